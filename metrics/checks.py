@@ -1,6 +1,6 @@
 """The errors of the measures, and the checks of single numbers and options that raise them.
 
-Curves are checked in `curves`, tables of curves in `scoring.curves_table`.
+Curves are checked in `curves`, tables of curves in `scoring.curves_file`.
 """
 
 import math

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from metrics.claims import CLAIMS, INTUITIONS
-from metrics.scoring.figure_panels import FIGURE_MEASURES
-from metrics.scoring.measures import MEASURE_CRITERIA
+from metrics.scoring.scores import MEASURE_CRITERIA
+from metrics.scoring.study_numbers import FIGURE_MEASURES
 from swarm_forage_env.studies.study import RULES_NAMES
 
 TABLES = {"verdicts": CLAIMS, "intuitions": INTUITIONS}

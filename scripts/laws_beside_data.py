@@ -21,8 +21,8 @@ import numpy as np
 
 from metrics import ForagingRates, Ladder, Summary, aggregate, fit_ladder
 from metrics.laws import LAW_WORDS, SYMBOLS
+from metrics.scoring.run_curves import study_lines
 from metrics.scoring.study_models import DRAWN_LAWS, ForagingRuns, foraging_runs
-from metrics.scoring.study_tables import study_lines
 from swarm_forage_env.rendering.figures import COLOURS, Panel, legend_below, saved_figure, shade, size_axis
 from swarm_forage_env.studies.study_table import read_study
 

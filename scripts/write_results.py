@@ -14,19 +14,19 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple, get_args
+from typing import Any
 
 from PIL import Image
 
-from metrics.claims import CLAIMS, INTUITIONS
+from metrics import verdict
+from metrics.claims import CLAIMS, INTUITIONS, Verdict
 from metrics.claims.outcomes import Answer
-from metrics.scoring import Judged, StudyFigure, StudyPanels, Waiting, draw_figure, study_figures
-from metrics.scoring.model_plots import draw_models
-from metrics.scoring.place_distributions import place_distributions
+from metrics.scoring import StudyFigure, StudyVerdict, draw_figure, study_figures
 from metrics.scoring.study_models import model_figures
+from metrics.scoring.study_numbers import place_distributions
+from metrics.scoring.study_plots import draw_models
 from metrics.scoring.study_report import command_of
-from metrics.scoring.study_verdict import scored_studies, verdict_of, waiting_lines
-from metrics.scoring.verdicts import VARIANTS
+from metrics.scoring.study_verdict import ANSWERS, VARIANTS, WAITS, claims_about, claims_of, waiting_lines
 from swarm_forage_env import read_study
 from swarm_forage_env._internal.wording import counted, number, percent
 from swarm_forage_env.runs.store import DONE
@@ -46,7 +46,6 @@ PICTURES = Path("images/results")
 PAGE, DETAILS = "results.md", "results_in_detail.md"
 COLOURS = 64
 """Of a picture; with more, its file is several times as large and looks the same."""
-ANSWERS = get_args(Answer)
 SIGNS: dict[Answer, str] = {"supported": "✓", "contradicted": "✗", "undecided": "?", "no scores": "-"}
 
 INTRODUCTION = f"""Each claim of the paper is held against these runs, under both [readings](readings.md) of its rules.
@@ -57,28 +56,10 @@ numbers of runs are in [{DETAILS}]({DETAILS}). `scripts/write_results` writes bo
 nothing in them is typed by hand."""
 
 
-class Results(NamedTuple):
-    """What the page is made of."""
-
-    tables: list[StudyTable]
-    scored: list[StudyPanels]
-    judged: Sequence[Judged]
-    waiting: Sequence[Waiting]
-    expected: Sequence[Judged]
-    expected_later: Sequence[Waiting]
-
-    @property
-    def rules(self) -> list[str]:
-        """Those that some study has."""
-        return list(dict.fromkeys(rules for table in self.tables for rules in table.spec.rules))
-
-
-def gathered(places: Sequence[Path]) -> Results:
+def gathered(places: Sequence[Path]) -> StudyVerdict:
     """Read, score and judge studies; the order is that of their names."""
     tables = sorted((read_study(place) for place in places), key=lambda table: table.spec.name)
-    scored = scored_studies(tables, tell=lambda words: print(words, file=sys.stderr))
-    found = verdict_of(tables, scored)
-    return Results(tables, scored, found.judged, found.waiting, found.expected, found.expected_later)
+    return verdict(*tables, tell=lambda words: print(words, file=sys.stderr))
 
 
 def rows(header: Sequence[str], lines: Sequence[Sequence[Any]], right: Sequence[int] = ()) -> str:
@@ -87,7 +68,7 @@ def rows(header: Sequence[str], lines: Sequence[Sequence[Any]], right: Sequence[
     return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in (header, under, *lines))
 
 
-def what_is_there(results: Results) -> str:
+def what_is_there(results: StudyVerdict) -> str:
     """Return how many runs of the sets the page is of, and which sets and conditions are not run yet, per budget."""
     return "\n\n".join(_of_budget(results, budget) for budget in dict.fromkeys(t.spec.budget for t in results.tables))
 
@@ -101,7 +82,7 @@ def plan_of(table: StudyTable) -> StudySpec:
     return plan if len(plan.seeds) >= len(spec.seeds) else replace(plan, seeds=spec.seeds)
 
 
-def _of_budget(results: Results, budget: str) -> str:
+def _of_budget(results: StudyVerdict, budget: str) -> str:
     tables = {table.spec.name: table for table in results.tables if table.spec.budget == budget}
     plans = {name: load_study(name, budget) for name in set_names() if budget in budget_names(name)}
     plans |= {name: plan_of(table) for name, table in tables.items()}
@@ -131,7 +112,7 @@ def _of_budget(results: Results, budget: str) -> str:
     return text + (" Sets of which runs are still to be made:\n" + "".join(in_part) if in_part else "")
 
 
-def what_ran(results: Results) -> str:
+def what_ran(results: StudyVerdict) -> str:
     """Return the part on runs and what they took."""
     lines: list[tuple[Any, ...]] = []
     for table in results.tables:
@@ -154,7 +135,7 @@ def what_ran(results: Results) -> str:
     )
 
 
-def what_the_rest_takes(results: Results) -> str:
+def what_the_rest_takes(results: StudyVerdict) -> str:
     """Return what whole sets take at the rate of these runs, in proportion to robots times ticks; "" if unknown."""
     timed = [table for table in results.tables if table.wall_time_s]
     done = sum(
@@ -174,18 +155,17 @@ def what_the_rest_takes(results: Results) -> str:
     return f" In proportion to robots times ticks, all {len(set_names())} sets take {words}, in core-hours."
 
 
-def answers(results: Results) -> str:
+def answers(results: StudyVerdict) -> str:
     """Return how many claims have which answer, and the answer to each, measures corrected."""
-    formulas = [one.verdict.answer for one in results.judged if not one.rules]
+    formulas = results.counts("", "corrected")
     counts: list[tuple[Any, ...]] = []
     for rules in results.rules:
-        mine = [one.verdict.answer for one in results.judged if (one.rules, one.variant) == (rules, "corrected")]
-        waiting = sum((one.rules, one.variant) == (rules, "corrected") for one in results.waiting)
-        counts.append((rules, *((mine + formulas).count(word) for word in ANSWERS), waiting))
-    found = {(one.claim.name, one.rules): one.verdict for one in results.judged if one.variant == "corrected"}
+        mine = results.counts(rules, "corrected")
+        counts.append((rules, *(mine[word] + formulas[word] for word in (*ANSWERS, WAITS))))
+    found = results.found
     lines: list[tuple[str, ...]] = []
     for name, claim in CLAIMS.items():
-        cells = [_answer(found.get((name, rules if claim.panels else ""))) for rules in results.rules]
+        cells = [_answer(found.get((name, rules if claim.panels else "", "corrected"))) for rules in results.rules]
         lines.append((f"[{name}]({DETAILS}#{name.lower()})", claim.text, *cells))
     return (
         "## The answers\n\n"
@@ -196,7 +176,7 @@ def answers(results: Results) -> str:
     )
 
 
-def _otherwise(results: Results) -> str:
+def _otherwise(results: StudyVerdict) -> str:
     """A sentence on the claims to which another form or sense gives another answer; empty if there are none."""
     given: dict[tuple[str, str], set[str]] = {}
     for one in results.judged:
@@ -211,30 +191,27 @@ def _otherwise(results: Results) -> str:
     )
 
 
-def _on_fewer_values(results: Results) -> str:
+def _on_fewer_values(results: StudyVerdict) -> str:
     """A sentence on the claims that are judged on fewer values than in the paper; empty if there are none."""
     names = {name for table in results.tables if left_out_words(table.spec) for name in claims_of(table.spec.name)}
     words = ", ".join(name for name in CLAIMS if name in names)
     return f" Judged [on fewer values than the paper's](#what-is-left-out): {words}." if words else ""
 
 
-def _answer(verdict: Any) -> str:
-    if verdict is None:
-        return "waits"
-    words = f"{SIGNS[verdict.answer]} {verdict.answer}"
-    return words if verdict.by_bands == verdict.answer else f"{words} ({verdict.by_bands})"
+def _answer(found: Verdict | None) -> str:
+    if found is None:
+        return WAITS
+    words = f"{SIGNS[found.answer]} {found.answer}"
+    return words if found.by_bands == found.answer else f"{words} ({found.by_bands})"
 
 
-def in_short(results: Results) -> str:
+def in_short(results: StudyVerdict) -> str:
     """Return how many claims have which answer, with each form of the measures and by each rule."""
     lines: list[tuple[Any, ...]] = []
     for rules in results.rules:
         for variant in VARIANTS:
-            mine = [one.verdict for one in results.judged if (one.rules, one.variant) == (rules, variant)]
-            counts = [sum(verdict.answer == word for verdict in mine) for word in ANSWERS]
-            by_bands = [sum(verdict.by_bands == word for verdict in mine) for word in ANSWERS]
-            waiting = sum((one.rules, one.variant) == (rules, variant) for one in results.waiting)
-            lines.append((rules, variant, *counts, *by_bands, waiting))
+            counts, by_bands = (results.counts(rules, variant, by_bands=each) for each in (False, True))
+            lines.append((rules, variant, *(counts[word] for word in ANSWERS), *by_bands.values()))
     header = ("rules", "measures", *ANSWERS, *(f"{word} by bands" for word in ANSWERS), "waiting")
     return (
         f"## How many\n\n{rows(header, lines, right=range(2, 3 + 2 * len(ANSWERS)))}\n\n"
@@ -242,7 +219,7 @@ def in_short(results: Results) -> str:
     )
 
 
-def every_verdict(results: Results) -> str:
+def every_verdict(results: StudyVerdict) -> str:
     """Return each claim with all its verdicts: rules, forms of the measures, both rules."""
     parts = [
         "## Claim by claim\n\nMeasures are as corrected, as printed in the paper, and as in the authors' program "
@@ -276,13 +253,9 @@ def every_verdict(results: Results) -> str:
     return "\n\n".join(parts)
 
 
-def what_hangs_on_what(results: Results) -> str:
+def what_hangs_on_what(results: StudyVerdict) -> str:
     """Return the claims whose answer depends on the rules, on the form, on what is meant or on the rule."""
-    found = {
-        (one.claim.name, one.rules, one.variant): one.verdict
-        for one in results.judged
-        if one.rules and one.verdict.answer != "no scores"
-    }
+    found = {key: verdict for key, verdict in results.found.items() if key[1] and verdict.answer != "no scores"}
     lines: list[tuple[str, ...]] = []
     for name in CLAIMS:
         here = {key[1:]: verdict.answer for key, verdict in found.items() if key[0] == name}
@@ -314,15 +287,15 @@ def what_hangs_on_what(results: Results) -> str:
     )
 
 
-def intuitions(results: Results) -> str:
+def intuitions(results: StudyVerdict) -> str:
     """Return what the paper expected, with the answers."""
-    found = {(one.claim.name, one.rules): one.verdict for one in results.expected}
+    found = results.found
     lines = [
         (
             f"[{name}]({DETAILS}#{name.lower()})",
             claim.figure.split(",")[0],
             claim.text,
-            *(_answer(found.get((name, r))) for r in results.rules),
+            *(_answer(found.get((name, rules, "corrected"))) for rules in results.rules),
         )
         for name, claim in INTUITIONS.items()
     ]
@@ -333,27 +306,24 @@ def intuitions(results: Results) -> str:
     )
 
 
-def pictured(results: Results) -> Iterator[tuple[StudyTable, list[StudyFigure]]]:
+def pictured(results: StudyVerdict) -> Iterator[tuple[StudyTable, list[StudyFigure]]]:
     """Yield each study with its figures that claims are about, measures corrected.
 
     They are those of the first rules that it has, and of another one where the answer to one of the claims differs.
     """
-    about = {panel for claim in CLAIMS.values() for panel in claim.panels}
-    answers = {(one.claim.name, one.rules): one.verdict.answer for one in results.judged if one.variant == "corrected"}
+    answers = {key: found.answer for key, found in results.found.items()}
     for table, panels in zip(results.tables, results.scored, strict=True):
         shown: list[StudyFigure] = []
         for figure in study_figures(panels):
             first = figure.panels[0]
-            here = {panel.name for panel in figure.panels}
-            names = [name for name, claim in CLAIMS.items() if not here.isdisjoint(claim.panels)]
-            base = table.spec.rules[0]
-            differs = any(answers.get((name, base)) != answers.get((name, first.rules)) for name in names)
-            if first.variant == "corrected" and here & about and (first.rules == base or differs):
+            names, both = claims_about(figure.panels), (table.spec.rules[0], first.rules)
+            differs = any(len({answers.get((name, rules, "corrected")) for rules in both}) > 1 for name in names)
+            if first.variant == "corrected" and names and (first.rules == both[0] or differs):
                 shown.append(figure)
         yield table, shown
 
 
-def figures(results: Results, folder: Path) -> str:
+def figures(results: StudyVerdict, folder: Path) -> str:
     """Draw the pictures and return the part that shows them."""
     (folder / PICTURES).mkdir(parents=True, exist_ok=True)
     for old in (folder / PICTURES).glob("*.png"):
@@ -363,16 +333,14 @@ def figures(results: Results, folder: Path) -> str:
         "Those that claims are about, measures corrected, and models beside runs ([laws.md](laws.md)). The second "
         "rules are shown where the answer to one of the claims differs. All others: `swarm-forage study plot`.",
     ]
-    found = {(one.claim.name, one.rules): one.verdict for one in results.judged if one.variant == "corrected"}
+    found = results.found
     for table, shown in pictured(results):
         parts += [f"### {table.spec.name}: {table.spec.title}"] if shown else []
         for figure in shown:
             parts.append(_pictured(figure.name, figure.title, folder, lambda path, it=figure: draw_figure(it, [path])))
-            here = {panel.name for panel in figure.panels}
             rules = figure.panels[0].rules
-            names = [name for name, claim in CLAIMS.items() if not here.isdisjoint(claim.panels)]
-            words = ", ".join(f"{name} {_answer(found.get((name, rules)))}" for name in names)
-            parts.append(f"Claims: {words}.")
+            told = [f"{name} {_answer(found.get((name, rules, 'corrected')))}" for name in claims_about(figure.panels)]
+            parts.append(f"Claims: {', '.join(told)}.")
         for model in model_figures(table):
             if model.rules == table.spec.rules[0]:
                 parts.append(_pictured(model.name, model.title, folder, lambda path, it=model: draw_models(it, [path])))
@@ -389,7 +357,7 @@ def _pictured(name: str, title: str, folder: Path, draw: Callable[[Path], None])
     return f"![{title}]({path.as_posix()})"
 
 
-def breakdowns(results: Results) -> str:
+def breakdowns(results: StudyVerdict) -> str:
     """Return in how many conditions of each set runs broke down, and where most often."""
     lines: list[tuple[Any, ...]] = []
     for table in results.tables:
@@ -417,7 +385,7 @@ def _value(value: Any) -> str:
     return number(float(value)) if isinstance(value, int | float) and not isinstance(value, bool) else str(value)
 
 
-def left_out(results: Results) -> str:
+def left_out(results: StudyVerdict) -> str:
     """Return which claims and measures are not there, and how all runs are made again."""
     lines = [f"- {line.strip()}" for line in waiting_lines((*results.waiting, *results.expected_later))[1:]]
     for table, panels in zip(results.tables, results.scored, strict=True):
@@ -431,7 +399,7 @@ def left_out(results: Results) -> str:
     )
 
 
-def fewer_values(results: Results) -> str:
+def fewer_values(results: StudyVerdict) -> str:
     """Return what these studies have less of than the paper's, and the claims judged without it; "" if nothing."""
     lines: list[tuple[str, ...]] = []
     for table in results.tables:
@@ -448,11 +416,6 @@ def fewer_values(results: Results) -> str:
         "claims judged without these values",
     )
     return f"Fewer runs and values than in the paper:\n\n{rows(header, lines)}\n\n" if lines else ""
-
-
-def claims_of(name: str) -> list[str]:
-    """Return the claims that a set has a figure of."""
-    return [claim.name for claim in CLAIMS.values() if any(panel[0].split()[0] == name for panel in claim.panels)]
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -19,12 +19,10 @@ from swarm_forage_env.runs.table import Table
 from swarm_forage_env.scenarios.performance import performance_of
 
 from ..controllers import PAPER_POLICIES
-from ..scoring.columns import INTERVAL_COLUMNS
+from ..scoring.policy_scores import score_study
 from ..scoring.question import Question, ask
-from ..scoring.runs import run_curves, study_curves
-from ..scoring.studies import StudyCurves
-from ..scoring.study_scores import score_study
-from ..scoring.table import Score
+from ..scoring.run_curves import INTERVAL_COLUMNS, StudyCurves, joined_curves, run_curves
+from ..scoring.scores import Score
 from .entry import Entry, EntryMeasure, EntryPolicy, Training, rounded, six_digits
 from .protocol import BenchmarkError, Group, Protocol, load_protocol
 
@@ -236,7 +234,7 @@ def _study(group: Group, table: Table, policy: str) -> StudyCurves:
     """The runs of a group as measures take them."""
     conditions = {condition.world.name: condition for condition in table.plan.of_policy(policy)}
     world = group.roles[0][1]
-    return study_curves(
+    return joined_curves(
         [
             run_curves(role, table.curves(conditions[name], *INTERVAL_COLUMNS), len(table.plan.seeds))
             for name, role in group.roles

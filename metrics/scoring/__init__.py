@@ -4,11 +4,8 @@ from swarm_forage_env.scenarios.performance import Performance
 
 from .ablation import Ablation, AblationQuestion, ablate_quirks, ablation_question
 from .choosing import Choice, ChoiceQuestion, choice_question, choose_policy
-from .comparison import Comparison, compare_tables
-from .figure_panels import StudyPanel, StudyPanels, study_panels
-from .front_door import ScoreQuestion, compare_policies, score_curves, score_policy, score_question
-from .measures import ScoreForms
-from .plots import draw_scores
+from .plots import draw_predictions, draw_scores
+from .policy_scores import ScoreQuestion, compare_policies, score_curves, score_policy, score_question
 from .prediction import (
     PredictionQuestion,
     Predictions,
@@ -17,17 +14,16 @@ from .prediction import (
     predict_policy,
     prediction_question,
 )
-from .prediction_plots import draw_predictions
 from .question import Question, ask
+from .run_curves import StudyLine, study_lines
+from .score_tables import Comparison, ScoreTable, compare_tables
+from .scores import Score, ScoreForms
 from .study_diff import StudyDiff, diff
-from .study_pictures import PlottedStudy, plot
-from .study_plots import StudyFigure, draw_figure, draw_map, study_figures
+from .study_numbers import StudyPanel, StudyPanels, study_panels
+from .study_plots import PlottedStudy, StudyFigure, draw_figure, draw_map, plot, study_figures
 from .study_report import StudyReport, report
-from .study_tables import StudyLine, study_lines
-from .study_verdict import StudyVerdict, verdict
+from .study_verdict import Judged, StudyVerdict, Waiting, judge_claims, verdict
 from .summary import RunQuestion, RunSummary, run_question, summarize_runs
-from .table import Score, ScoreTable
-from .verdicts import Judged, Waiting, judge_claims
 
 __all__ = [
     "score_policy",

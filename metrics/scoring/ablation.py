@@ -30,8 +30,8 @@ from swarm_forage_env.wrappers.world import WorldLike, world_of
 
 from ..significance import holm, pooled_p
 from ..statistics import aggregate
-from .intervals import bounds
 from .question import Question, ask
+from .scores import bounds
 from .summary import performance_number, span
 
 if TYPE_CHECKING:

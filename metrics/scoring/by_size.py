@@ -4,15 +4,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 
+from swarm_forage_env.wrappers.world import SIZE
+
 from ..curves import FloatArray, Form, Variant
 from ..emergence import interference_gain, spatial_emergence, task_emergence, time_emergence, undisturbed_gain
 from ..interference import performance_lost
 from ..scaling import efficiency, raw_performance, scalability
-from .columns import SIZE
-from .measures import MEASURE_VARIANTS
-from .scored_experiments import ScoredExperiments, Uncomputable, Values
-from .studies import RunCurves, StudyCurves, common_runs
-from .table import Score
+from .run_curves import RunCurves, StudyCurves, common_runs
+from .scores import MEASURE_VARIANTS, Score, Uncomputable, Values, score_runs
 
 FALLING = (
     "performance is lower than that of the next smaller swarm, and it weights the time lost, so that a collapse counts "
@@ -76,16 +75,8 @@ def _task_emergence(few: RunCurves, many: RunCurves, *, variant: Variant) -> Flo
     return task_emergence(few.performance, few.n_robots, many.performance, many.n_robots, reduce=reduce)
 
 
-def _interference_gain(few: RunCurves, many: RunCurves) -> FloatArray:
-    return interference_gain(
-        few.performance, few.interference, few.n_robots, many.performance, many.interference, many.n_robots
-    )
-
-
-def _undisturbed_gain(few: RunCurves, many: RunCurves) -> FloatArray:
-    return undisturbed_gain(
-        few.performance, few.interference, few.n_robots, many.performance, many.interference, many.n_robots
-    )
+def _gain(few: RunCurves, many: RunCurves, *, formula: Callable[..., FloatArray]) -> FloatArray:
+    return formula(few.performance, few.interference, few.n_robots, many.performance, many.interference, many.n_robots)
 
 
 def _scalability(few: RunCurves, many: RunCurves, *, variant: Variant) -> FloatArray:
@@ -115,7 +106,7 @@ class _SizeMeasure:
     weighted_in: tuple[Variant, ...] = ()
     """Variants that weight the time lost with the performance achieved, which misleads where performance falls."""
     order_matters: bool = False
-    """As in `ScoredExperiments.score`."""
+    """As in `score_runs`."""
 
 
 _SIZE_MEASURES: dict[str, _SizeMeasure] = {
@@ -146,7 +137,7 @@ _SIZE_MEASURES: dict[str, _SizeMeasure] = {
         values=_task_emergence, unit="objects {span}", of_two_sizes=True, is_gain=True, is_part=True
     ),
     "interference_gain": _SizeMeasure(
-        values=_interference_gain,
+        values=partial(_gain, formula=interference_gain),
         unit="objects {span}",
         of_two_sizes=True,
         needs_interference=True,
@@ -154,7 +145,7 @@ _SIZE_MEASURES: dict[str, _SizeMeasure] = {
         is_part=True,
     ),
     "undisturbed_gain": _SizeMeasure(
-        values=_undisturbed_gain,
+        values=partial(_gain, formula=undisturbed_gain),
         unit="objects {span}",
         of_two_sizes=True,
         needs_interference=True,
@@ -182,18 +173,20 @@ def _size_scores(name: str, study: StudyCurves, variant: Variant, form: Form) ->
         if measure.from_one and not _without_one(measure, one, variant, form):
             experiments = (one, *experiments)
         falls = variant in measure.weighted_in and previous is not None and _falls(previous, larger)
-        score = ScoredExperiments(
+        score = score_runs(
+            values,
+            experiments,
             measure=name,
             variant=variant,
             form=form,
             at=at,
             x=larger.n_robots,
             unit=_unit(name, study, variant),
-            experiments=experiments,
             compared_with=len(experiments) - 1 if measure.is_gain and variant != "sierra" else None,
             is_doubtful=falls,
             remark=FALLING if falls else UPSIDE_DOWN if name == "scalability" and variant != "corrected" else "",
-        ).score(values, order_matters=measure.order_matters)
+            order_matters=measure.order_matters,
+        )
         yield _per_robot(score, *experiments) if measure.is_part and variant == "corrected" else score
 
 

@@ -23,10 +23,9 @@ from swarm_forage_env.wrappers.world import World, WorldLike, world_of
 from ..checks import CurveError
 from ..significance import paired_p
 from ..statistics import Summary, aggregate
-from .columns import NOISE, POPULATION
-from .intervals import bounds, interval
-from .question import Question, ask, failure_lines
-from .run_totals import plan_totals, run_totals, unit_text
+from .question import Question, ask, failure_lines, plan_totals, run_totals, unit_text
+from .run_curves import NOISE, POPULATION
+from .scores import bounds, interval
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

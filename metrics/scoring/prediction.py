@@ -17,19 +17,17 @@ from swarm_forage_env.scenarios.performance import performance_of
 from swarm_forage_env.scenarios.presets import SEARCH_AND_RESCUE_OBJECTS, search_and_rescue
 from swarm_forage_env.scenarios.presets import scenario as preset
 from swarm_forage_env.studies.ladders import SIZE_SWEEP_OBJECTS, size_ladder
-from swarm_forage_env.wrappers.world import World, WorldLike, world_of
+from swarm_forage_env.wrappers.world import SIZE, World, WorldLike, world_of
 
 from ..checks import CurveError
 from ..laws import LAWS, MIN_SIZES, SizeLaw
 from ..prediction import SizePrediction, predict_performance
 from ..statistics import Summary, aggregate
-from .columns import SIZE
 from .curves_file import read_curves
-from .intervals import bounds
-from .performance import PerformanceLike
-from .prediction_plots import draw_predictions
-from .question import Question, ask, failure_lines
-from .run_totals import plan_totals, run_totals, unit_text
+from .plots import draw_predictions
+from .question import Question, ask, failure_lines, plan_totals, run_totals, unit_text
+from .run_curves import PerformanceLike
+from .scores import bounds
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from swarm_forage_env._internal.wording import number
+from swarm_forage_env.wrappers.world import SIZE
 
 from ..checks import CurveError
 from ..curves import FloatArray
@@ -18,9 +19,7 @@ from ..foraging_model import ForagingRates, estimate_rates, mean_field
 from ..ladder import Ladder, fit_ladder
 from ..queues import PopulationComparison, compare_population
 from ..statistics import aggregate
-from .columns import SIZE
-from .studies import RunCurves
-from .study_tables import StudyLine, study_lines
+from .run_curves import RunCurves, StudyLine, study_lines
 
 if TYPE_CHECKING:
     import polars as pl

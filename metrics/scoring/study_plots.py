@@ -1,7 +1,7 @@
-"""Figures of a study: a measure over what is varied, every run a dot. They need matplotlib (the extra "plots")."""
+"""Figures of a study, drawn and as files: measures with every run a dot, and models. They need the extra "plots"."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
@@ -11,7 +11,10 @@ from numpy.typing import NDArray
 
 from swarm_forage_env._internal.fields import known_name
 from swarm_forage_env._internal.wording import number
+from swarm_forage_env.inspect.snapshot import snapshot
 from swarm_forage_env.rendering.figures import (
+    COLOURS,
+    FORMATS,
     SCREEN,
     FigureStyle,
     Look,
@@ -23,24 +26,30 @@ from swarm_forage_env.rendering.figures import (
     shade,
     size_axis,
 )
+from swarm_forage_env.studies.study import StudySpec
+from swarm_forage_env.wrappers.world import SIZE
 
 from ..catalog import METRICS
+from ..checks import CurveError
 from ..claims import PanelName
-from ..curves import FloatArray
+from ..curves import FloatArray, Variant
 from ..statistics import Summary, aggregate
-from .columns import SIZE
-from .figure_panels import StudyPanel, StudyPanels
-from .measures import label_of
 from .plots import FEWEST_RUNS, X_LABELS
+from .scores import label_of
+from .study_models import ModelFigure, ModelPanel, model_figures
+from .study_numbers import StudyPanel, StudyPanels, place_distributions, policy_pairs, study_panels
+from .theory import theory_of
 
 if TYPE_CHECKING:
     import polars as pl
+
+    from swarm_forage_env.studies.study_table import StudyTable
 
 Band: TypeAlias = Literal["ci", "sd"]
 """What is shaded: the 95 % confidence interval of the mean, or the mean plus and minus two standard deviations."""
 
 _BANDS: dict[Band, str] = {"ci": "95 % interval of the mean", "sd": "mean ± 2 standard deviations of runs"}
-_NOTHING = Summary(mean=math.nan, std=math.nan, lower=math.nan, upper=math.nan, n_used=0, n_nan=0)
+_NOTHING = Summary.without_interval()
 _APART = 0.012
 """Distance between the dots of different policies at one level, as a share of the axis."""
 MANY_DOTS = 500
@@ -245,3 +254,156 @@ def _alone(known: NDArray[np.bool_]) -> NDArray[np.bool_]:
 def _summaries(scores: FloatArray) -> list[Summary]:
     """Return the mean of the runs at each level, with its interval; runs without a finite score are left out."""
     return [aggregate(known) if known.size else _NOTHING for known in (runs[np.isfinite(runs)] for runs in scores)]
+
+
+RUNS_COLOUR = "black"
+"""What was seen; the colours are for models."""
+
+
+def draw_models(figure: ModelFigure, paths: Sequence[Path], *, style: FigureStyle = SCREEN) -> None:
+    """Draw what was seen, solid with its 95 % interval, and what models say, dashed.
+
+    Args:
+        figure: From `model_figures`.
+        paths: Files to write; as in `saved_figure`, whose errors this has.
+        style: Of the figure.
+    """
+    title = f"{figure.title}\nshaded: 95 % interval of the mean; dashed: models"
+    with saved_panels(paths, len(figure.panels), (3.6, 3.0), title=title, style=style) as places:
+        for place, panel in zip(places, figure.panels, strict=True):
+            _draw_model(place, panel, figure)
+
+
+def _draw_model(place: Panel, panel: ModelPanel, figure: ModelFigure) -> None:
+    for curve, colour in zip(panel.expected, COLOURS, strict=False):
+        place.plot(curve.x, curve.y, "--", color=colour, label=curve.name, zorder=3)
+    for curve in panel.seen:
+        marker = "o" if figure.is_log else ""
+        place.plot(curve.x, curve.y, color=RUNS_COLOUR, linewidth=1.1, label=curve.name, zorder=4, marker=marker)
+        if curve.lower is not None and curve.upper is not None:
+            shade(place, curve.x, curve.lower, curve.upper, RUNS_COLOUR)
+    place.set_title(policy_words(panel.words))
+    if figure.is_log:
+        size_axis(place, panel.seen[0].x)
+    # Neither a law far off nor the interval of two runs may flatten what was seen.
+    place.set_ylim(0.0, 1.3 * float(max(curve.y.max() for curve in (*panel.seen, *panel.expected[:1]))))
+    place.set_xlabel(figure.x_label)
+    place.set_ylabel(figure.y_label)
+
+
+Draw: TypeAlias = Callable[[Sequence[Path], FigureStyle], None]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlottedStudy:
+    """Files of `plot`."""
+
+    files: tuple[Path, ...]
+    missing: tuple[str, ...]
+    """Measures without a figure, and why."""
+
+
+def plot(
+    table: "StudyTable",
+    folder: str | Path,
+    *,
+    band: Band = "ci",
+    variants: Sequence[Variant] = ("corrected",),
+    formats: Sequence[str] = ("svg", "png"),
+    style: FigureStyle = SCREEN,
+) -> PlottedStudy:
+    """Draw the figures of a study, with tables in CSV: each measure over what is varied, and models.
+
+    Args:
+        table: From `swarm_forage_env.read_study`.
+        folder: Where the files go.
+        band: "ci", the 95 % interval of the mean; "sd", mean ± 2 standard deviations of runs.
+        variants: Variants of the measures.
+        formats: Of the pictures: "svg", "png", "pdf".
+        style: Of the figures.
+
+    Raises:
+        ValueError: the study gives nothing to draw, or an unknown band, format or variant.
+        ImportError: matplotlib or Pillow is not installed.
+    """
+    checked_band(band)
+    for name in formats:
+        known_name("format", name, [known[1:] for known in FORMATS])
+    scored = study_panels(table, variants)
+    figures = figures_of(scored, table.spec.name)
+    drawing = _Drawing(Path(folder), tuple(f".{name}" for name in formats), style)
+    files = [file for figure in figures for file in drawing.measure(figure, band)]
+    for model in model_figures(table):
+        tables = {f"{model.name}.csv": model.to_frame(), f"{model.name}_facts.csv": model.facts()}
+        files += drawing.files(model.name, lambda paths, style, it=model: draw_models(it, paths, style=style), tables)
+    for sketch in theory_of(table.spec):
+        files += drawing.files(sketch.name, sketch.draw, {f"{sketch.name}.csv": sketch.numbers})
+    files.append(snapshot_written(table.spec, drawing.folder / f"{table.spec.name}_snapshot.png"))
+    files.append(drawing.table(f"{table.spec.name}_conditions.csv", place_distributions(table)))
+    missing = tuple(f"no figure of {measure}, {variant}: {why}" for (measure, variant), why in scored.missing.items())
+    return PlottedStudy(files=tuple(files), missing=missing)
+
+
+def figures_of(scored: StudyPanels, name: str) -> tuple[StudyFigure, ...]:
+    """Return the figures of a study.
+
+    Raises:
+        CurveError: it has none.
+    """
+    figures = study_figures(scored)
+    if not figures:
+        reasons = "; ".join(dict.fromkeys(scored.missing.values()))
+        raise CurveError(
+            f"Expected a study with finished runs and numbers on its last axis, got {name}, which gives nothing to "
+            f"draw{f': {reasons}' if reasons else ''}."
+        )
+    return figures
+
+
+@dataclass(frozen=True, slots=True)
+class _Drawing:
+    """Where figures go, in which formats and in which style."""
+
+    folder: Path
+    endings: tuple[str, ...]
+    style: FigureStyle
+
+    def files(self, name: str, draw: Draw, tables: "Mapping[str, pl.DataFrame]") -> list[Path]:
+        """Draw a figure, and write the tables behind it beside it, by the names of their files; returns all files."""
+        pictures = [self.folder / f"{name}{ending}" for ending in self.endings]
+        draw(pictures, self.style)
+        return [*pictures, *(self.table(file, frame) for file, frame in tables.items())]
+
+    def table(self, name: str, frame: "pl.DataFrame") -> Path:
+        """Write a table; returns its file."""
+        frame.write_csv(self.folder / name)
+        return self.folder / name
+
+    def measure(self, figure: StudyFigure, band: Band) -> Iterator[Path]:
+        """Draw a figure and its heat maps, with its numbers and its pairs of policies; yields all files."""
+        for name, draw in drawn_by(figure, band).items():
+            yield from self.files(name, draw, {f"{name}.csv": figure.to_frame()})
+        pairs = policy_pairs(figure.panels)
+        if len(pairs):
+            yield self.table(f"{figure.name}_pairs.csv", pairs)
+
+
+def drawn_by(figure: StudyFigure, band: Band) -> dict[str, Draw]:
+    """Return name -> what draws it, of the curves of a figure and of its heat maps, if it has them."""
+    draws: dict[str, Draw] = {figure.name: lambda paths, style: draw_figure(figure, paths, band=band, style=style)}
+    if figure.has_map:
+        draws[f"{figure.name}_map"] = lambda paths, style: draw_map(figure, paths, style=style)
+    return draws
+
+
+def snapshot_written(spec: StudySpec, file: Path) -> Path:
+    """Draw the arena of a study, as it is when a run begins, into a picture file; returns the file.
+
+    Raises:
+        ImportError: Pillow is not installed.
+    """
+    picture = snapshot(spec)
+    from PIL import Image  # after the frame, which says what to install without it
+
+    Image.fromarray(picture).save(file, optimize=True)
+    return file

@@ -7,11 +7,10 @@ pictures.
 import math
 import shlex
 import tempfile
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any
 
 from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env._internal.files import replacing
@@ -30,25 +29,27 @@ from swarm_forage_env.studies.study import StudySpec
 from swarm_forage_env.studies.study_file import is_set_of_paper
 
 from ..claims import CLAIMS, INTUITIONS, Claim, Verdict
-from ..claims.outcomes import Answer as ClaimAnswer
-from .figure_panels import StudyPanels
-from .model_plots import draw_models
-from .place_distributions import place_distributions
-from .policy_pairs import policy_pairs
 from .study_models import ModelFigure, model_figures
-from .study_pictures import Draw, drawn_by, snapshot_written
-from .study_plots import Band, StudyFigure, checked_band, study_figures
-from .study_verdict import StudyVerdict, scored_studies, verdict_of
+from .study_numbers import StudyPanels, place_distributions, policy_pairs
+from .study_plots import Band, Draw, StudyFigure, checked_band, draw_models, drawn_by, snapshot_written, study_figures
+from .study_verdict import (
+    ANSWERS,
+    WAITS,
+    Judged,
+    StudyVerdict,
+    Waiting,
+    claims_about,
+    scored_studies,
+    verdict_of,
+    why_no_claims,
+)
 from .theory import theory_figures, theory_of
-from .verdicts import Judged, Waiting, why_no_claims
 
 if TYPE_CHECKING:
     import polars as pl
 
     from swarm_forage_env.studies.study_table import StudyTable
 
-WAITS = "waits"
-"""What stands in place of an answer for which runs are missing."""
 FORMS = {
     "paper": "The same, measured as printed in the paper",
     "sierra": "The same, measured as in the authors' program",
@@ -180,34 +181,24 @@ def page_of(
     Raises:
         ImportError: matplotlib is not installed.
     """
-    judged, waiting, expected, expected_later = found.judged, found.waiting, found.expected, found.expected_later
-    columns = list(dict.fromkeys((one.rules, one.variant) for one in (*judged, *waiting) if one.rules))
+    of_claims, of_intuitions = (
+        list(dict.fromkeys((one.rules, one.variant) for one in some if one.rules))
+        for some in ((*found.judged, *found.waiting), (*found.expected, *found.expected_later))
+    )
     names = version_names(tables)
-    answers = get_args(ClaimAnswer)
-    counts = Counter((one.rules, one.variant, one.verdict.answer) for one in judged)
-    waits = Counter((one.rules, one.variant, WAITS) for one in waiting)
     return {
         "title": f"Swarm foraging: {', '.join(table.spec.name for table in tables)}",
-        "answers": (*answers, WAITS),
-        "columns": [{"rules": rules, "variant": variant} for rules, variant in columns],
+        "answers": (*ANSWERS, WAITS),
+        "columns": [{"rules": rules, "variant": variant} for rules, variant in of_claims],
         "counts": [
-            {
-                "rules": rules,
-                "variant": variant,
-                "counts": [(counts + waits)[rules, variant, word] for word in (*answers, WAITS)],
-            }
-            for rules, variant in columns
+            {"rules": rules, "variant": variant, "counts": list(found.counts(rules, variant).values())}
+            for rules, variant in of_claims
         ],
-        "claims": _claim_rows(CLAIMS, columns, judged, waiting),
-        "rules": list(dict.fromkeys(one.rules for one in (*expected, *expected_later))),
-        "intuitions": _claim_rows(
-            INTUITIONS,
-            list(dict.fromkeys((one.rules, one.variant) for one in (*expected, *expected_later))),
-            expected,
-            expected_later,
-        ),
+        "claims": _claim_rows(CLAIMS, of_claims, found),
+        "rules": list(dict.fromkeys(rules for rules, _ in of_intuitions)),
+        "intuitions": _claim_rows(INTUITIONS, of_intuitions, found),
         "studies": [_study(table, panels, found, band, tell) for table, panels in zip(tables, scored, strict=True)],
-        "theory": _theory(tables, judged),
+        "theory": _theory(tables, found.judged),
         "cost": [_cost(table) for table in tables],
         "version_names": names,
         "versions": [
@@ -218,16 +209,12 @@ def page_of(
 
 
 def _claim_rows(
-    claims: Mapping[str, Claim],
-    columns: Sequence[tuple[str, str]],
-    judged: Sequence[Judged],
-    waiting: Sequence[Waiting],
+    claims: Mapping[str, Claim], columns: Sequence[tuple[str, str]], judged: StudyVerdict
 ) -> list[dict[str, Any]]:
     """Return one row per claim, with a cell per column, and what stands behind its answers."""
     if not columns:
         return []
-    found = {(one.claim.name, one.rules, one.variant): one.verdict for one in judged}
-    waits = {(one.claim.name, one.rules, one.variant): one for one in waiting}
+    found, waits = judged.found, judged.later
     rows: list[dict[str, Any]] = []
     for name, claim in claims.items():
         cells: list[dict[str, Any]] = []
@@ -387,11 +374,11 @@ def _picture(words: str, draw: Draw) -> dict[str, str]:
 
 def _claims_about(figure: StudyFigure, judged: Sequence[Judged | Waiting]) -> list[dict[str, Any]]:
     """Return the claims that use a panel of the figure, with what was found under its rules."""
-    here = {panel.name for panel in figure.panels}
+    here = claims_about(figure.panels)
     rules = figure.panels[0].rules
     found: dict[str, dict[str, Any]] = {}
     for one in judged:
-        if one.rules != rules or here.isdisjoint(one.claim.panels):
+        if one.rules != rules or one.claim.name not in here:
             continue
         entry = found.setdefault(one.claim.name, {"name": one.claim.name, "text": one.claim.text, "found": []})
         if isinstance(one, Waiting):

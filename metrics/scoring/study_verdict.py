@@ -1,21 +1,186 @@
-"""What runs of the paper's sets say of its claims and of its intuitions: `verdict`, as tables."""
+"""What runs of the paper's sets say of its claims and of its intuitions, under all rules and in all variants."""
 
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from itertools import product
+from typing import TYPE_CHECKING, Any, get_args
 
-from swarm_forage_env._internal.wording import number, percent
+from swarm_forage_env._internal.wording import number, percent, plain
 from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.studies.study_file import is_set_of_paper
 
 from ..checks import CurveError
-from ..claims import INTUITIONS
+from ..claims import CLAIMS, INTUITIONS, Claim, PanelName, Verdict, check_claim
+from ..claims.outcomes import Answer as ClaimAnswer
+from ..claims.statements import POLICIES
 from ..curves import Variant
-from .figure_panels import StudyPanels, study_panels
-from .verdicts import VARIANTS, Judged, Waiting, judge_claims, why_no_claims
+from .scores import MEASURE_VARIANTS, label_of
+from .study_numbers import StudyPanel, StudyPanels, study_panels
 
 if TYPE_CHECKING:
     from swarm_forage_env.studies.study_table import StudyTable
+
+VARIANTS: tuple[Variant, ...] = ("corrected", "paper", "sierra")
+ANSWERS: tuple[ClaimAnswer, ...] = get_args(ClaimAnswer)
+WAITS = "waits"
+"""What stands in place of an answer for which runs are missing."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judged:
+    """What studies say of one claim under one of the rules and in one variant."""
+
+    claim: Claim
+    rules: str
+    """Empty for a claim about formulas, which needs no runs."""
+    variant: Variant
+    verdict: Verdict
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return it as plain values; numbers that JSON does not have are None."""
+        return {
+            "claim": self.claim.name,
+            "text": self.claim.text,
+            "figure": self.claim.figure,
+            "rules": self.rules,
+            "variant": self.variant,
+            **_plain(self.verdict),
+            "otherwise": {words: _plain(verdict) for words, verdict in self.verdict.otherwise.items()},
+        }
+
+
+def _plain(verdict: Verdict) -> dict[str, Any]:
+    return {
+        "answer": verdict.answer,
+        "by_bands": verdict.by_bands,
+        "statistic": plain(verdict.statistic),
+        "effect": plain(verdict.effect),
+        "n_runs": verdict.n_runs,
+        "why": verdict.why,
+    }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Waiting:
+    """A claim that cannot be answered yet, under one of the rules and in one variant."""
+
+    claim: Claim
+    rules: str
+    variant: Variant
+    lacks: tuple[PanelName, ...]
+    """Panels without scores."""
+    reasons: tuple[str, ...]
+    """Why they have none, where their study is there."""
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return it as plain values."""
+        return {
+            "claim": self.claim.name,
+            "text": self.claim.text,
+            "rules": self.rules,
+            "variant": self.variant,
+            "lacks": [list(name) for name in self.lacks],
+            "reasons": list(self.reasons),
+        }
+
+
+def why_no_claims(table: "StudyTable") -> str:
+    """Return why the claims cannot be held against a study; empty if they can."""
+    name = table.spec.name
+    if not claims_of(name):
+        sets = {name.split()[0] for claim in CLAIMS.values() for name, *_ in claim.panels}
+        return (
+            f"Expected studies of the paper's sets, {', '.join(sorted(sets))}, which its claims are about; got study "
+            f"{name!r}."
+        )
+    absent = [label for label in POLICIES if label not in {policy.label for policy in table.spec.policies}]
+    if absent:
+        return (
+            f"Expected the policies {', '.join(POLICIES)} in study {name}, which the claims of the paper are about; "
+            f"it has no {', '.join(absent)}."
+        )
+    return ""
+
+
+def judge_claims(
+    tables: "Sequence[StudyTable]",
+    scored: Sequence[StudyPanels],
+    variants: Sequence[Variant] = VARIANTS,
+    claims: Mapping[str, Claim] = CLAIMS,
+) -> tuple[tuple[Judged, ...], tuple[Waiting, ...]]:
+    """Hold claims against studies; a claim is left out in a variant that none of its measures has.
+
+    Args:
+        tables: Studies, each once.
+        scored: The panels of each in the same order, in these variants and the corrected one.
+        variants: Which.
+        claims: By name; those of the paper's text, or its `INTUITIONS`.
+
+    Returns:
+        The answered claims, by rules, variant and claim, formulas first; and those that wait for runs.
+
+    Raises:
+        CurveError: a study twice, one without the policies of the paper, or none of its sets.
+    """
+    names = [table.spec.name for table in tables]
+    if len(set(names)) < len(names):
+        raise CurveError(f"Expected each study once, got {', '.join(names)}.")
+    for reason in filter(None, map(why_no_claims, tables)):
+        raise CurveError(reason)
+    found = _Found(
+        panels={(panel.rules, panel.variant, panel.name): panel for one in scored for panel in one.panels},
+        reasons={
+            (name, *key): why for name, one in zip(names, scored, strict=True) for key, why in one.missing.items()
+        },
+    )
+    judged = [
+        Judged(claim=claim, rules="", variant="corrected", verdict=check_claim(claim, {}))
+        for claim in claims.values()
+        if not claim.panels
+    ]
+    waiting: list[Waiting] = []
+    every = dict.fromkeys(rules for table in tables for rules in table.spec.rules)
+    for rules, variant, claim in product(every, variants, claims.values()):
+        if claim.panels and any(_variant_of(name.measure, variant) == variant for name in claim.panels):
+            outcome = _judge(claim, rules, variant, found)
+            if isinstance(outcome, Judged):
+                judged.append(outcome)
+            else:
+                waiting.append(outcome)
+    return tuple(judged), tuple(waiting)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Found:
+    """What studies have."""
+
+    panels: Mapping[tuple[str, Variant, PanelName], StudyPanel]
+    """By rules, variant and name."""
+    reasons: Mapping[tuple[str, str, str], str]
+    """Study, measure in a form of it, and variant -> why there are no scores."""
+
+
+def _variant_of(measure: str, variant: Variant) -> Variant:
+    """Return the variant of a measure that is used: this one if it has it, else the corrected one."""
+    return variant if variant in MEASURE_VARIANTS.get(measure, ()) else "corrected"
+
+
+def _judge(claim: Claim, rules: str, variant: Variant, found: _Found) -> Judged | Waiting:
+    places: dict[PanelName, tuple[str, Variant, PanelName]] = {
+        name: (rules, _variant_of(name.measure, variant), name) for name in (*claim.panels, *claim.other_panels)
+    }
+    lacks = tuple(name for name in claim.panels if places[name] not in found.panels)
+    if not lacks:
+        panels = {name: found.panels[place].for_claims() for name, place in places.items() if place in found.panels}
+        return Judged(claim=claim, rules=rules, variant=variant, verdict=check_claim(claim, panels))
+    keys = [
+        (name.experiment.split()[0], label_of(name.measure, "corrected", name.form), _variant_of(name.measure, variant))
+        for name in lacks
+    ]
+    reasons = tuple(dict.fromkeys(found.reasons[key] for key in keys if key in found.reasons))
+    return Waiting(claim=claim, rules=rules, variant=variant, lacks=lacks, reasons=reasons)
+
 
 HEADER = ("claim", "text", "by intervals", "by bands", "statistic", "effect", "runs", "why")
 
@@ -25,11 +190,38 @@ class StudyVerdict(Answer):
     """Claims and intuitions that studies answer, and those that wait for runs."""
 
     tables: "tuple[StudyTable, ...]"
+    scored: tuple[StudyPanels, ...] = ()
+    """The panels of each, in all variants."""
     judged: tuple[Judged, ...] = ()
     waiting: tuple[Waiting, ...] = ()
     expected: tuple[Judged, ...] = ()
     """Intuitions, by corrected measures only."""
     expected_later: tuple[Waiting, ...] = ()
+
+    @property
+    def rules(self) -> tuple[str, ...]:
+        """Those that some study has."""
+        return tuple(dict.fromkeys(rules for table in self.tables for rules in table.spec.rules))
+
+    @property
+    def found(self) -> dict[tuple[str, str, str], Verdict]:
+        """Name of a claim or intuition, rules and variant -> what runs say of it; without rules what formulas say."""
+        return {(one.claim.name, one.rules, one.variant): one.verdict for one in (*self.judged, *self.expected)}
+
+    @property
+    def later(self) -> dict[tuple[str, str, str], Waiting]:
+        """The same of those that wait for runs."""
+        return {(one.claim.name, one.rules, one.variant): one for one in (*self.waiting, *self.expected_later)}
+
+    def counts(self, rules: str, variant: str, *, by_bands: bool = False) -> dict[str, int]:
+        """Return answer -> how many claims have it by these rules; and how many wait for runs, as `WAITS`.
+
+        Claims about formulas are counted by the rules "".
+        """
+        mine = [one.verdict for one in self.judged if (one.rules, one.variant) == (rules, variant)]
+        answers = Counter(verdict.by_bands if by_bands else verdict.answer for verdict in mine)
+        waiting = sum((one.rules, one.variant) == (rules, variant) for one in self.waiting)
+        return {**{word: answers[word] for word in ANSWERS}, WAITS: waiting}
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -91,7 +283,12 @@ def verdict_of(tables: "Sequence[StudyTable]", scored: Sequence[StudyPanels]) ->
     judged, waiting = judge_claims(tables, scored)
     expected, expected_later = judge_claims(tables, scored, ("corrected",), INTUITIONS)
     return StudyVerdict(
-        tables=tuple(tables), judged=judged, waiting=waiting, expected=expected, expected_later=expected_later
+        tables=tuple(tables),
+        scored=tuple(scored),
+        judged=judged,
+        waiting=waiting,
+        expected=expected,
+        expected_later=expected_later,
     )
 
 
@@ -108,6 +305,17 @@ def scored_studies(
             tell(f"scoring {table.spec.name}")
         scored.append(study_panels(table, variants))
     return scored
+
+
+def claims_about(panels: Sequence[StudyPanel]) -> list[str]:
+    """Return the claims of the paper that use one of these panels."""
+    here = {panel.name for panel in panels}
+    return [name for name, claim in CLAIMS.items() if not here.isdisjoint(claim.panels)]
+
+
+def claims_of(name: str) -> list[str]:
+    """Return the claims that a set has a figure of."""
+    return [claim.name for claim in CLAIMS.values() if any(panel[0].split()[0] == name for panel in claim.panels)]
 
 
 def waiting_lines(waiting: Sequence[Waiting]) -> list[str]:

@@ -30,9 +30,9 @@ from swarm_forage_env.wrappers.world import World, WorldLike, world_of
 
 from ..checks import chosen_seeds
 from ..statistics import Summary, aggregate
-from .intervals import bounds
 from .plots import FEWEST_RUNS
 from .question import Question
+from .scores import bounds
 
 LEVEL = 0.95
 """Confidence level of all intervals."""

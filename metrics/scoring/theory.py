@@ -25,6 +25,7 @@ from swarm_forage_env.rendering.figures import (
 from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.scenarios.presets import warehouse_small
 from swarm_forage_env.studies.study import StudySpec
+from swarm_forage_env.wrappers.world import SIZE
 
 from ..curves import FloatArray
 from ..emergence import task_emergence
@@ -33,7 +34,6 @@ from ..flexibility import adaptability, reactivity
 from ..laws import SizeLaw
 from ..population import availability_curves, ratio_for_team
 from ..queues import PopulationRates, queue_statistics
-from .columns import SIZE
 
 if TYPE_CHECKING:
     import polars as pl

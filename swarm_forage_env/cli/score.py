@@ -41,8 +41,8 @@ def score(
     policies are compared seed by seed, with the differences that are significant. Runs that the folder holds already
     are not repeated. The budget says how long runs are, unless --horizon does.
     """
-    from metrics.scoring.comparison import side_by_side
-    from metrics.scoring.front_door import score_curves
+    from metrics.scoring.policy_scores import score_curves
+    from metrics.scoring.score_tables import side_by_side
     from swarm_forage_env.cli.printer import ask_and_show, refusing, show
     from swarm_forage_env.cli.scenario_options import default_folder, split_names
     from swarm_forage_env.cli.score_options import asked_scores, score_forms

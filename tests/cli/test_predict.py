@@ -41,7 +41,7 @@ def curves():
 def one_object_per_robot(monkeypatch):
     """Runs of four seconds deliver nothing; count a robot's ticks at work as its performance."""
     from metrics.scoring import prediction
-    from metrics.scoring.run_totals import run_totals
+    from metrics.scoring.question import run_totals
 
     def totals(table, condition):
         return {seed: 10.0 * condition.world.value + seed for seed in run_totals(table, condition)}

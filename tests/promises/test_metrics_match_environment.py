@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from metrics import waveform
-from metrics.scoring.columns import CRITERIA, CURVE_COLUMNS, UNDISTURBED
-from metrics.scoring.curves_table import study_curves
-from metrics.scoring.measures import MEASURE_CRITERIA
+from metrics.scoring.curves_file import study_curves
+from metrics.scoring.run_curves import CRITERIA, CURVE_COLUMNS
+from metrics.scoring.scores import MEASURE_CRITERIA
 from swarm_forage_env.runs.record import RunRecord
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import RunSpec
@@ -16,7 +16,7 @@ from swarm_forage_env.wrappers import world as worlds
 from swarm_forage_env.wrappers.population import PopulationConfig
 from swarm_forage_env.wrappers.throttle import ThrottleConfig
 from swarm_forage_env.wrappers.waveform import Waveform
-from swarm_forage_env.wrappers.world import World
+from swarm_forage_env.wrappers.world import UNDISTURBED, World
 
 TICKS = np.arange(1, 50_001)
 DT_S = 0.2

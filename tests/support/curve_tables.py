@@ -6,8 +6,8 @@ from typing import Any
 import polars as pl
 
 from metrics import ScoreForms
-from metrics.scoring.curves_table import study_curves
-from metrics.scoring.study_scores import score_study
+from metrics.scoring.curves_file import study_curves
+from metrics.scoring.policy_scores import score_study
 
 
 def rows(

@@ -8,7 +8,7 @@ import pytest
 
 from metrics.benchmark import BenchmarkError, Training, benchmark_question, load_protocol, read_entry, run_benchmark
 from metrics.scoring import ask
-from metrics.scoring.measures import MEASURE_CRITERIA
+from metrics.scoring.scores import MEASURE_CRITERIA
 from swarm_forage_env import run_one
 from swarm_forage_env.policies.model_files import file_digest
 from swarm_forage_env.policies.pretrained import network_file

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from metrics import CurveError, aggregate, compare_tables
-from metrics.scoring.comparison import Comparison
-from metrics.scoring.table import Score, ScoreTable
+from metrics.scoring.score_tables import Comparison, ScoreTable
+from metrics.scoring.scores import Score
 from metrics.significance import holm, paired_p
 
 NAN = math.nan

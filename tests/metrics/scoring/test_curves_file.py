@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 from metrics import CurveError, score_curves
-from metrics.scoring.columns import CURVE_COLUMNS, REQUIRED_COLUMNS
+from metrics.scoring.run_curves import CURVE_COLUMNS, REQUIRED_COLUMNS
 from tests.support.curve_tables import CROWDING, rows, table
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "scoring.md"

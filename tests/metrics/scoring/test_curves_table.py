@@ -5,8 +5,8 @@ import polars as pl
 import pytest
 
 from metrics import CurveError, PopulationRates
-from metrics.scoring.curves_table import study_curves
-from metrics.scoring.studies import common_runs
+from metrics.scoring.curves_file import study_curves
+from metrics.scoring.run_curves import common_runs
 from tests.support.curve_tables import rows, table
 
 

@@ -7,8 +7,8 @@ import pytest
 
 import metrics
 from metrics import PopulationRates
-from metrics.scoring.forecast import FORECAST_HEADER, forecast_population
-from metrics.scoring.studies import RunCurves, StudyCurves
+from metrics.scoring.by_adversity import FORECAST_HEADER, forecast_population
+from metrics.scoring.run_curves import RunCurves, StudyCurves
 from swarm_forage_env.wrappers.population_process import EventRates, simulate_population
 
 CLOCK = np.array([100.0, 200.0])

@@ -7,7 +7,7 @@ import pytest
 
 import metrics
 from metrics import CurveError, Performance, compare_policies, compare_tables, score_curves, score_policy
-from metrics.scoring.performance import checked_performance
+from metrics.scoring.run_curves import checked_performance
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.runs import workers
 from swarm_forage_env.runs.record import record_columns

@@ -4,7 +4,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from metrics.scoring.place_distributions import place_distributions
+from metrics.scoring.study_numbers import place_distributions
 from swarm_forage_env.studies.study import Axis
 from swarm_forage_env.studies.study_table import StudyTable
 from tests.support.made_tables import FOUR, made_study, made_table

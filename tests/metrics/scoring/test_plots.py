@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from metrics import ScoreForms, waveform
-from metrics.scoring.curves_table import study_curves
+from metrics.scoring.curves_file import study_curves
 from metrics.scoring.plots import draw_scores
-from metrics.scoring.study_scores import score_study
-from metrics.scoring.table import ScoreTable
+from metrics.scoring.policy_scores import score_study
+from metrics.scoring.score_tables import ScoreTable
 from tests.support.curve_tables import rows, table
 from tests.support.pictures import PNG, keep_figures
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from metrics.scoring import study_figures, study_panels
-from metrics.scoring.policy_pairs import policy_pairs
+from metrics.scoring.study_numbers import policy_pairs
 from metrics.significance import holm, paired_p
 from swarm_forage_env.runs.policy_spec import PolicySpec
 from swarm_forage_env.studies.study import Axis

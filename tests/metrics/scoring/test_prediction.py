@@ -9,8 +9,8 @@ import pytest
 
 from metrics import CurveError, SizeLaw, predict_curves, predict_performance, predict_policy
 from metrics.scoring import ask
+from metrics.scoring.plots import draw_predictions
 from metrics.scoring.prediction import Predictions, law_text, prediction_question
-from metrics.scoring.prediction_plots import draw_predictions
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.runs import workers
 from swarm_forage_env.runs.run import run_one

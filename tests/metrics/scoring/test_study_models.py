@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from metrics.queues import PopulationRates, robots_at_work
-from metrics.scoring.model_plots import draw_models
 from metrics.scoring.study_models import MEAN_FIELD, model_figures
+from metrics.scoring.study_plots import draw_models
 from swarm_forage_env.runs.policy_spec import PolicySpec
 from swarm_forage_env.studies.study import Axis
 from tests.support.foraging_table import ONE, SIZES, foraging_table

@@ -7,11 +7,11 @@ import pytest
 
 import metrics
 from metrics import METRICS, CurveError, PopulationRates, ScoreForms
-from metrics.scoring.curves_table import study_curves
-from metrics.scoring.measures import MEASURE_CRITERIA, check_measures, criteria_of
-from metrics.scoring.studies import RunCurves, StudyCurves
-from metrics.scoring.study_scores import score_study
-from metrics.scoring.table import HEADER, ScoreTable
+from metrics.scoring.curves_file import study_curves
+from metrics.scoring.policy_scores import score_study
+from metrics.scoring.run_curves import RunCurves, StudyCurves
+from metrics.scoring.score_tables import ScoreTable
+from metrics.scoring.scores import HEADER, MEASURE_CRITERIA, check_measures, criteria_of
 from tests.support.curve_tables import CLOCK, CROWDING, IDEAL, SIGNAL, SLOWED, rows, scored, table, throttled
 
 

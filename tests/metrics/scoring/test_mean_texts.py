@@ -5,7 +5,7 @@ import math
 import pytest
 
 from metrics import aggregate
-from metrics.scoring.intervals import spread
+from metrics.scoring.scores import spread
 
 NAN = math.nan
 

@@ -1,15 +1,15 @@
-"""Which of several policies is better, and whether the difference is significant."""
+"""Tables of scores: of one policy, or of several, with which is better and whether the difference is significant."""
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from swarm_forage_env._internal.wording import limits, percent, plain
+from swarm_forage_env._internal.wording import counted, limits, percent, plain
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 from swarm_forage_env.runs.answer import Answer, Sheet
 
@@ -17,9 +17,130 @@ from ..checks import CurveError
 from ..curves import FloatArray
 from ..significance import holm, paired_p
 from ..statistics import Summary, aggregate
-from .intervals import spread
+from .by_adversity import FORECAST_HEADER, FORECAST_TITLE, PopulationForecast
 from .plots import draw_scores
-from .table import DOUBTFUL, Score, ScoreTable, forecast_sheets, title
+from .scores import BAND, DOUBTFUL, HEADER, Score, spread
+
+if TYPE_CHECKING:
+    import polars as pl
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ScoreTable(Answer):
+    """All scores of one policy in one scenario."""
+
+    policy: str
+    scenario: str
+    """Name of the scenario; empty if it is not known."""
+    scores: tuple[Score, ...]
+    forecasts: tuple[PopulationForecast, ...] = ()
+    """What the queue model predicts for a changing population, beside what the runs showed."""
+    missing: Mapping[str, str] = field(default_factory=dict[str, str])
+    """Measure -> why it could not be computed."""
+    failures: tuple[str, ...] = ()
+    """Runs that failed, one line each."""
+    settings: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    """How the runs were made: budget, length, seeds, folder."""
+    band: bool = False
+    """Whether the authors' bands stand beside the intervals."""
+
+    def __getitem__(self, measure: str) -> tuple[Score, ...]:
+        """Return the scores of one measure.
+
+        Raises:
+            KeyError: there are none; the message says why.
+        """
+        found = tuple(score for score in self.scores if score.measure == measure)
+        if not found:
+            raise KeyError(f"No score for {measure!r}: {self.missing.get(measure, 'it was not asked for')}")
+        return found
+
+    def notes(self) -> tuple[str, ...]:
+        """Return all notes: those of scores, missing measures, failed runs."""
+        noted = [f"{places}: {note}" for note, places in self._places_of_notes().items()]
+        absent = [f"{measure} is not computed: {reason}" for measure, reason in self.missing.items()]
+        return (*noted, *absent, *(f"failed: {failure}" for failure in self.failures))
+
+    def _places_of_notes(self) -> dict[str, str]:
+        """Note -> the scores that have it, in words, so that a note of many scores appears once."""
+        levels: dict[str, dict[str, list[str]]] = {}
+        for score in self.scores:
+            if score.note:
+                levels.setdefault(score.note, {}).setdefault(score.label, []).append(score.at)
+        return {
+            note: "; ".join(f"{measure}, {', '.join(places)}" for measure, places in places_of.items())
+            for note, places_of in levels.items()
+        }
+
+    def to_frame(self) -> "pl.DataFrame":
+        """Return one row per score; `per_seed` and `beside` do not fit into a row and are only in `to_mapping`."""
+        import polars as pl
+
+        rows: list[dict[str, Any]] = []
+        for score in self.scores:
+            row = score.to_mapping()
+            del row["per_seed"], row["beside"]
+            for name in ("relative", "of_mean_curves"):
+                values = row.pop(name) or [None, None, None]
+                row |= dict(zip((name, f"{name}_lower", f"{name}_upper"), values, strict=True))
+            row |= dict(zip(("two_sd_lower", "two_sd_upper"), row.pop("two_sd"), strict=True))
+            row["n_robots"] = " ".join(map(str, score.n_robots))
+            rows.append({"policy": self.policy, "scenario": self.scenario, **row})
+        return pl.DataFrame(rows, infer_schema_length=None)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the table as plain values, ready for JSON."""
+        return {
+            "policy": self.policy,
+            "scenario": self.scenario,
+            "settings": dict(self.settings),
+            "scores": [score.to_mapping() for score in self.scores],
+            "population": [forecast.to_mapping() for forecast in self.forecasts],
+            "missing": dict(self.missing),
+            "failures": list(self.failures),
+        }
+
+    def sheets(self) -> tuple[Sheet, ...]:
+        """Return scores, forecasts and notes."""
+        place = HEADER.index("95 % interval") + 1
+        header = (*HEADER[:place], BAND, *HEADER[place:]) if self.band else HEADER
+        rows = [score.cells(band=self.band) for score in self.scores]
+        scores = Sheet(title=title([self]), header=header, rows=rows)
+        return scores, *forecast_sheets([self]), Sheet(notes=self.notes())
+
+    @property
+    def has_picture(self) -> bool:
+        """Whether a score has runs."""
+        return any(score.per_seed for score in self.scores)
+
+    def draw(self, path: str | Path, *, style: FigureStyle = SCREEN) -> None:
+        """Draw the scores, see `draw_scores`."""
+        draw_scores([self], path, band=self.band, style=style)
+
+
+def title(tables: Sequence[ScoreTable]) -> str:
+    """Return who was scored, where, and how much was run: "crw in warehouse_small, budget quick, 4 seeds, 4,000 s"."""
+    words = ", ".join(table.policy for table in tables)
+    scenario, settings = tables[0].scenario, tables[0].settings
+    if scenario:
+        words += f" in {scenario}"
+    if settings.get("performance", "collected") != "collected":
+        words += f", performance {settings['performance']}"
+    if "budget" in settings:
+        seeds = counted(len(settings["seeds"]), "seed")
+        words += f", budget {settings['budget']}, {seeds}, {settings['horizon_s']:,g} s"
+    return words
+
+
+def forecast_sheets(tables: Sequence[ScoreTable]) -> list[Sheet]:
+    """Return forecasts and observations; equal ones of several policies appear once."""
+    different: list[list[tuple[str, ...]]] = []
+    for table in tables:
+        rows = [forecast.cells() for forecast in table.forecasts]
+        if rows and rows not in different:
+            different.append(rows)
+    return [Sheet(title=FORECAST_TITLE, header=FORECAST_HEADER, rows=rows) for rows in different]
+
 
 FAMILY_ERROR = 0.05
 """Probability that one or more differences within a measure are called significant by chance."""
@@ -282,7 +403,7 @@ def _paired_differences(first: Mapping[int, float], second: Mapping[int, float])
 
 def _difference(pair: _Pair, p: float, p_holm: float) -> Difference:
     values, score = pair.values, pair.score
-    summary = Summary(mean=math.nan, std=math.nan, lower=math.nan, upper=math.nan, n_used=values.size, n_nan=0)
+    summary = Summary.without_interval(n_used=values.size)
     if values.size and np.isfinite(values).all():
         summary = aggregate(values)
     better = ""

@@ -7,8 +7,8 @@ import pytest
 from metrics import CurveError
 from metrics.claims import EXPERIMENTS, INTUITIONS, PanelName
 from metrics.scoring import judge_claims, study_panels
-from metrics.scoring.figure_panels import experiment_of
-from metrics.scoring.verdicts import VARIANTS
+from metrics.scoring.study_numbers import experiment_of
+from metrics.scoring.study_verdict import VARIANTS
 from swarm_forage_env.runs.policy_spec import PolicySpec
 from swarm_forage_env.studies.study import Axis
 from swarm_forage_env.studies.study_file import load_study, set_names

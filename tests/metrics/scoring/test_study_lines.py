@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from metrics import ScoreForms
-from metrics.scoring.study_scores import score_study
-from metrics.scoring.study_tables import study_lines
+from metrics.scoring.policy_scores import score_study
+from metrics.scoring.run_curves import study_lines
 from swarm_forage_env import StudyFolder, read_study, run_study
 from swarm_forage_env.studies.study import Axis
 from tests.support.tiny_study import RANDOM, tiny_study

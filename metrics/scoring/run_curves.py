@@ -1,0 +1,423 @@
+"""The runs of an experiment as arrays (runs, intervals), with what it varied: of a table of runs, or of a study.
+
+Run records of `swarm_forage_env` and curves from other sources share the names of columns.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from swarm_forage_env.runs.plan import Condition
+from swarm_forage_env.runs.table import Curves, Table
+from swarm_forage_env.scenarios.columns import ALL_COLUMNS, Column
+from swarm_forage_env.scenarios.performance import (
+    PERFORMANCE_COLUMNS,
+    Performance,
+    performance_curve,
+    performance_of,
+)
+from swarm_forage_env.studies.study import value_words
+from swarm_forage_env.wrappers.world import SIZE, UNDISTURBED, World
+
+from ..checks import CurveError
+from ..curves import FloatArray
+from ..queues import PopulationRates
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from swarm_forage_env.studies.study import Place, Value
+    from swarm_forage_env.studies.study_table import StudyTable
+
+THROTTLE, NOISE, POPULATION, HANDLING = "throttle", "noise", "population_dynamics", "handling_cost"
+CRITERIA = (SIZE, THROTTLE, HANDLING, NOISE, POPULATION, UNDISTURBED)
+"""What a study varies, in column `criterion`."""
+
+RATE_COLUMNS = {
+    "lambda_d": "deaths_per_s",
+    "lambda_bd": "malfunctions_per_s",
+    "mu_b": "births_per_s",
+    "mu_bd": "repairs_per_s",
+}
+"""Field of `PopulationRates` -> column; one value per run. They are no part of records: specifications tell them."""
+REQUIRED_COLUMNS = ("n_robots", "seed", "interval", "performance")
+CURVE_COLUMNS: Mapping[str, Column] = {
+    **{
+        name: ALL_COLUMNS[name]
+        for name in (
+            "controller",
+            "criterion",
+            "criterion_value",
+            *REQUIRED_COLUMNS,
+            "t_end_s",
+            "interference_fraction",
+            "n_active",
+            "adversity",
+            "throttle",
+            "handling_cost",
+        )
+    },
+    **{
+        name: Column("amount", "1/s", "rate of the whole swarm, the same in each row") for name in RATE_COLUMNS.values()
+    },
+    **{name: ALL_COLUMNS[name] for name in ("deaths", "malfunctions", "repairs", "time_in_repair_s")},
+}
+"""Columns that measures read -> what they hold. Further columns are ignored."""
+INTERVAL_COLUMNS = tuple(
+    name
+    for name, column in CURVE_COLUMNS.items()
+    if column.kind in ("amount", "fraction", "number") and name not in ("criterion_value", *RATE_COLUMNS.values())
+)
+"""Columns with one value per interval."""
+
+PerformanceLike: TypeAlias = str | Performance | Callable[[Any], ArrayLike]
+"""A recorded column by name ("n_carrying", "1/interference_fraction"), or a function as in `Performance`."""
+
+
+def own_performance(given: PerformanceLike | None) -> Performance | None:
+    """Return what was given as a `Performance` if it is a function; None if it is a name or nothing.
+
+    Raises:
+        CurveError: it is none of these.
+    """
+    if given is None or isinstance(given, str):
+        return None
+    if isinstance(given, Performance):
+        return given
+    if not callable(given):
+        raise CurveError(
+            f"Expected performance to be the name of a recorded column, or a function of a record, got {given!r}."
+        )
+    return Performance(getattr(given, "__name__", type(given).__name__), function=given)
+
+
+def own_curve(performance: Performance, frame: "pl.DataFrame", where: str) -> FloatArray:
+    """Return the performance of one run by its function, (T,).
+
+    Args:
+        performance: One with a function.
+        frame: Record of the run.
+        where: Name of the run in error messages.
+
+    Raises:
+        CurveError: the function returns something else than (T,) finite numbers >= 0.
+    """
+    assert performance.function is not None, "others are columns"
+    return checked_performance(performance.function(frame), performance.name, len(frame), where)
+
+
+def checked_performance(values: ArrayLike, name: str, n_intervals: int, where: str) -> FloatArray:
+    """Return a performance as numbers, (T,) float64.
+
+    Args:
+        values: What was computed or recorded.
+        name: Name of the performance.
+        n_intervals: How many intervals T the run has.
+        where: Name of the run in error messages.
+
+    Raises:
+        CurveError: no numbers, not T of them, or NaN, infinite or negative ones; the message has the first interval.
+    """
+    try:
+        curve = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise CurveError(f"Expected performance {name} of {where} as numbers, got {values!r:.80}; {error}.") from error
+    if curve.shape != (n_intervals,):
+        raise CurveError(
+            f"Expected performance {name} of {where} with one number per interval, shape ({n_intervals},), got shape "
+            f"{curve.shape}."
+        )
+    wrong = np.flatnonzero(~(np.isfinite(curve) & (curve >= 0.0)))
+    if len(wrong):
+        raise CurveError(
+            f"Expected performance {name} of {where} as finite numbers >= 0, got {curve[wrong[0]]} in interval "
+            f"{wrong[0]}; let 1/0 be 0, and shift or turn round what can be negative."
+        )
+    return curve
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RunCurves:
+    """The runs of one experiment: one criterion at one value with one swarm size."""
+
+    criterion: str
+    """One of `CRITERIA`."""
+    value: float
+    n_robots: int
+    seeds: tuple[int, ...]
+    """Number of each run, rising, (R,)."""
+    curves: dict[str, FloatArray]
+    """Column -> values, (R, T); only columns that the table has."""
+    rates: PopulationRates | None = None
+    """Rates of change of the population, per second."""
+    n_planned: int | None = None
+    """How many runs were planned; None = as many as there are."""
+
+    @property
+    def performance(self) -> FloatArray:
+        """P(N, t), (R, T)."""
+        return self.curves["performance"]
+
+    @property
+    def interference(self) -> FloatArray:
+        """t_lost(N, t), (R, T)."""
+        return self.curves["interference_fraction"]
+
+    @property
+    def n_lost(self) -> int:
+        """Runs that were planned and are not there."""
+        return 0 if self.n_planned is None else self.n_planned - len(self.seeds)
+
+    def describe(self) -> str:
+        """Return the experiment in a few words."""
+        size = f"N = {self.n_robots}"
+        return size if self.criterion == SIZE else f"{self.criterion} {self.value:g}, {size}"
+
+    def averaged(self, performance: FloatArray) -> "RunCurves":
+        """Return the experiment with another performance, (..., T), and the mean over runs of all other curves."""
+        means: dict[str, FloatArray] = {name: curve.mean(axis=0) for name, curve in self.curves.items()}
+        return replace(self, curves=means | {"performance": performance})
+
+    def at_seeds(self, seeds: Sequence[int]) -> "RunCurves":
+        """Return the same experiment with some of its runs only."""
+        places = [self.seeds.index(seed) for seed in seeds]
+        return replace(self, seeds=tuple(seeds), curves={name: curve[places] for name, curve in self.curves.items()})
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StudyCurves:
+    """All experiments of one policy, on one clock."""
+
+    controller: str
+    experiments: tuple[RunCurves, ...]
+    t_end_s: FloatArray | None
+    """Ends of the intervals, (T,); None if the table has no such column."""
+    amount: str = "objects"
+    """What there is so and so much of in a performance."""
+    is_total: bool = True
+    """Whether performance is a total over its interval, like deliveries; else it is a mean, a ratio, a share."""
+    adds_up: bool = True
+    """Whether a swarm has what its robots have together, so that twice the swarm could have twice of it."""
+    reference_value: float = 0.0
+    """Value of a criterion at its reference runs; the authors compare population dynamics with the lowest level."""
+    where: str = "the table"
+    """Name of the table in error messages."""
+
+    @property
+    def horizon_s(self) -> float | None:
+        """Length of a run in seconds, where known."""
+        return None if self.t_end_s is None else float(self.t_end_s[-1])
+
+    def sizes(self) -> tuple[RunCurves, ...]:
+        """Return the experiments that vary the swarm size, smallest first."""
+        return tuple(sorted((e for e in self.experiments if e.criterion == SIZE), key=lambda e: e.n_robots))
+
+    def levels(self, criterion: str) -> tuple[tuple[RunCurves, RunCurves], ...]:
+        """Return (reference, disturbed) for each level of a criterion, by swarm size and value.
+
+        Raises:
+            CurveError: levels without a reference run of the same swarm size.
+        """
+        mine = [e for e in self.experiments if e.criterion == criterion and e.value != self.reference_value]
+        return tuple(
+            (self._reference(level), level) for level in sorted(mine, key=lambda level: (level.n_robots, level.value))
+        )
+
+    def _reference(self, level: RunCurves) -> RunCurves:
+        same_size = [e for e in self.experiments if e.n_robots == level.n_robots]
+        own = [e for e in same_size if e.criterion == level.criterion and e.value == self.reference_value]
+        shared = [e for e in same_size if e.criterion == UNDISTURBED]
+        for reference in (*own, *shared):
+            return reference
+        raise CurveError(
+            f"Expected a reference run for {level.describe()} of {self.controller} in {self.where}: the same swarm "
+            f"size with criterion {level.criterion} and value {self.reference_value:g}, or with criterion "
+            f"{UNDISTURBED}; got neither."
+        )
+
+
+def common_runs(*experiments: RunCurves) -> tuple[RunCurves, ...]:
+    """Return the experiments with only those runs whose number all of them have, paired by it."""
+    shared = shared_seeds(experiments)
+    return tuple(experiment.at_seeds(shared) for experiment in experiments)
+
+
+def shared_seeds(experiments: Sequence[RunCurves]) -> list[int]:
+    """Return the numbers of the runs that all experiments have."""
+    first, *others = (experiment.seeds for experiment in experiments)
+    return [seed for seed in first if all(seed in seeds for seeds in others)]
+
+
+def run_curves(world: World, curves: Curves, n_planned: int) -> RunCurves:
+    """Return the runs in a world as measures take them.
+
+    Args:
+        world: Its criterion and value say what the runs are to the measures.
+        curves: Seeds and columns, as tables of runs give them.
+        n_planned: How many runs were planned.
+    """
+    seeds, columns = curves
+    return RunCurves(
+        criterion=world.criterion,
+        value=world.value,
+        n_robots=world.n_robots,
+        seeds=seeds,
+        curves={name: curve for name, curve in columns.items() if name in INTERVAL_COLUMNS},
+        rates=rates_of(world),
+        n_planned=n_planned,
+    )
+
+
+def joined_curves(
+    experiments: Sequence[RunCurves], world: World, *, controller: str, read_as: Performance, **told: Any
+) -> StudyCurves:
+    """Return the runs of a policy in several worlds.
+
+    Args:
+        experiments: From `run_curves`.
+        world: Any of the worlds: all have its clock.
+        controller: Name of the policy.
+        read_as: What performance is.
+        told: Further fields of `StudyCurves`.
+    """
+    scenario = world.scenario
+    n_intervals = round(scenario.horizon_s / scenario.interval_s)
+    return StudyCurves(
+        controller=controller,
+        experiments=tuple(experiments),
+        t_end_s=scenario.interval_s * np.arange(1.0, n_intervals + 1.0),
+        amount=read_as.amount,
+        is_total=read_as.is_total,
+        adds_up=bool(read_as.adds_up),
+        **told,
+    )
+
+
+def policy_curves(table: Table, policy: str, performance: Performance | None = None) -> StudyCurves:
+    """Return all runs of a policy in a table; worlds without a finished run are there, without runs.
+
+    Args:
+        table: The runs.
+        policy: Label of the policy.
+        performance: A function of records that is the performance; None = what the scenario names.
+
+    Raises:
+        CurveError: a performance that is negative or no number.
+    """
+    conditions = table.plan.of_policy(policy)
+    world = conditions[0].world
+    read_as = performance or performance_of(world.scenario.performance)
+    experiments = [
+        run_curves(condition.world, _curves(table, condition, performance), len(table.plan.seeds))
+        for condition in conditions
+    ]
+    return joined_curves(experiments, world, controller=policy, read_as=read_as)
+
+
+def _curves(table: Table, condition: Condition, performance: Performance | None) -> Curves:
+    """The runs of a condition, with the performance that is asked for."""
+    records = table.of(condition)
+    seeds, columns = table.curves(condition, *INTERVAL_COLUMNS)
+    checked: list[FloatArray] = []
+    for record in records:
+        where = f"run {record.run_id}"
+        if performance is None:
+            name = performance_of(condition.world.scenario.performance).name
+            checked.append(checked_performance(record.performance, name, record.n_intervals, where))
+        else:
+            checked.append(own_curve(performance, record.to_frame(), where))
+    if checked:
+        columns["performance"] = np.stack(checked)
+    return seeds, columns
+
+
+def rates_of(world: World) -> PopulationRates | None:
+    """Return the rates at which the population of a world changes, per second; None where it stays as it is."""
+    config = world.population
+    if config is None:
+        return None
+    dt_s = world.scenario.dt_s
+    return PopulationRates(
+        lambda_d=config.death_per_tick / dt_s,
+        lambda_bd=config.malfunction_per_tick / dt_s,
+        mu_b=config.birth_per_tick / dt_s,
+        mu_bd=config.repair_per_tick / dt_s,
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StudyLine:
+    """The conditions of a study that differ on the last axis alone."""
+
+    rules: str
+    """Which rules: "described" or "program"."""
+    policy: str
+    """Label of the policy."""
+    others: "Mapping[str, Value]"
+    """Value on each axis but the last, by its name."""
+    words: Mapping[str, str]
+    """How these values are shown."""
+    places: "tuple[Place, ...]"
+    """In the order of the last axis."""
+    curves: StudyCurves
+    """One experiment per condition, in the same order; `score_study` takes it."""
+
+
+def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[StudyLine, ...]:
+    """Return the lines of a study, in the order of its conditions.
+
+    Args:
+        table: From `swarm_forage_env.read_study`. Failed and missing runs count as planned and lost.
+        performance: What P(N, t) is, by a name as in `score_policy`; default that of the scenario.
+
+    Raises:
+        ValueError: no such performance.
+    """
+    spec = table.spec
+    names = [axis.name for axis in spec.axes[:-1]]
+    words = [value_words(axis.values) for axis in spec.axes[:-1]]
+    places_of: dict[tuple[object, ...], list[Place]] = {}
+    for place in spec.places:
+        places_of.setdefault((place.rules, place.policy, place.values[:-1]), []).append(place)
+    lines: list[StudyLine] = []
+    for places in places_of.values():
+        first = places[0]
+        read_as = performance_of(performance or spec.world(first).scenario.performance)
+        experiments = tuple(_runs(table, place, performance) for place in places)
+        lines.append(
+            StudyLine(
+                rules=first.rules,
+                policy=first.policy,
+                others=dict(zip(names, first.values, strict=False)),
+                words={name: of[value] for name, of, value in zip(names, words, first.values, strict=False)},
+                places=tuple(places),
+                curves=joined_curves(
+                    experiments,
+                    spec.world(first),
+                    controller=first.policy,
+                    read_as=read_as,
+                    reference_value=_reference_value(table, places),
+                    where=f"study {spec.name}",
+                ),
+            )
+        )
+    return tuple(lines)
+
+
+def _runs(table: "StudyTable", place: "Place", performance: str | None) -> RunCurves:
+    """The finished runs of a condition."""
+    seeds, columns = table.curves(place, *{*INTERVAL_COLUMNS, *PERFORMANCE_COLUMNS})
+    if performance is not None and seeds:
+        columns["performance"] = performance_curve(performance, columns)
+    return run_curves(table.spec.world(place), (seeds, columns), len(table.spec.seeds))
+
+
+def _reference_value(table: "StudyTable", places: "list[Place]") -> float:
+    """Value of the criterion at the reference of a line; sizes have no other reference than each other."""
+    reference = table.spec.reference_of(places[0])
+    if reference is None or table.spec.world(reference).criterion == SIZE:
+        return 0.0
+    return table.spec.world(reference).value
