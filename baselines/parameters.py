@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import BoolArray, ObsArray
 

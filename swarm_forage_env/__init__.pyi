@@ -8,7 +8,7 @@ from .scenarios.config import ScenarioConfig as ScenarioConfig
 from .scenarios.overrides import with_overrides as with_overrides
 from .wrappers.world import World as World
 from .env import ForageEnv as ForageEnv
-from .scenarios.kinds import RobotKind as RobotKind
+from .scenarios.robots import RobotKind as RobotKind
 from .scenarios.quirks import Quirks as Quirks
 from .scenarios.quirks import AUTHORS_PROGRAM as AUTHORS_PROGRAM
 

@@ -187,7 +187,7 @@ def read_entry(path: str | Path, protocol: Protocol) -> Entry:
     Raises:
         BenchmarkError: the file cannot be read, holds no whole entry of `protocol`, or its digest does not fit.
     """
-    from swarm_forage_env._internal.parsing import parse_json
+    from swarm_forage_env._internal.files import parse_json
 
     try:
         content = parse_json(Path(path).read_text(encoding="utf-8"))

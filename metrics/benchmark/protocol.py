@@ -141,7 +141,7 @@ def load_protocol(file: str | Path | None = None, *, quick: bool = False) -> Pro
     Raises:
         BenchmarkError: the file cannot be read, or describes no protocol; the message names it.
     """
-    from swarm_forage_env._internal.parsing import parse_toml
+    from swarm_forage_env._internal.files import parse_toml
 
     path = protocol_folder() / f"benchmark_v{LATEST}.toml" if file is None else Path(file)
     try:

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env._internal.files import replacing
-from swarm_forage_env._internal.wording import counted, number, percent
+from swarm_forage_env._internal.wording import counted, install_command, number, percent
 from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.mixture import is_mixture, mixture_parts
 from swarm_forage_env.policies.registry import file_of, is_policy_file

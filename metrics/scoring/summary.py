@@ -24,8 +24,8 @@ from swarm_forage_env.runs.record import RunRecord
 from swarm_forage_env.runs.store import RunStore
 from swarm_forage_env.runs.table import Table
 from swarm_forage_env.scenarios.columns import part_column
-from swarm_forage_env.scenarios.kinds import kind_sizes
 from swarm_forage_env.scenarios.performance import Performance, performance_curve, performance_of
+from swarm_forage_env.scenarios.robots import kind_sizes
 from swarm_forage_env.wrappers.world import World, WorldLike, world_of
 
 from ..checks import chosen_seeds

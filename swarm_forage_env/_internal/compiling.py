@@ -39,8 +39,8 @@ _COMPILED_IN_EVERYWHERE = tuple(
         "contract/codes",
         "contract/detection",
         "contract/layout",
-        "scenarios/sensors",
-        "scenarios/units",
+        "scenarios/floor",
+        "scenarios/robots",
     )
 )
 """Modules whose functions and constants are compiled into those of other folders."""

@@ -16,8 +16,7 @@ from collections.abc import Iterable, Mapping
 from numbers import Integral, Real
 from typing import Any, cast
 
-from swarm_forage_env._internal.printable import is_printable, shown
-from swarm_forage_env._internal.spelling import nearest, suggestion
+from swarm_forage_env._internal.wording import is_printable, nearest, shown, suggestion
 
 MAX_NAME = 60
 """Longest name that files are named by (our choice: with four bytes a character, endings still fit into 255 bytes)."""

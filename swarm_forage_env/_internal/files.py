@@ -1,15 +1,24 @@
-"""Files that are there complete or not at all, whatever happens while they are written; and whether they can be."""
+"""Files that are there complete or not at all, whether they can be written, and what JSON and TOML of anybody's say.
+
+Texts that anybody may have written are read with a bound on how deep they are nested: both parsers, and all that walks
+over what they return, call themselves for each level, and a file of brackets alone would end the process's stack.
+"""
 
 import errno
+import json
 import os
 import re
-from collections.abc import Generator
+import tomllib
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 from uuid import uuid4
 
 _PROBE = bytes(1 << 16)
 """What a folder must have room for, as large as a small record (our choice)."""
+MOST_LEVELS = 50
+"""Levels of nested tables and lists that a file may have; our choice: our own files have fewer than ten."""
 
 
 @contextmanager
@@ -98,3 +107,41 @@ def check_file(path: Path) -> None:
 def as_file_name(text: str) -> str:
     """Return a text as a part of a file name: what is no letter, digit, dot, = + or - becomes an underscore."""
     return re.sub(r"[^\w.=+-]", "_", text)
+
+
+def parse_json(text: str) -> Any:
+    """Return what a JSON text holds.
+
+    Raises:
+        ValueError: no JSON, or nested deeper than `MOST_LEVELS`.
+    """
+    return _bounded(json.loads, text, "JSON")
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """Return the tables of a TOML text.
+
+    Raises:
+        ValueError: no TOML, or nested deeper than `MOST_LEVELS`.
+    """
+    return _bounded(tomllib.loads, text, "TOML")
+
+
+def _bounded(parse: Callable[[str], Any], text: str, language: str) -> Any:
+    message = f"Expected {language} of at most {MOST_LEVELS} nested levels, got more."
+    try:
+        content = parse(text)
+    except RecursionError as error:
+        raise ValueError(message) from error
+    level = [content]
+    for _ in range(MOST_LEVELS):
+        level = [item for value in level for item in _members(value)]
+        if not level:
+            return content
+    raise ValueError(message)
+
+
+def _members(value: Any) -> list[Any]:
+    if isinstance(value, dict):
+        return list(value.values())
+    return value if isinstance(value, list) else []

@@ -1,12 +1,25 @@
-"""Numbers and tables as texts for people, and as plain values for JSON."""
+"""Texts for people: numbers, tables and values from elsewhere, the name nearest to a mistyped one, how to install."""
 
+import difflib
 import math
-from collections.abc import Sequence
+import unicodedata
+from collections.abc import Iterable, Sequence
+from typing import Any
 
-
-def paragraph(lines: Sequence[str]) -> list[str]:
-    """Return the lines with an empty one before them; nothing if there are none."""
-    return ["", *lines] if lines else []
+_MOST_SHOWN = 200
+"""Characters of a value that a message shows; our choice: two lines of a terminal."""
+_UNSEEN = ("Cc", "Cf", "Cs")
+"""Unicode categories of characters that steer a terminal, that nobody sees, or that no encoding has."""
+_REFUSED = ("Cc", "Cs")
+"""Those that no text may have. Others that nobody sees are part of ordinary words, such as U+200C in Persian."""
+_TURNING = frozenset("\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
+"""Characters that steer the direction of writing, Bidi_Control of Unicode; those of `curves_table` of the metrics."""
+_MOST_NEAR = 4
+"""Names that a message lists where there are too many to list all."""
+_NEAR = 0.5
+"""Likeness of such names; less than is asked of one that is meant (our choice)."""
+_BESIDE = {"train": ' "torch==2.13.0"'}
+"""What an extra is installed together with."""
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
@@ -42,3 +55,50 @@ def limits(lower: float, upper: float) -> str:
 def plain(value: float | None) -> float | None:
     """Return the value, or None where JSON has no such number."""
     return value if value is not None and math.isfinite(value) else None
+
+
+def is_printable(text: str) -> bool:
+    """Return whether a text is one line that shows as what it is: no control characters, no broken encoding."""
+    return not any(unicodedata.category(character) in _REFUSED or character in _TURNING for character in text)
+
+
+def printable(text: str) -> str:
+    """Return a text with control characters, escape sequences among them, written as backslash escapes.
+
+    Ends of lines stay, so that a text of several lines remains one.
+    """
+    return "".join(_escaped(character) for character in text)
+
+
+def shown(value: Any) -> str:
+    """Return the representation of a value for a message, cut where it is long."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # a whole number of thousands of digits; tables nested too deep
+        return f"a value of type {type(value).__name__} that is too large to show"
+    return text if len(text) <= _MOST_SHOWN else f"{text[:_MOST_SHOWN]}... ({len(text):,} characters)"
+
+
+def _escaped(character: str) -> str:
+    if character == "\n" or unicodedata.category(character) not in _UNSEEN:
+        return character
+    return character.encode("unicode_escape").decode("ascii")
+
+
+def nearest(name: str, known: Iterable[str]) -> list[str]:
+    """Return the few known names that are most like a mistyped one, the nearest first."""
+    return difflib.get_close_matches(name, list(known), n=_MOST_NEAR, cutoff=_NEAR)
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """Return " Did you mean ...?" with the nearest known name, or an empty string."""
+    close = difflib.get_close_matches(name, list(known), n=1)
+    return f" Did you mean {close[0]!r}?" if close else ""
+
+
+def install_command(extra: str) -> str:
+    """Return the command that installs one of the extras of `pyproject.toml`, for messages.
+
+    The package is in no registry: it is installed from a checkout.
+    """
+    return f'pip install ".[{extra}]"{_BESIDE.get(extra, "")} in the checkout of swarm_forage_env'

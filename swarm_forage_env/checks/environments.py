@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from pettingzoo import ParallelEnv
 
-from swarm_forage_env._internal.extras import install_command
+from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.wrappers.base import SwarmWrapper
 

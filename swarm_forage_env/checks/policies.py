@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from swarm_forage_env._internal.rng import Stream, stream_rng
-from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.contract.layout import LIGHT_IF_CARRYING, ObservationLayout
 from swarm_forage_env.contract.policy import Policy, SwarmSpec

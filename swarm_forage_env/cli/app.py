@@ -73,7 +73,7 @@ def _check_known(what: str, words: Iterable[str], known: Iterable[str], before: 
     """Refuse a word that is not known, and say which one is right; `before` stands before it."""
     for word in words:
         if word not in known:
-            from swarm_forage_env._internal.spelling import suggestion
+            from swarm_forage_env._internal.wording import suggestion
             from swarm_forage_env.cli.former_words import COMMANDS as FORMER
 
             right = FORMER.get(f"{before}{word}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from metrics.controllers import PAPER_POLICIES
-from swarm_forage_env._internal.printable import printable
+from swarm_forage_env._internal.wording import printable
 from swarm_forage_env.cli.option_groups import PolicyOptions
 from swarm_forage_env.cli.options import AsJson, DryRun, Jobs
 

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_forage_env._internal.printable import printable
+from swarm_forage_env._internal.wording import printable
 from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions
 from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, FirstSeed, complain
 

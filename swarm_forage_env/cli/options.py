@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from swarm_forage_env._internal.printable import printable
+from swarm_forage_env._internal.wording import printable
 
 EXIT_FAILURE = 1
 EXIT_USAGE = 2

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.printable import printable
-from swarm_forage_env._internal.wording import counted
+from swarm_forage_env._internal.wording import counted, printable
 from swarm_forage_env.cli.errors import resumable
 from swarm_forage_env.cli.option_groups import RunOptions
 from swarm_forage_env.cli.options import EXIT_FAILURE, complain, no_picture

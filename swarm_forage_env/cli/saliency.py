@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from swarm_forage_env._internal.printable import printable
+from swarm_forage_env._internal.wording import printable
 from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions
 from swarm_forage_env.cli.options import AsJson, Picture, Seed, no_picture
 from swarm_forage_env.cli.terminal import notes

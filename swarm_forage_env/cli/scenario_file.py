@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swarm_forage_env._internal.fields import ConfigError, as_tuples, table
-from swarm_forage_env._internal.parsing import parse_toml
+from swarm_forage_env._internal.files import parse_toml
 from swarm_forage_env.wrappers.registry import wrappers_from_mapping
 
 if TYPE_CHECKING:

@@ -7,15 +7,14 @@ from pathlib import Path
 from typing import Any, TypeVar, get_origin
 
 from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, whole
-from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.cli.option_groups import PlaceOptions, WorldOptions
 from swarm_forage_env.cli.scenario_file import ScenarioFile, read_scenario_file
 from swarm_forage_env.policies.mixture import leading_mixture
 from swarm_forage_env.policies.registry import split_interface
 from swarm_forage_env.runs.spec import RunSpec, plan_run
-from swarm_forage_env.scenarios.overrides import field_types, parse_tuple
+from swarm_forage_env.scenarios.overrides import checked_density, field_types, parse_tuple
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.scenarios.sizing import checked_density
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.world import World
 

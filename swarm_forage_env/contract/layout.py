@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TypeAlias
 
-from swarm_forage_env.scenarios.sensors import SENSORS, WINDOWS_CELLS
-from swarm_forage_env.scenarios.units import WHEEL_SCALE_MPS
+from swarm_forage_env.scenarios.robots import SENSORS, WHEEL_SCALE_MPS, WINDOWS_CELLS
 
 RING_SENSORS = 24
 """Proximity beams, and as many light sensors: on one ring, every 15 degrees, the first at 7.5 degrees to the left."""

@@ -20,7 +20,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, instance, text, whole
-from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.layout import BUILT_IN_SLICES, OPTIONAL_SLICES, LayoutRow
 
 SENSOR_ENTRY_POINTS = "swarm_forage_env.sensors"

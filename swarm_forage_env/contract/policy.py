@@ -22,8 +22,9 @@ from swarm_forage_env.contract.layout import (
 from swarm_forage_env.contract.own_functions import own_sensor
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.floor import CELL_M, CELLS_PER_M
 from swarm_forage_env.scenarios.quirks import Quirks
-from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M, WHEEL_SCALE_MPS
+from swarm_forage_env.scenarios.robots import WHEEL_SCALE_MPS
 
 COMMANDS = 3
 """First columns of an action: left wheel, right wheel, gripper. What a robot says comes after them."""

@@ -2,7 +2,7 @@
 
 Axes: N robots, M objects, K cache slots, D observation columns, T recording intervals.
 Units are SI (metres, seconds, radians) unless a docstring says otherwise; a *tick* is one control
-step of `dt_s`, a *cell* is one square of the floor grid (`scenarios.units.CELL_M` wide).
+step of `dt_s`, a *cell* is one square of the floor grid (`scenarios.floor.CELL_M` wide).
 """
 
 from typing import Any, TypeAlias

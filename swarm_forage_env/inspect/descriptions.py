@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from swarm_forage_env._internal.fields import ConfigError, known_name
-from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.policies.mixture import is_mixture, mixture_parts

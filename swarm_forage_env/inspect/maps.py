@@ -17,8 +17,8 @@ from swarm_forage_env.inspect.replay.frames import Replay, ReplayError, Status
 from swarm_forage_env.policies.registry import policy_label
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.scenarios.floor import CELL_M
 from swarm_forage_env.scenarios.obstacles import Rectangle
-from swarm_forage_env.scenarios.units import CELL_M
 
 MEANINGS: Mapping[str, tuple[str, str]] = {
     "density": ("active robots, mean over time", "per m²"),

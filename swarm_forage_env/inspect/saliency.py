@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_forage_env._internal.fields import ConfigError, number
-from swarm_forage_env._internal.spelling import suggestion
-from swarm_forage_env._internal.wording import plain
+from swarm_forage_env._internal.wording import plain, suggestion
 from swarm_forage_env.contract.layout import ObservationLayout
 from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
 from swarm_forage_env.policies.learned import LearnedPolicy

@@ -21,7 +21,7 @@ from swarm_forage_env.rendering.view import arena_view, refusing
 from swarm_forage_env.rendering.window import CLOSE_UP_PX, Clicked, Closed, Pressed, Scene, Window, WindowEvent
 from swarm_forage_env.runs.run import LiveRun, build_env
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.units import CELL_M
+from swarm_forage_env.scenarios.floor import CELL_M
 from swarm_forage_env.wrappers.base import WrapperConfig
 
 HELP = (

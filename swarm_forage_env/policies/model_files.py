@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env._internal.fields import ConfigError, table
-from swarm_forage_env._internal.parsing import parse_json
+from swarm_forage_env._internal.files import parse_json
+from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.contract.policy import COMMANDS, SwarmSpec
 from swarm_forage_env.contract.types import ObsArray
 from swarm_forage_env.policies import trust

@@ -21,8 +21,7 @@ import numpy as np
 from gymnasium import spaces
 
 from swarm_forage_env._internal.fields import ConfigError, known_keys, one_of, switch, table
-from swarm_forage_env._internal.files import replacing
-from swarm_forage_env._internal.parsing import parse_json
+from swarm_forage_env._internal.files import parse_json, replacing
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ObsArray
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping

@@ -18,7 +18,7 @@ from types import ModuleType
 from typing import Any
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.model_files import checked_digest
 from swarm_forage_env.policies.registry import split_class

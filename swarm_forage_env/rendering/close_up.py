@@ -26,7 +26,7 @@ from swarm_forage_env.rendering.paint import (
 )
 from swarm_forage_env.rendering.view import CACHE_OPACITY, NEST_OPACITY, THEMES, Palette
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.units import CELL_M, WALL_M
+from swarm_forage_env.scenarios.floor import CELL_M, WALL_M
 from swarm_forage_env.world.sensors import PROXIMITY_RANGE_M
 from swarm_forage_env.world.state import CacheState, ObjectState, SwarmState
 

@@ -18,9 +18,9 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env._internal.fields import ConfigError, number
 from swarm_forage_env._internal.files import check_file, replacing
+from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.contract.types import FloatArray
 
 Figure: TypeAlias = Any

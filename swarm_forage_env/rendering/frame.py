@@ -36,7 +36,7 @@ from swarm_forage_env.rendering.view import (
     text_height,
 )
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.units import CELL_M, WALL_M
+from swarm_forage_env.scenarios.floor import CELL_M, WALL_M
 from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from importlib import resources
 from string import Template
 from typing import Any
 
-from swarm_forage_env._internal.parsing import parse_json
+from swarm_forage_env._internal.files import parse_json
 
 SCRIPTS = (
     "theme.js",

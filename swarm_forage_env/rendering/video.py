@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env._internal.fields import number
 from swarm_forage_env._internal.files import replacing
+from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.rendering.view import (
     CACHE_OPACITY,
     NEST_OPACITY,

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env._internal.fields import ConfigError, as_whole, one_of
+from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.rendering.paint import Colour
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.units import CELL_M, WALL_M
+from swarm_forage_env.scenarios.floor import CELL_M, WALL_M
 
 if TYPE_CHECKING:
     from PIL import ImageFont

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_forage_env._internal.extras import install_command
+from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.rendering.view import PALETTE, Palette, RenderError, text_font
 
 PANEL_PX = 320

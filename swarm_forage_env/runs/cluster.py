@@ -13,8 +13,8 @@ from contextlib import ExitStack, contextmanager
 from multiprocessing import resource_tracker
 from typing import Any
 
-from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.runs.workers import available_cores
 
 LOCAL, SLURM, SLURM_JOBS = "local", "slurm", "slurm-jobs"

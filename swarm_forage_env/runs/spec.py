@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swarm_forage_env._internal.fields import ConfigError, instance, known_keys, table, text, whole
-from swarm_forage_env._internal.parsing import parse_json
+from swarm_forage_env._internal.files import parse_json
 from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.mixed import agreed_caches
 from swarm_forage_env.policies.mixture import Part, is_mixture, mixture_of, mixture_parts, part_sizes

@@ -14,8 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.files import replacing
-from swarm_forage_env._internal.parsing import parse_json
+from swarm_forage_env._internal.files import parse_json, replacing
 from swarm_forage_env.runs.record import RecordError, RunRecord, software_versions
 from swarm_forage_env.runs.spec import RunSpec
 

@@ -12,12 +12,13 @@ from typing import Any, TypeVar, cast
 
 from swarm_forage_env._internal import fields
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.scenarios.obstacles import Rectangle, blocked_cells, check_obstacles, covered_area_m2
-from swarm_forage_env.scenarios.performance import performance_of
-from swarm_forage_env.scenarios.quirks import Quirks
-from swarm_forage_env.scenarios.regions import (
+from swarm_forage_env.scenarios.floor import (
+    CELL_M,
+    CELLS_PER_M,
+    EAST_WALL_M,
     PLACEMENTS,
     POSITIONS,
+    WALL_M,
     Box,
     cache_centre_box,
     capacity,
@@ -25,8 +26,10 @@ from swarm_forage_env.scenarios.regions import (
     overlap_cells,
     source_boxes,
 )
-from swarm_forage_env.scenarios.robots import RobotConfig
-from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M, EAST_WALL_M, WALL_M, WHEEL_SCALE_MPS
+from swarm_forage_env.scenarios.obstacles import Rectangle, blocked_cells, check_obstacles, covered_area_m2
+from swarm_forage_env.scenarios.performance import performance_of
+from swarm_forage_env.scenarios.quirks import Quirks
+from swarm_forage_env.scenarios.robots import WHEEL_SCALE_MPS, RobotConfig
 
 CACHE_KINDS = ("none", "static", "dynamic")
 PHYSICS_ENGINES = ("chipmunk", "compiled")
@@ -146,7 +149,7 @@ class ObjectConfig:
 
     n_objects: int
     placement: str
-    """One of `regions.PLACEMENTS`, or `regions.POSITIONS`."""
+    """One of `floor.PLACEMENTS`, or `floor.POSITIONS`."""
     object_positions_m: tuple[tuple[float, float], ...] = ()
     """With placement "positions": places (x, y) in m; an object lies on the cell around one of them."""
     walk_probability: float = 0.0
@@ -345,7 +348,7 @@ class ScenarioConfig:
 
     @property
     def source_cells(self) -> tuple[Box, ...]:
-        """Cells of the source regions, half-open; power-law clusters are drawn at reset (`regions.source_boxes`)."""
+        """Cells of the source regions, half-open; power-law clusters are drawn at reset (`floor.source_boxes`)."""
         return self._cells_of_positions or source_boxes(self.objects.placement, *self.arena.n_cells)
 
     @property
@@ -381,7 +384,7 @@ class ScenarioConfig:
 
     @property
     def cache_centre_cells(self) -> Box:
-        """Cells for centres of dynamic caches, half-open (`regions.cache_centre_box`)."""
+        """Cells for centres of dynamic caches, half-open (`floor.cache_centre_box`)."""
         return cache_centre_box(*self.arena.n_cells, round(self.cache_side_nominal_m / CELL_M))
 
     @property

@@ -13,8 +13,8 @@ from typing import Any, cast
 import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, known_keys, number, text
-from swarm_forage_env._internal.printable import shown
-from swarm_forage_env.scenarios.kinds import RobotKind
+from swarm_forage_env._internal.wording import shown
+from swarm_forage_env.scenarios.robots import RobotKind
 
 KINDS = ("uniform", "log_uniform", "choice", "same_as")
 """Ways to draw a value: all numbers of a range alike, all orders of magnitude alike, one of a list, and the value of

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from swarm_forage_env._internal import fields
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.printable import shown
-from swarm_forage_env.scenarios.regions import Box
-from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M
+from swarm_forage_env._internal.wording import shown
+from swarm_forage_env.scenarios.floor import CELL_M, CELLS_PER_M, Box
 
 Rectangle: TypeAlias = tuple[float, float, float, float]
 """x low, y low, x high, y high in m."""

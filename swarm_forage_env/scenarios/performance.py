@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.scenarios.columns import (
     CONTRIBUTED_COLUMNS,
     COUNTED_OF_PARTS,

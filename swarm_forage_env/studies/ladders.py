@@ -17,9 +17,9 @@ from typing import Any, NamedTuple, TypeVar
 
 from swarm_forage_env._internal.fields import ConfigError, known_name, whole
 from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.overrides import arena_at_density, in_arena, robots_at_density
 from swarm_forage_env.scenarios.presets import DENSITY, SEARCH_AND_RESCUE_OBJECTS, at_density, search_and_rescue
 from swarm_forage_env.scenarios.presets import scenario as preset_scenario
-from swarm_forage_env.scenarios.sizing import arena_at_density, in_arena, robots_at_density
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.handling import HandlingCostConfig, square_costs
 from swarm_forage_env.wrappers.noise import noise_levels

@@ -28,10 +28,10 @@ from swarm_forage_env.policies.mixture import SHARE, has_open_share
 from swarm_forage_env.runs.plan import Condition, Plan
 from swarm_forage_env.runs.policy_spec import PolicySpec
 from swarm_forage_env.runs.spec import RunSpec, identity_of, wrappers_from_list, wrappers_to_list
-from swarm_forage_env.scenarios.kinds import words_of_kind
 from swarm_forage_env.scenarios.overrides import field_sections, field_types, parse_tuple
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.quirks import RULES
+from swarm_forage_env.scenarios.robots import words_of_kind
 from swarm_forage_env.studies.ladders import CRITERIA, swarms_of_sizes, wrappers_at
 from swarm_forage_env.wrappers.registry import wrapper_config_class
 from swarm_forage_env.wrappers.world import SIZE, UNDISTURBED, World

@@ -32,8 +32,8 @@ from pathlib import Path
 from typing import Any
 
 from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, known_keys, known_name, several, table, whole
-from swarm_forage_env._internal.parsing import parse_toml
-from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env._internal.files import parse_toml
+from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.policies.mixture import Part, is_mixture, mixture_of, mixture_parts
 from swarm_forage_env.policies.registry import is_policy_file
 from swarm_forage_env.runs.policy_spec import PolicySpec, policy_spec

@@ -16,8 +16,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from swarm_forage_env._internal.fields import ConfigError, whole
-from swarm_forage_env._internal.files import replacing
-from swarm_forage_env._internal.parsing import parse_json
+from swarm_forage_env._internal.files import parse_json, replacing
 from swarm_forage_env.runs.record import RecordError
 from swarm_forage_env.runs.runner import Outcomes, longest_first, run_specs
 from swarm_forage_env.runs.spec import RunSpec

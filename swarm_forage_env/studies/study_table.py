@@ -20,8 +20,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from swarm_forage_env._internal.files import replacing
-from swarm_forage_env._internal.parsing import parse_json
+from swarm_forage_env._internal.files import parse_json, replacing
 from swarm_forage_env.runs.plan import Condition, Plan
 from swarm_forage_env.runs.record import COLUMN_DTYPES, PACKAGES, RecordError, RunRecord, record_of
 from swarm_forage_env.runs.spec import RunSpec

@@ -18,8 +18,7 @@ from swarm_forage_env._internal.fields import (
     text,
     whole,
 )
-from swarm_forage_env._internal.files import replacing
-from swarm_forage_env._internal.parsing import parse_json, parse_toml
+from swarm_forage_env._internal.files import parse_json, parse_toml, replacing
 from swarm_forage_env.contract.policy import layout_for
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping, learner_layout
 from swarm_forage_env.policies.pretrained import plan_file

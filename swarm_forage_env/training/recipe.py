@@ -16,10 +16,10 @@ from typing import Any
 from swarm_forage_env._internal.fields import ConfigError, known_keys, table, whole
 from swarm_forage_env.policies.interface import GivenInterface, InterfaceConfig, chosen_interface
 from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.floor import CELLS_PER_M
 from swarm_forage_env.scenarios.obstacles import stretched
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import chosen_scenario
-from swarm_forage_env.scenarios.units import CELLS_PER_M
 from swarm_forage_env.training.defaults import (
     DECISION_TICKS,
     DEFAULT_ARENAS,

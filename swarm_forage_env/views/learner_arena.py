@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, table
-from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.reset_and_step import OPTION_OF_TESTS
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.env import BatchStep, ForageEnv

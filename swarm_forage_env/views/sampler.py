@@ -42,10 +42,10 @@ from swarm_forage_env.scenarios.distributions import (
     plain_fields,
     read_fields,
 )
+from swarm_forage_env.scenarios.floor import CELL_M
 from swarm_forage_env.scenarios.overrides import field_types
 from swarm_forage_env.scenarios.presets import chosen_scenario
-from swarm_forage_env.scenarios.sensors import WINDOWS_CELLS
-from swarm_forage_env.scenarios.units import CELL_M
+from swarm_forage_env.scenarios.robots import WINDOWS_CELLS
 from swarm_forage_env.world.placement import static_cache_centres
 from swarm_forage_env.wrappers.registry import wrapper_config_class, wrappers_from_mapping
 from swarm_forage_env.wrappers.world import World

@@ -15,7 +15,7 @@ from swarm_forage_env.contract.own_functions import OwnSensor, own_sensor
 from swarm_forage_env.contract.policy import CompiledPolicy, layout_for, refused_action, refused_tasks
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.scenarios.config import MAX_HANDLING_TICKS, ScenarioConfig
-from swarm_forage_env.scenarios.units import CELLS_PER_M
+from swarm_forage_env.scenarios.floor import CELLS_PER_M
 from swarm_forage_env.world.allocation import new_arrays, new_state
 from swarm_forage_env.world.bodies import Bodies
 from swarm_forage_env.world.caches import (

@@ -8,8 +8,7 @@ import numpy as np
 from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, Counter, ObjectStatus, Task
 from swarm_forage_env.contract.types import BoolArray, CodeArray, IntArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.regions import Box, overlap_cells, square_box
-from swarm_forage_env.scenarios.units import CELL_M
+from swarm_forage_env.scenarios.floor import CELL_M, Box, overlap_cells, square_box
 from swarm_forage_env.world.placement import Source, static_cache_centres
 from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState, listed, make_list
 

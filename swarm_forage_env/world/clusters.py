@@ -14,7 +14,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import CELL_NEST
 from swarm_forage_env.contract.types import IntArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.regions import Box
+from swarm_forage_env.scenarios.floor import Box
 
 GUESSES = 100
 """Random places tried per cluster before the whole layout is drawn again (study: 100 tries)."""

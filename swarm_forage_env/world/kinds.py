@@ -7,9 +7,7 @@ import numpy as np
 
 from swarm_forage_env.contract.layout import KIND_COLUMNS, WINDOW_CELLS, ObservationLayout
 from swarm_forage_env.contract.types import FloatArray, IntArray, ObsArray
-from swarm_forage_env.scenarios.kinds import RobotKind
-from swarm_forage_env.scenarios.robots import RobotConfig
-from swarm_forage_env.scenarios.sensors import SENSORS
+from swarm_forage_env.scenarios.robots import SENSORS, RobotConfig, RobotKind
 
 
 def speeds(robots: RobotConfig) -> FloatArray:

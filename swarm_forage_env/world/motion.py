@@ -27,7 +27,7 @@ import numpy as np
 
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.units import WHEEL_SCALE_MPS
+from swarm_forage_env.scenarios.robots import WHEEL_SCALE_MPS
 from swarm_forage_env.world.kinds import speeds
 from swarm_forage_env.world.state import Motion, Touching
 

@@ -13,9 +13,8 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.types import FloatArray, IntArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.floor import CELL_M, Box, overlap_cells, square_box
 from swarm_forage_env.scenarios.obstacles import distances_m
-from swarm_forage_env.scenarios.regions import Box, overlap_cells, square_box
-from swarm_forage_env.scenarios.units import CELL_M
 from swarm_forage_env.world.clusters import draw_clusters
 from swarm_forage_env.world.kernels.placement import DRAWS, UNLIMITED, scatter
 from swarm_forage_env.world.state import ObjectState, listed, make_list

@@ -15,7 +15,8 @@ from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.layout import KIND, LIGHT_IF_CARRYING, MESSAGES, NEIGHBOURS, ObservationLayout
 from swarm_forage_env.contract.types import ObsArray
 from swarm_forage_env.scenarios.config import ArenaConfig, ScenarioConfig
-from swarm_forage_env.scenarios.units import CELL_M, WHEEL_SCALE_MPS
+from swarm_forage_env.scenarios.floor import CELL_M
+from swarm_forage_env.scenarios.robots import WHEEL_SCALE_MPS
 from swarm_forage_env.world.kinds import blank_boxes, half_windows, kind_columns
 from swarm_forage_env.world.physics import obstacle_rows
 from swarm_forage_env.world.state import Columns, ObjectState, Sensors, SwarmState

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.cli import training_report
 from swarm_forage_env.cli.option_groups import WorldOptions
 from swarm_forage_env.cli.train import train

@@ -23,8 +23,8 @@ from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.rendering.view import RenderError
 from swarm_forage_env.runs.run import LiveRun, build_env, run_one
 from swarm_forage_env.runs.spec import plan_run
-from swarm_forage_env.scenarios.kinds import RobotKind, kind_sizes
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.scenarios.robots import RobotKind, kind_sizes
 from swarm_forage_env.wrappers.recorder import TOTALS
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.world import World

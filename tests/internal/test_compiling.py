@@ -139,7 +139,8 @@ NOT_COMPILED_IN = {
         "scenarios/quirks",  # a dataclass; kernels are handed single switches
         "_internal/numba_settings",  # where numba looks for settings
         "_internal/rng",  # kernels are handed the numbers
-        "_internal/spelling",  # error messages
+        "_internal/fields",  # checks of configurations
+        "_internal/wording",  # error messages
     )
 }
 """Imported beside kernels, but never compiled into them."""

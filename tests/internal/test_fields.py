@@ -9,7 +9,7 @@ import pytest
 from metrics import checks
 from swarm_forage_env._internal import fields
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env._internal.wording import suggestion
 
 HUGE = 10**400
 """Too large for a float."""

@@ -11,8 +11,8 @@ from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.policies.kernels.sites import SiteMemory
 from swarm_forage_env.policies.learned import LearnedPolicy
-from swarm_forage_env.scenarios.kinds import RobotKind
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.scenarios.robots import RobotKind
 from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.plans import plan_arena
 from swarm_forage_env.wrappers.registry import parse_wrapper

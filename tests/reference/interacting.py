@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, field
 
 from swarm_forage_env.contract.codes import Event
-from swarm_forage_env.scenarios.regions import Box
+from swarm_forage_env.scenarios.floor import Box
 
 GRASP, RELEASE, DELIVER, SITE, CREATE_CACHE = "grasp", "release", "deliver", "site", "create"
 Request = tuple[str, int | None]

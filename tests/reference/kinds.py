@@ -3,7 +3,7 @@
 import numpy as np
 
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.scenarios.kinds import RobotKind, kind_sizes
+from swarm_forage_env.scenarios.robots import RobotKind, kind_sizes
 from tests.reference import motion, sensing
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from swarm_forage_env.contract.codes import CELL_EMPTY
 from swarm_forage_env.contract.types import FloatArray, IntArray
-from swarm_forage_env.scenarios.regions import Box
+from swarm_forage_env.scenarios.floor import Box
 from swarm_forage_env.world.kernels.placement import TRIES, UNLIMITED
 from swarm_forage_env.world.placement import Source
 

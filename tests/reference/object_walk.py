@@ -4,7 +4,7 @@ import numpy as np
 
 from swarm_forage_env.contract.codes import CELL_EMPTY, ObjectStatus
 from swarm_forage_env.contract.types import FloatArray
-from swarm_forage_env.scenarios.regions import Box
+from swarm_forage_env.scenarios.floor import Box
 from swarm_forage_env.world.state import ObjectState
 
 GAPS_AFTER = (5, 40, 43, 45, 47, 50, 52, 55, 57, 60, 62, 65, 67, 70, 72, 75, 77, 81, 86, 91, *range(95, 156, 5))

@@ -8,9 +8,9 @@ from swarm_forage_env.contract.layout import observation_layout
 from swarm_forage_env.contract.policy import RememberedPlaces
 from swarm_forage_env.rendering.close_up import render_close_up
 from swarm_forage_env.rendering.view import PALETTE, THEMES
+from swarm_forage_env.scenarios.floor import CELL_M
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.scenarios.units import CELL_M
 from swarm_forage_env.world.allocation import new_objects
 from swarm_forage_env.world.state import CacheState, SwarmState
 

@@ -21,8 +21,8 @@ from swarm_forage_env.rendering.view import (
     legend_rows,
 )
 from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.floor import CELL_M
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.scenarios.units import CELL_M
 from swarm_forage_env.world.allocation import new_objects
 from swarm_forage_env.world.state import CacheState, StepEvents, SwarmState
 from tests.support.colours import VISION, seen_lab

@@ -18,11 +18,10 @@ from swarm_forage_env.scenarios.config import (
     from_mapping,
     to_mapping,
 )
-from swarm_forage_env.scenarios.kinds import RobotKind
 from swarm_forage_env.scenarios.overrides import field_sections, with_overrides
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, SEARCH_AND_RESCUE_OBJECTS, scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
-from swarm_forage_env.scenarios.robots import RobotConfig
+from swarm_forage_env.scenarios.robots import RobotConfig, RobotKind
 
 PRESETS = [scenario(name) for name in SCENARIO_NAMES] + [
     scenario("search_and_rescue", side_m=side) for side in SEARCH_AND_RESCUE_OBJECTS

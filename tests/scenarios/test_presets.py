@@ -5,7 +5,7 @@ import math
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.scenarios.overrides import with_overrides
+from swarm_forage_env.scenarios.overrides import robots_at_density, with_overrides
 from swarm_forage_env.scenarios.presets import (
     DENSITY,
     SCENARIO_NAMES,
@@ -18,7 +18,6 @@ from swarm_forage_env.scenarios.presets import (
     warehouse_small,
 )
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
-from swarm_forage_env.scenarios.sizing import robots_at_density
 
 SIDES = (16, 32, 48, 64, 80, 96, 112, 128)
 ROBOTS = (12, 51, 115, 204, 320, 460, 627, 819)

@@ -5,10 +5,9 @@ import math
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.scenarios.overrides import with_overrides
+from swarm_forage_env.scenarios.floor import source_boxes
+from swarm_forage_env.scenarios.overrides import robots_at_density, with_overrides
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, at_density, chosen_scenario, scenario
-from swarm_forage_env.scenarios.regions import source_boxes
-from swarm_forage_env.scenarios.sizing import robots_at_density
 from swarm_forage_env.views.pettingzoo import parallel_env
 from swarm_forage_env.world.placement import static_cache_centres
 

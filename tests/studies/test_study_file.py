@@ -8,7 +8,7 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import pretrained
-from swarm_forage_env.scenarios.kinds import RobotKind
+from swarm_forage_env.scenarios.robots import RobotKind
 from swarm_forage_env.studies import study_file
 from swarm_forage_env.studies.ladders import BUDGETS
 from swarm_forage_env.studies.study import Axis, Place, StudySpec

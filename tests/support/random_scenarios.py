@@ -4,14 +4,12 @@ from random import Random
 from typing import Any
 
 from swarm_forage_env.scenarios.config import CACHE_KINDS, PHYSICS_ENGINES, RewardConfig, ScenarioConfig, to_mapping
-from swarm_forage_env.scenarios.kinds import RobotKind
+from swarm_forage_env.scenarios.floor import CELLS_PER_M, PLACEMENTS, POSITIONS
 from swarm_forage_env.scenarios.obstacles import MIN_SIDE_M
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, QUIRK_NAMES, Quirks
-from swarm_forage_env.scenarios.regions import PLACEMENTS, POSITIONS
-from swarm_forage_env.scenarios.sensors import SENSORS, WINDOWS_CELLS
-from swarm_forage_env.scenarios.units import CELLS_PER_M
+from swarm_forage_env.scenarios.robots import SENSORS, WINDOWS_CELLS, RobotKind
 from swarm_forage_env.views.sampler import SampledWorld, ScenarioSampler
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.handling import HandlingCostConfig

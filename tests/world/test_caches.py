@@ -8,8 +8,8 @@ import pytest
 
 from swarm_forage_env.contract.codes import CELL_CACHE, Counter, Grip, ObjectStatus, Task
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.scenarios.floor import square_box
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
-from swarm_forage_env.scenarios.regions import square_box
 from swarm_forage_env.world.allocation import new_objects
 from swarm_forage_env.world.caches import (
     count_cache_users,

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from swarm_forage_env.contract.codes import CELL_CACHE, Counter, Event, Grip, ObjectStatus
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.scenarios.floor import overlap_cells, square_box
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import Quirks
-from swarm_forage_env.scenarios.regions import overlap_cells, square_box
 from swarm_forage_env.world.caches import MAX_PASSES, cache_members, clear_centre, protected_boxes
 from swarm_forage_env.world.placement import Source, place_objects
 from swarm_forage_env.world.state import listed

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.scenarios.floor import square_box
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.scenarios.regions import square_box
 from swarm_forage_env.world.caches import clear_centre, n_cache_slots
 
 NARROW = {"width_m": 32.0, "nest_size_m": (3.2, 3.2), "start_margin_m": 0.5, "n_objects": 9}

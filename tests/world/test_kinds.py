@@ -12,7 +12,7 @@ from swarm_forage_env.contract.own_functions import register_sensor
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.runs.run import build_env
-from swarm_forage_env.scenarios.kinds import RobotKind
+from swarm_forage_env.scenarios.robots import RobotKind
 from swarm_forage_env.views.arenas import ArenaBatch
 from swarm_forage_env.views.plans import plan_arena
 from swarm_forage_env.wrappers.registry import parse_wrapper

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import binomtest, chisquare
 
 from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, ObjectStatus
-from swarm_forage_env.scenarios.regions import Box, distributable_box
+from swarm_forage_env.scenarios.floor import Box, distributable_box
 from swarm_forage_env.world.kernels.walk import OPEN_BORDERS, can_step, crosses_open_border, walk
 from swarm_forage_env.world.state import ObjectState
 from tests.reference.object_walk import GAPS_AFTER, walk_slowly

@@ -9,8 +9,8 @@ from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, ObjectStatus
 from swarm_forage_env.contract.types import IntArray
 from swarm_forage_env.scenarios.config import ArenaConfig, ObjectConfig, ScenarioConfig
+from swarm_forage_env.scenarios.floor import PLACEMENTS, Box, source_boxes
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
-from swarm_forage_env.scenarios.regions import PLACEMENTS, Box, source_boxes
 from swarm_forage_env.scenarios.robots import RobotConfig
 from swarm_forage_env.world.allocation import new_objects
 from swarm_forage_env.world.kernels.placement import DRAWS, UNLIMITED, count_objects, draw_source_cell, scatter

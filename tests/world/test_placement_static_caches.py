@@ -5,8 +5,8 @@ import itertools
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.scenarios.floor import overlap_cells
 from swarm_forage_env.scenarios.presets import SEARCH_AND_RESCUE_OBJECTS, scenario
-from swarm_forage_env.scenarios.regions import overlap_cells
 from swarm_forage_env.world.placement import static_cache_centres
 
 CACHE_SIDES = {16: 15, 32: 31, 48: 47, 64: 63, 80: 79, 96: 95, 112: 111, 128: 127}

@@ -21,9 +21,9 @@ from swarm_forage_env.inspect.replay.frames import Replay, ReplayError
 from swarm_forage_env.rendering.page import PageError, build_page, take_page_apart
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.kinds import RobotKind, kind_sizes
+from swarm_forage_env.scenarios.floor import CELL_M, WALL_M
 from swarm_forage_env.scenarios.performance import performance_of
-from swarm_forage_env.scenarios.units import CELL_M, WALL_M
+from swarm_forage_env.scenarios.robots import RobotKind, kind_sizes
 from swarm_forage_env.wrappers.recorder import TOTALS
 
 FORMAT = "swarm_forage_env replay"

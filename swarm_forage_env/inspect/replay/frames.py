@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.units import CELL_M
+from swarm_forage_env.scenarios.floor import CELL_M
 
 POSITION_STEP_M = 0.005
 """Positions are stored in steps of this size (our choice: 3 % of a robot's diameter), or larger ones in huge arenas."""

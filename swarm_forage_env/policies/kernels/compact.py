@@ -6,7 +6,7 @@ from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.detection import is_obstacle_vector, ring_sum, sees_cache, sees_nest
 from swarm_forage_env.contract.layout import GROUND_SENSORS, RING_SENSORS, WINDOW_CELLS
 from swarm_forage_env.contract.types import ObsArray
-from swarm_forage_env.scenarios.units import CELLS_PER_M
+from swarm_forage_env.scenarios.floor import CELLS_PER_M
 
 COMPACT_COLUMNS = 23
 VIEW_REACH_M = 1.0

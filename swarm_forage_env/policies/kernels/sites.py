@@ -15,7 +15,7 @@ import numpy as np
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.policies.kernels.compact import nearest_object, write_direction
-from swarm_forage_env.scenarios.units import CELLS_PER_M
+from swarm_forage_env.scenarios.floor import CELLS_PER_M
 
 N_SITES = 2
 SITE_COLUMNS = 4

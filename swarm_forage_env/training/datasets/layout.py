@@ -23,8 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from swarm_forage_env._internal.fields import ConfigError, known_keys, table
-from swarm_forage_env._internal.files import replacing
-from swarm_forage_env._internal.parsing import parse_json
+from swarm_forage_env._internal.files import parse_json, replacing
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping
 from swarm_forage_env.runs.spec import RunSpec
 

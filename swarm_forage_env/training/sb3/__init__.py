@@ -3,7 +3,7 @@
 It needs stable_baselines3 and torch; install them with the `train` extra.
 """
 
-from swarm_forage_env._internal.extras import install_command
+from swarm_forage_env._internal.wording import install_command
 
 try:
     from swarm_forage_env.training.sb3.buffers import ActiveRolloutBuffer, PresentReplayBuffer

@@ -16,7 +16,7 @@ from typing import Any
 from stable_baselines3.common.callbacks import BaseCallback
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env._internal.wording import suggestion
 
 CALLBACK_ENTRY_POINTS = "swarm_forage_env.callbacks"
 """Entry-point group under which installed packages offer classes of callbacks by name."""

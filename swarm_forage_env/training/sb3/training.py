@@ -26,7 +26,7 @@ from stable_baselines3.common.utils import safe_mean
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import check_folder, replacing
-from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.learned import LearnedPolicy

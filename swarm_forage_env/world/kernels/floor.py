@@ -16,7 +16,7 @@ from swarm_forage_env.contract.layout import (
     WINDOW_CELLS,
 )
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray, Row
-from swarm_forage_env.scenarios.units import CELLS_PER_M
+from swarm_forage_env.scenarios.floor import CELLS_PER_M
 from swarm_forage_env.world.state import CacheState
 
 _GROUND_X = np.array([0.063, 0.063, -0.063, -0.063])

@@ -8,7 +8,7 @@ possible in every tick until then. A RELEASE onto open floor acts at once.
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, GRIP_LOWER_ENDS, Counter, Event, ObjectStatus
 from swarm_forage_env.contract.types import ActionArray, FloatArray, IntArray
-from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M
+from swarm_forage_env.scenarios.floor import CELL_M, CELLS_PER_M
 from swarm_forage_env.world.state import CacheState, ObjectState, Rules, StepEvents, SwarmState, WorldState
 
 NO_REQUEST = 0

@@ -5,7 +5,7 @@ import numpy as np
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.codes import CELL_EMPTY, ObjectStatus
 from swarm_forage_env.contract.types import CodeArray, FloatArray, IntArray
-from swarm_forage_env.scenarios.units import CELL_M
+from swarm_forage_env.scenarios.floor import CELL_M
 
 _FREE = int(ObjectStatus.FREE)
 _STUDY_CELLS = 640

@@ -11,8 +11,15 @@ from swarm_forage_env import ConfigError, plan_run, scenario
 from swarm_forage_env.cli.scenario_options import parse_setting
 from swarm_forage_env.contract.layout import WINDOW_CELLS, observation_layout
 from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping, to_mapping
-from swarm_forage_env.scenarios.kinds import RobotKind, kind_from_words, kind_rows, kind_sizes, words_of_kind
-from swarm_forage_env.scenarios.sensors import SENSORS, WINDOWS_CELLS
+from swarm_forage_env.scenarios.robots import (
+    SENSORS,
+    WINDOWS_CELLS,
+    RobotKind,
+    kind_from_words,
+    kind_rows,
+    kind_sizes,
+    words_of_kind,
+)
 from swarm_forage_env.studies.study import Axis, list_word
 from swarm_forage_env.views.sampler import SampledWorld, ScenarioSampler
 

@@ -1,4 +1,4 @@
-"""Which cells objects may lie on: pure integer geometry of the floor grid.
+"""The floor: its cells and walls, and which cells objects may lie on, as pure integer geometry.
 
 A box is (x low, y low, x high, y high) in cells, half-open: x low <= x < x high.
 Integer arithmetic throughout, because 0.2 m and the shares below are not exact in binary.
@@ -8,6 +8,16 @@ from collections.abc import Iterable
 from typing import TypeAlias
 
 import numpy as np
+
+CELL_M = 0.2
+"""Side of a floor cell and of an object."""
+CELLS_PER_M = 5.0
+"""Cell index = floor(coordinate * 5); dividing by 0.2 would truncate 0.6 m to cell 2."""
+WALL_M = 0.2
+"""How far the walls in the west, south and north reach into the arena: half of their 0.4 m; the other half stands
+outside."""
+EAST_WALL_M = 0.4
+"""How far the wall in the east reaches into the arena: all of it."""
 
 Box: TypeAlias = tuple[int, int, int, int]
 

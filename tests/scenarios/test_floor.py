@@ -2,9 +2,15 @@
 
 import pytest
 
+from swarm_forage_env.scenarios.floor import (
+    CELL_M,
+    PLACEMENTS,
+    capacity,
+    distributable_box,
+    overlap_cells,
+    source_boxes,
+)
 from swarm_forage_env.scenarios.presets import SEARCH_AND_RESCUE_OBJECTS, scenario
-from swarm_forage_env.scenarios.regions import PLACEMENTS, capacity, distributable_box, overlap_cells, source_boxes
-from swarm_forage_env.scenarios.units import CELL_M
 
 
 @pytest.mark.parametrize(
