@@ -7,8 +7,7 @@
 Each returns None if all is well, and otherwise raises a `CheckError` about the first fault.
 """
 
-from .environments import check_env
-from .faults import CheckError
+from .environments import CheckError, check_env
 from .policies import check_policy
 from .runs import check_determinism
 

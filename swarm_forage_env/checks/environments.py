@@ -1,4 +1,4 @@
-"""Does an environment keep the rules of PettingZoo, its spaces and its seeds?"""
+"""Does an environment keep the rules of PettingZoo, its spaces and its seeds? And what every check raises."""
 
 import contextlib
 import copy
@@ -14,7 +14,18 @@ from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.wrappers.base import SwarmWrapper
 
-from .faults import CheckError, summary
+
+class CheckError(ValueError):
+    """An environment or a policy that breaks a promise; the message says what was expected, what came, what to do."""
+
+
+def summary(values: Any) -> str:
+    """Return kind and range of values, for messages."""
+    array = np.asarray(values)
+    shown = f"{array.dtype} of shape {array.shape}"
+    if array.size and array.dtype.kind in "fiub":
+        shown += f" from {array.min():g} to {array.max():g}"
+    return shown
 
 
 def check_env(env: ParallelEnv[str, Any, Any], *, ticks: int = 60) -> None:

@@ -17,9 +17,8 @@ from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import with_overrides
 
-from .faults import CheckError, summary
-from .runs import INTERVAL_TICKS, check_compiled
-from .subjects import built, config_for, factory_of
+from .environments import CheckError, summary
+from .runs import INTERVAL_TICKS, built, check_compiled, config_for, factory_of
 
 
 def check_policy(

@@ -1,18 +1,24 @@
 """Are whole runs of a policy equal: with equal seeds, and with and without Python between ticks?"""
 
-from collections.abc import Sequence
+import copy
+import inspect
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
+from pathlib import PurePath
 from typing import Any
 
 import numpy as np
 
 from swarm_forage_env.contract.policy import Policy
+from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import LiveRun, build_env, build_stack
-from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.runs.spec import chosen_caches
+from swarm_forage_env.scenarios.config import CACHE_KINDS, ScenarioConfig
+from swarm_forage_env.scenarios.presets import scenario as preset
 from swarm_forage_env.wrappers.recorder import RunRecorder
 
-from .faults import CheckError
-from .subjects import built, config_for, factory_of
+from .environments import CheckError
 
 INTERVAL_TICKS = 10
 """Length of a recording interval in compared records. Our choice: short, so that small differences are seen."""
@@ -100,3 +106,36 @@ def check_compiled(policy: Policy, config: ScenarioConfig, seed: int, ticks: int
             f"Expected what compiled returns to do what act does, got another {different} in a run of "
             f"{config.horizon_ticks} ticks; let both call one kernel, with the same draws in every tick."
         )
+
+
+def factory_of(policy: Any) -> Callable[[], Any]:
+    """Return what builds a fresh policy: by name, by path, from a class, or as a copy of an object."""
+    if isinstance(policy, str | PurePath):
+        return partial(load_policy, policy)
+    if inspect.isclass(policy):
+        return policy
+    return partial(copy.deepcopy, policy)
+
+
+def built(build: Callable[[], Any]) -> Policy:
+    """Return a fresh policy; raises CheckError for something that is none."""
+    policy = build()
+    missing = [name for name in ("reset", "act") if not callable(getattr(policy, name, None))]
+    if missing:
+        raise CheckError(
+            f"Expected a policy with the methods reset and act, got {policy!r} without {' and '.join(missing)}; a "
+            "function from observations to actions becomes a policy by from_callable(function)."
+        )
+    return policy
+
+
+def config_for(policy: Policy, scenario: str | ScenarioConfig) -> ScenarioConfig:
+    """Return a scenario with the caches of `chosen_caches`; raises CheckError for caches that there are not."""
+    caches = getattr(policy, "caches", None)
+    if caches is not None and caches not in CACHE_KINDS:
+        raise CheckError(
+            f"Expected caches of the policy to be one of {', '.join(CACHE_KINDS)}, got {caches!r}; leave the attribute "
+            "out where it does not matter."
+        )
+    config = preset(scenario) if isinstance(scenario, str) else scenario
+    return replace(config, caches=chosen_caches(None, policy, config))
