@@ -16,7 +16,8 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-FOLDERS = ("swarm_forage_env/rendering/kernels", "swarm_forage_env/world/kernels", "swarm_forage_env/wrappers/kernels")
+PLACES = ("rendering/kernels.py", "world/kernels/*.py", "wrappers/kernels.py")
+"""Where they are, in `swarm_forage_env`."""
 TESTS = (
     "tests/promises/test_conservation.py",
     "tests/rendering/test_paint.py",
@@ -40,11 +41,11 @@ ELSEWHERE = {
 
 
 def kernels() -> set[str]:
-    """Return the names of all kernels in `FOLDERS`, as file.function."""
+    """Return the names of all kernels in `PLACES`, as file.function."""
     return {
         f"{file.stem}.{node.name}"
-        for folder in FOLDERS
-        for file in (ROOT / folder).glob("*.py")
+        for place in PLACES
+        for file in (ROOT / "swarm_forage_env").glob(place)
         for node in ast.parse(file.read_text(encoding="utf-8")).body
         if isinstance(node, ast.FunctionDef)
         and any(isinstance(decorator, ast.Name) and decorator.id == "kernel" for decorator in node.decorator_list)

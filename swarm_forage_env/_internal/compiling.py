@@ -44,23 +44,30 @@ _COMPILED_IN_EVERYWHERE = tuple(
     )
 )
 """Modules whose functions and constants are compiled into those of other folders."""
-_COMPILED_IN_BY_FOLDER = {
+_COMPILED_IN_BY_ROOM = {
     _PACKAGE / "world/kernels": (_PACKAGE / "world/state.py",),
-    _PACKAGE / "wrappers/kernels": (_PACKAGE / "world/kernels/drive.py", _PACKAGE / "world/kernels/kinds.py"),
+    _PACKAGE / "wrappers/kernels.py": (_PACKAGE / "world/kernels/drive.py", _PACKAGE / "world/kernels/kinds.py"),
 }
-"""Further modules that are compiled into the functions of one folder."""
+"""Further modules that are compiled into the functions of one room; see `room_of`."""
 
 
 @functools.cache
-def _digest_of_sources(folder: Path) -> str:
-    """Digest of every source from which something may be compiled into a function of `folder`."""
-    return hashlib.sha256(b"".join(file.read_bytes() for file in sources_of(folder))).hexdigest()
+def _digest_of_sources(room: Path) -> str:
+    """Digest of every source from which something may be compiled into a function of `room`."""
+    return hashlib.sha256(b"".join(file.read_bytes() for file in sources_of(room))).hexdigest()
 
 
-def sources_of(folder: Path) -> tuple[Path, ...]:
-    """Return every source from which something may be compiled into a function of `folder`, sorted."""
-    own = () if folder == _PACKAGE / "contract" else folder.glob("*.py")  # that folder is listed file by file
-    return tuple(sorted({*own, *_COMPILED_IN_EVERYWHERE, *_COMPILED_IN_BY_FOLDER.get(folder, ())}))
+def room_of(file: Path) -> Path:
+    """Return what may be compiled into each other together with a file: its folder, or itself if it is `kernels.py`."""
+    return file if file.name == "kernels.py" else file.parent
+
+
+def sources_of(room: Path) -> tuple[Path, ...]:
+    """Return every source from which something may be compiled into a function of a room, sorted."""
+    own = room.glob("*.py") if room.is_dir() else (room,)
+    if room == _PACKAGE / "contract":  # that folder is listed file by file
+        own = ()
+    return tuple(sorted({*own, *_COMPILED_IN_EVERYWHERE, *_COMPILED_IN_BY_ROOM.get(room, ())}))
 
 
 def kernel(function: F) -> F:
@@ -135,7 +142,7 @@ def _keep_on_disk(compiled: Any, mark: str, read_by: type[CompileResultCacheImpl
     # By itself numba watches only the file of the function, and would keep what it has compiled into it from others. It
     # offers no public way to watch more. The version is what it looks at first, before it opens an index that may name
     # types which the sources no longer have.
-    cache_file._version += _digest_of_sources(Path(function.__code__.co_filename).parent)
+    cache_file._version += _digest_of_sources(room_of(Path(function.__code__.co_filename)))
     cache._cache_file = cache_file
     if read_by is not None:
         cache._impl = read_by(function)

@@ -29,21 +29,20 @@ from swarm_forage_env.contract.layout import (
 )
 from swarm_forage_env.contract.policy import COMMANDS, ActionError, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, IntArray, ObsArray
-from swarm_forage_env.policies.kernels.commands import (
+from swarm_forage_env.policies.kernels import (
+    COMPACT_COLUMNS,
     GRIP_COMMANDS,
     MOTION_WHEELS,
     N_GRIPS,
     N_MOTIONS,
-    automatic_grip,
-    mask_actions,
-    numbered_actions,
-)
-from swarm_forage_env.policies.kernels.compact import COMPACT_COLUMNS, compact_view
-from swarm_forage_env.policies.kernels.sites import (
     N_SITES,
     SITE_COLUMNS,
     SiteMemory,
+    automatic_grip,
+    compact_view,
+    mask_actions,
     new_site_memory,
+    numbered_actions,
     remember_sites,
     show_sites,
 )
@@ -97,7 +96,7 @@ class InterfaceConfig:
     """Whether the learner sees what a robot's kind can do, where its scenario has two or more. None: as for
     `neighbours_seen`."""
     site_memory: bool = False
-    """Two places that a robot remembers, see `policies.kernels.sites`: eight more columns."""
+    """Two places that a robot remembers, see `policies.kernels`: eight more columns."""
     own_sensors: tuple[str, ...] | None = None
     """Names of own sensors that the learner sees beside the columns of the package, in this order. Where nothing is
     said (None), environments and trainings fill in those of their scenario, and a policy sees none."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swarm_forage_env.contract.types import FloatArray
-from swarm_forage_env.rendering.kernels import shapes
+from swarm_forage_env.rendering import kernels
 
 Colour: TypeAlias = tuple[int, int, int]
 """Red, green, blue in 0..255."""
@@ -31,7 +31,7 @@ class Canvas:
     def __init__(self, ground: NDArray[np.uint8]) -> None:
         n_pixels = ground.shape[0] * ground.shape[1]
         self._ground = ground
-        self.sheet = shapes.Sheet(
+        self.sheet = kernels.Sheet(
             height=ground.shape[0],
             width=ground.shape[1],
             colours=ground.reshape(-1, 3).astype(np.float32),
@@ -50,7 +50,7 @@ class Canvas:
     def take_picture(self) -> NDArray[np.uint8]:
         """Return what has been painted, (H, W, 3), and clean the canvas."""
         picture = self._ground.copy()
-        shapes.take_picture(self.sheet, self._ground.reshape(-1, 3), picture.reshape(-1, 3))
+        kernels.take_picture(self.sheet, self._ground.reshape(-1, 3), picture.reshape(-1, 3))
         return picture
 
 
@@ -94,7 +94,7 @@ def paint_box(canvas: Canvas, box: tuple[float, float, float, float], colour: Co
     x, y = np.flatnonzero(across), np.flatnonzero(down)
     if x.size and y.size:
         share = (opacity * down[y, None] * across[x]).astype(np.float32)
-        shapes.paint_share(canvas.sheet, int(y[0]), int(x[0]), share, _stored(colour))
+        kernels.paint_share(canvas.sheet, int(y[0]), int(x[0]), share, _stored(colour))
 
 
 def paint_frame(
@@ -140,7 +140,7 @@ def paint_crosses(canvas: Canvas, centre: ArrayLike, radius: float, line: float,
 def paint_squares(canvas: Canvas, centre: ArrayLike, side: float, colour: Colour, opacity: float = 1.0) -> None:
     """Fill axis-aligned squares of side `side` at `centre` (n, 2)."""
     half = side / 2.0
-    shapes.paint_square(
+    kernels.paint_square(
         canvas.sheet,
         _places(centre),
         np.float32(opacity),
@@ -160,7 +160,7 @@ def paint_glows(canvas: Canvas, centre: ArrayLike, radius: float, colour: Colour
         dy = (np.arange(height)[rows] + 0.5 - y).astype(np.float32)[:, None]
         spot = np.clip(1.0 - (dx * dx + dy * dy) / (radius * radius), 0.0, 1.0) ** 3
         share[rows, columns] = np.maximum(share[rows, columns], np.float32(opacity) * spot)
-    shapes.paint_share(canvas.sheet, 0, 0, share, _stored(colour))
+    kernels.paint_share(canvas.sheet, 0, 0, share, _stored(colour))
 
 
 def _paint_round(
@@ -173,9 +173,9 @@ def _paint_round(
     colour: Colour,
     opacity: float | NDArray[np.floating] = 1.0,
 ) -> None:
-    """Call `kernels.shapes.paint_round`, which see, with numbers of the types that are stored."""
+    """Call `kernels.paint_round`, which see, with numbers of the types that are stored."""
     places = _places(middle)
-    shapes.paint_round(
+    kernels.paint_round(
         canvas.sheet,
         places,
         along,

@@ -13,8 +13,7 @@ from swarm_forage_env.contract.types import FloatArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import from_mapping
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
-from swarm_forage_env.wrappers.kernels.gaussian import to_normal
-from swarm_forage_env.wrappers.kernels.noise import garble
+from swarm_forage_env.wrappers.kernels import garble, to_normal
 from swarm_forage_env.wrappers.waveform import Sigma, check_sigma, gather_waveform, sigma_in_words, sigma_signal
 
 

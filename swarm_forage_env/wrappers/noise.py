@@ -14,8 +14,7 @@ from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, F
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import from_mapping
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
-from swarm_forage_env.wrappers.kernels.gains import noisy_gain
-from swarm_forage_env.wrappers.kernels.noise import NOT_NOISY, disturb, shift_neighbours
+from swarm_forage_env.wrappers.kernels import NOT_NOISY, disturb, noisy_gain, shift_neighbours
 from swarm_forage_env.wrappers.waveform import (
     Sigma,
     Signal,
@@ -45,7 +44,7 @@ _UNIFORM_WIDTH = 2.0 * sqrt(3.0)
 
 
 def _append_span(spans: list[tuple[int, int, int]], lows: list[float], span: tuple[int, int, int], low: float) -> None:
-    """Append a run of columns, as `kernels.noise.disturb` wants it.
+    """Append a run of columns, as `kernels.disturb` wants it.
 
     Where it goes on from the end of the last, it makes that longer, because few long runs are faster.
     """

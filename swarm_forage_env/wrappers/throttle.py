@@ -12,7 +12,7 @@ from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import from_mapping
 from swarm_forage_env.world.motion import drive_limits
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
-from swarm_forage_env.wrappers.kernels.gains import throttle
+from swarm_forage_env.wrappers.kernels import throttle
 from swarm_forage_env.wrappers.waveform import Waveform, gather_waveform
 
 IDEAL_THROTTLE = 0.10

@@ -62,28 +62,28 @@ TWINS = {
     "swarm_forage_env.contract.detection.sees_nest": COMPACT_VIEW,
     "swarm_forage_env.contract.detection.sees_object": CRW,
     "swarm_forage_env.contract.detection.sees_obstacle": INTERFERENCE,
-    "swarm_forage_env.policies.kernels.commands.automatic_grip": Twin(
+    "swarm_forage_env.policies.kernels.automatic_grip": Twin(
         "commands.automatic_grip",
         "policies/test_interface_twins.py",
         "swarm_forage_env.policies.interface.LearnerInterface.command",
     ),
-    "swarm_forage_env.policies.kernels.commands.mask_actions": Twin(
+    "swarm_forage_env.policies.kernels.mask_actions": Twin(
         "commands.allowed_actions",
         "policies/test_interface_twins.py",
         "swarm_forage_env.policies.interface.LearnerInterface.mask",
     ),
-    "swarm_forage_env.policies.kernels.commands.numbered_actions": Twin(
+    "swarm_forage_env.policies.kernels.numbered_actions": Twin(
         "commands.numbered_action",
         "policies/test_interface_twins.py",
         "swarm_forage_env.policies.interface.LearnerInterface.command",
     ),
-    "swarm_forage_env.policies.kernels.compact.compact_view": COMPACT_VIEW,
-    "swarm_forage_env.policies.kernels.sites.remember_sites": SITES,
-    "swarm_forage_env.policies.kernels.sites.show_sites": SITES,
-    "swarm_forage_env.rendering.kernels.shapes.paint_round": Twin(
+    "swarm_forage_env.policies.kernels.compact_view": COMPACT_VIEW,
+    "swarm_forage_env.policies.kernels.remember_sites": SITES,
+    "swarm_forage_env.policies.kernels.show_sites": SITES,
+    "swarm_forage_env.rendering.kernels.paint_round": Twin(
         "painting.round_share", "rendering/test_paint.py", "swarm_forage_env.rendering.paint.paint_discs"
     ),
-    "swarm_forage_env.rendering.kernels.shapes.paint_square": Twin(
+    "swarm_forage_env.rendering.kernels.paint_square": Twin(
         "painting.square_share", "rendering/test_paint.py", "swarm_forage_env.rendering.paint.paint_squares"
     ),
     "swarm_forage_env.world.kernels.beams.proximity": OBSERVED,
@@ -123,11 +123,11 @@ TWINS = {
     "swarm_forage_env.world.kernels.walk.walk": Twin(
         "object_walk.walk_slowly", "world/test_object_motion.py", "swarm_forage_env.world.kernels.walk.walk"
     ),
-    "swarm_forage_env.wrappers.kernels.noise.disturb": NOISE,
-    "swarm_forage_env.wrappers.kernels.noise.garble": Twin(
+    "swarm_forage_env.wrappers.kernels.disturb": NOISE,
+    "swarm_forage_env.wrappers.kernels.garble": Twin(
         "adversity.garbled", "wrappers/test_messages.py", "swarm_forage_env.wrappers.base.SwarmWrapper.step_batch"
     ),
-    "swarm_forage_env.wrappers.kernels.noise.shift_neighbours": Twin(
+    "swarm_forage_env.wrappers.kernels.shift_neighbours": Twin(
         "adversity.shifted_neighbours",
         "wrappers/test_messages.py",
         "swarm_forage_env.wrappers.base.SwarmWrapper.step_batch",
@@ -137,7 +137,7 @@ TWINS = {
         "wrappers/test_recorder.py",
         "swarm_forage_env.world.kernels.counting.add_task_shares",
     ),
-    "swarm_forage_env.wrappers.kernels.gains.throttle": Twin(
+    "swarm_forage_env.wrappers.kernels.throttle": Twin(
         "adversity.throttle_gain", "wrappers/test_throttle.py", "swarm_forage_env.wrappers.base.SwarmWrapper.step_batch"
     ),
 }
@@ -150,10 +150,9 @@ ONE_BY_ONE = "compared with arenas that are taken one by one in tests/world/test
 WITHOUT = {
     "swarm_forage_env.world.kernels.reward.book_rows": "sums row by row; the lives of rows are told by hand in "
     "tests/views/test_arenas.py",
-    "swarm_forage_env.rendering.kernels.shapes.paint_share": "one product per colour; by hand in "
+    "swarm_forage_env.rendering.kernels.paint_share": "one product per colour; by hand in "
     "tests/rendering/test_paint.py",
-    "swarm_forage_env.rendering.kernels.shapes.take_picture": "compared with `numpy.rint` in "
-    "tests/rendering/test_paint.py",
+    "swarm_forage_env.rendering.kernels.take_picture": "compared with `numpy.rint` in tests/rendering/test_paint.py",
     "swarm_forage_env.world.kernels.bodies.tell_poses": "compared with `unpack_poses` in tests/world/test_bodies.py",
     "swarm_forage_env.world.kernels.interact.drop_cargo": "two rules of `interact`, which has a twin; by hand in "
     "tests/world/test_interactions_timing.py",
@@ -162,7 +161,7 @@ WITHOUT = {
     "swarm_forage_env.world.kernels.lockstep.whole_each": "`tick.whole` for each world; compared with arenas that are "
     "stepped alone in tests/world/test_lockstep.py",
     "swarm_forage_env.world.kernels.reward.rewards": "a weighted sum; term by term in tests/world/test_rewards.py",
-    "swarm_forage_env.wrappers.kernels.gaussian.to_normal": "held against the distribution function in "
+    "swarm_forage_env.wrappers.kernels.to_normal": "held against the distribution function in "
     "tests/wrappers/test_noise.py",
     "swarm_forage_env.world.kernels.tick.close": IN_ORDER,
     "swarm_forage_env.world.kernels.tick.meet_and_close": IN_ORDER,
@@ -171,7 +170,6 @@ WITHOUT = {
     "tests/runs/test_compiled_runs.py",
     "swarm_forage_env.world.kernels.tick.set_out": IN_ORDER,
     "swarm_forage_env.world.kernels.tick.whole": IN_ORDER,
-    "swarm_forage_env.wrappers.kernels.gains.noisy_gain": "one product per wheel; by hand in "
-    "tests/wrappers/test_noise.py",
+    "swarm_forage_env.wrappers.kernels.noisy_gain": "one product per wheel; by hand in tests/wrappers/test_noise.py",
 }
 """Kernel -> why it has no twin here."""

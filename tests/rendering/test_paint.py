@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from swarm_forage_env.rendering.kernels import shapes
+from swarm_forage_env.rendering import kernels
 from swarm_forage_env.rendering.paint import (
     Canvas,
     Canvases,
@@ -156,9 +156,9 @@ def test_a_picture_rounds_and_leaves_the_ground():
 
 def test_a_sheet_of_colours_becomes_a_picture():
     canvas = Canvas(plain(1, 2, GROUND))
-    shapes.paint_share(canvas.sheet, 0, 1, np.full((1, 1), 0.5, np.float32), np.zeros(3, np.float32))
+    kernels.paint_share(canvas.sheet, 0, 1, np.full((1, 1), 0.5, np.float32), np.zeros(3, np.float32))
     picture = plain(1, 2, GROUND)
-    shapes.take_picture(canvas.sheet, plain(1, 2, GROUND).reshape(-1, 3), picture.reshape(-1, 3))
+    kernels.take_picture(canvas.sheet, plain(1, 2, GROUND).reshape(-1, 3), picture.reshape(-1, 3))
     assert picture.tolist() == [[[24, 31, 42], [12, 16, 21]]]
 
 

@@ -10,7 +10,7 @@ from swarm_forage_env.contract.detection import sees_cache, sees_nest, sees_obje
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import Quirks
-from swarm_forage_env.wrappers.kernels.gaussian import to_normal
+from swarm_forage_env.wrappers.kernels import to_normal
 from swarm_forage_env.wrappers.noise import (
     NOISE_GROUPS,
     ActuatorNoise,

@@ -1,1 +1,0 @@
-"""Compiled functions behind what a learned policy sees and does."""
