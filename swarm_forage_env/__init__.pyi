@@ -79,8 +79,8 @@ from .wrappers.population import PopulationDynamics as PopulationDynamics
 from .wrappers.population import PopulationConfig as PopulationConfig
 from .wrappers.handling import HandlingCost as HandlingCost
 from .wrappers.handling import HandlingCostConfig as HandlingCostConfig
-from .wrappers.messages import MessageNoise as MessageNoise
-from .wrappers.messages import MessageNoiseConfig as MessageNoiseConfig
+from .wrappers.noise import MessageNoise as MessageNoise
+from .wrappers.noise import MessageNoiseConfig as MessageNoiseConfig
 from .wrappers.waveform import Waveform as Waveform
 
 # what observations, actions and events mean

@@ -4,8 +4,7 @@ The dict API packs actions once, the whole stack runs on arrays, and observation
 wrapper costs microseconds, not a pass over all agents.
 """
 
-from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -17,6 +16,7 @@ from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, F
 from swarm_forage_env.env import BatchStep, ForageEnv
 from swarm_forage_env.scenarios import config as configs
 from swarm_forage_env.world.snapshots import Snapshot
+from swarm_forage_env.wrappers.waveform import gather_waveform
 
 STACK_ORDER = (
     "RunRecorder",
@@ -249,19 +249,26 @@ class SwarmWrapper(BaseParallelWrapper):
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class WrapperConfig(ABC):
+class WrapperConfig:
     """A wrapper as data, part of a run's specification. Subclasses are frozen dataclasses of plain values."""
 
     name: ClassVar[str]
     """Name in stored specifications and in `wrappers.registry.WRAPPERS`."""
-    stack_position: ClassVar[int]
-    """Place of the wrapper in `STACK_ORDER`."""
+    wrapper: ClassVar[type[SwarmWrapper]]
+    """What it is a configuration of."""
+    waveform_field: ClassVar[str] = ""
+    """The field that may hold a waveform, "" for none; plain values say it as `waveform.gather_waveform` reads it."""
     example: ClassVar[str] = ""
     """Settings as words of a command line that work with every scenario; errors show them."""
 
-    @abstractmethod
+    @property
+    def stack_position(self) -> int:
+        """Place of the wrapper in `STACK_ORDER`."""
+        return self.wrapper.stack_position
+
     def wrap(self, env: ForageEnv | SwarmWrapper) -> SwarmWrapper:
         """Build the wrapper around `env`."""
+        return self.wrapper(env, self)
 
     def in_words(self, dt_s: float) -> str:
         """Return the wrapper and its settings for people, in one line; pages show it.
@@ -280,13 +287,14 @@ class WrapperConfig(ABC):
         return configs.to_mapping(self)
 
     @classmethod
-    def from_mapping(cls, mapping: dict[str, Any]) -> "WrapperConfig":
-        """Build the configuration back from `to_mapping`; a class with nested dataclasses overrides this.
+    def from_mapping(cls, mapping: Mapping[str, Any]) -> "WrapperConfig":
+        """Build the configuration back from `to_mapping`; a class with other nested dataclasses overrides this.
 
         Raises:
             ConfigError: an unknown or missing key, or a value that the class refuses.
         """
-        return configs.from_mapping(cls, mapping)
+        values = gather_waveform(mapping, cls.waveform_field, cls) if cls.waveform_field else dict(mapping)
+        return configs.from_mapping(cls, values)
 
 
 def wrap_in_order(env: ForageEnv, wrappers: Iterable[WrapperConfig]) -> ForageEnv | SwarmWrapper:

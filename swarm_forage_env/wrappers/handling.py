@@ -1,14 +1,13 @@
 """HandlingCost: picking up and dropping take longer, by a waveform of time."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from swarm_forage_env._internal.fields import ConfigError, instance
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.scenarios.config import MAX_HANDLING_TICKS, from_mapping
+from swarm_forage_env.scenarios.config import MAX_HANDLING_TICKS
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
-from swarm_forage_env.wrappers.waveform import Waveform, gather_waveform
+from swarm_forage_env.wrappers.waveform import Waveform
 
 IDEAL_COST = 1.0
 """Constant cost, in ticks, that comparisons take as ideal conditions: nothing extra."""
@@ -72,7 +71,8 @@ class HandlingCostConfig(WrapperConfig):
     """
 
     name: ClassVar[str] = "handling_cost"
-    stack_position: ClassVar[int] = HandlingCost.stack_position
+    wrapper: ClassVar[type[SwarmWrapper]] = HandlingCost
+    waveform_field: ClassVar[str] = "waveform"
 
     waveform: Waveform
     """Ticks that a pick-up or a drop takes; values below those of the scenario change nothing."""
@@ -87,19 +87,10 @@ class HandlingCostConfig(WrapperConfig):
                 f"{self.waveform.peak:g}; lower its amplitude or its offset."
             )
 
-    def wrap(self, env: ForageEnv | SwarmWrapper) -> HandlingCost:
-        """Build the wrapper around `env`."""
-        return HandlingCost(env, self)
-
     def in_words(self, dt_s: float) -> str:
         """Return how long handling takes; see `WrapperConfig.in_words`."""
         # One tick is what handling takes without the wrapper.
         return f"handling cost: a pick-up or a drop takes {self.waveform.in_words(' s', factor=dt_s, floor=1.0)}"
-
-    @classmethod
-    def from_mapping(cls, mapping: Mapping[str, Any]) -> "HandlingCostConfig":
-        """Build the configuration from plain values; the waveform as `waveform.gather_waveform` reads it."""
-        return from_mapping(cls, gather_waveform(mapping, "waveform", cls))
 
 
 def square_costs() -> tuple[HandlingCostConfig, ...]:

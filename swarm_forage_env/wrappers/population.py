@@ -146,7 +146,7 @@ class PopulationConfig(WrapperConfig):
     """
 
     name: ClassVar[str] = "population"
-    stack_position: ClassVar[int] = PopulationDynamics.stack_position
+    wrapper: ClassVar[type[SwarmWrapper]] = PopulationDynamics
 
     death_per_tick: float = 0.0
     birth_per_tick: float = 0.0
@@ -177,10 +177,6 @@ class PopulationConfig(WrapperConfig):
             malfunction=self.malfunction_per_tick,
             repair=self.repair_per_tick,
         )
-
-    def wrap(self, env: ForageEnv | SwarmWrapper) -> PopulationDynamics:
-        """Build the wrapper around `env`."""
-        return PopulationDynamics(env, self)
 
     def in_words(self, dt_s: float) -> str:
         """Return how often what happens to the swarm; see `WrapperConfig.in_words`."""

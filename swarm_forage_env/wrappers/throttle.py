@@ -1,19 +1,17 @@
 """Throttle: robots lose part of their speed, by a waveform of time."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, instance, switch
 from swarm_forage_env.contract.types import ActionArray, FloatArray
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.scenarios.config import from_mapping
 from swarm_forage_env.world.motion import drive_limits
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 from swarm_forage_env.wrappers.kernels import throttle
-from swarm_forage_env.wrappers.waveform import Waveform, gather_waveform
+from swarm_forage_env.wrappers.waveform import Waveform
 
 IDEAL_THROTTLE = 0.10
 """Constant throttle that the paper's flexibility studies take as ideal conditions."""
@@ -79,7 +77,8 @@ class ThrottleConfig(WrapperConfig):
     """
 
     name: ClassVar[str] = "throttle"
-    stack_position: ClassVar[int] = Throttle.stack_position
+    wrapper: ClassVar[type[SwarmWrapper]] = Throttle
+    waveform_field: ClassVar[str] = "waveform"
 
     waveform: Waveform
     """Share of speed lost; negative values throttle nothing."""
@@ -97,19 +96,10 @@ class ThrottleConfig(WrapperConfig):
             )
         switch("throttle.carriers", self.carriers)
 
-    def wrap(self, env: ForageEnv | SwarmWrapper) -> Throttle:
-        """Build the wrapper around `env`."""
-        return Throttle(env, self)
-
     def in_words(self, dt_s: float) -> str:
         """Return who loses which share of its speed; see `WrapperConfig.in_words`."""
         who = "carrying robots" if self.carriers else "robots"
         return f"throttle: {who} lose {self.waveform.in_words(' % of their speed', factor=100.0, floor=0.0)}"
-
-    @classmethod
-    def from_mapping(cls, mapping: Mapping[str, Any]) -> "ThrottleConfig":
-        """Build the configuration from plain values; the waveform as `waveform.gather_waveform` reads it."""
-        return from_mapping(cls, gather_waveform(mapping, "waveform", cls))
 
 
 def square_throttles() -> tuple[ThrottleConfig, ...]:

@@ -22,8 +22,13 @@ from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.gymnasium import JointForageEnv
 from swarm_forage_env.wrappers.base import STACK_ORDER, WrapperConfig
 from swarm_forage_env.wrappers.handling import HandlingCostConfig
-from swarm_forage_env.wrappers.messages import MessageNoiseConfig
-from swarm_forage_env.wrappers.noise import ActuatorNoise, ActuatorNoiseConfig, SensorNoise, SensorNoiseConfig
+from swarm_forage_env.wrappers.noise import (
+    ActuatorNoise,
+    ActuatorNoiseConfig,
+    MessageNoiseConfig,
+    SensorNoise,
+    SensorNoiseConfig,
+)
 from swarm_forage_env.wrappers.population import PopulationConfig
 from swarm_forage_env.wrappers.registry import WRAPPERS, parse_wrapper, wrapper_config_class, wrappers_from_mapping
 from swarm_forage_env.wrappers.throttle import Throttle, ThrottleConfig
@@ -92,7 +97,7 @@ def test_names_and_places_agree(name):
     wrapper = ACTIVE[name].wrap(ForageEnv(world_config()))
     assert config_class is type(ACTIVE[name])
     assert config_class.name == name
-    assert config_class.stack_position == type(wrapper).stack_position
+    assert config_class.wrapper is type(wrapper)
     assert STACK_ORDER[wrapper.stack_position] == type(wrapper).__name__
 
 

@@ -13,8 +13,13 @@ from swarm_forage_env.scenarios.robots import SENSORS, WINDOWS_CELLS, RobotKind
 from swarm_forage_env.views.sampler import SampledWorld, ScenarioSampler
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.handling import HandlingCostConfig
-from swarm_forage_env.wrappers.messages import MessageNoiseConfig
-from swarm_forage_env.wrappers.noise import DISTRIBUTIONS, NOISE_GROUPS, ActuatorNoiseConfig, SensorNoiseConfig
+from swarm_forage_env.wrappers.noise import (
+    DISTRIBUTIONS,
+    NOISE_GROUPS,
+    ActuatorNoiseConfig,
+    MessageNoiseConfig,
+    SensorNoiseConfig,
+)
 from swarm_forage_env.wrappers.population import DEATHS, PopulationConfig
 from swarm_forage_env.wrappers.throttle import ThrottleConfig
 from swarm_forage_env.wrappers.waveform import Waveform

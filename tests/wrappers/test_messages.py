@@ -8,8 +8,13 @@ import pytest
 from swarm_forage_env import ConfigError, ForageEnv, scenario
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.wrappers.kernels import to_normal
-from swarm_forage_env.wrappers.messages import MessageNoise, MessageNoiseConfig
-from swarm_forage_env.wrappers.noise import NOISE_GROUPS, SensorNoise, SensorNoiseConfig
+from swarm_forage_env.wrappers.noise import (
+    NOISE_GROUPS,
+    MessageNoise,
+    MessageNoiseConfig,
+    SensorNoise,
+    SensorNoiseConfig,
+)
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.waveform import Waveform
 from tests.reference.adversity import garbled, shifted_neighbours
