@@ -1,8 +1,11 @@
-"""Check three habits: ignores have reasons, private names stay in their file, CONTRIBUTING maps every folder.
+"""Check four habits: ignores have reasons, private names stay in their file, lengths, CONTRIBUTING maps every folder.
 
 - A `noqa`, `type: ignore` or `pyright: ignore` names its rules and says why, on the same line or, for a setting of a
   whole file, in the line above.
 - A name with a leading underscore is not imported from another file, nor taken from an imported module.
+- A file has at most 500 lines and a function at most 60, docstrings not counted. One that has to be longer says why
+  in a comment: `# long file: <reason>` within the first 20 lines of the file, `# long: <reason>` on the line of the
+  `def`.
 - The map "Where things are" in CONTRIBUTING.md names every folder of the tree, and no other.
 """
 
@@ -22,6 +25,11 @@ IGNORE = re.compile(
 )
 LETTERS = re.compile(r"[A-Za-z]{2}")
 MAP_HEADING = "## Where things are"
+MAX_FILE_LINES = 500
+MAX_FUNCTION_LINES = 60
+FILE_REASON = re.compile(r"#\s*long file:\s*\S")
+FUNCTION_REASON = re.compile(r"#\s*long:\s*\S")
+FILE_HEADER_LINES = 20
 
 
 def ignores_without_reason(source: str) -> Iterator[tuple[int, str]]:
@@ -65,6 +73,31 @@ def private_imports(tree: ast.AST, *, of_tests: bool) -> Iterator[tuple[int, str
             yield node.lineno, f"{node.value.id}.{node.attr}"
 
 
+def _docstring_lines(tree: ast.AST) -> set[int]:
+    """Return the line numbers of all strings that stand alone as statements: docstrings and field descriptions."""
+    lines: set[int] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
+            lines.update(range(node.lineno, (node.end_lineno or node.lineno) + 1))
+    return lines
+
+
+def too_long(name: Path, source: str, tree: ast.AST) -> Iterator[str]:
+    """Yield one line of text per file or function that is too long and gives no reason."""
+    lines = source.splitlines()
+    documentation = _docstring_lines(tree)
+    length = len(lines) - len(documentation)
+    excused = any(FILE_REASON.search(line) for line in lines[:FILE_HEADER_LINES])
+    if length > MAX_FILE_LINES and not excused:
+        yield f"{name}:1: file of {length} lines, at most {MAX_FILE_LINES}"
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            span = range(node.lineno, (node.end_lineno or node.lineno) + 1)
+            length = len(span) - len(documentation.intersection(span))
+            if length > MAX_FUNCTION_LINES and not FUNCTION_REASON.search(lines[node.lineno - 1]):
+                yield f"{name}:{node.lineno}: {node.name}() of {length} lines, at most {MAX_FUNCTION_LINES}"
+
+
 def folders_of_the_tree() -> set[str]:
     """Return the folders that hold tracked or new files, "tests/world" for example."""
     listed = subprocess.run(
@@ -97,15 +130,16 @@ def offences() -> Iterator[str]:
     for folder in FOLDERS:
         for path in sorted((ROOT / folder).rglob("*.py")):
             source = path.read_text(encoding="utf-8")
-            name = path.relative_to(ROOT)
+            tree, name = ast.parse(source), path.relative_to(ROOT)
             for line, comment in ignores_without_reason(source):
                 yield f"{name}:{line}: expected a rule and a reason behind it, got {comment}"
-            for line, private in private_imports(ast.parse(source), of_tests=folder == "tests"):
+            for line, private in private_imports(tree, of_tests=folder == "tests"):
                 yield f"{name}:{line}: {private} is private to another file; give it a public name there"
-    tree, mapped = folders_of_the_tree(), folders_of_the_map((ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"))
-    for folder in sorted(tree - mapped):
+            yield from too_long(name, source, tree)
+    there, mapped = folders_of_the_tree(), folders_of_the_map((ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"))
+    for folder in sorted(there - mapped):
         yield f"CONTRIBUTING.md: {folder}/ is missing in the map"
-    for folder in sorted(mapped - tree):
+    for folder in sorted(mapped - there):
         yield f"CONTRIBUTING.md: {folder}/ is in the map, but not in the tree"
 
 

@@ -1,20 +1,24 @@
-"""Draw the pictures of robots at work, and of the window, that README and docs show.
+"""Draw the pictures of robots at work, of the window, and of theory, that README and docs show.
 
-    python scripts/draw_pictures.py [FILE ...]
+    python scripts/draw_pictures.py [FILE ...] [--out FOLDER]    default all of them, docs/images
 
-Robots have trails of 40 s. The window needs no display. Needs the render extra.
+Robots have trails of 40 s. The window needs no display. Theory is self-organisation over sizes, an example of
+flexibility and the task graph: no run is needed, and `swarm-forage study plot` and `report` draw the same figures.
+Needs the extras render and plots.
 """
 
+import argparse
 import os
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from PIL import Image
 
+from metrics.scoring.theory import theory_figures
 from swarm_forage_env import load_policy, plan_run, scenario
 from swarm_forage_env.inspect.watch import Watch
+from swarm_forage_env.rendering.figures import SCREEN
 from swarm_forage_env.rendering.frame import Trails, render_frame
 from swarm_forage_env.rendering.window import Pressed, Window
 from swarm_forage_env.runs.run import LiveRun, build_env
@@ -34,14 +38,16 @@ FIELDS: dict[str, dict[str, Any]] = {
 """File -> scenario fields that are not those of the preset."""
 WINDOWS = {"window.png": "dark", "window_light.png": "light"}
 """File -> theme of the window."""
+THEORY = ("self_organisation.png", "flexibility.png", "task_graph.png")
+"""Those of theory that pages show; `swarm-forage predict availability` draws the other one."""
 WINDOW_S = 600.0
 TRAIL_S = 40.0
 SAMPLE_S = 1.0
 
 
-def draw(file: str, scenario_name: str, policy_name: str, time_s: float, size_px: int, theme: str) -> None:
+def draw(file: Path, scenario_name: str, policy_name: str, time_s: float, size_px: int, theme: str) -> None:
     """Run a policy with seed 0 and draw the arena as it is at `time_s`."""
-    world = scenario(scenario_name, **FIELDS.get(file, {}))
+    world = scenario(scenario_name, **FIELDS.get(file.name, {}))
     world = plan_run(world, policy_name).scenario  # with the caches that the policy is made for
     policy = load_policy(policy_name)
     run = LiveRun(build_env(world), policy, 0)
@@ -63,11 +69,11 @@ def draw(file: str, scenario_name: str, policy_name: str, time_s: float, size_px
         title=title,
         theme=theme,
     )
-    Image.fromarray(picture).save(IMAGES / file, optimize=True)
-    print(IMAGES / file)
+    Image.fromarray(picture).save(file, optimize=True)
+    print(file)
 
 
-def draw_window(file: str, theme: str) -> None:
+def draw_window(file: Path, theme: str) -> None:
     """Watch DPO with seed 0 until a robot near objects meets another one; raise the throttle and choose the robot."""
     import pygame
 
@@ -85,15 +91,31 @@ def draw_window(file: str, theme: str) -> None:
     screen = pygame.display.get_surface()
     assert screen is not None, "a window was shown"
     pixels = pygame.surfarray.array3d(screen).swapaxes(0, 1)
-    Image.fromarray(pixels).save(IMAGES / file, optimize=True)
+    Image.fromarray(pixels).save(file, optimize=True)
     window.close()
-    print(IMAGES / file)
+    print(file)
+
+
+def main() -> None:
+    """Draw what was asked for."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    known = (*PICTURES, *WINDOWS, *THEORY)
+    parser.add_argument("files", nargs="*", metavar="FILE", help=f"default all: {', '.join(known)}")
+    parser.add_argument("--out", type=Path, default=IMAGES, metavar="FOLDER", help="where they go")
+    arguments = parser.parse_args()
+    unknown = [name for name in arguments.files if name not in known]
+    if unknown:
+        parser.error(f"expected some of {', '.join(known)}, got {unknown[0]!r}")
+    for name in arguments.files or known:
+        if name in PICTURES:
+            draw(arguments.out / name, *PICTURES[name])
+        elif name in WINDOWS:
+            draw_window(arguments.out / name, WINDOWS[name])
+    for figure in theory_figures():
+        name = f"{figure.kind}.png"
+        if name in THEORY and name in (arguments.files or known):
+            figure.draw([arguments.out / name], SCREEN)
 
 
 if __name__ == "__main__":
-    for name, about in PICTURES.items():
-        if name in sys.argv[1:] or not sys.argv[1:]:
-            draw(name, *about)
-    for name, about in WINDOWS.items():
-        if name in sys.argv[1:] or not sys.argv[1:]:
-            draw_window(name, about)
+    main()
