@@ -18,7 +18,7 @@ from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.mixture import is_mixture, mixture_parts
 from swarm_forage_env.policies.registry import file_of, is_policy_file
 from swarm_forage_env.rendering.figures import SCREEN
-from swarm_forage_env.rendering.report import build_report, picture_address, shown
+from swarm_forage_env.rendering.pages import build_report, picture_address, shown
 from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.record import PACKAGES
 from swarm_forage_env.runs.store import DONE

@@ -116,25 +116,24 @@ class Waveform:
     @property
     def peak(self) -> float:
         """Largest value that the signal can take."""
-        if self.kind == "constant":
-            return self.amplitude
-        if self.kind == "table":
-            return max(self.values)
-        if self.kind == "step":
-            return self.offset + max(0.0, self.amplitude)
-        shift = 2.0 * self.amplitude * self.phase if self.kind == "sawtooth" else 0.0
-        return self.offset + shift + abs(self.amplitude)
+        return self._ends[1]
 
     @property
     def trough(self) -> float:
         """Smallest value that the signal can take."""
+        return self._ends[0]
+
+    @property
+    def _ends(self) -> tuple[float, float]:
         if self.kind == "constant":
-            return self.amplitude
+            return self.amplitude, self.amplitude
         if self.kind == "table":
-            return min(self.values)
+            return min(self.values), max(self.values)
         if self.kind == "step":
-            return self.offset + min(0.0, self.amplitude)
-        return self.peak - 2.0 * abs(self.amplitude)
+            return self.offset + min(0.0, self.amplitude), self.offset + max(0.0, self.amplitude)
+        shift = 2.0 * self.amplitude * self.phase if self.kind == "sawtooth" else 0.0
+        peak = self.offset + shift + abs(self.amplitude)
+        return peak - 2.0 * abs(self.amplitude), peak
 
     def in_words(self, unit: str, *, factor: float = 1.0, floor: float = -math.inf) -> str:
         """Return how the value goes, for people: "0 to 40 % (sine, period 200 s)".

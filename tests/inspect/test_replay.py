@@ -395,7 +395,7 @@ def test_performance_that_the_world_does_not_count_is_shown_as_deliveries(replay
     spec = dataclasses.replace(replay.spec, world=World(dataclasses.replace(CROWDED, performance="n_carrying")))
     other = dataclasses.replace(replay, spec=spec)
     for one, expected in ((replay, "deliveries"), (other, "deliveries")):
-        header, _ = files_module.take_page_apart(files_module.page_of([one]))
+        header, _ = files_module.take_replay_page_apart(files_module.page_of([one]))
         assert header["runs"][0]["performance"] == {"counter": "collected", "words": expected}
 
 
@@ -404,7 +404,7 @@ def test_the_page_is_told_where_obstacles_are(replay):
     arena = dataclasses.replace(CROWDED.arena, obstacles=boxes)
     spec = dataclasses.replace(replay.spec, world=World(dataclasses.replace(CROWDED, arena=arena)))
     for one, expected in ((replay, []), (dataclasses.replace(replay, spec=spec), [list(box) for box in boxes])):
-        header, _ = files_module.take_page_apart(files_module.page_of([one]))
+        header, _ = files_module.take_replay_page_apart(files_module.page_of([one]))
         assert header["runs"][0]["world"]["obstacles_m"] == expected
 
 
@@ -415,7 +415,7 @@ def test_the_page_is_told_who_is_of_which_kind(replay):
     n_scouts = kind_sizes(kinds, robots.n_robots)[0]
     named = [["scout", n_scouts], ["hauler", robots.n_robots - n_scouts]]
     for one, expected in ((replay, []), (dataclasses.replace(replay, spec=spec), named)):
-        header, _ = files_module.take_page_apart(files_module.page_of([one]))
+        header, _ = files_module.take_replay_page_apart(files_module.page_of([one]))
         assert header["runs"][0]["kinds"] == expected
 
 

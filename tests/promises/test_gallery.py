@@ -7,7 +7,7 @@ import pytest
 from scripts.make_gallery import EXHIBITS, FILMS, FOLDER, README, page, table_of_films
 from swarm_forage_env.inspect.replay.files import FORMAT_VERSION
 from swarm_forage_env.policies.registry import policy_names
-from swarm_forage_env.rendering.page import SCRIPTS, take_page_apart
+from swarm_forage_env.rendering.pages import SCRIPTS, take_replay_page_apart
 from swarm_forage_env.wrappers.registry import WRAPPERS
 from tests.support.foraging import NEAR
 
@@ -39,7 +39,7 @@ def test_pages_and_readme_show_what_the_script_makes():
 @pytest.mark.parametrize("exhibit", EXHIBITS, ids=lambda exhibit: exhibit.name)
 def test_stored_replays_have_the_runs_and_the_present_page(exhibit):
     text = (FOLDER / f"{exhibit.name}.html").read_text()
-    header, _ = take_page_apart(text)
+    header, _ = take_replay_page_apart(text)
     assert header["version"] == FORMAT_VERSION, "python scripts/make_gallery.py makes the gallery anew"
     assert [run["run_id"] for run in header["runs"]] == [spec.run_id for spec in exhibit.specs()]
     parts = resources.files("swarm_forage_env.rendering").joinpath("replay_page")
@@ -51,7 +51,7 @@ def test_stored_replays_have_the_runs_and_the_present_page(exhibit):
 @pytest.mark.parametrize("exhibit", EXHIBITS, ids=lambda exhibit: exhibit.name)
 def test_stored_replays_are_small(exhibit):
     text = (FOLDER / f"{exhibit.name}.html").read_text()
-    header, blocks = take_page_apart(text)
+    header, blocks = take_replay_page_apart(text)
     poses = sum(run["n_robots"] * run["n_frames"] for run in header["runs"])
     in_base64 = sum(len(block) for block in blocks) * 4 / 3
     assert 0.5 * poses < in_base64 < MOST_BYTES * poses

@@ -18,7 +18,7 @@ from swarm_forage_env._internal.files import replacing
 from swarm_forage_env.contract.codes import Counter, Task
 from swarm_forage_env.inspect.replay.coding import pack, unpack
 from swarm_forage_env.inspect.replay.frames import Replay, ReplayError
-from swarm_forage_env.rendering.page import PageError, build_page, take_page_apart
+from swarm_forage_env.rendering.pages import PageError, build_replay_page, take_replay_page_apart
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M, WALL_M
@@ -80,7 +80,7 @@ def page_of(replays: Sequence[Replay], *, title: str | None = None) -> str:
     replays = _told_apart(replays)
     packed = [_packed(replay) for replay in replays]
     header = {"format": FORMAT, "version": FORMAT_VERSION, "runs": [about for about, _ in packed]}
-    return build_page(title or _headline(replays), header, [block for _, block in packed])
+    return build_replay_page(title or _headline(replays), header, [block for _, block in packed])
 
 
 def read_replays(path: str | Path) -> tuple[Replay, ...]:
@@ -90,7 +90,7 @@ def read_replays(path: str | Path) -> tuple[Replay, ...]:
         ReplayError: the file is missing, no replay page, damaged, or of another version; the message names it.
     """
     try:
-        header, blocks = take_page_apart(Path(path).read_text(encoding="utf-8"))
+        header, blocks = take_replay_page_apart(Path(path).read_text(encoding="utf-8"))
         return tuple(_replay_of(about, block) for about, block in zip(_runs_of(header), blocks, strict=True))
     except OSError as error:
         raise ReplayError(f"Cannot read {path}: {error.strerror or error}.") from error

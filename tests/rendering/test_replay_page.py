@@ -7,7 +7,7 @@ from itertools import combinations, product
 import numpy as np
 import pytest
 
-from swarm_forage_env.rendering.page import SCRIPTS, PageError, build_page, take_page_apart
+from swarm_forage_env.rendering.pages import SCRIPTS, PageError, build_replay_page, take_replay_page_apart
 from tests.support.colours import VISION, seen_lab
 
 FOLDER = resources.files("swarm_forage_env.rendering").joinpath("replay_page")
@@ -17,8 +17,8 @@ STYLE = FOLDER.joinpath("replay.css").read_text()
 def test_data_come_back_whatever_they_hold():
     header = {"name": "</script><b>", "list": [1, None, 2.5]}
     blocks = [b"", bytes(range(256)), b"</script>"]
-    page = build_page("a <title> & more", header, blocks)
-    assert take_page_apart(page) == (header, blocks)
+    page = build_replay_page("a <title> & more", header, blocks)
+    assert take_replay_page_apart(page) == (header, blocks)
     assert "<title>a &lt;title&gt; &amp; more</title>" in page
 
 
@@ -32,24 +32,24 @@ def test_data_come_back_whatever_they_hold():
 )
 def test_other_texts_are_refused(text, expected):
     with pytest.raises(PageError, match=expected):
-        take_page_apart(text)
+        take_replay_page_apart(text)
 
 
 def test_every_script_is_in_the_page():
     files = {file.name for file in FOLDER.iterdir() if file.name.endswith(".js")}
     assert files == set(SCRIPTS)
-    page = build_page("", {}, [])
+    page = build_replay_page("", {}, [])
     assert all(FOLDER.joinpath(name).read_text() in page for name in SCRIPTS)
 
 
 def test_a_page_brings_the_licence_of_what_it_borrows():
-    page = build_page("", {}, [])
+    page = build_replay_page("", {}, [])
     assert "fflate" in page
     assert "The above copyright notice and this permission notice shall be included" in page
 
 
 def test_the_page_loads_nothing():
-    page = build_page("", {}, [])
+    page = build_replay_page("", {}, [])
     assert re.findall(r"https?:|//[\w.]+\.\w+/|\b(?:src|href)=\"(?!data:,\")|@import|url\(|\bfetch\(", page) == []
     assert "default-src 'none'" in page
 

@@ -3,7 +3,7 @@
 import pytest
 from jinja2 import UndefinedError
 
-from swarm_forage_env.rendering.report import build_report, picture_address
+from swarm_forage_env.rendering.pages import build_report, picture_address
 
 FIGURE = {
     "title": "a < b",
