@@ -24,7 +24,6 @@ from metrics.claims.outcomes import Answer
 from metrics.scoring import StudyFigure, StudyVerdict, draw_figure, study_figures
 from metrics.scoring.study_models import model_figures
 from metrics.scoring.study_numbers import place_distributions
-from metrics.scoring.study_plots import draw_models
 from metrics.scoring.study_report import command_of
 from metrics.scoring.study_verdict import ANSWERS, VARIANTS, WAITS, claims_about, claims_of, waiting_lines
 from swarm_forage_env import read_study
@@ -343,7 +342,7 @@ def figures(results: StudyVerdict, folder: Path) -> str:
             parts.append(f"Claims: {', '.join(told)}.")
         for model in model_figures(table):
             if model.rules == table.spec.rules[0]:
-                parts.append(_pictured(model.name, model.title, folder, lambda path, it=model: draw_models(it, [path])))
+                parts.append(_pictured(model.name, model.title, folder, lambda path, it=model: it.draw([path])))
     return "\n\n".join(parts)
 
 

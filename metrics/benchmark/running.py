@@ -19,7 +19,7 @@ from swarm_forage_env.runs.table import Table
 from swarm_forage_env.scenarios.performance import performance_of
 
 from ..controllers import PAPER_POLICIES
-from ..scoring.policy_scores import score_study
+from ..scoring.measures import score_study
 from ..scoring.question import Question, ask
 from ..scoring.run_curves import INTERVAL_COLUMNS, StudyCurves, joined_curves, run_curves
 from ..scoring.scores import Score

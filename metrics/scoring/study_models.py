@@ -6,11 +6,22 @@ Laws know all sizes of a line; the mean field knows one small swarm, the queue o
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from swarm_forage_env._internal.wording import number
+from swarm_forage_env.rendering.figures import (
+    COLOURS,
+    SCREEN,
+    FigureStyle,
+    Panel,
+    policy_words,
+    saved_panels,
+    shade,
+    size_axis,
+)
 from swarm_forage_env.wrappers.world import SIZE
 
 from ..checks import CurveError
@@ -37,6 +48,8 @@ MIN_SIZES, MIN_RUNS = 4, 2
 """What a ladder of laws takes at least."""
 _SEED = 1
 """Fixed, so that the same runs give the same intervals."""
+RUNS_COLOUR = "black"
+"""What was seen; the colours are for models."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -108,6 +121,35 @@ class ModelFigure:
 
         rows = [{"rules": self.rules, **panel.place, **row} for panel in self.panels for row in panel.facts]
         return pl.DataFrame(rows, infer_schema_length=None).fill_nan(None)
+
+    def draw(self, paths: Sequence[Path], style: FigureStyle = SCREEN) -> None:
+        """Draw what was seen, solid with its 95 % interval, and what models say, dashed.
+
+        Args:
+            paths: Files to write; as in `saved_figure`, whose errors this has.
+            style: Of the figure.
+        """
+        title = f"{self.title}\nshaded: 95 % interval of the mean; dashed: models"
+        with saved_panels(paths, len(self.panels), (3.6, 3.0), title=title, style=style) as places:
+            for place, panel in zip(places, self.panels, strict=True):
+                _draw_panel(place, panel, self)
+
+
+def _draw_panel(place: Panel, panel: ModelPanel, figure: ModelFigure) -> None:
+    for curve, colour in zip(panel.expected, COLOURS, strict=False):
+        place.plot(curve.x, curve.y, "--", color=colour, label=curve.name, zorder=3)
+    for curve in panel.seen:
+        marker = "o" if figure.is_log else ""
+        place.plot(curve.x, curve.y, color=RUNS_COLOUR, linewidth=1.1, label=curve.name, zorder=4, marker=marker)
+        if curve.lower is not None and curve.upper is not None:
+            shade(place, curve.x, curve.lower, curve.upper, RUNS_COLOUR)
+    place.set_title(policy_words(panel.words))
+    if figure.is_log:
+        size_axis(place, panel.seen[0].x)
+    # Neither a law far off nor the interval of two runs may flatten what was seen.
+    place.set_ylim(0.0, 1.3 * float(max(curve.y.max() for curve in (*panel.seen, *panel.expected[:1]))))
+    place.set_xlabel(figure.x_label)
+    place.set_ylabel(figure.y_label)
 
 
 def model_figures(table: "StudyTable") -> tuple[ModelFigure, ...]:

@@ -21,7 +21,7 @@ from ..curves import FloatArray, Form, Variant
 from ..distributions import interquartile_mean, probability_of_improvement
 from ..significance import holm, paired_p
 from ..statistics import Estimate
-from .policy_scores import score_study
+from .measures import score_study
 from .run_curves import THROTTLE, RunCurves, StudyCurves, StudyLine, study_lines
 from .scores import DISTURBANCES, MEASURE_CRITERIA, MEASURE_VARIANTS, Score, ScoreForms, label_of
 

@@ -13,7 +13,6 @@ from swarm_forage_env._internal.fields import known_name
 from swarm_forage_env._internal.wording import number
 from swarm_forage_env.inspect.snapshot import snapshot
 from swarm_forage_env.rendering.figures import (
-    COLOURS,
     FORMATS,
     SCREEN,
     FigureStyle,
@@ -36,7 +35,7 @@ from ..curves import FloatArray, Variant
 from ..statistics import Summary, aggregate
 from .plots import FEWEST_RUNS, X_LABELS
 from .scores import label_of
-from .study_models import ModelFigure, ModelPanel, model_figures
+from .study_models import model_figures
 from .study_numbers import StudyPanel, StudyPanels, place_distributions, policy_pairs, study_panels
 from .theory import theory_of
 
@@ -256,41 +255,6 @@ def _summaries(scores: FloatArray) -> list[Summary]:
     return [aggregate(known) if known.size else _NOTHING for known in (runs[np.isfinite(runs)] for runs in scores)]
 
 
-RUNS_COLOUR = "black"
-"""What was seen; the colours are for models."""
-
-
-def draw_models(figure: ModelFigure, paths: Sequence[Path], *, style: FigureStyle = SCREEN) -> None:
-    """Draw what was seen, solid with its 95 % interval, and what models say, dashed.
-
-    Args:
-        figure: From `model_figures`.
-        paths: Files to write; as in `saved_figure`, whose errors this has.
-        style: Of the figure.
-    """
-    title = f"{figure.title}\nshaded: 95 % interval of the mean; dashed: models"
-    with saved_panels(paths, len(figure.panels), (3.6, 3.0), title=title, style=style) as places:
-        for place, panel in zip(places, figure.panels, strict=True):
-            _draw_model(place, panel, figure)
-
-
-def _draw_model(place: Panel, panel: ModelPanel, figure: ModelFigure) -> None:
-    for curve, colour in zip(panel.expected, COLOURS, strict=False):
-        place.plot(curve.x, curve.y, "--", color=colour, label=curve.name, zorder=3)
-    for curve in panel.seen:
-        marker = "o" if figure.is_log else ""
-        place.plot(curve.x, curve.y, color=RUNS_COLOUR, linewidth=1.1, label=curve.name, zorder=4, marker=marker)
-        if curve.lower is not None and curve.upper is not None:
-            shade(place, curve.x, curve.lower, curve.upper, RUNS_COLOUR)
-    place.set_title(policy_words(panel.words))
-    if figure.is_log:
-        size_axis(place, panel.seen[0].x)
-    # Neither a law far off nor the interval of two runs may flatten what was seen.
-    place.set_ylim(0.0, 1.3 * float(max(curve.y.max() for curve in (*panel.seen, *panel.expected[:1]))))
-    place.set_xlabel(figure.x_label)
-    place.set_ylabel(figure.y_label)
-
-
 Draw: TypeAlias = Callable[[Sequence[Path], FigureStyle], None]
 
 
@@ -335,7 +299,7 @@ def plot(
     files = [file for figure in figures for file in drawing.measure(figure, band)]
     for model in model_figures(table):
         tables = {f"{model.name}.csv": model.to_frame(), f"{model.name}_facts.csv": model.facts()}
-        files += drawing.files(model.name, lambda paths, style, it=model: draw_models(it, paths, style=style), tables)
+        files += drawing.files(model.name, model.draw, tables)
     for sketch in theory_of(table.spec):
         files += drawing.files(sketch.name, sketch.draw, {f"{sketch.name}.csv": sketch.numbers})
     files.append(snapshot_written(table.spec, drawing.folder / f"{table.spec.name}_snapshot.png"))

@@ -30,7 +30,7 @@ from swarm_forage_env.studies.study_file import is_set_of_paper
 from ..claims import CLAIMS, INTUITIONS, Claim, Verdict
 from .study_models import ModelFigure, model_figures
 from .study_numbers import StudyPanels, place_distributions, policy_pairs
-from .study_plots import Band, Draw, StudyFigure, checked_band, draw_models, drawn_by, snapshot_written, study_figures
+from .study_plots import Band, Draw, StudyFigure, checked_band, drawn_by, snapshot_written, study_figures
 from .study_verdict import (
     ANSWERS,
     WAITS,
@@ -316,9 +316,7 @@ def _model(figure: ModelFigure) -> dict[str, Any]:
 
     return {
         "title": figure.title,
-        "pictures": [
-            _picture(f"{figure.title}, runs and models", lambda paths, style: draw_models(figure, paths, style=style))
-        ],
+        "pictures": [_picture(f"{figure.title}, runs and models", figure.draw)],
         "facts": _numbers(figure.facts()),
     }
 

@@ -7,7 +7,7 @@ import polars as pl
 
 from metrics import ScoreForms
 from metrics.scoring.curves_file import study_curves
-from metrics.scoring.policy_scores import score_study
+from metrics.scoring.measures import score_study
 
 
 def rows(

@@ -7,8 +7,8 @@ import pytest
 
 from metrics import ScoreForms, waveform
 from metrics.scoring.curves_file import study_curves
+from metrics.scoring.measures import score_study
 from metrics.scoring.plots import draw_scores
-from metrics.scoring.policy_scores import score_study
 from metrics.scoring.score_tables import ScoreTable
 from tests.support.curve_tables import rows, table
 from tests.support.pictures import PNG, keep_figures

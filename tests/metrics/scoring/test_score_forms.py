@@ -8,7 +8,7 @@ import pytest
 import metrics
 from metrics import CurveError, PopulationRates, ScoreForms
 from metrics.scoring.curves_file import study_curves
-from metrics.scoring.policy_scores import score_study
+from metrics.scoring.measures import score_study
 from metrics.scoring.score_tables import ScoreTable
 from metrics.scoring.scores import HEADER
 from tests.support.curve_tables import CLOCK, IDEAL, SIGNAL, SLOWED, rows, scored, table, throttled

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from metrics import ScoreForms
-from metrics.scoring.policy_scores import score_study
+from metrics.scoring.measures import score_study
 from metrics.scoring.run_curves import study_lines
 from swarm_forage_env import StudyFolder, read_study, run_study
 from swarm_forage_env.studies.study import Axis

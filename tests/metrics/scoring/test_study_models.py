@@ -5,7 +5,6 @@ import pytest
 
 from metrics.queues import PopulationRates, robots_at_work
 from metrics.scoring.study_models import MEAN_FIELD, model_figures
-from metrics.scoring.study_plots import draw_models
 from swarm_forage_env.runs.policy_spec import PolicySpec
 from swarm_forage_env.studies.study import Axis
 from tests.support.foraging_table import ONE, SIZES, foraging_table
@@ -43,7 +42,7 @@ def test_facts_of_laws_have_intervals(laws):
 
 def test_models_are_drawn(laws, tmp_path):
     files = [tmp_path / "laws.svg", tmp_path / "laws.png"]
-    draw_models(laws, files)
+    laws.draw(files)
     words = {"hamann", "mean field", "robots", "shaded: 95 % interval of the mean; dashed: models"}
     assert words <= {*words_in(files[0])}
 

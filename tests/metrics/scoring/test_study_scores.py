@@ -8,7 +8,7 @@ import pytest
 import metrics
 from metrics import METRICS, CurveError, PopulationRates, ScoreForms
 from metrics.scoring.curves_file import study_curves
-from metrics.scoring.policy_scores import score_study
+from metrics.scoring.measures import score_study
 from metrics.scoring.run_curves import RunCurves, StudyCurves
 from metrics.scoring.score_tables import ScoreTable
 from metrics.scoring.scores import HEADER, MEASURE_CRITERIA, check_measures, criteria_of

@@ -1,17 +1,20 @@
-"""Scores of the measures that vary the swarm size: which sizes each compares."""
+"""Scores of all measures that curves allow. Those that vary the swarm size are here: which sizes each compares."""
 
-from collections.abc import Callable, Iterator
+import re
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 from swarm_forage_env.wrappers.world import SIZE
 
+from ..catalog import METRICS
 from ..curves import FloatArray, Form, Variant
 from ..emergence import interference_gain, spatial_emergence, task_emergence, time_emergence, undisturbed_gain
 from ..interference import performance_lost
 from ..scaling import efficiency, raw_performance, scalability
+from .by_adversity import BY_ADVERSITY
 from .run_curves import RunCurves, StudyCurves, common_runs
-from .scores import MEASURE_VARIANTS, Score, Uncomputable, Values, score_runs
+from .scores import MEASURE_VARIANTS, Score, ScoreForms, Uncomputable, Values, check_measures, label_of, score_runs
 
 FALLING = (
     "performance is lower than that of the next smaller swarm, and it weights the time lost, so that a collapse counts "
@@ -109,7 +112,7 @@ class _SizeMeasure:
     """As in `score_runs`."""
 
 
-_SIZE_MEASURES: dict[str, _SizeMeasure] = {
+BY_SIZE: dict[str, _SizeMeasure] = {
     "raw_performance": _SizeMeasure(values=_raw_performance, unit="objects {span}"),
     "efficiency": _SizeMeasure(values=_efficiency, unit="objects per robot {span}"),
     "t_lost_fraction": _SizeMeasure(values=_t_lost_fraction, unit="share of robot time", needs_interference=True),
@@ -154,10 +157,11 @@ _SIZE_MEASURES: dict[str, _SizeMeasure] = {
     ),
     "scalability": _SizeMeasure(values=_scalability, unit="1 = linear", of_two_sizes=True, order_matters=True),
 }
+"""Measure of swarm sizes -> how it is applied."""
 
 
 def _size_scores(name: str, study: StudyCurves, variant: Variant, form: Form) -> Iterator[Score]:
-    measure = _SIZE_MEASURES[name]
+    measure = BY_SIZE[name]
     values = partial(measure.values, variant=variant) if name in MEASURE_VARIANTS else measure.values
     sizes = _sizes(study, measure, variant, form)
     one = sizes[0]
@@ -191,7 +195,7 @@ def _size_scores(name: str, study: StudyCurves, variant: Variant, form: Form) ->
 
 
 def _unit(name: str, study: StudyCurves, variant: Variant) -> str:
-    measure = _SIZE_MEASURES[name]
+    measure = BY_SIZE[name]
     if name == "scalability" and variant != "corrected":
         return "printed form, summed over intervals" if variant == "paper" else "printed form, last interval"
     if variant == "sierra":
@@ -236,7 +240,61 @@ def _without_one(measure: _SizeMeasure, smallest: RunCurves, variant: Variant, f
     return measure.one_drops_out and smallest.n_robots != 1 and form == "marginal" and variant != "sierra"
 
 
-BY_SIZE: dict[str, Callable[[str, StudyCurves, Variant, Form], Iterator[Score]]] = dict.fromkeys(
-    _SIZE_MEASURES, _size_scores
-)
+_SCORES: dict[str, Callable[[str, StudyCurves, Variant, Form], Iterator[Score]]] = {
+    **dict.fromkeys(BY_SIZE, _size_scores),
+    **BY_ADVERSITY,
+}
 """Measure -> what computes its scores, in one variant and form."""
+_OVER_A_RUN = re.compile(r"(per run|in [\d,]+ s)$")
+"""End of a unit of what is summed over a run."""
+_NO_SUM = "this performance is no sum over robots, and the measure compares with growth in proportion to them"
+_OTHER_SWARMS = {"one robot", "two sizes", "rates", "robots at work"}
+"""Input of measures that know how many robots made a performance, and expect it of as many others."""
+
+
+def score_study(
+    study: StudyCurves, measures: Sequence[str] | None = None, forms: ScoreForms | None = None
+) -> tuple[tuple[Score, ...], dict[str, str]]:
+    """Compute the scores of all measures that the curves of a study allow.
+
+    Args:
+        study: Curves of one policy.
+        measures: Names out of `MEASURE_CRITERIA`; default all.
+        forms: Variants and forms; default the corrected marginal one.
+
+    Returns:
+        The scores, and for each measure (in a form of it) that could not be computed the reason.
+
+    Raises:
+        CurveError: an unknown measure, or curves that a measure refuses.
+    """
+    scores: list[Score] = []
+    missing: dict[str, str] = {}
+    for measure in check_measures(measures):
+        for variant, form in (forms or ScoreForms()).of(measure):
+            try:
+                scores += list(_SCORES[measure](measure, study, variant, form))
+            except Uncomputable as reason:
+                missing[label_of(measure, variant, form)] = str(reason)
+    return tuple(_told(score, study) for score in scores), missing
+
+
+def _told(score: Score, study: StudyCurves) -> Score:
+    """Return the score in the unit of the performance, with a note if the measure expects another kind.
+
+    Measures write units for deliveries, "objects in 4,000 s". With robots carrying, a mean over each interval, it is
+    "robots summed over intervals".
+    """
+    unit = score.unit.replace("objects", study.amount)
+    if not study.is_total:
+        unit = _OVER_A_RUN.sub("summed over intervals", unit)
+    note = score.note
+    if not study.adds_up and _is_in_proportion(score.measure):
+        note = f"{note}; {_NO_SUM}" if note else _NO_SUM
+    return replace(score, unit=unit, note=note)
+
+
+def _is_in_proportion(measure: str) -> bool:
+    """Whether a measure compares with performance in proportion to the robots: of other sizes, at work, or each."""
+    needs = METRICS[measure].needs
+    return measure == "efficiency" or ("performance" in needs and not _OTHER_SWARMS.isdisjoint(needs))
