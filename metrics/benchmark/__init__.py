@@ -1,8 +1,7 @@
 """A benchmark that others can enter: a fixed protocol of worlds and seeds, entry files, and what they are worth."""
 
-from .board import Board, board_of
+from .board import Board, board_of, draw_benchmark
 from .entry import Entry, Training, read_entry
-from .figure import draw_benchmark
 from .page import details_page, page_block
 from .protocol import BenchmarkError, Protocol, ProtocolWorld, load_protocol
 from .running import BenchmarkQuestion, benchmark_question, run_benchmark

@@ -13,7 +13,6 @@ import numpy as np
 
 from ..population import availability, ratio_for_team
 from .checking import Claim, Place, Statement
-from .experiments import LARGER, ONSET
 from .orders import opposite_order, same_order, unrelated
 from .outcomes import Answer, Outcome
 from .predicates import (
@@ -38,6 +37,8 @@ from .statements import (
     COMPLEX,
     E_S,
     E_T,
+    LARGER,
+    ONSET,
     POLICIES,
     SIMPLE,
     STEADY,

@@ -8,9 +8,9 @@ import pytest
 from metrics import CurveError, Panel
 from metrics.claims import orders, shapes
 from metrics.claims import predicates as general
-from metrics.claims.experiments import ONSET, SIGMAS
 from metrics.claims.outcomes import Outcome, all_of, most_of
 from metrics.claims.panel import interval_of, resampled_means, signs
+from metrics.claims.statements import ONSET, SIGMAS
 from tests.support.panels import SIX, panel
 
 
