@@ -1,8 +1,8 @@
 """Tables of scores: of one policy, or of several, with which is better and whether the difference is significant."""
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +13,7 @@ from swarm_forage_env._internal.wording import counted, limits, percent, plain
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 from swarm_forage_env.runs.answer import Answer, Sheet
 
+from ..catalog import METRICS
 from ..checks import CurveError
 from ..curves import FloatArray
 from ..significance import holm, paired_p
@@ -178,11 +179,9 @@ class Difference:
     """Mean difference of runs with the same seed, with its interval."""
     p: float
     """p value of the paired t test; NaN where there is none (fewer than two pairs, infinite scores)."""
-    p_holm: float
+    p_holm: float = math.nan
     """The same after Holm's correction over all levels and pairs of policies of the measure; relative scores have a
     correction of their own."""
-    better: str
-    """The better policy if the difference is significant, else empty."""
 
     @property
     def key(self) -> tuple[str, str, bool, str, str, tuple[int, ...]]:
@@ -193,6 +192,13 @@ class Difference:
     def is_significant(self) -> bool:
         """Whether p_holm is at most `FAMILY_ERROR`."""
         return self.p_holm <= FAMILY_ERROR
+
+    @property
+    def better(self) -> str:
+        """The better policy if the difference is significant, else empty."""
+        if not self.is_significant:
+            return ""
+        return self.first if (self.summary.mean > 0.0) == METRICS[self.measure].higher_is_better else self.second
 
     def cell(self) -> str:
         """Return the difference as a text, with its half interval and a star if it is significant."""
@@ -348,49 +354,41 @@ def compare_tables(tables: Sequence[ScoreTable]) -> Comparison:
         told = ", ".join(f"{named} of {name}" for name, named in zip(names, performances, strict=True))
         raise CurveError(f"Expected tables of one performance to compare, got {told}; score them by the same.")
     scores = {table.policy: {score.key: score for score in table.scores} for table in tables}
-    found: list[_Pair] = []
-    for first, second in combinations(names, 2):
-        for key, score in scores[first].items():
-            other = scores[second].get(key)
-            if other is not None:
-                found += _pairs(score, other, first, second)
-    p_values = np.array([paired_p(pair.values) for pair in found])
-    corrected = np.full(len(found), math.nan)
-    for family in {pair.family for pair in found}:
-        mine = np.array([pair.family == family for pair in found])
-        corrected[mine] = holm(p_values[mine])
-    differences = tuple(
-        _difference(pair, float(p), float(p_holm)) for pair, p, p_holm in zip(found, p_values, corrected, strict=True)
-    )
-    return Comparison(tables=tuple(tables), differences=differences)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Pair:
-    """One score of two policies, to be tested."""
-
-    score: Score
-    first: str
-    second: str
-    is_relative: bool
-    values: FloatArray
-    """Differences of runs with the same seed, (R,)."""
-
-    @property
-    def family(self) -> tuple[str, bool]:
-        """Tests that are corrected together."""
-        return self.score.label, self.is_relative
-
-
-def _pairs(score: Score, other: Score, first: str, second: str) -> list[_Pair]:
-    kinds = ((False, score.per_seed, other.per_seed), (True, score.relative_per_seed, other.relative_per_seed))
-    return [
-        _Pair(
-            score=score, first=first, second=second, is_relative=is_relative, values=_paired_differences(mine, theirs)
-        )
-        for is_relative, mine, theirs in kinds
-        if mine and theirs
+    found = [
+        difference
+        for first, second in combinations(names, 2)
+        for key, score in scores[first].items()
+        if key in scores[second]
+        for difference in _differences(score, scores[second][key], first, second)
     ]
+    families: dict[tuple[str, bool], list[int]] = {}
+    for index, one in enumerate(found):
+        families.setdefault((one.label, one.is_relative), []).append(index)
+    for family in families.values():
+        corrected = holm(np.array([found[index].p for index in family]))
+        for index, p_holm in zip(family, corrected.tolist(), strict=True):
+            found[index] = replace(found[index], p_holm=p_holm)
+    return Comparison(tables=tuple(tables), differences=tuple(found))
+
+
+def _differences(score: Score, other: Score, first: str, second: str) -> Iterator[Difference]:
+    """One score of two policies, itself and relative to performance, before the correction."""
+    kinds = ((False, score.per_seed, other.per_seed), (True, score.relative_per_seed, other.relative_per_seed))
+    for is_relative, mine, theirs in kinds:
+        if mine and theirs:
+            values = _paired_differences(mine, theirs)
+            is_known = values.size > 0 and bool(np.isfinite(values).all())
+            yield Difference(
+                measure=score.measure,
+                label=score.label,
+                at=score.at,
+                n_robots=score.n_robots,
+                first=first,
+                second=second,
+                is_relative=is_relative,
+                summary=aggregate(values) if is_known else Summary.without_interval(n_used=values.size),
+                p=paired_p(values),
+            )
 
 
 def _paired_differences(first: Mapping[int, float], second: Mapping[int, float]) -> FloatArray:
@@ -399,29 +397,6 @@ def _paired_differences(first: Mapping[int, float], second: Mapping[int, float])
         values = np.array([first[seed] - second[seed] for seed in first if seed in second], dtype=np.float64)
     undefined = [math.isnan(first[seed]) or math.isnan(second[seed]) for seed in first if seed in second]
     return values[~np.array(undefined, dtype=bool)]
-
-
-def _difference(pair: _Pair, p: float, p_holm: float) -> Difference:
-    values, score = pair.values, pair.score
-    summary = Summary.without_interval(n_used=values.size)
-    if values.size and np.isfinite(values).all():
-        summary = aggregate(values)
-    better = ""
-    if p_holm <= FAMILY_ERROR:
-        better = pair.first if (summary.mean > 0.0) == score.higher_is_better else pair.second
-    return Difference(
-        measure=score.measure,
-        label=score.label,
-        at=score.at,
-        n_robots=score.n_robots,
-        first=pair.first,
-        second=pair.second,
-        is_relative=pair.is_relative,
-        summary=summary,
-        p=p,
-        p_holm=p_holm,
-        better=better,
-    )
 
 
 def _cell(score: Score | None, *, band: bool) -> str:
