@@ -157,7 +157,7 @@ def study_panels(
                     if why:
                         missing[label_of(measure, "corrected", form), variant] = why
                 if any(found.values()):
-                    panels.append(_panel(table, together[0], variant, form, found))
+                    panels.append(_score_panel(table, together[0], variant, form, found))
     if not panels and "raw_performance" in measures:
         panels = _performance_panels(table, list(lines.values()))
     return StudyPanels(panels=tuple(panels), missing=missing)
@@ -192,81 +192,77 @@ def _scores(curves: StudyCurves, measure: str, variant: Variant, form: Form) -> 
 
 
 def _panel(
-    table: "StudyTable", line: StudyLine, variant: Variant, form: Form, found: Mapping[str, Sequence[Score]]
+    table: "StudyTable",
+    line: StudyLine,
+    values: Mapping[str, Mapping[float, Mapping[int, float]]],
+    distances: Mapping[float, float],
+    **told: Any,
 ) -> StudyPanel:
-    """Put the scores of several policies beside each other."""
-    scores = [score for of_policy in found.values() for score in of_policy]
-    x = sorted({score.x for score in scores})
+    """Put the values of several policies beside each other.
+
+    Args:
+        table: The study.
+        line: Of one of the policies.
+        values: Policy -> level -> seed -> value.
+        distances: Level -> distance of its conditions from the ideal ones, where it is known.
+        told: Fields of `StudyPanel` that no value tells.
+    """
+    x = sorted({level for of_policy in values.values() for level in of_policy})
     seeds = tuple(sorted(table.spec.seeds))
-    matrices = {policy: np.full((len(x), len(seeds)), np.nan) for policy in found}
-    for policy, of_policy in found.items():
-        for score in of_policy:
-            for seed, value in score.per_seed.items():
-                matrices[policy][x.index(score.x), seeds.index(seed)] = value
+    far = np.array([distances.get(level, np.nan) for level in x])
     return StudyPanel(
         study=table.spec.name,
         rules=line.rules,
         others=line.others,
         words=line.words,
-        measure=scores[0].measure,
-        variant=variant,
-        form=form,
-        criterion=scores[0].criterion,
         x=np.array(x),
-        levels=_places(x, scores),
-        unit=scores[0].unit,
+        levels=far if np.isfinite(far).all() and (np.diff(far) > 0.0).all() else np.array(x),
         seeds=seeds,
-        scores=matrices,
+        scores={
+            policy: np.array([[of_policy.get(level, {}).get(seed, np.nan) for seed in seeds] for level in x])
+            for policy, of_policy in values.items()
+        },
+        **told,
     )
+
+
+def _score_panel(
+    table: "StudyTable", line: StudyLine, variant: Variant, form: Form, found: Mapping[str, Sequence[Score]]
+) -> StudyPanel:
+    scores = [score for of_policy in found.values() for score in of_policy]
+    values: dict[str, dict[float, dict[int, float]]] = {policy: {} for policy in found}
+    for policy, of_policy in found.items():
+        for score in of_policy:
+            values[policy].setdefault(score.x, {}).update(score.per_seed)
+    far = "environment_distance"
+    distances = {score.x: score.beside[far] for score in scores if far in score.beside}
+    first = scores[0]
+    about = {"measure": first.measure, "criterion": first.criterion, "unit": first.unit}
+    return _panel(table, line, values, distances, variant=variant, form=form, **about)
 
 
 def _performance_panels(table: "StudyTable", groups: Sequence[Sequence[StudyLine]]) -> list[StudyPanel]:
     """Return the performance of each run over the last axis, whatever that is, where it has numbers."""
-    values = table.spec.axes[-1].values if table.spec.axes else ()
-    if not values or any(isinstance(value, str | bool) for value in values):
+    levels = table.spec.axes[-1].values if table.spec.axes else ()
+    if not levels or any(isinstance(level, str | bool) for level in levels):
         return []
-    order: list[int] = np.argsort(np.array(values, dtype=np.float64)).tolist()
-    x = np.array(values, dtype=np.float64)[order]
-    seeds = tuple(sorted(table.spec.seeds))
     panels: list[StudyPanel] = []
     for lines in groups:
-        first = lines[0]
-        matrices = {line.policy: np.full((len(x), len(seeds)), np.nan) for line in lines}
-        for line in lines:
-            for row, place in enumerate(order):
-                runs = line.curves.experiments[place]
-                if runs.seeds:
-                    matrices[line.policy][row, np.isin(seeds, runs.seeds)] = runs.performance.sum(axis=-1)
-        over = f"in {table.spec.horizon_s:,.0f} s" if first.curves.is_total else "summed over intervals"
-        panels.append(
-            StudyPanel(
-                study=table.spec.name,
-                rules=first.rules,
-                others=first.others,
-                words=first.words,
-                measure="raw_performance",
-                variant="corrected",
-                form="marginal",
-                criterion=table.spec.axes[-1].name,
-                x=x,
-                levels=x,
-                unit=f"{first.curves.amount} {over}",
-                seeds=seeds,
-                scores=matrices,
-            )
-        )
+        first = lines[0].curves
+        values = {
+            line.policy: {
+                float(level): dict(zip(runs.seeds, runs.performance.sum(axis=-1).tolist(), strict=True))
+                if runs.seeds
+                else {}
+                for level, runs in zip(levels, line.curves.experiments, strict=True)
+            }
+            for line in lines
+        }
+        over = f"in {table.spec.horizon_s:,.0f} s" if first.is_total else "summed over intervals"
+        about = {"measure": "raw_performance", "variant": "corrected", "form": "marginal"}
+        about |= {"criterion": table.spec.axes[-1].name, "unit": f"{first.amount} {over}"}
+        panels.append(_panel(table, lines[0], values, {}, **about))
     return panels
-
-
-def _places(x: Sequence[float], scores: Sequence[Score]) -> FloatArray:
-    """Distances of the conditions from the ideal ones, where the scores have them and they rise; else x itself."""
-    distances = {score.x: score.beside["environment_distance"] for score in scores if _has_distance(score)}
-    places = np.array([distances.get(value, np.nan) for value in x])
-    return places if np.isfinite(places).all() and (np.diff(places) > 0.0).all() else np.array(x)
-
-
-def _has_distance(score: Score) -> bool:
-    return "environment_distance" in score.beside
 
 
 FAMILY_ERROR = 0.05
