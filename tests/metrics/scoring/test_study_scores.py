@@ -150,7 +150,9 @@ def test_doing_nothing_is_noted_and_not_praised():
 def test_a_note_of_many_rows_is_told_once():
     idle = [[0.0] * 4] * 2
     sizes = [rows(n, idle, criterion="population_size", criterion_value=n, t_end_s=CLOCK) for n in (2, 4, 9)]
-    found = scored(*throttled(idle, idle), *sizes)
+    found = scored(
+        *throttled(idle, idle), *sizes, measures=["task_emergence", "scalability", "reactivity", "adaptability"]
+    )
     notes = ScoreTable(policy="mine", scenario="", scores=found).notes()
     assert [note.split(": ", 1)[0] for note in notes] == [
         "task_emergence, N = 2 to 4, N = 4 to 9; reactivity, throttle 0.3; adaptability, throttle 0.3",
