@@ -14,8 +14,6 @@ from swarm_forage_env.cli.former_words import COMMANDS as FORMER
 from swarm_forage_env.cli.former_words import OPTIONS, right_option
 from swarm_forage_env.cli.option_groups import spread
 
-MAKE_RUNS = ("run", "score", "compare", "predict", "choose", "ablate")
-"""Commands that make many runs."""
 ONE_RUN = ("record", "replay", "watch", "saliency")
 """Commands that look into one run, or into one of each policy."""
 
@@ -28,8 +26,13 @@ def options_of(words):
     return {option for param in ALL[words].params for option in param.opts}
 
 
+MAKE_RUNS = [words for words in WITH_SCENARIO if "--dry-run" in options_of(words) and words != "dataset"]
+"""Commands that make many runs and answer a question about them."""
+
+
 def test_commands_that_have_a_scenario_are_those_that_we_mean():
-    assert {*MAKE_RUNS, *ONE_RUN, "train", "dataset"} <= {*WITH_SCENARIO}
+    assert {"run", "score", "compare", "predict", "choose", "ablate"} <= {*MAKE_RUNS}
+    assert {*ONE_RUN, "train", "dataset"} <= {*WITH_SCENARIO}
 
 
 @pytest.mark.parametrize("words", WITH_SCENARIO)
@@ -41,7 +44,7 @@ def test_whatever_has_a_scenario_takes_all_that_describes_a_world(words):
 @pytest.mark.parametrize("words", WITH_SCENARIO)
 def test_whatever_has_a_scenario_takes_a_file_of_it(command, words):
     Path("world.toml").write_text('scenario = "warehouse_smal"\n')
-    needed = {"choose": ("--deliver", "4")}.get(words, ())
+    needed = [word for param in ALL[words].params if param.required for word in (param.opts[0], "4")]
     policies = () if words == "train" else ("ppo_warehouse_small",)
     code, out, err = command(*words.split(), *policies, "--scenario", "world.toml", *needed)
     assert (code, out) == (2, "")
