@@ -19,6 +19,7 @@ from swarm_forage_env.scenarios.presets import (
 )
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
 
+OF_THE_STUDY = ("warehouse_small", "warehouse_medium", "warehouse_dual", "warehouse_quad", "search_and_rescue")
 SIDES = (16, 32, 48, 64, 80, 96, 112, 128)
 ROBOTS = (12, 51, 115, 204, 320, 460, 627, 819)
 OBJECTS = (80, 272, 368, 448, 544, 1248, 1408, 1568)
@@ -26,9 +27,13 @@ CACHE_SIDES_M = (3.0, 6.2, 9.4, 12.6, 15.8, 19.0, 22.2, 25.4)
 
 
 @pytest.mark.parametrize("name", SCENARIO_NAMES)
-def test_settings_common_to_all_presets(name):
+def test_a_preset_has_the_name_that_it_is_found_by(name):
+    assert scenario(name).name == name
+
+
+@pytest.mark.parametrize("name", OF_THE_STUDY)
+def test_settings_common_to_all_presets_of_the_study(name):
     config = scenario(name)
-    assert config.name == name
     assert (config.horizon_ticks, config.interval_ticks) == (50_000, 1_000)
     assert config.caches == "none"
     assert config.quirks == Quirks()
