@@ -25,6 +25,7 @@ SIGNATURES = {
     "undisturbed_gain": "perf1, t_lost1, n1, perf2, t_lost2, n2, *, relative=False",
     "scalability": "perf1, n1, perf2, n2, *, variant='corrected', reduce=None, zero_policy='nan'",
     "efficiency": "perf, n, *, reduce='last'",
+    "raw_performance": "perf, *, reduce='last'",
     "dtw": "x, y, *, ground='value', clock=None, window=None, per_interval=False",
     "aligned_l1": "x, y",
     "waveform": "kind, ticks, *, frequency=0.0, amplitude=0.0, offset=0.0, phase=0.0",
@@ -76,6 +77,10 @@ def test_arguments_and_defaults_stay(name, expected):
     parameters = inspect.signature(getattr(metrics, name)).parameters.values()
     bare = inspect.Signature([p.replace(annotation=inspect.Parameter.empty) for p in parameters])
     assert str(bare).removesuffix(")").startswith(f"({expected}")
+
+
+def test_every_measure_has_its_arguments_here():
+    assert metrics.METRICS.keys() - SIGNATURES.keys() == set()
 
 
 def test_every_public_name_loads():

@@ -1,11 +1,16 @@
 """The table of measures agrees with the measures."""
 
 import math
+import re
+from pathlib import Path
 
 import pytest
 
 import metrics
 from metrics import METRICS
+from metrics.scoring.scores import MEASURE_CRITERIA
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 
 @pytest.mark.parametrize("name", METRICS)
@@ -50,3 +55,15 @@ INDEPENDENT = {
 def test_an_undisturbed_swarm_of_independent_robots_has_the_neutral_value(name):
     measure = METRICS[name]
     assert INDEPENDENT[name](measure.function) == pytest.approx(measure.neutral, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", METRICS)
+def test_every_measure_stands_on_the_page_of_measures(name):
+    assert f"`{name}`" in (DOCS / "metrics.md").read_text()
+
+
+@pytest.mark.parametrize("criterion", sorted(set(MEASURE_CRITERIA.values())))
+def test_the_page_of_scores_says_what_is_varied_for_which_measure(criterion):
+    what_is_run = (DOCS / "scoring.md").read_text().split("\n## ")[1]
+    (row,) = re.findall(rf"^\| `{criterion}` \|.*\|(.+)\|$", what_is_run, re.MULTILINE)
+    assert re.findall(r"`(\w+)`", row) == [name for name, varied in MEASURE_CRITERIA.items() if varied == criterion]
