@@ -5,12 +5,11 @@ scenario is registered with PettingZoo and Gymnasium, as soon as they are import
 `swarm_forage/warehouse_small-v1`.
 """
 
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import lazy_loader
-
-from swarm_forage_env._internal.importing import when_imported
 
 _load, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
@@ -50,5 +49,44 @@ def _register_with_gymnasium() -> None:
         )
 
 
-when_imported("pettingzoo", _register_with_pettingzoo)
-when_imported("gymnasium", _register_with_gymnasium)
+class _Finder:
+    """Asks the other finders where a module is, and has something done after it was run."""
+
+    def __init__(self) -> None:
+        self.waiting: dict[str, Callable[[], None]] = {}
+
+    def find_spec(self, name: str, path: Any, target: Any = None) -> Any:
+        """Return what Python is to import, None for modules that nobody waits for."""
+        if name not in self.waiting:
+            return None
+        others = (finder.find_spec(name, path, target) for finder in sys.meta_path if finder is not self)
+        spec: Any = next(filter(None, others), None)
+        if spec is not None:
+            run = spec.loader.exec_module
+
+            def run_and_tell(module: Any) -> None:
+                run(module)
+                self.waiting.pop(name, _nothing)()
+
+            spec.loader.exec_module = run_and_tell
+        return spec
+
+
+def _nothing() -> None: ...
+
+
+_finder = _Finder()
+
+
+def _when_imported(name: str, action: Callable[[], None]) -> None:
+    """Have something done after the import of the top module `name`; now, where it is imported already."""
+    if name in sys.modules:
+        action()
+        return
+    if _finder not in sys.meta_path:
+        sys.meta_path.insert(0, _finder)
+    _finder.waiting[name] = action
+
+
+_when_imported("pettingzoo", _register_with_pettingzoo)
+_when_imported("gymnasium", _register_with_gymnasium)
