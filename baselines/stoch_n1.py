@@ -18,12 +18,12 @@ from typing import NamedTuple
 import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
-from swarm_forage_env.contract.codes import Task
+from swarm_forage_env.contract.codes import SOURCE, TAB_CHILDREN, TAB_ROOT, Goal, Tab, Task
 from swarm_forage_env.contract.types import BoolArray, CodeArray, FloatArray, IntArray, Row
 from swarm_forage_env.scenarios.quirks import Quirks
 
 from .robots import ACQUIRE, TRANSPORT, WAIT_DROP, WAIT_PICKUP
-from .tasks import N_TABS, N_TASKS, ROOTED_TAB, SOURCE, TAB_CHILDREN, TAB_ROOT, Goal, Tab, TaskParameters
+from .tasks import N_TABS, N_TASKS, ROOTED_TAB, TaskParameters
 
 NO_TASK = int(Task.NONE)
 _GENERALIST = int(Task.GENERALIST)

@@ -1,6 +1,6 @@
 """One tick of a robot that allocates tasks: memory, executive, the machine of its task.
 
-Every task is one machine with its own source and destination (`tasks.SOURCE`, `tasks.DESTINATION`):
+Every task is one machine with its own source and destination (`SOURCE`, `DESTINATION`):
 
     ACQUIRE         on the way to the source, or searching it; there          -> WAIT_PICKUP
     WAIT_PICKUP     stand, ask; cargo -> HOMING or TRANSPORT; refused         -> ACQUIRE
@@ -16,7 +16,7 @@ Source: STOCHM and STOCHX of the paper, section "Candidate Algorithms".
 import numpy as np
 
 from swarm_forage_env._internal.compiling import inline_kernel, kernel
-from swarm_forage_env.contract.codes import Event, Task
+from swarm_forage_env.contract.codes import DESTINATION, SOURCE, Event, Goal, Task
 from swarm_forage_env.contract.detection import sees_cache
 from swarm_forage_env.contract.layout import CACHE_FIELDS, GROUND_SENSORS
 from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, ObsArray, Row
@@ -68,7 +68,7 @@ from .robots import (
     sense,
 )
 from .stoch_n1 import NO_TASK, Allocation, after_tick, end_task, next_task
-from .tasks import DESTINATION, DRAW_ABORT, DRAW_MOVE, DRAW_PARTITION, DRAW_SWITCH, DROP_GRIP, SOURCE, Goal
+from .tasks import DRAW_ABORT, DRAW_MOVE, DRAW_PARTITION, DRAW_SWITCH, DROP_GRIP
 
 _OBJECT = int(Goal.OBJECT)
 _CACHE = int(Goal.CACHE)

@@ -5,6 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from swarm_forage_env.contract.codes import Goal
 from swarm_forage_env.contract.policy import Memories, SwarmSpec
 from swarm_forage_env.contract.types import CodeArray, FloatArray, IntArray
 
@@ -15,7 +16,7 @@ from .robots import describe_robot
 from .scripted import ScriptedPolicy
 from .stoch_n1 import new_allocation
 from .task_machines import new_task_robots, step_tasks
-from .tasks import N_TASKS, TASK_DRAWS, Goal, TaskParameters
+from .tasks import N_TASKS, TASK_DRAWS, TaskParameters
 
 
 def site_box_m(spec: SwarmSpec) -> tuple[float, float, float, float]:

@@ -1,52 +1,18 @@
-"""Tasks of the controllers that use caches: source and destination of each, the task graph, and all numbers.
+"""Numbers of the controllers that use caches and allocate tasks. Their graph is in the contract, beside the codes.
 
-    Generalist            free object    -> nest
-      Harvester           free object    -> existing cache
-        Cache Starter     free object    -> a site half way to the nest
-        Cache Finisher    free object    -> an isolated object, where it creates a cache
-      Collector           existing cache -> nest
-        Cache Transferer  existing cache -> another existing cache
-        Cache Collector   existing cache -> nest
-
-A task with two subtasks is the root of a task allocation block (TAB): doing both subtasks once does the root's work
-once. STOCHM knows the upper block only, STOCHX all three. Source: section "Candidate Algorithms" of the paper.
+STOCHM knows the upper block of tasks only, STOCHX all three. Source: section "Candidate Algorithms" of the paper.
 """
 
 import math
 from dataclasses import dataclass
-from enum import IntEnum
 
 import numpy as np
 
-from swarm_forage_env.contract.codes import Grip, Task
+from swarm_forage_env.contract.codes import DESTINATION, Goal, Grip, Tab, Task
 
 from .object_choice import MemoryParameters
 from .parameters import ParameterError
 from .robots import DRAWS
-
-
-class Goal(IntEnum):
-    """What a robot takes an object from, or brings it to."""
-
-    NONE = 0
-    OBJECT = 1
-    """A free object, by ground sensor or memory."""
-    CACHE = 2
-    """An existing cache."""
-    NEST = 3
-    SITE = 4
-    """A place for a new cache."""
-    ISOLATED_OBJECT = 5
-    """A free object far from all others and from caches: the start of a new cache."""
-
-
-class Tab(IntEnum):
-    """Task allocation blocks, by root."""
-
-    GENERALIST = 0
-    HARVESTER = 1
-    COLLECTOR = 2
-
 
 (DRAW_ABORT, DRAW_MOVE, DRAW_PARTITION, DRAW_SWITCH, DRAW_POINT_X, DRAW_POINT_Y) = range(DRAWS, DRAWS + 6)
 """Draw columns beyond those of `machines`: giving up, moving the active block, subtask or root, switching subtasks,
@@ -58,48 +24,8 @@ N_TASKS = len(Task)
 N_TABS = len(Tab)
 NO_TAB = -1
 
-TAB_ROOT = np.array([Task.GENERALIST, Task.HARVESTER, Task.COLLECTOR], np.int8)
-"""(N_TABS,) task code of each block's root."""
-TAB_CHILDREN = np.array(
-    [(Task.HARVESTER, Task.COLLECTOR), (Task.STARTER, Task.FINISHER), (Task.TRANSFERER, Task.CACHE_COLLECTOR)], np.int8
-)
-"""(N_TABS, 2) task codes of each block's subtasks."""
-
-
-def _by_task(values: dict[Task, int]) -> np.ndarray:
-    return np.array([values[task] for task in Task], np.int8)
-
-
-ROOTED_TAB = _by_task(
-    {task: int(Tab[task.name]) if task.name in Tab.__members__ else NO_TAB for task in Task},
-)
+ROOTED_TAB = np.array([Tab[task.name] if task.name in Tab.__members__ else NO_TAB for task in Task], np.int8)
 """(N_TASKS,) block whose root a task is, or NO_TAB."""
-SOURCE = _by_task(
-    {
-        Task.NONE: Goal.NONE,
-        Task.GENERALIST: Goal.OBJECT,
-        Task.HARVESTER: Goal.OBJECT,
-        Task.COLLECTOR: Goal.CACHE,
-        Task.STARTER: Goal.OBJECT,
-        Task.FINISHER: Goal.OBJECT,
-        Task.TRANSFERER: Goal.CACHE,
-        Task.CACHE_COLLECTOR: Goal.CACHE,
-    }
-)
-"""(N_TASKS,) `Goal` code of where a task takes its object from."""
-DESTINATION = _by_task(
-    {
-        Task.NONE: Goal.NONE,
-        Task.GENERALIST: Goal.NEST,
-        Task.HARVESTER: Goal.CACHE,
-        Task.COLLECTOR: Goal.NEST,
-        Task.STARTER: Goal.SITE,
-        Task.FINISHER: Goal.ISOLATED_OBJECT,
-        Task.TRANSFERER: Goal.CACHE,
-        Task.CACHE_COLLECTOR: Goal.NEST,
-    }
-)
-"""(N_TASKS,) `Goal` code of where a task brings it."""
 DROP_GRIP = np.array([Grip.SITE if goal == Goal.SITE else Grip.DELIVER for goal in DESTINATION], np.float32)
 DROP_GRIP[Task.FINISHER] = Grip.CREATE_CACHE
 """(N_TASKS,) gripper command of a robot that waits to drop."""

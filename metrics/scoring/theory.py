@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from baselines.tasks import DESTINATION, SOURCE, TAB_CHILDREN, TAB_ROOT, Goal
-from swarm_forage_env.contract.codes import Task
+from swarm_forage_env.contract.codes import DESTINATION, SOURCE, TAB_CHILDREN, TAB_ROOT, Goal, Task
 from swarm_forage_env.rendering.figures import (
     COLOURS,
     SCREEN,

@@ -1,10 +1,22 @@
-"""Numeric codes: gripper commands, events, tasks, floor codes, object states, counters.
+"""Numeric codes: gripper commands, events, tasks and their graph, floor codes, object states, counters.
 
-Policies use the first three; the rest is for the world.
+Policies use the first three; the rest is for the world. The paper's tasks:
+
+    Generalist            free object    -> nest
+      Harvester           free object    -> existing cache
+        Cache Starter     free object    -> a site half way to the nest
+        Cache Finisher    free object    -> an isolated object, where it creates a cache
+      Collector           existing cache -> nest
+        Cache Transferer  existing cache -> another existing cache
+        Cache Collector   existing cache -> nest
+
+A task with two subtasks is the root of a task allocation block (TAB): doing both once does the root's work once.
 """
 
 from enum import IntEnum
 from typing import ClassVar
+
+import numpy as np
 
 
 class Grip:
@@ -53,6 +65,50 @@ class Task(IntEnum):
     TRANSFERER = 6
     CACHE_COLLECTOR = 7
 
+
+class Goal(IntEnum):
+    """What a robot takes an object from, or brings it to."""
+
+    NONE = 0
+    OBJECT = 1
+    """A free object, by ground sensor or memory."""
+    CACHE = 2
+    """An existing cache."""
+    NEST = 3
+    SITE = 4
+    """A place for a new cache."""
+    ISOLATED_OBJECT = 5
+    """A free object far from all others and from caches: the start of a new cache."""
+
+
+class Tab(IntEnum):
+    """Task allocation blocks, by root."""
+
+    GENERALIST = 0
+    HARVESTER = 1
+    COLLECTOR = 2
+
+
+_ENDS = {
+    Task.NONE: (Goal.NONE, Goal.NONE),
+    Task.GENERALIST: (Goal.OBJECT, Goal.NEST),
+    Task.HARVESTER: (Goal.OBJECT, Goal.CACHE),
+    Task.COLLECTOR: (Goal.CACHE, Goal.NEST),
+    Task.STARTER: (Goal.OBJECT, Goal.SITE),
+    Task.FINISHER: (Goal.OBJECT, Goal.ISOLATED_OBJECT),
+    Task.TRANSFERER: (Goal.CACHE, Goal.CACHE),
+    Task.CACHE_COLLECTOR: (Goal.CACHE, Goal.NEST),
+}
+SOURCE = np.array([_ENDS[task][0] for task in Task], np.int8)
+"""(8,) `Goal` code of where a task takes its object from."""
+DESTINATION = np.array([_ENDS[task][1] for task in Task], np.int8)
+"""(8,) `Goal` code of where a task brings it."""
+TAB_ROOT = np.array([Task.GENERALIST, Task.HARVESTER, Task.COLLECTOR], np.int8)
+"""(3,) task code of each block's root."""
+TAB_CHILDREN = np.array(
+    [(Task.HARVESTER, Task.COLLECTOR), (Task.STARTER, Task.FINISHER), (Task.TRANSFERER, Task.CACHE_COLLECTOR)], np.int8
+)
+"""(3, 2) task codes of each block's subtasks."""
 
 CELL_EMPTY = -1
 """Floor code of a cell that holds nothing. Codes >= 0 are the row of the free object lying there."""

@@ -17,7 +17,8 @@ from baselines.cache_choice import (
 from baselines.robots import Activity
 from baselines.stochm import STOCHMPolicy
 from baselines.task_machines import select_goal
-from baselines.tasks import DRAW_POINT_X, DRAW_POINT_Y, TASK_DRAWS, Goal
+from baselines.tasks import DRAW_POINT_X, DRAW_POINT_Y, TASK_DRAWS
+from swarm_forage_env.contract.codes import Goal
 from swarm_forage_env.scenarios.quirks import Quirks
 from tests.support.task_robot import TaskRobot
 

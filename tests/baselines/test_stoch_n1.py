@@ -10,8 +10,8 @@ from baselines.robots import Activity
 from baselines.stochm import STOCHMPolicy
 from baselines.stochx import STOCHXPolicy
 from baselines.task_policy import task_constants
-from baselines.tasks import STOCHM_PARAMETERS, STOCHX_PARAMETERS, Tab
-from swarm_forage_env.contract.codes import Task
+from baselines.tasks import STOCHM_PARAMETERS, STOCHX_PARAMETERS
+from swarm_forage_env.contract.codes import Tab, Task
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
 from tests.reference import task_chain
 from tests.support.observations import make_spec

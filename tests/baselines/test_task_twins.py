@@ -8,8 +8,8 @@ import pytest
 from baselines.robots import Activity
 from baselines.stochm import STOCHMPolicy
 from baselines.stochx import STOCHXPolicy
-from baselines.tasks import TASK_DRAWS, Goal
-from swarm_forage_env.contract.codes import Event, Task
+from baselines.tasks import TASK_DRAWS
+from swarm_forage_env.contract.codes import Event, Goal, Task
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
 from tests.reference import task_chain
 from tests.reference.controllers import ObjectDictionary

@@ -6,20 +6,8 @@ import pytest
 from baselines.parameters import ParameterError
 from baselines.stochm import STOCHMPolicy
 from baselines.stochx import STOCHXPolicy
-from baselines.tasks import (
-    DESTINATION,
-    DROP_GRIP,
-    NO_TAB,
-    ROOTED_TAB,
-    SOURCE,
-    STOCHM_PARAMETERS,
-    STOCHX_PARAMETERS,
-    TAB_CHILDREN,
-    TAB_ROOT,
-    Goal,
-    Tab,
-)
-from swarm_forage_env.contract.codes import Grip, Task
+from baselines.tasks import DROP_GRIP, NO_TAB, ROOTED_TAB, STOCHM_PARAMETERS, STOCHX_PARAMETERS
+from swarm_forage_env.contract.codes import DESTINATION, SOURCE, TAB_CHILDREN, TAB_ROOT, Goal, Grip, Tab, Task
 
 
 def test_every_task_but_the_root_is_a_subtask_once():

@@ -10,8 +10,8 @@ from baselines.memory import OneMemory, remember
 from baselines.robots import Activity, VectorState, sense
 from baselines.stochx import STOCHXPolicy
 from baselines.task_policy import TaskPolicy
-from baselines.tasks import ROOTED_TAB, TAB_CHILDREN
-from swarm_forage_env.contract.codes import Task
+from baselines.tasks import ROOTED_TAB
+from swarm_forage_env.contract.codes import TAB_CHILDREN, Task
 from swarm_forage_env.contract.layout import SERIAL_SCALE
 from tests.support.observations import Observations, make_spec
 
