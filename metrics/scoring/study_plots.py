@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from swarm_forage_env._internal.fields import known_name
 from swarm_forage_env._internal.wording import number
-from swarm_forage_env.inspect.snapshot import snapshot
+from swarm_forage_env.inspect.study_maps import snapshot
 from swarm_forage_env.rendering.figures import (
     FORMATS,
     SCREEN,

@@ -1,12 +1,18 @@
-"""Maps of the floor per condition of a study: a condition's runs are made again, since records hold no positions."""
+"""Pictures of the arena of a study: where its runs begin, and maps of the floor per condition.
+
+For maps a condition's runs are made again, since records hold no positions.
+"""
 
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swarm_forage_env._internal.fields import ConfigError, known_keys, whole
 from swarm_forage_env.inspect.maps import FloorMaps, floor_maps, mean_maps, same_proportions
 from swarm_forage_env.inspect.replay.capture import record_replay
+from swarm_forage_env.rendering.frame import render_frame
+from swarm_forage_env.runs.run import build_env
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import DONE
 from swarm_forage_env.studies.study import Place, StudySpec, Value, value_words
@@ -19,8 +25,40 @@ DEFAULT_SEEDS = 4
 _COMPARED = "collected"
 """Column of a stored run that must come out the same when the run is made again."""
 
+SIZE_PX = 700
+"""Longer side of the arena in pixels, in the picture of a beginning."""
+
 Advance = Callable[[float], None]
 """Called with the robot-ticks of all conditions that are done."""
+
+
+def snapshot_place(spec: StudySpec) -> Place:
+    """Return the condition that a picture is of: first rules, last policy, the middle value of each axis."""
+    middle = tuple(axis.values[(len(axis.values) - 1) // 2] for axis in spec.axes)
+    wanted = (spec.rules[0], spec.policies[-1].label, middle)
+    return next(place for place in spec.places if (place.rules, place.policy, place.values) == wanted)
+
+
+def snapshot(spec: StudySpec) -> NDArray[np.uint8]:
+    """Draw the first run of that condition before its first tick.
+
+    Returns:
+        (H, W, 3) picture, first row at the top.
+
+    Raises:
+        ImportError: Pillow is not installed.
+    """
+    place = snapshot_place(spec)
+    run = spec.specs_of(place)[0]
+    env = build_env(run.scenario)
+    env.reset_batch(run.seed)
+    world = run.scenario
+    values = spec.place_words()[place][2:]
+    places = [f"{axis.name.replace('_', ' ')} {word}" for axis, word in zip(spec.axes, values, strict=True)]
+    title = ", ".join([f"{spec.name}: {world.arena.width_m:g} x {world.arena.height_m:g} m", *places])
+    return render_frame(
+        world, env.swarm, env.objects, env.caches, env.events, tick=0, size_px=SIZE_PX, title=title, theme="light"
+    )
 
 
 def choose_places(spec: StudySpec, words: Sequence[str]) -> tuple[Place, ...]:

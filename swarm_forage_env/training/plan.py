@@ -2,7 +2,7 @@
 
 import dataclasses
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -183,11 +183,10 @@ class TrainingPlan:
             whose scenario cannot be or has another number of robots, or actions that the algorithm cannot choose.
     """
 
-    scenario: ScenarioConfig
-    """What is to be mastered, rewards included; evaluations take place in it. Stages may have shorter episodes. Beside
-    a sampler it is its largest world, which stands for all where spaces are asked for."""
-    wrappers: tuple[WrapperConfig, ...] = ()
-    """What disturbs the swarm, in training and in evaluations; samplers and worlds to be judged in have their own."""
+    world: World
+    """What is to be mastered, rewards included, and what disturbs the swarm; evaluations take place in it. Stages may
+    have shorter episodes. Beside a sampler it is its largest world, undisturbed, which stands for all where spaces are
+    asked for; samplers and worlds to be judged in have their own wrappers."""
     algorithm: str = "ppo"
     interface: InterfaceConfig = field(default_factory=InterfaceConfig)
     n_arenas: int = DEFAULT_ARENAS
@@ -202,7 +201,7 @@ class TrainingPlan:
     """Whether the policy that comes of it draws its discrete actions by their probabilities, as it did while it learnt
     (PPO, A2C). Robots that always take the likeliest one may block each other for ever."""
     sampler: ScenarioSampler | None = None
-    """Draws the world of each episode; None = it is always `scenario`. Then `evaluation` has worlds."""
+    """Draws the world of each episode; None = it is always `world`. Then `evaluation` has worlds."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "interface", self.interface.for_scenario(self.scenario))
@@ -236,7 +235,7 @@ class TrainingPlan:
         if self.sampler is not None and (self.scenario != self.sampler.largest or self.wrappers):
             raise ConfigError(
                 "Expected a plan with a sampler without scenario and wrappers, which it draws; in Python, give "
-                "scenario=sampler.largest."
+                "world=World(sampler.largest)."
             )
         is_sampled = any(stage.sampler or self.sampler for stage in self.stages)
         if is_sampled and not self.evaluation.worlds:
@@ -282,9 +281,19 @@ class TrainingPlan:
             )
 
     @property
+    def scenario(self) -> ScenarioConfig:
+        """The scenario of the world."""
+        return self.world.scenario
+
+    @property
+    def wrappers(self) -> tuple[WrapperConfig, ...]:
+        """What disturbs the swarm."""
+        return self.world.wrappers
+
+    @property
     def judging_worlds(self) -> tuple[World, ...]:
         """Worlds that the policy is judged in, with runs as long as evaluations have them."""
-        return tuple(map(self.evaluation.timed, self.evaluation.worlds or (World(self.scenario, self.wrappers),)))
+        return tuple(map(self.evaluation.timed, self.evaluation.worlds or (self.world,)))
 
     def judging(self, *policies: PolicySpec) -> Plan:
         """Return the runs of an evaluation of policies, in all worlds; raises ConfigError where one cannot be."""
@@ -297,7 +306,7 @@ class TrainingPlan:
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the plan as nested plain values."""
-        plain = {item.name: getattr(self, item.name) for item in dataclasses.fields(self)}
+        plain = {name: getattr(self, name) for name in _keys()}
         nested: dict[str, Any] = {name: dataclasses.asdict(plain[name]) for name in ("scenario", "interface")}
         nested["evaluation"] = self.evaluation.to_mapping()
         nested["wrappers"] = {config.name: config.to_mapping() for config in self.wrappers}
@@ -358,7 +367,7 @@ class TrainingPlan:
         Raises:
             ConfigError: unknown keys, or values that a plan cannot have.
         """
-        values = _known(cls, mapping, "")
+        values = _known(cls, mapping, "", _keys())
         if "sampler" in values:
             given = [name for name in ("scenario", "wrappers") if name in values]
             if given:
@@ -377,7 +386,14 @@ class TrainingPlan:
             if not isinstance(values["stages"], list):
                 raise ConfigError(f"Expected stages to be a list of tables, [[stages]], got {values['stages']!r}.")
             values["stages"] = tuple(Stage.from_mapping(stage) for stage in values["stages"])
-        return cls(**tuples(values))
+        world = World(values.pop("scenario"), values.pop("wrappers", ()))
+        return cls(world=world, **tuples(values))
+
+
+def _keys() -> list[str]:
+    """Names in the file of a plan: its fields, with the parts of the world."""
+    _, *others = dataclasses.fields(TrainingPlan)
+    return ["scenario", "wrappers", *(item.name for item in others)]
 
 
 def read_plan(path: Path) -> TrainingPlan:
@@ -423,7 +439,7 @@ def _leaves(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
         yield name, value
 
 
-def _known(config_class: type, mapping: Mapping[str, Any], where: str) -> dict[str, Any]:
+def _known(config_class: type, mapping: Mapping[str, Any], where: str, keys: Sequence[str] = ()) -> dict[str, Any]:
     table(where.rstrip(".") or "the plan", mapping)
-    known_keys(mapping, [item.name for item in dataclasses.fields(config_class)], prefix=where)
+    known_keys(mapping, keys or [item.name for item in dataclasses.fields(config_class)], prefix=where)
     return dict(mapping)

@@ -138,8 +138,7 @@ def recipe(
     if small_start is None:
         small_start = config.performance == "collected" and sampler is None and measured.small_start
     return TrainingPlan(
-        scenario=config,
-        wrappers=wrapper_configs(wrappers),
+        world=World(config, wrapper_configs(wrappers)),
         algorithm=algorithm,
         interface=chosen,
         n_arenas=n_arenas,

@@ -166,7 +166,7 @@ class ArenaBatch:
         self.arenas = [LearnerArena(plan, share) for share in shares]
         self.interface = self.arenas[0].interface
         self.n_arenas = n_arenas
-        self.n_robots = plan.scenario.robots.n_robots
+        self.n_robots = plan.world.n_robots
         self.n_rows = n_arenas * self.n_robots
         self.render_mode = plan.render_mode
         self._is_reset = self._is_closed = False
@@ -176,7 +176,7 @@ class ArenaBatch:
         self._returns = np.zeros((n_arenas, self.n_robots), np.float64)
         self._lengths = np.zeros((n_arenas, self.n_robots), np.int32)
         self._n_columns = self.interface.layout.size
-        action_size = COMMANDS + plan.scenario.robots.message_size
+        action_size = COMMANDS + plan.world.scenario.robots.message_size
         self._commands = np.zeros((n_arenas, self.n_robots, action_size), np.float32)
         self._rows = self._absent, self._present, self._returns, self._lengths
         self._ways: tuple[list[ForagingArena], Lockstep | None, Bookkeeping | None] | None = None

@@ -74,7 +74,7 @@ class LearnerArena:
         """
         self._plan = plan
         self._share = share
-        self.n_rows = plan.scenario.robots.n_robots
+        self.n_rows = plan.world.n_robots
         self._overrides: dict[str, Any] = {}
         self._world: World | None = None
         self._seeds = np.random.default_rng()

@@ -25,12 +25,10 @@ Result = TypeVar("Result")
 class ArenaPlan:
     """Everything that an arena is made from; picklable."""
 
-    scenario: ScenarioConfig
-    """The world; with a sampler its largest one, which says how many rows and which columns there are."""
-    wrappers: tuple[WrapperConfig, ...] = ()
-    """What disturbs the swarm, in any order; with a sampler nothing beside what it draws."""
+    world: World
+    """With a sampler its largest one, undisturbed, which says how many rows and which columns there are."""
     sampler: ScenarioSampler | None = None
-    """Where the world of each run comes from; None = it is always `scenario`."""
+    """Where the world of each run comes from; None = it is always `world`."""
     interface: InterfaceConfig = field(default_factory=InterfaceConfig)
     """What a learner sees and does."""
     max_cycles: int | None = None
@@ -44,13 +42,13 @@ class ArenaPlan:
 
         Args:
             overrides: Scenario fields by name.
-            world: What the sampler has drawn; None = the scenario and wrappers of the plan.
+            world: What the sampler has drawn; None = that of the plan.
 
         Raises:
             ConfigError: unknown fields, values that do not fit together, another number of robots, or more robots or
                 objects than the largest worlds of the sampler have.
         """
-        given = world or World(self.scenario, self.wrappers)
+        given = world or self.world
         scenario = scenario_of_same_size(given.scenario, overrides)
         if self.sampler is not None:
             self._check_room(scenario, self.sampler)
@@ -119,7 +117,7 @@ def plan_arena(
             raise ConfigError(
                 "Expected a sampler for swarm_forage/sampled-v1, got none; give sampler=ScenarioSampler(...)."
             )
-        world = chosen_scenario(scenario or DEFAULT_SCENARIO, overrides)
+        config = chosen_scenario(scenario or DEFAULT_SCENARIO, overrides)
     else:
         instance("sampler", sampler, ScenarioSampler, hint="; ScenarioSampler.from_mapping reads a table")
         given = ["scenario"] * (scenario not in (None, SAMPLED)) + ["wrappers"] * bool(disturbing) + list(overrides)
@@ -128,12 +126,11 @@ def plan_arena(
                 f"Expected either a sampler, which decides on the worlds, or {', '.join(given)}; got both. Write it "
                 "into the sampler, where all worlds can share it. By id, make swarm_forage/sampled-v1."
             )
-        world = sampler.largest
+        config = sampler.largest
     return ArenaPlan(
-        scenario=world,
-        wrappers=disturbing,
+        world=World(config, disturbing),
         sampler=sampler,
-        interface=chosen_interface(interface).for_scenario(world),
+        interface=chosen_interface(interface).for_scenario(config),
         max_cycles=max_cycles,
         render_mode=render_mode,
         snapshots=snapshots,

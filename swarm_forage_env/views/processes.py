@@ -83,10 +83,10 @@ class ArenaProcesses:
         if not 1 <= n_processes <= n_arenas:
             raise ValueError(f"Expected n_processes from 1 to n_arenas = {n_arenas}, got {n_processes}.")
         self.n_arenas = n_arenas
-        self.n_robots = plan.scenario.robots.n_robots
+        self.n_robots = plan.world.n_robots
         self.n_rows = n_arenas * self.n_robots
         self.render_mode = plan.render_mode
-        self.interface = LearnerInterface(plan.interface, SwarmSpec.of(plan.scenario))
+        self.interface = LearnerInterface(plan.interface, SwarmSpec.of(plan.world.scenario))
         self._shares = [part.tolist() for part in np.array_split(np.arange(n_arenas), n_processes)]
         starter: Any = multiprocessing.get_context(context)  # the declared type lacks Process, but every context has it
         self._pipes: list[Connection] = []
@@ -278,7 +278,7 @@ def open_arenas(
             "Expected render_mode None or 'rgb_array' for a vector environment, got 'human'; a window shows one arena, "
             "of parallel_env or JointForageEnv."
         )
-    n_arenas = _number_of_arenas(num_envs, n_arenas, plan.scenario.robots.n_robots)
+    n_arenas = _number_of_arenas(num_envs, n_arenas, plan.world.n_robots)
     if n_processes:
         return ArenaProcesses(plan, n_arenas, n_processes)
     return ArenaBatch(plan, n_arenas)

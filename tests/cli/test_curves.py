@@ -11,9 +11,10 @@ from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.training.evaluations import EVALUATIONS_FILE, PLAN_FILE, write_evaluations
 from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan
 from swarm_forage_env.training.status import Evaluation
+from swarm_forage_env.wrappers.world import World
 
 PLAN = TrainingPlan(
-    scenario=scenario("warehouse_small", n_robots=2, n_objects=20, horizon_s=4.0, interval_s=2.0),
+    world=World(scenario("warehouse_small", n_robots=2, n_objects=20, horizon_s=4.0, interval_s=2.0)),
     stages=(Stage(steps=10), Stage(steps=20)),
     evaluation=EvaluationPlan(every_steps=10, horizon_s=4.0, n_runs=2),
 )

@@ -27,6 +27,7 @@ from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterfac
 from swarm_forage_env.training.datasets.recording import plan_dataset
 from swarm_forage_env.training.plan import TrainingPlan
 from swarm_forage_env.views.gymnasium import SwarmVectorEnv
+from swarm_forage_env.wrappers.world import World
 from tests.support.branches import pickled
 
 
@@ -273,7 +274,7 @@ def test_an_interface_says_its_sensors_in_a_word_or_in_json(own_sensors):
 
 
 def test_a_plan_of_a_training_says_them():
-    plan = TrainingPlan(scenario=scenario("warehouse_small", own_sensors=("both",)))
+    plan = TrainingPlan(world=World(scenario("warehouse_small", own_sensors=("both",))))
     assert plan.interface.own_sensors == ("both",)
     assert TrainingPlan.from_mapping(json.loads(json.dumps(plan.to_mapping()))) == plan
 

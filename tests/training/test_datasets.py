@@ -125,14 +125,15 @@ def test_episodes_end_where_robots_do(tmp_path):
     dataset = TrajectoryDataset(tmp_path)
     episodes = list(dataset.episodes())
     assert [(one.seed, one.robot) for one in episodes] == [(seed, robot) for seed in (3, 4) for robot in range(4)]
-    assert any(one.terminated for one in episodes)
+    assert any(one.terminated[-1] for one in episodes)
     for one in episodes:
         steps = dataset.steps(one.seed)
         length = len(one.rewards)
         assert len(one.observations) == len(one.active) == length + 1
-        assert one.terminated != one.truncated or len(steps) < 100
-        assert steps.terminated[length - 1, one.robot] == one.terminated
-        if one.terminated:
+        assert one.terminated[-1] != one.truncated[-1] or len(steps) < 100
+        assert steps.terminated[length - 1, one.robot] == one.terminated[-1]
+        assert not one.terminated[:-1].any()
+        if one.terminated[-1]:
             assert not one.observations[-1].any()
             assert not steps.active[length:, one.robot].any()
 

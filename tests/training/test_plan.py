@@ -9,6 +9,7 @@ from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.pretrained import plan_file
 from swarm_forage_env.scenarios.presets import warehouse_small
 from swarm_forage_env.training.plan import LEARNING, EvaluationPlan, Stage, TrainingPlan, read_plan
+from swarm_forage_env.wrappers.world import World
 
 TOML = """
 algorithm = "dqn"
@@ -42,6 +43,8 @@ options = { learning_rate = 0.1 }
 every_steps = 50
 horizon_s = 400.0
 """
+
+SMALL = warehouse_small(n_robots=6)
 
 
 @pytest.fixture
@@ -129,14 +132,14 @@ def test_plans_that_cannot_be_are_refused_with_their_file(tmp_path, old, new, re
 
 def test_a_plan_has_stages_and_a_readable_file(tmp_path):
     with pytest.raises(ConfigError, match="at least one stage"):
-        TrainingPlan(scenario=warehouse_small(), stages=())
+        TrainingPlan(world=World(warehouse_small()), stages=())
     with pytest.raises(ConfigError, match="Cannot read the plan"):
         read_plan(tmp_path / "nothing.toml")
 
 
 def test_performances_that_arenas_do_not_count_are_refused(plan):
     with pytest.raises(ConfigError, match="to be one of collected, first_picked, got 'n_carrying'"):
-        replace(plan, scenario=replace(plan.scenario, performance="n_carrying"))
+        replace(plan, world=replace(plan.world, scenario=replace(plan.scenario, performance="n_carrying")))
 
 
 def test_a_file_without_a_table_is_no_plan(tmp_path):
@@ -166,8 +169,14 @@ def test_plans_that_go_on_with_a_training_differ_in_steps_to_come_alone(plan):
     ("changes", "difference"),
     [
         ({"seed": 4}, "seed: 0 before, 4 now"),
-        ({"scenario": warehouse_small(n_robots=6)}, "scenario.arena.nest_centre_m: (4.0, 8.0) before, (3.2, 8.0) now"),
-        ({"wrappers": ()}, "wrappers.sensor_noise.sigma: 0.02 before, nothing now"),
+        (
+            {"world": World(warehouse_small(n_robots=6))},
+            "scenario.arena.nest_centre_m: (4.0, 8.0) before, (3.2, 8.0) now",
+        ),
+        (
+            {"world": World(warehouse_small(n_robots=6, nest_centre_m=(4.0, 8.0)))},
+            "wrappers.sensor_noise.sigma: 0.02 before, nothing now",
+        ),
         ({"options": {"gamma": 0.9, "tau": 0.5}}, "options.tau: nothing before, 0.5 now"),
         ({"hidden": (16, 16)}, "hidden: (16,) before, (16, 16) now"),
     ],

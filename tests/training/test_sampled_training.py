@@ -11,6 +11,7 @@ pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-b
 from stable_baselines3 import DQN, PPO
 
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.cli.training_report import heading
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.runs.table import Table
@@ -19,13 +20,13 @@ from swarm_forage_env.training import judging
 from swarm_forage_env.training.evaluation_worlds import EvaluationWorld
 from swarm_forage_env.training.evaluations import read_evaluations
 from swarm_forage_env.training.judging import baseline_runs, best_baselines, ratio_to
-from swarm_forage_env.training.lines import heading
 from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.recipe import recipe
 from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv
 from swarm_forage_env.training.sb3.training import train
 from swarm_forage_env.training.status import Evaluation
 from swarm_forage_env.wrappers.registry import wrapper_configs
+from swarm_forage_env.wrappers.world import World
 from tests.support.sampled import TWO_WORLDS, sampler
 
 WORLDS = sampler()
@@ -40,7 +41,7 @@ JUDGED = (
 def tiny_plan(**changes) -> TrainingPlan:
     """Two rollouts in drawn worlds."""
     plan = TrainingPlan(
-        scenario=WORLDS.largest,
+        world=World(WORLDS.largest),
         sampler=WORLDS,
         interface=NUMBERED,
         n_arenas=2,
@@ -130,7 +131,7 @@ def test_the_same_plan_with_a_sampler_gives_the_same_weights_in_one_process_and_
 
 def test_plans_without_worlds_write_what_they_always_wrote():
     plan = dataclasses.replace(
-        tiny_plan(), sampler=None, scenario=warehouse_small(**QUICK), evaluation=EvaluationPlan(every_steps=5)
+        tiny_plan(), sampler=None, world=World(warehouse_small(**QUICK)), evaluation=EvaluationPlan(every_steps=5)
     )
     mapping = plan.to_mapping()
     assert "sampler" not in mapping
@@ -193,7 +194,7 @@ def test_stages_share_the_caches_of_the_policy():
         tiny_plan(stages=(Stage(steps=5, sampler=cached),))
 
 
-FIXED = TrainingPlan(scenario=warehouse_small(**QUICK), interface=NUMBERED)
+FIXED = TrainingPlan(world=World(warehouse_small(**QUICK)), interface=NUMBERED)
 
 
 @pytest.mark.parametrize("fields", [{"neighbours_seen": 2}, {"caches": "static"}])
@@ -202,7 +203,9 @@ def test_worlds_to_be_judged_in_fit_the_policy(fields):
     seen = {"neighbours_seen": 2, "neighbour_range_m": 4.0} if "neighbours_seen" in fields else {}
     odd = EvaluationWorld(scenario=warehouse_small(**QUICK, **fields), name="odd", baseline="crw")
     with pytest.raises(ConfigError, match=r"evaluation world odd(: .* neighbour_range_m=4| with the caches)"):
-        dataclasses.replace(FIXED, scenario=warehouse_small(**QUICK, **seen), evaluation=EvaluationPlan(worlds=(odd,)))
+        dataclasses.replace(
+            FIXED, world=World(warehouse_small(**QUICK, **seen)), evaluation=EvaluationPlan(worlds=(odd,))
+        )
 
 
 def test_wrappers_stand_where_they_take_effect():
@@ -211,7 +214,7 @@ def test_wrappers_stand_where_they_take_effect():
     stages = (Stage(steps=5, sampler=WORLDS),)
     for changes in ({"evaluation": judged}, {"evaluation": judged, "stages": stages}):
         with pytest.raises(ConfigError, match=r"without wrappers beside .* got sensor_noise;"):
-            dataclasses.replace(FIXED, wrappers=noise, **changes)
+            dataclasses.replace(FIXED, world=World(FIXED.scenario, noise), **changes)
 
 
 def test_worlds_of_one_name_have_one_performance():

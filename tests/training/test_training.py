@@ -27,6 +27,7 @@ from swarm_forage_env.training.sb3.export import export_network, note_interface
 from swarm_forage_env.training.sb3.training import train
 from swarm_forage_env.views.pettingzoo import parallel_env
 from swarm_forage_env.wrappers.registry import parse_wrapper
+from swarm_forage_env.wrappers.world import World
 
 NUMBERED = InterfaceConfig(
     observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5, own_sensors=()
@@ -37,7 +38,7 @@ DRIVEN = InterfaceConfig(observation="compact", automatic_gripper=True)
 def tiny_plan(**changes) -> TrainingPlan:
     """Two stages of three rollouts, in seconds."""
     plan = TrainingPlan(
-        scenario=warehouse_small(n_robots=4, n_objects=20, horizon_s=200.0),
+        world=World(warehouse_small(n_robots=4, n_objects=20, horizon_s=200.0)),
         interface=NUMBERED,
         n_arenas=2,
         hidden=(8,),
@@ -233,7 +234,7 @@ def test_a_training_that_kept_nothing_is_started_again(tmp_path):
         ({"evaluation": EvaluationPlan(baseline="gone.npz")}, 0, r"baseline to be a controller: .*gone\.npz"),
         # Clusters are drawn by the first reset.
         (
-            {"scenario": search_and_rescue(side_m=48.0, n_robots=4, horizon_s=200.0),
+            {"world": World(search_and_rescue(side_m=48.0, n_robots=4, horizon_s=200.0)),
              "stages": (Stage(steps=64, scenario=ROOMLESS),)},
             0,
             r"Cannot train in stage 1, with width_m = 9.6, .*: Expected room for \d+ clusters",
@@ -266,8 +267,10 @@ def test_a_training_that_diverges_leaves_the_checkpoint_before(tmp_path):
 
 def test_a_rollout_with_nobody_at_work_says_so(tmp_path):
     plan = tiny_plan(
-        scenario=warehouse_small(n_robots=1, n_objects=20, horizon_s=200.0),
-        wrappers=(parse_wrapper("population:malfunction_per_tick=0.2,repair_per_tick=0.201"),),
+        world=World(
+            warehouse_small(n_robots=1, n_objects=20, horizon_s=200.0),
+            (parse_wrapper("population:malfunction_per_tick=0.2,repair_per_tick=0.201"),),
+        ),
         n_arenas=1,
         options={"n_steps": 2, "batch_size": 2},
     )
@@ -281,7 +284,7 @@ def test_checkpoints_run_as_they_were_trained(tmp_path, algorithm):
     replay = {"buffer_size": 400, "learning_starts": 64, "batch_size": 16}
     scenario = warehouse_small(n_robots=4, n_objects=60, horizon_s=200.0, caches="static")
     changes = {"algorithm": "sac", "interface": driven, "options": replay} if algorithm == "sac" else {}
-    result = train(tiny_plan(stages=(Stage(steps=128),), scenario=scenario, **changes), tmp_path)
+    result = train(tiny_plan(stages=(Stage(steps=128),), world=World(scenario), **changes), tmp_path)
     policy = load_policy(tmp_path / "model.zip")
     assert policy.caches == "static"
     env = parallel_env("warehouse_small", n_robots=4, n_objects=20)

@@ -10,6 +10,7 @@ from swarm_forage_env.views import learner_arena
 from swarm_forage_env.views.arenas import ArenaBatch, ArenaStep
 from swarm_forage_env.views.plans import ArenaPlan, plan_arena
 from swarm_forage_env.wrappers.registry import parse_wrapper
+from swarm_forage_env.wrappers.world import World
 from tests.support import lives
 
 
@@ -86,9 +87,10 @@ def test_the_arena_ends_with_its_last_robot():
 
 def test_deaths_of_the_population_wrapper_end_rows_once_per_run():
     wrapped = ArenaPlan(
-        scenario=scenario("warehouse_small", n_robots=6, n_objects=4),
+        world=World(
+            scenario("warehouse_small", n_robots=6, n_objects=4), (parse_wrapper("population:death_per_tick=0.05"),)
+        ),
         max_cycles=60,
-        wrappers=(parse_wrapper("population:death_per_tick=0.05"),),
         interface=InterfaceConfig(observation="compact"),
     )
     batch = ArenaBatch(wrapped, 1)
@@ -261,9 +263,11 @@ def test_small_rewards_of_long_runs_add_up():
 
 def test_attributes_are_set_where_they_are_also_below_wrappers():
     wrapped = ArenaPlan(
-        scenario=scenario("warehouse_small", n_robots=3, n_objects=4),
+        world=World(
+            scenario("warehouse_small", n_robots=3, n_objects=4),
+            (parse_wrapper("sensor_noise:sigma=0.01"), parse_wrapper("actuator_noise:sigma=0.01")),
+        ),
         max_cycles=9,
-        wrappers=(parse_wrapper("sensor_noise:sigma=0.01"), parse_wrapper("actuator_noise:sigma=0.01")),
     )
     batch = ArenaBatch(wrapped, 1)
     batch.reset([0], [None])

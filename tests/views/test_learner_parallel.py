@@ -13,6 +13,7 @@ from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv, parallel_env
 from swarm_forage_env.views.plans import ArenaPlan
 from swarm_forage_env.wrappers.noise import SensorNoise
 from swarm_forage_env.wrappers.registry import parse_wrapper
+from swarm_forage_env.wrappers.world import World
 
 INTERFACES = {
     "full": InterfaceConfig(),
@@ -41,7 +42,7 @@ def test_shows_the_same_as_the_rows_of_an_arena(interface):
     narrow = scenario("warehouse_small", n_robots=6, n_objects=40, width_m=12.0, nest_centre_m=(1.2, 8.0),
                       nest_size_m=(1.2, 12.8), tick=0.01)  # fmt: skip
     env = ParallelLearnerEnv(narrow, interface=interface, wrappers=wrappers, max_cycles=100)
-    batch = ArenaBatch(ArenaPlan(scenario=narrow, wrappers=wrappers, max_cycles=100, interface=interface), 1)
+    batch = ArenaBatch(ArenaPlan(world=World(narrow, wrappers), max_cycles=100, interface=interface), 1)
     observations, infos = env.reset(seed=2)
     rows, _ = batch.reset([2], [None])
     n_deaths = 0

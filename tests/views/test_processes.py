@@ -18,8 +18,9 @@ from swarm_forage_env.views import processes
 from swarm_forage_env.views.arenas import ArenaBatch
 from swarm_forage_env.views.plans import ArenaPlan
 from swarm_forage_env.views.processes import ArenaProcessError, ArenaProcesses, open_arenas
+from swarm_forage_env.wrappers.world import World
 
-PLAN = ArenaPlan(scenario=scenario("warehouse_small", n_robots=3, n_objects=4), max_cycles=50)
+PLAN = ArenaPlan(world=World(scenario("warehouse_small", n_robots=3, n_objects=4)), max_cycles=50)
 IDLE = np.zeros((6, 3), np.float32)
 
 
@@ -79,7 +80,7 @@ def test_a_process_that_was_killed_before_its_first_answer_is_not_blamed_on_the_
 
 
 def test_a_plan_that_cannot_be_built_is_refused_at_once_and_leaves_no_process():
-    impossible = ArenaPlan(scenario=PLAN.scenario, max_cycles=0)
+    impossible = ArenaPlan(world=PLAN.world, max_cycles=0)
     before = multiprocessing.active_children()
     with pytest.raises(ValueError, match="max_cycles to be a whole number >= 1 or None, got 0"):
         ArenaProcesses(impossible, 2, 2)
@@ -90,7 +91,7 @@ def test_the_interface_is_known_without_an_environment_in_this_process(monkeypat
     monkeypatch.setattr(ForageEnv, "__init__", lambda *_, **__: pytest.fail("an environment was built"))
     arenas = ArenaProcesses(PLAN, 1, 1)
     arenas.close()
-    assert arenas.interface.observation_space.shape == (SwarmSpec.of(PLAN.scenario).layout.size,)
+    assert arenas.interface.observation_space.shape == (SwarmSpec.of(PLAN.world.scenario).layout.size,)
 
 
 def test_ctrl_c_is_left_to_the_parent(running):
@@ -132,8 +133,8 @@ def test_errors_that_cannot_travel_are_told_in_words():
 
 
 def test_arenas_are_opened_here_or_elsewhere():
-    assert isinstance(open_arenas(PLAN.scenario), ArenaBatch)
-    elsewhere = open_arenas(PLAN.scenario, n_processes=1)
+    assert isinstance(open_arenas(PLAN.world.scenario), ArenaBatch)
+    elsewhere = open_arenas(PLAN.world.scenario, n_processes=1)
     assert isinstance(elsewhere, ArenaProcesses)
     with pytest.raises(RuntimeError, match="Call reset before step"):
         elsewhere.step(IDLE[:3])

@@ -154,7 +154,7 @@ def test_the_arrays_of_a_snapshot_are_found(interface, way):
 
 def arenas(n: int) -> list[ForagingArena]:
     """Arenas that have begun, each with a seed of its own."""
-    config = plan().scenario
+    config = plan().world.scenario
     made = [ForagingArena(config) for _ in range(n)]
     for seed, arena in enumerate(made):
         arena.reset(seed)
@@ -253,7 +253,7 @@ def test_a_copy_of_a_batch_goes_on_by_itself():
 
 
 def test_who_may_go_in_lockstep():
-    config = plan().scenario
+    config = plan().world.scenario
     assert can_go_in_lockstep([ForagingArena(config), ForagingArena(config)])
     unlike = (
         ForagingArena(config, reads=("proximity",)),

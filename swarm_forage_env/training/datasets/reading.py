@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,9 +19,15 @@ _LONGER_BY_ONE = ("observations", "active")
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class Steps:
-    """Decisions of all robots, a chunk or a whole run of n; `datasets.layout` has shapes and meaning."""
+    """Decisions of all robots, a chunk or a whole run of n; `datasets.layout` has shapes and meaning.
+
+    Those of one robot, from the start to its death or the end of the run, have no axis of robots. After a death the
+    last observation is zeros.
+    """
 
     seed: int
+    robot: int | None = None
+    """Row of the one robot; None = all of them."""
     observations: ObsArray
     actions: np.ndarray
     rewards: np.ndarray
@@ -31,26 +38,12 @@ class Steps:
     def __len__(self) -> int:
         return len(self.rewards)
 
-
-@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
-class Episode:
-    """What one robot saw and did in a run of L decisions, until it died or the run ended."""
-
-    seed: int
-    robot: int
-    """Row of the robot."""
-    observations: ObsArray
-    """(L + 1, d); after a death the last one is zeros."""
-    actions: np.ndarray
-    """(L,) or (L, k)."""
-    rewards: np.ndarray
-    """(L,) float64."""
-    terminated: bool
-    """Whether the robot died."""
-    truncated: bool
-    """Whether the run ended although the robot could have gone on."""
-    active: BoolArray
-    """(L + 1,) whether the robot was at work; what it does while it is not has no effect."""
+    def of_robot(self, robot: int) -> "Steps":
+        """Return what one robot of a whole run saw and did."""
+        deaths = np.flatnonzero(self.terminated[:, robot])
+        end = int(deaths[0]) + 1 if len(deaths) else len(self)
+        arrays: dict[str, Any] = {name: getattr(self, name)[: end + (name in _LONGER_BY_ONE), robot] for name in ARRAYS}
+        return Steps(seed=self.seed, robot=robot, **arrays)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -127,7 +120,7 @@ class TrajectoryDataset:
             seeds = ", ".join(str(run.seed) for run in self.runs) or "none"
             raise DatasetError(f"Expected one of the runs in {self.folder}, seeds {seeds}, got seed {seed}.")
         chunks = list(self._chunks_of(run))
-        joined = {
+        joined: dict[str, Any] = {
             # Of the two arrays with one row more, the last row of a chunk is the first of the next one.
             name: np.concatenate(
                 [getattr(chunk, name)[: len(chunk)] for chunk in chunks]
@@ -137,23 +130,11 @@ class TrajectoryDataset:
         }
         return Steps(seed=seed, **joined)
 
-    def episodes(self) -> Iterator[Episode]:
+    def episodes(self) -> Iterator[Steps]:
         """Yield the episode of every robot, run by run."""
         for run in self.runs:
             steps = self.steps(run.seed)
-            for robot in range(steps.rewards.shape[1]):
-                deaths = np.flatnonzero(steps.terminated[:, robot])
-                end = int(deaths[0]) + 1 if len(deaths) else len(steps)
-                yield Episode(
-                    seed=run.seed,
-                    robot=robot,
-                    observations=steps.observations[: end + 1, robot],
-                    actions=steps.actions[:end, robot],
-                    rewards=steps.rewards[:end, robot],
-                    terminated=bool(len(deaths)),
-                    truncated=bool(steps.truncated[end - 1, robot]),
-                    active=steps.active[: end + 1, robot],
-                )
+            yield from map(steps.of_robot, range(steps.rewards.shape[1]))
 
     def transitions(self) -> Transitions:
         """Return all decisions of robots that were at work, in memory; for more than that, use `chunks`."""
