@@ -1,6 +1,7 @@
 """The commands `benchmark`, `benchmark worlds`, `show` and `page`."""
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,35 +13,53 @@ from swarm_forage_env.cli.option_groups import PolicyOptions
 from swarm_forage_env.cli.options import AsJson, DryRun, Jobs
 
 if TYPE_CHECKING:
-    from metrics.benchmark import BenchmarkQuestion, Board
+    from metrics.benchmark import BenchmarkQuestion, Board, Training
 
 Entries = Annotated[list[Path], typer.Argument(metavar="ENTRY...", help="Entry files; the scripted four come along.")]
 
 
-def run(  # long: one parameter per option
-    policies: PolicyOptions,
-    name: Annotated[str | None, typer.Option("--name", help="Name of the entry; default that of the policy.")] = None,
-    file: Annotated[Path | None, typer.Option("--file", help="Entry; default results/benchmark/NAME.json.")] = None,
-    out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Folder for records of runs.")] = Path(
-        "results/benchmark/records"
-    ),
-    quick: Annotated[bool, typer.Option("--quick", help="Short runs and few seeds, for a look; no entry.")] = False,
+@dataclass(frozen=True, kw_only=True, slots=True)
+class TrainedOptions:
+    """How the policies of an entry were trained."""
+
     trained_in: Annotated[
         str,
         typer.Option(
             "--trained-in",
             help="given: in the training worlds only; other: also elsewhere; nothing: not trained; unknown.",
         ),
-    ] = "unknown",
-    training: Annotated[str, typer.Option("--training", help="Command that trained the policies, for the page.")] = "",
-    library: Annotated[str, typer.Option("--library", help="Library that trained them, with its version.")] = "",
+    ] = "unknown"
+    training_command: Annotated[
+        str, typer.Option("--training", help="Command that trained the policies, for the page.")
+    ] = ""
+    library: Annotated[str, typer.Option("--library", help="Library that trained them, with its version.")] = ""
     training_hours: Annotated[
         float | None, typer.Option("--training-hours", min=0.0, help="Core-hours of all trainings together.")
-    ] = None,
+    ] = None
     training_seeds: Annotated[
         list[int] | None,
         typer.Option("--training-seed", min=0, help="Per policy, in their order; default what their files tell."),
-    ] = None,
+    ] = None
+
+    def training(self) -> "Training":
+        """Return it as an entry tells it."""
+        from metrics.benchmark import Training
+
+        return Training(
+            worlds=self.trained_in, command=self.training_command, library=self.library, core_hours=self.training_hours
+        )
+
+
+def run(
+    policies: PolicyOptions,
+    *,
+    name: Annotated[str | None, typer.Option("--name", help="Name of the entry; default that of the policy.")] = None,
+    file: Annotated[Path | None, typer.Option("--file", help="Entry; default results/benchmark/NAME.json.")] = None,
+    out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Folder for records of runs.")] = Path(
+        "results/benchmark/records"
+    ),
+    quick: Annotated[bool, typer.Option("--quick", help="Short runs and few seeds, for a look; no entry.")] = False,
+    trained: TrainedOptions,
     jobs: Jobs = None,
     as_json: AsJson = False,
     dry_run: DryRun = False,
@@ -55,7 +74,7 @@ def run(  # long: one parameter per option
         raise typer.BadParameter("Expected --name for an entry of several policies.")
     if quick and file is not None:
         raise typer.BadParameter("Expected --file without --quick: a quick look is no entry.")
-    from metrics.benchmark import Training, benchmark_question, board_of, load_protocol, scripted_entries
+    from metrics.benchmark import benchmark_question, board_of, load_protocol, scripted_entries
     from metrics.benchmark.running import entry_name
     from metrics.scoring.question import ask
     from swarm_forage_env._internal.files import as_file_name, check_file
@@ -67,8 +86,8 @@ def run(  # long: one parameter per option
         names,
         name=called,
         protocol=protocol,
-        training=Training(worlds=trained_in, command=training, library=library, core_hours=training_hours),
-        training_seeds=training_seeds or (),
+        training=trained.training(),
+        training_seeds=trained.training_seeds or (),
     )
     if dry_run:
         typer.echo(_plan_text(question, out, jobs))

@@ -1,10 +1,13 @@
 """The command `train`: it makes a plan by `training.recipe` and carries it out by `training.sb3.training`."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.option_groups import WorldOptions, given_options, refuse_others
 from swarm_forage_env.training.defaults import (
     DECISION_TICKS,
@@ -14,6 +17,9 @@ from swarm_forage_env.training.defaults import (
     EVALUATE_EVERY,
 )
 
+if TYPE_CHECKING:
+    from swarm_forage_env.training.plan import TrainingPlan
+
 _HIDDEN = ",".join(map(str, DEFAULT_HIDDEN))
 _OF_PLAN = ("plan", "out", "seed", "callbacks", "jobs", "resume")
 """Options that go with --plan."""
@@ -21,41 +27,35 @@ _OF_RESUMING = ("steps", "out", "callbacks", "jobs", "resume")
 """Options that say nothing of the plan that is resumed."""
 
 
-def train(  # long: one parameter per option
-    context: typer.Context,
-    described: WorldOptions,
-    out: Annotated[Path | None, typer.Option(help="Folder of the training; default results/training/NAME.")] = None,
-    plan: Annotated[
-        str | None,
-        typer.Option(
-            help="TOML file with a training plan, or name of a shipped policy, instead of all below; but --seed counts."
-        ),
-    ] = None,
-    algorithm: Annotated[str | None, typer.Option("--algo", help="ppo, a2c, dqn or sac; default ppo.")] = None,
+@dataclass(frozen=True, kw_only=True, slots=True)
+class RecipeOptions:
+    """What the recipe of a training is asked for; None = its default."""
+
+    algorithm: Annotated[str | None, typer.Option("--algo", help="ppo, a2c, dqn or sac; default ppo.")] = None
     steps: Annotated[
         int | None, typer.Option(min=1, help=f"Decisions of single robots; default {DEFAULT_STEPS:,}.")
-    ] = None,
+    ] = None
     arenas: Annotated[
         int | None, typer.Option(min=1, help=f"Arenas side by side; default {DEFAULT_ARENAS}, fewer of large swarms.")
-    ] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Seed of everything; default 0, or that of --plan.")] = None,
-    observation: Annotated[str | None, typer.Option(help="compact or full; default compact.")] = None,
+    ] = None
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of everything; default 0, or that of --plan.")] = None
+    observation: Annotated[str | None, typer.Option(help="compact or full; default compact.")] = None
     actions: Annotated[
         str | None, typer.Option(help="discrete or continuous; default discrete, for sac continuous.")
-    ] = None,
+    ] = None
     automatic_gripper: Annotated[
         bool | None,
         typer.Option("--automatic-gripper/--own-gripper", help="Whether the gripper is automatic; default yes."),
-    ] = None,
+    ] = None
     decision_ticks: Annotated[
         int | None, typer.Option(min=1, help=f"Ticks per decision; default {DECISION_TICKS}.")
-    ] = None,
+    ] = None
     site_memory: Annotated[
         bool | None,
         typer.Option(
             "--site-memory/--no-site-memory", help="Whether robots remember two places with objects; default yes."
         ),
-    ] = None,
+    ] = None
     samples: Annotated[
         bool | None,
         typer.Option(
@@ -63,7 +63,7 @@ def train(  # long: one parameter per option
             help="Whether the trained policy draws its actions by their probabilities, or takes the likeliest; default "
             "drawn where it has probabilities (ppo, a2c).",
         ),
-    ] = None,
+    ] = None
     evaluate_every: Annotated[
         int | None,
         typer.Option(
@@ -71,22 +71,62 @@ def train(  # long: one parameter per option
             help="Decisions between evaluations and checkpoints; "
             f"default {EVALUATE_EVERY:,}, more where evaluations take long.",
         ),
-    ] = None,
+    ] = None
     evaluation_horizon: Annotated[
         float | None, typer.Option(help="Seconds per run of an evaluation; default those of the scenario.")
-    ] = None,
+    ] = None
     small_start: Annotated[
         bool | None,
         typer.Option(
             "--small-start/--no-small-start",
             help="Spend the first third in a smaller arena with short ways; default if deliveries count.",
         ),
-    ] = None,
-    hidden: Annotated[str | None, typer.Option(help=f"Sizes of the hidden layers; default {_HIDDEN}.")] = None,
+    ] = None
+    hidden: Annotated[str | None, typer.Option(help=f"Sizes of the hidden layers; default {_HIDDEN}.")] = None
     arguments: Annotated[
-        list[str] | None,
+        tuple[str, ...],
         typer.Option("--arg", metavar="KEY=NUMBER", help="Argument of the algorithm; may be repeated."),
+    ] = ()
+
+    def plan(self, described: WorldOptions) -> "TrainingPlan":
+        """Return the plan of a training in the world that is described, made by `training.recipe`.
+
+        Raises:
+            ConfigError: anything wrong with the options.
+        """
+        from swarm_forage_env.cli.scenario_options import described_fields
+        from swarm_forage_env.scenarios.presets import scenario
+        from swarm_forage_env.training.recipe import recipe
+
+        world = described_fields(described)
+        scenario(world.preset, **world.fields)  # or the recipe could take unknown fields for its own arguments
+        return recipe(
+            world.preset,
+            interface=self._chosen("observation", "actions", "automatic_gripper", "decision_ticks", "site_memory"),
+            wrappers=world.wrappers,
+            options=dict(map(_argument, self.arguments)),
+            evaluation=_given({"every_steps": self.evaluate_every, "horizon_s": self.evaluation_horizon}),
+            **self._chosen("algorithm", "steps", "small_start", "seed", "samples"),
+            **_given({"n_arenas": self.arenas, "hidden": None if self.hidden is None else _layers(self.hidden)}),
+            **world.fields,
+        )
+
+    def _chosen(self, *names: str) -> dict[str, Any]:
+        return _given({name: getattr(self, name) for name in names})
+
+
+def train(
+    context: typer.Context,
+    described: WorldOptions,
+    *,
+    out: Annotated[Path | None, typer.Option(help="Folder of the training; default results/training/NAME.")] = None,
+    plan: Annotated[
+        str | None,
+        typer.Option(
+            help="TOML file with a training plan, or name of a shipped policy, instead of all below; but --seed counts."
+        ),
     ] = None,
+    asked: RecipeOptions,
     callbacks: Annotated[
         list[str] | None,
         typer.Option(
@@ -112,40 +152,44 @@ def train(  # long: one parameter per option
     all that was chosen. Ctrl-C keeps a checkpoint; swarm-forage --trust-models train --out
     FOLDER --resume goes on.
     """
-    from swarm_forage_env.cli.training_plan import build_plan
     from swarm_forage_env.cli.training_report import run_training
     from swarm_forage_env.training.evaluations import resumed_plan
     from swarm_forage_env.training.plan import named_plan
 
     if plan is not None:
         refuse_others(context, "--plan", _OF_PLAN, "which it decides; write them into its file")
-    says_more = bool(given_options(context, besides=_OF_RESUMING))
-    if plan is not None:
-        chosen = named_plan(plan, seed)
-        name = Path(plan).stem if seed is None else f"{Path(plan).stem}_seed_{seed}"
+        chosen = named_plan(plan, asked.seed)
+        name = Path(plan).stem if asked.seed is None else f"{Path(plan).stem}_seed_{asked.seed}"
     else:
-        chosen = build_plan(
-            described,
-            interface={
-                "observation": observation,
-                "actions": actions,
-                "automatic_gripper": automatic_gripper,
-                "decision_ticks": decision_ticks,
-                "site_memory": site_memory,
-            },
-            evaluation={"every_steps": evaluate_every, "horizon_s": evaluation_horizon},
-            hidden=hidden,
-            arguments=arguments or (),
-            algorithm=algorithm,
-            steps=steps,
-            n_arenas=arenas,
-            small_start=small_start,
-            seed=seed,
-            samples=samples,
-        )
+        chosen = asked.plan(described)
         name = f"{chosen.scenario.name}_{chosen.algorithm}"
     folder = out or Path("results/training") / name
     if resume and plan is None:
-        chosen = resumed_plan(folder, chosen if says_more else None, steps)
+        says_more = bool(given_options(context, besides=_OF_RESUMING))
+        chosen = resumed_plan(folder, chosen if says_more else None, asked.steps)
     n_processes = 0 if jobs == 1 else min(jobs, chosen.n_arenas)
     run_training(chosen, folder, n_processes=n_processes, resume=resume, callbacks=callbacks or ())
+
+
+def _given(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Leave out options that were not given, so that the defaults stand in one place."""
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def _layers(text: str) -> tuple[int, ...]:
+    try:
+        return tuple(int(size) for size in text.split(","))
+    except ValueError as error:
+        raise ConfigError(f"Expected --hidden as sizes of layers, such as 128,128, got {text!r}.") from error
+
+
+def _argument(word: str) -> tuple[str, float | int]:
+    name, _, text = word.partition("=")
+    if name in ("hidden", "net_arch", "policy_kwargs"):
+        raise ConfigError(f"Expected the network as --hidden 128,128 (sizes of hidden layers), got --arg {word}.")
+    for kind in (int, float):
+        try:
+            return name, kind(text)
+        except ValueError:
+            continue
+    raise ConfigError(f"Expected an argument of the algorithm as key=number, got {word!r}.")

@@ -16,8 +16,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.cli import training_report
 from swarm_forage_env.cli.option_groups import WorldOptions
-from swarm_forage_env.cli.train import train
-from swarm_forage_env.cli.training_plan import build_plan
+from swarm_forage_env.cli.train import RecipeOptions, train
 from swarm_forage_env.training.defaults import DEFAULT_REWARDS
 from swarm_forage_env.training.plan import EvaluationPlan, read_plan
 from swarm_forage_env.training.recipe import recipe
@@ -206,7 +205,7 @@ def test_a_callback_of_the_user_runs_beside_the_training_and_can_end_it(command)
 
 @pytest.mark.parametrize("name", ["warehouse_small", "search_and_rescue"])
 def test_the_plan_of_the_command_is_the_recipe(name):
-    assert build_plan(WorldOptions(scenario=name)) == recipe(name)
+    assert RecipeOptions().plan(WorldOptions(scenario=name)) == recipe(name)
 
 
 def test_words_are_arguments_of_the_recipe(tmp_path):
@@ -223,16 +222,20 @@ def test_words_are_arguments_of_the_recipe(tmp_path):
     options = {
         "algorithm": "sac",
         "steps": 300,
-        "n_arenas": 3,
+        "arenas": 3,
         "seed": 4,
-        "interface": {"observation": "full", "automatic_gripper": False, "decision_ticks": 2, "site_memory": False},
+        "observation": "full",
+        "automatic_gripper": False,
+        "decision_ticks": 2,
+        "site_memory": False,
         "samples": False,
-        "evaluation": {"every_steps": 50, "horizon_s": 200.0},
+        "evaluate_every": 50,
+        "evaluation_horizon": 200.0,
         "small_start": False,
         "hidden": "128,32",
         "arguments": ("batch_size=8", "gamma=0.9"),
     }
-    assert build_plan(words, **options) == recipe(
+    assert RecipeOptions(**options).plan(words) == recipe(
         "warehouse_small",
         algorithm="sac",
         steps=300,
@@ -259,7 +262,7 @@ def test_what_people_set_goes_before_the_recipe(tmp_path, by_file):
     path = tmp_path / "world.toml"
     path.write_text("[scenario]\nnest_progress = 0.0\nhorizon_s = 400.0\n" if by_file else "")
     settings = () if by_file else ("nest_progress=0.0", "horizon_s=400")
-    plan = build_plan(WorldOptions(scenario=str(path), settings=settings))
+    plan = RecipeOptions().plan(WorldOptions(scenario=str(path), settings=settings))
     assert (plan.scenario.reward.nest_progress, plan.scenario.reward.first_pickup) == (0.0, 1.0)
     assert {stage.scenario["horizon_s"] for stage in plan.stages} == {400.0}
 
@@ -277,12 +280,12 @@ def test_a_file_sets_fields_of_the_scenario_and_no_arguments_of_the_recipe(tmp_p
     path = tmp_path / "world.toml"
     path.write_text(f"[scenario]\n{name} = 3\n")
     with pytest.raises(ConfigError, match=f"Unknown scenario field '{name}'"):
-        build_plan(WorldOptions(scenario=str(path)))
+        RecipeOptions().plan(WorldOptions(scenario=str(path)))
 
 
 def test_a_wrapper_option_goes_before_the_same_wrapper_in_the_file(tmp_path):
     path = tmp_path / "world.toml"
     path.write_text("[sensor_noise]\nsigma = 0.01\n")
     words = WorldOptions(scenario=str(path), wrappers=("sensor_noise:sigma=0.02",))
-    (config,) = build_plan(words).wrappers
+    (config,) = RecipeOptions().plan(words).wrappers
     assert config.to_mapping()["sigma"] == 0.02
