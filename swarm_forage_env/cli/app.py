@@ -128,7 +128,7 @@ def loaded(command: Command) -> Any:
     """Import a command; returns what typer makes of it."""
     import typer
 
-    from swarm_forage_env.cli.option_groups import spread
+    from swarm_forage_env.cli.options import spread
 
     module, _, function = command.place.partition(":")
     app = typer.Typer(add_completion=False, rich_markup_mode=None)

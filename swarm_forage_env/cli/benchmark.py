@@ -9,8 +9,7 @@ import typer
 
 from metrics.controllers import PAPER_POLICIES
 from swarm_forage_env._internal.wording import printable
-from swarm_forage_env.cli.option_groups import PolicyOptions
-from swarm_forage_env.cli.options import AsJson, DryRun, Jobs
+from swarm_forage_env.cli.options import AsJson, DryRun, Jobs, PolicyOptions
 
 if TYPE_CHECKING:
     from metrics.benchmark import BenchmarkQuestion, Board, Training
@@ -148,7 +147,7 @@ def _show(board: "Board", *, as_json: bool) -> None:
 def _plan_text(question: "BenchmarkQuestion", records: Path, jobs: int | None) -> str:
     """What would be run, with an estimate."""
     from swarm_forage_env._internal.wording import counted
-    from swarm_forage_env.cli.terminal import notes
+    from swarm_forage_env.cli.printer import notes
     from swarm_forage_env.runs.plan_summary import summarize_plan
 
     protocol = question.protocol

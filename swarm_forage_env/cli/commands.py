@@ -14,29 +14,29 @@ class Command(NamedTuple):
     about: str
     """At most 50 characters, so that a terminal of 80 columns cuts none."""
     place: str = ""
-    """Module in this folder and function in it, `run:run`; empty where only a second word makes a command."""
+    """Module in this folder and function in it, `study:run`; empty where only a second word makes a command."""
 
 
 COMMANDS: dict[str, tuple[Command, ...]] = {
     "Run and look": (
-        Command("run", "Run policies in a scenario and compare them.", "run:run"),
-        Command("watch", "Watch a run in a window.", "watch:watch"),
-        Command("record", "Film a run, or draw it at one time.", "record:record"),
+        Command("run", "Run policies in a scenario and compare them.", "questions:run"),
+        Command("watch", "Watch a run in a window.", "look:watch"),
+        Command("record", "Film a run, or draw it at one time.", "look:record"),
         Command("replay", "Write runs as one page, with play and pause.", "replay:replay"),
         Command("maps", "Draw where on the floor things happened.", "maps:maps"),
-        Command("saliency", "Show what a trained network looks at.", "saliency:saliency"),
+        Command("saliency", "Show what a trained network looks at.", "look:saliency"),
     ),
     "Score and decide": (
-        Command("score", "Score policies in all measures' experiments.", "score:score"),
-        Command("compare", "The same, for several policies.", "score:score"),
-        Command("predict", "Fit performance to swarm size, and predict.", "predict:predict"),
-        Command("predict availability", "Show how likely enough robots are at work.", "availability:availability"),
-        Command("choose", "Rank policies by constraints that they meet.", "choose:choose"),
+        Command("score", "Score policies in all measures' experiments.", "questions:score"),
+        Command("compare", "The same, for several policies.", "questions:score"),
+        Command("predict", "Fit performance to swarm size, and predict.", "questions:predict"),
+        Command("predict availability", "Show how likely enough robots are at work.", "questions:availability"),
+        Command("choose", "Rank policies by constraints that they meet.", "questions:choose"),
     ),
     "Train": (
         Command("train", "Train one policy that every robot shares.", "train:train"),
-        Command("train curves", "Draw how trainings went.", "curves:curves"),
-        Command("dataset", "Record what robots see and do, for learners.", "dataset:dataset"),
+        Command("train curves", "Draw how trainings went.", "train:curves"),
+        Command("dataset", "Record what robots see and do, for learners.", "train:dataset"),
     ),
     "Studies and benchmark": (
         Command("study", "Whole studies: the paper's sets, or your own."),
@@ -45,23 +45,23 @@ COMMANDS: dict[str, tuple[Command, ...]] = {
         Command("study run", "Run what is missing of a study, and pack it.", "study:run"),
         Command("study status", "Show which runs of a study are done.", "study:status"),
         Command("study pack", "Put all runs of a study into one file.", "study:pack"),
-        Command("study verdict", "Hold the claims of the paper against runs.", "study_verdict:verdict"),
-        Command("study plot", "Draw the figures of a study.", "study_plot:plot"),
-        Command("study report", "Write one page about studies.", "study_report:report"),
-        Command("study diff", "Say which conditions of two studies differ.", "study_diff:diff"),
-        Command("ablate", "Switch one quirk of the rules at a time.", "ablate:ablate"),
+        Command("study verdict", "Hold the claims of the paper against runs.", "study:verdict"),
+        Command("study plot", "Draw the figures of a study.", "study:plot"),
+        Command("study report", "Write one page about studies.", "study:report"),
+        Command("study diff", "Say which conditions of two studies differ.", "study:diff"),
+        Command("ablate", "Switch one quirk of the rules at a time.", "questions:ablate"),
         Command("benchmark", "Run policies in a fixed protocol of worlds.", "benchmark:run"),
         Command("benchmark worlds", "List the worlds of the benchmark.", "benchmark:worlds"),
         Command("benchmark show", "Show what entries are worth.", "benchmark:show"),
         Command("benchmark page", "Write the page that compares entries.", "benchmark:page"),
     ),
     "What there is": (
-        Command("list", "List scenarios, policies, wrappers or columns.", "show:list_everything"),
-        Command("info", "Show what a scenario or a policy is.", "show:info"),
+        Command("list", "List scenarios, policies, wrappers or columns.", "look:list_everything"),
+        Command("info", "Show what a scenario or a policy is.", "look:info"),
     ),
     "Checks": (
         Command("check", "Check rules of policies, find stuck robots.", "check:check"),
-        Command("rerun", "Run a stored run again, here, and compare.", "rerun:rerun"),
+        Command("rerun", "Run a stored run again, here, and compare.", "check:rerun"),
     ),
 }
 """Heading in `--help` -> its commands."""

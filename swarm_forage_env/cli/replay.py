@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, refuse_others
-from swarm_forage_env.cli.options import Seed
-from swarm_forage_env.cli.terminal import notes, progress_bar
+from swarm_forage_env.cli.options import PolicyOptions, Seed, WorldOptions, refuse_others
+from swarm_forage_env.cli.printer import notes, progress_bar
 
 if TYPE_CHECKING:
     from swarm_forage_env.inspect.replay.frames import Replay

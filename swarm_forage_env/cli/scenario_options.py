@@ -8,7 +8,7 @@ from typing import Any, TypeVar, get_origin
 
 from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, whole
 from swarm_forage_env._internal.wording import suggestion
-from swarm_forage_env.cli.option_groups import PlaceOptions, WorldOptions
+from swarm_forage_env.cli.options import PlaceOptions, WorldOptions
 from swarm_forage_env.cli.scenario_file import ScenarioFile, read_scenario_file
 from swarm_forage_env.policies.mixture import leading_mixture
 from swarm_forage_env.policies.registry import split_interface

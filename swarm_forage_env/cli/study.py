@@ -1,4 +1,4 @@
-"""The commands `study list`, `show`, `run`, `status`, `pack` and those of their results."""
+"""The commands of studies: what there is, running them, and what came of them."""
 
 from contextlib import nullcontext
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, DryRun, Jobs, complain
+from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, Band, DryRun, Jobs, Variants, complain
 from swarm_forage_env.cli.signals import EXIT_INTERRUPTED
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def run(  # long: one parameter per option
 
     Finished runs are kept: after Ctrl-C, or with more seeds, the same command does the rest.
     """
-    from swarm_forage_env.cli.terminal import notes
+    from swarm_forage_env.cli.printer import notes
     from swarm_forage_env.runs.cluster import cluster_executor
     from swarm_forage_env.runs.store import FAILED
     from swarm_forage_env.studies.status import StudyOutcome
@@ -96,7 +96,7 @@ def run(  # long: one parameter per option
 
 def _summary(spec: "StudySpec", folder: "StudyFolder", part: tuple[int, int], jobs: int | None) -> "PlanSummary":
     """Say what is left to run, and how long it takes."""
-    from swarm_forage_env.cli.terminal import notes
+    from swarm_forage_env.cli.printer import notes
     from swarm_forage_env.runs.plan_summary import summarize_plan
     from swarm_forage_env.studies.study_folder import shard
 
@@ -146,3 +146,136 @@ def _chosen(name: str, budget: str | None, seeds: int | None, rules: str) -> "St
     known_name("rules", rules, (*RULES_NAMES, "both", "file"))
     chosen = {"both": tuple(RULES_NAMES), "file": None}.get(rules, (rules,))
     return load_study(name, budget, seeds=seeds, rules=chosen)
+
+
+Places = Annotated[list[Path], typer.Argument(metavar="DIR|FILE...", help="Folders of studies, or their packed files.")]
+
+
+def verdict(
+    places: Places,
+    file: Annotated[
+        Path | None, typer.Option("--file", help="Write it, too: .txt, .md, .csv or .json, with more numbers.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Hold the claims of the paper against runs of its sets: what they support, contradict or leave open.
+
+    Below them the same for its intuitions, what it expected of each algorithm before the experiments.
+    """
+    from metrics import verdict as verdict_of
+    from swarm_forage_env._internal.fields import ConfigError
+    from swarm_forage_env._internal.files import check_file
+    from swarm_forage_env.cli.printer import notes, show_boxed
+    from swarm_forage_env.runs.answer import FORMS
+    from swarm_forage_env.studies.study_table import read_study
+
+    if file is not None and file.suffix not in FORMS:
+        raise ConfigError(f"Expected --file as a file ending in {', '.join(FORMS)}, got {str(file)!r}.")
+    aside = notes()
+    tables = [read_study(place) for place in places]
+    if file is not None:
+        check_file(file)
+    found = verdict_of(*tables, tell=aside.print)
+    for remark in found.remarks:
+        aside.print(f"note: {remark}")
+    if as_json:
+        typer.echo(found.json())
+    else:
+        show_boxed(found)
+    if file is not None:
+        found.write(file)
+        aside.print(f"written {file}")
+
+
+def plot(
+    place: Annotated[Path, typer.Argument(metavar="DIR|FILE", help="Folder of a study, or its packed file.")],
+    out: Annotated[Path | None, typer.Option("--out", help="Folder; default results/figures/NAME.")] = None,
+    band: Band = False,
+    variants: Variants = "corrected",
+    formats: Annotated[str, typer.Option("--format", help="svg, png, pdf; separated by commas.")] = "svg,png",
+    width: Annotated[
+        float | None,
+        typer.Option("--width", min=2.0, max=100.0, help="Of a figure, in inches; default what its panels need."),
+    ] = None,
+    font_size: Annotated[float, typer.Option("--font-size", min=4.0, max=40.0, help="Of words, in points.")] = 9.0,
+    title: Annotated[bool, typer.Option("--title/--no-title", help="Headlines; in a paper, captions say it.")] = True,
+) -> None:
+    """Draw the figures of a study, with tables in CSV: each measure over what is varied, and models.
+
+    Models are laws and a mean field where swarm sizes vary, the queue where robots leave and come. theory_... has what
+    follows without runs: availability curves, and sketches of the measures. NAME_snapshot.png is the arena when a run
+    begins. NAME_conditions.csv has how runs of each condition spread and how many broke down, ..._pairs.csv which
+    policy is better how often.
+    """
+    from metrics import plot as plot_study
+    from swarm_forage_env.cli.questions import score_forms
+    from swarm_forage_env.cli.scenario_options import split_names
+    from swarm_forage_env.rendering.figures import FigureStyle
+    from swarm_forage_env.studies.study_table import read_study
+
+    forms = score_forms(variants, "marginal")
+    table = read_study(place)
+    plotted = plot_study(
+        table,
+        out or Path("results", "figures", table.spec.name),
+        band="sd" if band else "ci",
+        variants=forms.variants,
+        formats=split_names(formats),
+        style=FigureStyle(width_in=width, font_size=font_size, title=title),
+    )
+    for file in plotted.files:
+        typer.echo(file)
+    for line in plotted.missing:
+        typer.echo(line, err=True)
+
+
+_PAGE_FORMS = (".html", ".md", ".txt", ".csv", ".json")
+
+
+def report(
+    places: Places,
+    file: Annotated[
+        Path, typer.Option("--file", help="Page to write, .html; .md, .txt, .csv, .json: its tables.")
+    ] = Path("report.html"),
+    band: Band = False,
+) -> None:
+    """Write one page about studies: what they say of the paper's claims, figures, numbers, settings, versions."""
+    from metrics import report as report_of
+    from swarm_forage_env._internal.fields import ConfigError
+    from swarm_forage_env._internal.files import check_file
+    from swarm_forage_env.cli.printer import notes
+    from swarm_forage_env.studies.study_table import read_study
+
+    if file.suffix not in _PAGE_FORMS:
+        raise ConfigError(f"Expected --file as a file ending in {', '.join(_PAGE_FORMS)}, got {str(file)!r}.")
+    tables = [read_study(place) for place in places]
+    check_file(file)
+    report_of(*tables, band="sd" if band else "ci", tell=notes().print).write(file)
+    notes().print(f"written {file}")
+
+
+def diff(
+    first: Annotated[Path, typer.Argument(metavar="A", help="Folder of a study, or its packed file.")],
+    second: Annotated[Path, typer.Argument(metavar="B", help="The same of the other study.")],
+    columns: Annotated[
+        str | None,
+        typer.Option(
+            "--columns", help="Recorded columns to test, separated by commas; see 'swarm-forage list columns'."
+        ),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Say which conditions of two studies differ beyond chance.
+
+    Exit code 0 if no condition differs; 1 if one does or may, or if one has no finished runs in A or in B.
+    """
+    from metrics import diff as diff_of
+    from metrics.scoring.study_diff import COLUMNS
+    from swarm_forage_env.cli.printer import show as print_answer
+    from swarm_forage_env.studies.study_table import read_study
+
+    names = COLUMNS if columns is None else tuple(name.strip() for name in columns.split(","))
+    found = diff_of(read_study(first), read_study(second), names)
+    print_answer(found, as_json=as_json)
+    if found.differs:
+        raise typer.Exit(EXIT_FAILURE)

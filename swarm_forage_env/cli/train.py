@@ -1,4 +1,4 @@
-"""The command `train`: it makes a plan by `training.recipe` and carries it out by `training.sb3.training`."""
+"""The commands `train`, `train curves` and `dataset`: policies that learn, and what others learn from."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,8 +7,22 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from metrics.controllers import PAPER_POLICIES
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.cli.option_groups import WorldOptions, given_options, refuse_others
+from swarm_forage_env.cli.options import (
+    EXIT_FAILURE,
+    DryRun,
+    FirstSeed,
+    Jobs,
+    Picture,
+    PolicyOptions,
+    WorldOptions,
+    complain,
+    given_options,
+    no_picture,
+    refuse_others,
+)
+from swarm_forage_env.cli.signals import EXIT_INTERRUPTED
 from swarm_forage_env.training.defaults import (
     DECISION_TICKS,
     DEFAULT_ARENAS,
@@ -193,3 +207,102 @@ def _argument(word: str) -> tuple[str, float | int]:
         except ValueError:
             continue
     raise ConfigError(f"Expected an argument of the algorithm as key=number, got {word!r}.")
+
+
+PICTURE_FILE = "curves.png"
+
+
+def curves(
+    folders: Annotated[list[Path], typer.Argument(metavar="DIR ...", help="Folders of trainings in one scenario.")],
+    policies: Annotated[
+        str,
+        typer.Option("--policy", help="Policies to compare with, separated by commas; none for no others."),
+    ] = ",".join(PAPER_POLICIES),
+    picture: Picture = None,
+    jobs: Jobs = None,
+) -> None:
+    """Draw how trainings went, beside the scripted controllers on the same axes.
+
+    The others make the runs of the trainings' evaluations: same world, same seeds, the caches that they are made for.
+    """
+    from swarm_forage_env.cli.scenario_options import split_names
+    from swarm_forage_env.rendering.figures import check_picture
+    from swarm_forage_env.training.curves import curves as curves_of
+    from swarm_forage_env.training.curves import read_trainings
+
+    file = picture or folders[0] / PICTURE_FILE
+    read_trainings(folders)  # refuses folders before it looks at the place of the picture
+    check_picture(file)
+    found = curves_of(folders, beside=() if policies == "none" else split_names(policies), jobs=jobs)
+    typer.echo(found.text())
+    try:
+        found.draw(file)
+    except ImportError as error:
+        raise typer.Exit(complain(str(error), EXIT_FAILURE)) from None
+    except OSError as error:  # the table was shown, but a picture was asked for
+        raise typer.Exit(complain(no_picture(file, error), EXIT_FAILURE)) from None
+    typer.echo(f"wrote {file}")
+
+
+def dataset(  # long: one parameter per option
+    policies: PolicyOptions,
+    described: WorldOptions,
+    seeds: Annotated[int, typer.Option(min=1, help="Number of runs.")] = 1,
+    first_seed: FirstSeed = 0,
+    observation: Annotated[
+        str | None,
+        typer.Option(help="full or compact; default what a learned policy sees, else full."),
+    ] = None,
+    site_memory: Annotated[
+        bool | None,
+        typer.Option(
+            "--site-memory/--no-site-memory",
+            help="Whether to record two places that robots remember; default as a learned policy sees, else not.",
+        ),
+    ] = None,
+    compress: Annotated[bool, typer.Option("--compress", help="Smaller files, which take longer to write.")] = False,
+    minari: Annotated[
+        str | None, typer.Option(metavar="ID", help="Also make a Minari data set of the whole swarm as one agent.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Folder; default results/datasets/SCENARIO_POLICY.")] = None,
+    dry_run: DryRun = False,
+) -> None:
+    """Record what robots see and do, for offline reinforcement learning and imitation.
+
+    Writes observations, actions, rewards and ends of every robot. Runs that the folder holds already are not repeated,
+    so an interrupted command can simply be given again.
+    """
+    from swarm_forage_env._internal.files import as_file_name
+    from swarm_forage_env.cli.printer import progress_bar
+    from swarm_forage_env.cli.scenario_options import plan_runs
+    from swarm_forage_env.policies.registry import policy_label
+    from swarm_forage_env.training.datasets.recording import plan_dataset, record_dataset
+
+    spec = plan_runs(described, (policies.one("dpo"),), n_seeds=1, first_seed=first_seed)[0]
+    plan = plan_dataset(
+        spec,
+        range(first_seed, first_seed + seeds),
+        observation=observation,
+        site_memory=site_memory,
+        compress=compress,
+    )
+    folder = out or Path("results", "datasets", as_file_name(f"{spec.scenario.name}_{policy_label(spec.policy)}"))
+    typer.echo(plan.describe(folder).text())
+    if dry_run:
+        return
+    if minari is not None:
+        from swarm_forage_env.training.datasets.minari_export import check_minari
+
+        check_minari(minari)  # before hours of work
+    try:
+        with progress_bar("decisions") as progress:
+            runs = record_dataset(plan, folder, progress=progress)
+    except KeyboardInterrupt:
+        words = f"Interrupted. Finished runs are kept in {folder}; the same command does the rest."
+        raise typer.Exit(complain(words, EXIT_INTERRUPTED)) from None
+    delivered = sum(run.collected for run in runs)
+    typer.echo(f"wrote {folder}: {sum(sum(run.chunks) for run in runs):,} decisions, {delivered:,} objects delivered")
+    if minari is not None:
+        from swarm_forage_env.training.datasets.minari_export import export_minari
+
+        typer.echo(f"wrote the Minari data set {export_minari(folder, minari).spec.dataset_id}")

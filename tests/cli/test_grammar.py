@@ -12,7 +12,7 @@ from swarm_forage_env.cli.app import loaded
 from swarm_forage_env.cli.commands import COMMANDS
 from swarm_forage_env.cli.former_words import COMMANDS as FORMER
 from swarm_forage_env.cli.former_words import OPTIONS, right_option
-from swarm_forage_env.cli.option_groups import spread
+from swarm_forage_env.cli.options import spread
 
 ONE_RUN = ("record", "replay", "watch", "saliency")
 """Commands that look into one run, or into one of each policy."""

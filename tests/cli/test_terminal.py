@@ -3,7 +3,7 @@
 import pytest
 from rich.console import Console
 
-from swarm_forage_env.cli.terminal import progress_bar
+from swarm_forage_env.cli.printer import progress_bar
 
 
 @pytest.mark.parametrize("is_terminal", [True, False])

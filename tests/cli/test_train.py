@@ -15,7 +15,7 @@ import pytest
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.cli import training_report
-from swarm_forage_env.cli.option_groups import WorldOptions
+from swarm_forage_env.cli.options import WorldOptions
 from swarm_forage_env.cli.train import RecipeOptions, train
 from swarm_forage_env.training.defaults import DEFAULT_REWARDS
 from swarm_forage_env.training.plan import EvaluationPlan, read_plan

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.cli.option_groups import WorldOptions
+from swarm_forage_env.cli.options import WorldOptions
 from swarm_forage_env.cli.scenario_options import plan_runs
 from swarm_forage_env.policies import model_files
 from swarm_forage_env.policies.interface import InterfaceConfig

@@ -1,0 +1,182 @@
+"""The commands that show what is there, one run, or a network: `list`, `info`, `watch`, `record`, `saliency`."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from swarm_forage_env._internal.wording import printable
+from swarm_forage_env.cli.options import AsJson, Picture, PolicyOptions, Seed, WorldOptions, no_picture
+from swarm_forage_env.cli.printer import notes, progress_bar
+
+
+def list_everything(
+    what: Annotated[str | None, typer.Argument(help="scenarios, policies, wrappers or columns (of records).")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """List scenarios and policies, wrappers, or the columns of run records."""
+    from swarm_forage_env.inspect.descriptions import overview
+
+    listed = overview(what)
+    typer.echo(listed.json() if as_json else listed.text())
+
+
+def info(
+    name: Annotated[str, typer.Argument(help="A scenario, an environment id, a policy or its file.")],
+    as_json: AsJson = False,
+) -> None:
+    """Show all fields and spaces of a scenario, or what a policy is."""
+    from swarm_forage_env._internal.wording import printable
+    from swarm_forage_env.inspect.descriptions import describe
+
+    found = describe(name)
+    typer.echo(printable(found.json() if as_json else found.text()))  # a file may hold anything
+
+
+def watch(
+    policies: PolicyOptions,
+    described: WorldOptions,
+    speed: Annotated[float, typer.Option(help="Simulated seconds per second at first; arrow keys change it.")] = 10.0,
+    size: Annotated[int, typer.Option(help="Longer side of the arena in pixels.")] = 900,
+    theme: Annotated[str, typer.Option(help="dark or light.")] = "dark",
+    seed: Seed = 0,
+) -> None:
+    """Watch a run in a window: pause, choose robots, raise noise, kill.
+
+    The window shows the keys. Needs a display; without one, see record and replay.
+    """
+    from swarm_forage_env.cli.scenario_options import described_world
+    from swarm_forage_env.inspect.watch import watch_run
+    from swarm_forage_env.policies.model_files import ModelError
+    from swarm_forage_env.policies.network import NetworkError
+    from swarm_forage_env.policies.registry import policy_class
+    from swarm_forage_env.rendering.view import RenderError
+
+    policy = policies.one()
+    world, asked_caches = described_world(described)
+    try:
+        policy_class(policy)
+    except ValueError as error:  # an unknown name is a mistake in the words; a ValueError of the run is not
+        raise typer.BadParameter(str(error)) from error
+    try:
+        watched = watch_run(
+            world.scenario,
+            policy,
+            seed=seed,
+            speed=speed,
+            size_px=size,
+            theme=theme,
+            caches=asked_caches,
+            wrappers=world.wrappers,
+        )
+    except (RenderError, ModelError, NetworkError) as error:
+        raise typer.BadParameter(str(error)) from error
+    typer.echo(watched.summary())
+
+
+def record(
+    policies: PolicyOptions,
+    described: WorldOptions,
+    file: Annotated[
+        Path | None,
+        typer.Option(
+            "--file", help="File to write, .gif or .mp4, or .png with --at; default results/SCENARIO_POLICY.gif."
+        ),
+    ] = None,
+    at: Annotated[
+        float | None, typer.Option(metavar="SECONDS", help="One picture at this simulated time, in place of a film.")
+    ] = None,
+    seconds: Annotated[float, typer.Option(help="Simulated seconds to film.")] = 300.0,
+    speedup: Annotated[float, typer.Option(help="Simulated seconds per second of film.")] = 20.0,
+    fps: Annotated[float, typer.Option(help="Pictures per second.")] = 20.0,
+    size: Annotated[int, typer.Option(help="Longer side of the arena in pixels.")] = 900,
+    theme: Annotated[str, typer.Option(help="dark or light.")] = "dark",
+    seed: Seed = 0,
+) -> None:
+    """Film a run, or draw it at one time.
+
+    'swarm-forage record dpo --at 300 --file dpo.png' draws how it is after 300 s.
+    """
+    from swarm_forage_env._internal.files import as_file_name
+    from swarm_forage_env.cli.scenario_options import described_world
+    from swarm_forage_env.inspect.film import picture_run, record_run
+    from swarm_forage_env.policies.model_files import ModelError
+    from swarm_forage_env.policies.network import NetworkError
+    from swarm_forage_env.policies.registry import policy_label
+    from swarm_forage_env.rendering.view import RenderError
+
+    policy = policies.one("crw")
+    world, asked_caches = described_world(described)
+    _refuse_unknown(policy)
+    ending = "gif" if at is None else "png"
+    path = file or Path("results", f"{world.scenario.name}_{as_file_name(policy_label(policy))}.{ending}")
+    look: dict[str, Any] = {
+        "seed": seed,
+        "size_px": size,
+        "theme": theme,
+        "caches": asked_caches,
+        "wrappers": world.wrappers,
+    }
+    try:
+        if at is not None:
+            written = picture_run(world.scenario, policy, path, at_s=at, **look)
+        else:
+            with progress_bar("pictures") as progress:
+                written = record_run(
+                    world.scenario,
+                    policy,
+                    path,
+                    seconds=seconds,
+                    speedup=speedup,
+                    fps=fps,
+                    progress=progress,
+                    **look,
+                )
+    except (RenderError, ModelError, NetworkError) as error:
+        raise typer.BadParameter(str(error)) from error
+    typer.echo(f"wrote {written}")
+
+
+def _refuse_unknown(policy: str) -> None:
+    from swarm_forage_env.policies.registry import policy_class
+
+    try:
+        policy_class(policy)
+    except ValueError as error:  # an unknown name is a mistake in the words; a ValueError of the run is not
+        raise typer.BadParameter(str(error)) from error
+
+
+def saliency(
+    policies: PolicyOptions,
+    described: WorldOptions,
+    picture: Picture = None,
+    seconds: Annotated[float | None, typer.Option(help="Simulated seconds to look at; default the whole run.")] = None,
+    seed: Seed = 0,
+    as_json: AsJson = False,
+) -> None:
+    """Show what a trained network looks at: how much it acts otherwise when one part of what it sees is exchanged.
+
+    A robot gets, for example, the light readings of another robot. How often does it then decide otherwise? The policy
+    is a shipped network, or an .npz file of a training.
+    """
+    from swarm_forage_env.cli.scenario_options import plan_runs
+    from swarm_forage_env.inspect.saliency import open_network_of
+    from swarm_forage_env.inspect.saliency import saliency as measured
+    from swarm_forage_env.rendering.figures import check_picture
+
+    policy = policies.one()
+    network = open_network_of(policy)
+    (spec,) = plan_runs(described, (policy,), n_seeds=1, first_seed=seed)
+    file = picture or Path("results", f"{spec.scenario.name}_{Path(policy).stem}.saliency.png")
+    check_picture(file)
+    found = measured(network, spec, seconds=seconds)
+    typer.echo(found.json() if as_json else printable(found.text()))
+    try:
+        found.draw(file)
+    except ImportError as error:
+        notes().print(str(error))
+        return
+    except OSError as error:  # the table is worth more than its picture
+        notes().print(no_picture(file, error))
+        return
+    notes().print(f"picture {file}")

@@ -1,0 +1,346 @@
+"""The commands `run`, `score`, `compare`, `predict`, `choose` and `ablate`: questions about policies."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from metrics.controllers import PAPER_POLICIES
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.cli.options import (
+    OF_RUNS,
+    AsJson,
+    Band,
+    Budget,
+    Curves,
+    Disturbance,
+    FirstSeed,
+    Forms,
+    Measures,
+    Picture,
+    PlaceOptions,
+    PolicyOptions,
+    RunOptions,
+    ScoreSeeds,
+    Variants,
+    WorldOptions,
+    refuse_others,
+)
+
+if TYPE_CHECKING:
+    from metrics.scoring import ScoreForms, ScoreQuestion
+
+
+def run(
+    policies: PolicyOptions,
+    described: WorldOptions,
+    options: RunOptions,
+    seeds: Annotated[int, typer.Option(min=1, help="Runs per policy.")] = 1,
+    first_seed: FirstSeed = 0,
+    picture: Picture = None,
+) -> None:
+    """Run policies in a scenario and compare how they perform.
+
+    Runs in parallel, shows a table, stores one record per run and draws performance over time. Runs that the folder
+    holds already are not repeated, so an interrupted command can simply be given again.
+    """
+    from metrics.scoring.summary import run_question
+    from swarm_forage_env._internal.fields import MOST_SEEDS, whole
+    from swarm_forage_env.cli.printer import ask_and_show, refusing
+    from swarm_forage_env.cli.scenario_options import default_folder, described_world
+
+    whole("--seeds", seeds, at_least=1, at_most=MOST_SEEDS)
+    world, caches = described_world(described)
+    chosen = range(first_seed, first_seed + seeds)
+    with refusing():
+        question = run_question(policies.names("crw"), world, seeds=chosen, caches=caches)
+    folder = options.out or default_folder(world.scenario.name)
+    ask_and_show(question, folder, options, picture=picture or folder / "performance.png")
+
+
+_CURVES_OF_SCORE = ("curves", "measures", "performance", "variant", "form", "band", "picture", "as_json")
+"""Options that go with --curves."""
+
+
+def score(
+    context: typer.Context,
+    policies: PolicyOptions,
+    described: WorldOptions,
+    options: RunOptions,
+    curves: Curves = None,
+    measures: Measures = None,
+    variant: Variants = "corrected",
+    form: Forms = "marginal",
+    band: Band = False,
+    budget: Budget = "standard",
+    seeds: ScoreSeeds = None,
+    disturbance: Disturbance = "throttle",
+    picture: Picture = None,
+) -> None:
+    """Run policies in all experiments that the measures of swarm engineering need, score and compare them.
+
+    Swarms of several sizes, throttled, noisy and failing robots; one table with intervals and noise floors. Several
+    policies are compared seed by seed, with the differences that are significant. Runs that the folder holds already
+    are not repeated. The budget says how long runs are, unless --horizon does.
+    """
+    from metrics.scoring.policy_scores import score_curves
+    from metrics.scoring.score_tables import side_by_side
+    from swarm_forage_env.cli.printer import ask_and_show, refusing, show
+    from swarm_forage_env.cli.scenario_options import default_folder, split_names
+
+    forms = score_forms(variant, form, band=band)
+    wanted = None if measures is None else split_names(measures)
+    if curves is not None:
+        refuse_others(context, "--curves", _CURVES_OF_SCORE, OF_RUNS)
+        with refusing():
+            tables = score_curves(curves, measures=wanted, performance=described.performance, forms=forms)
+        show(side_by_side(tables), picture, as_json=options.as_json)
+        return
+    question = asked_scores(
+        policies.names(),
+        described,
+        measures=wanted,
+        budget=budget,
+        seeds=seeds,
+        disturbance=disturbance,
+        forms=forms,
+    )
+    folder = options.out or default_folder(question.world.scenario.name)
+    file = picture or folder / ("scores.png" if len(question.plan.policies) == 1 else "comparison.png")
+    ask_and_show(question, folder, options, picture=file)
+
+
+_OF_THE_BUDGET = ("horizon_s", "interval_s")
+
+
+def asked_scores(policies: Sequence[str], described: WorldOptions, **options: Any) -> "ScoreQuestion":
+    """Return the question that the words ask.
+
+    Args:
+        policies: Names and files.
+        described: Options of the world.
+        options: Further ones of `score_question`.
+
+    Raises:
+        ConfigError: whatever is wrong with the words.
+        ImportError: the policy is a model, and stable-baselines3 is not installed.
+    """
+    from metrics.scoring import score_question
+    from swarm_forage_env.cli.printer import refusing
+    from swarm_forage_env.cli.scenario_options import described_fields, described_world
+
+    for word in described.settings:
+        if word.partition("=")[0] in _OF_THE_BUDGET:
+            raise ConfigError(f"Expected no --set {word}, which the budget sets; --horizon changes the length of runs.")
+    density = described_fields(described).fields.get("density")
+    world, caches = described_world(replace(described, horizon=None))
+    with refusing():
+        return score_question(policies, world, horizon_s=described.horizon, caches=caches, density=density, **options)
+
+
+def score_forms(variants: str, forms: str, *, band: bool = False) -> "ScoreForms":
+    """Return the variants and forms that the words name, separated by commas.
+
+    Raises:
+        ConfigError: an unknown word, or none.
+    """
+    from metrics.scoring import ScoreForms
+    from swarm_forage_env.cli.printer import refusing
+    from swarm_forage_env.cli.scenario_options import split_names
+
+    words: dict[str, Any] = {"variants": split_names(variants), "forms": split_names(forms)}
+    with refusing():
+        return ScoreForms(**words, band=band)
+
+
+_CURVES_OF_PREDICT = ("curves", "fit", "hold", "performance", "picture", "as_json")
+"""Options of `predict` that go with --curves."""
+
+
+def predict(
+    context: typer.Context,
+    policies: PolicyOptions,
+    described: PlaceOptions,
+    options: RunOptions,
+    curves: Curves = None,
+    fit: Annotated[
+        str | None,
+        typer.Option(
+            help="Swarm sizes that are fitted, four or more; default 1,2,4,8,16,32 (search_and_rescue: "
+            "12,51,115,204,320), or those of the file."
+        ),
+    ] = None,
+    hold: Annotated[
+        str | None, typer.Option(help="Larger sizes that are run, or in the file, but not fitted: the test.")
+    ] = None,
+    seeds: Annotated[int, typer.Option(min=2, help="Runs per size.")] = 4,
+    picture: Picture = None,
+) -> None:
+    """Fit performance to small swarms; predict twice and four times the largest, with intervals, and the critical size.
+
+    The critical size is the swarm size of the largest performance. Sizes of --hold are run as well and held against
+    the prediction. Runs that the folder holds already are not repeated.
+    """
+    from metrics.scoring.prediction import Predictions, predict_curves, prediction_question
+    from swarm_forage_env.cli.printer import ask_and_show, refusing, show
+    from swarm_forage_env.cli.scenario_options import default_folder, described_world, split_numbers
+
+    fitted = None if fit is None else split_numbers("--fit", fit, int)
+    held = () if hold is None else split_numbers("--hold", hold, int)
+    if curves is not None:
+        refuse_others(context, "--curves", _CURVES_OF_PREDICT, OF_RUNS)
+        with refusing():
+            tables = predict_curves(curves, fit=fitted, hold=held, performance=described.performance)
+        show(Predictions(tables=tables), picture, as_json=options.as_json)
+        return
+    if any(word.partition("=")[0] == "n_robots" for word in described.settings):
+        raise typer.BadParameter("Expected no --set n_robots=..., because sizes are varied; use --fit and --hold.")
+    world, caches = described_world(described)
+    with refusing():
+        question = prediction_question(policies.names(), world, fit=fitted, hold=held, seeds=seeds, caches=caches)
+    folder = options.out or default_folder(world.scenario.name)
+    file = picture or folder / "prediction.png"
+    ask_and_show(question, folder, options, picture=file)
+
+
+def availability(
+    robots: Annotated[str, typer.Option("--robots", help="Swarm sizes, separated by commas.")] = "50,200",
+    teams: Annotated[str, typer.Option("--teams", help="Mean teams M, robots at work on average.")] = "5,10,20",
+    needed: Annotated[str, typer.Option("--needed", help="Numbers of robots needed, for the table.")] = "1,5,10,20,40",
+    picture: Picture = None,
+    as_json: AsJson = False,
+) -> None:
+    """Show how likely enough robots are at work, over how many are needed. Computed in equilibrium, without runs."""
+    from metrics.scoring.theory import availability as computed
+    from swarm_forage_env.cli.printer import notes
+    from swarm_forage_env.cli.scenario_options import split_numbers
+    from swarm_forage_env.rendering.figures import check_picture
+
+    sizes = split_numbers("--robots", robots, int)
+    means = split_numbers("--teams", teams, float)
+    demands = split_numbers("--needed", needed, int)
+    if picture is not None:
+        check_picture(picture)
+    try:
+        found = computed(sizes, means, demands)
+    except ValueError as error:  # a size or a team that cannot be
+        raise ConfigError(str(error)) from error
+    told = {**found.to_mapping(), "picture": None if picture is None else str(picture)}
+    typer.echo(json.dumps(told) if as_json else found.text())
+    if picture is not None:
+        found.draw(picture)
+        notes().print(f"picture {picture}")
+
+
+def choose(
+    policies: PolicyOptions,
+    described: WorldOptions,
+    options: RunOptions,
+    deliver: Annotated[
+        float,
+        typer.Option(help="Performance that an undisturbed run must reach, in all: objects or what is asked for."),
+    ],
+    keep: Annotated[
+        float, typer.Option(help="Share of --deliver that is still demanded under each disturbance.")
+    ] = 1.0,
+    failures: Annotated[
+        float | None,
+        typer.Option(
+            metavar="RATE",
+            help="Malfunctions per tick (0.2 s) of the whole swarm, 0.001 in the study. Robots stop and are repaired "
+            "one after the other, a little faster than they fail (docs/deciding.md).",
+        ),
+    ] = None,
+    deaths: Annotated[
+        float | None,
+        typer.Option(
+            metavar="COUNT", help="Robots that are expected to die in a run, at random times; they do not come back."
+        ),
+    ] = None,
+    noise: Annotated[
+        float | None,
+        typer.Option(metavar="SIGMA", help="Standard deviation of the noise of all sensors and wheels."),
+    ] = None,
+    seeds: Annotated[int, typer.Option(min=2, help="Runs per policy and condition.")] = 4,
+) -> None:
+    """Rank policies by the constraints that they meet: deliver so much, despite failures, deaths and noise.
+
+    Each policy runs undisturbed and under each disturbance alone. A constraint is met if the whole 95 % interval of
+    mean performance reaches the demand. Runs that the folder holds already are not repeated.
+    """
+    from metrics.scoring.choosing import choice_question
+    from swarm_forage_env.cli.printer import ask_and_show, refusing
+    from swarm_forage_env.cli.scenario_options import default_folder, described_world
+
+    world, caches = described_world(described)
+    with refusing():
+        question = choice_question(
+            policies.names(),
+            world,
+            deliver=deliver,
+            keep=keep,
+            failures=failures,
+            deaths=deaths,
+            noise=noise,
+            seeds=seeds,
+            caches=caches,
+        )
+    ask_and_show(question, options.out or default_folder(world.scenario.name), options)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class SeveralPlaces(PlaceOptions):
+    """Options of worlds that differ in scenario and size."""
+
+    scenario: Annotated[
+        str,
+        typer.Option("--scenario", metavar="NAME|FILE.toml", help="One or more presets or files, separated by commas."),
+    ] = "warehouse_small,warehouse_medium"
+    robots: Annotated[str, typer.Option("--robots", help="One or more swarm sizes, separated by commas.")] = "32,256"
+
+    def places(self) -> list[WorldOptions]:
+        """Return the options of each world."""
+        from swarm_forage_env.cli.scenario_options import split_names, split_numbers
+
+        common = {field.name: getattr(self, field.name) for field in fields(PlaceOptions)}
+        return [
+            WorldOptions(**{**common, "scenario": name}, robots=size)
+            for name in split_names(self.scenario)
+            for size in split_numbers("--robots", self.robots, int)
+        ]
+
+
+def ablate(
+    policies: PolicyOptions,
+    described: SeveralPlaces,
+    options: RunOptions,
+    quirks: Annotated[
+        str, typer.Option("--quirks", help="Which to switch, separated by commas; all; or none: both rules only.")
+    ] = "all",
+    seeds: Annotated[int, typer.Option(min=2, help="Runs per policy, size and switched quirk.")] = 3,
+) -> None:
+    """Switch one quirk at a time, on in the rules as described and off in the authors' program, and show what it moves.
+
+    The tables are Markdown. Records go to a folder; an interrupted command can simply be given again.
+    """
+    from metrics.scoring.ablation import ablation_question
+    from swarm_forage_env._internal.fields import MOST_SEEDS, whole
+    from swarm_forage_env.cli.printer import ask_and_show, refusing
+    from swarm_forage_env.cli.scenario_options import described_world, split_names
+    from swarm_forage_env.scenarios.quirks import QUIRK_NAMES
+
+    whole("--seeds", seeds, at_least=2, at_most=MOST_SEEDS)
+    every = {"all": QUIRK_NAMES, "none": ()}
+    with refusing():
+        question = ablation_question(
+            [described_world(place)[0] for place in described.places()],
+            policies.names(",".join(PAPER_POLICIES)),
+            quirks=every[quirks] if quirks in every else split_names(quirks),
+            seeds=seeds,
+            caches=described.caches,
+        )
+    folder = options.out or Path("results", "ablation")
+    ask_and_show(question, folder, options, as_markdown=True)
