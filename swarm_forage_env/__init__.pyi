@@ -7,6 +7,7 @@ from .scenarios.presets import SCENARIO_NAMES as SCENARIO_NAMES
 from .scenarios.config import ScenarioConfig as ScenarioConfig
 from .scenarios.overrides import with_overrides as with_overrides
 from .wrappers.world import World as World
+from .wrappers.world import read_world as read_world
 from .env import ForageEnv as ForageEnv
 from .scenarios.robots import RobotKind as RobotKind
 from .scenarios.quirks import Quirks as Quirks

@@ -9,14 +9,12 @@ from typing import Any, TypeVar, get_origin
 from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, whole
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.cli.options import PlaceOptions, WorldOptions
-from swarm_forage_env.cli.scenario_file import ScenarioFile, read_scenario_file
 from swarm_forage_env.policies.mixture import leading_mixture
 from swarm_forage_env.policies.registry import split_interface
 from swarm_forage_env.runs.spec import RunSpec, plan_run
 from swarm_forage_env.scenarios.overrides import checked_density, field_types, parse_tuple
-from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.registry import parse_wrapper
-from swarm_forage_env.wrappers.world import World
+from swarm_forage_env.wrappers.world import FILE, World, WorldDescription, describe_file
 
 _FIELD = re.compile(r"[a-z_]+=[^/\\]*")
 _Number = TypeVar("_Number", int, float)
@@ -80,23 +78,22 @@ def described_world(options: PlaceOptions) -> tuple[World, str | None]:
         ConfigError: unknown names, values of a wrong type or that do not fit together, or a file that cannot be used.
     """
     described = described_fields(options)
-    config = scenario(described.preset, **described.fields)
-    return World(config, described.wrappers), described.fields.get("caches")
+    return described.world(), described.fields.get("caches")
 
 
-def described_fields(options: PlaceOptions) -> ScenarioFile:
+def described_fields(options: PlaceOptions) -> WorldDescription:
     """Return what options describe as a file would say it; they override the fields and wrappers of the file.
 
     Raises:
         ConfigError: see `described_world`; names and values of fields are not looked at here.
     """
-    is_file = Path(options.scenario).suffix == ".toml"
-    file = read_scenario_file(Path(options.scenario)) if is_file else ScenarioFile(preset=options.scenario)
+    is_file = Path(options.scenario).suffix == FILE
+    file = describe_file(options.scenario) if is_file else WorldDescription(preset=options.scenario)
     fields = {**file.fields, **_fields_of(options, file.preset)}
     wrappers = tuple(parse_wrapper(word) for word in options.wrappers)
     named = {wrapper.name for wrapper in wrappers}
     left = (wrapper for wrapper in file.wrappers if wrapper.name not in named)
-    return ScenarioFile(preset=file.preset, fields=fields, wrappers=(*wrappers, *left))
+    return WorldDescription(preset=file.preset, fields=fields, wrappers=(*wrappers, *left))
 
 
 def _fields_of(options: PlaceOptions, preset: str) -> dict[str, Any]:

@@ -1,11 +1,23 @@
-"""World: a scenario, what disturbs the swarm in it, and a name that tells both."""
+"""World: a scenario, what disturbs the swarm in it, and a name that tells both. It may stand in a file.
+
+scenario = "warehouse_small"           # the preset; this one if it is left out
+
+[set]                                  # any scenario field
+n_robots = 30
+
+[wrappers.sensor_noise]
+sigma = 0.03
+"""
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, TypeAlias
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-from swarm_forage_env._internal.fields import ConfigError, instance, number, text
+from swarm_forage_env._internal.fields import ConfigError, as_tuples, instance, number, table, text
+from swarm_forage_env._internal.files import parse_toml
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.wrappers.registry import wrappers_from_mapping
 
 if TYPE_CHECKING:
     from swarm_forage_env.wrappers.base import WrapperConfig
@@ -15,6 +27,10 @@ UNDISTURBED = "none"
 """Criterion of a world in which nothing is varied."""
 SIZE = "population_size"
 """Criterion of worlds that differ in the number of robots."""
+FILE = ".toml"
+"""Ending of files of worlds."""
+_PRESET = "warehouse_small"
+"""What a file without a preset changes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,16 +95,70 @@ class World:
         return ", ".join(words)
 
 
-WorldLike: TypeAlias = World | ScenarioConfig | str
-"""A world; the configuration of a scenario or the name of a preset is one without wrappers."""
+@dataclass(frozen=True, kw_only=True, slots=True)
+class WorldDescription:
+    """A preset, and what is other than in it: what a file or a command line says of a world."""
+
+    preset: str
+    fields: dict[str, Any] = field(default_factory=dict)
+    """Scenario fields by name."""
+    wrappers: "tuple[WrapperConfig, ...]" = ()
+
+    def world(self) -> World:
+        """Return the world; raises ConfigError where it cannot be."""
+        return World(scenario(self.preset, **self.fields), self.wrappers)
+
+
+def describe_file(file: str | Path) -> WorldDescription:
+    """Read a file of a world, and look at no names and values of scenario fields.
+
+    The fields may also stand in a table `scenario`, and wrappers in tables of their own, `[sensor_noise]`.
+
+    Raises:
+        ConfigError: not readable, no TOML, or tables that no wrapper has or refuses; names the file.
+    """
+    path = Path(file)
+    try:
+        tables = parse_toml(path.read_text(encoding="utf-8"))
+        preset, fields = tables.pop("scenario", _PRESET), tables.pop("set", {})
+        if not isinstance(preset, str):
+            preset, fields = _PRESET, {**table("scenario", preset), **table("set", fields)}
+        wrappers = wrappers_from_mapping({**table("wrappers", tables.pop("wrappers", {})), **tables})
+        given = {name: as_tuples(value) for name, value in table("set", fields).items()}
+    except OSError as error:
+        raise ConfigError(f"Cannot use {path}: {error.strerror or error}.") from error
+    except ValueError as error:
+        raise ConfigError(f"Cannot use {path}: {error}") from error
+    return WorldDescription(preset=preset, fields=given, wrappers=wrappers)
+
+
+def read_world(file: str | Path) -> World:
+    """Read a world from its file, as `--scenario FILE.toml` does.
+
+    Raises:
+        ConfigError: as `describe_file`, or the scenario cannot be; names the file.
+    """
+    described = describe_file(file)
+    try:
+        return described.world()
+    except ConfigError as error:
+        raise ConfigError(f"Cannot use {file}: {error}") from error
+
+
+WorldLike: TypeAlias = World | ScenarioConfig | str | Path
+"""A world, or a file of one (.toml); a scenario's configuration or the name of a preset is one without wrappers."""
 
 
 def world_of(given: WorldLike) -> World:
     """Return what was given as a world.
 
     Raises:
-        ConfigError: an unknown preset, or neither a world, a configuration nor a name.
+        ConfigError: an unknown preset, a file that cannot be used, or neither a world, a configuration nor a name.
     """
     if isinstance(given, World):
         return given
+    if isinstance(given, str | Path) and Path(given).suffix == FILE:
+        return read_world(given)
+    if isinstance(given, Path):
+        raise ConfigError(f"Expected the file of a world, which ends with {FILE}, got {given}.")
     return World(scenario(given) if isinstance(given, str) else given)

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.cli.scenario_file import read_scenario_file
 from swarm_forage_env.cli.scenario_options import parse_setting
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping, to_mapping
 from swarm_forage_env.scenarios.obstacles import MAX_OBSTACLES, blocked_cells, covered_area_m2, distances_m
 from swarm_forage_env.scenarios.presets import at_density, scenario
 from swarm_forage_env.studies.study_file import load_study
-from swarm_forage_env.wrappers.world import World
+from swarm_forage_env.wrappers.world import World, describe_file
 
 WALL = (14.0, 4.0, 14.4, 12.0)
 PILLAR = (18.0, 7.5, 19.0, 8.5)
@@ -73,7 +72,7 @@ def test_obstacles_come_from_the_command_line_and_from_files(tmp_path):
             parse_setting(word)
     file = tmp_path / "world.toml"
     file.write_text("[scenario]\nobstacles = [[14.0, 4.0, 14.4, 12.0], [18.0, 7.5, 19.0, 8.5]]\n")
-    assert read_scenario_file(file).fields == {"obstacles": (WALL, PILLAR)}
+    assert describe_file(file).fields == {"obstacles": (WALL, PILLAR)}
 
 
 def test_obstacles_come_back_from_json_and_make_another_run():

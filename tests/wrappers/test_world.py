@@ -8,7 +8,8 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.noise import SensorNoiseConfig
 from swarm_forage_env.wrappers.population import PopulationConfig
-from swarm_forage_env.wrappers.world import SIZE, UNDISTURBED, World, world_of
+from swarm_forage_env.wrappers.registry import parse_wrapper
+from swarm_forage_env.wrappers.world import SIZE, UNDISTURBED, World, read_world, world_of
 from tests.support.wrapper_configs import InnerConfig, OuterConfig
 
 SMALL = scenario("warehouse_small")
@@ -90,3 +91,15 @@ def test_other_caches_leave_the_rest_as_it_is():
     assert world.with_caches("static").name == "mine"
     with pytest.raises(ConfigError, match="caches"):
         world.with_caches("heaps")
+
+
+def test_a_world_may_stand_in_a_file(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text('scenario = "warehouse_small"\n[set]\nn_robots = 7\n[wrappers.sensor_noise]\nsigma = 0.1\n')
+    world = World(scenario("warehouse_small", n_robots=7), (parse_wrapper("sensor_noise:sigma=0.1"),))
+    assert read_world(file) == world_of(file) == world_of(str(file)) == world
+    file.write_text("[set]\nn_robts = 7\n")
+    with pytest.raises(ConfigError, match=r"Cannot use .*mine\.toml: .*n_robts.*n_robots"):
+        read_world(file)
+    with pytest.raises(ConfigError, match="file of a world, which ends with"):
+        world_of(tmp_path)
