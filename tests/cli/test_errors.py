@@ -33,7 +33,7 @@ def test_what_nobody_foresaw_is_one_line_and_a_file_with_the_details(command, tm
     assert (code, out, err.count("\n")) == (EXIT_UNFORESEEN, "", 1)
     assert "an error that should not happen: ZeroDivisionError: a fault of ours" in err
     kept = Path(re.search(r"Details: (\S+);", err)[1]).read_text(encoding="utf-8")
-    for words in ("command: swarm-forage list", "numpy: ", "Traceback", "show.py", "a fault of ours"):
+    for words in ("command: swarm-forage list", "numpy: ", "Traceback", "look.py", "a fault of ours"):
         assert words in kept
 
 
