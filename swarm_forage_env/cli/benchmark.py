@@ -106,11 +106,12 @@ def run(
         typer.echo("A quick look, no entry: shorter runs than those of the scripted controllers.", err=True)
 
 
-def worlds() -> None:
+def worlds(as_json: AsJson = False) -> None:
     """Show the worlds of the benchmark: those to train in, and those that are held out."""
     from metrics.benchmark import load_protocol
+    from swarm_forage_env.cli.printer import show as print_answer
 
-    typer.echo(load_protocol().text())
+    print_answer(load_protocol(), as_json=as_json)
 
 
 def show(entries: Entries, as_json: AsJson = False) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from swarm_forage_env._internal.wording import printable
-from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, FirstSeed, PolicyOptions, WorldOptions, complain
+from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, FirstSeed, Jobs, PolicyOptions, WorldOptions, complain
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,6 +21,7 @@ def check(
     first_seed: FirstSeed = 0,
     window: Annotated[float, typer.Option("--window", help="Seconds in which every robot should get away.")] = 600.0,
     moved: Annotated[float, typer.Option("--moved", help="How far that is, in m.")] = 0.05,
+    jobs: Jobs = None,
     as_json: AsJson = False,
 ) -> None:
     """Check that policies keep the rules, and find robots that get stuck; exits with 1 if something is wrong.
@@ -33,7 +34,7 @@ def check(
 
     specs = plan_runs(described, policies.names("crw"), n_seeds=seeds, first_seed=first_seed)
     _check_rules(specs)
-    found = find_stuck_in(specs, window_s=window, moved_m=moved)
+    found = find_stuck_in(specs, window_s=window, moved_m=moved, jobs=jobs)
     typer.echo(found.json() if as_json else printable(found.text()))
     if found.found:
         raise typer.Exit(EXIT_FAILURE)

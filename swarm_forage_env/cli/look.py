@@ -110,28 +110,15 @@ def record(
     _refuse_unknown(policy)
     ending = "gif" if at is None else "png"
     path = file or Path("results", f"{world.scenario.name}_{as_file_name(policy_label(policy))}.{ending}")
-    look: dict[str, Any] = {
-        "seed": seed,
-        "size_px": size,
-        "theme": theme,
-        "caches": asked_caches,
-        "wrappers": world.wrappers,
-    }
+    look: dict[str, Any] = {"seed": seed, "size_px": size, "theme": theme, "caches": asked_caches}
+    look["wrappers"] = world.wrappers
     try:
         if at is not None:
             written = picture_run(world.scenario, policy, path, at_s=at, **look)
         else:
             with progress_bar("pictures") as progress:
-                written = record_run(
-                    world.scenario,
-                    policy,
-                    path,
-                    seconds=seconds,
-                    speedup=speedup,
-                    fps=fps,
-                    progress=progress,
-                    **look,
-                )
+                film: dict[str, Any] = {"seconds": seconds, "speedup": speedup, "fps": fps, "progress": progress}
+                written = record_run(world.scenario, policy, path, **film, **look)
     except (RenderError, ModelError, NetworkError) as error:
         raise typer.BadParameter(str(error)) from error
     typer.echo(f"wrote {written}")

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import Picture, PolicyOptions, WorldOptions, refuse_others
+from swarm_forage_env.cli.options import Jobs, Picture, PolicyOptions, WorldOptions, refuse_others
 from swarm_forage_env.cli.printer import notes, progress_bar
 
 if TYPE_CHECKING:
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 PICTURE_FILE = "maps.png"
 _OF_ALL = ("policies", "named_policies", "square", "per_robot", "own_scales", "picture")
-"""Options that go with a page, too."""
-_OF_STUDIES = (*_OF_ALL, "seeds", "conditions")
+"""Options that go with a page and a record, too."""
+_OF_STUDIES = (*_OF_ALL, "seeds", "conditions", "jobs")
 """Options that go with a study."""
 
 
@@ -45,43 +45,48 @@ def maps(
         bool,
         typer.Option("--own-scales", help="A scale of its own for each map; default one per column, to compare rows."),
     ] = False,
+    jobs: Jobs = None,
     picture: Picture = None,
 ) -> None:
     """Draw where robots were, took and left objects, and got in each other's way.
 
-    Of policies in a scenario; or of a page that 'swarm-forage replay' has written; or of a study, its folder or packed
-    file. One row per policy, run of the page or condition of the study; then, for each after the first, what is more in
-    it than in the first. The arrays go to .npz files beside the picture. Stored runs hold no positions, so those of a
-    study are made again.
+    Of policies in a scenario; or of a page that 'swarm-forage replay' has written; or of a stored run; or of a study,
+    its folder or packed file. One row per policy, run of the page or condition of the study; then, for each after the
+    first, what is more in it than in the first. The arrays go to .npz files beside the picture. Stored runs hold no
+    positions, so they are made again.
     """
+    from swarm_forage_env.cli.scenario_options import plan_runs
+    from swarm_forage_env.rendering.figures import check_picture
+    from swarm_forage_env.runs.record import is_record
+    from swarm_forage_env.studies.study_table import read_study
+
     words = policies.names()
     place = Path(words[0])
     if place.suffix == ".html":
         refuse_others(context, "a page", _OF_ALL, "which describe runs; leave them out, or name a policy")
         found, file = _of_page(Path(policies.one()), square), picture or place.with_suffix(".maps.png")
-        _check(file)
+        check_picture(file)
+    elif place.suffix == ".parquet" and is_record(place):
+        refuse_others(context, "a stored run", _OF_ALL, "which describe another one; leave them out, or name a policy")
+        file = picture or place.with_suffix(".maps.png")
+        check_picture(file)
+        found = _of_record(Path(policies.one()), square)
     elif place.suffix == ".parquet" or place.is_dir():
         refuse_others(context, "a study", _OF_STUDIES, "which describe other runs; leave them out, or name a policy")
-        study = _study(Path(policies.one()))
+        study = read_study(Path(policies.one()))
         file = picture or Path("results", "maps", study.spec.name, PICTURE_FILE)
-        _check(file)
-        found = _of_study(study, conditions or (), seeds, square)
+        check_picture(file)
+        found = _of_study(study, conditions or (), seeds, square, jobs)
     else:
-        specs = _planned(words, described, seeds or 1)
+        specs = plan_runs(described, words, n_seeds=seeds or 1, first_seed=0)
         file = picture or Path("results", "maps", specs[0].scenario.name, PICTURE_FILE)
-        _check(file)
-        found = _of_runs(specs, square)
+        check_picture(file)
+        found = _of_runs(specs, square, jobs)
     try:
         (found.per_robot() if per_robot else found).write(file, own_scales=own_scales)
     except ImportError as error:
         notes().print(str(error))
     typer.echo(f"wrote maps to {file} and .npz files beside it")
-
-
-def _check(picture: Path) -> None:
-    from swarm_forage_env.rendering.figures import check_picture
-
-    check_picture(picture)
 
 
 def _of_page(page: Path, square: float) -> "ComparedMaps":
@@ -90,37 +95,44 @@ def _of_page(page: Path, square: float) -> "ComparedMaps":
     return maps_of_page(page, side_m=square)
 
 
-def _study(place: Path) -> "StudyTable":
-    from swarm_forage_env.studies.study_table import read_study
+def _of_record(place: Path, square: float) -> "ComparedMaps":
+    """Make a stored run again, and tell if it came out different."""
+    from swarm_forage_env.inspect.maps import maps_of_record
+    from swarm_forage_env.runs.record import RunRecord
+    from swarm_forage_env.runs.spec import RunSpec
 
-    return read_study(place)
+    record = RunRecord.read(place)
+    with progress_bar("making the run again", RunSpec.from_json(record.spec).robot_ticks) as advance:
+        found, is_same = maps_of_record(record, side_m=square, advance=advance)
+    _tell_of_changed([] if is_same else [record.run_id])
+    return found
 
 
-def _of_study(table: "StudyTable", conditions: "Sequence[str]", seeds: int | None, square: float) -> "ComparedMaps":
+def _tell_of_changed(run_ids: "Sequence[str]") -> None:
+    if run_ids:
+        notes().print(
+            f"Runs that come out different from their records, which other versions made: {', '.join(run_ids)}; "
+            "the maps show them as they are now."
+        )
+
+
+def _of_study(
+    table: "StudyTable", conditions: "Sequence[str]", seeds: int | None, square: float, jobs: int | None
+) -> "ComparedMaps":
     """Make runs of a study again, and tell which came out different."""
     from swarm_forage_env.inspect.maps import ComparedMaps
     from swarm_forage_env.inspect.study_maps import choose_places, maps_of_places, robot_ticks
 
     chosen = choose_places(table.spec, conditions)
     with progress_bar("making the runs again", robot_ticks(table.spec, chosen, seeds)) as advance:
-        found, changed = maps_of_places(table, chosen, n_seeds=seeds, side_m=square, advance=advance)
-    if changed:
-        notes().print(
-            f"Runs that come out different from their records, which other versions made: {', '.join(changed)}; "
-            "the maps show them as they are now."
-        )
+        found, changed = maps_of_places(table, chosen, n_seeds=seeds, side_m=square, jobs=jobs, advance=advance)
+    _tell_of_changed(changed)
     return ComparedMaps(maps=tuple(found))
 
 
-def _planned(words: "Sequence[str]", described: WorldOptions, seeds: int) -> "Sequence[RunSpec]":
-    from swarm_forage_env.cli.scenario_options import plan_runs
-
-    return plan_runs(described, words, n_seeds=seeds, first_seed=0)
-
-
-def _of_runs(specs: "Sequence[RunSpec]", square: float) -> "ComparedMaps":
+def _of_runs(specs: "Sequence[RunSpec]", square: float, jobs: int | None) -> "ComparedMaps":
     """Make the runs, and show how far they are."""
     from swarm_forage_env.inspect.maps import maps_of_runs
 
     with progress_bar("runs", sum(spec.robot_ticks for spec in specs)) as advance:
-        return maps_of_runs(specs, side_m=square, advance=advance)
+        return maps_of_runs(specs, side_m=square, jobs=jobs, advance=advance)

@@ -1,7 +1,7 @@
 """The commands `train`, `train curves` and `dataset`: policies that learn, and what others learn from."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,6 +11,7 @@ from metrics.controllers import PAPER_POLICIES
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.options import (
     EXIT_FAILURE,
+    AsJson,
     DryRun,
     FirstSeed,
     Jobs,
@@ -220,6 +221,7 @@ def curves(
     ] = ",".join(PAPER_POLICIES),
     picture: Picture = None,
     jobs: Jobs = None,
+    as_json: AsJson = False,
 ) -> None:
     """Draw how trainings went, beside the scripted controllers on the same axes.
 
@@ -234,37 +236,46 @@ def curves(
     read_trainings(folders)  # refuses folders before it looks at the place of the picture
     check_picture(file)
     found = curves_of(folders, beside=() if policies == "none" else split_names(policies), jobs=jobs)
-    typer.echo(found.text())
+    typer.echo(found.json() if as_json else found.text())
     try:
         found.draw(file)
     except ImportError as error:
         raise typer.Exit(complain(str(error), EXIT_FAILURE)) from None
     except OSError as error:  # the table was shown, but a picture was asked for
         raise typer.Exit(complain(no_picture(file, error), EXIT_FAILURE)) from None
-    typer.echo(f"wrote {file}")
+    typer.echo(f"wrote {file}", err=as_json)
 
 
-def dataset(  # long: one parameter per option
-    policies: PolicyOptions,
-    described: WorldOptions,
-    seeds: Annotated[int, typer.Option(min=1, help="Number of runs.")] = 1,
-    first_seed: FirstSeed = 0,
+@dataclass(frozen=True, kw_only=True, slots=True)
+class RecordedOptions:
+    """What a data set holds of a run; names as in `plan_dataset`."""
+
     observation: Annotated[
         str | None,
         typer.Option(help="full or compact; default what a learned policy sees, else full."),
-    ] = None,
+    ] = None
     site_memory: Annotated[
         bool | None,
         typer.Option(
             "--site-memory/--no-site-memory",
             help="Whether to record two places that robots remember; default as a learned policy sees, else not.",
         ),
-    ] = None,
-    compress: Annotated[bool, typer.Option("--compress", help="Smaller files, which take longer to write.")] = False,
+    ] = None
+    compress: Annotated[bool, typer.Option("--compress", help="Smaller files, which take longer to write.")] = False
+
+
+def dataset(
+    policies: PolicyOptions,
+    described: WorldOptions,
+    *,
+    seeds: Annotated[int, typer.Option(min=1, help="Number of runs.")] = 1,
+    first_seed: FirstSeed = 0,
+    recorded: RecordedOptions,
     minari: Annotated[
         str | None, typer.Option(metavar="ID", help="Also make a Minari data set of the whole swarm as one agent.")
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="Folder; default results/datasets/SCENARIO_POLICY.")] = None,
+    jobs: Jobs = None,
     dry_run: DryRun = False,
 ) -> None:
     """Record what robots see and do, for offline reinforcement learning and imitation.
@@ -279,13 +290,7 @@ def dataset(  # long: one parameter per option
     from swarm_forage_env.training.datasets.recording import plan_dataset, record_dataset
 
     spec = plan_runs(described, (policies.one("dpo"),), n_seeds=1, first_seed=first_seed)[0]
-    plan = plan_dataset(
-        spec,
-        range(first_seed, first_seed + seeds),
-        observation=observation,
-        site_memory=site_memory,
-        compress=compress,
-    )
+    plan = plan_dataset(spec, range(first_seed, first_seed + seeds), **asdict(recorded))
     folder = out or Path("results", "datasets", as_file_name(f"{spec.scenario.name}_{policy_label(spec.policy)}"))
     typer.echo(plan.describe(folder).text())
     if dry_run:
@@ -296,7 +301,7 @@ def dataset(  # long: one parameter per option
         check_minari(minari)  # before hours of work
     try:
         with progress_bar("decisions") as progress:
-            runs = record_dataset(plan, folder, progress=progress)
+            runs = record_dataset(plan, folder, jobs=jobs, progress=progress)
     except KeyboardInterrupt:
         words = f"Interrupted. Finished runs are kept in {folder}; the same command does the rest."
         raise typer.Exit(complain(words, EXIT_INTERRUPTED)) from None

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,12 @@ from swarm_forage_env._internal.files import as_file_name, replacing
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.inspect.replay.capture import record_replay
 from swarm_forage_env.inspect.replay.files import read_replays
-from swarm_forage_env.inspect.replay.frames import Replay, ReplayError, Status
+from swarm_forage_env.inspect.replay.frames import Replay, Status
 from swarm_forage_env.policies.registry import policy_label
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
+from swarm_forage_env.runs.record import RunRecord
 from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.runs.workers import Tell, map_runs
 from swarm_forage_env.scenarios.floor import CELL_M
 from swarm_forage_env.scenarios.obstacles import Rectangle
 
@@ -182,41 +185,64 @@ def maps_of_page(page: str | Path, *, side_m: float = 2 * CELL_M) -> ComparedMap
         ReplayError: it is none.
         ConfigError: see `floor_maps`.
     """
-    file = Path(page)
-    if file.suffix == ".parquet":
-        raise ReplayError(
-            f"Expected a page that 'swarm-forage replay' has written, got {file}; records of runs hold no positions. "
-            f"'swarm-forage replay {file}' makes the page of a run, and 'swarm-forage maps' takes studies, too."
-        )
-    return ComparedMaps(maps=tuple(floor_maps(replay, side_m=side_m) for replay in read_replays(file)))
+    return ComparedMaps(maps=tuple(floor_maps(replay, side_m=side_m) for replay in read_replays(Path(page))))
 
 
 def maps_of_runs(
-    specs: Sequence[RunSpec], *, side_m: float = 2 * CELL_M, advance: Callable[[float], None] | None = None
+    specs: Sequence[RunSpec],
+    *,
+    side_m: float = 2 * CELL_M,
+    jobs: int | None = 1,
+    advance: Callable[[float], None] | None = None,
 ) -> ComparedMaps:
     """Make runs and return the mean of the maps of each policy.
 
     Args:
         specs: The runs; those of a policy differ in their seeds, and all arenas are of one size.
         side_m: As in `floor_maps`.
-        advance: Called after every frame, with the robot-ticks that are done.
+        jobs: As in `runs.workers.map_runs`, and so is `advance`.
+        advance: Called with the robot-ticks that are done.
 
     Raises:
         ConfigError: see `floor_maps`.
         ValueError: a policy that is not installed, or refuses its file.
     """
     made: dict[str, list[FloorMaps]] = {}
-    done = 0.0
-    for spec in specs:
-
-        def tell(tick: int, end: int, before: float = done, ticks: float = spec.robot_ticks) -> None:
-            if advance is not None:
-                advance(before + ticks * tick / end)
-
-        replay, _ = record_replay(spec, progress=tell)
-        made.setdefault(policy_label(spec.policy), []).append(floor_maps(replay, side_m=side_m))
-        done += spec.robot_ticks
+    found = map_runs(partial(map_run, side_m, None), specs, jobs=jobs, advance=advance)
+    for spec, (maps, _) in zip(specs, found, strict=True):
+        made.setdefault(policy_label(spec.policy), []).append(maps)
     return ComparedMaps(maps=tuple(mean_maps(maps, label) for label, maps in made.items()))
+
+
+def maps_of_record(
+    record: RunRecord, *, side_m: float = 2 * CELL_M, advance: Callable[[float], None] | None = None
+) -> tuple[ComparedMaps, bool]:
+    """Make the run of a record again, which holds no positions.
+
+    Returns:
+        Its maps, and whether it came out the same.
+
+    Raises:
+        ConfigError: see `floor_maps`.
+        ValueError: a policy that is not installed, or refuses its file.
+    """
+    ((maps, again),) = map_runs(partial(map_run, side_m, None), [RunSpec.from_json(record.spec)], advance=advance)
+    return ComparedMaps(maps=(maps,)), again.same_columns(record)
+
+
+def map_run(side_m: float, in_width_m: float | None, spec: RunSpec, tell: Tell | None) -> tuple[FloorMaps, RunRecord]:
+    """Make a run, for `runs.workers.map_runs`, and return its maps and its record.
+
+    Args:
+        side_m: Side of a square.
+        in_width_m: Width of the arena in which it is so long, elsewhere in proportion; None = everywhere.
+        spec: The run.
+        tell: Called after every frame.
+    """
+    replay, record = record_replay(spec, progress=tell)
+    assert record is not None, "whole runs have records"
+    side_m = side_m if in_width_m is None else side_m * spec.scenario.arena.width_m / in_width_m
+    return floor_maps(replay, side_m=side_m), record
 
 
 def _sides(side_m: float, n: int, extent_m: float) -> FloatArray:

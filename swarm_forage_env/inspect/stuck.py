@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
@@ -17,6 +18,7 @@ from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.run import LiveRun, build_env
 from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.runs.workers import Tell, map_runs
 
 SAMPLE_S = 5.0
 """Positions are looked at this often; our choice: within it a robot in motion drives 0.4 m, so none is missed."""
@@ -133,10 +135,17 @@ def _row(spec: RunSpec, one: StuckRobot) -> tuple[str, ...]:
     )
 
 
-def find_stuck_in(specs: Sequence[RunSpec], *, window_s: float = 600.0, moved_m: float = 0.05) -> StuckRobots:
-    """Find the robots that get stuck in several runs; arguments and errors as in `find_stuck`."""
-    found = [(spec, one) for spec in specs for one in find_stuck(spec, window_s=window_s, moved_m=moved_m)]
-    return StuckRobots(found=tuple(found), n_runs=len(specs))
+def find_stuck_in(
+    specs: Sequence[RunSpec], *, window_s: float = 600.0, moved_m: float = 0.05, jobs: int | None = 1
+) -> StuckRobots:
+    """Find the robots that get stuck in several runs; arguments as in `find_stuck` and `runs.workers.map_runs`."""
+    found = map_runs(partial(_stuck_in, window_s, moved_m), specs, jobs=jobs)
+    pairs = [(spec, one) for spec, robots in zip(specs, found, strict=True) for one in robots]
+    return StuckRobots(found=tuple(pairs), n_runs=len(specs))
+
+
+def _stuck_in(window_s: float, moved_m: float, spec: RunSpec, _: Tell | None) -> tuple[StuckRobot, ...]:
+    return find_stuck(spec, window_s=window_s, moved_m=moved_m)
 
 
 def find_stuck(spec: RunSpec, *, window_s: float = 600.0, moved_m: float = 0.05) -> tuple[StuckRobot, ...]:

@@ -4,17 +4,19 @@ For maps a condition's runs are made again, since records hold no positions.
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swarm_forage_env._internal.fields import ConfigError, known_keys, whole
-from swarm_forage_env.inspect.maps import FloorMaps, floor_maps, mean_maps, same_proportions
-from swarm_forage_env.inspect.replay.capture import record_replay
+from swarm_forage_env.inspect.maps import FloorMaps, map_run, mean_maps, same_proportions
 from swarm_forage_env.rendering.frame import render_frame
+from swarm_forage_env.runs.record import RunRecord
 from swarm_forage_env.runs.run import build_env
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import DONE
+from swarm_forage_env.runs.workers import Tell, map_runs
 from swarm_forage_env.studies.study import Place, StudySpec, Value, value_words
 from swarm_forage_env.studies.study_table import StudyTable
 
@@ -90,6 +92,7 @@ def maps_of_places(
     *,
     n_seeds: int | None = None,
     side_m: float = 0.4,
+    jobs: int | None = 1,
     advance: Advance | None = None,
 ) -> tuple[tuple[FloorMaps, ...], tuple[str, ...]]:
     """Make runs of conditions again and return the mean of their maps.
@@ -99,7 +102,8 @@ def maps_of_places(
         places: Which ones; their arenas must have one shape.
         n_seeds: How many runs per condition, the first ones; default at most `DEFAULT_SEEDS`.
         side_m: Side of a square in the smallest arena. In larger ones squares are larger, so that all have as many.
-        advance: Called after every frame.
+        jobs: As in `runs.workers.map_runs`, and so is `advance`.
+        advance: Called with the robot-ticks that are done.
 
     Returns:
         One per condition; and the run_ids of those runs that came out different from what the study holds.
@@ -119,18 +123,20 @@ def maps_of_places(
             f"Expected conditions whose arenas have one shape, got {sorted({*sizes_m})} m; choose others."
         )
     smallest_m = min(size_m[0] for size_m in sizes_m)
-    labels = _labels(spec, places)
+    runs = {place: spec.specs_of(place)[:n_seeds] for place in places}
+    made = map_runs(
+        partial(_map_of, side_m, smallest_m), [run for of in runs.values() for run in of], jobs=jobs, advance=advance
+    )
     maps: list[FloorMaps] = []
     changed: list[str] = []
-    done = 0.0
-    for place, label, size_m in zip(places, labels, sizes_m, strict=True):
-        of_runs: list[FloorMaps] = []
-        for run in spec.specs_of(place)[:n_seeds]:
-            one, is_same = _map_of(table, place, run, side_m * size_m[0] / smallest_m, _part(advance, done, run))
-            of_runs.append(one)
-            changed += [] if is_same else [run.run_id]
-            done += run.robot_ticks
-        maps.append(mean_maps(of_runs, label))
+    for (place, of_place), label in zip(runs.items(), _labels(spec, places), strict=True):
+        found = [next(made) for _ in of_place]
+        maps.append(mean_maps([one for one, _ in found], label))
+        changed += [
+            run.run_id
+            for run, (_, record) in zip(of_place, found, strict=True)
+            if not _is_same(table, place, run, record)
+        ]
     return tuple(maps), tuple(changed)
 
 
@@ -140,28 +146,20 @@ def robot_ticks(spec: StudySpec, places: Sequence[Place], n_seeds: int | None) -
     return sum(run.robot_ticks for place in places for run in spec.specs_of(place)[:n_runs])
 
 
-def _map_of(
-    table: StudyTable, place: Place, run: RunSpec, side_m: float, progress: Callable[[int, int], None] | None
-) -> tuple[FloorMaps, bool]:
-    """Return the maps of a run, and whether it came out as the study has it; one that it has not is as good."""
+def _map_of(side_m: float, in_width_m: float, run: RunSpec, tell: Tell | None) -> tuple[FloorMaps, RunRecord]:
     try:
-        replay, record = record_replay(run, progress=progress)
+        return map_run(side_m, in_width_m, run, tell)
     except ConfigError:
         raise
     except ValueError as error:  # a policy that is not installed here, or a file that has changed
         raise ConfigError(str(error)) from error
-    assert record is not None, "whole runs have records"
+
+
+def _is_same(table: StudyTable, place: Place, run: RunSpec, record: RunRecord) -> bool:
+    """Return whether a run came out as the study has it; one that it has not is as good."""
     rows = table.rows(place)
     stored = rows.filter((rows["run_id"] == run.run_id) & (rows["state"] == DONE))
-    is_same = not len(stored) or np.array_equal(stored[_COMPARED].to_numpy(), record.columns()[_COMPARED])
-    return floor_maps(replay, side_m=side_m), is_same
-
-
-def _part(advance: Advance | None, before: float, run: RunSpec) -> Callable[[int, int], None] | None:
-    """Return the progress of a run that follows on others."""
-    if advance is None:
-        return None
-    return lambda tick, end: advance(before + run.robot_ticks * tick / end)
+    return not len(stored) or np.array_equal(stored[_COMPARED].to_numpy(), record.columns()[_COMPARED])
 
 
 def _values(spec: StudySpec) -> dict[str, tuple[Value, ...]]:

@@ -153,6 +153,12 @@ def file_of(policy: str) -> str:
     return split_class(policy if found is None else found["file"])[0]
 
 
+def policy_files(policy: str) -> tuple[str, ...]:
+    """Return the files that a policy, or the parts of a mixed swarm, come from."""
+    parts = [part.policy for part in mixture_parts(policy)] if is_mixture(policy) else [policy]
+    return tuple(file_of(part) for part in parts if is_policy_file(part))
+
+
 def whole_path(policy: str) -> str:
     """Return a policy file with its whole path, and with the class if it has one."""
     file, name = split_class(policy)

@@ -35,8 +35,7 @@ class _Command:
     typed: frozenset[Path] | None = None
     """Whole paths of the files that its user typed; None = any file."""
     looks_only: bool = False
-    """Whether nothing is to be run (--dry-run), so that no model is opened to plan; `study run --dry-run` does run
-    policies, to measure them, and by that opens models."""
+    """Whether nothing is to be run (--dry-run), so that no model is opened to plan."""
     tell: Callable[[str], None] = _keep_quiet
     """Told of each model that is opened."""
 
@@ -54,8 +53,7 @@ def of_a_command(
 
     Args:
         typed: Words that the user typed; those that are no files do no harm.
-        looks_only: Whether nothing is to be run, so that no model is opened to plan. `study run --dry-run` measures
-            how long its policies take, and by that opens models.
+        looks_only: Whether nothing is to be run, so that no model is opened to plan.
         tell: Told, in one line, of each model that is opened.
     """
     _now.append(_Command(typed=frozenset(map(_whole, typed)), looks_only=looks_only, tell=tell))

@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from swarm_forage_env._internal.wording import counted
-from swarm_forage_env.policies.mixture import is_mixture, mixture_parts
-from swarm_forage_env.policies.registry import file_of, is_policy_file, local_policy
+from swarm_forage_env.policies.registry import local_policy, policy_files
 from swarm_forage_env.policies.trust import only_looks_at
 from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.cost import Cost, Kind, calibrate, kind_of
@@ -196,8 +195,7 @@ def _measured(specs: Iterable[RunSpec], tell: Callable[[str], None] | None) -> d
 
 def _is_closed(policy: str) -> bool:
     """Whether a policy has a file that is not to be opened, see `policies.trust.only_looks_at`."""
-    parts = [part.policy for part in mixture_parts(policy)] if is_mixture(policy) else [policy]
-    return any(is_policy_file(part) and only_looks_at(file_of(part)) for part in parts)
+    return any(map(only_looks_at, policy_files(policy)))
 
 
 def _world_cells(world: World) -> tuple[str, ...]:

@@ -235,6 +235,16 @@ class RunRecord:
         return record
 
 
+def is_record(path: str | os.PathLike[str]) -> bool:
+    """Return whether a Parquet file says that it holds a run."""
+    import polars as pl
+
+    try:
+        return set(_FILE_KEYS) <= pl.read_parquet_metadata(str(path)).keys()
+    except (OSError, pl.exceptions.PolarsError, pl.exceptions.PanicException):
+        return False
+
+
 _DTYPES: dict[Any, type] = {
     str: str,
     int: int,

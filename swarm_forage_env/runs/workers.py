@@ -8,7 +8,7 @@ import signal
 import threading
 import traceback
 from collections import deque
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
     BrokenExecutor,
@@ -20,13 +20,16 @@ from concurrent.futures import (
 )
 from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
+from functools import partial
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 from swarm_forage_env._internal.compiling import tell_of_first_run
 from swarm_forage_env._internal.fields import as_whole
 from swarm_forage_env._internal.files import check_folder
+from swarm_forage_env.policies import trust
+from swarm_forage_env.policies.registry import policy_files
 from swarm_forage_env.runs.first_compilation import (
     WAKE_UP_EVERY_S,
     compile_outermost,
@@ -41,6 +44,9 @@ from swarm_forage_env.runs.store import RunFailure, RunStore
 from swarm_forage_env.world.compiled import compile_half
 
 Outcome: TypeAlias = RunRecord | RunFailure
+Result = TypeVar("Result")
+Tell: TypeAlias = Callable[[int, int], None]
+"""Called with how much of a run is done, and of how much."""
 Task: TypeAlias = tuple[RunSpec, ...]
 """Runs that an executor gets together."""
 
@@ -102,6 +108,50 @@ def run_each(
     else:
         outcomes = _run_in_pool(todo, processes_of(len(todo), jobs))
     return _stored(outcomes, store)
+
+
+def map_runs(
+    do: Callable[[RunSpec, Tell | None], Result],
+    specs: Sequence[RunSpec],
+    *,
+    jobs: int | None = 1,
+    advance: Callable[[float], None] | None = None,
+) -> Generator[Result]:
+    """Yield what a function makes of each run, in their order; it is for what is more than a record.
+
+    Args:
+        do: Makes one run. It is told how to say how far it is, or None. Other processes must find it by its name.
+        specs: The runs.
+        jobs: Processes, None = one per available core; 1 = in this process.
+        advance: Called with the robot-ticks that are done.
+
+    Raises:
+        WorkerError: worker processes could not be started, or one was killed.
+        UntrustedModelError: see `policies.trust`.
+        Exception: whatever the function raises.
+    """
+    done = 0.0
+    if (n_workers := processes_of(len(specs), jobs)) == 1:
+        for spec in specs:
+            yield do(spec, None if advance is None else partial(_advance, advance, done, spec.robot_ticks))
+            done += spec.robot_ticks
+        return
+    for file in {file for spec in specs for file in policy_files(spec.policy)}:
+        trust.check(file)  # workers know nothing of what the user of a command allows
+    with _process_pool(n_workers) as pool:
+        _check_workers_start(pool)
+        _warm_up_workers(pool, specs)
+        for spec, future in [(spec, pool.submit(do, spec, None)) for spec in specs]:
+            if _is_broken_by(future):
+                raise WorkerError(KILLED)
+            yield future.result()
+            done += spec.robot_ticks
+            if advance is not None:
+                advance(done)
+
+
+def _advance(advance: Callable[[float], None], before: float, robot_ticks: int, tick: int, end: int) -> None:
+    advance(before + robot_ticks * tick / end)
 
 
 def _stored(outcomes: Generator[Outcome], store: RunStore | None) -> Generator[Outcome]:

@@ -59,3 +59,16 @@ def test_maps_refuses_other_files(command):
         assert (code, out) == (2, "")
         assert message in err
         assert err.count("\n") == 1
+
+
+def test_maps_of_a_stored_run(command):
+    short = ("--set", "horizon_s=20", "--set", "interval_s=10", "--robots", "3", "--objects", "20")
+    assert command("run", "random", *short, "--jobs", "1")[0] == 0
+    (record,) = Path("results/warehouse_small").glob("*.parquet")
+    code, out, err = command("maps", str(record))
+    assert (code, err) == (0, "")
+    assert out == f"wrote maps to {record.with_suffix('.maps.png')} and .npz files beside it\n"
+    assert [file.name for file in record.parent.glob("*.npz")] == [f"{record.stem}.maps.random.npz"]
+    code, _, err = command("maps", str(record), "--seeds", "2")
+    assert code == 2
+    assert "Expected a stored run without --seeds" in err

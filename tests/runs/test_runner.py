@@ -11,8 +11,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.policies.registry import RandomPolicy, from_callable
+from swarm_forage_env.policies.trust import UntrustedModelError, of_a_command
 from swarm_forage_env.runs import store as runs_store
 from swarm_forage_env.runs import workers
 from swarm_forage_env.runs.plan import Condition, Plan
@@ -22,7 +24,7 @@ from swarm_forage_env.runs.run import WARM_UP_TICKS, build_stack, run_one, run_p
 from swarm_forage_env.runs.runner import RunsInterrupted, longest_first, run_plan, run_specs
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import DONE, FAILED, MISSING, RunFailure, RunStore
-from swarm_forage_env.runs.workers import WorkerError, run_each
+from swarm_forage_env.runs.workers import WorkerError, map_runs, run_each
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.wrappers.base import STACK_ORDER
@@ -458,3 +460,29 @@ def test_conditions_of_one_run_share_it():
     table = run_plan(plan, jobs=1)
     assert len(table.records) == 1
     assert table.of(plan.conditions[0]) == table.of(plan.conditions[1])
+
+
+def seed_of(spec, tell):
+    if tell is not None:
+        tell(1, 2)
+    if spec.seed == 9:
+        raise ConfigError("nine is none")
+    return spec.seed
+
+
+@pytest.mark.parametrize(("jobs", "told"), [(1, 3), (2, 3)])
+def test_any_function_of_runs_is_mapped_in_their_order(jobs, told):
+    specs = [RunSpec(world=World(WORLD), policy="random", seed=seed) for seed in (2, 0, 1)]
+    done: list[float] = []
+    assert list(map_runs(seed_of, specs, jobs=jobs, advance=done.append)) == [2, 0, 1]
+    assert len(done) == told
+    assert done == sorted(done)
+    with pytest.raises(ConfigError, match="nine is none"):
+        list(map_runs(seed_of, [*specs, replace(specs[0], seed=9)], jobs=jobs))
+
+
+def test_other_processes_open_no_models_that_this_one_may_not(tmp_path):
+    (tmp_path / "mine.zip").write_bytes(b"")
+    specs = [RunSpec(world=World(WORLD), policy=str(tmp_path / "mine.zip"), seed=seed) for seed in (0, 1)]
+    with of_a_command([]), pytest.raises(UntrustedModelError):
+        list(map_runs(seed_of, specs, jobs=2))

@@ -5,6 +5,7 @@ import math
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ from swarm_forage_env.runs.answer import Sheet
 from swarm_forage_env.runs.record import software_versions
 from swarm_forage_env.runs.run import build_env
 from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.runs.workers import Tell, map_runs
 from swarm_forage_env.training.datasets.layout import (
     CARD_FILE,
     Card,
@@ -197,7 +199,11 @@ def _learned_interface(spec: RunSpec, world: SwarmSpec) -> InterfaceConfig | Non
 
 
 def record_dataset(
-    plan: DatasetPlan, folder: str | Path, *, progress: Callable[[int, int], None] | None = None
+    plan: DatasetPlan,
+    folder: str | Path,
+    *,
+    jobs: int | None = 1,
+    progress: Callable[[int, int], None] | None = None,
 ) -> tuple[RunSummary, ...]:
     """Make the runs that a folder lacks; each chunk is there whole or not at all.
 
@@ -207,7 +213,8 @@ def record_dataset(
     Args:
         plan: What to record.
         folder: Where it goes; it is made if it is missing.
-        progress: Called with (decisions done, decisions in all) after each chunk.
+        jobs: As in `runs.workers.map_runs`.
+        progress: Called with (decisions done, decisions in all) after each chunk; of several processes, after each run.
 
     Returns:
         One summary per seed of the plan.
@@ -222,7 +229,7 @@ def record_dataset(
     folder.mkdir(parents=True, exist_ok=True)
     try:
         with alone_in(folder):
-            _record_runs(plan, folder, progress)
+            _record_runs(plan, folder, jobs, progress)
     except BlockingIOError as error:
         raise DatasetError(
             f"Expected to be the only one that writes to {folder}, but another command is recording there; wait until "
@@ -231,19 +238,25 @@ def record_dataset(
     return tuple(RunSummary.read(folder, seed) for seed in plan.card.seeds)
 
 
-def _record_runs(plan: DatasetPlan, folder: Path, progress: Callable[[int, int], None] | None) -> None:
+def _record_runs(
+    plan: DatasetPlan, folder: Path, jobs: int | None, progress: Callable[[int, int], None] | None
+) -> None:
     _card_of_folder(plan.card, folder).write(folder)
-    todo = plan.missing(folder)
     for draft in folder.glob(".*.tmp"):  # of a process that was killed
         draft.unlink(missing_ok=True)
-    in_all = len(todo) * plan.n_decisions
-    for number, seed in enumerate(todo):
+    todo = [replace(plan.spec, seed=seed) for seed in plan.missing(folder)]
+    in_all, robot_ticks = len(todo) * plan.n_decisions, sum(spec.robot_ticks for spec in todo)
 
-        def tell(done: int, before: int = number * plan.n_decisions) -> None:
-            if progress is not None:
-                progress(before + done, in_all)
+    def tell(done: float) -> None:
+        if progress is not None:
+            progress(round(done / robot_ticks * in_all), in_all)
 
-        _record_run(plan, seed, folder, tell).write(folder)
+    for _ in map_runs(partial(_keep_run, plan, folder), todo, jobs=jobs, advance=tell):
+        pass
+
+
+def _keep_run(plan: DatasetPlan, folder: Path, spec: RunSpec, tell: Tell | None) -> None:
+    _record_run(plan, spec.seed, folder, lambda done: tell and tell(done, plan.n_decisions)).write(folder)
 
 
 def _card_of_folder(card: Card, folder: Path) -> Card:
@@ -314,7 +327,7 @@ class _Chunk:
         self.length = 0
 
 
-def _record_run(plan: DatasetPlan, seed: int, folder: Path, tell: Callable[[int], None]) -> RunSummary:
+def _record_run(plan: DatasetPlan, seed: int, folder: Path, tell: Callable[[int], object]) -> RunSummary:
     spec, config = plan.spec, plan.card.interface
     policy: Policy = load_policy(spec.policy, spec.parameters)
     env = build_env(spec.scenario, spec.wrappers, reads=_reads(policy, config))
