@@ -26,7 +26,7 @@ from .runs.policy_spec import policy_specs as policy_specs
 # runs
 from .runs.runner import run_plan as run_plan
 from .runs.plan_summary import summarize_plan as summarize_plan
-from .runs.rerun import rerun as rerun
+from .runs.runner import rerun as rerun
 from .runs.plan import Plan as Plan
 from .runs.plan import Condition as Condition
 from .runs.table import Table as Table

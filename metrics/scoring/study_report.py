@@ -22,8 +22,7 @@ from swarm_forage_env.rendering.pages import build_report, picture_address, show
 from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.record import PACKAGES
 from swarm_forage_env.runs.store import DONE
-from swarm_forage_env.studies.description import describe
-from swarm_forage_env.studies.status import status
+from swarm_forage_env.studies.description import describe, status
 from swarm_forage_env.studies.study import StudySpec
 from swarm_forage_env.studies.study_file import is_set_of_paper
 

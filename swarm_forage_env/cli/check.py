@@ -58,7 +58,7 @@ def rerun(
     import traceback
 
     from swarm_forage_env.policies.trust import UntrustedModelError
-    from swarm_forage_env.runs import rerun as again
+    from swarm_forage_env.runs import runner as again
     from swarm_forage_env.runs.record import RecordError
 
     try:

@@ -71,7 +71,7 @@ def run(  # long: one parameter per option
     from swarm_forage_env.cli.printer import notes
     from swarm_forage_env.runs.cluster import cluster_executor
     from swarm_forage_env.runs.store import FAILED
-    from swarm_forage_env.studies.status import StudyOutcome
+    from swarm_forage_env.studies.description import StudyOutcome
     from swarm_forage_env.studies.study_folder import StudyFolder, parse_shard, run_study
 
     spec = _chosen(name, budget, seeds, rules)
@@ -109,7 +109,7 @@ def _summary(spec: "StudySpec", folder: "StudyFolder", part: tuple[int, int], jo
 def status(place: Place, as_json: AsJson = False) -> None:
     """Show which runs of each condition are done, missing or failed; exit code 1 unless all are done."""
     from swarm_forage_env.cli.printer import show as print_answer
-    from swarm_forage_env.studies.status import status as status_of
+    from swarm_forage_env.studies.description import status as status_of
     from swarm_forage_env.studies.study_table import read_study
 
     found = status_of(read_study(place))

@@ -11,12 +11,11 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.cli.options import complain, no_picture
 from swarm_forage_env.cli.signals import EXIT_INTERRUPTED
-from swarm_forage_env.runs.progress import duration
+from swarm_forage_env.runs.cost import duration
 from swarm_forage_env.training.curves import curve_of_training, place_of
 from swarm_forage_env.training.evaluation_worlds import ALL_WORLDS
-from swarm_forage_env.training.evaluations import MODEL_FILE, TrainingCurve
+from swarm_forage_env.training.evaluations import MODEL_FILE, Evaluation, TrainingCurve, TrainingStatus
 from swarm_forage_env.training.plan import TrainingPlan
-from swarm_forage_env.training.status import Evaluation, TrainingStatus
 
 PICTURE_FILE = "training.png"
 LINE_EVERY_S = 60.0

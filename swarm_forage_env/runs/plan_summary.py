@@ -16,9 +16,8 @@ from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.policies.registry import local_policy, policy_files
 from swarm_forage_env.policies.trust import only_looks_at
 from swarm_forage_env.runs.answer import Answer, Sheet
-from swarm_forage_env.runs.cost import Cost, Kind, calibrate, kind_of
+from swarm_forage_env.runs.cost import Cost, Kind, calibrate, duration, kind_of
 from swarm_forage_env.runs.plan import Condition, Plan
-from swarm_forage_env.runs.progress import duration
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import DONE, RunStore
 from swarm_forage_env.runs.workers import processes_of

@@ -1,4 +1,4 @@
-"""What a study varies, and what the sets of the paper take, as tables."""
+"""What a study varies, how far it is, what came of its runs, and what the sets of the paper take."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,8 +6,12 @@ from typing import Any
 
 from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.runs.answer import Answer, Sheet
+from swarm_forage_env.runs.runner import Outcomes
+from swarm_forage_env.runs.store import DONE, FAILED, MISSING, STATES
 from swarm_forage_env.studies.study import StudySpec, value_words
 from swarm_forage_env.studies.study_file import PAPER, left_out, left_out_words, load_study, set_names
+from swarm_forage_env.studies.study_folder import StudyFolder
+from swarm_forage_env.studies.study_table import LOSS_COLUMNS, StudyTable
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -106,3 +110,100 @@ def _numbers(specs: Sequence[StudySpec]) -> tuple[str, str, str]:
         f"{sum(spec.n_runs for spec in specs):,}",
         f"{sum(spec.robot_ticks for spec in specs):.2e}",
     )
+
+
+FAILURES_SHOWN = 10
+"""Failed runs that are named; the packed file and `to_mapping` have all."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StudyStatus(Answer):
+    """Which runs of a study are done, failed and missing."""
+
+    table: StudyTable
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every run is done."""
+        return all(state.is_complete for state in self.table.place_states())
+
+    @property
+    def headline(self) -> str:
+        """The study, and how many runs are in which state."""
+        spec = self.table.spec
+        totals = [sum(state.n_runs[name] for state in self.table.place_states()) for name in STATES]
+        return f"{spec.name}, budget {spec.budget}: {_counts(totals)}"
+
+    def sheets(self) -> Sequence[Sheet]:
+        """Return how far it is, the conditions that are not complete, and failed runs."""
+        spec, versions, states = self.table.spec, self.table.versions, self.table.place_states()
+        left = [state for state in states if not state.is_complete]
+        lines = [f"{len(states) - len(left):,} of {counted(len(states), 'condition')} complete"]
+        if len(versions) > 1:
+            lines.append(f"The runs were made by {len(versions)} versions or commits of the packages.")
+        sheets = [Sheet(title=self.headline, notes=lines)]
+        if left:
+            shown = spec.place_words()
+            rows = [(*shown[state.place], *(str(state.n_runs[name]) for name in STATES)) for state in left]
+            sheets.append(Sheet(header=("rules", "policy", *(axis.name for axis in spec.axes), *STATES), rows=rows))
+        failures = self._failures()
+        for row in failures[:FAILURES_SHOWN]:
+            title = f"failed: {row['policy']}, seed {row['seed']}: {row['error']}"
+            sheets.append(Sheet(title=title, notes=[f"  again: {row['rerun']}"]))
+        if more := _more(len(failures)):
+            sheets[-1] = Sheet(title=sheets[-1].title, notes=[*sheets[-1].notes, *more])
+        return sheets
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the states of all conditions, and all failed runs."""
+        return {
+            "study": self.table.spec.to_mapping(),
+            "versions": list(self.table.versions),
+            "conditions": self.table.places().to_dicts(),
+            "failures": self._failures(),
+        }
+
+    def _failures(self) -> list[dict[str, Any]]:
+        lost = self.table.frame.filter(self.table.frame["state"] == FAILED)
+        keys = {"run_id": "run_id", "rules": "reading"} | {name: name for name in ("policy", "seed", *LOSS_COLUMNS[1:])}
+        return [{key: row[name] for key, name in keys.items()} for row in lost.iter_rows(named=True)]
+
+
+def status(table: StudyTable) -> StudyStatus:
+    """Say how far a study is, from `read_study`."""
+    return StudyStatus(table=table)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StudyOutcome(Answer):
+    """What came of the runs that one call made."""
+
+    outcomes: Outcomes
+    folder: StudyFolder
+
+    def sheets(self) -> Sequence[Sheet]:
+        """Return how many are done, and how to make each failed one again."""
+        files = [str(file) for file in self._failed()]
+        lines = [f"  again, alone: swarm-forage rerun {file}" for file in files[:FAILURES_SHOWN]]
+        counts = _counts([self.outcomes.count(name) for name in STATES])
+        return (Sheet(title=f"{counts}, in {self.folder.folder}", notes=[*lines, *_more(len(files))]),)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return how many runs are in which state, and the files of the failed ones."""
+        counts = {name: self.outcomes.count(name) for name in STATES}
+        return {"folder": str(self.folder.folder), "n_runs": counts, "failed": [str(file) for file in self._failed()]}
+
+    def _failed(self) -> list[Any]:
+        failed = [run_id for run_id, state in self.outcomes.states.items() if state == FAILED]
+        return [self.folder.store.failure_path(run_id) for run_id in failed]
+
+
+def _more(n_failed: int) -> list[str]:
+    return [f"  and {n_failed - FAILURES_SHOWN} more"] if n_failed > FAILURES_SHOWN else []
+
+
+def _counts(numbers: Sequence[int]) -> str:
+    done, failed, missing = numbers
+    words = [f"{done:,} of {counted(sum(numbers), 'run')} {DONE}"]
+    words += [f"{number:,} {state}" for state, number in ((FAILED, failed), (MISSING, missing)) if number]
+    return ", ".join(words)

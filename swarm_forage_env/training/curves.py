@@ -20,8 +20,14 @@ from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.policy_spec import policy_specs
 from swarm_forage_env.scenarios.performance import performance_of
-from swarm_forage_env.training.evaluations import TrainingCurve, read_training
-from swarm_forage_env.training.judging import finished_runs, in_all_worlds, judged, known_baselines
+from swarm_forage_env.training.evaluations import (
+    TrainingCurve,
+    finished_runs,
+    in_all_worlds,
+    judged,
+    known_baselines,
+    read_training,
+)
 from swarm_forage_env.training.plan import TrainingPlan
 
 

@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.training.evaluations import EVALUATIONS_FILE, PLAN_FILE, write_evaluations
+from swarm_forage_env.training.evaluations import EVALUATIONS_FILE, PLAN_FILE, Evaluation, write_evaluations
 from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan
-from swarm_forage_env.training.status import Evaluation
 from swarm_forage_env.wrappers.world import World
 
 PLAN = TrainingPlan(

@@ -8,7 +8,7 @@ import pytest
 
 from swarm_forage_env.runs import cost as calibration
 from swarm_forage_env.runs import runner
-from swarm_forage_env.studies import status
+from swarm_forage_env.studies import description
 from swarm_forage_env.studies.study_table import read_study
 
 FILE = """
@@ -103,7 +103,7 @@ def test_failures_are_told_with_the_command_that_makes_them_again(written, monke
     code, out, _ = written(*RUN, "--seeds", "3")
     assert code == 1
     assert "0 of 12 runs done, 12 failed" in out
-    assert out.count(f"again, alone: swarm-forage rerun {FOLDER}/runs/failures/") == status.FAILURES_SHOWN
+    assert out.count(f"again, alone: swarm-forage rerun {FOLDER}/runs/failures/") == description.FAILURES_SHOWN
     assert "and 2 more" in out
     code, out, _ = written("study", "status", str(FOLDER / "mine.parquet"))
     assert code == 1

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from swarm_forage_env.runs import progress
-from swarm_forage_env.runs.progress import DAMAGED_SHOWN, RunProgress, duration
+from swarm_forage_env.runs import cost
+from swarm_forage_env.runs.cost import DAMAGED_SHOWN, RunProgress, duration
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.world import World
@@ -26,7 +26,7 @@ def took(seconds):
 def clock(monkeypatch):
     """Seconds that pass as the test says."""
     now = [0.0]
-    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(cost.time, "monotonic", lambda: now[0])
     return now
 
 

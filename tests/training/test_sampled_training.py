@@ -16,15 +16,13 @@ from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.runs.table import Table
 from swarm_forage_env.scenarios.presets import warehouse_small
-from swarm_forage_env.training import judging
+from swarm_forage_env.training import evaluations
 from swarm_forage_env.training.evaluation_worlds import EvaluationWorld
-from swarm_forage_env.training.evaluations import read_evaluations
-from swarm_forage_env.training.judging import baseline_runs, best_baselines, ratio_to
+from swarm_forage_env.training.evaluations import Evaluation, baseline_runs, best_baselines, ratio_to, read_evaluations
 from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.recipe import recipe
 from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv
 from swarm_forage_env.training.sb3.training import train
-from swarm_forage_env.training.status import Evaluation
 from swarm_forage_env.wrappers.registry import wrapper_configs
 from swarm_forage_env.wrappers.world import World
 from tests.support.sampled import TWO_WORLDS, sampler
@@ -151,7 +149,7 @@ def test_the_best_of_the_scripted_controllers_runs_with_its_own_caches(monkeypat
     world = EvaluationWorld(scenario=warehouse_small(**QUICK))
     runs = baseline_runs(dataclasses.replace(FIXED, evaluation=EvaluationPlan(worlds=(world,))))
     caches = {condition: runs.specs_of(condition)[0].scenario.caches for condition in runs.conditions}
-    monkeypatch.setattr(judging, "means", lambda _, condition: (reached[caches[condition]], 0.0))
+    monkeypatch.setattr(evaluations, "means", lambda _, condition: (reached[caches[condition]], 0.0))
     assert best_baselines(Table(plan=runs, records={})) == {"warehouse_small_2": ("stochm", 9.0)}
 
 

@@ -41,22 +41,21 @@ from swarm_forage_env.training.evaluations import (
     EVALUATIONS_FILE,
     MODEL_FILE,
     PLAN_FILE,
-    kept_plan,
-    read_evaluations,
-    write_evaluations,
-)
-from swarm_forage_env.training.judging import (
+    Evaluation,
+    TrainingStatus,
     baseline_runs,
     best_baselines,
     finished_runs,
     in_all_worlds,
     judged,
+    kept_plan,
     known_baselines,
+    read_evaluations,
+    write_evaluations,
 )
 from swarm_forage_env.training.plan import LEARNING, Stage, TrainingPlan
 from swarm_forage_env.training.sb3.buffers import ActiveRolloutBuffer, EmptyRolloutError, PresentReplayBuffer
 from swarm_forage_env.training.sb3.export import export_network, note_interface
-from swarm_forage_env.training.status import Evaluation, TrainingStatus
 from swarm_forage_env.views.stable_baselines3 import SwarmVecEnv
 
 ALGORITHM_CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "a2c": A2C, "dqn": DQN, "sac": SAC}

@@ -5,8 +5,7 @@ import json
 import pytest
 
 from metrics import CurveError, report, verdict
-from swarm_forage_env.studies.description import describe, paper_sets
-from swarm_forage_env.studies.status import status
+from swarm_forage_env.studies.description import describe, paper_sets, status
 from tests.support.made_tables import made_study, made_table
 
 
