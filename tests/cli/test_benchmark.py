@@ -75,6 +75,7 @@ def test_the_worlds_are_shown(command, tiny):
     code, out, _ = command("benchmark", "worlds")
     assert code == 0
     assert "seeds 1, 2, 200 s per run, 6 worlds that count" in out
+    assert json.loads(command("benchmark", "worlds", "--json")[1])
     assert "room, throttle 0   " in out
     assert "reference of measures" in out
 

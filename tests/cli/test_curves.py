@@ -1,6 +1,7 @@
 """The command `curves`, on folders as trainings leave them."""
 
 import dataclasses
+import json
 import re
 import sys
 from pathlib import Path
@@ -44,6 +45,10 @@ def test_trainings_are_drawn_beside_others(command, monkeypatch):
     assert cells.keys() >= {"random", "crw"}
     assert out.endswith("wrote both.png\n")
     assert Path("both.png").read_bytes().startswith(b"\x89PNG")
+    code, out, err = command(*words, "--picture", "both.png", "--json")
+    assert code == 0
+    assert err.endswith("wrote both.png\n")
+    assert json.loads(out)
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     code, _, err = command("train", "curves", "first", "--policy", "none")
     assert code == 1
