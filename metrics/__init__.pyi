@@ -62,13 +62,11 @@ from .environment import waveform as waveform
 from .environment import environment_scaling as environment_scaling
 from .environment import environment_distance as environment_distance
 
-# flexibility
+# flexibility and robustness to noise
 from .flexibility import reactivity as reactivity
 from .flexibility import adaptability as adaptability
-
-# robustness
-from .robustness import noise_robustness as noise_robustness
-from .robustness import mean_signed_difference as mean_signed_difference
+from .flexibility import noise_robustness as noise_robustness
+from .flexibility import mean_signed_difference as mean_signed_difference
 
 # queues and population
 from .queues import PopulationRates as PopulationRates

@@ -1,14 +1,15 @@
 """The measures in one table: what each is called, how to read it, and what it needs."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
+from .curves import Variant
 from .emergence import interference_gain, spatial_emergence, task_emergence, time_emergence, undisturbed_gain
-from .flexibility import adaptability, reactivity
+from .flexibility import adaptability, noise_robustness, reactivity
 from .interference import performance_lost, t_lost_fraction
 from .population import availability, population_robustness, recorded_population_robustness
-from .robustness import noise_robustness
 from .scaling import efficiency, raw_performance, scalability
 
 Input: TypeAlias = Literal[
@@ -30,17 +31,17 @@ class Measure:
     """Direction of the corrected form."""
     neutral: float | None
     """Value that separates better from worse: robots that do not affect each other, or an undisturbed swarm."""
-    lowest: float
-    """Lower end of the range."""
-    highest: float
-    """Upper end of the range."""
-    is_distance: bool
-    """Whether `normalize` needs distance=True."""
     needs: tuple[Input, ...]
     """What has to be run to compute it."""
+    lowest: float = -math.inf
+    """Lower end of the range."""
+    highest: float = math.inf
+    """Upper end of the range."""
+    is_distance: bool = False
+    """Whether `normalize` needs distance=True."""
+    variants: tuple[Variant, ...] = ("corrected",)
+    """Its variants that give different numbers."""
 
-
-_INF = float("inf")
 
 METRICS: dict[str, Measure] = {
     "t_lost_fraction": Measure(
@@ -51,7 +52,6 @@ METRICS: dict[str, Measure] = {
         neutral=0.0,
         lowest=0.0,
         highest=1.0,
-        is_distance=False,
         needs=("interference",),
     ),
     "performance_lost": Measure(
@@ -60,10 +60,8 @@ METRICS: dict[str, Measure] = {
         equation="Eq. (1)",
         higher_is_better=False,
         neutral=0.0,
-        lowest=-_INF,
-        highest=_INF,
-        is_distance=False,
         needs=("performance", "interference", "one robot"),
+        variants=("corrected", "sierra"),
     ),
     "spatial_emergence": Measure(
         function=spatial_emergence,
@@ -71,10 +69,8 @@ METRICS: dict[str, Measure] = {
         equation="Eq. (2)",
         higher_is_better=True,
         neutral=0.0,
-        lowest=-_INF,
-        highest=_INF,
-        is_distance=False,
         needs=("performance", "interference", "one robot", "two sizes"),
+        variants=("corrected", "paper", "sierra"),
     ),
     "time_emergence": Measure(
         function=time_emergence,
@@ -82,9 +78,6 @@ METRICS: dict[str, Measure] = {
         equation="ours, Eq. (2) in robot time",
         higher_is_better=True,
         neutral=0.0,
-        lowest=-_INF,
-        highest=_INF,
-        is_distance=False,
         needs=("interference", "two sizes"),
     ),
     "task_emergence": Measure(
@@ -93,10 +86,8 @@ METRICS: dict[str, Measure] = {
         equation="Eq. (3)",
         higher_is_better=True,
         neutral=0.0,
-        lowest=-_INF,
-        highest=_INF,
-        is_distance=False,
         needs=("performance", "two sizes"),
+        variants=("corrected", "sierra"),
     ),
     "interference_gain": Measure(
         function=interference_gain,
@@ -104,9 +95,6 @@ METRICS: dict[str, Measure] = {
         equation="ours, part of Eq. (3)",
         higher_is_better=True,
         neutral=0.0,
-        lowest=-_INF,
-        highest=_INF,
-        is_distance=False,
         needs=("performance", "interference", "two sizes"),
     ),
     "undisturbed_gain": Measure(
@@ -115,9 +103,6 @@ METRICS: dict[str, Measure] = {
         equation="ours, part of Eq. (3)",
         higher_is_better=True,
         neutral=0.0,
-        lowest=-_INF,
-        highest=_INF,
-        is_distance=False,
         needs=("performance", "interference", "two sizes"),
     ),
     "scalability": Measure(
@@ -126,10 +111,8 @@ METRICS: dict[str, Measure] = {
         equation="Eq. (4)",
         higher_is_better=True,
         neutral=1.0,
-        lowest=-_INF,
-        highest=_INF,
-        is_distance=False,
         needs=("performance", "two sizes"),
+        variants=("corrected", "paper", "sierra"),
     ),
     "reactivity": Measure(
         function=reactivity,
@@ -138,9 +121,9 @@ METRICS: dict[str, Measure] = {
         higher_is_better=False,
         neutral=0.0,
         lowest=0.0,
-        highest=_INF,
         is_distance=True,
         needs=("performance", "ideal run", "waveforms"),
+        variants=("corrected", "paper", "sierra"),
     ),
     "adaptability": Measure(
         function=adaptability,
@@ -149,9 +132,9 @@ METRICS: dict[str, Measure] = {
         higher_is_better=False,
         neutral=0.0,
         lowest=0.0,
-        highest=_INF,
         is_distance=True,
         needs=("performance", "ideal run"),
+        variants=("corrected", "sierra"),
     ),
     "noise_robustness": Measure(
         function=noise_robustness,
@@ -160,9 +143,9 @@ METRICS: dict[str, Measure] = {
         higher_is_better=False,
         neutral=0.0,
         lowest=0.0,
-        highest=_INF,
         is_distance=True,
         needs=("performance", "ideal run"),
+        variants=("corrected", "sierra"),
     ),
     "population_robustness": Measure(
         function=population_robustness,
@@ -170,10 +153,8 @@ METRICS: dict[str, Measure] = {
         equation="Eq. (12)",
         higher_is_better=True,
         neutral=0.0,
-        lowest=-_INF,
-        highest=_INF,
-        is_distance=False,
         needs=("performance", "ideal run", "rates"),
+        variants=("corrected", "paper", "sierra"),
     ),
     "recorded_population_robustness": Measure(
         function=recorded_population_robustness,
@@ -181,9 +162,6 @@ METRICS: dict[str, Measure] = {
         equation="ours, Eq. (12) with the robots recorded at work",
         higher_is_better=True,
         neutral=0.0,
-        lowest=-_INF,
-        highest=_INF,
-        is_distance=False,
         needs=("performance", "ideal run", "robots at work"),
     ),
     "availability": Measure(
@@ -194,7 +172,6 @@ METRICS: dict[str, Measure] = {
         neutral=1.0,
         lowest=0.0,
         highest=1.0,
-        is_distance=False,
         needs=("rates",),
     ),
     "efficiency": Measure(
@@ -204,9 +181,8 @@ METRICS: dict[str, Measure] = {
         higher_is_better=True,
         neutral=None,
         lowest=0.0,
-        highest=_INF,
-        is_distance=False,
         needs=("performance",),
+        variants=("corrected", "sierra"),
     ),
     "raw_performance": Measure(
         function=raw_performance,
@@ -215,9 +191,8 @@ METRICS: dict[str, Measure] = {
         higher_is_better=True,
         neutral=None,
         lowest=0.0,
-        highest=_INF,
-        is_distance=False,
         needs=("performance",),
+        variants=("corrected", "sierra"),
     ),
 }
 """Public function name -> what the measure is."""

@@ -21,7 +21,7 @@ from swarm_forage_env.scenarios.performance import performance_of
 from ..controllers import PAPER_POLICIES
 from ..scoring.measures import score_study
 from ..scoring.question import Question, ask
-from ..scoring.run_curves import INTERVAL_COLUMNS, StudyCurves, joined_curves, run_curves
+from ..scoring.run_curves import INTERVAL_COLUMNS, StudyCurves, curves_in_worlds
 from ..scoring.scores import Score
 from .entry import Entry, EntryMeasure, EntryPolicy, Training, rounded, six_digits
 from .protocol import BenchmarkError, Group, Protocol, load_protocol
@@ -233,15 +233,11 @@ def _measures(protocol: Protocol, table: Table) -> tuple[EntryMeasure, ...]:
 def _study(group: Group, table: Table, policy: str) -> StudyCurves:
     """The runs of a group as measures take them."""
     conditions = {condition.world.name: condition for condition in table.plan.of_policy(policy)}
-    world = group.roles[0][1]
-    return joined_curves(
-        [
-            run_curves(role, table.curves(conditions[name], *INTERVAL_COLUMNS), len(table.plan.seeds))
-            for name, role in group.roles
-        ],
-        world,
+    return curves_in_worlds(
+        [(role, table.curves(conditions[name], *INTERVAL_COLUMNS)) for name, role in group.roles],
+        len(table.plan.seeds),
         controller=policy,
-        read_as=performance_of(world.scenario.performance),
+        read_as=performance_of(group.roles[0][1].scenario.performance),
         where=f"the group {group.name}",
     )
 

@@ -17,7 +17,7 @@ from ..checks import PopulationError
 from ..curves import FloatArray, Form, Variant
 from ..distance import noise_floor
 from ..environment import environment_distance
-from ..flexibility import adaptability, reactivity
+from ..flexibility import adaptability, mean_signed_difference, noise_robustness, reactivity
 from ..population import (
     PopulationWeight,
     availability,
@@ -26,7 +26,6 @@ from ..population import (
     recorded_population_robustness,
 )
 from ..queues import PopulationRates, mean_away, queue_statistics
-from ..robustness import mean_signed_difference, noise_robustness
 from ..statistics import Summary, aggregate
 from .run_curves import HANDLING, NOISE, POPULATION, THROTTLE, RunCurves, StudyCurves, common_runs
 from .scores import DISTURBANCES, MEASURE_CRITERIA, Score, Uncomputable, Values, score_runs

@@ -14,7 +14,7 @@ from ..interference import performance_lost
 from ..scaling import efficiency, raw_performance, scalability
 from .by_adversity import BY_ADVERSITY
 from .run_curves import RunCurves, StudyCurves, common_runs
-from .scores import MEASURE_VARIANTS, Score, ScoreForms, Uncomputable, Values, check_measures, label_of, score_runs
+from .scores import Score, ScoreForms, Uncomputable, Values, check_measures, label_of, score_runs
 
 FALLING = (
     "performance is lower than that of the next smaller swarm, and it weights the time lost, so that a collapse counts "
@@ -162,7 +162,7 @@ BY_SIZE: dict[str, _SizeMeasure] = {
 
 def _size_scores(name: str, study: StudyCurves, variant: Variant, form: Form) -> Iterator[Score]:
     measure = BY_SIZE[name]
-    values = partial(measure.values, variant=variant) if name in MEASURE_VARIANTS else measure.values
+    values = partial(measure.values, variant=variant) if len(METRICS[name].variants) > 1 else measure.values
     sizes = _sizes(study, measure, variant, form)
     one = sizes[0]
     for previous, larger in zip((None, *sizes), sizes, strict=False):

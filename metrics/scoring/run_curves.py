@@ -251,43 +251,35 @@ def shared_seeds(experiments: Sequence[RunCurves]) -> list[int]:
     return [seed for seed in first if all(seed in seeds for seeds in others)]
 
 
-def run_curves(world: World, curves: Curves, n_planned: int) -> RunCurves:
-    """Return the runs in a world as measures take them.
-
-    Args:
-        world: Its criterion and value say what the runs are to the measures.
-        curves: Seeds and columns, as tables of runs give them.
-        n_planned: How many runs were planned.
-    """
-    seeds, columns = curves
-    return RunCurves(
-        criterion=world.criterion,
-        value=world.value,
-        n_robots=world.n_robots,
-        seeds=seeds,
-        curves={name: curve for name, curve in columns.items() if name in INTERVAL_COLUMNS},
-        rates=rates_of(world),
-        n_planned=n_planned,
-    )
-
-
-def joined_curves(
-    experiments: Sequence[RunCurves], world: World, *, controller: str, read_as: Performance, **told: Any
+def curves_in_worlds(
+    runs: Sequence[tuple[World, Curves]], n_planned: int, *, controller: str, read_as: Performance, **told: Any
 ) -> StudyCurves:
-    """Return the runs of a policy in several worlds.
+    """Return the runs of a policy in several worlds as measures take them.
 
     Args:
-        experiments: From `run_curves`.
-        world: Any of the worlds: all have its clock.
+        runs: Worlds of one clock, with seeds and columns as tables of runs give them. Criterion and value of a world
+            say what its runs are to the measures.
+        n_planned: How many runs were planned in each.
         controller: Name of the policy.
         read_as: What performance is.
         told: Further fields of `StudyCurves`.
     """
-    scenario = world.scenario
+    scenario = runs[0][0].scenario
     n_intervals = round(scenario.horizon_s / scenario.interval_s)
     return StudyCurves(
         controller=controller,
-        experiments=tuple(experiments),
+        experiments=tuple(
+            RunCurves(
+                criterion=world.criterion,
+                value=world.value,
+                n_robots=world.n_robots,
+                seeds=seeds,
+                curves={name: curve for name, curve in columns.items() if name in INTERVAL_COLUMNS},
+                rates=rates_of(world),
+                n_planned=n_planned,
+            )
+            for world, (seeds, columns) in runs
+        ),
         t_end_s=scenario.interval_s * np.arange(1.0, n_intervals + 1.0),
         amount=read_as.amount,
         is_total=read_as.is_total,
@@ -308,13 +300,9 @@ def policy_curves(table: Table, policy: str, performance: Performance | None = N
         CurveError: a performance that is negative or no number.
     """
     conditions = table.plan.of_policy(policy)
-    world = conditions[0].world
-    read_as = performance or performance_of(world.scenario.performance)
-    experiments = [
-        run_curves(condition.world, _curves(table, condition, performance), len(table.plan.seeds))
-        for condition in conditions
-    ]
-    return joined_curves(experiments, world, controller=policy, read_as=read_as)
+    read_as = performance or performance_of(conditions[0].world.scenario.performance)
+    runs = [(condition.world, _curves(table, condition, performance)) for condition in conditions]
+    return curves_in_worlds(runs, len(table.plan.seeds), controller=policy, read_as=read_as)
 
 
 def _curves(table: Table, condition: Condition, performance: Performance | None) -> Curves:
@@ -386,7 +374,7 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
     for places in places_of.values():
         first = places[0]
         read_as = performance_of(performance or spec.world(first).scenario.performance)
-        experiments = tuple(_runs(table, place, performance) for place in places)
+        runs = [(spec.world(place), _place_curves(table, place, performance)) for place in places]
         lines.append(
             StudyLine(
                 rules=first.rules,
@@ -394,9 +382,9 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
                 others=dict(zip(names, first.values, strict=False)),
                 words={name: of[value] for name, of, value in zip(names, words, first.values, strict=False)},
                 places=tuple(places),
-                curves=joined_curves(
-                    experiments,
-                    spec.world(first),
+                curves=curves_in_worlds(
+                    runs,
+                    len(spec.seeds),
                     controller=first.policy,
                     read_as=read_as,
                     reference_value=_reference_value(table, places),
@@ -407,12 +395,12 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
     return tuple(lines)
 
 
-def _runs(table: "StudyTable", place: "Place", performance: str | None) -> RunCurves:
-    """The finished runs of a condition."""
+def _place_curves(table: "StudyTable", place: "Place", performance: str | None) -> Curves:
+    """The finished runs of a condition of a study, with the performance that is asked for."""
     seeds, columns = table.curves(place, *{*INTERVAL_COLUMNS, *PERFORMANCE_COLUMNS})
     if performance is not None and seeds:
         columns["performance"] = performance_curve(performance, columns)
-    return run_curves(table.spec.world(place), (seeds, columns), len(table.spec.seeds))
+    return seeds, columns
 
 
 def _reference_value(table: "StudyTable", places: "list[Place]") -> float:

@@ -54,21 +54,6 @@ def criteria_of(measures: Sequence[str], disturbance: str) -> set[str]:
     return {disturbance if criterion == THROTTLE else criterion for criterion in criteria}
 
 
-MEASURE_VARIANTS: dict[str, tuple[Variant, ...]] = {
-    "raw_performance": ("corrected", "sierra"),
-    "efficiency": ("corrected", "sierra"),
-    "performance_lost": ("corrected", "sierra"),
-    "spatial_emergence": ("corrected", "paper", "sierra"),
-    "task_emergence": ("corrected", "sierra"),
-    "scalability": ("corrected", "paper", "sierra"),
-    "reactivity": ("corrected", "paper", "sierra"),
-    "adaptability": ("corrected", "sierra"),
-    "noise_robustness": ("corrected", "sierra"),
-    "population_robustness": ("corrected", "paper", "sierra"),
-}
-"""Measure -> its variants that give different numbers. Measures without an entry have the corrected one only."""
-
-
 @dataclass(frozen=True, kw_only=True, slots=True)
 class ScoreForms:
     """The forms in which measures are scored: every variant with every form that a measure has."""
@@ -86,7 +71,7 @@ class ScoreForms:
 
     def of(self, measure: str) -> Iterator[tuple[Variant, Form]]:
         """Yield each variant and form of a measure that was asked for, once."""
-        has = MEASURE_VARIANTS.get(measure, ("corrected",))
+        has = METRICS[measure].variants
         wanted: list[Variant] = [variant if variant in has else "corrected" for variant in self.variants]
         forms: tuple[Form, ...] = self.forms if "two sizes" in METRICS[measure].needs else ("marginal",)
         for variant in dict.fromkeys(wanted):

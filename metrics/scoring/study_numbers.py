@@ -23,7 +23,7 @@ from ..significance import holm, paired_p
 from ..statistics import Estimate
 from .measures import score_study
 from .run_curves import THROTTLE, RunCurves, StudyCurves, StudyLine, study_lines
-from .scores import DISTURBANCES, MEASURE_CRITERIA, MEASURE_VARIANTS, Score, ScoreForms, label_of
+from .scores import DISTURBANCES, MEASURE_CRITERIA, Score, ScoreForms, label_of
 
 if TYPE_CHECKING:
     import polars as pl
@@ -178,7 +178,7 @@ def _measures_in(measures: Sequence[str], variant: Variant, curves: StudyCurves)
         for measure in measures
         for form in FIGURE_FORMS.get(measure, ("marginal",))
         if form == "marginal" or has_lone_robot
-        if MEASURE_CRITERIA[measure] in varied and variant in MEASURE_VARIANTS.get(measure, ("corrected",))
+        if MEASURE_CRITERIA[measure] in varied and variant in METRICS[measure].variants
     ]
 
 

@@ -10,12 +10,13 @@ from swarm_forage_env._internal.wording import number, percent, plain
 from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.studies.study_file import is_set_of_paper
 
+from ..catalog import METRICS
 from ..checks import CurveError
 from ..claims import CLAIMS, INTUITIONS, Claim, PanelName, Verdict, check_claim
 from ..claims.outcomes import Answer as ClaimAnswer
 from ..claims.statements import POLICIES
 from ..curves import Variant
-from .scores import MEASURE_VARIANTS, label_of
+from .scores import label_of
 from .study_numbers import StudyPanel, StudyPanels, study_panels
 
 if TYPE_CHECKING:
@@ -163,7 +164,7 @@ class _Found:
 
 def _variant_of(measure: str, variant: Variant) -> Variant:
     """Return the variant of a measure that is used: this one if it has it, else the corrected one."""
-    return variant if variant in MEASURE_VARIANTS.get(measure, ()) else "corrected"
+    return variant if variant in METRICS[measure].variants else "corrected"
 
 
 def _judge(claim: Claim, rules: str, variant: Variant, found: _Found) -> Judged | Waiting:
