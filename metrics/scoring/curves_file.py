@@ -7,11 +7,11 @@ import difflib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from swarm_forage_env.scenarios.performance import INVERTED
+from swarm_forage_env.scenarios.performance import INVERTED, Performance
 from swarm_forage_env.wrappers.world import SIZE
 
 from ..checks import CurveError
@@ -20,6 +20,7 @@ from ..queues import PopulationRates
 from .run_curves import (
     CRITERIA,
     CURVE_COLUMNS,
+    DELIVERIES,
     HANDLING,
     INTERVAL_COLUMNS,
     NOISE,
@@ -53,14 +54,13 @@ def read_curves(path: str | Path, performance: PerformanceLike | None = None) ->
     """
     file = Path(path)
     frame = _read_frame(file)
-    if performance is None:
-        studies = study_curves(frame, where=str(file), controller=file.stem)
-    else:
-        frame, told = with_performance(frame, performance, str(file))
-        studies = tuple(replace(study, **told) for study in study_curves(frame, where=str(file), controller=file.stem))
+    read_as = DELIVERIES
+    if performance is not None:
+        frame, read_as = with_performance(frame, performance, str(file))
+    studies = study_curves(frame, where=str(file), controller=file.stem)
     for study in studies:
         _check_comparable(study)
-    return studies
+    return tuple(replace(study, read_as=read_as) for study in studies)
 
 
 def _check_comparable(study: StudyCurves) -> None:
@@ -98,9 +98,7 @@ RUN_KEYS = ("controller", "criterion", "criterion_value", "n_robots", "seed")
 """Columns that tell the runs of a table apart, where it has them."""
 
 
-def with_performance(
-    frame: "pl.DataFrame", given: PerformanceLike, where: str
-) -> tuple["pl.DataFrame", dict[str, Any]]:
+def with_performance(frame: "pl.DataFrame", given: PerformanceLike, where: str) -> tuple["pl.DataFrame", Performance]:
     """Replace the column `performance` of a table of curves.
 
     Args:
@@ -109,7 +107,7 @@ def with_performance(
         where: Name of the table in error messages.
 
     Returns:
-        The table with its rows in the same order; `amount`, `is_total` and `adds_up` of its studies (`StudyCurves`).
+        The table with its rows in the same order, and what its performance is now.
 
     Raises:
         CurveError: there is no such column, or no such numbers.
@@ -119,8 +117,8 @@ def with_performance(
     own = own_performance(given)
     if own is None:
         assert isinstance(given, str), "own_performance returns None for names only"
-        curve, told = _column(frame, given, where)
-        return frame.with_columns(pl.Series("performance", curve)), told
+        curve, read_as = _column(frame, given, where)
+        return frame.with_columns(pl.Series("performance", curve)), read_as
     keys = [name for name in RUN_KEYS if name in frame.columns]
     ordered = frame.with_row_index(_ROW).sort("interval") if "interval" in frame.columns else frame.with_row_index(_ROW)
     parts = ordered.partition_by(keys, maintain_order=True) if keys else [ordered]
@@ -128,8 +126,7 @@ def with_performance(
         part.with_columns(pl.Series("performance", own_curve(own, part.drop(_ROW), _run(part, keys, where))))
         for part in parts
     ]
-    told = {"amount": own.amount, "is_total": own.is_total, "adds_up": own.adds_up}
-    return pl.concat(runs).sort(_ROW).drop(_ROW), told
+    return pl.concat(runs).sort(_ROW).drop(_ROW), own
 
 
 _ROW = "row of the table"
@@ -142,7 +139,7 @@ def _run(part: "pl.DataFrame", keys: list[str], where: str) -> str:
     return f"{', '.join(f'{key} {first[key]}' for key in keys)} in {where}"
 
 
-def _column(frame: "pl.DataFrame", name: str, where: str) -> tuple[FloatArray, dict[str, Any]]:
+def _column(frame: "pl.DataFrame", name: str, where: str) -> tuple[FloatArray, Performance]:
     import polars as pl
 
     own = name.removeprefix(INVERTED)
@@ -156,13 +153,9 @@ def _column(frame: "pl.DataFrame", name: str, where: str) -> tuple[FloatArray, d
         curve = np.divide(1.0, curve, out=np.zeros_like(curve), where=curve != 0.0)
     curve = checked_performance(curve, name, len(frame), where)
     known = CURVE_COLUMNS.get(name)
-    amount = name if known is None or known.unit in ("", "1") else known.unit
     # Of a column of one's own nobody knows whether it is a total, or adds up; a share and an inverse do not.
-    return curve, {
-        "amount": amount,
-        "is_total": False,
-        "adds_up": own == name and (known is None or known.kind == "amount"),
-    }
+    adds_up = own == name and (known is None or known.kind == "amount")
+    return curve, Performance(name, (known and known.unit) or "1", is_total=False, adds_up=adds_up)
 
 
 MOST = 1e15

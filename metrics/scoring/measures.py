@@ -285,11 +285,11 @@ def _told(score: Score, study: StudyCurves) -> Score:
     Measures write units for deliveries, "objects in 4,000 s". With robots carrying, a mean over each interval, it is
     "robots summed over intervals".
     """
-    unit = score.unit.replace("objects", study.amount)
-    if not study.is_total:
+    unit = score.unit.replace("objects", study.read_as.amount)
+    if not study.read_as.is_total:
         unit = _OVER_A_RUN.sub("summed over intervals", unit)
     note = score.note
-    if not study.adds_up and _is_in_proportion(score.measure):
+    if not study.read_as.adds_up and _is_in_proportion(score.measure):
         note = f"{note}; {_NO_SUM}" if note else _NO_SUM
     return replace(score, unit=unit, note=note)
 

@@ -375,7 +375,7 @@ def predict_curves(
                 f"Expected swarm sizes that {study.controller} has in {path}, {', '.join(map(str, totals))}, "
                 f"got {', '.join(map(str, missing))}."
             )
-        known = study.horizon_s is not None or not study.is_total
+        known = study.horizon_s is not None or not study.read_as.is_total
         tables.append(
             _table(
                 policy=study.controller,
@@ -384,8 +384,8 @@ def predict_curves(
                 totals=totals,
                 fit=fitted,
                 hold=held,
-                unit=unit_text(study, study.horizon_s) if known else "performance per run",
-                adds_up=study.adds_up,
+                unit=unit_text(study.read_as, study.horizon_s) if known else "performance per run",
+                adds_up=study.read_as.adds_up,
             )
         )
     return tuple(tables)

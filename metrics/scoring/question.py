@@ -13,13 +13,14 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 from swarm_forage_env.runs.plan import Condition, Plan
 from swarm_forage_env.runs.policy_spec import PolicyLike, policy_specs
 from swarm_forage_env.runs.runner import run_plan
 from swarm_forage_env.runs.store import RunStore
 from swarm_forage_env.runs.table import Table
+from swarm_forage_env.scenarios.performance import Performance
 from swarm_forage_env.wrappers.world import World
 
 from ..checks import CurveError, chosen_seeds
@@ -84,20 +85,6 @@ def failure_lines(table: Table, policy: str) -> tuple[str, ...]:
     return tuple(f"{failure.spec.describe()}: {failure.error}" for failure in failed)
 
 
-class ReadAs(Protocol):
-    """What the numbers of a performance are, as a scenario's performance and `StudyCurves` tell it."""
-
-    @property
-    def amount(self) -> str:
-        """What there is so and so much of."""
-        ...
-
-    @property
-    def is_total(self) -> bool:
-        """Whether a number is a total over its interval."""
-        ...
-
-
 def plan_totals(
     policies: Sequence[PolicyLike] | Mapping[str, PolicyLike],
     worlds: Sequence[World],
@@ -130,7 +117,7 @@ def run_totals(table: Table, condition: Condition) -> dict[int, float]:
     return {record.seed: float(record.performance.sum()) for record in table.of(condition)}
 
 
-def unit_text(read_as: ReadAs, horizon_s: float | None = None) -> str:
+def unit_text(read_as: Performance, horizon_s: float | None = None) -> str:
     """Return the unit of performance summed over a run, of that length where it is told."""
     if not read_as.is_total:
         return f"{read_as.amount} summed over intervals"

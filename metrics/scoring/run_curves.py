@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from swarm_forage_env.studies.study import Place, Value
     from swarm_forage_env.studies.study_table import StudyTable
 
+DELIVERIES = performance_of("collected")
+"""What performance is unless something else is told."""
 THROTTLE, NOISE, POPULATION, HANDLING = "throttle", "noise", "population_dynamics", "handling_cost"
 CRITERIA = (SIZE, THROTTLE, HANDLING, NOISE, POPULATION, UNDISTURBED)
 """What a study varies, in column `criterion`."""
@@ -195,12 +197,8 @@ class StudyCurves:
     experiments: tuple[RunCurves, ...]
     t_end_s: FloatArray | None
     """Ends of the intervals, (T,); None if the table has no such column."""
-    amount: str = "objects"
-    """What there is so and so much of in a performance."""
-    is_total: bool = True
-    """Whether performance is a total over its interval, like deliveries; else it is a mean, a ratio, a share."""
-    adds_up: bool = True
-    """Whether a swarm has what its robots have together, so that twice the swarm could have twice of it."""
+    read_as: Performance = DELIVERIES
+    """What performance is."""
     reference_value: float = 0.0
     """Value of a criterion at its reference runs; the authors compare population dynamics with the lowest level."""
     where: str = "the table"
@@ -281,9 +279,7 @@ def curves_in_worlds(
             for world, (seeds, columns) in runs
         ),
         t_end_s=scenario.interval_s * np.arange(1.0, n_intervals + 1.0),
-        amount=read_as.amount,
-        is_total=read_as.is_total,
-        adds_up=bool(read_as.adds_up),
+        read_as=read_as,
         **told,
     )
 

@@ -171,7 +171,7 @@ def model_figures(table: "StudyTable") -> tuple[ModelFigure, ...]:
         panels = _population_panels([line for line in lines if line.rules == rules])
         if panels:
             found["population", rules] = panels
-    amount = f"{lines[0].curves.amount} per robot in {table.spec.horizon_s:,.0f} s"
+    amount = f"{lines[0].curves.read_as.amount} per robot in {table.spec.horizon_s:,.0f} s"
     words = {
         "laws": ("performance per robot beside laws", "robots", amount, True),
         "population": ("robots at work beside the queue model", "time, s", "robots at work", False),
@@ -205,7 +205,7 @@ def _axis_words(line: StudyLine) -> list[str]:
 
 def _law_panel(table: "StudyTable", line: StudyLine) -> ModelPanel | None:
     """Deliveries per robot over the size, with laws fitted to all sizes, and the mean field of one small swarm."""
-    if not table.spec.axes or table.spec.axes[-1].name != SIZE or not line.curves.is_total:
+    if not table.spec.axes or table.spec.axes[-1].name != SIZE or not line.curves.read_as.is_total:
         return None
     ladder_runs = [runs for runs in line.curves.sizes() if len(runs.seeds) >= MIN_RUNS]
     if len(ladder_runs) < MIN_SIZES:

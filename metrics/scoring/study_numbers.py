@@ -258,9 +258,9 @@ def _performance_panels(table: "StudyTable", groups: Sequence[Sequence[StudyLine
             }
             for line in lines
         }
-        over = f"in {table.spec.horizon_s:,.0f} s" if first.is_total else "summed over intervals"
+        over = f"in {table.spec.horizon_s:,.0f} s" if first.read_as.is_total else "summed over intervals"
         about = {"measure": "raw_performance", "variant": "corrected", "form": "marginal"}
-        about |= {"criterion": table.spec.axes[-1].name, "unit": f"{first.amount} {over}"}
+        about |= {"criterion": table.spec.axes[-1].name, "unit": f"{first.read_as.amount} {over}"}
         panels.append(_panel(table, lines[0], values, {}, **about))
     return panels
 
@@ -369,7 +369,7 @@ def place_distributions(table: "StudyTable") -> "pl.DataFrame":
 
 
 def _totals(line: StudyLine, runs: RunCurves) -> FloatArray:
-    return runs.performance.sum(axis=-1) if line.curves.is_total else runs.performance.mean(axis=-1)
+    return runs.performance.sum(axis=-1) if line.curves.read_as.is_total else runs.performance.mean(axis=-1)
 
 
 def _spread(line: StudyLine, runs: RunCurves) -> dict[str, float | int]:
@@ -400,7 +400,7 @@ def _breakdowns(table: "StudyTable", line: StudyLine, runs: RunCurves, reference
     level = reference.performance.mean(axis=0)
     half = max(1, level.size // 2)
     # Deliveries grow in the course of a run or fade: the window must hold enough where there is least, but the start.
-    per_interval = float(level[-half:].mean()) if line.curves.is_total else ENOUGH
+    per_interval = float(level[-half:].mean()) if line.curves.read_as.is_total else ENOUGH
     window = max(LEAST_WINDOW, math.ceil(ENOUGH / per_interval)) if per_interval > 0.0 else math.inf  # NaN: no window
     if window > half:
         return _numbers(math.nan, math.nan, math.nan, math.nan)

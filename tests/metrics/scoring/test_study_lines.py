@@ -70,5 +70,5 @@ def test_lost_runs_are_counted_and_another_performance_is_read(made, tmp_path):
     reference, level = line.curves.experiments
     assert (reference.n_lost, level.n_lost, level.seeds) == (0, 1, (0,))
     np.testing.assert_array_equal(level.performance, level.curves["n_active"])
-    assert line.curves.amount == "robots"
-    assert not line.curves.is_total
+    assert line.curves.read_as.amount == "robots"
+    assert not line.curves.read_as.is_total
