@@ -35,6 +35,22 @@ ENOUGH_SHARE = 0.1
 
 _WORDS = {THROTTLE: "throttle", HANDLING: "handling cost", NOISE: "sigma", POPULATION: "population"}
 """Criterion -> its word in `Score.at`."""
+_WEIGHTS: dict[Variant, PopulationWeight] = {"corrected": "transient", "paper": "paper", "sierra": "sierra"}
+FORECAST_TITLE = "Population: what the queueing model predicts for runs of this length, beside what the runs showed"
+FORECAST_HEADER = (
+    "level",
+    "robots",
+    "at work: predicted",
+    "observed",
+    "s in per departure: predicted",
+    "observed",
+    "s out: predicted",
+    "observed",
+    "s per repair: observed",
+    "without end",
+    "printed",
+)
+"""Headings of `PopulationForecast.cells`."""
 
 
 def _levels(study: StudyCurves, *criteria: str) -> tuple[tuple[RunCurves, RunCurves], ...]:
@@ -161,9 +177,6 @@ def _beside_distance(reference: RunCurves, level: RunCurves) -> dict[str, float]
     return beside
 
 
-_WEIGHTS: dict[Variant, PopulationWeight] = {"corrected": "transient", "paper": "paper", "sierra": "sierra"}
-
-
 def _population_scores(name: str, study: StudyCurves, variant: Variant, _: Form) -> Iterator[Score]:
     horizon_s = study.horizon_s
     levels = _levels(study, POPULATION)
@@ -283,22 +296,6 @@ BY_ADVERSITY: dict[str, Callable[[str, StudyCurves, Variant, Form], Iterator[Sco
     "availability": _availability_scores,
 }
 """Measure -> what computes its scores."""
-
-FORECAST_TITLE = "Population: what the queueing model predicts for runs of this length, beside what the runs showed"
-FORECAST_HEADER = (
-    "level",
-    "robots",
-    "at work: predicted",
-    "observed",
-    "s in per departure: predicted",
-    "observed",
-    "s out: predicted",
-    "observed",
-    "s per repair: observed",
-    "without end",
-    "printed",
-)
-"""Headings of `PopulationForecast.cells`."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -41,6 +41,18 @@ if TYPE_CHECKING:
     import polars as pl
 
 
+RUN_KEYS = ("controller", "criterion", "criterion_value", "n_robots", "seed")
+"""Columns that tell the runs of a table apart, where it has them."""
+_ROW = "row of the table"
+"""Column for the order of rows; no table of curves has one of this name."""
+MOST = 1e15
+"""Largest number in a table; our choice: sums of squares of such numbers are finite, and whole ones are exact."""
+MOST_ROBOTS = 10_000_000
+"""Largest swarm in a table; our choice: some measures need an array of this length."""
+_STEERING = "[\\p{Cc}\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]"
+"""Characters that steer a terminal or the direction of writing, which a name must not."""
+
+
 def read_curves(path: str | Path, performance: PerformanceLike | None = None) -> tuple[StudyCurves, ...]:
     """Read curves from a CSV or Parquet file with the columns of `CURVE_COLUMNS`; one study per policy in it.
 
@@ -94,10 +106,6 @@ def _read_frame(file: Path) -> "pl.DataFrame":
         raise CurveError(f"Cannot read {file} as {file.suffix.lower()[1:].upper()}: {reason}.") from error
 
 
-RUN_KEYS = ("controller", "criterion", "criterion_value", "n_robots", "seed")
-"""Columns that tell the runs of a table apart, where it has them."""
-
-
 def with_performance(frame: "pl.DataFrame", given: PerformanceLike, where: str) -> tuple["pl.DataFrame", Performance]:
     """Replace the column `performance` of a table of curves.
 
@@ -129,10 +137,6 @@ def with_performance(frame: "pl.DataFrame", given: PerformanceLike, where: str) 
     return pl.concat(runs).sort(_ROW).drop(_ROW), own
 
 
-_ROW = "row of the table"
-"""Column for the order of rows; no table of curves has one of this name."""
-
-
 def _run(part: "pl.DataFrame", keys: list[str], where: str) -> str:
     """Return the name of a run for error messages."""
     first = part.row(0, named=True)
@@ -156,14 +160,6 @@ def _column(frame: "pl.DataFrame", name: str, where: str) -> tuple[FloatArray, P
     # Of a column of one's own nobody knows whether it is a total, or adds up; a share and an inverse do not.
     adds_up = own == name and (known is None or known.kind == "amount")
     return curve, Performance(name, (known and known.unit) or "1", is_total=False, adds_up=adds_up)
-
-
-MOST = 1e15
-"""Largest number in a table; our choice: sums of squares of such numbers are finite, and whole ones are exact."""
-MOST_ROBOTS = 10_000_000
-"""Largest swarm in a table; our choice: some measures need an array of this length."""
-_STEERING = "[\\p{Cc}\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]"
-"""Characters that steer a terminal or the direction of writing, which a name must not."""
 
 
 def study_curves(frame: "pl.DataFrame", *, where: str = "the table", controller: str = "") -> tuple[StudyCurves, ...]:

@@ -24,6 +24,11 @@ FALLING = (
 UPSIDE_DOWN = (
     "this form of scalability is minus the speedup times the corrected one, so it reverses the order of swarms"
 )
+_OVER_A_RUN = re.compile(r"(per run|in [\d,]+ s)$")
+"""End of a unit of what is summed over a run."""
+_NO_SUM = "this performance is no sum over robots, and the measure compares with growth in proportion to them"
+_OTHER_SWARMS = {"one robot", "two sizes", "rates", "robots at work"}
+"""Input of measures that know how many robots made a performance, and expect it of as many others."""
 
 
 def _raw_performance(runs: RunCurves, *, variant: Variant) -> FloatArray:
@@ -245,11 +250,6 @@ _SCORES: dict[str, Callable[[str, StudyCurves, Variant, Form], Iterator[Score]]]
     **BY_ADVERSITY,
 }
 """Measure -> what computes its scores, in one variant and form."""
-_OVER_A_RUN = re.compile(r"(per run|in [\d,]+ s)$")
-"""End of a unit of what is summed over a run."""
-_NO_SUM = "this performance is no sum over robots, and the measure compares with growth in proportion to them"
-_OTHER_SWARMS = {"one robot", "two sizes", "rates", "robots at work"}
-"""Input of measures that know how many robots made a performance, and expect it of as many others."""
 
 
 def score_study(

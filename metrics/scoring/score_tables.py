@@ -26,6 +26,25 @@ if TYPE_CHECKING:
     import polars as pl
 
 
+FAMILY_ERROR = 0.05
+"""Probability that one or more differences within a measure are called significant by chance."""
+TEST = (
+    "Differences: first policy minus second, runs paired by seed, mean with half of Student's 95 % interval. "
+    "* = significant: two-sided paired t test, p at most 0.05 after Holm's correction over all levels and pairs of "
+    "policies of a measure. Relative = per unit of the performance compared with, tested as a measure of its own: "
+    "amounts and distances grow with performance, so a swarm that does little has little to lose."
+)
+"""How differences are tested, as a text for readers."""
+VALUES = (
+    "Values: mean over seeds with half of Student's 95 % interval; in brackets the mean relative to the performance "
+    f"compared with; ! = runs are missing; {DOUBTFUL} = misleads, a note says why. Noise floor: what two runs of the "
+    "undisturbed swarm score by chance."
+)
+BANDS = "In square brackets: mean minus and plus two standard deviations of single runs."
+PAIRS_PER_TABLE = 6
+"""Pairs of policies side by side; more go into further tables."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ScoreTable(Answer):
     """All scores of one policy in one scenario."""
@@ -141,25 +160,6 @@ def forecast_sheets(tables: Sequence[ScoreTable]) -> list[Sheet]:
         if rows and rows not in different:
             different.append(rows)
     return [Sheet(title=FORECAST_TITLE, header=FORECAST_HEADER, rows=rows) for rows in different]
-
-
-FAMILY_ERROR = 0.05
-"""Probability that one or more differences within a measure are called significant by chance."""
-TEST = (
-    "Differences: first policy minus second, runs paired by seed, mean with half of Student's 95 % interval. "
-    "* = significant: two-sided paired t test, p at most 0.05 after Holm's correction over all levels and pairs of "
-    "policies of a measure. Relative = per unit of the performance compared with, tested as a measure of its own: "
-    "amounts and distances grow with performance, so a swarm that does little has little to lose."
-)
-"""How differences are tested, as a text for readers."""
-VALUES = (
-    "Values: mean over seeds with half of Student's 95 % interval; in brackets the mean relative to the performance "
-    f"compared with; ! = runs are missing; {DOUBTFUL} = misleads, a note says why. Noise floor: what two runs of the "
-    "undisturbed swarm score by chance."
-)
-BANDS = "In square brackets: mean minus and plus two standard deviations of single runs."
-PAIRS_PER_TABLE = 6
-"""Pairs of policies side by side; more go into further tables."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -40,6 +40,18 @@ MEASURE_CRITERIA: dict[str, str] = {
 """Measure -> what has to be varied for it. The order is that of score tables."""
 DISTURBANCES = (THROTTLE, HANDLING)
 """Kinds of disturbance over time, the paper's two, under which reactivity and adaptability can be scored."""
+_NO_AMOUNT = 1e-12
+"""Smaller amounts are rounding errors and are shown as zero."""
+HEADER = ("measure", "at", "robots", "value", "95 % interval", "noise floor", "relative", "runs", "better", "unit")
+"""Headings of `Score.cells`."""
+BAND = "mean ± 2 sd"
+"""Heading of the column that `Score.cells` adds for the authors' bands."""
+DOUBTFUL = "?"
+"""Mark of a value that misleads; its note says why."""
+_BOOTSTRAP_SEED = 1
+"""Fixed, so that the same runs give the same table."""
+Values: TypeAlias = Callable[..., ArrayLike]
+"""A measure of experiments: it takes their common runs and returns one value per run."""
 
 
 def criteria_of(measures: Sequence[str], disturbance: str) -> set[str]:
@@ -107,10 +119,6 @@ def _check_words(what: str, words: Sequence[str], known: Sequence[str]) -> None:
         raise CurveError(f"Expected one or more {what}s of {', '.join(known)}, got none.")
 
 
-_NO_AMOUNT = 1e-12
-"""Smaller amounts are rounding errors and are shown as zero."""
-
-
 def interval(summary: Summary) -> str:
     """Return the bounds of an interval."""
     return limits(summary.lower, summary.upper)
@@ -132,14 +140,6 @@ def spread(summary: Summary, *, is_share: bool = False) -> str:
 def bounds(summary: Summary | None) -> list[float | None] | None:
     """Return mean, lower and upper bound as plain values; None where there is no summary."""
     return None if summary is None else [plain(value) for value in (summary.mean, summary.lower, summary.upper)]
-
-
-HEADER = ("measure", "at", "robots", "value", "95 % interval", "noise floor", "relative", "runs", "better", "unit")
-"""Headings of `Score.cells`."""
-BAND = "mean ± 2 sd"
-"""Heading of the column that `Score.cells` adds for the authors' bands."""
-DOUBTFUL = "?"
-"""Mark of a value that misleads; its note says why."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -277,13 +277,6 @@ class Score:
             "per_seed": {str(seed): plain(value) for seed, value in self.per_seed.items()},
             "note": self.note,
         }
-
-
-_BOOTSTRAP_SEED = 1
-"""Fixed, so that the same runs give the same table."""
-
-Values: TypeAlias = Callable[..., ArrayLike]
-"""A measure of experiments: it takes their common runs and returns one value per run."""
 
 
 class Uncomputable(Exception):  # noqa: N818 - not an error: the table notes it and continues

@@ -60,6 +60,14 @@ _EXPERIMENTS: dict[tuple[Any, ...], str] = {
     ("S2d", 320): "S2d 320",
 }
 """Name of a set, and value on its first axis where it has two -> experiment that claims speak of."""
+FAMILY_ERROR = 0.05
+"""Probability that the tests of a panel tell any difference where there is none, as in comparisons of policies."""
+_SEED = 1
+"""Fixed, so that the same runs give the same table."""
+ENOUGH = 20.0
+"""What the reference must achieve in a window: with fewer objects, breakdowns are chance (`find_breakdowns`)."""
+LEAST_WINDOW = 5
+"""Intervals: deliveries come in bursts, and a single poor interval at the end of a run is no breakdown."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -265,12 +273,6 @@ def _performance_panels(table: "StudyTable", groups: Sequence[Sequence[StudyLine
     return panels
 
 
-FAMILY_ERROR = 0.05
-"""Probability that the tests of a panel tell any difference where there is none, as in comparisons of policies."""
-_SEED = 1
-"""Fixed, so that the same runs give the same table."""
-
-
 def policy_pairs(panels: Sequence[StudyPanel]) -> "pl.DataFrame":
     """Return one row per panel and pair of policies.
 
@@ -332,12 +334,6 @@ def _probability(panel: StudyPanel, first: str, second: str) -> Estimate:
         return Estimate(value=np.nan, lower=np.nan, upper=np.nan, n_runs=0)
     known = ([scores[k][np.isfinite(scores[k])] for k in shared] for scores in (a, b))
     return probability_of_improvement(*known, higher_is_better=panel.higher_is_better, seed=_SEED)
-
-
-ENOUGH = 20.0
-"""What the reference must achieve in a window: with fewer objects, breakdowns are chance (`find_breakdowns`)."""
-LEAST_WINDOW = 5
-"""Intervals: deliveries come in bursts, and a single poor interval at the end of a run is no breakdown."""
 
 
 def place_distributions(table: "StudyTable") -> "pl.DataFrame":

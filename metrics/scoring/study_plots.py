@@ -53,6 +53,7 @@ _APART = 0.012
 """Distance between the dots of different policies at one level, as a share of the axis."""
 MANY_DOTS = 500
 """More dots in a panel are put into vector pictures as an image: as single marks they take a megabyte and more."""
+Draw: TypeAlias = Callable[[Sequence[Path], FigureStyle], None]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -253,9 +254,6 @@ def _alone(known: NDArray[np.bool_]) -> NDArray[np.bool_]:
 def _summaries(scores: FloatArray) -> list[Summary]:
     """Return the mean of the runs at each level, with its interval; runs without a finite score are left out."""
     return [aggregate(known) if known.size else _NOTHING for known in (runs[np.isfinite(runs)] for runs in scores)]
-
-
-Draw: TypeAlias = Callable[[Sequence[Path], FigureStyle], None]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -26,6 +26,7 @@ VARIANTS: tuple[Variant, ...] = ("corrected", "paper", "sierra")
 ANSWERS: tuple[ClaimAnswer, ...] = get_args(ClaimAnswer)
 WAITS = "waits"
 """What stands in place of an answer for which runs are missing."""
+HEADER = ("claim", "text", "by intervals", "by bands", "statistic", "effect", "runs", "why")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -181,9 +182,6 @@ def _judge(claim: Claim, rules: str, variant: Variant, found: _Found) -> Judged 
     ]
     reasons = tuple(dict.fromkeys(found.reasons[key] for key in keys if key in found.reasons))
     return Waiting(claim=claim, rules=rules, variant=variant, lacks=lacks, reasons=reasons)
-
-
-HEADER = ("claim", "text", "by intervals", "by bands", "statistic", "effect", "runs", "why")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
