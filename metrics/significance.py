@@ -11,6 +11,9 @@ from .curves import FloatArray
 
 ROUNDING = 1e-9
 """Differences that vary by less than this share of their mean are equal up to rounding."""
+SIGNIFICANT = 0.05
+"""Largest p value that is called significant. After Holm's correction it is the probability that chance makes one or
+more of the tests so that are corrected together."""
 
 
 def paired_p(differences: FloatArray) -> float:

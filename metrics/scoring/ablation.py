@@ -28,7 +28,7 @@ from swarm_forage_env.scenarios.performance import Performance, performance_of
 from swarm_forage_env.scenarios.quirks import QUIRK_NAMES, RULES
 from swarm_forage_env.wrappers.world import WorldLike, world_of
 
-from ..significance import holm, pooled_p
+from ..significance import SIGNIFICANT, holm, pooled_p
 from ..statistics import aggregate
 from .question import Question, ask
 from .scores import bounds
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
 TASK_COLUMNS = tuple(f"task_share_{task.name.lower()}" for task in Task)
 CLOSE = 0.05
 """Policies whose means differ by a smaller share count as equal in an order (our choice)."""
-ALPHA = 0.05
 _SWITCHED = {"DESCRIBED": "switched on in the description", "AUTHORS_PROGRAM": "switched off in the authors' program"}
 _RULES_HEADER = (
     "world",
@@ -420,6 +419,6 @@ def _starred(effects: Sequence[Effect], quantity: str) -> Callable[[Effect], str
         mean = float(getattr(effect, quantity).mean())
         if effect.is_same or np.isnan(mean):
             return "=" if effect.is_same else "-"
-        return f"{100.0 * mean:+.1f}" + ("*" if adjusted[effect.switch] <= ALPHA else "")
+        return f"{100.0 * mean:+.1f}" + ("*" if adjusted[effect.switch] <= SIGNIFICANT else "")
 
     return text

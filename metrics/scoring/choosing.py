@@ -21,7 +21,7 @@ from swarm_forage_env.wrappers.population import PopulationConfig
 from swarm_forage_env.wrappers.world import World, WorldLike, world_of
 
 from ..checks import CurveError
-from ..significance import paired_p
+from ..significance import SIGNIFICANT, paired_p
 from ..statistics import Summary, aggregate
 from .question import Question, ask, failure_lines, plan_totals, run_totals, unit_text
 from .run_curves import NOISE, POPULATION
@@ -37,8 +37,6 @@ RULE = (
     "demand lies inside. Confidence: probability that mean performance reaches the demand, from the same distribution. "
     "Ranked by constraints met, then by fewest not met, then by undisturbed performance."
 )
-SIGNIFICANT = 0.05
-"""Largest p value of a difference that is called significant."""
 _NEARLY = 0.001
 """Probabilities closer than this to 0 or 1 are shown as below or above it."""
 _HEADER = ("rank", "policy", "constraint", "demand", "measured", "95 % interval", "margin", "confidence", "runs", "")

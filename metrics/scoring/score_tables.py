@@ -16,7 +16,7 @@ from swarm_forage_env.runs.answer import Answer, Sheet
 from ..catalog import METRICS
 from ..checks import CurveError
 from ..curves import FloatArray
-from ..significance import holm, paired_p
+from ..significance import SIGNIFICANT, holm, paired_p
 from ..statistics import Summary, aggregate
 from .by_adversity import FORECAST_HEADER, FORECAST_TITLE, PopulationForecast
 from .plots import draw_scores
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     import polars as pl
 
 
-FAMILY_ERROR = 0.05
-"""Probability that one or more differences within a measure are called significant by chance."""
 TEST = (
     "Differences: first policy minus second, runs paired by seed, mean with half of Student's 95 % interval. "
     "* = significant: two-sided paired t test, p at most 0.05 after Holm's correction over all levels and pairs of "
@@ -190,8 +188,8 @@ class Difference:
 
     @property
     def is_significant(self) -> bool:
-        """Whether p_holm is at most `FAMILY_ERROR`."""
-        return self.p_holm <= FAMILY_ERROR
+        """Whether p_holm is at most `SIGNIFICANT`."""
+        return self.p_holm <= SIGNIFICANT
 
     @property
     def better(self) -> str:

@@ -17,7 +17,7 @@ from swarm_forage_env.runs.answer import Answer, Sheet
 
 from ..checks import CurveError
 from ..curves import FloatArray
-from ..significance import ROUNDING, holm
+from ..significance import ROUNDING, SIGNIFICANT, holm
 
 if TYPE_CHECKING:
     from swarm_forage_env.studies.study import Place
@@ -28,8 +28,6 @@ ROWS_SHOWN = 20
 COLUMNS = ("performance", "interference_fraction", "n_carrying", "cache_pickups")
 """Columns that are compared by default: what is achieved, the time lost, and what robots do. Each run counts with the
 mean over its intervals (our choice: few, so that the correction for many tests stays small)."""
-FAMILY_ERROR = 0.05
-"""Probability that one or more differences are called significant by chance."""
 TEST = (
     "Means over the intervals of a run are compared. Studies of the same seeds are paired by seed, others by Welch's "
     "test. A line is all conditions of a policy under the same rules that can be tested, and identical ones, each in "
@@ -87,8 +85,8 @@ class Shift:
 
     @property
     def is_significant(self) -> bool:
-        """Whether p_holm is at most `FAMILY_ERROR`."""
-        return self.p_holm <= FAMILY_ERROR
+        """Whether p_holm is at most `SIGNIFICANT`."""
+        return self.p_holm <= SIGNIFICANT
 
     def to_mapping(self) -> dict[str, Any]:
         """Return it as plain values; numbers that JSON does not have are None."""

@@ -19,7 +19,7 @@ from ..checks import CurveError
 from ..claims import Panel, PanelName
 from ..curves import FloatArray, Form, Variant
 from ..distributions import interquartile_mean, probability_of_improvement
-from ..significance import holm, paired_p
+from ..significance import SIGNIFICANT, holm, paired_p
 from ..statistics import Estimate
 from .measures import score_study
 from .run_curves import THROTTLE, RunCurves, StudyCurves, StudyLine, study_lines
@@ -60,8 +60,6 @@ _EXPERIMENTS: dict[tuple[Any, ...], str] = {
     ("S2d", 320): "S2d 320",
 }
 """Name of a set, and value on its first axis where it has two -> experiment that claims speak of."""
-FAMILY_ERROR = 0.05
-"""Probability that the tests of a panel tell any difference where there is none, as in comparisons of policies."""
 _SEED = 1
 """Fixed, so that the same runs give the same table."""
 ENOUGH = 20.0
@@ -298,7 +296,7 @@ def policy_pairs(panels: Sequence[StudyPanel]) -> "pl.DataFrame":
         for (first, second), difference, of_pair in zip(pairs, differences, adjusted, strict=True):
             gains = difference if panel.higher_is_better else -difference
             means = np.array([_mean(level) for level in gains])
-            is_sure = of_pair <= FAMILY_ERROR
+            is_sure = of_pair <= SIGNIFICANT
             better = _probability(panel, first, second)
             rows.append(
                 {
