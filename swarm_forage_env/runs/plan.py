@@ -68,27 +68,31 @@ class Plan:
         return tuple(condition for condition in self.conditions if condition.policy.label == label)
 
     def specs_of(self, condition: Condition) -> tuple[RunSpec, ...]:
-        """Return the runs of a condition, one per seed.
-
-        Raises:
-            KeyError: the plan has no such condition.
-        """
-        first = self._firsts[condition]
+        """Return the runs of a condition, one per seed."""
+        first = self._firsts.get(id(condition)) or self._first_of(condition, condition.world)
         return tuple(replace(first, seed=seed) for seed in self.seeds)
 
+    def _first_of(self, condition: Condition, world: World) -> RunSpec:
+        """The run of a condition with the first seed, in its world with the caches of its policy."""
+        policy = condition.policy
+        return RunSpec(
+            world=world.with_caches(policy.caches),
+            policy=policy.policy,
+            parameters=policy.parameters,
+            seed=self.seeds[0],
+        )
+
     @cached_property
-    def _firsts(self) -> dict[Condition, RunSpec]:
-        """The run of each condition with the first seed."""
-        worlds: dict[tuple[World, str | None], World] = {}  # policies share them, and each costs many checks
-        found: dict[Condition, RunSpec] = {}
+    def _firsts(self) -> dict[int, RunSpec]:
+        """The run of each condition with the first seed, by `id`: configurations of users may have no hash."""
+        worlds: dict[tuple[int, str | None], World] = {}  # policies share them, and each costs many checks
+        found: dict[int, RunSpec] = {}
         for condition in self.conditions:
             policy, world = condition
-            asked = (world, policy.caches)
+            asked = (id(world), policy.caches)
             if asked not in worlds:
                 worlds[asked] = world.with_caches(policy.caches)
-            found[condition] = RunSpec(
-                world=worlds[asked], policy=policy.policy, parameters=policy.parameters, seed=self.seeds[0]
-            )
+            found[id(condition)] = self._first_of(condition, worlds[asked])
         return found
 
     @property
@@ -99,4 +103,4 @@ class Plan:
     @property
     def robot_ticks(self) -> int:
         """Robots times ticks of all runs."""
-        return sum(self._firsts[condition].robot_ticks for condition in self.conditions) * len(self.seeds)
+        return sum(self._firsts[id(condition)].robot_ticks for condition in self.conditions) * len(self.seeds)

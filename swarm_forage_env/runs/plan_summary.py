@@ -38,7 +38,7 @@ class PlanSummary(Answer):
 
     name: str
     """What stands before the numbers, empty where a plan has no name."""
-    runs: Mapping[Condition, Mapping[str, RunSpec]]
+    runs: tuple[tuple[Condition, Mapping[str, RunSpec]], ...]
     """Each condition with its runs by their ids."""
     stored: frozenset[str]
     """Ids of the runs that are stored already."""
@@ -52,7 +52,7 @@ class PlanSummary(Answer):
     @cached_property
     def planned(self) -> dict[str, RunSpec]:
         """All runs by their ids, each once."""
-        return {run_id: spec for specs in self.runs.values() for run_id, spec in specs.items()}
+        return {run_id: spec for _, specs in self.runs for run_id, spec in specs.items()}
 
     @cached_property
     def todo(self) -> tuple[RunSpec, ...]:
@@ -98,7 +98,7 @@ class PlanSummary(Answer):
     def _world_rows(self) -> list[tuple[str, ...]]:
         n_runs: Counter[tuple[str, ...]] = Counter()
         n_todo: Counter[tuple[str, ...]] = Counter()
-        for condition, specs in self.runs.items():
+        for condition, specs in self.runs:
             row = _world_cells(condition.world)
             n_runs[row] += len(specs)
             n_todo[row] += len(specs.keys() - self.stored)
@@ -106,7 +106,7 @@ class PlanSummary(Answer):
 
     def _policy_rows(self) -> list[tuple[str, ...]]:
         rows: dict[str, dict[str, RunSpec]] = {}
-        for condition, specs in self.runs.items():
+        for condition, specs in self.runs:
             rows.setdefault(condition.policy.label, {}).update(specs)
         if len(rows) > 1:
             rows["all"] = self.planned
@@ -123,13 +123,13 @@ class PlanSummary(Answer):
     def to_mapping(self) -> dict[str, Any]:
         """Return all runs with their specifications, and the estimate."""
         return {
-            "policies": list(dict.fromkeys(condition.policy.label for condition in self.runs)),
+            "policies": list(dict.fromkeys(condition.policy.label for condition, _ in self.runs)),
             "out": None if self.folder is None else str(self.folder),
             "core_hours": self.core_hours,
             "estimated_wall_s": self.wall_s,
             "runs": [
                 {"run_id": run_id, "stored": run_id in self.stored, "spec": spec.to_mapping()}
-                for specs in self.runs.values()
+                for _, specs in self.runs
                 for run_id, spec in specs.items()
             ],
         }
@@ -155,11 +155,11 @@ def summarize_plan(
         tell: Gets a line about each measured swarm before it is measured.
     """
     meant = None if only is None else {spec.run_id for spec in only}
-    runs: dict[Condition, dict[str, RunSpec]] = {}
+    runs: list[tuple[Condition, dict[str, RunSpec]]] = []
     for condition in plan.conditions:
         by_id = {spec.run_id: spec for spec in plan.specs_of(condition)}
-        runs[condition] = {run_id: spec for run_id, spec in by_id.items() if meant is None or run_id in meant}
-    planned = {run_id: spec for specs in runs.values() for run_id, spec in specs.items()}
+        runs.append((condition, {run_id: spec for run_id, spec in by_id.items() if meant is None or run_id in meant}))
+    planned = {run_id: spec for _, specs in runs for run_id, spec in specs.items()}
     store = None if out is None else RunStore(out)
     states = {} if store is None else store.look_up(planned.values(), keep=False).states
     stored = frozenset(run_id for run_id, state in states.items() if state == DONE)
@@ -171,7 +171,7 @@ def summarize_plan(
         costs = _measured(todo, tell)
     return PlanSummary(
         name=name,
-        runs=runs,
+        runs=tuple(runs),
         stored=stored,
         costs=costs,
         processes=processes_of(len(todo), jobs),

@@ -1,9 +1,12 @@
 """Plans: which runs there are, in which order, and what is refused."""
 
+from dataclasses import dataclass, field
+
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.runs.plan import Condition, Plan
+from swarm_forage_env.runs.plan_summary import summarize_plan
 from swarm_forage_env.runs.policy_spec import policy_spec
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import scenario
@@ -25,6 +28,21 @@ def test_every_policy_runs_in_every_world_once_per_seed():
     assert len({spec.run_id for spec in plan.specs}) == 8
     assert plan.specs[2:4] == plan.specs_of(plan.conditions[1])
     assert plan.robot_ticks == sum(spec.robot_ticks for spec in plan.specs) == 8 * 3 * 20
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ListedConfig(InnerConfig):
+    """A configuration without a hash."""
+
+    names: list[str] = field(default_factory=list)
+
+
+def test_configurations_need_no_hash():
+    world = World(WORLD, (ListedConfig(),))
+    plan = Plan.product([CRW, STOCHM], [world], seeds=[3, 5])
+    assert [spec.world.wrappers for spec in plan.specs] == [(ListedConfig(),)] * 4
+    assert plan.specs_of(Condition(CRW, World(WORLD, (ListedConfig(),)))) == plan.specs[:2], "an equal condition"
+    assert len(summarize_plan(plan, jobs=1).todo) == 4
 
 
 @pytest.mark.parametrize("policy", [CRW, STOCHM])
