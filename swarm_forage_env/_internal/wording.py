@@ -13,7 +13,7 @@ _UNSEEN = ("Cc", "Cf", "Cs")
 _REFUSED = ("Cc", "Cs")
 """Those that no text may have. Others that nobody sees are part of ordinary words, such as U+200C in Persian."""
 _TURNING = frozenset("\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
-"""Characters that steer the direction of writing, Bidi_Control of Unicode; those of `curves_table` of the metrics."""
+"""Characters that steer the direction of writing, Bidi_Control of Unicode; those of `metrics.scoring.curves_file`."""
 _MOST_NEAR = 4
 """Names that a message lists where there are too many to list all."""
 _NEAR = 0.5

@@ -26,7 +26,6 @@ def info(
     as_json: AsJson = False,
 ) -> None:
     """Show all fields and spaces of a scenario, or what a policy is."""
-    from swarm_forage_env._internal.wording import printable
     from swarm_forage_env.inspect.descriptions import describe
 
     found = describe(name)

@@ -1,7 +1,7 @@
 """The Policy protocol, and what a policy knows before a run.
 
 A policy, scripted or trained, sees observations and never the state of the world. `baselines` imports only this folder,
-`Quirks`, and the tools `compiling`, `rng` and `spelling`, and nothing else of `swarm_forage_env`.
+`Quirks`, and the tools `compiling`, `rng` and `wording`, and nothing else of `swarm_forage_env`.
 """
 
 from collections.abc import Iterable

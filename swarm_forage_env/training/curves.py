@@ -120,7 +120,7 @@ def curves(
     """
     found = read_trainings(folders)
     if beside is None:
-        from metrics.controllers import PAPER_POLICIES  # late: see judging
+        from metrics.controllers import PAPER_POLICIES  # late: see training.evaluations
 
         beside = PAPER_POLICIES
     return TrainingCurves(trainings=found, beside=_levels(found[0], beside, jobs, progress=progress))
