@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from metrics.controllers import PAPER_POLICIES
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.options import (
     EXIT_FAILURE,
@@ -216,9 +215,11 @@ PICTURE_FILE = "curves.png"
 def curves(
     folders: Annotated[list[Path], typer.Argument(metavar="DIR ...", help="Folders of trainings in one scenario.")],
     policies: Annotated[
-        str,
-        typer.Option("--policy", help="Policies to compare with, separated by commas; none for no others."),
-    ] = ",".join(PAPER_POLICIES),
+        str | None,
+        typer.Option(
+            "--policy", help="Policies to compare with, separated by commas; none for no others; default the paper's."
+        ),
+    ] = None,
     picture: Picture = None,
     jobs: Jobs = None,
     as_json: AsJson = False,
@@ -235,7 +236,8 @@ def curves(
     file = picture or folders[0] / PICTURE_FILE
     read_trainings(folders)  # refuses folders before it looks at the place of the picture
     check_picture(file)
-    found = curves_of(folders, beside=() if policies == "none" else split_names(policies), jobs=jobs)
+    beside = () if policies == "none" else None if policies is None else split_names(policies)
+    found = curves_of(folders, beside=beside, jobs=jobs)
     typer.echo(found.json() if as_json else found.text())
     try:
         found.draw(file)

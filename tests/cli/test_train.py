@@ -289,3 +289,9 @@ def test_a_wrapper_option_goes_before_the_same_wrapper_in_the_file(tmp_path):
     words = WorldOptions(scenario=str(path), wrappers=("sensor_noise:sigma=0.02",))
     (config,) = RecipeOptions().plan(words).wrappers
     assert config.to_mapping()["sigma"] == 0.02
+
+
+def test_it_does_without_the_measures_where_a_file_of_that_name_is_in_the_way(command):
+    Path("metrics.py").write_text("")
+    code = "import sys; sys.path.insert(0, '.'); import metrics; from swarm_forage_env.cli.train import train, dataset"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
