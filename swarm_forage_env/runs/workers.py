@@ -126,10 +126,13 @@ def map_runs(
         advance: Called with the robot-ticks that are done.
 
     Raises:
+        ConfigError: `jobs` is no number of processes.
         WorkerError: worker processes could not be started, or one was killed.
         UntrustedModelError: see `policies.trust`.
         Exception: whatever the function raises.
     """
+    if jobs is not None:
+        jobs = as_whole("jobs", jobs, at_least=1, or_none=True)
     done = 0.0
     if (n_workers := processes_of(len(specs), jobs)) == 1:
         for spec in specs:

@@ -479,6 +479,8 @@ def test_any_function_of_runs_is_mapped_in_their_order(jobs, told):
     assert done == sorted(done)
     with pytest.raises(ConfigError, match="nine is none"):
         list(map_runs(seed_of, [*specs, replace(specs[0], seed=9)], jobs=jobs))
+    with pytest.raises(ConfigError, match=r"Expected jobs to be .*, got 0"):
+        list(map_runs(seed_of, specs, jobs=0))
 
 
 def test_other_processes_open_no_models_that_this_one_may_not(tmp_path):
