@@ -125,12 +125,16 @@ def ask_and_show(
         as_markdown: Print tables as Markdown, where it is not JSON.
 
     Raises:
+        ConfigError: a picture whose ending is none of figures.
         typer.Exit: Ctrl-C; runs have failed, or too many for an answer.
     """
     from metrics.checks import CurveError
+    from swarm_forage_env.rendering.figures import picture_ending
     from swarm_forage_env.runs.plan_summary import summarize_plan
     from swarm_forage_env.runs.store import RunStore
 
+    if picture is not None:
+        picture_ending(picture)  # before the work; a place that cannot be written to is told of beside the answer
     aside = notes()
     for remark in question.remarks:
         aside.print(remark)

@@ -91,11 +91,11 @@ def check_picture(path: Path) -> None:
         ConfigError: an ending that is none of `FORMATS`.
         OSError: the file cannot be written.
     """
-    _ending(path)
+    picture_ending(path)
     check_file(path)
 
 
-def _ending(path: Path) -> str:
+def picture_ending(path: Path) -> str:
     """Return the ending of a picture file in small letters; raises ConfigError if it is none of `FORMATS`."""
     ending = path.suffix.lower()
     if ending not in FORMATS:
@@ -121,7 +121,7 @@ def saved_figure(
         OSError: a file cannot be written.
     """
     files = [Path(path) for path in ((paths,) if isinstance(paths, str | Path) else paths)]
-    endings = [_ending(file) for file in files]
+    endings = [picture_ending(file) for file in files]
     try:
         from matplotlib import style as styles
         from matplotlib.figure import Figure as Drawing  # not pyplot: no global state, no window system

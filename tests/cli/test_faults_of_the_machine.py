@@ -95,6 +95,13 @@ def test_results_are_shown_even_if_their_picture_cannot_be_written(command, monk
     assert "No picture results/warehouse_small/performance.png: No space left on device." in " ".join(err.split())
 
 
+@pytest.mark.parametrize("words", [("run", "random"), ("score", "random"), ("predict", "random")])
+def test_a_picture_of_an_unknown_kind_is_told_before_anything_is_run(command, monkeypatch, words):
+    monkeypatch.setattr(ForageEnv, "reset_batch", lambda *_, **__: pytest.fail("a run was started"))
+    told = "swarm-forage: Expected a picture file that ends in .png, .svg, .pdf, got 'wrong.gif'.\n"
+    assert command(*words, "--jobs", "1", "--picture", "wrong.gif") == (2, "", told)
+
+
 def test_sigterm_keeps_finished_runs_as_ctrl_c_does(command, monkeypatch):
     command(*RUN, "--seeds", "1")
     before = signal.getsignal(signal.SIGTERM)
