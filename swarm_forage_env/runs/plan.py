@@ -11,7 +11,7 @@ benchmark and the evaluations of a training each write a plan; `runs.runner` mak
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from swarm_forage_env._internal.fields import ConfigError, several, whole
 from swarm_forage_env.runs.policy_spec import PolicySpec
@@ -50,6 +50,10 @@ class Plan:
         if len(set(self.seeds)) < len(self.seeds):
             raise ConfigError(f"Expected different seeds, got {', '.join(map(str, self.seeds))}.")
         _ = self._firsts  # refuses what runs refuse
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what copies and pickles have; the runs by `id` are no others' than this plan's."""
+        return {"conditions": self.conditions, "seeds": self.seeds}
 
     @classmethod
     def product(cls, policies: Iterable[PolicySpec], worlds: Sequence[World], seeds: Sequence[int]) -> "Plan":

@@ -1,5 +1,7 @@
 """Plans: which runs there are, in which order, and what is refused."""
 
+import copy
+import pickle
 from dataclasses import dataclass, field
 
 import pytest
@@ -43,6 +45,16 @@ def test_configurations_need_no_hash():
     assert [spec.world.wrappers for spec in plan.specs] == [(ListedConfig(),)] * 4
     assert plan.specs_of(Condition(CRW, World(WORLD, (ListedConfig(),)))) == plan.specs[:2], "an equal condition"
     assert len(summarize_plan(plan, jobs=1).todo) == 4
+
+
+@pytest.mark.parametrize(
+    "copied",
+    [copy.copy, copy.deepcopy, lambda plan: pickle.loads(pickle.dumps(plan))],  # noqa: S301 - our own bytes
+)
+def test_a_copy_has_the_same_runs(copied):
+    plan = Plan.product([CRW, STOCHM], [QUIET, NOISY], seeds=[3, 5])
+    again = copied(plan)
+    assert (again.specs, again.robot_ticks) == (plan.specs, plan.robot_ticks)
 
 
 @pytest.mark.parametrize("policy", [CRW, STOCHM])
