@@ -72,7 +72,9 @@ def _about_words(error: Any) -> str:
         return f"No such option: {wrong}; for this command it is {right}."
     said = next((theirs for theirs in _WANTED if error.message.startswith(theirs)), None)
     if said is None:
-        return error.format_message()
+        help_text = getattr(getattr(error, "param", None), "help", "") if not error.message else ""  # a missing option
+        complaint = error.format_message().removeprefix("Invalid value: ")
+        return f"{complaint} It is: {help_text}" if help_text else complaint
     wanted = _WANTED[said] + error.message.removeprefix(said).partition(",")[0]
     got = error.__cause__.errors()[0]["input"]
     return f"Expected {error.param.opts[0]} to be {wanted}, got {got!r}. It is: {error.param.help}"

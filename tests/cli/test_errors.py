@@ -115,3 +115,10 @@ def test_the_guard_is_around_every_command(command, monkeypatch, tmp_path):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     monkeypatch.setattr("swarm_forage_env.inspect.descriptions.overview", lambda _: [].pop())
     assert command("list")[0] == EXIT_UNFORESEEN
+
+
+def test_a_missing_word_is_explained_and_our_own_words_have_no_prefix(command):
+    code, _, err = command("choose", "crw")
+    assert code == 2
+    assert err.startswith("swarm-forage: Missing option '--deliver'. It is: Performance")
+    assert command("saliency")[2].startswith("swarm-forage: Expected a policy")
