@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 RESULTS = Path("results")
 """Where the runs of a run id are looked for: the folder that `swarm-forage run` stores them in."""
+PAGES = (".html", ".htm")
+"""Endings of a page that browsers open."""
 _RUN_ID = re.compile(r"[0-9a-f]{16}")
 _OPTIONS_OF_STORED_RUNS = ("policies", "named_policies", "file", "seconds", "frame")
 
@@ -55,6 +57,10 @@ def replay(
         runs = _planned(words, described, seed)
         path = file or _default_file(runs[0][0])
         check_file(path)
+        if path.suffix.lower() not in PAGES:
+            raise typer.BadParameter(
+                f"Expected a page that ends in {', '.join(PAGES)}, got {str(path)!r}; 'record' makes films."
+            )
         _write(path, [_recorded(spec, record, seconds, frame) for spec, record in runs])
 
 

@@ -63,6 +63,12 @@ def test_what_is_beside_a_stored_run_must_be_a_policy(command, stored):
         assert err.count("\n") == 1
 
 
+def test_a_page_under_the_name_of_a_film_is_refused_before_the_run(command):
+    code, out, err = command("replay", "random", *SHORT, "--file", "run.gif")
+    assert (code, out) == (2, "")
+    assert err == "swarm-forage: Expected a page that ends in .html, .htm, got 'run.gif'; 'record' makes films.\n"
+
+
 def test_a_stored_run_whose_policy_is_missing_is_one_line(command, stored):
     import dataclasses
 
