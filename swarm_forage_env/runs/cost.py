@@ -108,7 +108,8 @@ def calibrate(specs: Iterable[RunSpec], *, tell: Callable[[str], None] | None = 
         measured: list[tuple[float, float, float]] = []
         for n_robots in _some(sorted(by_size)):
             if tell is not None:
-                tell(f"measuring {by_size[n_robots].policy}, N = {n_robots}")
+                disturbed = "".join(f", {config.name}" for config in by_size[n_robots].wrappers)
+                tell(f"measuring {by_size[n_robots].policy}, N = {n_robots}{disturbed}")
             measured.append((float(n_robots), *_measured(by_size[n_robots])))
         costs[kind] = Cost(*np.array(measured).T)
     return costs
