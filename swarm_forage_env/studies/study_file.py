@@ -80,7 +80,7 @@ def find_study(name: str | Path) -> Path:
         return SETS / f"{name}.toml"
     if not Path(name).is_file():
         raise ConfigError(
-            f"Expected a study file or one of {', '.join(set_names())}, got {str(name)!r}."
+            f"Expected a study file that exists, or one of {', '.join(set_names())}, got {str(name)!r}."
             f"{suggestion(str(name), set_names())}"
         )
     return Path(name)

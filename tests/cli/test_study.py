@@ -142,7 +142,7 @@ def test_an_interrupt_keeps_what_is_done(written, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("run", "mine.tom"), "Expected a study file or one of S1a"),
+        (("run", "mine.tom"), "Expected a study file that exists, or one of S1a"),
         (("run", "mine.toml", "--budget", "tini"), "Did you mean 'tiny'?"),
         (("run", "mine.toml", "--rules", "progam"), "Did you mean 'program'?"),
         (("run", "mine.toml", "--shard", "3/2"), "the shard to be a whole number from 1 to 2"),

@@ -59,7 +59,7 @@ def test_trains_shows_evaluations_and_goes_on(command, painted, monkeypatch):
 
     code, _, err = command(*words)
     assert code == 2
-    assert "resume it or go elsewhere" in err
+    assert "resume it (--resume), or choose another folder (--out)" in err
     code, _, err = command("--trust-models", *words, "--resume")
     assert code == 0
     assert "This training was finished: 128 of 128 decisions" in err

@@ -174,7 +174,7 @@ def test_training_goes_on_where_it_stopped(tmp_path):
 
 def test_folders_of_other_trainings_are_left_alone(tmp_path):
     train(tiny_plan(stages=(Stage(steps=128),)), tmp_path)
-    with pytest.raises(ConfigError, match="resume it or go elsewhere"):
+    with pytest.raises(ConfigError, match="or choose another folder"):
         train(tiny_plan(), tmp_path)
     other = dataclasses.replace(tiny_plan().evaluation, n_runs=2)
     with pytest.raises(ConfigError, match=r"another plan: evaluation\.n_runs: 1 before, 2 now; seed: 0 before, 5 now"):

@@ -206,7 +206,10 @@ def _check_folder(folder: Path, plan: TrainingPlan, *, resume: bool) -> None:
                 f"{'; '.join(differences)}."
             )
     elif any((folder / name).exists() for name in (MODEL_FILE, EVALUATIONS_FILE, POLICY_FILE)):
-        raise ConfigError(f"Expected an unused folder, got {folder} with a training run; resume it or go elsewhere.")
+        raise ConfigError(
+            f"Expected an unused folder, got {folder} with a training run; resume it (--resume), or choose another "
+            "folder (--out)."
+        )
 
 
 def _check_baseline(plan: TrainingPlan) -> None:
