@@ -97,12 +97,17 @@ def _of_page(page: Path, square: float) -> "ComparedMaps":
 
 def _of_record(place: Path, square: float) -> "ComparedMaps":
     """Make a stored run again, and tell if it came out different."""
+    from swarm_forage_env.cli.printer import refusing
     from swarm_forage_env.inspect.maps import maps_of_record
+    from swarm_forage_env.policies.registry import load_policy
     from swarm_forage_env.runs.record import RunRecord
     from swarm_forage_env.runs.spec import RunSpec
 
     record = RunRecord.read(place)
-    with progress_bar("making the run again", RunSpec.from_json(record.spec).robot_ticks) as advance:
+    spec = RunSpec.from_json(record.spec)
+    with refusing():  # a policy that is not installed here is told of; a ValueError of its run is a fault
+        load_policy(spec.policy, spec.parameters)
+    with progress_bar("making the run again", spec.robot_ticks) as advance:
         found, is_same = maps_of_record(record, side_m=square, advance=advance)
     _tell_of_changed([] if is_same else [record.run_id])
     return found

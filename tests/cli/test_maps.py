@@ -61,7 +61,7 @@ def test_maps_refuses_other_files(command):
         assert err.count("\n") == 1
 
 
-def test_maps_of_a_stored_run(command):
+def test_maps_of_a_stored_run(command, monkeypatch):
     short = ("--set", "horizon_s=20", "--set", "interval_s=10", "--robots", "3", "--objects", "20")
     assert command("run", "random", *short, "--jobs", "1")[0] == 0
     (record,) = Path("results/warehouse_small").glob("*.parquet")
@@ -72,3 +72,6 @@ def test_maps_of_a_stored_run(command):
     code, _, err = command("maps", str(record), "--seeds", "2")
     assert code == 2
     assert "Expected a stored run without --seeds" in err
+    monkeypatch.setattr("swarm_forage_env.policies.registry._installed", lambda _: ())
+    code, _, err = command("maps", str(record))
+    assert (code, err.startswith("swarm-forage: Unknown policy 'random'.")) == (2, True)
