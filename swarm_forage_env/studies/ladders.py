@@ -145,7 +145,7 @@ def joined_wrappers(
     if taken:
         raise ConfigError(
             f"Expected no wrapper {taken[0]} in a world where {criterion} is varied, which sets it, too; leave out "
-            f"the wrapper, or what varies {criterion}: a score does not with other measures (--measures)."
+            f"the wrapper, or what varies {criterion}; a score varies it only for some measures (--measures)."
         )
     return (*always, *varied)
 
