@@ -7,7 +7,7 @@ import numpy as np
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.types import Row
 
-from .cache_memory import OneTaskMemory, covers, keep_away_m
+from .cache_memory import NOT_TO_ADD, NOT_TO_TAKE, OneTaskMemory, covers, is_listed, keep_away_m
 from .memory import OneMemory, density
 from .robots import ACQUIRE, TRANSPORT, Senses
 from .tasks import DRAW_POINT_X, DRAW_POINT_Y
@@ -60,13 +60,14 @@ def select_cache(robot: np.record, senses: Senses, c: np.record, draws: Row, mem
         Whether there is one; then goal, tolerance and target (the cache's serial) of the robot are set.
     """
     takes = robot.activity == ACQUIRE
+    shunned = memory.shunned_caches[NOT_TO_TAKE if takes else NOT_TO_ADD]
     best = 0.0
     best_entry = -1
     for entry in range(robot.n_caches):
         cache = memory.caches[entry]
-        if covers(cache, senses.x, senses.y, c):
+        if covers(cache, senses.x, senses.y, c) or is_listed(cache.serial, shunned):
             continue
-        if (takes and (cache.no_pickup or not is_large_enough(cache, c))) or (not takes and cache.no_drop):
+        if takes and not is_large_enough(cache, c):
             continue
         centre_x = (cache.cell_x + 0.5) * c.cell_m
         centre_y = (cache.cell_y + 0.5) * c.cell_m

@@ -32,8 +32,6 @@ CACHE = np.dtype(
                 ("serial", np.int32),  # identity
                 ("count", np.int32),  # objects when last seen
                 ("seen", np.int32),  # tick of the robot's own clock at which it was last seen
-                ("no_pickup", np.bool_),  # not to be taken from
-                ("no_drop", np.bool_),  # not to be added to
                 ("has_refused", np.bool_),  # the world refused to start another cache near it
             ],
             align=True,
@@ -51,6 +49,8 @@ class TaskMemory(NamedTuple):
     """(N, K) records of `CACHE`; row i holds a compact list of `n_caches[i]` caches, in no particular order."""
     shunned: IntArray
     """(N, M) by object row: the robot's `shun_round` in which it was to be left alone, 0 = never."""
+    shunned_caches: IntArray
+    """(N, 2, K) serials of caches not to take from and not to add to, newest first, 0 = no more."""
 
 
 class OneTaskMemory(NamedTuple):
@@ -59,6 +59,13 @@ class OneTaskMemory(NamedTuple):
     objects: OneMemory
     caches: Row
     shunned: Row
+    shunned_caches: np.ndarray
+
+
+NOT_TO_TAKE = 0
+"""Place in `TaskMemory.shunned_caches` of the caches that a robot takes nothing from."""
+NOT_TO_ADD = 1
+"""The same for those that it adds nothing to."""
 
 
 def new_task_memory(spec: SwarmSpec) -> TaskMemory:
@@ -70,6 +77,7 @@ def new_task_memory(spec: SwarmSpec) -> TaskMemory:
         objects=new_memory(*shape),
         caches=np.zeros((spec.n_robots, 2 * n_side_by_side), CACHE),
         shunned=np.zeros(shape, np.int32),
+        shunned_caches=np.zeros((spec.n_robots, 2, 2 * n_side_by_side), np.int32),
     )
 
 
@@ -77,7 +85,10 @@ def new_task_memory(spec: SwarmSpec) -> TaskMemory:
 def task_memory_of(memory: TaskMemory, robot_index: int) -> OneTaskMemory:
     """Return views of one robot's memory."""
     return OneTaskMemory(
-        memory_of(memory.objects, robot_index), memory.caches[robot_index], memory.shunned[robot_index]
+        memory_of(memory.objects, robot_index),
+        memory.caches[robot_index],
+        memory.shunned[robot_index],
+        memory.shunned_caches[robot_index],
     )
 
 
@@ -130,8 +141,6 @@ def remember_cache(robot: np.record, memory: OneTaskMemory, fields: Row, c: np.r
         cache.serial = serial
         cache.cell_x = cell_x
         cache.cell_y = cell_y
-        cache.no_pickup = False
-        cache.no_drop = False
         cache.has_refused = False
         _forget_objects_under(robot, memory.objects, cache, c)
     cache.count = int(fields[3] * c.n_objects + 0.5)
@@ -209,7 +218,7 @@ def look_for_caches(robot: np.record, row: Row, c: np.record, memory: OneTaskMem
     visible = row[c.los_cache : c.los_cache + VISIBLE_CACHES * CACHE_FIELDS]
     for entry in range(robot.n_caches - 1, -1, -1):  # backwards: forgetting moves the last entry here
         cache = memory.caches[entry]
-        if _should_be_visible(robot, cache, c) and not _is_listed(cache, visible, c):
+        if _should_be_visible(robot, cache, c) and not _is_visible(cache, visible, c):
             forget_cache(robot, memory.caches, entry, c)
     for place in range(VISIBLE_CACHES):
         if visible[place * CACHE_FIELDS] <= 0.0:
@@ -218,7 +227,7 @@ def look_for_caches(robot: np.record, row: Row, c: np.record, memory: OneTaskMem
 
 
 @kernel
-def _is_listed(cache: np.record, visible: Row, c: np.record) -> bool:
+def _is_visible(cache: np.record, visible: Row, c: np.record) -> bool:
     """Whether a remembered cache is among the visible ones, by its centre cell."""
     for place in range(VISIBLE_CACHES):
         fields = visible[place * CACHE_FIELDS :]
@@ -245,11 +254,45 @@ def stop_shunning_objects(robot: np.record) -> None:
 
 
 @kernel
-def stop_shunning_caches(robot: np.record, caches: Row) -> None:
-    """Make every cache selectable again, and forget refusals."""
+def is_listed(serial: int, serials: Row) -> bool:
+    """Whether a serial is among those of a list that ends at its first 0."""
+    for known in serials:
+        if known == 0:
+            return False
+        if known == serial:
+            return True
+    return False
+
+
+@kernel
+def shun_cache(robot: np.record, serials: Row, serial: int) -> None:
+    """Leave a cache alone until `stop_shunning_caches`, also when it is forgotten meanwhile and seen again.
+
+    Args:
+        robot: Record of the robot.
+        serials: Part of `TaskMemory.shunned_caches`, edited; a full list loses the serial that was added first.
+        serial: Identity of the cache; nothing happens for 0.
+    """
+    if serial == 0:
+        return
+    robot.shunned_cache_in_task = True
+    if is_listed(serial, serials):
+        return
+    for place in range(serials.shape[0] - 1, 0, -1):
+        serials[place] = serials[place - 1]
+    serials[0] = serial
+
+
+@kernel
+def stop_shunning_caches(serials: np.ndarray) -> None:
+    """Make every cache selectable again."""
+    serials[:] = 0
+
+
+@kernel
+def forgive_refusals(robot: np.record, caches: Row) -> None:
+    """Forget which caches have refused."""
     for entry in range(robot.n_caches):
-        caches[entry].no_pickup = False
-        caches[entry].no_drop = False
         caches[entry].has_refused = False
 
 
@@ -275,6 +318,12 @@ def event_cache_entry(robot: np.record, row: Row, c: np.record, caches: Row) -> 
         cell_of(row[c.event_cache + 1], c.half_width_m, c),
         cell_of(row[c.event_cache + 2], c.half_height_m, c),
     )
+
+
+@kernel
+def event_cache_serial(row: Row, c: np.record) -> int:
+    """Serial of the cache that this step's event names, or 0."""
+    return int(row[c.event_cache] * SERIAL_SCALE + 0.5)
 
 
 @kernel

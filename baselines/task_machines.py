@@ -23,13 +23,18 @@ from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, 
 
 from .cache_choice import cache_is_known, from_nest_m, object_is_near, select_cache, select_isolated_object
 from .cache_memory import (
+    NOT_TO_ADD,
+    NOT_TO_TAKE,
     OneTaskMemory,
     TaskMemory,
     cell_of,
     event_cache_entry,
+    event_cache_serial,
     event_object_row,
+    forgive_refusals,
     look_for_caches,
     remember_cache,
+    shun_cache,
     shun_object,
     stop_shunning_caches,
     stop_shunning_objects,
@@ -195,10 +200,7 @@ def follow_events(
         forget(robot, memory.objects, object_row_of(row[c.cargo], c))
         robot.cargo_from_nest_m = np.inf
         if task == _TRANSFERER:
-            entry = event_cache_entry(robot, row, c, memory.caches)
-            if entry >= 0:
-                memory.caches[entry].no_drop = True
-                robot.shunned_cache_in_task = True
+            shun_cache(robot, memory.shunned_caches[NOT_TO_ADD], event_cache_serial(row, c))
             if not c.transferer_goes_anywhere and row[c.event_cache] > 0.0:
                 # From the event: the cache may have been used up in the same tick, and be forgotten.
                 x = cell_of(row[c.event_cache + 1], c.half_width_m, c)
@@ -208,10 +210,7 @@ def follow_events(
         if task in (_STARTER, _FINISHER):
             shun_object(robot, memory, event_object_row(row, c))
         elif task == _TRANSFERER:
-            entry = event_cache_entry(robot, row, c, memory.caches)
-            if entry >= 0:
-                memory.caches[entry].no_pickup = True
-                robot.shunned_cache_in_task = True
+            shun_cache(robot, memory.shunned_caches[NOT_TO_TAKE], event_cache_serial(row, c))
     elif senses.event == _CACHE_TOO_NEAR:
         remember_cache(robot, memory, row[c.event_cache : c.event_cache + CACHE_FIELDS], c)
         entry = event_cache_entry(robot, row, c, memory.caches)
@@ -236,7 +235,8 @@ def manage_task(
     if not robot.shunned_in_task:
         stop_shunning_objects(robot)
     if not (robot.shunned_cache_in_task and a.task[i] == _TRANSFERER):
-        stop_shunning_caches(robot, memory.caches)
+        stop_shunning_caches(memory.shunned_caches)
+    forgive_refusals(robot, memory.caches)
     robot.shunned_in_task = False
     robot.shunned_cache_in_task = False
     restart_acquiring(robot)

@@ -14,6 +14,7 @@ from baselines.cache_choice import (
     select_cache,
     select_isolated_object,
 )
+from baselines.cache_memory import NOT_TO_ADD, NOT_TO_TAKE
 from baselines.robots import Activity
 from baselines.stochm import STOCHMPolicy
 from baselines.task_machines import select_goal
@@ -103,12 +104,14 @@ def test_stochm_takes_from_any_cache():
 
 
 @pytest.mark.parametrize(
-    ("flag", "activity"), [("no_pickup", Activity.ACQUIRE), ("no_drop", Activity.TRANSPORT)], ids=["taking", "adding"]
+    ("purpose", "activity"),
+    [(NOT_TO_TAKE, Activity.ACQUIRE), (NOT_TO_ADD, Activity.TRANSPORT)],
+    ids=["taking", "adding"],
 )
-def test_caches_to_be_left_alone_are_left_out_for_one_purpose_only(flag, activity):
+def test_caches_to_be_left_alone_are_left_out_for_one_purpose_only(purpose, activity):
     robot = robot_at(24.0, 8.0, activity)
     robot.know_cache(1, CACHE, 9)
-    robot.memory.caches[0][flag] = True
+    robot.memory.shunned_caches[purpose, :2] = 5, 1
     assert not select(robot)
     other = Activity.TRANSPORT if activity == Activity.ACQUIRE else Activity.ACQUIRE
     robot.record.activity = other

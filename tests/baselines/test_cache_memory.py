@@ -2,6 +2,7 @@
 
 import pytest
 
+from baselines.cache_memory import is_listed, shun_cache, stop_shunning_caches
 from swarm_forage_env.scenarios.quirks import Quirks
 from tests.support.task_robot import TaskRobot
 
@@ -31,12 +32,12 @@ def test_a_cache_is_remembered_with_place_count_and_decaying_density():
 def test_a_new_cache_on_the_same_cell_replaces_the_old_one_with_all_that_was_held_against_it():
     robot = TaskRobot()
     stand(robot, (56, 40), CACHE_SEEN)
-    robot.memory.caches[0].no_drop = True
+    robot.memory.caches[0].has_refused = True
     stand(robot, (56, 40), CACHE_SEEN)
-    assert robot.memory.caches[0].no_drop
+    assert robot.memory.caches[0].has_refused
     stand(robot, (56, 40), (8, CENTRE, 3))
     assert list(robot.policy.remembered_caches(0)) == [8]
-    assert not robot.memory.caches[0].no_drop
+    assert not robot.memory.caches[0].has_refused
 
 
 def test_objects_on_the_square_of_a_cache_are_forgotten():
@@ -151,3 +152,31 @@ def test_a_full_memory_gives_up_the_cache_unseen_for_longest():
     robot.know_cache(50, (110, 40), 5)
     serials = set(robot.policy.remembered_caches(0))
     assert serials == set(range(1, room + 1)) - {9} | {50}
+
+
+def test_caches_are_left_alone_by_identity_and_each_is_listed_once():
+    robot = TaskRobot()
+    serials = robot.memory.shunned_caches[0]
+    assert len(serials) == len(robot.memory.caches)
+    for serial in (7, 9, 7, 0):
+        shun_cache(robot.record, serials, serial)
+    assert serials[:3].tolist() == [9, 7, 0]
+    assert [is_listed(serial, serials) for serial in (7, 8, 9, 0)] == [True, False, True, False]
+    stop_shunning_caches(robot.memory.shunned_caches)
+    assert not is_listed(7, serials)
+
+
+def test_no_cache_is_no_entry():
+    robot = TaskRobot()
+    shun_cache(robot.record, robot.memory.shunned_caches[0], 0)
+    assert not robot.record.shunned_cache_in_task
+    shun_cache(robot.record, robot.memory.shunned_caches[0], 4)
+    assert robot.record.shunned_cache_in_task
+
+
+def test_a_full_list_of_caches_to_be_left_alone_loses_the_first():
+    robot = TaskRobot()
+    serials = robot.memory.shunned_caches[1]
+    for serial in range(1, len(serials) + 2):
+        shun_cache(robot.record, serials, serial)
+    assert serials.tolist() == list(range(len(serials) + 1, 1, -1))

@@ -36,8 +36,6 @@ class RememberedCache:
     serial: int
     count: int
     density: float
-    no_pickup: bool = False
-    no_drop: bool = False
     refused: bool = False
 
 
@@ -65,6 +63,9 @@ class ReferenceTaskRobot(ReferenceRobot):
     shunned: set[int] = field(default_factory=set)
     shunned_now: bool = False
     shunned_cache_now: bool = False
+    not_to_take: set[int] = field(default_factory=set)
+    not_to_add: set[int] = field(default_factory=set)
+    """Serials of caches, remembered or not."""
     searching: bool = False
     started: dict[str, int] = field(default_factory=dict)
     lasted: dict[str, int] = field(default_factory=dict)
@@ -145,15 +146,14 @@ class ReferenceTaskRobot(ReferenceRobot):
         destination = JOBS[self.job][1] if self.job else "object"
         onward = "homing" if destination == "nest" else "transport"
         serial, cell, count = self.decode(self.senses["event_cache"])
-        known = self.caches.get(cell) if serial else None
         if self.carrying and self.state in ("acquire", "wait for pick-up"):
             self.set_out(onward)
             self.memory.known.pop(round(self.senses["cargo"][0] * self.spec.n_objects) - 1, None)
             self.cargo_from = None
-            if self.job == "transferer" and known:
-                known.no_drop = self.shunned_cache_now = True
             if self.job == "transferer" and serial:
                 self.cargo_from = cell
+                self.not_to_add.add(serial)
+                self.shunned_cache_now = True
             return
         if self.carrying and self.state == "wait for drop" and failed:
             self.set_out(onward)
@@ -168,8 +168,9 @@ class ReferenceTaskRobot(ReferenceRobot):
             if self.job in ("starter", "finisher") and row >= 0:
                 self.shunned.add(row)
                 self.shunned_now = True
-            if self.job == "transferer" and known:
-                known.no_pickup = self.shunned_cache_now = True
+            if self.job == "transferer" and serial:
+                self.not_to_take.add(serial)
+                self.shunned_cache_now = True
             return
         if event == Event.CACHE_TOO_NEAR:
             if serial:
@@ -198,8 +199,9 @@ class ReferenceTaskRobot(ReferenceRobot):
         self.choose_job()
         self.shunned = self.shunned if self.shunned_now else set()
         if not (self.shunned_cache_now and self.job == "transferer"):
-            for cache in self.caches.values():
-                cache.no_pickup = cache.no_drop = cache.refused = False
+            self.not_to_take, self.not_to_add = set(), set()
+        for cache in self.caches.values():
+            cache.refused = False
         self.shunned_now = self.shunned_cache_now = False
         self.restart()
         if self.carrying:
@@ -320,7 +322,8 @@ class ReferenceTaskRobot(ReferenceRobot):
         for cell, cache in self.caches.items():
             centre = ((cell[0] + 0.5) * 0.2, (cell[1] + 0.5) * 0.2)
             taking = self.state == "acquire"
-            unwanted = cache.no_pickup or cache.count < self.smallest_cache if taking else cache.no_drop
+            unwanted = cache.serial in (self.not_to_take if taking else self.not_to_add)
+            unwanted = unwanted or (taking and cache.count < self.smallest_cache)
             if not taking and self.cargo_from and not self.spec.quirks.transferer_goes_anywhere:
                 unwanted = unwanted or self.nest_distance(cell) >= self.nest_distance(self.cargo_from)
             if not unwanted and not self.covered(cell, tuple(self.position)):

@@ -63,7 +63,8 @@ class TaskRobot:
     @property
     def memory(self) -> OneTaskMemory:
         memory = self.policy._memory
-        return OneTaskMemory(OneMemory(*(part[0] for part in memory.objects)), memory.caches[0], memory.shunned[0])
+        objects, *others = memory
+        return OneTaskMemory(OneMemory(*(part[0] for part in objects)), *(part[0] for part in others))
 
     @property
     def senses(self) -> Any:
