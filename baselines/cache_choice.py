@@ -89,18 +89,23 @@ def select_cache(robot: np.record, senses: Senses, c: np.record, draws: Row, mem
 
 
 @kernel
-def cache_is_known(robot: np.record, c: np.record, memory: OneTaskMemory) -> bool:
-    """Whether the goal still lies in a remembered cache, which has enough objects if the robot wants one.
+def cache_of_goal(robot: np.record, c: np.record, memory: OneTaskMemory) -> int:
+    """List entry of the remembered cache in which the goal lies, or -1.
 
     A cache that is there again serves as well. Quirk `cache_goal_by_identity`: it must be the one that was chosen.
     """
     for entry in range(robot.n_caches):
         cache = memory.caches[entry]
         if covers(cache, robot.goal_x_m, robot.goal_y_m, c):
-            if c.cache_goal_by_identity and cache.serial != robot.target:
-                return False
-            return robot.activity == TRANSPORT or is_large_enough(cache, c)
-    return False
+            return -1 if c.cache_goal_by_identity and cache.serial != robot.target else entry
+    return -1
+
+
+@kernel
+def cache_is_known(robot: np.record, c: np.record, memory: OneTaskMemory) -> bool:
+    """Whether the goal still lies in a remembered cache, which has enough objects if the robot wants one."""
+    entry = cache_of_goal(robot, c, memory)
+    return entry >= 0 and (robot.activity == TRANSPORT or is_large_enough(memory.caches[entry], c))
 
 
 @kernel

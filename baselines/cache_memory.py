@@ -32,7 +32,7 @@ CACHE = np.dtype(
                 ("serial", np.int32),  # identity
                 ("count", np.int32),  # objects when last seen
                 ("seen", np.int32),  # tick of the robot's own clock at which it was last seen
-                ("has_refused", np.bool_),  # the world refused to start another cache near it
+                ("has_refused", np.bool_),  # it is known that the world refuses to start another cache near it
             ],
             align=True,
         ),
@@ -302,7 +302,7 @@ def keep_away_m(cache: np.record, c: np.record) -> float:
 
     Robots plan with a shorter distance than the world allows. One that was refused keeps the world's distance for the
     rest of its task: with the old one it would choose the same place again and stand there. Our choice: the authors'
-    program knows only the shorter one.
+    program knows only the shorter one (quirk `refusals_not_remembered`).
     """
     return c.refusal_m if cache.has_refused else c.proximity_m
 

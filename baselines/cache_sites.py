@@ -9,7 +9,7 @@ from one that has refused, see `cache_memory.keep_away_m`), and lies in a box. I
 near the allowed point nearest to m. This module computes that point exactly and without iterations (our choice). It is
 m itself, or m pushed out of one disc or into the box, or a crossing of the border of a disc with another disc or the
 box. A random offset replaces the scatter of the optimiser; it is far below the distance at which robots count as
-arrived.
+arrived. Quirk `scattered_sites`: the scatter as it was measured.
 """
 
 import math
@@ -25,6 +25,12 @@ from .tasks import DRAW_POINT_X, DRAW_POINT_Y
 
 _RIM_M = 1e-6
 """Distance by which points on a border are moved to its allowed side."""
+_TURNS, _TURN_RAD = 16, 2.4
+"""Directions in which a scattered site is looked for, and the angle between them."""
+_RANDOM_SITES = 256
+"""Points looked at for a random site; with 2 % of the box allowed, one is found in 99 % of the cases."""
+_MULTIPLIER, _MODULUS = 48271, 2**31 - 1
+"""Of the random numbers behind a draw (Park, Miller and Stockmeyer, 1993): kernels draw nothing themselves."""
 
 
 class Best(NamedTuple):
@@ -171,6 +177,55 @@ def nearest_allowed(
 
 
 @kernel
+def scattered_site(
+    robot: np.record, best: Best, turn: float, u: float, c: np.record, memory: OneTaskMemory
+) -> tuple[float, float]:
+    """Return the site under the quirk `scattered_sites`: around the best place, as that optimiser ends around it.
+
+    With a small probability it is a random allowed point. Else it lies r = a / u', u' uniform in (0, 1], from the best
+    place, in a random direction that is turned while the point is not allowed; after some turns the best place itself.
+
+    Args:
+        robot: Record of the robot.
+        best: The best place.
+        turn: Random direction, rad.
+        u: Uniform draw in [0, 1).
+        c: Constants of the run.
+        memory: The robot's memory.
+    """
+    is_inside = best.distance == 0.0
+    far_share = c.far_site_share if is_inside else c.far_site_share_at_border
+    if u < far_share:
+        return _random_site(robot, best, turn / (2.0 * math.pi), u / far_share, c, memory)
+    scale = c.site_scatter_m if is_inside else c.site_scatter_at_border_m
+    length = scale * (1.0 - far_share) / (1.0 - u)
+    for _ in range(_TURNS):
+        x = best.x + length * math.cos(turn)
+        y = best.y + length * math.sin(turn)
+        if is_allowed(robot, x, y, c, memory):
+            return x, y
+        turn += _TURN_RAD
+    return best.x, best.y
+
+
+@kernel
+def _random_site(
+    robot: np.record, best: Best, u: float, v: float, c: np.record, memory: OneTaskMemory
+) -> tuple[float, float]:
+    """Return the first allowed point of a random sequence in the box, which begins with the draws u and v."""
+    column = 1 + int(u * (_MODULUS - 2))
+    row = 1 + int(v * (_MODULUS - 2))
+    for _ in range(_RANDOM_SITES):
+        x = c.site_x_low_m + (c.site_x_high_m - c.site_x_low_m) * column / _MODULUS
+        y = c.site_y_low_m + (c.site_y_high_m - c.site_y_low_m) * row / _MODULUS
+        if is_allowed(robot, x, y, c, memory):
+            return x, y
+        column = column * _MULTIPLIER % _MODULUS
+        row = row * _MULTIPLIER % _MODULUS
+    return best.x, best.y
+
+
+@kernel
 def select_site(robot: np.record, senses: Senses, c: np.record, draws: np.ndarray, memory: OneTaskMemory) -> bool:
     """Choose a site for a new cache as goal.
 
@@ -183,6 +238,10 @@ def select_site(robot: np.record, senses: Senses, c: np.record, draws: np.ndarra
     best = nearest_allowed(robot, middle_x, middle_y, turn, c, memory)
     if best.distance == math.inf:
         return False
+    if c.scattered_sites:
+        robot.goal_x_m, robot.goal_y_m = scattered_site(robot, best, turn, draws[DRAW_POINT_Y], c, memory)
+        robot.goal_tolerance_m = c.site_tolerance_m
+        return True
     length = c.site_jitter_m * draws[DRAW_POINT_Y]
     if best.distance == 0.0:
         length = c.site_offset_low_m + (c.site_offset_high_m - c.site_offset_low_m) * draws[DRAW_POINT_Y]

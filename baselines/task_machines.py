@@ -21,7 +21,14 @@ from swarm_forage_env.contract.detection import sees_cache
 from swarm_forage_env.contract.layout import CACHE_FIELDS, GROUND_SENSORS
 from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, ObsArray, Row
 
-from .cache_choice import cache_is_known, from_nest_m, object_is_near, select_cache, select_isolated_object
+from .cache_choice import (
+    cache_is_known,
+    cache_of_goal,
+    from_nest_m,
+    object_is_near,
+    select_cache,
+    select_isolated_object,
+)
 from .cache_memory import (
     NOT_TO_ADD,
     NOT_TO_TAKE,
@@ -42,6 +49,7 @@ from .cache_memory import (
 )
 from .cache_sites import select_site
 from .machines import (
+    RELEASE,
     acquire,
     command,
     deliver_and_leave,
@@ -56,6 +64,7 @@ from .machines import (
     stop_vector,
 )
 from .memory import forget, look_around, object_row_of
+from .motion import arrival
 from .object_choice import object_is_known, object_is_reached, select_best_object
 from .robots import (
     ACQUIRE,
@@ -66,6 +75,7 @@ from .robots import (
     LET_GO,
     NOT_EXPLORING,
     TRANSPORT,
+    VECTOR_IDLE,
     WAIT_DROP,
     WAIT_PICKUP,
     Senses,
@@ -215,11 +225,18 @@ def follow_events(
         remember_cache(robot, memory, row[c.event_cache : c.event_cache + CACHE_FIELDS], c)
         entry = event_cache_entry(robot, row, c, memory.caches)
         if entry >= 0:
-            memory.caches[entry].has_refused = True
+            memory.caches[entry].has_refused = not c.refusals_not_remembered
         if robot.activity == WAIT_DROP:
             start_carrying(robot, loaded)
-    elif robot.activity == WAIT_PICKUP and SOURCE[task] == _CACHE and not cache_is_known(robot, c, memory):
-        restart_acquiring(robot)  # other robots have left too few objects in the cache
+    elif (
+        robot.activity == WAIT_PICKUP
+        and SOURCE[task] == _CACHE
+        and not cache_is_known(robot, c, memory)
+        and not (
+            c.waits_for_cache and cache_of_goal(robot, c, memory) >= 0
+        )  # quirk: it stands there until there are more
+    ):
+        restart_acquiring(robot)  # other robots have left too few objects in the cache, or it is gone
 
 
 @inline_kernel
@@ -245,6 +262,20 @@ def manage_task(
     return True
 
 
+@kernel
+def stands_at_site(robot: np.record, senses: Senses, c: np.record, draws: Row, memory: OneTaskMemory) -> bool:
+    """Quirk `no_walk_at_site`: choose a site; whether the robot is so near that it drifts there and chooses again.
+
+    Nothing happens while the robot is on the way to one.
+    """
+    if robot.vector_state != VECTOR_IDLE or not select_site(robot, senses, c, draws, memory):
+        return False
+    robot.explore_ticks = NOT_EXPLORING
+    dx = robot.goal_x_m - senses.x
+    dy = robot.goal_y_m - senses.y
+    return dx * dx + dy * dy <= robot.goal_tolerance_m * robot.goal_tolerance_m
+
+
 @inline_kernel
 def run_machine(
     robot: np.record, task: int, senses: Senses, row: Row, c: np.record, draws: Row, memory: OneTaskMemory
@@ -253,6 +284,8 @@ def run_machine(
     if robot.activity not in (ACQUIRE, TRANSPORT):
         return deliver_and_leave(robot, senses, row, c, draws)
     robot.goal_kind = SOURCE[task] if robot.activity == ACQUIRE else DESTINATION[task]
+    if c.no_walk_at_site and robot.goal_kind == _SITE and stands_at_site(robot, senses, c, draws, memory):
+        return arrival(robot, senses.x, senses.y, float(row[c.heading]), float(row[c.heading + 1]), c)
     found, x, y = acquire(
         robot, senses, row, c, draws, memory, select_goal, goal_is_known, goal_is_reached, search_for_goal
     )
@@ -295,3 +328,5 @@ def step_tasks(
         if not has_started:
             after_tick(allocation, i, now, robot.activity, c)
         command(robot, x, y, c, float(DROP_GRIP[task]), action)
+        if robot.activity == WAIT_PICKUP and SOURCE[task] == _CACHE and not cache_is_known(robot, c, known):
+            action[2] = RELEASE  # quirk waits_for_cache: it stands there without asking

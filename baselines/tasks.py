@@ -93,6 +93,14 @@ class TaskParameters(MemoryParameters):
     """Smallest random offset of a site from the midpoint between robot and nest where that is allowed; our choice."""
     site_offset_high_m: float = 0.5
     """Largest such offset; our choice."""
+    site_scatter_m: float = 0.0125
+    """Under the quirk `scattered_sites`, length a of the offsets a / u around the midpoint; measured."""
+    site_scatter_at_border_m: float = 0.03
+    """The same around a place at the border of what is allowed; measured."""
+    far_site_share: float = 0.005
+    """Under that quirk, probability of a random allowed point where the midpoint is allowed; measured."""
+    far_site_share_at_border: float = 0.05
+    """The same where it is not; measured."""
     creation_distance_m: float = 0.8
     """A Cache Finisher drops where it remembers an object this near; authors' program."""
     loose_creation_share: float = 0.15
@@ -101,7 +109,7 @@ class TaskParameters(MemoryParameters):
     def __post_init__(self) -> None:
         # super() without arguments fails in a slots dataclass, because that is a new class.
         MemoryParameters.__post_init__(self)
-        for name in ("estimate_weight", "least_abort_probability"):
+        for name in ("estimate_weight", "least_abort_probability", "far_site_share", "far_site_share_at_border"):
             if getattr(self, name) > 1.0:
                 raise ParameterError(f"Expected {name} <= 1, got {getattr(self, name)}.")
         for name in ("generalist_estimate", "subtask_estimate"):

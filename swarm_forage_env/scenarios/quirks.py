@@ -35,6 +35,16 @@ class Quirks:
     """The place where a search for caches begins is stored whenever the only known cache is seen again."""
     finisher_tolerance_mismatch: bool = False
     """A Cache Finisher arrives at one distance and is accepted at another; starting within tolerance is no arrival."""
+    refusals_not_remembered: bool = False
+    """A refused Cache Starter or Finisher chooses again with its own distance, although the world's is larger."""
+    no_walk_at_site: bool = False
+    """A Cache Starter that stands where it would start a cache drifts towards its choices until one is farther off."""
+    scattered_sites: bool = False
+    """Cache sites scatter around the best allowed place with a heavy tail; some lie anywhere allowed."""
+    waits_for_cache: bool = False
+    """A robot that waits in a cache with too few objects stands until there are enough, and does not search anew."""
+    only_delivering_counts: bool = False
+    """In the nest only the command DELIVER delivers; objects let go or laid down there otherwise are placed again."""
     obstacle_behind_counts: bool = False
     """A summed proximity vector that points straight back is an obstacle whatever its length."""
     pose_sensors_exact: bool = False
@@ -67,6 +77,11 @@ AUTHORS_PROGRAM = Quirks(
     cache_goal_by_identity=True,
     last_cache_at_every_sight=True,
     finisher_tolerance_mismatch=True,
+    refusals_not_remembered=True,
+    no_walk_at_site=True,
+    scattered_sites=True,
+    waits_for_cache=True,
+    only_delivering_counts=True,
     obstacle_behind_counts=True,
     pose_sensors_exact=True,
     nest_left_at_random=True,

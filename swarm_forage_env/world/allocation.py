@@ -61,6 +61,7 @@ def new_arrays(
             cache_proximity_m=config.cache_proximity_m,
             dynamic_caches=config.caches == "dynamic",
             serialized=config.quirks.serialized_interactions,
+            only_delivering_counts=config.quirks.only_delivering_counts,
         ),
         motion=new_motion(config, twist),
         sensors=sensors,

@@ -223,6 +223,8 @@ class Rules(NamedTuple):
     dynamic_caches: bool
     serialized: bool
     """At most one interaction per handler finishes in a tick (quirk `serialized_interactions`)."""
+    only_delivering_counts: bool
+    """In the nest only DELIVER delivers (quirk of this name)."""
 
 
 class Columns(NamedTuple):

@@ -9,6 +9,7 @@ from baselines.cache_sites import is_allowed, nearest_allowed, select_site
 from baselines.task_policy import site_box_m
 from baselines.tasks import DRAW_POINT_X, DRAW_POINT_Y, TASK_DRAWS
 from swarm_forage_env.scenarios.quirks import Quirks
+from tests.reference import scattered_sites
 from tests.support.observations import make_spec
 from tests.support.task_robot import TaskRobot
 
@@ -143,3 +144,74 @@ def test_no_allowed_point_is_nearer(seed):
     assert math.dist((best.x, best.y), middle) == pytest.approx(math.sqrt(best.distance))
     assert math.sqrt(best.distance) <= nearest + 1e-5
     assert nearest <= math.sqrt(best.distance) + 4 * step, "the grid must have a point near the best one"
+
+
+# The scatter of the authors' program
+
+
+def scattered(robot: TaskRobot, x: float, y: float, u: float, v: float) -> tuple[complex, complex]:
+    """Site chosen by a robot at (x, y), and what the slow twin chooses."""
+    c, memory = robot.constants, robot.memory
+    goal = choose(robot, x, y, u, v)
+    middle = 0.5 * (x + c.nest_x_m), 0.5 * (y + c.nest_y_m)
+    best = nearest_allowed(robot.record, *middle, 2 * math.pi * u, c, memory)
+    expected = scattered_sites.site(
+        complex(best.x, best.y),
+        "inside" if best.distance == 0.0 else "border",
+        (c.site_x_low_m, c.site_y_low_m, c.site_x_high_m, c.site_y_high_m),
+        u,
+        v,
+        lambda place: is_allowed(robot.record, place.real, place.imag, c, memory),
+    )
+    return complex(*goal), expected
+
+
+def in_scatter(**changes: object) -> TaskRobot:
+    return TaskRobot(quirks=Quirks(scattered_sites=True), **changes)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_quirk_scattered_sites_as_the_slow_twin(seed):
+    rng = np.random.default_rng(seed)
+    robot = in_scatter(**(MEDIUM if seed % 2 else {}))
+    width_m, height_m = robot.seen.spec.arena_size_m
+    for serial in range(1, int(rng.integers(1, 4))):
+        robot.know_cache(serial, (int(rng.integers(width_m * 5)), int(rng.integers(height_m * 5))), 5)
+    for _ in range(60):
+        x, y = rng.uniform((0.2, 0.2), (width_m - 0.2, height_m - 0.2))
+        v = rng.random() * (1.0 if rng.random() < 0.5 else 0.05)
+        found, expected = scattered(robot, x, y, rng.random(), v)
+        assert abs(found - expected) < 2e-4, "positions are float32"
+
+
+@pytest.mark.parametrize(("x", "scale_m", "far"), [(24.0, 0.0125, 0.005), (8.0, 0.03, 0.05)], ids=["inside", "border"])
+def test_scattered_sites_have_a_heavy_tail_and_a_share_that_lies_anywhere(x, scale_m, far):
+    robot = in_scatter()
+    rng = np.random.default_rng(3)
+    best = (0.5 * (x + 3.2), 8.0) if x > 20.0 else (9.6, 8.0)
+    sites = np.array([choose(robot, x, 8.0, *rng.random(2)) for _ in range(20_000)])
+    distance = np.hypot(*(sites - best).T)
+    assert np.median(distance) == pytest.approx(2 * scale_m, rel=0.08)
+    assert np.mean(distance > 8 * scale_m) == pytest.approx(far + 1 / 8, rel=0.1)
+    anywhere = np.mean(distance > 3.0)
+    assert anywhere == pytest.approx(far + scale_m / 3.0, rel=0.25), "few of the tail reach so far"
+
+
+def test_a_far_site_is_uniform_over_what_is_allowed():
+    robot = in_scatter()
+    robot.know_cache(1, (72, 40), 5)
+    rng = np.random.default_rng(5)
+    sites = np.array([choose(robot, 24.0, 8.0, rng.random(), 0.05 * rng.random()) for _ in range(4000)])
+    c = robot.constants
+    assert all(is_allowed(robot.record, x, y, c, robot.memory) for x, y in sites)
+    grid = rng.uniform((c.site_x_low_m, c.site_y_low_m), (c.site_x_high_m, c.site_y_high_m), (40_000, 2))
+    allowed = np.array([(x, y) for x, y in grid if is_allowed(robot.record, x, y, c, robot.memory)])
+    for axis in range(2):
+        edges = np.quantile(allowed[:, axis], np.linspace(0, 1, 9)[1:-1])
+        counts = np.bincount(np.searchsorted(edges, sites[:, axis]), minlength=8)
+        assert counts == pytest.approx(500, abs=100)
+
+
+def test_a_scattered_site_that_fits_nowhere_is_the_best_place():
+    robot = in_scatter()
+    assert choose(robot, 24.0, 8.0, u=0.3, v=1.0 - 1e-9) == pytest.approx((13.6, 8.0)), "a million metres off"

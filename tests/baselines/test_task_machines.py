@@ -76,6 +76,19 @@ def test_a_refused_pickup_is_an_acquisition_again(robot, task, event):
     assert robot.task is task
 
 
+@pytest.mark.parametrize("task", COLLECTS)
+def test_quirk_waits_for_cache(task):
+    robot = TaskRobot(quirks=Quirks(waits_for_cache=True))
+    wait_for_pickup(robot, task)
+    for count, grip in ((2, Grip.RELEASE), (2, Grip.RELEASE), (3, Grip.GRASP), (2, Grip.RELEASE)):
+        robot.seen.caches((7, CACHE, count))
+        assert robot.act().tolist() == [0.0, 0.0, np.float32(grip)]
+        assert robot.activity is Activity.WAIT_PICKUP
+    robot.seen.caches()
+    robot.act()
+    assert robot.activity is Activity.ACQUIRE, "nothing to wait for"
+
+
 def test_a_collector_gives_way_when_others_have_emptied_the_cache_too_far(robot):
     wait_for_pickup(robot, Task.COLLECTOR)
     robot.seen.caches((7, CACHE, 3))
@@ -216,6 +229,54 @@ def test_a_starter_goes_away_from_a_cache_that_has_refused(robot):
     for task in (Task.HARVESTER, Task.STARTER):
         robot.start(task)
     assert not robot.memory.caches[0].has_refused, "until the task ends"
+
+
+@pytest.mark.parametrize("task", [Task.STARTER, Task.FINISHER])
+def test_quirk_refusals_not_remembered(task):
+    robot = TaskRobot(quirks=Quirks(refusals_not_remembered=True))
+    wait_for_drop(robot, task)
+    x, y = robot.goal
+    if task is Task.STARTER:
+        robot.seen.pose(26.0, 8.1)
+        x, y = 14.6, 8.05  # half way
+    cache = (11, (int((x + 7.1) / 0.2), int(y / 0.2)), 4)  # the world wants 12.8 m, the robot 6.4 m
+    robot.seen.event(Event.CACHE_TOO_NEAR, cache=cache)
+    robot.act()
+    assert list(robot.policy.remembered_caches(0)) == [11]
+    assert not robot.memory.caches[0].has_refused
+    assert math.dist(robot.goal, (x, y)) < 0.6, "where it will be refused again"
+    assert robot.activity is (Activity.TRANSPORT if task is Task.STARTER else Activity.WAIT_DROP)
+
+
+@pytest.mark.parametrize("stays", [False, True])
+@pytest.mark.parametrize("sees_obstacle", [False, True])
+def test_quirk_no_walk_at_site(stays, sees_obstacle):
+    quirks = Quirks(no_walk_at_site=stays, scattered_sites=True, finisher_tolerance_mismatch=True)
+    robot = TaskRobot(quirks=quirks)
+    wait_for_pickup(robot, Task.STARTER)
+    robot.policy._constants["far_site_share_at_border"] = 0.0
+    robot.policy._constants["site_scatter_at_border_m"] = 1e-6  # all choices in one place, 6.4 m from the nest
+    robot.seen.pose(9.2, 8.0, 1.0)
+    if sees_obstacle:
+        robot.seen.obstacle(0.0)
+    robot.seen.window({})
+    robot.seen.carry(3)
+    seen = []
+    for _ in range(4):
+        robot.act()
+        seen.append((robot.stage, robot.record.explore_ticks, robot.record.wander_deg))
+    assert math.dist(robot.goal, (9.6, 8.0)) < 0.01
+    alone = [(VectorState.IDLE, -1, seen[0][2])] * 4
+    assert (seen == alone) == stays, "else it avoids or wanders"
+    assert robot.activity is Activity.TRANSPORT
+    robot.policy._constants["far_site_share_at_border"] = 1.0
+    robot.seen.obstacle(None)
+    robot.act(12)
+    if stays:
+        assert robot.stage is VectorState.VECTOR, "a choice farther away"
+        robot.seen.pose(*robot.goal)
+        robot.act()
+        assert robot.activity is Activity.WAIT_DROP
 
 
 def test_a_finisher_leaves_an_object_near_a_cache_that_has_refused(robot):

@@ -37,6 +37,7 @@ class SlowWorld:
     proximity_m: float
     dynamic: bool
     serialized: bool
+    only_delivering_counts: bool
     position: list[tuple[float, float]]
     active: list[bool]
     cargo: dict[int, int]
@@ -92,7 +93,7 @@ class SlowWorld:
             return ("take from floor", self.floor[cell]) if cell in self.floor else ("nothing", None)
         if band == GRASP:
             return None
-        if self.in_nest(robot):
+        if self.in_nest(robot) and (band == DELIVER or not self.only_delivering_counts):
             return "deliver", None
         if cache is not None:
             return "drop into cache", cache

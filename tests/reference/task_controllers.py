@@ -93,6 +93,8 @@ class ReferenceTaskRobot(ReferenceRobot):
     def grip(self) -> float:
         if self.state == "wait for drop":
             return {"starter": Grip.SITE, "finisher": Grip.CREATE_CACHE}.get(self.job, Grip.DELIVER)
+        if self.state == "wait for pick-up" and JOBS[self.job][0] == "cache" and not self.valid():
+            return Grip.RELEASE  # quirk waits_for_cache: for more objects
         return Grip.RELEASE if self.state in ("acquire", "let go") else Grip.GRASP
 
     # Memory
@@ -175,10 +177,15 @@ class ReferenceTaskRobot(ReferenceRobot):
         if event == Event.CACHE_TOO_NEAR:
             if serial:
                 self.know(serial, cell, count, density=1.0 - RHO)
-                self.caches[cell].refused = True
+                self.caches[cell].refused = not self.spec.quirks.refusals_not_remembered
             if self.state == "wait for drop":
                 self.set_out(onward)
         elif self.state == "wait for pick-up" and JOBS[self.job][0] == "cache" and not self.valid():
+            self.restart_unless_waiting()
+
+    def restart_unless_waiting(self) -> None:
+        """Look for another cache; under the quirk, only when there is none here to wait in."""
+        if not (self.spec.quirks.waits_for_cache and self.goal_cache()):
             self.restart()
 
     def set_out(self, state: str) -> None:
@@ -283,6 +290,11 @@ class ReferenceTaskRobot(ReferenceRobot):
 
     def approach(self) -> tuple[bool, complex]:
         starts = self.vector == "idle" or self.searching
+        if self.spec.quirks.no_walk_at_site and starts and self.kind == "site" and self.choose_goal():
+            distance = math.dist(self.goal, self.position)
+            if distance <= self.tolerance:
+                self.timer = None
+                return False, self.arrive(distance)
         if starts:
             if not self.choose_goal():
                 return self.look()
@@ -364,11 +376,16 @@ class ReferenceTaskRobot(ReferenceRobot):
         if self.kind == "object":
             return self.target in self.memory.known
         if self.kind == "cache":
-            holding = [cache for cell, cache in self.caches.items() if self.covered(cell, self.goal)]
-            if not holding or (self.spec.quirks.cache_goal_by_identity and holding[0].serial != self.goal_serial):
-                return False
-            return self.state == "transport" or holding[0].count >= self.smallest_cache
+            cache = self.goal_cache()
+            return cache is not None and (self.state == "transport" or cache.count >= self.smallest_cache)
         return True
+
+    def goal_cache(self) -> RememberedCache | None:
+        """The remembered cache in which the goal lies, if it is the one that was chosen."""
+        holding = [cache for cell, cache in self.caches.items() if self.covered(cell, self.goal)]
+        if not holding or (self.spec.quirks.cache_goal_by_identity and holding[0].serial != self.goal_serial):
+            return None
+        return holding[0]
 
     def reached(self) -> bool:
         if self.kind == "object":

@@ -8,6 +8,7 @@ import pytest
 from swarm_forage_env.contract.codes import CELL_EMPTY, Counter, Event, Grip, ObjectStatus
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.world.kernels.interact import CREATE_CACHE, DELIVER_ONLY, GRASP, RELEASE, SITE, band_of, serve
 from swarm_forage_env.world.state import listed
 from tests.support.engines import in_each_engine
@@ -123,6 +124,24 @@ def test_empty_robots_have_nothing_to_release(grip):
 
 
 # Carrying robots
+
+
+@in_each_engine
+@pytest.mark.parametrize("caches", ["none", "dynamic"])
+@pytest.mark.parametrize("grip", ANY_RELEASE)
+def test_quirk_only_delivering_counts(grip, caches):
+    env = tidy_world(caches=caches, quirks=Quirks(only_delivering_counts=True))
+    stand(env, 0, NEST_CELL)
+    load(env, 0, 2)
+    waits = grip == Grip.DELIVER or (caches == "dynamic" and grip in (Grip.SITE, Grip.CREATE_CACHE))
+    found = events_of(env, grip, 2 if waits else 1)
+    assert found[-1] == (DELIVERED if grip == Grip.DELIVER else ELSEWHERE)
+    assert env.swarm.carried_object[0] == -1
+    delivered = int(grip == Grip.DELIVER)
+    counters = (Counter.COLLECTED, Counter.FLOOR_DROPS, Counter.DISPLACED_DROPS)
+    assert [count(env, counter) for counter in counters] == [delivered, 1 - delivered, 1 - delivered]
+    assert env.objects.status[2] == ObjectStatus.FREE, "placed again"
+    assert_conserved(env)
 
 
 @in_each_engine

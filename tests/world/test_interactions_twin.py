@@ -36,7 +36,7 @@ KINDS = {
 }
 
 
-def crowd(caches: str, serialized: bool) -> ForageEnv:
+def crowd(caches: str, quirks: Quirks) -> ForageEnv:
     config = scenario(
         "warehouse_small",
         n_robots=N_ROBOTS,
@@ -44,7 +44,7 @@ def crowd(caches: str, serialized: bool) -> ForageEnv:
         caches=caches,
         side_share=0.02,
         distance_share=0.01,
-        quirks=Quirks(serialized_interactions=serialized),
+        quirks=quirks,
     )
     env = ForageEnv(config)
     env.reset_batch(0)
@@ -66,6 +66,7 @@ def mirror(env: ForageEnv) -> SlowWorld:
         proximity_m=config.cache_proximity_m,
         dynamic=config.caches == "dynamic",
         serialized=config.quirks.serialized_interactions,
+        only_delivering_counts=config.quirks.only_delivering_counts,
         position=[(x, y) for x, y in swarm.position.tolist()],
         active=swarm.active.tolist(),
         cargo={robot: row for robot, row in enumerate(swarm.carried_object.tolist()) if row >= 0},
@@ -134,11 +135,15 @@ def create_somewhere(env: ForageEnv, rng: np.random.Generator) -> None:
 
 
 @pytest.mark.parametrize("longest", [1, 4])
-@pytest.mark.parametrize("serialized", [False, True])
+@pytest.mark.parametrize(
+    "quirks",
+    [Quirks(), Quirks(serialized_interactions=True), Quirks(only_delivering_counts=True)],
+    ids=["described", "serialized", "only delivering"],
+)
 @pytest.mark.parametrize("caches", ["none", "static", "dynamic"])
-def test_every_tick_equals_the_twin(caches, serialized, longest):
+def test_every_tick_equals_the_twin(caches, quirks, longest):
     """With `longest` above 1, picking up and dropping take 1 to that many ticks, drawn in every tick."""
-    env = crowd(caches, serialized)
+    env = crowd(caches, quirks)
     rng = np.random.default_rng(7)
     grips = np.ones(N_ROBOTS, np.float32)
     actions = np.zeros((N_ROBOTS, 3), np.float32)

@@ -120,7 +120,7 @@ def request_of(state: WorldState, rules: Rules, band: int, i: int) -> tuple[int,
         return NOTHING, -1
     if band == GRASP:
         return NO_REQUEST, -1
-    if _in_nest(position, rules, i):
+    if _in_nest(position, rules, i) and (band == DELIVER_ONLY or not rules.only_delivering_counts):
         return DELIVER, -1
     if code <= CELL_CACHE:
         return CACHE_DROP, CELL_CACHE - code
