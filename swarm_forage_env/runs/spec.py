@@ -38,8 +38,14 @@ _LATER_FIELDS = (
     ("reward", "own_reward"),
     ("arena", "obstacles"),
     ("objects", "object_positions_m"),
+    ("quirks", "refusals_not_remembered"),
+    ("quirks", "no_walk_at_site"),
+    ("quirks", "scattered_sites"),
+    ("quirks", "waits_for_cache"),
+    ("quirks", "only_delivering_counts"),
 )
-"""Fields that are no part of an identity where they are empty: runs without them are those of before there were any."""
+"""Fields that are no part of an identity where they are empty or off: runs without them are those of before there were
+any."""
 _KEYS = ("scenario", "policy", "parameters", "wrappers", "criterion", "criterion_value", "seed")
 
 
@@ -92,7 +98,7 @@ class RunSpec:
         `performance` of the scenario is left out: it says how the run is read. So another one finds the stored run.
         `physics` is left out where it is the default, so that runs in Chipmunk have the same ids with and without it;
         so are own sensors, an own reward, neighbours, messages, kinds of robots, obstacles and positions of objects
-        where there are none.
+        where there are none, and quirks of `_LATER_FIELDS` where they are off.
         """
         return identity_of({**self._others(), "scenario": _identifying_fields(self.scenario)})
 
