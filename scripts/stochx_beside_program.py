@@ -1,4 +1,4 @@
-"""STOCHX under the rules `AUTHORS_PROGRAM` beside runs of the authors' program itself, as tables for docs/controllers.md.
+"""STOCHX under the rules `AUTHORS_PROGRAM` beside runs of the authors' program itself: tables of docs/controllers.md.
 
     python scripts/stochx_beside_program.py                 runs of 10,000 s, some minutes
     python scripts/stochx_beside_program.py --seeds 4       fewer of them
@@ -58,7 +58,7 @@ class Found:
     def robots_per_task(self) -> list[float]:
         """Mean number of robots in each of `TASKS` in the second half."""
         shares = [
-            [np.split(record.columns()[f"task_share_{task.name.lower()}"], 2)[1].mean() for task in TASKS]
+            [np.array_split(record.columns()[f"task_share_{task.name.lower()}"], 2)[1].mean() for task in TASKS]
             for record in self.records
         ]
         return (self.place.n_robots * np.mean(shares, axis=0)).tolist()
@@ -69,7 +69,7 @@ class Found:
         return sorted((at[0] + 1) * INTERVAL_S if len(at) else np.inf for at in created)
 
 
-def runs_of(place: Place, n_seeds: int) -> Found:
+def runs_of(place: Place, n_seeds: int, horizon_s: float) -> Found:
     """Run STOCHX in a place."""
     world = scenario(
         place.name,
@@ -77,7 +77,7 @@ def runs_of(place: Place, n_seeds: int) -> Found:
         n_objects=place.n_objects,
         quirks="AUTHORS_PROGRAM",
         physics="compiled",
-        horizon_s=10_000.0,
+        horizon_s=horizon_s,
         interval_s=INTERVAL_S,
     )
     return Found(place=place, records=[run_one(plan_run(world, "stochx", seed=seed)) for seed in range(n_seeds)])
@@ -96,13 +96,14 @@ def deliveries(found: Sequence[Found]) -> Sheet:
                 str(place.n_robots),
                 str(place.n_objects),
                 "-" if place.program is None else f"{place.program:.1f}",
-                f"{mean.mean:.1f} ± {mean.mean - mean.lower:.1f}",
+                f"{mean.mean:.1f}",
+                f"{mean.lower:.1f} to {mean.upper:.1f}",
                 ratio,
                 f"{np.std(rates, ddof=1):.1f}",
             )
         )
-    header = ("world", "robots", "objects", "program", "AUTHORS_PROGRAM", "ratio", "sd of one run")
-    note = f"±: 95 % t interval of the mean of {len(found[0].records)} runs"
+    header = ("world", "robots", "objects", "program", "AUTHORS_PROGRAM", "95 %", "ratio", "sd of one run")
+    note = f"95 %: Student's interval of the mean of {len(found[0].records)} runs"
     return Sheet(title="deliveries per 1,000 s", header=header, rows=rows, notes=[note])
 
 
@@ -134,8 +135,9 @@ def main() -> None:
     """Do what the command line says."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=whole(at_least=2), default=16, help="runs of each world (default: 16)")
-    n_seeds = parser.parse_args().seeds
-    found = [runs_of(place, n_seeds) for place in PLACES]
+    parser.add_argument("--horizon", type=float, default=10_000.0, help="seconds of a run (default: 10000)")
+    words = parser.parse_args()
+    found = [runs_of(place, words.seeds, words.horizon) for place in PLACES]
     by_place = {one.place: one for one in found}
     sheets = (deliveries(found), tasks(by_place[WITH_TASKS]), first_caches(found))
     print("\n\n".join(sheet.text() for sheet in sheets))

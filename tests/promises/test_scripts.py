@@ -103,6 +103,20 @@ def test_results_say_which_sets_and_conditions_they_are_of(run):
     assert f"| `S1c` | {len(whole.places)} | 0 | 0 | - |" in page, "four intervals are too short for breakdowns"
 
 
+@pytest.mark.compiled
+def test_stochx_is_held_beside_the_program(run):
+    lines = run("stochx_beside_program", "--seeds", "2", "--horizon", "400")[1].splitlines()
+    assert [line.split()[:3] for line in lines[2:7]] == [
+        ["warehouse_small", "16", "230"],
+        ["warehouse_small", "32", "230"],
+        ["warehouse_small", "50", "177"],
+        ["warehouse_small", "64", "230"],
+        ["warehouse_medium", "200", "800"],
+    ]
+    of_robots = [float(number) for number in lines[12].split()[1:]]
+    assert 49.0 < sum(of_robots) <= 50.1, "everybody has a task but in the first tick"
+
+
 def test_laws_are_written_beside_the_runs_of_a_study(run):
     pytest.importorskip("matplotlib", reason="needs the plots extra: matplotlib")
     foraging_table().write("laws.parquet")
