@@ -136,7 +136,7 @@ def main() -> None:
     torch.manual_seed(args.seed)
     torch.set_num_threads(1)
     envs = gymnasium.make_vec(
-        "swarm_forage/warehouse_small-v1",
+        "swarm_forage/warehouse_small-v2",
         n_arenas=args.n_arenas,
         n_robots=args.n_robots,
         interface=INTERFACE,

@@ -2,12 +2,13 @@
 
 Public names stand in `__init__.pyi`. They load on first use: importing the package loads next to nothing. Every
 scenario is registered with PettingZoo and Gymnasium, as soon as they are imported, under ids such as
-`swarm_forage/warehouse_small-v1`.
+`swarm_forage/warehouse_small-v2`.
 """
 
 import sys
 from collections.abc import Callable, Iterator
-from typing import Any
+from functools import partial
+from typing import Any, NoReturn
 
 import lazy_loader
 
@@ -26,27 +27,39 @@ def _ids() -> Iterator[tuple[str, dict[str, str]]]:
     from swarm_forage_env.scenarios.presets import SCENARIO_NAMES
 
     for name in (*SCENARIO_NAMES, "sampled"):
-        yield f"swarm_forage/{name}-v1", {"scenario": name}
+        yield f"swarm_forage/{name}", {"scenario": name}
+
+
+def _former(error: type[Exception], name: str, **_: Any) -> NoReturn:
+    """Stand in for an environment of version 1, whose runs cannot be told from those of version 2 by their id alone."""
+    raise error(
+        f"{name}-v1 moved robots with Chipmunk, {name}-v2 moves them in compiled code, several times as fast; other "
+        f'rules have changed too, see the changelog. Make {name}-v2, with physics="chipmunk" for bodies as before.'
+    )
 
 
 def _register_with_pettingzoo() -> None:
     import pettingzoo
+    from pettingzoo.env_registry.exceptions import VersionNotFound
 
-    for env_id, kwargs in _ids():
-        pettingzoo.register("parallel", env_id, "swarm_forage_env.views.pettingzoo:parallel_env", kwargs=kwargs)
-        pettingzoo.register("aec", env_id, "swarm_forage_env.views.pettingzoo:env", kwargs=kwargs)
+    for name, kwargs in _ids():
+        for form, maker in (("parallel", "parallel_env"), ("aec", "env")):
+            pettingzoo.register(form, f"{name}-v2", f"swarm_forage_env.views.pettingzoo:{maker}", kwargs=kwargs)
+            pettingzoo.register(form, f"{name}-v1", partial(_former, VersionNotFound, name))
 
 
 def _register_with_gymnasium() -> None:
     import gymnasium
 
-    for env_id, kwargs in _ids():
+    for name, kwargs in _ids():
         gymnasium.register(
-            env_id,
+            f"{name}-v2",
             "swarm_forage_env.views.gymnasium:JointForageEnv",
             kwargs=kwargs,
             vector_entry_point="swarm_forage_env.views.gymnasium:vector_env",
         )
+        former = partial(_former, gymnasium.error.DeprecatedEnv, name)
+        gymnasium.register(f"{name}-v1", former, vector_entry_point=former)
 
 
 class _Finder:

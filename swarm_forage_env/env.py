@@ -40,7 +40,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - PettingZoo types it as an attribute of instances
-        "name": "swarm_forage_v1",
+        "name": "swarm_forage_v2",
         "render_modes": ["rgb_array", "human"],
         "render_fps": 5,
         "is_parallelizable": True,
@@ -62,10 +62,9 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
             max_cycles: Steps until truncation; default the scenario's horizon.
             render_mode: None, "rgb_array", or "human": every reset and step is shown in a window, without waiting.
             reads: Observation slices that will be used; others may stay zero, which is faster. Default: all.
-            snapshots: Keep what `snapshot`, `copy.deepcopy` and `pickle` need. With physics="compiled" that is nothing,
-                and they always work. With physics="chipmunk" it is a history of the run, 24 bytes per robot and tick,
-                and a restore or copy repeats the motion of all bodies since the reset: about 1 microsecond per robot
-                and tick.
+            snapshots: Keep what `snapshot`, `copy.deepcopy` and `pickle` need with physics="chipmunk": a history of the
+                run, 24 bytes per robot and tick; a restore or copy repeats the motion of all bodies since the reset,
+                about 1 microsecond per robot and tick. With compiled bodies they always work and keep nothing.
 
         Raises:
             ConfigError: `scenario` is no ScenarioConfig, an unknown slice in `reads`, or `snapshots` is no bool.

@@ -96,7 +96,7 @@ class RunSpec:
         """Short hexadecimal hash of all that can change a run; equal specifications have equal ids.
 
         `performance` of the scenario is left out: it says how the run is read. So another one finds the stored run.
-        `physics` is left out where it is the default, so that runs in Chipmunk have the same ids with and without it;
+        `physics` is left out of runs in Chipmunk, as it was before there were compiled bodies;
         so are own sensors, an own reward, neighbours, messages, kinds of robots, obstacles and positions of objects
         where there are none, and quirks of `_LATER_FIELDS` where they are off.
         """
@@ -142,8 +142,10 @@ class RunSpec:
         if missing:
             raise ConfigError(f"Missing key {missing[0]!r} in a run specification.")
         values = dict(mapping)
+        # Chipmunk was the only engine when specifications did not name one
+        scenario = {"physics": "chipmunk"} | dict(values.pop("scenario"))
         world = World(
-            from_mapping(ScenarioConfig, values.pop("scenario"), where="scenario."),
+            from_mapping(ScenarioConfig, scenario, where="scenario."),
             wrappers_from_list(values.pop("wrappers", ())),
             criterion=values.pop("criterion", UNDISTURBED),
             value=values.pop("criterion_value", 0.0),

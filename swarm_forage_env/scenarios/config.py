@@ -32,7 +32,7 @@ from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.scenarios.robots import WHEEL_SCALE_MPS, RobotConfig
 
 CACHE_KINDS = ("none", "static", "dynamic")
-PHYSICS_ENGINES = ("chipmunk", "compiled")
+PHYSICS_ENGINES = ("compiled", "chipmunk")
 MAX_DISC_SHARE = 0.4
 """Robot discs may cover at most this share of the start area; with more, random start poses cannot be drawn."""
 MAX_HANDLING_TICKS = 1_000_000
@@ -239,8 +239,8 @@ class ScenarioConfig:
     horizon_s: float = 10_000.0
     interval_s: float = 200.0
     """Length of a recording interval."""
-    physics: str = "chipmunk"
-    """What moves the bodies and resolves contacts: "chipmunk" (`world.physics`) or "compiled" (`world.bodies`), which
+    physics: str = "compiled"
+    """What moves the bodies and resolves contacts: "chipmunk" (`world.chipmunk`) or "compiled" (`world.bodies`), which
     has the same model of contact and is faster. Runs agree until heaps of several robots part them."""
     physics_substeps: tuple[float, ...] = (0.25,) * 4
     """Substeps of the engine as equal shares of a tick, `MIN_SUBSTEPS` to `MAX_SUBSTEPS`. Free motion is exact for any

@@ -56,8 +56,6 @@ DEFAULT_OPTIONS: dict[str, dict[str, Any]] = {
 """Arguments that suit hundreds of robots at once; our choice, the rest is the library's."""
 LATE_OPTIONS: dict[str, dict[str, Any]] = {"ppo": {"learning_rate": 0.0003, "gamma": 0.995}}
 """Arguments of an algorithm in the last third of a training: smaller steps, further ahead; our choice."""
-TRAINING_PHYSICS = "compiled"
-"""What moves the bodies in training: contact follows the same model as with Chipmunk, in a part of the time."""
 SMALL_START = 0.4
 """Share of its size that an arena has in a small start; our choice."""
 
@@ -107,9 +105,7 @@ def recipe(
         samples: Whether the trained policy draws its actions, see `TrainingPlan.samples`; default where it can:
             discrete actions of ppo and a2c.
         overrides: Scenario fields by name; they go before the recipe's (`nest_progress=0.1`). `horizon_s` is the length
-            of the episodes; evaluations last as long as the scenario. Where nothing is said of `physics`, the stages of
-            a preset have `TRAINING_PHYSICS` and its evaluations those of the scenario; a complete configuration and
-            the worlds of a sampler keep their own in both.
+            of the episodes; evaluations last as long as the scenario.
 
     Raises:
         ConfigError: an unknown name or field, values that are refused by what they are for (see `TrainingPlan`), or
@@ -129,8 +125,6 @@ def recipe(
     episodes: dict[str, Any] = {}
     if not isinstance(scenario, ScenarioConfig):
         episodes = {"horizon_s": measured.episode_s}
-        if "physics" not in overrides:
-            episodes["physics"] = TRAINING_PHYSICS
     episodes |= {name: value for name, value in overrides.items() if name not in fields}
     with_overrides(config, **episodes)  # refuses an impossible length
     chosen = chosen_interface(interface, _default_interface(algorithm))

@@ -30,7 +30,6 @@ from swarm_forage_env.world.kernels.kinds import blank
 from swarm_forage_env.world.kernels.tick import DONE, NO_ROOM, TO_PLACE, run
 from swarm_forage_env.world.kinds import blank_boxes
 from swarm_forage_env.world.neighbourhood import Neighbourhood
-from swarm_forage_env.world.physics import Physics
 from swarm_forage_env.world.placement import (
     draw_source,
     draw_start_poses,
@@ -68,7 +67,7 @@ class ForagingArena:
             config: The scenario.
             reads: Observation slices that are used; the sensors of others may stay zero. Default: all. "light if
                 carrying" reads light in rows of robots that carry only.
-            snapshots: Whether Chipmunk's history is kept, see `physics.History`; compiled bodies need none.
+            snapshots: Whether Chipmunk's history is kept, see `chipmunk.History`; compiled bodies need none.
 
         Raises:
             ConfigError: `reads` holds an unknown name.
@@ -106,7 +105,9 @@ class ForagingArena:
         if config.physics == "compiled":
             self._physics = Bodies(config, position, heading, sensors.near, sensors.bins)
         else:
-            self._physics = Physics(config, position, heading, keeps_history=self._snapshots)
+            from swarm_forage_env.world.chipmunk import ChipmunkBodies  # pymunk is loaded where it is asked for
+
+            self._physics = ChipmunkBodies(config, position, heading, keeps_history=self._snapshots)
         self.obs = sensors.obs
         self._arrays = new_arrays(config, state, sensors, self._physics.twist, self._static_caches)
         for name in _FUNCTIONS:

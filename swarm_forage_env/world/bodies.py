@@ -1,4 +1,4 @@
-"""Robots as discs in compiled code: what `world.physics` does with Chipmunk, with the same model of contact.
+"""Robots as discs in compiled code: what `world.chipmunk` does with Chipmunk, with the same model of contact.
 
 Chipmunk is for bodies of every kind; this is for equal discs among boxes in a rectangle, and takes the neighbours that
 proximity sensing found. Only robots that can touch something within the tick are moved in substeps.
@@ -15,16 +15,17 @@ from swarm_forage_env._internal.compiling import direct
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.world.kernels.bodies import WALLS, BodyState, move_bodies, tell_poses
-from swarm_forage_env.world.physics import PARKED_M, obstacle_rows, room_of_centres
 from swarm_forage_env.world.state import SwarmState
 
+PARKED_M = -10.0
+"""Where robots are parked: far outside."""
 PAIRS_PER_ROBOT = 8
 """Room for pairs at the start, per robot. About six equal discs fit around one, and each pair is held once; it grows
 where more than that lie on top of each other."""
 
 
 class Bodies:
-    """Bodies of one run, with the methods of `physics.Physics`.
+    """Bodies of one run, with the methods of `chipmunk.ChipmunkBodies`.
 
     Attributes:
         twist: (N + 1, 3) float64 to be filled before `advance`: velocity x, y in m/s and turn rate in rad/s.
@@ -126,3 +127,15 @@ def _room_for(n_robots: int, n_pairs: int, n_fixed: int) -> dict[str, Any]:
         ),
         "memory": (np.zeros(1, np.int32), np.zeros((n_contacts, 3))),
     }
+
+
+def room_of_centres(config: ScenarioConfig) -> FloatArray:
+    """Where centres of robots can be whose bodies are inside: x low, y low, x high, y high in m."""
+    x_low, y_low, x_high, y_high = config.arena.interior_m
+    radius = config.robots.radius_m
+    return np.array([x_low + radius, y_low + radius, x_high - radius, y_high - radius])
+
+
+def obstacle_rows(config: ScenarioConfig) -> FloatArray:
+    """Obstacles as kernels take them: (B, 4) x low, y low, x high, y high in m."""
+    return np.array(config.arena.obstacles, np.float64).reshape(-1, 4)

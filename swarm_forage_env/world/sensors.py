@@ -17,8 +17,8 @@ from swarm_forage_env.contract.types import ObsArray
 from swarm_forage_env.scenarios.config import ArenaConfig, ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M
 from swarm_forage_env.scenarios.robots import WHEEL_SCALE_MPS
+from swarm_forage_env.world.bodies import obstacle_rows
 from swarm_forage_env.world.kinds import blank_boxes, half_windows, kind_columns
-from swarm_forage_env.world.physics import obstacle_rows
 from swarm_forage_env.world.state import Columns, ObjectState, Sensors, SwarmState
 
 PROXIMITY_RANGE_M = 0.1

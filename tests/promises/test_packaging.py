@@ -83,7 +83,7 @@ def test_changelog_and_citation_have_this_version_and_its_date():
 
 @pytest.mark.parametrize("name", swarm_forage_env.SCENARIO_NAMES)
 def test_every_scenario_is_registered(name):
-    env_id = f"swarm_forage/{name}-v1"
+    env_id = f"swarm_forage/{name}-v2"
     world = pettingzoo.make("parallel", env_id, n_robots=2, max_cycles=3)
     assert world.scenario.name == name
     assert world.scenario.robots.n_robots == 2
@@ -101,12 +101,12 @@ def test_ids_are_registered_in_any_order_of_imports(order):
         imports = f"import {order.format(package)}"
         late = f"import sys, swarm_forage_env; sys.modules['numpy'] = None\ntry: import {package}\nexcept ImportError: "
         for code in (imports, f"{late}del sys.modules['numpy']\nimport {package}"):
-            assert run_python(f"{code}\nprint('swarm_forage/warehouse_small-v1' in {registry})").strip() == "True"
+            assert run_python(f"{code}\nprint('swarm_forage/warehouse_small-v2' in {registry})").strip() == "True"
 
 
 def test_whoever_only_asks_where_a_package_is_changes_nothing():
     code = "import importlib.util, swarm_forage_env; importlib.util.find_spec('gymnasium'); import gymnasium; "
-    assert run_python(f"{code}print('swarm_forage/warehouse_small-v1' in gymnasium.registry)").strip() == "True"
+    assert run_python(f"{code}print('swarm_forage/warehouse_small-v2' in gymnasium.registry)").strip() == "True"
 
 
 def test_installed_policies_are_those_of_this_checkout():

@@ -55,11 +55,11 @@ def test_max_cycles():
 
 @pytest.mark.parametrize("name", SCENARIO_NAMES)
 def test_environments_are_made_by_id(name):
-    parallel = pettingzoo.make("parallel", f"swarm_forage/{name}-v1", caches="dynamic", **SMALL)
+    parallel = pettingzoo.make("parallel", f"swarm_forage/{name}-v2", caches="dynamic", **SMALL)
     assert isinstance(parallel.unwrapped, ForageEnv)
     assert parallel.unwrapped.scenario.name == name
     assert parallel.unwrapped.scenario.caches == "dynamic"
-    turns = pettingzoo.make("aec", f"swarm_forage/{name}-v1", **SMALL)
+    turns = pettingzoo.make("aec", f"swarm_forage/{name}-v2", **SMALL)
     assert isinstance(turns, AECEnv)
     assert turns.unwrapped.scenario.name == name
     assert len(turns.possible_agents) == 5
@@ -67,9 +67,9 @@ def test_environments_are_made_by_id(name):
 
 def test_metadata_names_a_versioned_environment():
     world = parallel_env(**SMALL)
-    assert world.metadata["name"] == "swarm_forage_v1"
+    assert world.metadata["name"] == "swarm_forage_v2"
     assert world.metadata["is_parallelizable"]
-    assert str(env(**SMALL)) == "swarm_forage_v1"
+    assert str(env(**SMALL)) == "swarm_forage_v2"
 
 
 # Spaces and agents
@@ -367,5 +367,5 @@ def test_one_factory_makes_all_forms():
     assert isinstance(parallel_env("warehouse_small", wrappers=[throttle], **SMALL), Throttle)
     learner = parallel_env("warehouse_small", wrappers=[throttle], interface={"actions": "discrete"}, **SMALL)
     assert isinstance(learner, ParallelLearnerEnv)
-    by_id = pettingzoo.make("parallel", "swarm_forage/warehouse_small-v1", wrappers=[throttle], **SMALL)
+    by_id = pettingzoo.make("parallel", "swarm_forage/warehouse_small-v2", wrappers=[throttle], **SMALL)
     assert isinstance(by_id, Throttle)

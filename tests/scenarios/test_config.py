@@ -138,7 +138,7 @@ def test_mapping_uses_defaults_for_what_is_left_out():
     config = from_mapping(ScenarioConfig, mapping)
     assert config.cache == CacheConfig()
     assert config.horizon_s == 10_000.0
-    assert config.physics == "chipmunk"
+    assert config.physics == "compiled"
 
 
 def test_mapping_refuses_unknown_keys_with_the_nearest():
@@ -213,7 +213,7 @@ def test_mapping_refuses_a_value_where_a_section_belongs():
         ({"integer_estimates": 1}, ("quirks.integer_estimates to be True or False", "got 1")),
         ({"caches": "dinamic"}, ("none, static, dynamic", "got 'dinamic'", "Did you mean 'dynamic'?")),
         ({"performance": "colected"}, ("performance to be a recorded column", "Did you mean 'collected'?")),
-        ({"physics": "compild"}, ("physics to be one of chipmunk, compiled", "Did you mean 'compiled'?")),
+        ({"physics": "compild"}, ("physics to be one of compiled, chipmunk", "Did you mean 'compiled'?")),
         ({"name": "../elsewhere"}, ("scenario.name to be at most 60 characters", "got '../elsewhere'")),
         ({"name": ""}, ("scenario.name to be a non-empty text", "got ''")),
         ({"dt_s": 0.0}, ("scenario.dt_s to be a finite number > 0", "got 0.0")),

@@ -6,13 +6,13 @@ import pytest
 from swarm_forage_env.contract.layout import observation_layout
 from swarm_forage_env.scenarios.config import PHYSICS_ENGINES, ScenarioConfig
 from swarm_forage_env.world.bodies import Bodies
+from swarm_forage_env.world.chipmunk import ChipmunkBodies
 from swarm_forage_env.world.kernels.beams import proximity
 from swarm_forage_env.world.kernels.neighbourhood import bin_robots
-from swarm_forage_env.world.physics import Physics
 from swarm_forage_env.world.sensors import new_sensors
 from swarm_forage_env.world.state import SwarmState
 
-CHOSEN = "chipmunk"
+CHOSEN = "compiled"
 """What `stage.tidy_world` makes; the fixture `each_engine` changes it for a test."""
 
 
@@ -50,14 +50,16 @@ class SensedBodies(Bodies):
         super().advance(swarm)
 
 
-def make_bodies(config: ScenarioConfig, swarm: SwarmState) -> Physics | SensedBodies:
+def make_bodies(config: ScenarioConfig, swarm: SwarmState) -> ChipmunkBodies | SensedBodies:
     """Bodies where the robots of a state are, in the engine of the configuration."""
     if config.physics == "compiled":
         return SensedBodies(config, swarm)
-    return Physics(config, swarm.position, swarm.heading)
+    return ChipmunkBodies(config, swarm.position, swarm.heading)
 
 
-def drive_at(physics: Physics | Bodies, swarm: SwarmState, heading: np.ndarray, speed: float | np.ndarray) -> None:
+def drive_at(
+    physics: ChipmunkBodies | Bodies, swarm: SwarmState, heading: np.ndarray, speed: float | np.ndarray
+) -> None:
     """One tick in which robots move in these directions (N,) at this speed in m/s, without turning."""
     physics.twist[:-1, 0] = speed * np.cos(heading)
     physics.twist[:-1, 1] = speed * np.sin(heading)

@@ -9,7 +9,7 @@ import pytest
 from swarm_forage_env import training
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.interface import InterfaceConfig
-from swarm_forage_env.scenarios.config import RewardConfig
+from swarm_forage_env.scenarios.config import PHYSICS_ENGINES, RewardConfig
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario, warehouse_small
 from swarm_forage_env.training.defaults import EVALUATE_EVERY
@@ -42,9 +42,9 @@ def test_where_deliveries_count_the_way_to_them_is_rewarded_and_short_at_first()
     plan = recipe("warehouse_small")
     assert plan.scenario == warehouse_small(nest_progress=0.05, first_pickup=1.0)
     assert plan.stages == (
-        Stage(steps=1_666_666, scenario={**small_arena(plan.scenario), "horizon_s": 1000.0, "physics": "compiled"}),
-        Stage(steps=1_666_668, scenario={"horizon_s": 1000.0, "physics": "compiled"}),
-        Stage(steps=1_666_666, scenario={"horizon_s": 1000.0, "physics": "compiled"}, options=LATE_OPTIONS["ppo"]),
+        Stage(steps=1_666_666, scenario={**small_arena(plan.scenario), "horizon_s": 1000.0}),
+        Stage(steps=1_666_668, scenario={"horizon_s": 1000.0}),
+        Stage(steps=1_666_666, scenario={"horizon_s": 1000.0}, options=LATE_OPTIONS["ppo"]),
     )
     assert plan == recipe("warehouse_small", small_start=True, nest_progress=0.05, first_pickup=1.0)
 
@@ -122,12 +122,9 @@ def test_policies_draw_their_actions_where_they_have_probabilities(algorithm, ac
             recipe(algorithm=algorithm, interface={"actions": actions}, samples=True)
 
 
-def test_trainings_have_compiled_bodies_and_evaluations_what_was_asked_for():
-    plan = recipe("search_and_rescue")
-    assert {stage.scenario["physics"] for stage in plan.stages} == {"compiled"}
-    assert {world.scenario.physics for world in plan.judging_worlds} == {"chipmunk"}
-    for engine in ("chipmunk", "compiled"):
-        asked = recipe("search_and_rescue", physics=engine)
+def test_a_policy_is_judged_by_the_engine_that_it_is_trained_in():
+    for engine, given in (("compiled", {}), *((engine, {"physics": engine}) for engine in PHYSICS_ENGINES)):
+        asked = recipe("search_and_rescue", **given)
         trained_in = {with_overrides(asked.scenario, **stage.scenario).physics for stage in asked.stages}
         assert trained_in == {world.scenario.physics for world in asked.judging_worlds} == {engine}
 

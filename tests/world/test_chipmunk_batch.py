@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.world.physics import Physics
+from swarm_forage_env.world.chipmunk import ChipmunkBodies
 from swarm_forage_env.world.state import SwarmState
 from tests.support.engines import drive_at
 
@@ -15,7 +15,7 @@ def test_batch_rows_are_the_bodies_in_order():
     cells = np.array(list(itertools.product(range(6), range(5))))
     swarm = SwarmState.empty(30)
     swarm.position[:], swarm.heading[:] = rng.permutation(cells) * 0.3 + (4.0, 4.0), rng.uniform(-3, 3, 30)
-    physics = Physics(scenario("warehouse_small", n_robots=30), swarm.position, swarm.heading)
+    physics = ChipmunkBodies(scenario("warehouse_small", n_robots=30), swarm.position, swarm.heading)
     assert len(physics.twist) == 31, "the space's own static body comes last"
     physics.park(3)
     swarm.present[3] = False

@@ -10,8 +10,8 @@ from scipy.spatial.distance import pdist
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.bodies import Bodies
+from swarm_forage_env.world.chipmunk import ChipmunkBodies
 from swarm_forage_env.world.kernels.drive import hold_inside
-from swarm_forage_env.world.physics import Physics
 from swarm_forage_env.world.state import SwarmState
 from swarm_forage_env.wrappers.noise import ActuatorNoise, ActuatorNoiseConfig
 from tests.reference.motion import WHEEL_BASE_M, WHEEL_SCALE_MPS, free_motion, held_inside, limited_wheels
@@ -28,7 +28,7 @@ ROUNDING_M = 1e-12
 MIDDLE = (16.0, 8.0)
 
 
-def world(position, heading) -> tuple[Physics | Bodies, SwarmState, ScenarioConfig]:
+def world(position, heading) -> tuple[ChipmunkBodies | Bodies, SwarmState, ScenarioConfig]:
     """Bodies of robots at these poses, and a state to write to."""
     config = scenario("warehouse_small", n_robots=len(heading), physics=engines.CHOSEN)
     swarm = SwarmState.empty(len(heading))
@@ -36,7 +36,7 @@ def world(position, heading) -> tuple[Physics | Bodies, SwarmState, ScenarioConf
     return make_bodies(config, swarm), swarm, config
 
 
-def drive_ahead(physics: Physics | Bodies, swarm: SwarmState) -> None:
+def drive_ahead(physics: ChipmunkBodies | Bodies, swarm: SwarmState) -> None:
     """One tick in which every robot drives where it faces."""
     drive_at(physics, swarm, swarm.heading, 0.10)
 

@@ -25,6 +25,7 @@ import pymunk.batch
 
 from swarm_forage_env.contract.types import BoolArray, FloatArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.world.bodies import PARKED_M, obstacle_rows, room_of_centres
 from swarm_forage_env.world.kernels.bodies import COLLISION_SLOP_M, FRICTION, WALL_INSET_M
 from swarm_forage_env.world.kernels.drive import hold_inside, unpack_poses
 from swarm_forage_env.world.kernels.obstacles import hold_outside
@@ -36,8 +37,6 @@ TIME_UNIT_S = 40.0
 MASS_KG = 1.6
 WALL_RADIUS_M = 0.2
 """Half the thickness of a wall."""
-PARKED_M = -10.0
-"""Where robots are parked: far outside."""
 ITERATIONS = 80
 """Rounds of Chipmunk's solver per substep; only contacts cost. Mean of the deepest overlap per tick of 512 robots,
 packed into a corner, that all push into it, as a share of a diameter: 10 rounds (its default) or 20: 0.93, which is one
@@ -53,7 +52,7 @@ placed."""
 
 
 class History:
-    """Everything that the bodies of a run were told, from which `Physics` builds a copy of itself.
+    """Everything that the bodies of a run were told, from which `ChipmunkBodies` builds a copy of itself.
 
     It takes 24 bytes per robot and tick.
     """
@@ -94,7 +93,7 @@ class History:
         return np.frombuffer(self._full[block]).reshape(self._block.shape)[place]
 
 
-class Physics:
+class ChipmunkBodies:
     """Bodies, walls and boxes of one run.
 
     With a history, copies and pickles are made by repeating all ticks, which takes as long as the bodies took: about
@@ -247,15 +246,3 @@ class Physics:
                     self._place(*change)
             if tick < history.n_ticks:
                 self._move(history.twist_of(tick), present)
-
-
-def room_of_centres(config: ScenarioConfig) -> FloatArray:
-    """Where centres of robots can be whose bodies are inside: x low, y low, x high, y high in m."""
-    x_low, y_low, x_high, y_high = config.arena.interior_m
-    radius = config.robots.radius_m
-    return np.array([x_low + radius, y_low + radius, x_high - radius, y_high - radius])
-
-
-def obstacle_rows(config: ScenarioConfig) -> FloatArray:
-    """Obstacles as kernels take them: (B, 4) x low, y low, x high, y high in m."""
-    return np.array(config.arena.obstacles, np.float64).reshape(-1, 4)
