@@ -39,7 +39,6 @@ FIVE = ("crw", "dpo", "stochm", "stochx", "ppo_warehouse_small")
 WITH_ALL = ("crw", "dpo", "stochm", "stochx", "generalist")
 SCENARIOS = {"small": "warehouse_small", "medium": "warehouse_medium", "rescue": "search_and_rescue"}
 """Short name in blocks -> scenario."""
-COMPILED = "--set physics=compiled"
 LIKELIEST = (
     "from dataclasses import replace as change; from swarm_forage_env.policies.network import Network; "
     "from swarm_forage_env.policies.pretrained import network_file as file; net = Network.load(file('generalist')); "
@@ -68,7 +67,7 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     ),
     **{
         f"generalist_{short}": (
-            (f"swarm-forage run {','.join(WITH_ALL)} --scenario {name} --seeds 4 {COMPILED}",),
+            (f"swarm-forage run {','.join(WITH_ALL)} --scenario {name} --seeds 4",),
             WITH_ALL,
         )
         for short, name in SCENARIOS.items()
@@ -79,8 +78,8 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     **{
         f"recipe_{short}_{seed}": (
             (
-                f"swarm-forage train --scenario {name} --seed {seed} {COMPILED} --out trained",
-                f"swarm-forage run trained/policy.npz --scenario {name} --seeds 4 {COMPILED}",
+                f"swarm-forage train --scenario {name} --seed {seed} --out trained",
+                f"swarm-forage run trained/policy.npz --scenario {name} --seeds 4",
             ),
             ("policy",),
         )
@@ -91,7 +90,7 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "drawn": (
         (
             f'python -c "{LIKELIEST}"',
-            f"swarm-forage run generalist,likeliest.npz --scenario search_and_rescue --robots 64 --seeds 4 {COMPILED}",
+            f"swarm-forage run generalist,likeliest.npz --scenario search_and_rescue --robots 64 --seeds 4",
         ),
         ("generalist", "likeliest"),
     ),
