@@ -173,7 +173,7 @@ def rows_of_case(specs: Sequence[RunSpec], seeds: int) -> Iterator[Row]:
     for measure, decimals in {**MEASURES, **CONFLICTS}.items():
         if measure not in runs[0][0]:
             continue
-        chipmunk, compiled = (np.array([run[measure] for run in of_engine]) for of_engine in runs)
+        compiled, chipmunk = (np.array([run[measure] for run in of_engine]) for of_engine in runs)
         difference = aggregate(compiled - chipmunk)
         cells = (chipmunk.mean(), compiled.mean(), difference.mean, difference.lower, difference.upper)
         before, after, mean, low, high = (written(value, decimals) for value in cells)

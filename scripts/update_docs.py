@@ -90,7 +90,7 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "drawn": (
         (
             f'python -c "{LIKELIEST}"',
-            f"swarm-forage run generalist,likeliest.npz --scenario search_and_rescue --robots 64 --seeds 4",
+            "swarm-forage run generalist,likeliest.npz --scenario search_and_rescue --robots 64 --seeds 4",
         ),
         ("generalist", "likeliest"),
     ),

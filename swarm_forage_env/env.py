@@ -233,7 +233,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
             self._seeds = np.random.default_rng(seed)
         obs = self.arena.reset(seed)
         self._rewards = RewardModel(
-            self.scenario.reward, self.scenario.arena.nest_centre_m, self.arena.swarm, self.arena.events, self.arena
+            self.scenario.reward, self.scenario.arena.nest_centres_m, self.arena.swarm, self.arena.events, self.arena
         )
         self.seed_value = seed
         self._terminated[:] = False

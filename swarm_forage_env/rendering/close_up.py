@@ -125,7 +125,8 @@ def _draw_ground(canvas: Canvas, lens: _Lens, scenario: ScenarioConfig, caches: 
             canvas, lens.box((-WALL_M, -WALL_M, arena.width_m + WALL_M, arena.height_m + WALL_M)), lens.palette.wall
         )
         paint_box(canvas, (left, top, right, bottom), lens.palette.floor)
-    paint_box(canvas, lens.box(arena.nest_box_m), lens.palette.nest, NEST_OPACITY)
+    for nest in arena.nest_boxes_m:
+        paint_box(canvas, lens.box(nest), lens.palette.nest, NEST_OPACITY)
     for obstacle in arena.obstacles:
         paint_box(canvas, lens.box(obstacle), lens.palette.wall)
     half = scenario.cache_side_cells * CELL_M / 2

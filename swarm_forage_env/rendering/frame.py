@@ -155,14 +155,14 @@ def _canvases(scenario: ScenarioConfig, size_px: int, theme: str) -> Canvases:
         ),
         view.palette.floor,
     )
-    nest = view.box(arena.nest_box_m)
     if scenario.objects.placement != "power_law":  # its clusters are drawn anew in each run
         for cells in scenario.source_cells:
             x_low, y_low, x_high, y_high = (CELL_M * cell for cell in cells)
             paint_box(canvas, view.box((x_low, y_low, x_high, y_high)), view.palette.source, SOURCE_OPACITY)
-        paint_box(canvas, nest, view.palette.floor)
-    paint_box(canvas, nest, view.palette.nest, NEST_OPACITY)
-    paint_frame(canvas, nest, max(1.0, 1.5 * view.unit), view.palette.nest)
+    for nest in map(view.box, arena.nest_boxes_m):
+        paint_box(canvas, nest, view.palette.floor)  # a source may reach under a nest
+        paint_box(canvas, nest, view.palette.nest, NEST_OPACITY)
+        paint_frame(canvas, nest, max(1.0, 1.5 * view.unit), view.palette.nest)
     for box in arena.obstacles:
         paint_box(canvas, view.box(box), view.palette.wall)
     lights = view.pixels(np.asarray(arena.lights_m)[:, :2])

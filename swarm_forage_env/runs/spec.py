@@ -36,6 +36,7 @@ _LATER_FIELDS = (
     ("robots", "own_sensors"),
     ("robots", "robot_kinds"),
     ("reward", "own_reward"),
+    ("arena", "further_nests"),
     ("arena", "obstacles"),
     ("objects", "object_positions_m"),
     ("quirks", "refusals_not_remembered"),
@@ -97,8 +98,8 @@ class RunSpec:
 
         `performance` of the scenario is left out: it says how the run is read. So another one finds the stored run.
         `physics` is left out of runs in Chipmunk, as it was before there were compiled bodies;
-        so are own sensors, an own reward, neighbours, messages, kinds of robots, obstacles and positions of objects
-        where there are none, and quirks of `_LATER_FIELDS` where they are off.
+        so are own sensors, an own reward, neighbours, messages, kinds of robots, further nests, obstacles and
+        positions of objects where there are none, and quirks of `_LATER_FIELDS` where they are off.
         """
         return identity_of({**self._others(), "scenario": _identifying_fields(self.scenario)})
 
@@ -142,8 +143,9 @@ class RunSpec:
         if missing:
             raise ConfigError(f"Missing key {missing[0]!r} in a run specification.")
         values = dict(mapping)
-        # Chipmunk was the only engine when specifications did not name one
-        scenario = {"physics": "chipmunk"} | dict(values.pop("scenario"))
+        scenario = values.pop("scenario")
+        if isinstance(scenario, Mapping):  # Chipmunk was the only engine when specifications did not name one
+            scenario = {"physics": "chipmunk", **scenario}
         world = World(
             from_mapping(ScenarioConfig, scenario, where="scenario."),
             wrappers_from_list(values.pop("wrappers", ())),

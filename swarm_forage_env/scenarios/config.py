@@ -26,7 +26,7 @@ from swarm_forage_env.scenarios.floor import (
     overlap_cells,
     source_boxes,
 )
-from swarm_forage_env.scenarios.obstacles import Rectangle, blocked_cells, check_obstacles, covered_area_m2
+from swarm_forage_env.scenarios.obstacles import Rectangle, blocked_cells, check_boxes, covered_area_m2
 from swarm_forage_env.scenarios.performance import performance_of
 from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.scenarios.robots import WHEEL_SCALE_MPS, RobotConfig
@@ -55,9 +55,27 @@ def _require(condition: bool, message: str) -> None:
         raise ConfigError(message)
 
 
+def _snapped(box: Rectangle) -> Box:
+    """Cells nearest to a box, at least one along each axis; half-open."""
+    x_low, y_low, x_high, y_high = (round(edge / CELL_M) for edge in box)
+    return x_low, y_low, max(x_low + 1, x_high), max(y_low + 1, y_high)
+
+
+def _lights_over(nest: Rectangle) -> tuple[tuple[float, float], ...]:
+    """Where the lights of a nest hang, see `ArenaConfig.lights_m`."""
+    x_low, y_low, x_high, y_high = nest
+    size_x, size_y = x_high - x_low, y_high - y_low
+    centre_x, centre_y = (x_low + x_high) / 2, (y_low + y_high) / 2
+    if abs(size_x - size_y) < 1e-9:
+        return ((centre_x, centre_y),)
+    if size_y > size_x:
+        return tuple((centre_x, y_low + share * size_y) for share in (0.25, 0.5, 0.75))
+    return tuple((x_low + share * size_x, centre_y) for share in (0.25, 0.5, 0.75))
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class ArenaConfig:
-    """A rectangular floor with walls and a nest. Origin at the lower left corner."""
+    """A rectangular floor with walls and one nest or several. Origin at the lower left corner."""
 
     width_m: float
     """Extent X along x, a multiple of the 0.2 m cell."""
@@ -66,6 +84,9 @@ class ArenaConfig:
     nest_centre_m: tuple[float, float]
     nest_size_m: tuple[float, float]
     """The nest is snapped to whole cells."""
+    further_nests: tuple[Rectangle, ...] = ()
+    """Boxes (x low, y low, x high, y high) in m, snapped to whole cells, that are nests like the first one: they have
+    lights and take deliveries. Static caches lie between the sources and the first nest."""
     obstacles: tuple[Rectangle, ...] = ()
     """Boxes (x low, y low, x high, y high) in m that robots cannot enter (`scenarios.obstacles`)."""
 
@@ -94,7 +115,9 @@ class ArenaConfig:
             f"Expected the nest inside the {self.width_m} x {self.height_m} m arena, got centre "
             f"{self.nest_centre_m} and size {self.nest_size_m}.",
         )
-        check_obstacles(self.obstacles, self.width_m, self.height_m, self.nest_box_m)
+        extent = self.width_m, self.height_m
+        check_boxes("further_nests", self.further_nests, *extent, clear_of=(self.nest_box_m,), are_apart=True)
+        check_boxes("obstacles", self.obstacles, *extent, clear_of=self.nest_boxes_m)
 
     @property
     def n_cells(self) -> tuple[int, int]:
@@ -103,16 +126,31 @@ class ArenaConfig:
 
     @property
     def nest_cells(self) -> Box:
-        """Cells of the nest, half-open."""
+        """Cells of the first nest, half-open."""
         (cx, cy), (sx, sy) = self.nest_centre_m, self.nest_size_m
         x_low, y_low = round((cx - sx / 2) / CELL_M), round((cy - sy / 2) / CELL_M)
         return (x_low, y_low, x_low + round(sx / CELL_M), y_low + round(sy / CELL_M))
 
     @property
-    def nest_box_m(self) -> tuple[float, float, float, float]:
-        """Closed nest rectangle: x low, y low, x high, y high."""
-        x_low, y_low, x_high, y_high = self.nest_cells
-        return (x_low / CELLS_PER_M, y_low / CELLS_PER_M, x_high / CELLS_PER_M, y_high / CELLS_PER_M)
+    def nest_box_m(self) -> Rectangle:
+        """Closed rectangle of the first nest: x low, y low, x high, y high."""
+        return self.nest_boxes_m[0]
+
+    @property
+    def all_nest_cells(self) -> tuple[Box, ...]:
+        """Cells of every nest, half-open; those of the first come first."""
+        return (self.nest_cells, *map(_snapped, self.further_nests))
+
+    @property
+    def nest_boxes_m(self) -> tuple[Rectangle, ...]:
+        """Closed rectangles of all nests, x low, y low, x high, y high; that of the first comes first."""
+        return tuple(cast("Rectangle", tuple(edge / CELLS_PER_M for edge in box)) for box in self.all_nest_cells)
+
+    @property
+    def nest_centres_m(self) -> tuple[tuple[float, float], ...]:
+        """Centre of every nest, x, y; that of the first comes first."""
+        further = (((box[0] + box[2]) / 2, (box[1] + box[3]) / 2) for box in self.nest_boxes_m[1:])
+        return (self.nest_centre_m, *further)
 
     @property
     def distributable_cells(self) -> Box:
@@ -127,15 +165,8 @@ class ArenaConfig:
     @property
     def lights_m(self) -> tuple[tuple[float, float, float], ...]:
         """Nest lights (x, y, height): one over a square nest, three at 25, 50, 75 % along a rectangular one."""
-        x_low, y_low, x_high, y_high = self.nest_box_m
-        size_x, size_y = x_high - x_low, y_high - y_low
-        centre_x, centre_y = (x_low + x_high) / 2, (y_low + y_high) / 2
         height = (self.width_m * self.height_m) ** 0.25
-        if abs(size_x - size_y) < 1e-9:
-            return ((centre_x, centre_y, height),)
-        if size_y > size_x:
-            return tuple((centre_x, y_low + share * size_y, height) for share in (0.25, 0.5, 0.75))
-        return tuple((x_low + share * size_x, centre_y, height) for share in (0.25, 0.5, 0.75))
+        return tuple((x, y, height) for nest in self.nest_boxes_m for x, y in _lights_over(nest))
 
     @property
     def light_intensity(self) -> float:
@@ -202,7 +233,7 @@ class RewardConfig:
     first_pickup: float = 0.1
     """Per pick-up of an object that no robot had carried since it was placed."""
     nest_progress: float = 0.0
-    """Per metre that a carrying robot comes closer to the nest centre."""
+    """Per metre that a carrying robot comes closer to the centre of the nearest nest."""
     interference: float = 0.0
     """Per tick in interference; give a negative weight for a penalty."""
     tick: float = 0.0
@@ -313,7 +344,7 @@ class ScenarioConfig:
     def _check_room_for_objects(self) -> None:
         if self.objects.placement == "power_law":
             return  # clusters are drawn at reset, which raises when they cannot hold the objects
-        taken = (self.arena.nest_cells, *self.obstacle_cells)
+        taken = (*self.arena.all_nest_cells, *self.obstacle_cells)
         for place, cell in zip(self.objects.object_positions_m, self._cells_of_positions, strict=True):
             _require(
                 bool(overlap_cells(cell, self.arena.distributable_cells))

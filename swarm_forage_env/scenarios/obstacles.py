@@ -6,7 +6,7 @@ Obstacles may touch and overlap each other, and reach into the walls.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, TypeAlias, cast
 
 import numpy as np
@@ -20,39 +20,44 @@ from swarm_forage_env.scenarios.floor import CELL_M, CELLS_PER_M, Box
 Rectangle: TypeAlias = tuple[float, float, float, float]
 """x low, y low, x high, y high in m."""
 
-MAX_OBSTACLES = 200
-"""Most obstacles (our choice: every robot looks at all of them in every tick)."""
+MAX_BOXES = 200
+"""Most obstacles, and most further nests (our choice: every robot looks at all of them in every tick)."""
 MIN_SIDE_M = CELL_M
 """Shortest side: a cell, as of the nest. A robot that is pushed never gets past the middle of one in a tick."""
 _ROUNDING_CELLS = 1e-6
 """Edges this close to a line between cells lie on it."""
 
 
-def check_obstacles(obstacles: Any, width_m: float, height_m: float, nest: Rectangle) -> None:
-    """Refuse what is no tuple of boxes inside of an arena and clear of its nest.
+def check_boxes(
+    name: str, given: Any, width_m: float, height_m: float, *, clear_of: Sequence[Rectangle], are_apart: bool = False
+) -> None:
+    """Refuse what is no tuple of boxes inside of an arena and clear of its nests.
 
     Args:
-        obstacles: What was given.
+        name: Of the arena's field.
+        given: What was given.
         width_m: Extent of the arena along x, m.
         height_m: Along y, m.
-        nest: The nest's rectangle, m.
+        clear_of: Rectangles of nests, m.
+        are_apart: Whether boxes must also be clear of each other.
 
     Raises:
         ConfigError: names the first box that cannot be.
     """
-    if not isinstance(obstacles, tuple):
+    if not isinstance(given, tuple):
         raise ConfigError(
-            "Expected arena.obstacles to be a tuple of boxes (x low, y low, x high, y high) in m, such as "
-            f"((14.0, 4.0, 14.4, 12.0),), got {shown(obstacles)}."
+            f"Expected arena.{name} to be a tuple of boxes (x low, y low, x high, y high) in m, such as "
+            f"((14.0, 4.0, 14.4, 12.0),), got {shown(given)}."
         )
-    boxes = cast("tuple[Any, ...]", obstacles)
-    if len(boxes) > MAX_OBSTACLES:
-        raise ConfigError(f"Expected at most {MAX_OBSTACLES} arena.obstacles, got {len(boxes)}.")
+    boxes = cast("tuple[Any, ...]", given)
+    if len(boxes) > MAX_BOXES:
+        raise ConfigError(f"Expected at most {MAX_BOXES} arena.{name}, got {len(boxes)}.")
     for index, box in enumerate(boxes):
-        _check_obstacle(f"arena.obstacles[{index}]", box, width_m, height_m, nest)
+        nests = (*clear_of, *boxes[:index]) if are_apart else clear_of
+        _check_box(f"arena.{name}[{index}]", box, width_m, height_m, nests)
 
 
-def _check_obstacle(where: str, box: Any, width_m: float, height_m: float, nest: Rectangle) -> None:
+def _check_box(where: str, box: Any, width_m: float, height_m: float, nests: Sequence[Rectangle]) -> None:
     edges = cast("tuple[Any, ...]", box) if isinstance(box, tuple) else ()
     if len(edges) != 4:
         raise ConfigError(f"Expected {where} to be (x low, y low, x high, y high) in m, got {shown(box)}.")
@@ -65,8 +70,9 @@ def _check_obstacle(where: str, box: Any, width_m: float, height_m: float, nest:
         )
     if min(x_low, y_low) < 0.0 or x_high > width_m or y_high > height_m:
         raise ConfigError(f"Expected {where} inside the {width_m} x {height_m} m arena, got {edges}.")
-    if x_low < nest[2] and nest[0] < x_high and y_low < nest[3] and nest[1] < y_high:
-        raise ConfigError(f"Expected {where} clear of the nest {nest}, got {edges}; move the box or the nest.")
+    for nest in nests:
+        if x_low < nest[2] and nest[0] < x_high and y_low < nest[3] and nest[1] < y_high:
+            raise ConfigError(f"Expected {where} clear of the nest {nest}, got {edges}; move the box or the nest.")
 
 
 def blocked_cells(box: Rectangle, nx: int, ny: int, radius_m: float) -> Box:
@@ -116,7 +122,7 @@ def covered_area_m2(area: Rectangle, obstacles: Iterable[Rectangle], radius_m: f
 def stretched(
     obstacles: Iterable[Rectangle], factors: tuple[float, float], extents_m: tuple[float, float]
 ) -> tuple[Rectangle, ...]:
-    """Return obstacles that keep their places and shares in an arena so much wider and higher.
+    """Return boxes that keep their places and shares in an arena so much wider and higher.
 
     A side that shrinks below `MIN_SIDE_M` is widened to it about its middle, and stays inside the arena.
 

@@ -17,7 +17,7 @@ from swarm_forage_env.scenarios.obstacles import stretched
 from swarm_forage_env.scenarios.quirks import RULES
 from swarm_forage_env.scenarios.robots import RobotKind, kind_from_words
 
-ARENA_FIELDS = ("width_m", "height_m", "nest_centre_m", "nest_size_m", "obstacles")
+ARENA_FIELDS = ("width_m", "height_m", "nest_centre_m", "nest_size_m", "further_nests", "obstacles")
 """What a density decides, and what therefore cannot be given beside it."""
 
 
@@ -169,12 +169,14 @@ def arena_at_density(config: ScenarioConfig, density: float, n_robots: int) -> d
     x_low, y_low, x_high, y_high = (round(edge * factor / common) for edge in config.arena.nest_cells)
     x_high, y_high = max(x_low + 1, x_high), max(y_low + 1, y_high)
     width_m, height_m = unit_x * factor / CELLS_PER_M, unit_y * factor / CELLS_PER_M
+    factors, extents_m = (factor / common, factor / common), (width_m, height_m)
     return {
         "width_m": width_m,
         "height_m": height_m,
         "nest_centre_m": ((x_low + x_high) / 2 / CELLS_PER_M, (y_low + y_high) / 2 / CELLS_PER_M),
         "nest_size_m": ((x_high - x_low) / CELLS_PER_M, (y_high - y_low) / CELLS_PER_M),
-        "obstacles": stretched(config.arena.obstacles, (factor / common, factor / common), (width_m, height_m)),
+        "further_nests": stretched(config.arena.further_nests, factors, extents_m),
+        "obstacles": stretched(config.arena.obstacles, factors, extents_m),
     }
 
 

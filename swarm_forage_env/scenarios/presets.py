@@ -182,7 +182,8 @@ def at_density(
     arena = {name: getattr(of_side, name) for name in ARENA_FIELDS}
     extents_m = of_side.width_m, of_side.height_m
     factors = of_side.width_m / config.arena.width_m, of_side.height_m / config.arena.height_m
-    arena["obstacles"] = stretched(config.arena.obstacles, factors, extents_m)
+    for name in ("further_nests", "obstacles"):
+        arena[name] = stretched(getattr(config.arena, name), factors, extents_m)
     objects = SEARCH_AND_RESCUE_OBJECTS[int(side_m)] if n_objects is None else n_objects
     return in_arena(config, arena, n_robots=n_robots, n_objects=objects)
 

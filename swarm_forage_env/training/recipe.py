@@ -310,5 +310,9 @@ def small_arena(scenario: ScenarioConfig) -> dict[str, Any]:
         "height_m": height_m,
         "nest_centre_m": (centre_x * shares[0], centre_y * shares[1]),
         "nest_size_m": (size_x * shares[0], size_y * shares[1]),
-        **({"obstacles": stretched(arena.obstacles, shares, (width_m, height_m))} if arena.obstacles else {}),
+        **{
+            name: stretched(boxes, shares, (width_m, height_m))
+            for name in ("further_nests", "obstacles")
+            if (boxes := getattr(arena, name))
+        },
     }

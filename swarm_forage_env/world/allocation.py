@@ -34,15 +34,16 @@ def new_state(config: ScenarioConfig) -> WorldState:
 
 
 def new_objects(config: ScenarioConfig) -> ObjectState:
-    """Return all objects, waiting, and a floor painted with obstacles and nest only."""
+    """Return all objects, waiting, and a floor painted with obstacles and nests only."""
     return ObjectState.empty(_painted_floor(config), config.objects.n_objects)
 
 
 def _painted_floor(config: ScenarioConfig) -> IntArray:
     nx, ny = config.arena.n_cells
     floor = np.full((ny, nx), CELL_EMPTY, np.int32)
-    # The nest comes last: an obstacle beside it may keep squares free that reach into it.
-    painted = [*((box, CELL_OBSTACLE) for box in config.obstacle_cells), (config.arena.nest_cells, CELL_NEST)]
+    # Nests come last: an obstacle beside one may keep squares free that reach into it.
+    nests = ((box, CELL_NEST) for box in config.arena.all_nest_cells)
+    painted = [*((box, CELL_OBSTACLE) for box in config.obstacle_cells), *nests]
     for (x_low, y_low, x_high, y_high), code in painted:
         floor[y_low:y_high, x_low:x_high] = code
     return floor
@@ -55,7 +56,7 @@ def new_arrays(
     return ArenaArrays(
         state=state,
         rules=Rules(
-            *config.arena.nest_box_m,
+            np.array(config.arena.nest_boxes_m),
             *config.arena.distributable_cells,
             cache_half_side=config.cache_half_side_cells,
             cache_proximity_m=config.cache_proximity_m,

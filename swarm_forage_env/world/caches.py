@@ -194,7 +194,7 @@ def place_for_cache(
     ones in scenario 2): if they leave no room, the passes start again without them. The
     objects of a cluster under the square join; the cluster then takes objects on the cells left to it.
     """
-    fixed = [config.arena.nest_cells, *config.obstacle_cells]
+    fixed = [*config.arena.all_nest_cells, *config.obstacle_cells]
     centre = clear_centre(mean_cell, config, [*fixed, *protected, *standing], rng)
     loose = config.objects.placement == "power_law" and not config.quirks.dynamic_cache_avoids_clusters
     if centre is None and loose:

@@ -181,7 +181,8 @@ def static_cache_centres(config: ScenarioConfig) -> tuple[tuple[int, int], ...]:
 
     Locations are the study's: half way between nest and each region for one or two sources; west, east, south and
     north of the nest for four; at the quarters of the arena for the rest. The quad source is moved outwards where
-    its squares would reach into the nest (our choice: a floor cell is either nest or cache).
+    its squares would reach into the nest (our choice: a floor cell is either nest or cache). Of several nests the
+    first counts.
 
     Raises:
         ConfigError: a cache square leaves the arena, reaches into nest or obstacles or overlaps another, or its centre,
@@ -213,7 +214,7 @@ def static_cache_centres(config: ScenarioConfig) -> tuple[tuple[int, int], ...]:
 
 def _check_cache_squares(config: ScenarioConfig, centres: tuple[tuple[int, int], ...]) -> None:
     nx, ny = config.arena.n_cells
-    taken: list[Box] = [config.arena.nest_cells, *config.obstacle_cells]
+    taken: list[Box] = [*config.arena.all_nest_cells, *config.obstacle_cells]
     for x, y in centres:
         square = square_box((x, y), config.cache_side_cells)
         inside = square[0] >= 0 and square[1] >= 0 and square[2] <= nx and square[3] <= ny

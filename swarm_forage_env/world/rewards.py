@@ -3,7 +3,7 @@
 A function of the user may add to them (`contract.own_functions.register_reward`).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -22,7 +22,7 @@ class RewardModel:
     def __init__(
         self,
         config: RewardConfig,
-        nest_centre_m: tuple[float, float],
+        nest_centres_m: Sequence[tuple[float, float]],
         swarm: SwarmState,
         events: StepEvents,
         world: object,
@@ -31,7 +31,7 @@ class RewardModel:
 
         Args:
             config: The weights.
-            nest_centre_m: x, y.
+            nest_centres_m: x, y of each nest.
             swarm: Robots.
             events: Happenings of a tick.
             world: What a function of the user is called with.
@@ -49,7 +49,7 @@ class RewardModel:
             swarm=swarm,
             events=events,
             previous_position=np.zeros_like(swarm.position),
-            nest_centre_m=np.array(nest_centre_m, np.float64),
+            nest_centres_m=np.array(nest_centres_m, np.float64),
             total=np.zeros(len(swarm.active)),
             reward=np.zeros(len(swarm.active), np.float32),
             weights=Weights(*(float(getattr(config, name)) for name in Weights._fields)),

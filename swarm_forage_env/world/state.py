@@ -206,11 +206,8 @@ class WorldState(NamedTuple):
 class Rules(NamedTuple):
     """Constants of interactions."""
 
-    nest_x_low: float
-    nest_y_low: float
-    nest_x_high: float
-    nest_y_high: float
-    """Of the nest, in m."""
+    nests: FloatArray
+    """(K, 4) x low, y low, x high, y high of every nest, in m."""
     area_x_low: int
     area_y_low: int
     area_x_high: int

@@ -31,7 +31,7 @@ class SlowCache:
 class SlowWorld:
     """Everything that interactions can see and change."""
 
-    nest: tuple[float, float, float, float]
+    nests: tuple[tuple[float, float, float, float], ...]
     area: Box
     side_cells: int
     proximity_m: float
@@ -69,9 +69,9 @@ class SlowWorld:
         return None
 
     def in_nest(self, robot: int) -> bool:
-        """Whether a robot's centre lies in the closed nest rectangle."""
+        """Whether a robot's centre lies in the closed rectangle of a nest."""
         x, y = self.position[robot]
-        return self.nest[0] <= x <= self.nest[2] and self.nest[1] <= y <= self.nest[3]
+        return any(nest[0] <= x <= nest[2] and nest[1] <= y <= nest[3] for nest in self.nests)
 
     def cache_too_near(self, robot: int) -> int | None:
         """Serial of the nearest cache whose centre is within the proximity distance."""
@@ -212,9 +212,9 @@ class SlowWorld:
         return False
 
     def cell_in_nest(self, cell: tuple[int, int]) -> bool:
-        """Whether a cell belongs to the nest."""
+        """Whether a cell belongs to a nest."""
         x, y = (2 * cell[0] + 1) / 10, (2 * cell[1] + 1) / 10
-        return self.nest[0] < x < self.nest[2] and self.nest[1] < y < self.nest[3]
+        return any(nest[0] < x < nest[2] and nest[1] < y < nest[3] for nest in self.nests)
 
     def report(self, robot: int, event: Event, row: int = -1, cache: int | None = None) -> None:
         """Note what happened to a robot."""

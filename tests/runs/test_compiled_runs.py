@@ -92,7 +92,7 @@ class Slow(CRWPolicy):
 
 
 def test_python_is_asked_wherever_it_has_a_say():
-    world = scenario("warehouse_small", n_robots=2, physics="compiled")
+    world = scenario("warehouse_small", n_robots=2)
     assert is_compiled(world, CRWPolicy())
     assert not is_compiled(world, Slow())
     assert not is_compiled(world, Proxy(CRWPolicy()))
@@ -102,7 +102,7 @@ def test_python_is_asked_wherever_it_has_a_say():
     assert LiveRun(patched, CRWPolicy(), seed=0).compiled_policy is None
     assert not is_compiled(world, tick_by_tick(CRWPolicy()))
     assert not is_compiled(world, CRWPolicy(), "sensor_noise:sigma=0.01")
-    assert not is_compiled(scenario("warehouse_small", n_robots=2), CRWPolicy())
+    assert not is_compiled(scenario("warehouse_small", n_robots=2, physics="chipmunk"), CRWPolicy())
 
 
 LAST_TICK = 5

@@ -162,7 +162,10 @@ def test_warm_up_reaches_the_interactions_of_a_policy_that_asks_for_nothing(monk
         return step(arena, actions, **options)
 
     monkeypatch.setattr(ForagingArena, "step", spied)
-    warm_up(replace(SPECS[0], policy="crw"))
+    chipmunk = replace(
+        SPECS[0].world, scenario=replace(SPECS[0].scenario, physics="chipmunk")
+    )  # in Python, tick by tick
+    warm_up(replace(SPECS[0], policy="crw", world=chipmunk))
     assert steps[-1] == (WARM_UP_TICKS, [Grip.GRASP] * 3)
 
 

@@ -9,7 +9,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.scenario_options import parse_setting
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping, to_mapping
-from swarm_forage_env.scenarios.obstacles import MAX_OBSTACLES, blocked_cells, covered_area_m2, distances_m
+from swarm_forage_env.scenarios.obstacles import MAX_BOXES, blocked_cells, covered_area_m2, distances_m
 from swarm_forage_env.scenarios.presets import at_density, scenario
 from swarm_forage_env.studies.study_file import load_study
 from swarm_forage_env.wrappers.world import World, describe_file
@@ -32,7 +32,7 @@ PILLAR = (18.0, 7.5, 19.0, 8.5)
             {"obstacles": ((4.0, 4.0, 6.0, 5.0),)},
             ("clear of the nest (1.6, 1.6, 4.8, 14.4)", "move the box or the nest"),
         ),
-        ({"obstacles": (WALL,) * (MAX_OBSTACLES + 1)}, (f"at most {MAX_OBSTACLES} arena.obstacles, got 201",)),
+        ({"obstacles": (WALL,) * (MAX_BOXES + 1)}, (f"at most {MAX_BOXES} arena.obstacles, got 201",)),
         ({"obstacles": ((24.0, 0.0, 28.0, 16.0),)}, ("at most 0 objects", "or move obstacles")),
         ({"obstacles": ((24.0, 0.0, 27.0, 16.0),)}, ("at most 56 objects", "got 200")),
         (

@@ -35,6 +35,7 @@ def make_spec(n_robots: int = 1, **changes: Any) -> SwarmSpec:
         cell_m=CELL_M,
         nest_centre_m=(3.2, 8.0),
         nest_size_m=(3.2, 12.8),
+        nest_boxes_m=((1.6, 1.6, 4.8, 14.4),),
         distributable_box_m=(4.8, 2.4, 27.4, 13.8),
         placement="single_source",
         caches="none",

@@ -53,6 +53,8 @@ def random_scenario(random: Random, caches: str | None, most_ticks: int) -> Scen
         if random.random() < 0.3:
             given[field_name] = value
     config = scenario(name, **given)
+    if random.random() < 0.2:
+        config = with_overrides(config, further_nests=_nests(random, config))
     if random.random() < 0.3:
         config = with_overrides(config, obstacles=_obstacles(random, config))
     return with_overrides(config, **_places(random, config)) if random.random() < 0.15 else config
@@ -131,10 +133,19 @@ def _kinds(random: Random) -> tuple[RobotKind, ...]:
     )
 
 
+def _nests(random: Random, config: ScenarioConfig) -> tuple[tuple[float, ...], ...]:
+    """A nest or two anywhere, on lines between cells and off them, clear of the first and of each other."""
+    given = _obstacles(random, config)
+    if len(given) < 2:
+        return given
+    (ax, ay, bx, by), (cx, cy, dx, dy) = given[:2]
+    return given[:2] if dx <= ax or cx >= bx or dy <= ay or cy >= by else given[:1]
+
+
 def _obstacles(random: Random, config: ScenarioConfig) -> tuple[tuple[float, ...], ...]:
-    """Boxes anywhere but in the nest: thin walls, squares, on lines between cells and off them, into the walls, too."""
+    """Boxes anywhere but in nests: thin walls, squares, on lines between cells and off them, into the walls, too."""
     extents = config.arena.width_m, config.arena.height_m
-    nest = config.arena.nest_box_m
+    nests = config.arena.nest_boxes_m
     found: list[tuple[float, ...]] = []
     for _ in range(random.randint(1, MOST_BOXES)):
         sides = [random.choice((MIN_SIDE_M, random.uniform(MIN_SIDE_M, 0.6 * extent))) for extent in extents]
@@ -143,7 +154,9 @@ def _obstacles(random: Random, config: ScenarioConfig) -> tuple[tuple[float, ...
             low = [round(edge * CELLS_PER_M) / CELLS_PER_M for edge in low]
             sides = [max(1, round(side * CELLS_PER_M)) / CELLS_PER_M for side in sides]
         high = [min(edge + side, extent) for edge, side, extent in zip(low, sides, extents, strict=True)]
-        is_clear = low[0] >= nest[2] or high[0] <= nest[0] or low[1] >= nest[3] or high[1] <= nest[1]
+        is_clear = all(
+            low[0] >= nest[2] or high[0] <= nest[0] or low[1] >= nest[3] or high[1] <= nest[1] for nest in nests
+        )
         if is_clear and min(high[0] - low[0], high[1] - low[1]) >= MIN_SIDE_M:
             found.append((*low, *high))
     return tuple(found)
@@ -152,7 +165,7 @@ def _obstacles(random: Random, config: ScenarioConfig) -> tuple[tuple[float, ...
 def _places(random: Random, config: ScenarioConfig) -> dict[str, Any]:
     """Places of one's own, now and then fewer objects than places, clear of nest and obstacles."""
     x_low, y_low, x_end, y_end = config.arena.distributable_cells
-    taken = (config.arena.nest_cells, *config.obstacle_cells)
+    taken = (*config.arena.all_nest_cells, *config.obstacle_cells)
     free = [
         (x, y)
         for x in range(x_low, x_end)

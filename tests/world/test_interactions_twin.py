@@ -60,7 +60,7 @@ def mirror(env: ForageEnv) -> SlowWorld:
         pending[robot] = BANDS[int(swarm.pending_band[robot])], (kind, None if target < 0 else target)
     lying = np.flatnonzero(objects.status == ObjectStatus.FREE).tolist()
     return SlowWorld(
-        nest=config.arena.nest_box_m,
+        nests=config.arena.nest_boxes_m,
         area=config.arena.distributable_cells,
         side_cells=config.cache_side_cells,
         proximity_m=config.cache_proximity_m,

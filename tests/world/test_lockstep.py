@@ -257,13 +257,13 @@ def test_who_may_go_in_lockstep():
     assert can_go_in_lockstep([ForagingArena(config), ForagingArena(config)])
     unlike = (
         ForagingArena(config, reads=("proximity",)),
-        ForagingArena(scenario("warehouse_small", n_robots=N_ROBOTS, physics="compiled")),
+        ForagingArena(scenario("warehouse_small", n_robots=N_ROBOTS + 1)),
     )
     for other in unlike:
         assert not can_go_in_lockstep([ForagingArena(config), other])
         with pytest.raises(ValueError, match="Expected arenas of one scenario"):
             Lockstep([ForagingArena(config), other])
-    assert not can_go_in_lockstep([ForagingArena(scenario("warehouse_small"))] * 2)
+    assert not can_go_in_lockstep([ForagingArena(scenario("warehouse_small", physics="chipmunk"))] * 2)
 
 
 def test_a_stack_whose_step_was_replaced_is_stepped_by_it(monkeypatch):

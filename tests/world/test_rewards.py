@@ -97,6 +97,15 @@ def test_nest_progress_pays_carrying_robots_by_the_metre():
     assert rewards_of(env, {}, wheels=(-0.5, -0.5)) == pytest.approx([-10 * 0.02, 0.0, 0.0, 0.0])
 
 
+def test_nest_progress_is_towards_the_nearest_of_several_nests():
+    env = tidy_world(reward=replace(NOTHING, nest_progress=10.0), further_nests=((28.0, 7.0, 30.0, 9.0),))
+    put(env, 0, 20.0, 8.0, np.pi)  # 16.8 m from (3.2, 8), 9 m from (29, 8)
+    put(env, 1, 16.0, 8.0, np.pi)  # 12.8 and 13 m
+    load(env, 0, 0)
+    load(env, 1, 1)
+    assert rewards_of(env, {}, wheels=(0.5, 0.5)) == pytest.approx([-10 * 0.02, 10 * 0.02, 0.0, 0.0])
+
+
 def test_interference_can_be_penalised():
     env = tidy_world(reward=replace(NOTHING, interference=-0.25))
     put(env, 0, 16.0, 8.0)

@@ -4,6 +4,7 @@ import copy
 import itertools
 import pickle
 import re
+from typing import Any
 
 import numpy as np
 import pytest
@@ -91,14 +92,15 @@ def test_a_snapshot_stays_as_it_is(physics):
 
 
 def test_a_snapshot_of_a_snapshot_is_the_same_and_shares_the_history():
-    env = parallel_env("warehouse_small", n_robots=20, n_objects=9, snapshots=True)
+    fields: dict[str, Any] = {"n_robots": 20, "n_objects": 9, "physics": "chipmunk", "snapshots": True}
+    env = parallel_env("warehouse_small", **fields)
     Branch(env, load_policy("crw")).go_on(140)
     first = env.snapshot()
     env.restore(first)
     second = env.snapshot()
     assert (len(first.kept), second.kept) == (2, first.kept)
     assert all(mine is yours for mine, yours in zip(second.kept, first.kept, strict=True))
-    other = parallel_env("warehouse_small", n_robots=20, n_objects=9, snapshots=True)
+    other = parallel_env("warehouse_small", **fields)
     other.restore(second)
     np.testing.assert_array_equal(other.state(), env.state())
 

@@ -27,10 +27,10 @@ from swarm_forage_env.scenarios.robots import RobotKind, kind_sizes
 from swarm_forage_env.wrappers.recorder import TOTALS
 
 FORMAT = "swarm_forage_env replay"
-FORMAT_VERSION = 3
+FORMAT_VERSION = 4
 """Raised whenever an array or a field is new, or changes its name, type or meaning."""
-READ_VERSIONS = (2, 3)
-"""Versions that `read_replays` reads; 2 is without `memory_events`."""
+READ_VERSIONS = (2, 3, 4)
+"""Versions that `read_replays` reads; 2 is without `memory_events`, 3 knows one nest."""
 _ARRAYS = {
     "position": "u2",
     "heading": "u1",
@@ -218,7 +218,7 @@ def _world(scenario: ScenarioConfig) -> dict[str, Any]:
         "wall_m": WALL_M,
         "cell_m": CELL_M,
         "interior_m": list(arena.interior_m),
-        "nest_box_m": list(arena.nest_box_m),
+        "nest_boxes_m": [list(box) for box in arena.nest_boxes_m],
         "obstacles_m": [list(box) for box in arena.obstacles],
         "lights_m": [[x, y] for x, y, _ in arena.lights_m],
         "sources_m": [[CELL_M * edge for edge in box] for box in sources],

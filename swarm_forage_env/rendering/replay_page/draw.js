@@ -56,12 +56,14 @@ class Painter {
       colour.wall, 1);
     this.fillBox(pen, world.interior_m, colour.floor, 1);
     for (const source of world.sources_m) this.fillBox(pen, source, colour.source, 0.1);
-    this.fillBox(pen, world.nest_box_m, colour.nest, 0.22);
     pen.strokeStyle = colour.nest;
     pen.lineWidth = 1.5;
-    pen.beginPath();
-    this.box(pen, world.nest_box_m);
-    pen.stroke();
+    for (const nest of world.nest_boxes_m) {
+      this.fillBox(pen, nest, colour.nest, 0.22);
+      pen.beginPath();
+      this.box(pen, nest);
+      pen.stroke();
+    }
     for (const box of world.obstacles_m) this.fillBox(pen, box, colour.wall, 1);
     pen.fillStyle = colour.light;
     pen.beginPath();

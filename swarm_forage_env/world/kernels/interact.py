@@ -77,7 +77,10 @@ def _floor_code(position: FloatArray, floor: IntArray, i: int) -> int:
 def _in_nest(position: FloatArray, rules: Rules, i: int) -> bool:
     x = position[i, 0]
     y = position[i, 1]
-    return rules.nest_x_low <= x <= rules.nest_x_high and rules.nest_y_low <= y <= rules.nest_y_high
+    for k in range(rules.nests.shape[0]):
+        if rules.nests[k, 0] <= x <= rules.nests[k, 2] and rules.nests[k, 1] <= y <= rules.nests[k, 3]:
+            return True
+    return False
 
 
 @kernel

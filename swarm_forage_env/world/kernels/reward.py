@@ -31,8 +31,8 @@ class Payment(NamedTuple):
     events: StepEvents
     previous_position: FloatArray
     """(N, 2) m, before the tick; kept up to date if a term needs it."""
-    nest_centre_m: FloatArray
-    """(2,)."""
+    nest_centres_m: FloatArray
+    """(K, 2)."""
     total: FloatArray
     """(N,) the rewards of the tick."""
     reward: ObsArray
@@ -56,18 +56,21 @@ def picked_first(p: Payment, i: int) -> float:
 
 @kernel
 def came_nearer(p: Payment, i: int) -> float:
-    """Metres that a carrying robot came closer to the nest centre in this tick."""
+    """Metres that a carrying robot came closer to the centre of the nearest nest in this tick."""
     if p.swarm.carried_object[i] < 0:
         return 0.0
-    before = _distance(p.previous_position, p.nest_centre_m, i)
-    return before - _distance(p.swarm.position, p.nest_centre_m, i)
+    before = _to_nearest(p.previous_position, p.nest_centres_m, i)
+    return before - _to_nearest(p.swarm.position, p.nest_centres_m, i)
 
 
 @kernel
-def _distance(position: FloatArray, place: FloatArray, i: int) -> float:
-    dx = position[i, 0] - place[0]
-    dy = position[i, 1] - place[1]
-    return math.sqrt(dx * dx + dy * dy)
+def _to_nearest(position: FloatArray, places: FloatArray, i: int) -> float:
+    nearest = math.inf
+    for k in range(places.shape[0]):
+        dx = position[i, 0] - places[k, 0]
+        dy = position[i, 1] - places[k, 1]
+        nearest = min(nearest, math.sqrt(dx * dx + dy * dy))
+    return nearest
 
 
 @kernel

@@ -1,0 +1,102 @@
+"""Several nests: what is refused, which cells they take, where their lights hang, and that they take deliveries."""
+
+import numpy as np
+import pytest
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.cli.scenario_options import parse_setting
+from swarm_forage_env.contract.codes import CELL_NEST, Event, Grip
+from swarm_forage_env.contract.policy import SwarmSpec
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.runs.spec import RunSpec, plan_run
+from swarm_forage_env.scenarios.config import PHYSICS_ENGINES
+from swarm_forage_env.scenarios.presets import at_density, scenario
+from swarm_forage_env.training.recipe import small_arena
+from tests.support.stage import load, put, tidy_world
+
+EAST = (28.0, 6.0, 30.0, 10.0)
+SQUARE = (16.0, 2.0, 18.0, 4.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ([EAST], ("arena.further_nests to be a tuple of boxes", "got [(28.0")),
+        (((30.0, 4.0, 33.0, 12.0),), ("arena.further_nests[0] inside the 32.0 x 16.0 m arena",)),
+        (((4.0, 4.0, 6.0, 5.0),), ("clear of the nest (1.6, 1.6, 4.8, 14.4)",)),
+        ((EAST, (29.0, 7.0, 31.0, 8.0)), ("arena.further_nests[1] clear of the nest (28.0, 6.0, 30.0, 10.0)",)),
+        (((28.0, 6.0, 28.1, 10.0),), ("at least 0.2 m apart",)),
+    ],
+)
+def test_nonsense_is_refused_with_one_clear_line(given, words):
+    with pytest.raises(ConfigError) as caught:
+        scenario("warehouse_small", further_nests=given)
+    assert all(word in str(caught.value) for word in words)
+    assert "\n" not in str(caught.value)
+
+
+def test_obstacles_keep_clear_of_every_nest():
+    with pytest.raises(ConfigError, match=r"obstacles\[0\] clear of the nest \(28\.0, 6\.0, 30\.0, 10\.0\)"):
+        scenario("warehouse_small", further_nests=(EAST,), obstacles=((29.0, 7.0, 31.0, 8.0),))
+
+
+def test_nests_are_whole_cells_with_lights_of_their_own():
+    arena = scenario("warehouse_small", further_nests=(EAST, SQUARE, (10.05, 8.05, 10.26, 8.26))).arena
+    assert arena.all_nest_cells[1:] == ((140, 30, 150, 50), (80, 10, 90, 20), (50, 40, 51, 41))
+    assert arena.nest_boxes_m[1] == EAST
+    assert arena.nest_centres_m == ((3.2, 8.0), (29.0, 8.0), (17.0, 3.0), (10.1, 8.1))
+    height = (32.0 * 16.0) ** 0.25
+    places = [(29.0, 7.0), (29.0, 8.0), (29.0, 9.0), (17.0, 3.0), (10.1, 8.1)]
+    assert arena.lights_m[3:] == tuple(pytest.approx((x, y, height)) for x, y in places)
+    assert arena.lights_m[:3] == scenario("warehouse_small").arena.lights_m
+
+
+def test_a_run_without_further_nests_is_the_run_of_before():
+    spec = plan_run(scenario("warehouse_small", n_robots=3, horizon_s=200.0), "crw", seed=1)
+    mapping = spec.to_mapping()
+    del mapping["scenario"]["arena"]["further_nests"]
+    assert RunSpec.from_mapping(mapping).run_id == spec.run_id
+    other = plan_run(scenario("warehouse_small", n_robots=3, horizon_s=200.0, further_nests=(EAST,)), "crw", seed=1)
+    assert other.run_id != spec.run_id
+
+
+def test_nests_come_from_words_and_go_to_policies():
+    assert parse_setting("further_nests=28,6,30,10+16,2,18,4") == ("further_nests", (EAST, SQUARE))
+    config = scenario("warehouse_small", further_nests=(EAST, SQUARE))
+    assert SwarmSpec.of(config).nest_boxes_m == ((1.6, 1.6, 4.8, 14.4), EAST, SQUARE)
+
+
+def test_nests_keep_their_share_of_an_arena_of_another_size():
+    config = scenario("warehouse_small", further_nests=(EAST,))
+    small = small_arena(config)
+    assert small["further_nests"][0] == pytest.approx((11.2, 6.0, 12.0, 10.0))
+    grown = at_density(config, 0.05, n_robots=200).arena
+    assert grown.nest_boxes_m[1] == pytest.approx(tuple(edge * 2.8 for edge in EAST), abs=0.11)
+
+
+@pytest.mark.parametrize("physics", PHYSICS_ENGINES)
+def test_every_nest_takes_deliveries_and_holds_no_objects(physics):
+    env = tidy_world(n_robots=2, physics=physics, further_nests=(EAST, SQUARE))
+    for robot, (x, y) in enumerate(((29.0, 6.0), (17.0, 3.0))):
+        put(env, robot, x, y)
+        load(env, robot, robot)
+    release = np.zeros((2, 3), np.float32)
+    release[:, 2] = Grip.DELIVER
+    for _ in range(20):
+        env.step_batch(release)
+        if env.arena.events.code.all():
+            break
+    assert env.arena.events.code.tolist() == [Event.DELIVERED, Event.DELIVERED]
+    for x_low, y_low, x_high, y_high in env.scenario.arena.all_nest_cells:
+        assert (env.arena.objects.floor[y_low:y_high, x_low:x_high] == CELL_NEST).all()
+
+
+def test_pictures_show_every_nest():
+    one, two = (scenario("warehouse_small", n_robots=1, further_nests=further) for further in ((), (EAST,)))
+    pictures = []
+    for config in (one, two):
+        env = ForageEnv(config, render_mode="rgb_array")
+        env.reset(seed=1)
+        pictures.append(env.render())
+    differs = np.argwhere((pictures[0] != pictures[1]).any(axis=2))
+    assert differs[:, 1].min() > 0.8 * pictures[0].shape[1], "the new nest lies in the east"
