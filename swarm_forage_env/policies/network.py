@@ -25,6 +25,7 @@ from swarm_forage_env._internal.files import parse_json, replacing
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ObsArray
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping
+from swarm_forage_env.policies.kernels import affine, tanh
 from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.scenarios.config import CACHE_KINDS
 
@@ -114,13 +115,16 @@ class Network:
             raise NetworkError("Expected weights and biases that are finite numbers; did the training diverge?")
 
     def outputs(self, rows: ObsArray) -> np.ndarray:
-        """Return the last layer's values for observations (N, d), before any choice of actions."""
-        value: np.ndarray = rows
+        """Return the last layer's values for observations (N, d), (N, m) float32, before any choice of actions.
+
+        A row has the same bits on every machine, and whatever other rows there are (`policies.kernels`).
+        """
+        value = np.ascontiguousarray(rows, np.float32)
         last = len(self.weights) - 1
         for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
-            value = value @ weight + bias
+            value = affine(value, np.ascontiguousarray(weight, np.float32), np.ascontiguousarray(bias, np.float32))
             if layer < last:
-                value = np.tanh(value) if self.about.activation == "tanh" else np.maximum(value, 0.0)
+                value = tanh(value) if self.about.activation == "tanh" else np.maximum(value, 0.0)
         return value
 
     def choose(self, rows: ObsArray, rng: np.random.Generator) -> np.ndarray:

@@ -1,6 +1,7 @@
 """Networks in files: evaluated as by hand, read back as written, refused when broken."""
 
 import copy
+import itertools
 import json
 
 import numpy as np
@@ -13,6 +14,7 @@ from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkError, NetworkPolicy
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.views.pettingzoo import parallel_env
+from tests.reference import perceptron
 from tests.support.branches import pickled
 
 
@@ -40,6 +42,28 @@ def compact_network(n_actions: int, rng: np.random.Generator, **about) -> Networ
 def test_outputs_by_hand(activation, expected):
     rows = np.array([[1.0, 0.5]], np.float32)
     np.testing.assert_allclose(small_network(activation=activation).outputs(rows), [expected], rtol=1e-6)
+
+
+@pytest.mark.parametrize("activation", ["tanh", "relu"])
+@pytest.mark.parametrize("sizes", [(31, 64, 64, 6), (1, 3), (5, 2, 7), (4, 4, 1)])
+def test_outputs_are_those_of_the_slow_twin_bit_for_bit(activation, sizes):
+    chance = np.random.default_rng(len(sizes))
+    weights = [chance.normal(size=size).astype(np.float32) for size in itertools.pairwise(sizes)]
+    biases = [chance.normal(size=size).astype(np.float32) for size in sizes[1:]]
+    network = Network(tuple(weights), tuple(biases), NetworkAbout(interface=InterfaceConfig(), activation=activation))
+    rows = chance.normal(size=(9, sizes[0])).astype(np.float32)
+    ours = network.outputs(rows)
+    assert ours.tobytes() == perceptron.outputs(weights, biases, rows, activation).tobytes()
+    for row in range(9):
+        assert network.outputs(rows[row : row + 1]).tobytes() == ours[row].tobytes(), "whatever rows are beside it"
+
+
+def test_tanh_is_good_to_float32():
+    identity = np.eye(1, dtype=np.float32), np.zeros(1, np.float32)
+    about = NetworkAbout(interface=InterfaceConfig(), activation="tanh")
+    network = Network((identity[0],) * 2, (identity[1],) * 2, about)
+    x = np.concatenate([np.linspace(-12, 12, 4001), [1e-30, -1e-8, 1e4, -1e30]]).astype(np.float32)
+    np.testing.assert_allclose(network.outputs(x[:, None])[:, 0], np.tanh(x.astype(float)), rtol=4e-7, atol=1e-38)
 
 
 def test_continuous_choices_are_cut_to_the_range_of_actions():

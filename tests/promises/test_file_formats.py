@@ -73,8 +73,8 @@ def test_a_replay_of_version_3_has_what_robots_remember():
 def test_a_replay_of_another_version_is_refused(tmp_path):
     page = (FILES / "replay_3.html").read_text(encoding="utf-8")
     assert page.count('"version": 3,') == 1
-    (tmp_path / "a.html").write_text(page.replace('"version": 3,', '"version": 4,'), encoding="utf-8")
-    with pytest.raises(ReplayError, match="version 4"):
+    (tmp_path / "a.html").write_text(page.replace('"version": 3,', '"version": 5,'), encoding="utf-8")
+    with pytest.raises(ReplayError, match="version 5"):
         read_replays(tmp_path / "a.html")
 
 

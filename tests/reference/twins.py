@@ -32,6 +32,7 @@ SITES = Twin(
     "policies/test_site_memory.py",
     "swarm_forage_env.policies.interface.LearnerInterface.observe",
 )
+PERCEPTRON = Twin("perceptron.outputs", "policies/test_network.py", "swarm_forage_env.policies.network.Network.outputs")
 INTERFERENCE = Twin("sensing.interferes", "world/test_interference.py", "swarm_forage_env.env.ForageEnv.step_batch")
 OBSERVED = Twin("sensing.observe", "world/test_sensors.py", "swarm_forage_env.world.arena.ForagingArena.observe")
 MOTION = Twin("motion.free_motion", "world/test_physics.py", "swarm_forage_env.env.ForageEnv.step_batch")
@@ -78,6 +79,9 @@ TWINS = {
         "swarm_forage_env.policies.interface.LearnerInterface.command",
     ),
     "swarm_forage_env.policies.kernels.compact_view": COMPACT_VIEW,
+    "swarm_forage_env.policies.kernels._affine": PERCEPTRON,
+    "swarm_forage_env.policies.kernels._fraction": PERCEPTRON,
+    "swarm_forage_env.policies.kernels._tanh_fraction": PERCEPTRON,
     "swarm_forage_env.policies.kernels.remember_sites": SITES,
     "swarm_forage_env.policies.kernels.show_sites": SITES,
     "swarm_forage_env.rendering.kernels.paint_round": Twin(
