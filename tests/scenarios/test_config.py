@@ -40,6 +40,7 @@ OTHER_VALUES: dict[str, Any] = {
     "height_m": 52.0,
     "nest_centre_m": (20.0, 22.0),
     "nest_size_m": (4.0, 6.0),
+    "further_nests": ((2.0, 2.0, 3.0, 3.0),),
     "obstacles": ((10.0, 10.0, 10.4, 12.0), (30.0, 8.0, 31.0, 9.0)),
     "n_robots": 3,
     "radius_m": 0.07,
