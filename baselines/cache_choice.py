@@ -9,7 +9,7 @@ from swarm_forage_env.contract.types import Row
 
 from .cache_memory import NOT_TO_ADD, NOT_TO_TAKE, OneTaskMemory, covers, is_listed, keep_away_m
 from .memory import OneMemory, density
-from .robots import ACQUIRE, TRANSPORT, Senses
+from .robots import ACQUIRE, TRANSPORT, Senses, nearest_nest
 from .tasks import DRAW_POINT_X, DRAW_POINT_Y
 
 
@@ -31,7 +31,8 @@ def cache_utility(
         c: Constants of the run.
     """
     robot_x, robot_y = cache_x - x, cache_y - y
-    nest_x, nest_y = cache_x - c.nest_x_m, cache_y - c.nest_y_m
+    nest_x, nest_y = nearest_nest(cache_x, cache_y, c)
+    nest_x, nest_y = cache_x - nest_x, cache_y - nest_y
     product = (robot_x * robot_x + robot_y * robot_y) * (nest_x * nest_x + nest_y * nest_y)
     return math.exp(pheromone) * count / math.sqrt(product)
 
@@ -44,8 +45,9 @@ def is_large_enough(cache: np.record, c: np.record) -> bool:
 
 @kernel
 def from_nest_m(x: float, y: float, c: np.record) -> float:
-    """Distance of a point (m) from the nest's centre, m."""
-    return math.sqrt((x - c.nest_x_m) ** 2 + (y - c.nest_y_m) ** 2)
+    """Distance of a point (m) from the centre of the nearest nest, m."""
+    nest_x, nest_y = nearest_nest(x, y, c)
+    return math.sqrt((x - nest_x) ** 2 + (y - nest_y) ** 2)
 
 
 @kernel
@@ -123,7 +125,8 @@ def isolated_object_utility(
         c: Constants of the run.
     """
     robot_x, robot_y = object_x - x, object_y - y
-    nest_x, nest_y = object_x - c.nest_x_m, object_y - c.nest_y_m
+    nest_x, nest_y = nearest_nest(object_x, object_y, c)
+    nest_x, nest_y = object_x - nest_x, object_y - nest_y
     product = (robot_x * robot_x + robot_y * robot_y) * (nest_x * nest_x + nest_y * nest_y)
     # The lower limit is for a robot exactly on the object.
     return math.exp(pheromone) / math.sqrt(max(product, 1e-12))

@@ -20,7 +20,7 @@ import numpy as np
 from swarm_forage_env._internal.compiling import kernel
 
 from .cache_memory import OneTaskMemory, keep_away_m
-from .robots import Senses
+from .robots import Senses, nearest_nest
 from .tasks import DRAW_POINT_X, DRAW_POINT_Y
 
 _RIM_M = 1e-6
@@ -44,10 +44,11 @@ class Best(NamedTuple):
 
 @kernel
 def _disc(k: int, c: np.record, memory: OneTaskMemory) -> tuple[float, float, float]:
-    """Centre and radius of forbidden disc k: the nest, then every remembered cache."""
-    if k == 0:
-        return c.nest_x_m, c.nest_y_m, c.proximity_m
-    cache = memory.caches[k - 1]
+    """Centre and radius of forbidden disc k: every nest, then every remembered cache."""
+    nests = c.nests_m
+    if k < nests.shape[0]:
+        return nests[k, 0], nests[k, 1], c.proximity_m
+    cache = memory.caches[k - nests.shape[0]]
     return (cache.cell_x + 0.5) * c.cell_m, (cache.cell_y + 0.5) * c.cell_m, keep_away_m(cache, c)
 
 
@@ -56,7 +57,7 @@ def is_allowed(robot: np.record, x: float, y: float, c: np.record, memory: OneTa
     """Whether a cache may be started at a point, as far as the robot knows."""
     if not (c.site_x_low_m <= x <= c.site_x_high_m and c.site_y_low_m <= y <= c.site_y_high_m):
         return False
-    for k in range(robot.n_caches + 1):
+    for k in range(robot.n_caches + c.nests_m.shape[0]):
         disc_x, disc_y, radius = _disc(k, c, memory)
         dx = disc_x - x
         dy = disc_y - y
@@ -161,7 +162,7 @@ def nearest_allowed(
     best = _better(best, robot, boxed_x, boxed_y, middle_x, middle_y, c, memory)
     if best.distance == 0.0:
         return best
-    for k in range(robot.n_caches + 1):
+    for k in range(robot.n_caches + c.nests_m.shape[0]):
         disc_x, disc_y, radius = _disc(k, c, memory)
         dx = middle_x - disc_x
         dy = middle_y - disc_y
@@ -233,8 +234,9 @@ def select_site(robot: np.record, senses: Senses, c: np.record, draws: np.ndarra
         Whether any point is allowed; then goal and tolerance of the robot are set.
     """
     turn = 2.0 * math.pi * draws[DRAW_POINT_X]
-    middle_x = 0.5 * (senses.x + c.nest_x_m)
-    middle_y = 0.5 * (senses.y + c.nest_y_m)
+    nest_x, nest_y = nearest_nest(senses.x, senses.y, c)
+    middle_x = 0.5 * (senses.x + nest_x)
+    middle_y = 0.5 * (senses.y + nest_y)
     best = nearest_allowed(robot, middle_x, middle_y, turn, c, memory)
     if best.distance == math.inf:
         return False

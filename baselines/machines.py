@@ -38,6 +38,7 @@ from .robots import (
     WAIT_PICKUP,
     Senses,
     in_nest,
+    nearest_nest,
 )
 
 NOTHING_HERE = int(Event.NOTHING_HERE)
@@ -318,8 +319,9 @@ def home(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -
     Returns:
         Whether the robot has reached its place to drop, and the force.
     """
-    dx = senses.x - c.nest_x_m
-    dy = senses.y - c.nest_y_m
+    nest_x, nest_y = nearest_nest(senses.x, senses.y, c)
+    dx = senses.x - nest_x
+    dy = senses.y - nest_y
     distance = np.sqrt(dx * dx + dy * dy)
     sees_it = in_nest(row, c)
     if robot.activity == HOMING and sees_it:

@@ -14,7 +14,7 @@ from swarm_forage_env.contract.types import Row
 
 from .memory import OneMemory, density
 from .parameters import ControllerParameters, ParameterError
-from .robots import Senses
+from .robots import Senses, nearest_nest
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -55,7 +55,8 @@ def object_utility(anchor_x: float, anchor_y: float, x: float, y: float, pheromo
         pheromone: Density of the object.
         c: Constants of the run.
     """
-    nest_x, nest_y = anchor_x - c.nest_x_m, anchor_y - c.nest_y_m
+    nest_x, nest_y = nearest_nest(anchor_x, anchor_y, c)
+    nest_x, nest_y = anchor_x - nest_x, anchor_y - nest_y
     away_x, away_y = anchor_x - x, anchor_y - y
     ratio = (nest_x * nest_x + nest_y * nest_y) / (away_x * away_x + away_y * away_y)
     return math.sqrt(ratio) * math.exp(pheromone * c.object_priority)

@@ -202,8 +202,6 @@ def kernel_constants(parameters: ControllerParameters, spec: SwarmSpec, **derive
         cell_m=spec.cell_m,
         wheel_scale_mps=spec.wheel_scale_mps,
         max_speed_mps=spec.max_speed_mps,
-        nest_x_m=spec.nest_centre_m[0],
-        nest_y_m=spec.nest_centre_m[1],
         soft_turn_rad=math.radians(parameters.soft_turn_deg),
         per_soft_turn=1.0 / math.radians(parameters.soft_turn_deg),
         per_wheel_scale=1.0 / spec.wheel_scale_mps,
@@ -211,9 +209,13 @@ def kernel_constants(parameters: ControllerParameters, spec: SwarmSpec, **derive
     )
     for name, value in (derived | wander_series(parameters)).items():
         (whole if isinstance(value, int) else real)[name] = value
-    fields = np.dtype([(name, np.int64) for name in whole] + [(name, np.float64) for name in real], align=True)
+    nests_m = [((left + right) / 2, (bottom + top) / 2) for left, bottom, right, top in spec.nest_boxes_m]
+    places: Any = ("nests_m", np.float64, (len(nests_m), 2))
+    numbers = [*((name, np.int64) for name in whole), *((name, np.float64) for name in real)]
+    fields = np.dtype([*numbers, places], align=True)
     # np.record makes fields readable as attributes also in uncompiled kernels; compiled kernels need no help.
     constants = np.zeros(1, np.dtype((np.record, fields)))
     for name, value in (whole | real).items():
         constants[name] = value
+    constants["nests_m"] = nests_m
     return constants

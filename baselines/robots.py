@@ -5,6 +5,7 @@ observation; `c` the record of `parameters.kernel_constants`; `draws` its unifor
 use, so that no decision shifts the randomness of another.
 """
 
+import math
 from collections.abc import Sequence
 from enum import IntEnum
 from typing import NamedTuple
@@ -192,6 +193,18 @@ def sense(row: Row, c: np.record) -> Senses:
         (float(row[c.position]) + 1.0) * c.half_width_m,
         (float(row[c.position + 1]) + 1.0) * c.half_height_m,
     )
+
+
+@kernel
+def nearest_nest(x: float, y: float, c: np.record) -> tuple[float, float]:
+    """Centre of the nest whose centre is nearest to a point, all in m. Our choice where there are several nests."""
+    nests = c.nests_m
+    nearest, least = 0, math.inf
+    for k in range(nests.shape[0]):
+        dx, dy = x - nests[k, 0], y - nests[k, 1]
+        if dx * dx + dy * dy < least:
+            nearest, least = k, dx * dx + dy * dy
+    return nests[nearest, 0], nests[nearest, 1]
 
 
 @kernel

@@ -153,7 +153,7 @@ def scattered(robot: TaskRobot, x: float, y: float, u: float, v: float) -> tuple
     """Site chosen by a robot at (x, y), and what the slow twin chooses."""
     c, memory = robot.constants, robot.memory
     goal = choose(robot, x, y, u, v)
-    middle = 0.5 * (x + c.nest_x_m), 0.5 * (y + c.nest_y_m)
+    middle = 0.5 * (x + c.nests_m[0, 0]), 0.5 * (y + c.nests_m[0, 1])
     best = nearest_allowed(robot.record, *middle, 2 * math.pi * u, c, memory)
     expected = scattered_sites.site(
         complex(best.x, best.y),

@@ -145,6 +145,11 @@ class ReferenceRobot:
         """Acquire from the beginning."""
         self.state, self.timer, self.vector, self.recovery = "acquire", None, "idle", 0
 
+    def nearest_nest(self, place: tuple[float, float]) -> tuple[float, float]:
+        """Centre of the nearest nest."""
+        centres = [((box[0] + box[2]) / 2, (box[1] + box[3]) / 2) for box in self.spec.nest_boxes_m]
+        return min(centres, key=lambda centre: math.dist(centre, place))
+
     def sees(self, low: float, high: float, at_least: int) -> bool:
         """Whether enough ground sensors read a grey in the band."""
         readings = self.senses["ground"]
@@ -204,13 +209,14 @@ class ReferenceRobot:
 
     def choose(self) -> bool:
         """Best remembered object further than 0.2 m."""
-        nest, cell_m = self.spec.nest_centre_m, self.spec.cell_m
+        cell_m = self.spec.cell_m
         utilities = {}
         for row, (cell, density) in self.memory.known.items():
             anchor = (cell[0] * cell_m, cell[1] * cell_m)
             centre = (anchor[0] + cell_m / 2, anchor[1] + cell_m / 2)
             if math.dist(centre, self.position) > 0.2:
-                utilities[row] = math.dist(anchor, nest) / math.dist(anchor, self.position) * math.exp(density)
+                from_nest = math.dist(anchor, self.nearest_nest(anchor))
+                utilities[row] = from_nest / math.dist(anchor, self.position) * math.exp(density)
         if not utilities:
             return False
         self.target = max(utilities, key=lambda row: utilities[row])
@@ -254,7 +260,7 @@ class ReferenceRobot:
         return with_length(offset, max(1.0, 8.0 * distance / 0.2) if self.slowing else 8.0)
 
     def home(self) -> complex:
-        distance = math.dist(self.position, self.spec.nest_centre_m)
+        distance = math.dist(self.position, self.nearest_nest(self.position))
         in_nest = self.sees(0.6, 0.8, 3)
         if self.state == "homing" and in_nest:
             self.depth = 0.01 + (distance - 0.01) * self.draws[0]

@@ -327,7 +327,8 @@ class ReferenceTaskRobot(ReferenceRobot):
         return self.choose_cache() if self.kind == "cache" else self.choose_isolated()
 
     def nest_distance(self, cell: Cell) -> float:
-        return math.dist(((cell[0] + 0.5) * 0.2, (cell[1] + 0.5) * 0.2), self.spec.nest_centre_m)
+        centre = (cell[0] + 0.5) * 0.2, (cell[1] + 0.5) * 0.2
+        return math.dist(centre, self.nearest_nest(centre))
 
     def choose_cache(self) -> bool:
         utilities, serials = {}, {}
@@ -339,7 +340,7 @@ class ReferenceTaskRobot(ReferenceRobot):
             if not taking and self.cargo_from and not self.spec.quirks.transferer_goes_anywhere:
                 unwanted = unwanted or self.nest_distance(cell) >= self.nest_distance(self.cargo_from)
             if not unwanted and not self.covered(cell, tuple(self.position)):
-                away = math.dist(centre, self.position) * math.dist(centre, self.spec.nest_centre_m)
+                away = math.dist(centre, self.position) * math.dist(centre, self.nearest_nest(centre))
                 utilities[centre] = math.exp(cache.density) * cache.count / away
                 serials[centre] = cache.serial
         if not utilities:
@@ -363,7 +364,7 @@ class ReferenceTaskRobot(ReferenceRobot):
             others = (other for key, other in places.items() if key != row)
             is_clear = all(math.dist(place, (x, y)) > distance for x, y, distance in caches)
             if is_clear and all(math.dist(place, other) > near for other in others):
-                away = math.dist(place, self.position) * math.dist(place, self.spec.nest_centre_m)
+                away = math.dist(place, self.position) * math.dist(place, self.nearest_nest(place))
                 utilities[place] = math.exp(self.memory.known[row][1]) / away
         if not utilities:
             return False

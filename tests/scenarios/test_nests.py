@@ -8,6 +8,7 @@ from swarm_forage_env.cli.scenario_options import parse_setting
 from swarm_forage_env.contract.codes import CELL_NEST, Event, Grip
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.spec import RunSpec, plan_run
 from swarm_forage_env.scenarios.config import PHYSICS_ENGINES
 from swarm_forage_env.scenarios.presets import at_density, scenario
@@ -89,6 +90,26 @@ def test_every_nest_takes_deliveries_and_holds_no_objects(physics):
     assert env.arena.events.code.tolist() == [Event.DELIVERED, Event.DELIVERED]
     for x_low, y_low, x_high, y_high in env.scenario.arena.all_nest_cells:
         assert (env.arena.objects.floor[y_low:y_high, x_low:x_high] == CELL_NEST).all()
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    ("policy", "caches"), [("crw", "none"), ("dpo", "none"), ("stochm", "static"), ("stochx", "dynamic")]
+)
+def test_the_controllers_bring_objects_to_both_nests(policy, caches):
+    """Two nests of one size with objects between them: each gets its part."""
+    world = scenario(
+        "warehouse_small", n_robots=30, n_objects=300, horizon_s=2000.0, caches=caches, placement="random",
+        nest_centre_m=(3.2, 8.0), nest_size_m=(2.0, 8.0), further_nests=((27.8, 4.0, 29.8, 12.0),),
+    )  # fmt: skip
+    env, chosen = ForageEnv(world), load_policy(policy)
+    chosen.reset(env.swarm_spec, np.random.default_rng(3))
+    obs, truncated, places = env.reset_batch(3), False, []
+    while not truncated:
+        obs, _, _, truncated = env.step_batch(chosen.act(obs, env.active))
+        places.extend(env.swarm.position[env.arena.events.code == Event.DELIVERED, 0].tolist())
+    west = sum(x < 16.0 for x in places)
+    assert min(west, len(places) - west) >= 5, (west, len(places))
 
 
 def test_pictures_show_every_nest():

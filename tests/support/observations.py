@@ -35,7 +35,7 @@ def make_spec(n_robots: int = 1, **changes: Any) -> SwarmSpec:
         cell_m=CELL_M,
         nest_centre_m=(3.2, 8.0),
         nest_size_m=(3.2, 12.8),
-        nest_boxes_m=((1.6, 1.6, 4.8, 14.4),),
+        nest_boxes_m=(),
         distributable_box_m=(4.8, 2.4, 27.4, 13.8),
         placement="single_source",
         caches="none",
@@ -49,7 +49,12 @@ def make_spec(n_robots: int = 1, **changes: Any) -> SwarmSpec:
         cache_reach_cells=(2,) * n_robots,
         quirks=Quirks(),
     )
-    return dataclasses.replace(task, **changes)
+    task = dataclasses.replace(task, **changes)
+    if "nest_boxes_m" not in changes:
+        (x, y), (width, height) = task.nest_centre_m, task.nest_size_m
+        box = x - width / 2, y - height / 2, x + width / 2, y + height / 2
+        task = dataclasses.replace(task, nest_boxes_m=(box,))
+    return task
 
 
 class Observations:
