@@ -17,6 +17,7 @@ from scripts.update_docs import made_with
 from swarm_forage_env import AUTHORS_PROGRAM, Quirks
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import RunSpec, plan_run
+from swarm_forage_env.scenarios.config import PHYSICS_ENGINES
 from swarm_forage_env.views.arenas import ArenaBatch
 from swarm_forage_env.views.plans import plan_arena
 from tests.support.foraging import NEAR, mild_wrappers, quick_world
@@ -32,8 +33,8 @@ AS_THEN = (
     pytest.mark.skipif(_HERE != _THEN, reason=f"fingerprints are for {_THEN}, the last bits differ with others"),
 )
 """Marks of tests whose numbers hold for the machine and the versions of the golden runs only."""
-COMPILED_POLICIES = ("crw", "stochx")
-"""Those that also run with compiled bodies. The other policies do nothing with bodies that these two do not do."""
+CHIPMUNK_POLICIES = ("crw", "stochx")
+"""Those that also run with Chipmunk's bodies. The other policies do nothing with bodies that these two do not do."""
 POLICIES = ("crw", "dpo", "stochm", "stochx", "ppo_warehouse_small")
 READINGS = {"described": Quirks(), "program": AUTHORS_PROGRAM}
 WRAPPERS = {"calm": (), "adverse": mild_wrappers()}
@@ -51,7 +52,7 @@ INTERFACES: dict[str, dict[str, Any]] = {
 def golden_specs() -> dict[str, RunSpec]:
     """One run for each preset, controller, reading and set of wrappers, by a name that tells them.
 
-    All of them have Chipmunk's bodies; a part of those by the description has compiled bodies as well.
+    A part of those by the description has Chipmunk's bodies as well.
     """
     specs = {}
     for scenario in NEAR:
@@ -61,9 +62,9 @@ def golden_specs() -> dict[str, RunSpec]:
                     world = quick_world(scenario, quirks=quirks, interval_s=60.0, **FAR.get(scenario, {}))
                     name = f"{scenario}/{policy}/{reading}/{adversity}"
                     specs[name] = plan_run(world, policy, wrappers=wrappers, seed=7)
-                    if policy in COMPILED_POLICIES and reading == "described":
-                        compiled = replace(world, physics="compiled")
-                        specs[f"{name}/compiled"] = plan_run(compiled, policy, wrappers=wrappers, seed=7)
+                    if policy in CHIPMUNK_POLICIES and reading == "described":
+                        chipmunk = replace(world, physics="chipmunk")
+                        specs[f"{name}/chipmunk"] = plan_run(chipmunk, policy, wrappers=wrappers, seed=7)
     return specs
 
 
@@ -79,12 +80,13 @@ def run_fingerprint(spec: RunSpec) -> str:
 def golden_batches() -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:
     """Return scenario fields and the interface of each batch, by a name that tells them.
 
-    Those with compiled bodies are crowded: while nobody touches anybody, both engines are the same.
+    Crowds are in both engines: while nobody touches anybody, these are the same.
     """
     batches = {}
     for name, interface in INTERFACES.items():
         batches[f"batch/{name}"] = {"n_robots": 20}, interface
-        batches[f"batch/{name}/compiled"] = {"n_robots": 100, "physics": "compiled"}, interface
+        for engine in PHYSICS_ENGINES:
+            batches[f"batch/{name}/crowd/{engine}"] = {"n_robots": 100, "physics": engine}, interface
     return batches
 
 
