@@ -6,6 +6,7 @@ All controllers share these functions. Every function is compiled, handles one r
 Conventions are those of `robots`.
 """
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -41,6 +42,10 @@ from .robots import (
     nearest_nest,
 )
 
+_HALF_RIGHT = math.sqrt(0.5)
+"""Cosine and sine of 45 degrees."""
+_OFF_THE_WALL = 0.1
+"""Share of the avoidance force while a robot drives along an obstacle; our choice: it stays in sight of it."""
 NOTHING_HERE = int(Event.NOTHING_HERE)
 VANISHED = int(Event.VANISHED)
 GRASP = float(Grip.GRASP)
@@ -61,6 +66,7 @@ def start_carrying(robot: np.record, activity: int) -> None:
     """Begin to carry the cargo to its destination: HOMING, or TRANSPORT with no goal and exploration not started."""
     robot.activity = activity
     robot.explore_ticks = NOT_EXPLORING
+    robot.rest_ticks = robot.detour_ticks = 0
     stop_vector(robot)
 
 
@@ -308,6 +314,38 @@ def acquire(
 
 
 @kernel
+def begin_detour(robot: np.record, senses: Senses, c: np.record, u: float) -> None:
+    """Begin a detour where a robot has not come further for long; `u`, uniform in [0, 1), decides side and length."""
+    dx = senses.x - robot.rest_x_m
+    dy = senses.y - robot.rest_y_m
+    if dx * dx + dy * dy > c.detour_way_m * c.detour_way_m:
+        robot.rest_x_m = senses.x
+        robot.rest_y_m = senses.y
+        robot.rest_ticks = 0
+    robot.rest_ticks += 1
+    if robot.rest_ticks > c.detour_after_ticks and robot.detour_ticks == 0:
+        share = abs(2.0 * u - 1.0)
+        ticks = 1 + int(share * share * c.detour_longest_ticks)
+        robot.detour_ticks = ticks if u < 0.5 else -ticks
+        robot.rest_ticks = 0
+
+
+@kernel
+def go_round(robot: np.record, senses: Senses, x: float, y: float, c: np.record) -> tuple[float, float]:
+    """One tick of a detour; returns the force, where (x, y) is the one towards the light.
+
+    A robot drives along what is in its way, and a little off it. Where it sees nothing, it turns half way back to the
+    light. So it goes round the end of a wall, or comes back and tries again.
+    """
+    side = 1.0 if robot.detour_ticks > 0 else -1.0
+    robot.detour_ticks -= int(side)
+    if not senses.obstacle:
+        return _HALF_RIGHT * (x - side * y), _HALF_RIGHT * (side * x + y)
+    away_x, away_y = avoidance(senses.obstacle_x, senses.obstacle_y, c)
+    return side * away_y + _OFF_THE_WALL * away_x, -side * away_x + _OFF_THE_WALL * away_y
+
+
+@kernel
 def home(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -> tuple[bool, float, float]:
     """One tick of carrying an object into the nest: towards the light, then deeper by a random amount.
 
@@ -330,6 +368,11 @@ def home(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -
     if robot.activity == HOMING_IN_NEST and sees_it and distance <= robot.drop_depth_m:
         return True, 0.0, 0.0
     x, y = phototaxis(row[c.light : c.light + RING_SENSORS], c)
+    if c.has_obstacles and robot.activity == HOMING:
+        begin_detour(robot, senses, c, draws[DRAW_DEPTH])
+        if robot.detour_ticks:
+            x, y = go_round(robot, senses, x, y, c)
+            return False, x, y
     if robot.activity == HOMING_IN_NEST:
         walk_x, walk_y = random_walk(robot, senses, c, draws[DRAW_WANDER])
     else:

@@ -72,6 +72,13 @@ class ControllerParameters:
     longest_turn_s: float = 2.4
     """A homing robot that has only turned on the spot for longer also wanders, to break free; our choice: half a turn
     takes 2.2 s."""
+    detour_after_s: float = 20.0
+    """In a world with obstacles, a homing robot that has not come `detour_way_m` further for so long begins a detour
+    along what is in its way; our choice: light and avoidance cancel before a wide wall, and the paper has none."""
+    detour_way_m: float = 0.5
+    """See `detour_after_s`; our choice: more than a robot is pushed to and fro on one spot."""
+    detour_longest_s: float = 400.0
+    """Longest detour, in which a robot drives about 32 m; short ones are likelier. Our choice."""
     soft_turn_deg: float = 15.0
     """Force angles up to this are driven as arcs, larger ones as turns on the spot; study."""
     exploration_lock_s: float = 10.0
@@ -194,6 +201,9 @@ def kernel_constants(parameters: ControllerParameters, spec: SwarmSpec, **derive
     whole["exploration_lock_ticks"] = round(parameters.exploration_lock_s / spec.dt_s)
     whole["longest_turn_ticks"] = round(parameters.longest_turn_s / spec.dt_s)
     whole["recovery_ticks"] = round(parameters.recovery_s / spec.dt_s)
+    whole["has_obstacles"] = int(spec.has_obstacles)
+    whole["detour_after_ticks"] = round(parameters.detour_after_s / spec.dt_s)
+    whole["detour_longest_ticks"] = round(parameters.detour_longest_s / spec.dt_s)
     whole.update({name: int(is_on) for name, is_on in dataclasses.asdict(spec.quirks).items()})
     real: dict[str, Any] = {field.name: getattr(parameters, field.name) for field in dataclasses.fields(parameters)}
     real.update(

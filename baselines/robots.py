@@ -98,6 +98,8 @@ DRAWS = 4
 
 ROBOT_FIELDS: list[tuple[str, type]] = [
     ("wander_deg", np.float64),  # wander angle
+    ("rest_x_m", np.float64),  # where a homing robot was when it last came further, in a world with obstacles
+    ("rest_y_m", np.float64),
     ("drop_depth_m", np.float64),  # deliver at most this far from the nest centre
     ("goal_x_m", np.float64),
     ("goal_y_m", np.float64),
@@ -106,6 +108,8 @@ ROBOT_FIELDS: list[tuple[str, type]] = [
     ("explore_ticks", np.int32),  # since exploration started, or NOT_EXPLORING
     ("recovery_ticks", np.int32),  # driven straight on after avoiding
     ("turn_ticks", np.int32),  # in a row, up to now, in which it was told to turn on the spot or to stand
+    ("rest_ticks", np.int32),  # since then
+    ("detour_ticks", np.int32),  # left of a detour: positive to the left, negative to the right
     ("clock", np.int32),  # ticks lived through while active
     ("n_known", np.int32),  # remembered objects
     ("window_x", np.int32),  # lower left cell of the window seen last

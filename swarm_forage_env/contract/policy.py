@@ -72,6 +72,8 @@ class SwarmSpec:
     nest_size_m: tuple[float, float]
     nest_boxes_m: tuple[tuple[float, float, float, float], ...]
     """x low, y low, x high, y high of every nest; the first is the one of `nest_centre_m` and `nest_size_m`."""
+    has_obstacles: bool
+    """Whether there is anything in the way but the outer walls."""
     distributable_box_m: tuple[float, float, float, float]
     """x low, y low, x high, y high of the area where objects may lie."""
     placement: str
@@ -145,6 +147,7 @@ class SwarmSpec:
             nest_centre_m=((nest_left + nest_right) / 2, (nest_bottom + nest_top) / 2),
             nest_size_m=(nest_right - nest_left, nest_top - nest_bottom),
             nest_boxes_m=arena.nest_boxes_m,
+            has_obstacles=bool(arena.obstacles),
             distributable_box_m=(left, bottom, right, top),
             placement=scenario.objects.placement,
             caches=scenario.caches,

@@ -9,6 +9,9 @@ from baselines.crw import CRWPolicy
 from baselines.dpo import DPOPolicy
 from baselines.robots import DRAWS, VectorState
 from swarm_forage_env.contract.codes import Event
+from swarm_forage_env.runs.run import run_one
+from swarm_forage_env.runs.spec import plan_run
+from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
 from tests.reference.controllers import ObjectDictionary, ReferenceRobot
 from tests.support.observations import GREYS, Observations, make_spec
@@ -98,6 +101,43 @@ def test_long_turns_are_as_in_the_slow_one():
             assert actions[i] == pytest.approx(twin.act(seen.array[i], draws[i]), abs=2e-6)
         driving += np.count_nonzero(actions[:, 0] + actions[:, 1] > 0.0)
     assert 5 < driving < 60
+
+
+def test_detours_are_as_in_the_slow_one():
+    """Robots that carry among obstacles and come no further; now and then they see nothing, or are elsewhere."""
+    task = make_spec(N_ROBOTS, has_obstacles=True)
+    seen, policy, draws_again = Observations(task), CRWPolicy(), np.random.default_rng(9)
+    policy.reset(task, np.random.default_rng(9))
+    twins, chance = [ReferenceRobot(task) for _ in range(N_ROBOTS)], np.random.default_rng(10)
+    on_the_way = set()
+    for i in range(N_ROBOTS):
+        seen.carry(i, i)
+        seen.light(math.radians(20.0 * i), i)
+    for tick in range(700):
+        for i in range(N_ROBOTS):
+            seen.set("proximity", chance.random(24) * chance.integers(2), i)
+            if chance.random() < 0.002:
+                seen.pose(*chance.uniform((10.0, 5.0), (20.0, 10.0)), robots=i)
+            if chance.random() < 0.002:
+                seen.carry(None if seen.get("carrying", i)[0] else i, i)
+        actions = policy.act(seen.array, np.ones(N_ROBOTS, bool))
+        draws = draws_again.random((N_ROBOTS, DRAWS))
+        for i, twin in enumerate(twins):
+            assert actions[i] == pytest.approx(twin.act(seen.array[i], draws[i]), abs=2e-6), (tick, i)
+            on_the_way.add((twin.detour > 0) * twin.side)
+    assert on_the_way == {-1, 0, 1}
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(("policy", "caches"), [("crw", "none"), ("dpo", "none"), ("stochm", "static")])
+def test_objects_come_home_round_a_wide_wall(policy, caches):
+    """Without detours hardly an object does: light and avoidance cancel before the wall."""
+    walled = scenario("warehouse_small", n_robots=20, horizon_s=3000.0, obstacles=((7.0, 3.0, 7.4, 13.0),))
+    delivered = [
+        run_one(plan_run(walled, policy, seed=1, caches=caches, parameters=parameters)).performance.sum()
+        for parameters in ({}, {"detour_after_s": 10_000.0})
+    ]
+    assert delivered[0] >= 2 > delivered[1]
 
 
 @pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy])

@@ -81,6 +81,12 @@ class ReferenceRobot:
     recovery: int = 0
     turning: int = 0
     """Ticks in a row in which it turned on the spot."""
+    rest: tuple[float, float] = (0.0, 0.0)
+    resting: int = 0
+    """Ticks since it was at `rest`, on its way home among obstacles."""
+    detour: int = 0
+    side: int = 1
+    """Ticks that are left of a detour to the left (1) or to the right (-1)."""
     slowing: bool = False
     depth: float = 0.0
     target: int = -1
@@ -127,11 +133,11 @@ class ReferenceRobot:
         event = round(self.senses["event"][0] * 16)
         failed = event in (Event.NOTHING_HERE, Event.VANISHED)
         if carrying and self.state in ("acquire", "wait for pick-up", "leave nest"):
-            self.state = "homing"
+            self.state, self.resting, self.detour = "homing", 0, 0
             if self.memory is not None:
                 self.memory.known.pop(round(self.senses["cargo"][0] * self.spec.n_objects) - 1, None)
         elif carrying and self.state == "wait for drop" and failed:
-            self.state = "homing"
+            self.state, self.resting, self.detour = "homing", 0, 0
         elif not carrying and (self.state.startswith("homing") or (self.state == "wait for pick-up" and failed)):
             self.restart()
         elif not carrying and self.state == "wait for drop":
@@ -259,6 +265,24 @@ class ReferenceRobot:
         self.slowing = distance <= 0.2
         return with_length(offset, max(1.0, 8.0 * distance / 0.2) if self.slowing else 8.0)
 
+    def is_on_a_detour(self) -> bool:
+        """Half a metre in 20 s, or a detour of at most 400 s begins."""
+        if math.dist(self.position, self.rest) > 0.5:
+            self.rest, self.resting = (float(self.position[0]), float(self.position[1])), 0
+        self.resting += 1
+        if self.resting > 100 and self.detour == 0:
+            self.detour = 1 + int((2.0 * self.draws[0] - 1.0) ** 2 * 2000)
+            self.side = 1 if self.draws[0] < 0.5 else -1
+            self.resting = 0
+        return self.detour > 0
+
+    def go_round(self, light: complex) -> complex:
+        self.detour -= 1
+        if self.obstacle():
+            away = with_length(-self.away, 8.0)
+            return 0.1 * away - 1j * self.side * away
+        return light * cmath.exp(1j * self.side * math.pi / 4)
+
     def home(self) -> complex:
         distance = math.dist(self.position, self.nearest_nest(self.position))
         in_nest = self.sees(0.6, 0.8, 3)
@@ -268,7 +292,10 @@ class ReferenceRobot:
         if self.state == "homing in nest" and in_nest and distance <= self.depth:
             self.state = "wait for drop"
             return 0j
-        force = with_length(vector_sum(self.senses["light"]), 8.0) + self.avoid()
+        light = with_length(vector_sum(self.senses["light"]), 8.0)
+        if self.spec.has_obstacles and self.state == "homing" and self.is_on_a_detour():
+            return self.go_round(light)
+        force = light + self.avoid()
         if self.state == "homing in nest" or self.turning > LONGEST_TURN_TICKS:
             force += self.wander(1)
         return force
