@@ -43,9 +43,11 @@ def _register_with_pettingzoo() -> None:
     from pettingzoo.env_registry.exceptions import VersionNotFound
 
     for name, kwargs in _ids():
-        for form, maker in (("parallel", "parallel_env"), ("aec", "env")):
-            pettingzoo.register(form, f"{name}-v2", f"swarm_forage_env.views.pettingzoo:{maker}", kwargs=kwargs)
-            pettingzoo.register(form, f"{name}-v1", partial(_former, VersionNotFound, name))
+        pettingzoo.register("parallel", f"{name}-v2", "swarm_forage_env.views.pettingzoo:parallel_env", kwargs=kwargs)
+        pettingzoo.register("aec", f"{name}-v2", "swarm_forage_env.views.pettingzoo:env", kwargs=kwargs)
+        former = partial(_former, VersionNotFound, name)
+        pettingzoo.register("parallel", f"{name}-v1", former)
+        pettingzoo.register("aec", f"{name}-v1", former)
 
 
 def _register_with_gymnasium() -> None:
