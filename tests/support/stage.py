@@ -192,8 +192,8 @@ def assert_conserved(env: ForageEnv) -> None:
     expected = np.full_like(floor, CELL_EMPTY)
     for left, bottom, right, top in env.scenario.obstacle_cells:
         expected[bottom:top, left:right] = CELL_OBSTACLE
-    nest = env.scenario.arena.nest_cells
-    expected[nest[1] : nest[3], nest[0] : nest[2]] = CELL_NEST
+    for left, bottom, right, top in env.scenario.arena.all_nest_cells:
+        expected[bottom:top, left:right] = CELL_NEST
     half = env.scenario.cache_side_cells // 2
     for slot in np.flatnonzero(caches.alive).tolist():
         x, y = caches.cell[slot].tolist()
