@@ -131,7 +131,7 @@ def _runs_of(header: dict[str, Any]) -> list[dict[str, Any]]:
     if header.get("version") not in READ_VERSIONS:
         raise PageError(
             f"it has version {header.get('version')} of the format, this version of swarm_forage_env reads "
-            f"{' and '.join(map(str, READ_VERSIONS))}; read it with the version that wrote it"
+            f"{' to '.join(map(str, (READ_VERSIONS[0], READ_VERSIONS[-1])))}; read it with the version that wrote it"
         )
     return header["runs"]
 
