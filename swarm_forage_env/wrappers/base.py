@@ -261,6 +261,14 @@ class WrapperConfig:
     example: ClassVar[str] = ""
     """Settings as words of a command line that work with every scenario; errors show them."""
 
+    def __init_subclass__(cls) -> None:
+        """Refuse a class that does not say what it configures; TypeError."""
+        if not hasattr(cls, "wrapper") and "wrap" not in vars(cls):
+            raise TypeError(
+                f"Expected {cls.__name__} to say what it is a configuration of; add a line "
+                '"wrapper: ClassVar[type[SwarmWrapper]] = ..." with your subclass of SwarmWrapper.'
+            )
+
     @property
     def stack_position(self) -> int:
         """Place of the wrapper in `STACK_ORDER`."""

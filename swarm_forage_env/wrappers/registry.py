@@ -42,14 +42,15 @@ def parse_wrapper(text: str) -> "WrapperConfig":
         sensor_noise:sigma=0.03,groups=proximity+light,sigmas.position=0.1
 
     Raises:
-        ConfigError: an unknown name or key, a word that is no key=value, no word after the colon, or values that the
+        ConfigError: an unknown name or key, a word that is no key=value, no settings, or values that the
             wrapper refuses; the message has an example.
     """
     name, colon, settings = text.strip().partition(":")
     config_class = wrapper_config_class(name)
     try:
-        if colon and not settings:
-            raise ConfigError(f"Expected the settings of wrapper {name} after the colon, got none.")
+        if not settings:
+            where = "after the colon" if colon else "after its name and a colon"
+            raise ConfigError(f"Expected the settings of wrapper {name} {where}, got none.")
         return config_class.from_mapping(_settings(text, name, settings))
     except ConfigError as error:
         raise ConfigError(f"{error} For example: {name}:{config_class.example}") from error

@@ -330,6 +330,7 @@ def test_wrappers_are_named_on_a_command_line(text, expected):
         ("sensor_noise:sigma=0.1,groups=proximty", "Unknown group of sensors 'proximty'"),
         ("population:death_per_tick=-1", "population.death_per_tick to be a finite number >= 0"),
         ("population:", "Expected the settings of wrapper population after the colon, got none"),
+        ("sensor_noise", "Expected the settings of wrapper sensor_noise after its name and a colon, got none"),
         ("population:death=0.1", r"Unknown key 'death'.* For example: population:death_per_tick=0\.0005$"),
         ("", "Unknown wrapper ''"),
     ],
@@ -431,3 +432,8 @@ def test_wrappers_are_read_from_toml():
 def test_toml_errors_say_what_is_wrong(tables, message):
     with pytest.raises(ConfigError, match=message):
         wrappers_from_mapping(tables)
+
+
+def test_a_configuration_says_of_what():
+    with pytest.raises(TypeError, match="Expected Nameless to say what it is a configuration of"):
+        type("Nameless", (WrapperConfig,), {})

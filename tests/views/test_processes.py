@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 
@@ -122,6 +123,7 @@ def test_processes_end_even_when_their_answers_were_never_read_and_stay_closed(a
 class _StrangeError(Exception):
     def __init__(self, first: int, second: int) -> None:
         super().__init__(f"{first} and {second}")
+        self.lock = threading.Lock()  # which no library can pickle
 
 
 def test_errors_that_cannot_travel_are_told_in_words():
