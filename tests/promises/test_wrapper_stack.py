@@ -308,7 +308,6 @@ def test_every_difference_between_wrappers_is_another_run():
             "population:death_per_tick=1e-4,initial_robots=20,deaths=absorbing",
             PopulationConfig(death_per_tick=1e-4, initial_robots=20, deaths="absorbing"),
         ),
-        ("population", PopulationConfig()),
     ],
 )
 def test_wrappers_are_named_on_a_command_line(text, expected):
@@ -384,7 +383,7 @@ def test_the_example_of_a_wrapper_works_and_does_something(name):
             "population:malfunction_per_tick=0.01,repair_per_tick=0.02",
             "population: a malfunction every 20 s on average, a repair every 10 s on average",
         ),
-        ("population", "population: no changes"),
+        ("population:deaths=terminate", "population: no changes"),
     ],
 )
 def test_wrappers_tell_their_settings_in_plain_words(text, expected):
