@@ -86,7 +86,6 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         n_robots = scenario.robots.n_robots
         self._terminated = np.zeros(n_robots, np.bool_)
         self.possible_agents = [f"robot_{row}" for row in range(n_robots)]
-        self._row_of = {agent: row for row, agent in enumerate(self.possible_agents)}
         self.agents: list[str] = []
         self._actions = np.zeros((n_robots, COMMANDS + scenario.robots.message_size), np.float32)
         self._seeds = np.random.default_rng()
@@ -112,7 +111,11 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         """(A,) float32 in [-1, 1]: left wheel, right wheel, gripper, message; one space object per agent."""
         return self._action_spaces[agent]
 
-    @cached_property  # made when asked for: runs of a policy never look at them, and there may be thousands
+    @cached_property  # like the spaces made when asked for: runs of a policy never look, and there may be a million
+    def _row_of(self) -> dict[str, int]:
+        return {agent: row for row, agent in enumerate(self.possible_agents)}
+
+    @cached_property
     def _observation_spaces(self) -> dict[str, spaces.Box]:
         columns = self.layout.size
         return {agent: spaces.Box(-1.0, 1.0, (columns,), np.float32) for agent in self.possible_agents}

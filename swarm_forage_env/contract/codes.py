@@ -110,12 +110,15 @@ TAB_CHILDREN = np.array(
 )
 """(3, 2) task codes of each block's subtasks."""
 
-CELL_EMPTY = -1
-"""Floor code of a cell that holds nothing. Codes >= 0 are the row of the free object lying there."""
-CELL_NEST = -2
-CELL_OBSTACLE = -3
+CELL_EMPTY = 0
+"""Floor code of a cell that holds nothing. It is 0 because memory of zeros costs nothing until it is written: a huge
+floor takes only what lies on it."""
+CELL_OBJECT = 1
+"""Floor code of a cell where object 0 lies; row k lies as CELL_OBJECT + k."""
+CELL_NEST = -1
+CELL_OBSTACLE = -2
 """Floor code of a cell that an obstacle keeps free of objects."""
-CELL_CACHE = -4
+CELL_CACHE = -3
 """Floor code of cache slot 0; slot k paints its cells with CELL_CACHE - k."""
 
 

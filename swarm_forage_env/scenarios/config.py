@@ -37,8 +37,9 @@ MAX_DISC_SHARE = 0.4
 """Robot discs may cover at most this share of the start area; with more, random start poses cannot be drawn."""
 MAX_HANDLING_TICKS = 1_000_000
 """Longest pick-up or drop (our choice: twenty runs of the paper, far below what a 32-bit tick holds)."""
-MAX_CELLS = 200_000_000
-"""Largest floor, 2.8 km square (our choice: its codes take 800 MB; the largest of the paper has 409,600 cells)."""
+MAX_CELLS = 2**30
+"""Largest floor, 6.5 km square (our choice: its codes take 4 GiB where something lies everywhere; a million robots at
+5 % density need half of it, and the largest floor of the paper has 409,600 cells)."""
 
 MAX_SUBSTEPS = 100
 """Most substeps of a tick (our choice: overlap stops shrinking long before, and every one takes time)."""
@@ -100,7 +101,8 @@ class ArenaConfig:
             )
         _require(
             math.prod(self.n_cells) <= MAX_CELLS,
-            f"Expected an arena of at most {MAX_CELLS:,} cells of {CELL_M} m, got {self.width_m} x {self.height_m} m.",
+            f"Expected an arena of at most {MAX_CELLS:,} cells of {CELL_M} m, whose floor takes up to 4 GiB of memory, "
+            f"got {self.width_m} x {self.height_m} m; choose a smaller one, or fewer robots at a density.",
         )
         fields.pair("arena.nest_centre_m", self.nest_centre_m)
         fields.pair("arena.nest_size_m", self.nest_size_m)

@@ -80,8 +80,13 @@ def capacity(sources: Iterable[Box], nx: int, ny: int, taken: Iterable[Box]) -> 
 
     Regions of the quad source overlap in their corners; those cells count once.
     """
-    is_source = np.zeros((ny, nx), np.bool_)
-    for boxes, is_free in ((sources, True), (taken, False)):
-        for x_low, y_low, x_high, y_high in boxes:
+    inside = [np.clip(np.array([*boxes], np.int64).reshape(-1, 4), 0, (nx, ny, nx, ny)) for boxes in (sources, taken)]
+    # Nothing changes between two edges, so a huge floor is looked at as the few rectangles that edges cut it into.
+    edges_x, edges_y = (np.unique(np.concatenate(inside)[:, axis::2]) for axis in (0, 1))
+    is_source = np.zeros((max(0, len(edges_y) - 1), max(0, len(edges_x) - 1)), np.bool_)
+    for boxes, is_free in zip(inside, (True, False), strict=True):
+        lows_x, highs_x = np.searchsorted(edges_x, boxes[:, 0::2]).T
+        lows_y, highs_y = np.searchsorted(edges_y, boxes[:, 1::2]).T
+        for x_low, y_low, x_high, y_high in zip(lows_x, lows_y, highs_x, highs_y, strict=True):
             is_source[y_low:y_high, x_low:x_high] = is_free
-    return int(np.count_nonzero(is_source))
+    return int(np.diff(edges_y) @ is_source @ np.diff(edges_x))

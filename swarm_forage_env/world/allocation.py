@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from swarm_forage_env.contract.codes import CELL_EMPTY, CELL_NEST, CELL_OBSTACLE
+from swarm_forage_env.contract.codes import CELL_NEST, CELL_OBSTACLE
 from swarm_forage_env.contract.types import FloatArray, IntArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.world.caches import n_cache_slots
@@ -40,7 +40,7 @@ def new_objects(config: ScenarioConfig) -> ObjectState:
 
 def _painted_floor(config: ScenarioConfig) -> IntArray:
     nx, ny = config.arena.n_cells
-    floor = np.full((ny, nx), CELL_EMPTY, np.int32)
+    floor = np.zeros((ny, nx), np.int32)  # CELL_EMPTY
     # Nests come last: an obstacle beside one may keep squares free that reach into it.
     nests = ((box, CELL_NEST) for box in config.arena.all_nest_cells)
     painted = [*((box, CELL_OBSTACLE) for box in config.obstacle_cells), *nests]

@@ -5,7 +5,7 @@ What robots do with caches (adding, taking, the last pair dissolving) is in `ker
 
 import numpy as np
 
-from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, Counter, ObjectStatus, Task
+from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_OBJECT, Counter, ObjectStatus, Task
 from swarm_forage_env.contract.types import BoolArray, CodeArray, IntArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M, Box, overlap_cells, square_box
@@ -227,7 +227,7 @@ def create_dynamic_caches(
     protected = protected_boxes(config, source)
     for robot in robots.tolist():
         x, y = swarm_cells[robot]
-        first = int(objects.floor[y, x])
+        first = int(objects.floor[y, x]) - CELL_OBJECT
         if first < 0:
             continue  # an earlier creator of this tick has already drawn the object into its cache
         members = cache_members(first, config, objects, protected)

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import ObjectStatus
-from swarm_forage_env.contract.types import FloatArray, IntArray
+from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M, Box, overlap_cells, square_box
 from swarm_forage_env.scenarios.obstacles import distances_m
@@ -39,17 +40,31 @@ def draw_start_poses(config: ScenarioConfig, rng: np.random.Generator) -> tuple[
     low = np.array([margin, margin])
     high = np.array([config.arena.width_m - margin, config.arena.height_m - margin])
     position = rng.uniform(low, high, (n_robots, 2))
+    tree = KDTree(position)  # of the first positions: later, only robots that were drawn again can overlap anybody
+    is_moved = np.zeros(n_robots, np.bool_)
+    pairs = tree.query_pairs(2 * config.robots.radius_m, output_type="ndarray")
     for _ in range(_TRIALS):
-        pairs = KDTree(position).query_pairs(2 * config.robots.radius_m, output_type="ndarray")
         blocked = np.flatnonzero(distances_m(config.arena.obstacles, position) < config.robots.radius_m)
         if len(pairs) == 0 and len(blocked) == 0:
             return position, -rng.uniform(-np.pi, np.pi, n_robots)
         again = np.union1d(pairs.max(axis=1), blocked)
         position[again] = rng.uniform(low, high, (len(again), 2))
+        is_moved[again] = True
+        pairs = _overlaps_of_moved(position, is_moved, tree, 2 * config.robots.radius_m)
     raise ConfigError(
         f"Found no start positions without overlap for {n_robots} robots in {_TRIALS} trials; "
         "use fewer robots, a larger arena or a smaller robots.start_margin_m."
     )
+
+
+def _overlaps_of_moved(position: FloatArray, is_moved: BoolArray, tree: KDTree, diameter_m: float) -> NDArray[np.intp]:
+    """Return the pairs (P, 2) of overlapping robots of which one has moved; the tree holds those that have not."""
+    moved = np.flatnonzero(is_moved)
+    own = KDTree(position[moved])
+    among = moved[own.query_pairs(diameter_m, output_type="ndarray")]
+    found = own.sparse_distance_matrix(tree, diameter_m, output_type="ndarray")
+    others = np.column_stack((moved[found["i"]], found["j"]))
+    return np.concatenate((among, others[~is_moved[found["j"]]]))
 
 
 @dataclass(frozen=True, slots=True)

@@ -84,7 +84,8 @@ class ObjectState(NamedTuple):
     """All objects and the floor they lie on."""
 
     floor: IntArray
-    """(ny, nx) code per square, row = y: object row, CELL_EMPTY, CELL_NEST, CELL_OBSTACLE or CELL_CACHE - slot."""
+    """(ny, nx) code per square, row = y: CELL_EMPTY, CELL_OBJECT + object row, CELL_NEST, CELL_OBSTACLE or
+    CELL_CACHE - slot."""
     status: CodeArray
     """(M,) ObjectStatus."""
     cell: IntArray

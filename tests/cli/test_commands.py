@@ -433,7 +433,7 @@ def test_the_columns_of_records_are_listed(command):
         (("run", "--set", "n_robots=x"), "Expected n_robots to be a whole number, got 'x'"),
         (("run", "--set", "dt_s=fast"), "Expected dt_s to be a number, got 'fast'"),
         (("run", "--set", "dt_s=nan"), "finite number"),
-        (("run", "--set", "width_m=1e9"), "at most 200,000,000 cells"),
+        (("run", "--set", "width_m=1e9"), "at most 1,073,741,824 cells"),
         (("run", "--set", "team=maybe"), "Expected team to be true or false, got 'maybe'"),
         (("run", "--set", "nest_size_m=1"), "Expected nest_size_m to be numbers separated by commas"),
         (("run", "--set", "n_robots=3", "--robots", "4"), "Expected n_robots once"),

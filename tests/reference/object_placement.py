@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from swarm_forage_env.contract.codes import CELL_EMPTY
+from swarm_forage_env.contract.codes import CELL_EMPTY, CELL_NEST, CELL_OBJECT, CELL_OBSTACLE
 from swarm_forage_env.contract.types import FloatArray, IntArray
 from swarm_forage_env.scenarios.floor import Box
 from swarm_forage_env.world.kernels.placement import TRIES, UNLIMITED
@@ -37,7 +37,7 @@ def choose_cell(floor: IntArray, source: Source, area: Box, draws: FloatArray) -
         box = (max(x_low, area[0]), max(y_low, area[1]), min(x_high, area[2]), min(y_high, area[3]))
         cells = cells_of(box)
         free = [(x, y) for x, y in cells if floor[y, x] == CELL_EMPTY]
-        occupied = sum(1 for x, y in cells if floor[y, x] >= 0)
+        occupied = sum(1 for x, y in cells if floor[y, x] >= CELL_OBJECT)
         capacity = source.capacity[region]
         if not free or (capacity != UNLIMITED and occupied >= capacity):
             continue
@@ -59,7 +59,7 @@ def scatter_slowly(rows: IntArray, floor: IntArray, source: Source, area: Box, d
         cell = choose_cell(floor, source, area, row_draws)
         if cell is None:
             break
-        floor[cell[1], cell[0]] = row
+        floor[cell[1], cell[0]] = CELL_OBJECT + row
         placed[row] = cell
     return placed
 
@@ -79,6 +79,6 @@ def random_source(rng: np.random.Generator) -> tuple[Source, Box, IntArray]:
     regions = np.array([(x, y, x + w, y + h) for (x, y), (w, h) in zip(corners, extents, strict=True)], np.int32)
     source = Source(regions, np.array([2, 5, 5, 9, 9, 9], np.int32), np.array([0, 1, 3, 6], np.int32))
     floor = np.full((16, 24), CELL_EMPTY, np.int32)
-    floor[rng.random(floor.shape) < 0.2] = -2
-    floor[rng.random(floor.shape) < 0.2] = -3
+    floor[rng.random(floor.shape) < 0.2] = CELL_NEST
+    floor[rng.random(floor.shape) < 0.2] = CELL_OBSTACLE
     return source, (2, 2, 22, 13), floor

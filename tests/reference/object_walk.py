@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from swarm_forage_env.contract.codes import CELL_EMPTY, ObjectStatus
+from swarm_forage_env.contract.codes import CELL_EMPTY, CELL_OBJECT, ObjectStatus
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.scenarios.floor import Box
 from swarm_forage_env.world.state import ObjectState
@@ -35,7 +35,7 @@ def walk_slowly(objects: ObjectState, area: Box, probability: float, chance: Flo
         if chance[row] < probability and choices:
             to_x, to_y = choices[int(chance[row] / probability * len(choices))]
             objects.floor[y, x] = CELL_EMPTY
-            objects.floor[to_y, to_x] = row
+            objects.floor[to_y, to_x] = CELL_OBJECT + row
             objects.cell[row] = to_x, to_y
             moved += 1
     return moved

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 
-from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, CELL_OBSTACLE
+from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, CELL_OBJECT, CELL_OBSTACLE
 from swarm_forage_env.env import ForageEnv
 
 RADIUS_M = 0.085036758
@@ -96,7 +96,7 @@ def grey(env: ForageEnv, x: float, y: float) -> float:
     if not (0 <= column < nx and 0 <= row < ny):
         return 1.0
     code = env.objects.floor[row, column]
-    if code >= 0:
+    if code >= CELL_OBJECT:
         return 0.0
     return {CELL_EMPTY: 1.0, CELL_OBSTACLE: 1.0, CELL_NEST: 179 / 255}.get(code, 102 / 255)
 
@@ -134,7 +134,8 @@ def objects_in_sight(env: ForageEnv, robot: int) -> list[float]:
     for y in range(row - 2, row + 3):
         for x in range(column - 2, column + 3):
             code = env.objects.floor[y, x] if 0 <= x < nx and 0 <= y < ny else CELL_EMPTY
-            window.append((code + 1) / env.scenario.objects.n_objects if code >= 0 else 0.0)
+            lying = code - CELL_OBJECT
+            window.append((lying + 1) / env.scenario.objects.n_objects if lying >= 0 else 0.0)
     return window
 
 

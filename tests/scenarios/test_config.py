@@ -176,7 +176,7 @@ def test_mapping_refuses_a_value_where_a_section_belongs():
         ({"n_robots": 2.0}, ("robots.n_robots to be a whole number", "got 2.0")),
         ({"n_robots": True}, ("robots.n_robots to be a whole number", "got True.")),
         ({"n_robots": np.int64(5)}, ("robots.n_robots to be a whole number", "convert it with int()")),
-        ({"width_m": 1e9}, ("at most 200,000,000 cells", "1000000000.0 x ")),
+        ({"width_m": 1e9}, ("at most 1,073,741,824 cells", "4 GiB", "1000000000.0 x ")),
         ({"dt_s": 1.0}, ("at most their radius of 0.085036758 m per tick", "0.1 m/s for dt_s = 1.0 s")),
         ({"max_speed_mps": 5.0, "dt_s": 0.5}, ("at most their radius", "got 0.2 m/s")),
         ({"radius_m": -0.1}, ("robots.radius_m to be a finite number > 0", "got -0.1")),

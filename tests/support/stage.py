@@ -13,6 +13,7 @@ from swarm_forage_env.contract.codes import (
     CELL_CACHE,
     CELL_EMPTY,
     CELL_NEST,
+    CELL_OBJECT,
     CELL_OBSTACLE,
     Counter,
     Event,
@@ -60,7 +61,7 @@ def begin(wrapper: SwarmWrapper, seed: int = 0) -> None:
 def clear(env: ForageEnv) -> None:
     """Take all objects and caches out of the world; the test has to lay down every object before it goes on."""
     objects, caches = env.objects, env.caches
-    objects.floor[(objects.floor >= 0) | (objects.floor <= CELL_CACHE)] = CELL_EMPTY
+    objects.floor[(objects.floor >= CELL_OBJECT) | (objects.floor <= CELL_CACHE)] = CELL_EMPTY
     caches.alive[:], caches.count[:], caches.serial[:] = False, 0, 0
     objects.status[:], objects.cache_slot[:], objects.carriers[:], objects.cell[:] = ObjectStatus.WAITING, -1, 0, -1
     make_list(objects.waiting, [])
@@ -104,7 +105,7 @@ def lay(env: ForageEnv, row: int, cell: tuple[int, int]) -> None:
     """Put an object on a cell."""
     lift(env, row)
     objects = env.objects
-    objects.floor[cell[1], cell[0]] = row
+    objects.floor[cell[1], cell[0]] = CELL_OBJECT + row
     objects.cell[row], objects.status[row] = cell, ObjectStatus.FREE
 
 
@@ -180,15 +181,15 @@ def assert_conserved(env: ForageEnv) -> None:
     assert set(status.tolist()) <= set(ObjectStatus)
     floor = objects.floor
     # Floor: exactly the free objects, each on its own cell.
-    y, x = np.nonzero(floor >= 0)
-    rows = floor[y, x]
+    y, x = np.nonzero(floor >= CELL_OBJECT)
+    rows = floor[y, x] - CELL_OBJECT
     assert sorted(rows.tolist()) == np.flatnonzero(status == ObjectStatus.FREE).tolist()
     assert np.array_equal(objects.cell[rows], np.array((x, y)).T), "an object lies where it says that it does"
     x_low, y_low, x_high, y_high = env.scenario.arena.distributable_cells
     low, high = np.array([x_low, y_low]), np.array([x_high, y_high])
     assert np.all((objects.cell[rows] >= low) & (objects.cell[rows] < high))
     # Obstacles, nest and caches: every special code where it belongs, and nowhere else.
-    painted = np.where(floor >= 0, CELL_EMPTY, floor)
+    painted = np.where(floor >= CELL_OBJECT, CELL_EMPTY, floor)
     expected = np.full_like(floor, CELL_EMPTY)
     for left, bottom, right, top in env.scenario.obstacle_cells:
         expected[bottom:top, left:right] = CELL_OBSTACLE

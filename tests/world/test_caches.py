@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from swarm_forage_env.contract.codes import CELL_CACHE, Counter, Grip, ObjectStatus, Task
+from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, Counter, Grip, ObjectStatus, Task
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.floor import square_box
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
@@ -225,7 +225,7 @@ def test_all_missing_caches_come_back_together():
     assert env.caches.alive.sum() == 4
     for slot in (1, 3):  # two caches lose all their objects
         rows = np.flatnonzero(env.objects.cache_slot == slot)
-        env.objects.floor[env.objects.floor == CELL_CACHE - slot] = -1
+        env.objects.floor[env.objects.floor == CELL_CACHE - slot] = CELL_EMPTY
         env.objects.cache_slot[rows], env.objects.status[rows] = -1, ObjectStatus.WAITING
         env.objects.cell[rows] = -1
         make_list(env.objects.waiting, [*listed(env.objects.waiting), *rows])

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarm_forage_env.contract.codes import CELL_CACHE, Counter, Event, Grip, ObjectStatus
+from swarm_forage_env.contract.codes import CELL_CACHE, CELL_OBJECT, Counter, Event, Grip, ObjectStatus
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.floor import overlap_cells, square_box
 from swarm_forage_env.scenarios.presets import scenario
@@ -176,7 +176,7 @@ def test_random_placement_protects_nothing():
     assert protected_boxes(env.scenario, env.arena._source) == []
     row = int(np.argmin(np.abs(env.objects.cell - (60, 120)).sum(axis=1)))
     cell = tuple((env.objects.cell[row] + (1, 0)).tolist())
-    other = next(row for row in range(800) if env.objects.floor[cell[1], cell[0]] != row)
+    other = next(row for row in range(800) if env.objects.floor[cell[1], cell[0]] != CELL_OBJECT + row)
     (slot,) = found_at(env, cell, row=other)
     assert env.caches.count[slot] > 20
 

@@ -5,7 +5,7 @@ from collections import Counter as Tally
 import numpy as np
 import pytest
 
-from swarm_forage_env.contract.codes import CELL_EMPTY, Counter, Event, Grip, ObjectStatus
+from swarm_forage_env.contract.codes import CELL_EMPTY, CELL_OBJECT, Counter, Event, Grip, ObjectStatus
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import Quirks
@@ -366,7 +366,7 @@ def test_the_last_pair_dissolves_the_cache_and_the_orphan_lies_on_the_centre():
     assert not env.caches.alive[slot]
     assert env.objects.status[orphan] == ObjectStatus.FREE
     assert env.objects.cell[orphan].tolist() == list(BASE_CELL)
-    assert env.objects.floor[BASE_CELL[::-1]] == orphan
+    assert env.objects.floor[BASE_CELL[::-1]] == CELL_OBJECT + orphan
     assert count(env, Counter.CACHES_DEPLETED) == 1
     assert_conserved(env)
 

@@ -5,7 +5,7 @@ from collections import Counter as Tally
 import numpy as np
 import pytest
 
-from swarm_forage_env.contract.codes import Counter, Event, ObjectStatus
+from swarm_forage_env.contract.codes import CELL_EMPTY, CELL_OBJECT, Counter, Event, ObjectStatus
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import Quirks
@@ -116,9 +116,9 @@ def shuffle(env: ForageEnv, rng: np.random.Generator, grips: np.ndarray) -> None
         if PATCH[0] <= x < PATCH[2] and PATCH[1] <= y < PATCH[3]:
             continue
         to_x, to_y = rng.integers(PATCH[:2], PATCH[2:]).tolist()
-        if to_x >= 24 and objects.floor[to_y, to_x] == -1:
-            objects.floor[y, x] = -1
-            objects.floor[to_y, to_x] = row
+        if to_x >= 24 and objects.floor[to_y, to_x] == CELL_EMPTY:
+            objects.floor[y, x] = CELL_EMPTY
+            objects.floor[to_y, to_x] = CELL_OBJECT + row
             objects.cell[row] = to_x, to_y
     if len(env.caches.alive) and np.count_nonzero(env.caches.alive) < 2 and rng.random() < 0.5:
         create_somewhere(env, rng)
@@ -129,8 +129,8 @@ def create_somewhere(env: ForageEnv, rng: np.random.Generator) -> None:
     x, y = rng.integers((PATCH[0], PATCH[1]), (PATCH[2], PATCH[3])).tolist()
     floor = env.objects.floor
     square = floor[y - half : y + half + 1, x - half : x + half + 1]
-    rows = np.unique(square[square >= 0]).tolist()
-    if np.all(square >= -1) and len(rows) >= 2:
+    rows = (np.unique(square[square >= CELL_OBJECT]) - CELL_OBJECT).tolist()
+    if np.all(square >= CELL_EMPTY) and len(rows) >= 2:
         build_cache(env, rows, (x, y))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest, chisquare
 
-from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, ObjectStatus
+from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, CELL_OBJECT, ObjectStatus
 from swarm_forage_env.scenarios.floor import Box, distributable_box
 from swarm_forage_env.world.kernels.walk import OPEN_BORDERS, can_step, crosses_open_border, walk
 from swarm_forage_env.world.state import ObjectState
@@ -21,7 +21,7 @@ def world(cells: list[tuple[int, int]], nx: int, ny: int) -> ObjectState:
     n_objects = len(cells)
     floor = np.full((ny, nx), CELL_EMPTY, np.int32)
     for row, (x, y) in enumerate(cells):
-        floor[y, x] = row
+        floor[y, x] = CELL_OBJECT + row
     return ObjectState(
         floor=floor,
         status=np.full(n_objects, ObjectStatus.FREE, np.int8),
@@ -75,8 +75,8 @@ def test_objects_are_conserved_and_stay_on_their_floor(self_conflict):
     assert moved > 100
     free = np.flatnonzero(objects.status == ObjectStatus.FREE)
     x, y = objects.cell[free].T
-    np.testing.assert_array_equal(objects.floor[y, x], free)
-    np.testing.assert_array_equal(np.sort(objects.floor[objects.floor >= 0]), free)
+    np.testing.assert_array_equal(objects.floor[y, x], CELL_OBJECT + free)
+    np.testing.assert_array_equal(np.sort(objects.floor[objects.floor >= CELL_OBJECT]), CELL_OBJECT + free)
     np.testing.assert_array_equal(objects.status, before.status)
     np.testing.assert_array_equal(objects.floor <= CELL_NEST, before.floor <= CELL_NEST)
     others = np.flatnonzero(objects.status != ObjectStatus.FREE)
@@ -118,7 +118,7 @@ def test_every_free_neighbour_is_equally_likely(start, n_choices):
     for _ in range(400 * n_choices):
         objects = world([start], 5, 5)
         assert step(objects, (0, 0, 5, 5), 1.0, rng) == 1
-        counts += objects.floor == 0
+        counts += objects.floor == CELL_OBJECT
     assert counts[start[1], start[0]] == 0
     reached = counts[counts > 0]
     assert len(reached) == n_choices
@@ -131,7 +131,7 @@ def test_the_number_that_triggers_a_move_does_not_bias_its_direction():
     for _ in range(40_000):
         objects = world([(1, 1)], 3, 3)
         if step(objects, (0, 0, 3, 3), 0.05, rng):
-            counts += objects.floor == 0
+            counts += objects.floor == CELL_OBJECT
     counts = np.delete(counts.ravel(), 4)
     assert binomtest(int(counts.sum()), 40_000, 0.05).pvalue > SIGNIFICANCE
     assert chisquare(counts).pvalue > SIGNIFICANCE
@@ -162,7 +162,7 @@ def test_long_run_visits_are_proportional_to_the_number_of_neighbours():
     for tick in range(40_000):
         step(objects, (0, 0, 4, 3), 1.0, rng)
         if tick % 10 == 0:
-            visits += objects.floor == 0
+            visits += objects.floor == CELL_OBJECT
     neighbours = np.array([[3, 5, 5, 3], [5, 8, 8, 5], [3, 5, 5, 3]])
     assert chisquare(visits.ravel(), (4_000 * neighbours / neighbours.sum()).ravel()).pvalue > SIGNIFICANCE
 

@@ -6,7 +6,7 @@ from scipy.stats import chisquare
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.rng import Stream, stream_rng
-from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, ObjectStatus
+from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, CELL_OBJECT, ObjectStatus
 from swarm_forage_env.contract.types import IntArray
 from swarm_forage_env.scenarios.config import ArenaConfig, ObjectConfig, ScenarioConfig
 from swarm_forage_env.scenarios.floor import PLACEMENTS, Box, source_boxes
@@ -53,8 +53,8 @@ def furnished(config: ScenarioConfig, seed: int = 0) -> tuple[ObjectState, Sourc
 def assert_consistent(objects: ObjectState) -> None:
     free = np.flatnonzero(objects.status == ObjectStatus.FREE)
     x, y = objects.cell[free].T
-    np.testing.assert_array_equal(objects.floor[y, x], free)
-    assert np.count_nonzero(objects.floor >= 0) == len(free)
+    np.testing.assert_array_equal(objects.floor[y, x], CELL_OBJECT + free)
+    assert np.count_nonzero(objects.floor >= CELL_OBJECT) == len(free)
     not_lying = np.flatnonzero(objects.status == ObjectStatus.WAITING)
     assert sorted(waiting(objects)) == not_lying.tolist()
     assert np.all(objects.cell[not_lying] == -1)
@@ -92,7 +92,7 @@ def test_sources_are_the_regions_without_limit(placement):
 
 def test_a_full_source_strip_takes_exactly_its_cells():
     objects, _, _ = furnished(scenario("warehouse_small", n_objects=896))
-    assert np.all(objects.floor[12:68, 120:136] >= 0)
+    assert np.all(objects.floor[12:68, 120:136] >= CELL_OBJECT)
 
 
 def test_same_seed_same_places():
@@ -161,7 +161,7 @@ def test_a_crowded_region_is_filled_uniformly():
     for seed in range(400):
         objects = bare_objects(36, 8, 6)
         place_all(objects, one_region((0, 0, 8, 6)), (0, 0, 8, 6), np.random.default_rng(seed))
-        counts += objects.floor >= 0
+        counts += objects.floor >= CELL_OBJECT
     # A cell is taken 36 / 48 of the time with variance p (1 - p); sampling without replacement takes one degree.
     statistic = np.sum((counts - 300) ** 2) / (400 * 0.75 * 0.25) * 47 / 48
     assert 25 < statistic < 80  # 0.1 and 99.9 percent points of chi-square with 47 degrees lie at 23 and 83
@@ -200,7 +200,7 @@ def test_a_region_at_capacity_is_skipped_dropped_objects_included():
     regions = np.array([(0, 0, 5, 5), (6, 0, 11, 5)], np.int32)
     source = Source(regions, np.array([3, 3], np.int32), np.array([0, 2], np.int32))
     objects = bare_objects(6, 12, 6)
-    objects.floor[2, 2], objects.floor[3, 3] = 4, 5  # laid there by robots
+    objects.floor[2, 2], objects.floor[3, 3] = CELL_OBJECT + 4, CELL_OBJECT + 5  # laid there by robots
     objects.cell[[4, 5]] = (2, 2), (3, 3)
     objects.status[[4, 5]] = ObjectStatus.FREE
     make_list(objects.waiting, [])
@@ -227,7 +227,7 @@ def test_a_region_outside_the_distributable_box_is_passed_over():
     source = Source(regions, np.full(2, UNLIMITED, np.int32), np.array([0, 2], np.int32))
     objects = bare_objects(9, 10, 10)
     place_all(objects, source, (4, 5, 7, 10), np.random.default_rng(0))
-    assert np.all(objects.floor[5:8, 4:7] >= 0)
+    assert np.all(objects.floor[5:8, 4:7] >= CELL_OBJECT)
 
 
 def test_placed_objects_start_anew():
@@ -293,7 +293,7 @@ def test_waiting_list_follows_the_rule_word_by_word(seed):
         def place(row: int, twin_floor: IntArray = twin_floor) -> bool:
             cell = choose_cell(twin_floor, source, area, rng.random(DRAWS))
             if cell is not None:
-                twin_floor[cell[1], cell[0]] = row
+                twin_floor[cell[1], cell[0]] = CELL_OBJECT + row
             return cell is not None
 
         place_objects(rows, objects, source, area, rng)
@@ -325,5 +325,5 @@ def test_largest_uniforms_stay_inside():
     last = np.full(DRAWS, np.nextafter(1.0, 0.0))
     args = (source.regions, source.capacity, source.group_start, (0, 0, 10, 10), last)
     assert draw_source_cell(floor, *args) == (8, 6)
-    floor[6, 8] = 0
+    floor[6, 8] = CELL_OBJECT
     assert draw_source_cell(floor, *args) == (7, 6)  # all tries hit the taken cell, the list ends before it

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.contract.codes import Event, Grip
+from swarm_forage_env.contract.codes import CELL_OBJECT, Event, Grip
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.kernels.beams import proximity_reading
@@ -78,7 +78,7 @@ def build_two_caches(env: ForageEnv) -> None:
         half = env.scenario.cache_side_cells // 2
         (x, y), floor = centre, env.objects.floor
         square = floor[y - half : y + half + 1, x - half : x + half + 1]
-        build_cache(env, sorted({*rows, *square[square >= 0].tolist()}), centre)
+        build_cache(env, sorted({*rows, *(square[square >= CELL_OBJECT] - CELL_OBJECT).tolist()}), centre)
 
 
 @pytest.mark.parametrize(("name", "caches"), [*zip(NEAR, itertools.cycle(CACHE_KINDS), strict=False)])

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
-from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST
+from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, CELL_OBJECT
 from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
 from swarm_forage_env.contract.layout import (
     CACHE_FIELDS,
@@ -36,7 +36,7 @@ _HALF_WINDOW = WINDOW_CELLS // 2
 @kernel
 def grey_of(code: int) -> float:
     """Grey level of a floor code of `contract.codes`: object 0, nest 0.70, cache 0.40, empty 1, also by an obstacle."""
-    if code >= 0:
+    if code >= CELL_OBJECT:
         return _GREY_OBJECT
     if code == CELL_EMPTY:
         return _GREY_EMPTY
@@ -176,7 +176,7 @@ def _whole_window(floor: IntArray, x_low: int, y_low: int, shares: ObsArray, win
     """Write the objects of a window inside of the floor. Without a branch: where objects lie cannot be foreseen."""
     for y in range(WINDOW_CELLS):
         for x in range(WINDOW_CELLS):
-            window[y * WINDOW_CELLS + x] = shares[max(floor[y_low + y, x_low + x], -1) + 1]
+            window[y * WINDOW_CELLS + x] = shares[max(floor[y_low + y, x_low + x], CELL_EMPTY)]
 
 
 @kernel
@@ -186,7 +186,7 @@ def _cut_window(floor: IntArray, x_low: int, y_low: int, shares: ObsArray, windo
     for y in range(WINDOW_CELLS):
         for x in range(WINDOW_CELLS):
             inside = 0 <= x_low + x < nx and 0 <= y_low + y < ny
-            window[y * WINDOW_CELLS + x] = shares[max(floor[y_low + y, x_low + x], -1) + 1] if inside else 0.0
+            window[y * WINDOW_CELLS + x] = shares[max(floor[y_low + y, x_low + x], CELL_EMPTY)] if inside else 0.0
 
 
 @kernel

@@ -6,7 +6,15 @@ possible in every tick until then. A RELEASE onto open floor acts at once.
 """
 
 from swarm_forage_env._internal.compiling import kernel
-from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, GRIP_LOWER_ENDS, Counter, Event, ObjectStatus
+from swarm_forage_env.contract.codes import (
+    CELL_CACHE,
+    CELL_EMPTY,
+    CELL_OBJECT,
+    GRIP_LOWER_ENDS,
+    Counter,
+    Event,
+    ObjectStatus,
+)
 from swarm_forage_env.contract.types import ActionArray, FloatArray, IntArray
 from swarm_forage_env.scenarios.floor import CELL_M, CELLS_PER_M
 from swarm_forage_env.world.state import CacheState, ObjectState, Rules, StepEvents, SwarmState, WorldState
@@ -118,8 +126,8 @@ def request_of(state: WorldState, rules: Rules, band: int, i: int) -> tuple[int,
             return NO_REQUEST, -1
         if code <= CELL_CACHE:
             return CACHE_PICKUP, CELL_CACHE - code
-        if code >= 0:
-            return FLOOR_PICKUP, code
+        if code >= CELL_OBJECT:
+            return FLOOR_PICKUP, code - CELL_OBJECT
         return NOTHING, -1
     if band == GRASP:
         return NO_REQUEST, -1
@@ -214,7 +222,7 @@ def lay_on_floor(state: WorldState, rules: Rules, i: int) -> bool:
     inside = rules.area_x_low <= x < rules.area_x_high and rules.area_y_low <= y < rules.area_y_high
     events.counters[_FLOOR_DROPS] += 1
     if inside and objects.floor[y, x] == CELL_EMPTY:
-        objects.floor[y, x] = row
+        objects.floor[y, x] = CELL_OBJECT + row
         objects.status[row] = _FREE
         objects.cell[row, 0] = x
         objects.cell[row, 1] = y
@@ -281,7 +289,7 @@ def _dissolve(objects: ObjectState, caches: CacheState, slot: int, half: int) ->
         if objects.cache_slot[row] == slot:
             objects.cache_slot[row] = -1
             objects.status[row] = _FREE
-            objects.floor[cy, cx] = row
+            objects.floor[cy, cx] = CELL_OBJECT + row
     caches.alive[slot] = False
     caches.count[slot] = 0
 

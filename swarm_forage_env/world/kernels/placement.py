@@ -1,12 +1,12 @@
 """Drawing free cells for objects: which region, which cell. Random numbers are passed in.
 
-Floor codes are those of `contract.codes`: an object row >= 0, else CELL_EMPTY, nest, obstacle or cache.
+Floor codes are those of `contract.codes`.
 """
 
 import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
-from swarm_forage_env.contract.codes import CELL_EMPTY
+from swarm_forage_env.contract.codes import CELL_EMPTY, CELL_OBJECT
 from swarm_forage_env.contract.types import FloatArray, IntArray
 
 UNLIMITED = int(np.iinfo(np.int32).max)
@@ -23,7 +23,7 @@ def count_objects(floor: IntArray, x_low: int, y_low: int, x_high: int, y_high: 
     count = 0
     for y in range(y_low, y_high):
         for x in range(x_low, x_high):
-            if floor[y, x] >= 0:
+            if floor[y, x] >= CELL_OBJECT:
                 count += 1
     return count
 
@@ -117,7 +117,7 @@ def scatter(
         x, y = draw_source_cell(floor, regions, capacity, group_start, area, draws[i])
         if x < 0:
             return i
-        floor[y, x] = rows[i]
+        floor[y, x] = CELL_OBJECT + rows[i]
         cell[rows[i], 0] = x
         cell[rows[i], 1] = y
     return rows.shape[0]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
-from swarm_forage_env.contract.codes import CELL_EMPTY, ObjectStatus
+from swarm_forage_env.contract.codes import CELL_EMPTY, CELL_OBJECT, ObjectStatus
 from swarm_forage_env.contract.types import CodeArray, FloatArray, IntArray
 from swarm_forage_env.scenarios.floor import CELL_M
 
@@ -85,7 +85,7 @@ def walk(
                 continue
             if wanted == 0:
                 floor[y, x] = CELL_EMPTY
-                floor[y + dy, x + dx] = row
+                floor[y + dy, x + dx] = CELL_OBJECT + row
                 cell[row, 0] = x + dx
                 cell[row, 1] = y + dy
                 moves += 1
