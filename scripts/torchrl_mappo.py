@@ -31,7 +31,7 @@ from torchrl.objectives.value.functional import generalized_advantage_estimate
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.policies.interface import LearnerInterface
 from swarm_forage_env.policies.network import Network, NetworkAbout
-from swarm_forage_env.runs.record import software_versions
+from swarm_forage_env.runs.versions import software_versions
 from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
 from swarm_forage_env.views.gymnasium import SwarmVectorEnv
 

@@ -14,8 +14,9 @@ import numpy as np
 from swarm_forage_env.policies.registry import file_of, is_policy_file, policy_label
 from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.policy_spec import policy_specs
-from swarm_forage_env.runs.record import RunRecord, software_versions
+from swarm_forage_env.runs.record import RunRecord
 from swarm_forage_env.runs.table import Table
+from swarm_forage_env.runs.versions import software_versions
 from swarm_forage_env.scenarios.performance import performance_of
 
 from ..controllers import PAPER_POLICIES

@@ -20,8 +20,8 @@ from swarm_forage_env.policies.registry import file_of, is_policy_file
 from swarm_forage_env.rendering.figures import SCREEN
 from swarm_forage_env.rendering.pages import build_report, picture_address, shown
 from swarm_forage_env.runs.answer import Answer, Sheet
-from swarm_forage_env.runs.record import PACKAGES
 from swarm_forage_env.runs.store import DONE
+from swarm_forage_env.runs.versions import VERSION_NAMES
 from swarm_forage_env.studies.description import describe, status
 from swarm_forage_env.studies.study import StudySpec
 from swarm_forage_env.studies.study_file import is_set_of_paper
@@ -419,6 +419,6 @@ def _policy_files(spec: StudySpec) -> list[str]:
 
 
 def version_names(tables: "Sequence[StudyTable]") -> list[str]:
-    """Return of what the versions are shown: our own first, then the commit, which only runs from a checkout have."""
+    """Return of what the versions are shown: our own first, then our code, then the commit, if there was one."""
     names = {name for table in tables for made in table.versions for name, version in made.items() if version}
-    return sorted(names, key=lambda name: ((PACKAGES[0], "commit", name).index(name), name))
+    return sorted(names, key=lambda name: ((VERSION_NAMES[0], "code", "commit", name).index(name), name))

@@ -109,7 +109,7 @@ def _report(error: BaseException, words: Sequence[str]) -> Path:
     """
     import platform
 
-    from swarm_forage_env.runs.record import software_versions
+    from swarm_forage_env.runs.versions import software_versions
 
     versions = {"python": platform.python_version(), "system": platform.platform(), **software_versions()}
     lines = [

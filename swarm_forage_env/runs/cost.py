@@ -199,7 +199,7 @@ class RunProgress:
         if self._foreign:
             be = "was" if self._foreign == 1 else "were"
             self._console.print(
-                f"{self._foreign} of them {be} made by another version or commit of the packages; "
+                f"{self._foreign} of them {be} made by other code or other versions of the packages; "
                 "give another folder to run them afresh."
             )
         for reason in self._damaged[:DAMAGED_SHOWN]:

@@ -8,11 +8,8 @@ and a digest by which a damaged file is noticed.
 import hashlib
 import json
 import os
-import subprocess
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache
-from importlib import metadata
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, get_type_hints
@@ -23,6 +20,7 @@ from numpy.typing import NDArray
 from swarm_forage_env._internal.files import parse_json, replacing
 from swarm_forage_env.contract.types import FloatArray, IntArray
 from swarm_forage_env.runs.answer import Sheet
+from swarm_forage_env.runs.versions import identity
 from swarm_forage_env.scenarios.columns import ALL_COLUMNS, INTERVAL_COLUMNS, KEY_COLUMNS
 from swarm_forage_env.scenarios.performance import performance_curve
 
@@ -31,8 +29,6 @@ if TYPE_CHECKING:
 
 SCHEMA_VERSION = 2
 """Version of the file layout; raised whenever a column changes its name, type or meaning."""
-PACKAGES = ("swarm-forage-env", "numpy", "scipy", "numba", "llvmlite", "pymunk", "pettingzoo")
-"""Distributions whose versions are part of every record."""
 
 CountArray: TypeAlias = NDArray[np.int64]
 
@@ -86,7 +82,7 @@ class RunRecord:
     spec: str
     """The run's complete specification as JSON (`runs.spec.RunSpec.from_json`)."""
     provenance: Mapping[str, str]
-    """Versions, commit, time of creation, seconds of the clock and of a core."""
+    """Versions, code, commit, time of creation, seconds of the clock and of a core."""
 
     def __post_init__(self) -> None:
         n_intervals = len(self.interval)
@@ -155,8 +151,8 @@ class RunRecord:
         return replace(self, performance=curve, spec=json.dumps(spec, sort_keys=True))
 
     def made_by(self, versions: Mapping[str, str]) -> bool:
-        """Return whether the run was made by these `software_versions`, the commit included."""
-        return all(self.provenance.get(name, "") == versions.get(name, "") for name in (*PACKAGES, "commit"))
+        """Return whether these `software_versions` made the run: the same packages and the same code."""
+        return identity(self.provenance) == identity(versions)
 
     def same_results(self, other: "RunRecord") -> bool:
         """Return whether both records hold the same keys and bit-equal columns; provenance may differ."""
@@ -269,28 +265,6 @@ def record_columns() -> Sheet:
         for name, column in ALL_COLUMNS.items()
     ]
     return Sheet(title="columns", header=("column", "type", "unit", "meaning"), rows=rows)
-
-
-@lru_cache(maxsize=1)
-def software_versions() -> dict[str, str]:
-    """Return the versions that results depend on, and the commit where the package runs from a checkout."""
-    versions = {name: metadata.version(name) for name in PACKAGES}
-    commit = _commit()
-    return versions | ({"commit": commit} if commit else {})
-
-
-@cache  # git is asked once per process: every run of a study needs the answer
-def _commit() -> str:
-    """Return the checked-out commit ("-dirty" appended when edited), or "" outside a checkout of this package."""
-    here = Path(__file__)
-    tracked = ["git", "ls-files", "--error-unmatch", here.name]
-    describe = ["git", "describe", "--always", "--abbrev=40", "--dirty", "--exclude=*"]
-    try:
-        for command in (tracked, describe):
-            answer = subprocess.run(command, cwd=here.parent, capture_output=True, text=True, timeout=10, check=True)
-    except (OSError, subprocess.SubprocessError):
-        return ""
-    return answer.stdout.strip()
 
 
 def _checked(name: str, values: Any, dtype: type, n_intervals: int) -> np.ndarray:

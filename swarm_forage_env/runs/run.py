@@ -15,8 +15,9 @@ from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.contract.policy import CompiledPolicy, Policy
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
-from swarm_forage_env.runs.record import RunRecord, software_versions
+from swarm_forage_env.runs.record import RunRecord
 from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.runs.versions import software_versions
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig, wrap_in_order
 from swarm_forage_env.wrappers.recorder import RunRecorder

@@ -15,8 +15,9 @@ from pathlib import Path
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import parse_json, replacing
-from swarm_forage_env.runs.record import RecordError, RunRecord, software_versions
+from swarm_forage_env.runs.record import RecordError, RunRecord
 from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.runs.versions import software_versions
 
 DONE, FAILED, MISSING = "done", "failed", "missing"
 STATES = (DONE, FAILED, MISSING)
@@ -54,7 +55,7 @@ class StoredRuns:
     damaged: Mapping[str, str] = field(default_factory=dict[str, str])
     """run_id of a run whose file cannot be used -> why; it counts as missing."""
     n_foreign: int = 0
-    """Runs that another version or commit of the packages made."""
+    """Runs that other code or other versions of the packages made."""
 
 
 class RunStore:

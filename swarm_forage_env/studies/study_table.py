@@ -22,10 +22,11 @@ import numpy as np
 
 from swarm_forage_env._internal.files import parse_json, replacing
 from swarm_forage_env.runs.plan import Condition, Plan
-from swarm_forage_env.runs.record import COLUMN_DTYPES, PACKAGES, RecordError, RunRecord, record_of
+from swarm_forage_env.runs.record import COLUMN_DTYPES, RecordError, RunRecord, record_of
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import DONE, FAILED, FAILURES, MISSING, RunFailure, RunStore, read_failure
 from swarm_forage_env.runs.table import Curves, Table
+from swarm_forage_env.runs.versions import VERSION_NAMES
 from swarm_forage_env.studies.study import Place, StudySpec
 from swarm_forage_env.studies.study_folder import PlaceState, StudyFolder, place_state
 
@@ -241,7 +242,7 @@ def gather_study(folder: StudyFolder) -> StudyTable:
             else:
                 records.append(record)
                 wall_time_s += record.wall_time_s
-                versions.add(tuple((name, record.provenance.get(name, "")) for name in (*PACKAGES, "commit")))
+                versions.add(tuple((name, record.provenance.get(name, "")) for name in VERSION_NAMES))
         where = place_columns(spec, place)
         first = {"study": spec.name, "cell": number, "reading": where.pop("rules"), **where}
         rows = pl.concat([_frame(records), _losses(lost)], how="diagonal").sort("seed", "interval")

@@ -100,7 +100,7 @@ def test_where_everything_is_stored_only_that_is_said(capsys):
         pass
     first, second = capsys.readouterr().err.splitlines()
     assert first == "3 of 3 runs are stored already."
-    assert second.startswith("1 of them was made by another version or commit of the packages; give another folder")
+    assert second.startswith("1 of them was made by other code or other versions of the packages; give another folder")
 
 
 def test_damaged_files_are_named_up_to_a_few(capsys):

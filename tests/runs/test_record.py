@@ -1,8 +1,6 @@
 """RunRecord and its file."""
 
-import ast
 import json
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +10,7 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.runs import record as recording
-from swarm_forage_env.runs.record import RecordError, RunRecord, record_columns, software_versions
+from swarm_forage_env.runs.record import RecordError, RunRecord, record_columns
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.config import whole_intervals
 from swarm_forage_env.scenarios.presets import scenario
@@ -256,41 +254,6 @@ def test_the_table_of_columns_lists_every_column_once(record):
     names = [line.split()[0] for line in record_columns().text().splitlines()[2:]]
     assert names[: len(record.keys()) + len(recording.COLUMN_DTYPES)] == [*record.keys(), *recording.COLUMN_DTYPES]
     assert len(set(names)) == len(names)
-
-
-def test_versions_are_known_for_every_package():
-    versions = software_versions()
-    assert set(recording.PACKAGES) <= versions.keys()
-    assert versions["numpy"] == np.__version__
-
-
-IN_A_RUN = ("_internal", "contract", "scenarios", "world", "wrappers")
-"""Folders of swarm_forage_env that every tick of a run may go through."""
-
-
-def test_every_library_that_computes_in_a_run_is_in_its_record():
-    package = Path(recording.__file__).parents[1]
-    files = [file for folder in IN_A_RUN for file in (package / folder).rglob("*.py")]
-    files += (package.parent / "baselines").rglob("*.py")
-    imports = [node for file in files for node in ast.walk(_without_types(ast.parse(file.read_text())))]
-    modules = {node.module for node in imports if isinstance(node, ast.ImportFrom) and node.level == 0}
-    modules |= {alias.name for node in imports if isinstance(node, ast.Import) for alias in node.names}
-    libraries = {module.split(".")[0] for module in modules} - sys.stdlib_module_names - {package.name}
-    assert "numpy" in libraries
-    assert libraries <= set(recording.PACKAGES)
-
-
-def _without_types(tree):
-    """What only a type checker imports computes nothing."""
-    tree.body = [
-        node for node in tree.body if not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING")
-    ]
-    return tree
-
-
-def test_the_commit_is_absent_outside_a_checkout(tmp_path, monkeypatch):
-    monkeypatch.setattr(recording, "__file__", str(tmp_path / "recording.py"))
-    assert recording._commit.__wrapped__() == ""
 
 
 def test_whole_intervals():

@@ -390,9 +390,9 @@ def test_stored_runs_of_other_versions_are_pointed_out(tmp_path, monkeypatch, ca
     assert capsys.readouterr().err == "2 of 2 runs are stored already.\n"
     monkeypatch.setattr(runs_store, "software_versions", lambda: {"numba": "0.0"})
     run_specs(SPECS[:2], store=store, jobs=1, progress=True)
-    assert "2 of them were made by another version or commit" in capsys.readouterr().err
+    assert "2 of them were made by other code or other versions" in capsys.readouterr().err
     run_specs(SPECS[:1], store=store, jobs=1, progress=True)
-    assert "1 of them was made by another version or commit" in capsys.readouterr().err
+    assert "1 of them was made by other code or other versions" in capsys.readouterr().err
 
 
 @pytest.mark.compiled

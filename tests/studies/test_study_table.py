@@ -6,10 +6,11 @@ import numpy as np
 import polars as pl
 import pytest
 
-from swarm_forage_env.runs.record import RecordError, RunRecord, software_versions
+from swarm_forage_env.runs.record import RecordError, RunRecord
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.runner import longest_first, run_plan, run_specs
 from swarm_forage_env.runs.store import FAILURES, MISSING
+from swarm_forage_env.runs.versions import software_versions
 from swarm_forage_env.studies.study import Axis, Place
 from swarm_forage_env.studies.study_folder import StudyFolder, run_study
 from swarm_forage_env.studies.study_table import gather_study, read_study

@@ -20,9 +20,10 @@ from swarm_forage_env.inspect.replay.frames import (
 )
 from swarm_forage_env.policies.registry import load_policy, policy_label
 from swarm_forage_env.rendering.view import refusing
-from swarm_forage_env.runs.record import RunRecord, software_versions
+from swarm_forage_env.runs.record import RunRecord
 from swarm_forage_env.runs.run import LiveRun, Started, build_stack, finished_record
 from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.runs.versions import software_versions
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.wrappers.handling import HandlingCostConfig
 from swarm_forage_env.wrappers.throttle import ThrottleConfig

@@ -25,9 +25,9 @@ from swarm_forage_env.policies.mixture import is_mixture, part_sizes
 from swarm_forage_env.policies.model_files import look_at_file
 from swarm_forage_env.policies.registry import file_of, is_policy_file, load_policy, part_labels, policy_label
 from swarm_forage_env.runs.answer import Sheet
-from swarm_forage_env.runs.record import software_versions
 from swarm_forage_env.runs.run import build_env
 from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.runs.versions import software_versions
 from swarm_forage_env.runs.workers import Tell, map_runs
 from swarm_forage_env.training.datasets.layout import (
     CARD_FILE,

@@ -34,7 +34,7 @@ from swarm_forage_env.policies.model_files import MODEL_FAULTS, deterministic_ch
 from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.first_compilation import compile_world
-from swarm_forage_env.runs.record import software_versions
+from swarm_forage_env.runs.versions import software_versions
 from swarm_forage_env.runs.workers import available_cores
 from swarm_forage_env.training.evaluation_worlds import BEST
 from swarm_forage_env.training.evaluations import (
