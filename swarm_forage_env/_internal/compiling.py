@@ -36,6 +36,7 @@ _COMPILED_IN_EVERYWHERE = tuple(
     for name in (
         "_internal/compiled_parts",
         "_internal/compiling",
+        "_internal/held",
         "contract/codes",
         "contract/detection",
         "contract/layout",
@@ -93,12 +94,22 @@ def kernel(function: F) -> F:
     return cast(F, compiled)
 
 
-def _widened(kind: Any) -> Any:
-    """Return the type as which a kernel takes an argument from another kernel: signed whole numbers all as int64.
+class HeldType(types.Type):
+    """What numba knows of a tuple that is held, see `held`. As a value it is an address."""
 
-    So it is compiled once, and not for every width and every constant that it is called with.
+    def __init__(self, of: Any) -> None:
+        """Take the type of the tuple."""
+        self.of = of
+        super().__init__(f"Held({of})")
+
+
+def _widened(kind: Any) -> Any:
+    """Return the type as which a kernel takes an argument from another kernel.
+
+    Signed whole numbers are all int64 and a tuple that is held is the tuple. So it is compiled once, and not for every
+    width and every constant that it is called with.
     """
-    plain = types.unliteral(kind)
+    plain = kind.of if isinstance(kind, HeldType) else types.unliteral(kind)
     return types.int64 if plain in types.signed_domain else plain
 
 
@@ -228,10 +239,10 @@ def direct(function: F, *example: Any) -> F:
     compiled = getattr(function, "compile", None)
     if compiled is None:  # the compiler is switched off
         return function
-    key = function, tuple(_kind_of(argument) for argument in example)
+    key = function, tuple(kind_of(argument) for argument in example)
     if key not in _entry_points:
         with _collector_off():
-            _entry_points[key] = compiled(tuple(_type_of(argument) for argument in example))
+            _entry_points[key] = compiled(tuple(type_of(argument) for argument in example))
     return cast(F, _entry_points[key])
 
 
@@ -239,7 +250,7 @@ def compile_part(function: Callable[..., Any], *example: Any) -> None:
     """Compile what kernels take from `function` when they call it, for arguments of the types of `example`."""
     if is_compiled(function):
         with _collector_off():
-            cast(Any, function).get_call_template(tuple(_type_of(argument) for argument in example), {})
+            cast(Any, function).get_call_template(tuple(type_of(argument) for argument in example), {})
 
 
 def is_new(function: Callable[..., Any], *example: Any) -> bool:
@@ -250,7 +261,7 @@ def is_new(function: Callable[..., Any], *example: Any) -> bool:
     compiled = cast(Any, function)
     if not is_compiled(function) or not isinstance(compiled._cache, _Cache):
         return False
-    kinds = tuple(_type_of(argument) for argument in example)
+    kinds = tuple(type_of(argument) for argument in example)
     if kinds in compiled.overloads or compiled._cache.holds(kinds, compiled.targetctx):
         return False
     try:
@@ -265,19 +276,22 @@ _entry_points: dict[Any, Callable[..., Any]] = {}
 milliseconds, and every run of a study asks."""
 
 
-def _kind_of(argument: Any) -> Any:
+def kind_of(argument: Any) -> Any:
     """Return something that is equal for arguments of the same type."""
     if isinstance(argument, np.ndarray):
         flags = argument.flags
         return argument.dtype, argument.ndim, flags.c_contiguous, flags.f_contiguous, flags.aligned, flags.writeable
     if isinstance(argument, tuple):
-        return type(argument), *map(_kind_of, argument)
+        return type(argument), *map(kind_of, argument)
     if type(argument) in (bool, int, float):
         return type(argument)
-    return _type_of(argument)
+    return type_of(argument)
 
 
-def _type_of(argument: Any) -> Any:
+def type_of(argument: Any) -> Any:
+    """Return numba's type of an argument; a type stands for itself."""
+    if isinstance(argument, types.Type):
+        return argument
     return argument.type if isinstance(argument, Callback) else typeof(argument)
 
 

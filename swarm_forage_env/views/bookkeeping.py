@@ -6,11 +6,12 @@ from typing import Any
 import numpy as np
 
 from swarm_forage_env._internal.compiling import direct, is_compiled
+from swarm_forage_env._internal.held import addresses, hold
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.views.learner_arena import LearnerArena
-from swarm_forage_env.world.kernels.lockstep import book_each, pay_each
-from swarm_forage_env.world.lockstep import addresses, are_others
+from swarm_forage_env.world.kernels.lockstep import Robots, book_each, pay_each
+from swarm_forage_env.world.lockstep import are_others
 from swarm_forage_env.world.rewards import RewardModel
 
 
@@ -23,8 +24,7 @@ class Bookkeeping:
     """Compiled calls for all arenas of a batch. What they do is bit for bit what the arenas do one by one.
 
     Attributes:
-        pays: Whether `pay` can be called: no wrapper, no function of Python and no window takes part in a step, and
-            all arenas weigh their rewards alike.
+        pays: Whether `pay` can be called: no wrapper, no function of Python and no window takes part in a step.
         copies: Whether `book` writes the observations: learners see the rows of the environment as they are.
     """
 
@@ -55,12 +55,11 @@ class Bookkeeping:
         self._models: list[RewardModel] = [env.reward_model for env in environments]
         plain = all(type(arena.env) is ForageEnv and arena.env.render_mode != "human" for arena in self._arenas)
         payments = [payment for model in self._models if (payment := model.payment) is not None]
-        kinds = {(payment.weights, payment.is_dense) for payment in payments}  # for all there is that of the first
-        self.pays = plain and len(payments) == len(environments) and len(kinds) == 1
-        self._payments = payments[:1], np.array([addresses(payment) for payment in payments], np.intp)
+        self.pays = plain and len(payments) == len(environments)
+        self._payments = payments[:1], addresses(payments)
         self.copies = plain and all(arena.interface.shows_all for arena in self._arenas)
-        robots = [(env.swarm, env.terminated, env.last_obs) for env in environments]
-        self._robots = robots[0], np.array([addresses(each) for each in robots], np.intp)
+        self._held = [hold(Robots(env.swarm, env.terminated, env.last_obs)) for env in environments]
+        self._robots = self._held[0], addresses(self._held)
         self._no_obs = np.empty((0, *environments[0].last_obs.shape), np.float32)
 
     def remember(self, seats: Sequence[int]) -> None:
@@ -70,9 +69,9 @@ class Bookkeeping:
 
     def pay(self, seats: Sequence[int], rewards: ObsArray) -> None:
         """Add the rewards of a tick to `rewards` (A, N) float32, for the arenas that were stepped."""
-        (payment,), payments_at = self._payments
+        (payment,), places = self._payments
         rows = self._all_seats if len(seats) == len(self._arenas) else np.array(seats, np.int64)
-        arguments = payment, payments_at, rows, rewards
+        arguments = payment, places, rows, rewards
         if self._pay is None:
             self._pay = direct(pay_each, *arguments)
         self._pay(*arguments)

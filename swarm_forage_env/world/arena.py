@@ -8,6 +8,7 @@ import numpy as np
 
 from swarm_forage_env._internal.compiling import direct
 from swarm_forage_env._internal.fields import ConfigError, whole
+from swarm_forage_env._internal.held import hold
 from swarm_forage_env._internal.rng import Stream, TickDraws, stream_rng
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.layout import MESSAGES, NEIGHBOURS
@@ -40,8 +41,8 @@ from swarm_forage_env.world.placement import (
 from swarm_forage_env.world.sensors import new_sensors, read_slices
 from swarm_forage_env.world.state import ArenaArrays, listed
 
-_FUNCTIONS = ("_compiled", "_own_sensors")
-"""Attributes of an arena that hold functions: made when they are needed, for one run."""
+_OF_PROCESS = ("_compiled", "_held", "_own_sensors")
+"""Attributes of an arena that hold functions and addresses: made when they are needed, for the arrays of a run."""
 
 
 class ForagingArena:
@@ -110,26 +111,36 @@ class ForagingArena:
             self._physics = ChipmunkBodies(config, position, heading, keeps_history=self._snapshots)
         self.obs = sensors.obs
         self._arrays = new_arrays(config, state, sensors, self._physics.twist, self._static_caches)
-        for name in _FUNCTIONS:
-            vars(self).pop(name, None)  # those of the run before hold its arrays
+        self._forget_addresses()
         self._neighbourhood = Neighbourhood(config.robots, self.layout, self.reads)
         self.has_changed = False
         return self.observe()
+
+    def _forget_addresses(self) -> None:
+        """Forget what belongs to the arrays of the run before."""
+        for name in _OF_PROCESS:
+            vars(self).pop(name, None)
+
+    @cached_property
+    def _held(self) -> ArenaArrays:
+        """The arrays, as compiled code takes them from Python."""
+        return hold(self._arrays)
 
     @cached_property
     def _compiled(self) -> CompiledTick:
         return CompiledTick(self._arrays, self._physics.state if isinstance(self._physics, Bodies) else None)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what copies and snapshots are made of: everything but functions, which cannot all be stored."""
-        return {name: value for name, value in vars(self).items() if name not in _FUNCTIONS}
+        """Return what copies and snapshots are made of: everything but functions and addresses."""
+        return {name: value for name, value in vars(self).items() if name not in _OF_PROCESS}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
+        self._forget_addresses()
 
     def observe(self) -> ObsArray:
         """Return the observation (N, D) of the world as it is now; only needed after a change between two steps."""
-        self._compiled.observe(self._arrays)
+        self._compiled.observe(self._held)
         self._sense_further()
         return self.obs
 
@@ -194,16 +205,16 @@ class ForagingArena:
         """
         tick = self.tick + 1
         gain = self._unit_gain if wheel_gain is None else np.ascontiguousarray(wheel_gain, np.float64)
-        arrays, compiled, physics = self._arrays, self._compiled, self._physics
+        held, compiled, physics = self._held, self._compiled, self._physics
         picks, walks = self.draws(tick)
         draws = picks[0], walks[0]
         if isinstance(physics, Bodies):
-            outcome = compiled.whole(arrays, physics.state, actions, gain, tick, self.has_changed, *draws)
+            outcome = compiled.whole(held, physics.held, actions, gain, tick, self.has_changed, *draws)
         else:
-            outcome = compiled.set_out(arrays, actions, gain, tick, self.has_changed)
+            outcome = compiled.set_out(held, actions, gain, tick, self.has_changed)
             if outcome == DONE:
                 physics.advance(self.swarm)
-                outcome = compiled.meet_and_close(arrays, actions, tick, *draws)
+                outcome = compiled.meet_and_close(held, actions, tick, *draws)
         self.conclude(outcome, actions, gain, tasks)
         return self.obs
 
@@ -245,12 +256,12 @@ class ForagingArena:
         picks, walks = self.draws(self.tick)
         if outcome == NO_ROOM:
             self._physics.advance(self.swarm)
-            outcome = self._compiled.meet_and_close(self._arrays, actions, self.tick, picks[0], walks[0])
+            outcome = self._compiled.meet_and_close(self._held, actions, self.tick, picks[0], walks[0])
         if outcome == TO_PLACE:
             self._create_dynamic_caches()
             self._replace_displaced()
             self._restore_caches(tasks)
-            self._compiled.close(self._arrays, walks[0])
+            self._compiled.close(self._held, walks[0])
 
     def run(self, policy: CompiledPolicy, n_ticks: int, task_shares: FloatArray) -> None:
         """Let a compiled policy drive the world for some ticks; what happens is what `step` and `act` do by turns.
@@ -271,8 +282,8 @@ class ForagingArena:
             picks, walks = self.draws(first)
             n_drawn = min(len(rows) for rows in (policy_draws, picks, walks) if rows is not self._nothing)
             arguments = (
-                self._arrays,
-                bodies.state,
+                self._held,
+                bodies.held,
                 self._unit_gain,
                 first,
                 min(n_left, n_drawn),
@@ -312,8 +323,8 @@ class ForagingArena:
 
     @property
     def parts(self) -> tuple[ArenaArrays, BodyState]:
-        """What the compiled tick works on; other objects after a reset, and where bodies need more room."""
-        return self._arrays, self.bodies.state
+        """What the compiled tick works on, held; other objects after a reset, and where bodies need more room."""
+        return self._held, self.bodies.held
 
     def _create_dynamic_caches(self) -> None:
         creators = listed(self._requests.creators)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from swarm_forage_env._internal.compiling import direct
+from swarm_forage_env._internal.held import hold
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.world.kernels.bodies import WALLS, BodyState, move_bodies, tell_poses
@@ -68,8 +69,13 @@ class Bodies:
         )
 
     @cached_property
+    def held(self) -> BodyState:
+        """`state`, as compiled code takes it from Python; another object where there is more room."""
+        return hold(self.state)
+
+    @cached_property
     def _move(self) -> Callable[[BodyState, FloatArray, BoolArray, float], bool]:
-        return direct(move_bodies, self.state, self.twist, self.state.near, self._dt_s)
+        return direct(move_bodies, self.held, self.twist, self.state.near, self._dt_s)
 
     @cached_property
     def _tell(self) -> Callable[[FloatArray, BoolArray, FloatArray, FloatArray, FloatArray], None]:
@@ -78,7 +84,7 @@ class Bodies:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what copies and snapshots are made of: everything but compiled functions, which cannot be stored."""
-        return {name: value for name, value in vars(self).items() if name not in ("_move", "_tell")}
+        return {name: value for name, value in vars(self).items() if name not in ("held", "_move", "_tell")}
 
     @property
     def n_pairs(self) -> int:
@@ -93,10 +99,11 @@ class Bodies:
         n_contacts[:] = before[0]
         contacts[: len(before[1])] = before[1]
         self.state = self.state._replace(**more)
+        vars(self).pop("held", None)
 
     def advance(self, swarm: SwarmState) -> None:
         """Move all bodies by one tick along `twist` and write position, heading and facing of present robots."""
-        while not self._move(self.state, self.twist, swarm.present, self._dt_s):
+        while not self._move(self.held, self.twist, swarm.present, self._dt_s):
             self.make_room()
         self._tell(self.state.poses, swarm.present, swarm.position, swarm.heading, swarm.facing)
 

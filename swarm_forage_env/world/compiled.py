@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from swarm_forage_env._internal.compiling import compile_part, direct, is_new
+from swarm_forage_env._internal.held import held_type
 from swarm_forage_env.contract.policy import CompiledPolicy, layout_for
 from swarm_forage_env.contract.types import ActionArray, CodeArray, FloatArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -32,12 +33,19 @@ class ExampleCalls:
     """A call of each function of `kernels.tick`, as runs make it: what is compiled beforehand is what they ask for."""
 
     def __init__(self, arrays: ArenaArrays, bodies: BodyState | None) -> None:
-        """Take arrays and bodies (None where Chipmunk has them) from a run, or empty ones; only types matter."""
-        n_robots = len(arrays.state.swarm.present)
-        self.actions: ActionArray = np.zeros((n_robots, 3), np.float32)
-        self.draws: FloatArray = np.zeros(n_robots)
+        """Take arrays and bodies (None where Chipmunk has them) as other kernels take them, or held as Python does.
+
+        They may be those of a run or empty ones; only types matter.
+        """
+        self.actions: ActionArray = np.zeros((1, 3), np.float32)
+        self.draws: FloatArray = np.zeros(1)
         self._arrays, self._bodies = arrays, bodies
-        self._gain: FloatArray = np.zeros((n_robots, 2))
+        self._gain: FloatArray = np.zeros((1, 2))
+
+    @classmethod
+    def from_python(cls, arrays: ArenaArrays, bodies: BodyState | None) -> "ExampleCalls":
+        """Return the calls that Python makes."""
+        return cls(held_type(arrays), None if bodies is None else held_type(bodies))
 
     @property
     def bodies(self) -> BodyState:
@@ -86,7 +94,8 @@ def tasks_of(policy: CompiledPolicy) -> CodeArray:
 class CompiledTick:
     """The functions of `kernels.tick`, each compiled when it is first asked for.
 
-    They are called without a look at the arguments, which must be contiguous arrays of exactly these types.
+    They are called without a look at the arguments, which must be contiguous arrays of exactly these types. Arrays and
+    bodies of the run are handed over as `held` tuples.
     """
 
     def __init__(self, arrays: ArenaArrays, bodies: BodyState | None) -> None:
@@ -96,7 +105,7 @@ class CompiledTick:
             arrays: State and constants of the run.
             bodies: Compiled bodies, None where Chipmunk has them.
         """
-        self._calls = ExampleCalls(arrays, bodies)
+        self._calls = ExampleCalls.from_python(arrays, bodies)
 
     @cached_property
     def observe(self) -> Callable[[ArenaArrays], None]:
@@ -142,9 +151,9 @@ def compile_half(config: ScenarioConfig, half: int) -> None:
     The second is the smaller one, because the process that compiles it may have to be started first.
     """
     for function, *example in parts_of(config, half):
-        # Chipmunk's bodies move between two calls from Python.
-        from_python = function is tick.set_out and config.physics == "chipmunk"
-        (direct if from_python else compile_part)(function, *example)
+        compile_part(function, *example)
+    if half == 0 and config.physics == "chipmunk":  # its bodies move between two calls from Python
+        direct(*ExampleCalls.from_python(*_empty_parts(config)).set_out)
 
 
 def parts_of(config: ScenarioConfig, half: int) -> tuple[Call, ...]:
@@ -152,7 +161,7 @@ def parts_of(config: ScenarioConfig, half: int) -> tuple[Call, ...]:
     arrays, bodies = _empty_parts(config)
     calls, swarm, motion = ExampleCalls(arrays, bodies), arrays.state.swarm, arrays.motion
     if half == 0:
-        return calls.close, calls.set_out
+        return (calls.close,) if bodies is None else (calls.close, calls.set_out)
     serving = serve, arrays.state, arrays.rules, calls.actions, 0, calls.draws
     if bodies is None:
         return (serving,)
@@ -167,7 +176,7 @@ def outermost(config: ScenarioConfig, policy: CompiledPolicy | None) -> Call:
         config: The scenario.
         policy: The policy of a run without Python between the ticks, None for other runs.
     """
-    calls = ExampleCalls(*_empty_parts(config))
+    calls = ExampleCalls.from_python(*_empty_parts(config))
     if config.physics == "chipmunk":
         return calls.meet_and_close
     return calls.whole if policy is None else calls.run(policy)
@@ -175,4 +184,4 @@ def outermost(config: ScenarioConfig, policy: CompiledPolicy | None) -> Call:
 
 def is_first(config: ScenarioConfig) -> bool:
     """Return whether not even a reset of this scenario is compiled yet, and what is compiled can be kept."""
-    return is_new(*ExampleCalls(*_empty_parts(config)).observe)
+    return is_new(*ExampleCalls.from_python(*_empty_parts(config)).observe)

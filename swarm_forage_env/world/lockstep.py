@@ -1,17 +1,17 @@
 """Arenas of one scenario, stepped together by one compiled call: for learners, whose actions come for all at once."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from operator import is_not
 from typing import Any
 
 import numpy as np
 
 from swarm_forage_env._internal.compiling import direct, is_compiled
+from swarm_forage_env._internal.held import addresses
 from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.contract.types import ActionArray, FloatArray
 from swarm_forage_env.world.arena import ForagingArena
-from swarm_forage_env.world.kernels.bodies import BodyState
 from swarm_forage_env.world.kernels.lockstep import whole_each
-from swarm_forage_env.world.state import ArenaArrays
 
 
 def can_go_in_lockstep(arenas: Sequence[ForagingArena]) -> bool:
@@ -45,7 +45,7 @@ class Lockstep:
         self.arenas = tuple(arenas)
         self._draws_picks = config.caches != "none"
         self._draws_walks = config.objects.walk_probability > 0.0
-        self._seated: list[tuple[ArenaArrays, BodyState]] = []
+        self._seated: list[object] = []
         self._has_gain = [False] * n_seats
         self._gain = np.ones((n_seats, n_robots, 2))
         self._ticks = np.zeros(n_seats, np.int64)
@@ -75,7 +75,7 @@ class Lockstep:
         Returns:
             Seat -> why the arena was not stepped: an active robot's action or gain is NaN or infinite.
         """
-        if not self._seated or any(map(are_others, (arena.parts for arena in self.arenas), self._seated)):
+        if are_others([part for arena in self.arenas for part in arena.parts], self._seated):
             self._note_addresses()
         for seat, gain in gains.items():
             self._prepare(seat, gain)
@@ -106,27 +106,10 @@ class Lockstep:
 
     def _note_addresses(self) -> None:
         """Note where the arrays of all arenas are: at first, after a reset, and where one has taken other arrays."""
-        most = max(arena.bodies.n_pairs for arena in self.arenas)
-        for arena in self.arenas:
-            while arena.bodies.n_pairs < most:  # there is one shape for all
-                arena.bodies.make_room()
-        self._seated = [arena.parts for arena in self.arenas]
-        self._places = self._seated[0], np.array([addresses(parts) for parts in self._seated], np.intp)
+        self._seated = [part for arena in self.arenas for part in arena.parts]
+        self._places = *self._seated[:2], addresses(self._seated).reshape(-1, 2)
 
 
 def are_others(now: Sequence[object], noted: Sequence[object]) -> bool:
-    """Whether an arena has other objects now than when the addresses of their arrays were noted."""
-    return any(one is not other for one, other in zip(now, noted, strict=True))
-
-
-def addresses(value: Any) -> list[int]:
-    """Return where the data of all arrays in nested tuples is, in order."""
-    return [array.ctypes.data for array in _arrays(value)]
-
-
-def _arrays(value: Any) -> Iterator[np.ndarray]:
-    if isinstance(value, np.ndarray):
-        yield value
-    elif isinstance(value, tuple):
-        for item in value:
-            yield from _arrays(item)
+    """Whether arenas have other objects now than when their addresses were noted."""
+    return len(now) != len(noted) or any(map(is_not, now, noted))

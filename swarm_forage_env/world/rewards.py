@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from swarm_forage_env._internal.compiling import direct
+from swarm_forage_env._internal.held import hold
 from swarm_forage_env.contract.own_functions import OwnFunctionError, OwnReward, called, own_reward
 from swarm_forage_env.scenarios.config import RewardConfig
 from swarm_forage_env.world.kernels.reward import Payment, Weights, rewards
@@ -57,17 +58,21 @@ class RewardModel:
         )
 
     @cached_property
+    def _held(self) -> Payment:
+        return hold(self._payment)
+
+    @cached_property
     def _rewards(self) -> Callable[[Payment], None]:
-        return direct(rewards, self._payment)
+        return direct(rewards, self._held)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what copies and snapshots are made of: everything but functions, which cannot all be stored."""
-        return {name: value for name, value in vars(self).items() if name not in {"_rewards", "_own"}}
+        """Return what copies and snapshots are made of: everything but functions and addresses."""
+        return {name: value for name, value in vars(self).items() if name not in {"_held", "_rewards", "_own"}}
 
     @property
     def payment(self) -> Payment | None:
         """What `kernels.reward.pay` does the work of `reward` with; None where it cannot: a user's function, `team`."""
-        return None if self._own_name or self._is_team else self._payment
+        return None if self._own_name or self._is_team else self._held
 
     def remember(self) -> None:
         """Keep the positions before a step, if a term needs them."""
@@ -83,7 +88,7 @@ class RewardModel:
         if not (p.events.happened[0] or p.is_dense):
             p.reward[:] = 0.0
             return p.reward
-        self._rewards(p)
+        self._rewards(self._held)
         if self._own is not None:
             p.total[:] += self._own_terms(self._own)
             p.reward[:] = p.total

@@ -1,23 +1,15 @@
 """Several arenas of one scenario, stepped by one call. Each stays where it is; a table tells where its arrays are.
 
 B is the number of arenas. They know nothing of each other: each is stepped by the function that steps a single one.
-Only arrays have addresses. Everything else, such as rules, columns and other constants, is that of the arena that is
-given for all, so all must be of one scenario.
+What is given for all is one of the `held` tuples, for its type; those of the others are at the addresses of the table.
 """
 
-import itertools
-from typing import Any, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from swarm_forage_env._internal import numba_settings  # noqa: F401  (before numba)
-
-# isort: split
-from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic
-
 from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.held import at
 from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.world.kernels.bodies import BodyState
 from swarm_forage_env.world.kernels.reward import Payment, book_rows, pay
@@ -25,42 +17,11 @@ from swarm_forage_env.world.kernels.tick import whole
 from swarm_forage_env.world.state import ArenaArrays, SwarmState
 
 
-def _alike(typingctx: Any, like: Any, at: Any) -> Any:  # noqa: ARG001 - numba hands over the types
-    """Say how compiled code makes a value of the type of `like` whose arrays have their data at the addresses `at`."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        table = context.make_array(at)(context, builder, value=args[1])
-        places = itertools.count()
-
-        def moved(kind: Any, value: Any) -> Any:
-            if isinstance(kind, types.BaseTuple):
-                fields = enumerate(cast(Any, kind))
-                parts = [moved(part, builder.extract_value(value, k)) for k, part in fields]
-                return context.make_tuple(builder, kind, parts)
-            if not isinstance(kind, types.Array):
-                return value
-            array = context.make_array(kind)(context, builder, value=value)
-            place = context.get_constant(types.intp, next(places))
-            array.data = builder.inttoptr(builder.load(builder.gep(table.data, [place])), array.data.type)
-            # The memory belongs to whoever made the array; nobody here may free it.
-            array.meminfo = cgutils.get_null_value(array.meminfo.type)
-            array.parent = cgutils.get_null_value(array.parent.type)
-            return array._getvalue()
-
-        return moved(signature.return_type, args[0])
-
-    return like(like, at), generate
-
-
-alike: Any = intrinsic(_alike)
-"""(nested tuples, addresses) -> the same tuples with the arrays that are at these addresses, a row of a table of
-`world.lockstep.addresses`; what is no array stays. For compiled code only."""
-
-
 @kernel
 def whole_each(
-    parts: tuple[ArenaArrays, BodyState],
-    parts_at: np.ndarray,
+    arrays: ArenaArrays,
+    bodies: BodyState,
+    places: np.ndarray,
     seats: np.ndarray,
     actions: ActionArray,
     wheel_gain: FloatArray,
@@ -73,8 +34,9 @@ def whole_each(
     """Step arenas, each by `tick.whole`.
 
     Args:
-        parts: Those of any of the arenas, with its bodies: gives types, shapes and constants.
-        parts_at: (B, arrays) addresses of the arrays of each.
+        arrays: Those of any of the arenas, held.
+        bodies: Likewise.
+        places: (B, 2) addresses of both, of each arena.
         seats: Which of the B arenas are stepped.
         actions: (B, N, A), and all others as in `tick.whole` with one more dimension in front.
         wheel_gain: (B, N, 2).
@@ -86,31 +48,41 @@ def whole_each(
     """
     for seat in range(seats.shape[0]):
         b = seats[seat]
-        arrays, bodies = alike(parts, parts_at[b])
+        own_arrays, own_bodies = at(arrays, places[b, 0]), at(bodies, places[b, 1])
         outcomes[b] = whole(
-            arrays, bodies, actions[b], wheel_gain[b], ticks[b], look_first[b], chance[b], walk_chance[b]
+            own_arrays, own_bodies, actions[b], wheel_gain[b], ticks[b], look_first[b], chance[b], walk_chance[b]
         )
 
 
 @kernel
-def pay_each(payment: Payment, payments_at: np.ndarray, seats: np.ndarray, paid: ObsArray) -> None:
+def pay_each(payment: Payment, places: np.ndarray, seats: np.ndarray, paid: ObsArray) -> None:
     """Add the rewards of a tick, arena by arena, as `reward.pay` does.
 
     Args:
-        payment: Any of the payments: gives types, shapes and weights.
-        payments_at: (B, arrays) addresses of the arrays of each.
+        payment: Any of the payments, held.
+        places: (B,) address of each.
         seats: Which of the B arenas were stepped.
         paid: (B, N) float32.
     """
     for seat in range(seats.shape[0]):
         b = seats[seat]
-        pay(alike(payment, payments_at[b]), paid[b])
+        pay(at(payment, places[b]), paid[b])
+
+
+class Robots(NamedTuple):
+    """What is booked and copied of an arena."""
+
+    swarm: SwarmState
+    dead: BoolArray
+    """(N,) for good."""
+    obs: ObsArray
+    """(N, D)."""
 
 
 @kernel
 def book_each(
-    robots: tuple[SwarmState, BoolArray, ObsArray],
-    robots_at: np.ndarray,
+    robots: Robots,
+    places: np.ndarray,
     reward: ObsArray,
     absent: BoolArray,
     present: BoolArray,
@@ -124,8 +96,8 @@ def book_each(
     """Book a step of learners, arena by arena, as `reward.book_rows` does, and copy the observations.
 
     Args:
-        robots: Those of any of the arenas, who of them is dead for good, and observations: gives types and shapes.
-        robots_at: (B, arrays) addresses of the arrays of each.
+        robots: Those of any of the arenas, held.
+        places: (B,) address of each.
         reward: (B, N), and all others as in `book_rows` with one more dimension in front.
         absent: (B, N).
         present: (B, N).
@@ -136,11 +108,12 @@ def book_each(
         n_terminated: (B,) is written: how many rows of each arena terminate.
         obs: (B, N, D) is written, or (0, N, D) where nobody wants it.
     """
-    for b in range(robots_at.shape[0]):
-        swarm, dead, seen = alike(robots, robots_at[b])
+    for b in range(places.shape[0]):
+        own = at(robots, places[b])
+        seen = own.obs
         n_terminated[b] = book_rows(
-            swarm,
-            dead,
+            own.swarm,
+            own.dead,
             reward[b],
             absent[b],
             present[b],
