@@ -15,7 +15,7 @@ _VARYING_FIELDS = {
 """Fields of JSON documents; the digest of an entry is also of its versions and hours."""
 _PROGRESS = re.compile(
     r"\d+/\d+ runs, .*|\d+ of \d+ runs (is|are) stored already\.|swarm-forage: Compiling what is used .*|measuring .*"
-    r"|\d+ of them (was|were) made by another version .*"
+    r"|\d+ of them (was|were) made by other code .*"
 )
 """Lines that depend on what is stored and compiled already."""
 _REPLACED: tuple[tuple[str, str], ...] = (
@@ -23,6 +23,7 @@ _REPLACED: tuple[tuple[str, str], ...] = (
     (r"\b[0-9a-f]{40}\b", "<commit>"),
     (r"(?<=made with      ).*", "<versions>"),
     (r"about \d[^,\n]* on (\d+) cores?", r"about <time> on \1 core"),
+    (r"(?m)(e\+\d\d +)(<0\.01|\d[\d,.]*) *$", r"\1<hours>"),
     (r"(?<=\nVersions\n)study \|.*\n(.*\|\n)+", "<versions>\n"),
 )
 _SPEED = re.compile(r"(\d\.\d{3} +)[\d,]+$", re.MULTILINE)
