@@ -90,4 +90,4 @@ class CRWPolicy(ScriptedPolicy):
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run: every robot explores."""
         constants = kernel_constants(self.parameters, spec)
-        self._start(spec, rng, DRAWS, constants, new_robots(spec.n_robots))
+        self._start_script(spec, rng, DRAWS, constants, new_robots(spec.n_robots))

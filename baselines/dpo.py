@@ -121,7 +121,7 @@ class DPOPolicy(ScriptedPolicy):
         """Start a run: every robot explores and remembers nothing."""
         constants = kernel_constants(self.parameters, spec, **self.parameters.derived())
         self._memory = new_memory(spec.n_robots, spec.n_objects)
-        self._start(spec, rng, DRAWS, constants, new_robots(spec.n_robots), self._memory)
+        self._start_script(spec, rng, DRAWS, constants, new_robots(spec.n_robots), self._memory)
 
     @property
     def n_known(self) -> IntArray:

@@ -14,7 +14,6 @@ import numpy as np
 
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.policy import SwarmSpec
-from swarm_forage_env.contract.types import BoolArray, ObsArray
 
 COLUMNS = (
     "proximity",
@@ -106,36 +105,6 @@ class ControllerParameters:
                 f"Expected wander_circle_radius > wander_circle_distance = {self.wander_circle_distance}, "
                 f"got {self.wander_circle_radius}; otherwise the robot would wander backwards."
             )
-
-
-class ObservationError(ValueError):
-    """Observations that are not those of the swarm that the policy was reset for."""
-
-
-def require_inputs(obs: ObsArray, active: BoolArray, spec: SwarmSpec | None) -> None:
-    """Refuse arrays of another shape than the swarm; compiled kernels would read and write beyond their ends.
-
-    Args:
-        obs: Observations.
-        active: Which robots act.
-        spec: The specification given to `reset`; None = there was no reset.
-
-    Raises:
-        ObservationError: `obs` is not (n_robots, layout.size), `active` not (n_robots,), or there was no reset.
-    """
-    if spec is None:
-        raise ObservationError("Expected reset before act; call reset with the spec of the environment first.")
-    expected = (spec.n_robots, spec.layout.size)
-    if obs.shape != expected:
-        raise ObservationError(
-            f"Expected observations with shape (n_robots, columns) = {expected}, got {obs.shape}; "
-            "call reset with the spec of this environment."
-        )
-    if active.shape != expected[:1]:
-        raise ObservationError(
-            f"Expected active with shape (n_robots,) = {expected[:1]}, got {active.shape}; pass `active` of the "
-            "environment."
-        )
 
 
 P = TypeVar("P", bound=ControllerParameters)

@@ -100,7 +100,7 @@ class TaskPolicy(ScriptedPolicy):
         robots = new_task_robots(spec.n_robots)
         self._memory = new_task_memory(spec)
         self._allocation = new_allocation(spec.n_robots, self.parameters, spec.quirks, self.n_tabs, rng)
-        self._start(spec, rng, TASK_DRAWS, constants, robots, self._memory, self._allocation)
+        self._start_script(spec, rng, TASK_DRAWS, constants, robots, self._memory, self._allocation)
 
     @property
     def task(self) -> CodeArray:

@@ -16,9 +16,11 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-PLACES = ("rendering/kernels.py", "world/kernels/*.py", "wrappers/kernels.py")
+PLACES = ("policies/kernels/*.py", "rendering/kernels.py", "world/kernels/*.py", "wrappers/kernels.py")
 """Where they are, in `swarm_forage_env`."""
 TESTS = (
+    "tests/policies/test_interface_twins.py",
+    "tests/policies/test_network_twin.py",
     "tests/promises/test_conservation.py",
     "tests/rendering/test_paint.py",
     "tests/world/test_kinds.py",
@@ -29,7 +31,7 @@ TESTS = (
 )
 CHOICE = (
     "(test_objects_are_conserved and warehouse_small and busy) or test_paint or together or gains_from_outside "
-    "or they_are_those_of_the_twins or as_by_the_twin"
+    "or they_are_those_of_the_twins or as_by_the_twin or test_interface_twins or test_network_twin"
 )
 """Every kind of caches with Chipmunk; shapes beyond the edge; arenas together, wrapped and not, with the compiled
 engine; noise on wheels; neighbours, messages and kinds of robots."""

@@ -9,8 +9,9 @@ from gymnasium import spaces
 from pettingzoo import ParallelEnv
 
 from swarm_forage_env._internal.fields import as_whole, instance, switch
+from swarm_forage_env.contract.kernel_policy import CompiledPolicy
 from swarm_forage_env.contract.layout import ObservationLayout
-from swarm_forage_env.contract.policy import COMMANDS, ActionError, CompiledPolicy, SwarmSpec
+from swarm_forage_env.contract.policy import COMMANDS, ActionError, SwarmSpec
 from swarm_forage_env.contract.reset_and_step import as_actions, checked_gain, is_over, no_options, refuse_not_finite
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.scenarios.config import ScenarioConfig

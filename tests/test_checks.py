@@ -9,10 +9,10 @@ from pettingzoo.utils import BaseParallelWrapper
 
 import swarm_forage_env
 from baselines.crw import CRWPolicy
-from baselines.scripted import example_of
 from swarm_forage_env import CheckError, check_determinism, check_env, check_policy
 from swarm_forage_env._internal.compiling import Callback, kernel
 from swarm_forage_env.contract.codes import Task
+from swarm_forage_env.contract.kernel_policy import example_of
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import from_callable, policy_names
 from swarm_forage_env.runs.run import build_stack

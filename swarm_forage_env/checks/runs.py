@@ -98,7 +98,7 @@ def check_compiled(policy: Policy, config: ScenarioConfig, seed: int, ticks: int
     except Exception as error:
         raise CheckError(
             f"Expected what compiled returns to drive a run, got {type(error).__name__}: {error}. "
-            "See contract.policy.CompiledPolicy, or leave compiled out."
+            "See contract.kernel_policy.CompiledPolicy, or leave compiled out."
         ) from error
     different = _first_difference(by_act, by_compiled)
     if different:

@@ -6,7 +6,7 @@ A policy, scripted or trained, sees observations and never the state of the worl
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -233,36 +233,6 @@ class Memories(NamedTuple):
         return RememberedPlaces(self.place_m[own & ~self.is_cache], self.place_m[own & self.is_cache])
 
 
-class CompiledPolicy(Protocol):
-    """A policy whose ticks can be run without Python in between. Policies offer it by a method `compiled`."""
-
-    @property
-    def callback(self) -> Any:
-        """The kernel of a tick, (obs, active, draws, state, tick), as `_internal.compiling.Callback`.
-
-        It must not raise: an exception inside of it is printed, but does not stop the run.
-        """
-        ...
-
-    @property
-    def state(self) -> tuple[Any, ...]:
-        """What the kernel edits; the last are the actions, (N, 3) float32."""
-        ...
-
-    @property
-    def task(self) -> CodeArray | None:
-        """(N,) `Task` codes that the kernel keeps up to date, None for a policy without tasks."""
-        ...
-
-    def next_ticks(self) -> tuple[int, FloatArray]:
-        """Return the number of the next tick, and the draws (ticks, N, draws) of it and of some that follow."""
-        ...
-
-    def count_ticks(self, n_ticks: int) -> None:
-        """Note that the kernel has done so many ticks."""
-        ...
-
-
 @runtime_checkable
 class Policy(Protocol):
     """Controls every robot at once. An instance drives one run; its memory is created by `reset`.
@@ -272,9 +242,9 @@ class Policy(Protocol):
     (`inspect.replay` keeps it); `describe_memories() -> Memories`, where all robots remember things (`inspect.replay`
     keeps it, and the window shows those of one); `part_rows`, slices of rows that the record tells apart, set by
     `reset` (of mixed swarms, whose runs are counted tick by tick);
-    `compiled() -> CompiledPolicy | None`, for runs without Python between ticks; the class attributes `caches` ("none",
-    "static", "dynamic": those that the policy is made for) and `reads` (names of the slices it looks at; default all;
-    "light if carrying" = light only of robots that carry).
+    `compiled() -> CompiledPolicy | None`, for runs without Python between ticks (`KernelPolicy` has it); the class
+    attributes `caches` ("none", "static", "dynamic": those that the policy is made for) and `reads` (names of the
+    slices it looks at; default all; "light if carrying" = light only of robots that carry).
     """
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:

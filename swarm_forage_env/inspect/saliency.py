@@ -20,9 +20,8 @@ from numpy.typing import NDArray
 from swarm_forage_env._internal.fields import ConfigError, number
 from swarm_forage_env._internal.wording import plain, suggestion
 from swarm_forage_env.contract.layout import ObservationLayout
-from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
-from swarm_forage_env.policies.learned import LearnedPolicy
-from swarm_forage_env.policies.network import Network
+from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, ObsArray
+from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.policies.pretrained import network_file, network_names
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 from swarm_forage_env.runs.answer import Answer, Sheet
@@ -161,15 +160,14 @@ def saliency(
     interface = network.about.interface
     n_decisions = -(-end // interface.decision_ticks)
     every = max(1, -(-n_decisions * scenario.robots.n_robots // MOST_ROWS))
-    album = _Album(network, every)
-    policy = LearnedPolicy(interface, album.choose, caches=network.about.caches)
+    policy = _Watched(network, every)
     run = LiveRun(build_env(scenario, spec.wrappers, reads=policy.reads), policy, spec.seed)
     step = max(1, end // 100)
     while run.forage_env.tick < end and not run.over:
         run.advance(to_tick=min(run.forage_env.tick + step, end))
         if progress is not None:
             progress(run.forage_env.tick, end)
-    seen = np.concatenate(album.rows)
+    seen = np.concatenate(policy.rows)
     rows = seen[seen[:, policy.interface.active_column] > 0.5]
     if not len(rows):
         raise ConfigError("Expected robots at work, got a run in which no robot decided anything; choose another seed.")
@@ -218,20 +216,19 @@ def saliency_of_rows(network: Network, layout: ObservationLayout, rows: ObsArray
     )
 
 
-class _Album:
-    """Lets the network choose, and keeps what it saw at every so-many-th decision."""
+class _Watched(NetworkPolicy):
+    """Keeps what robots saw at every so-many-th decision."""
 
     def __init__(self, network: Network, every: int) -> None:
-        self._network = network
-        self._every = every
-        self._n_decisions = 0
+        super().__init__(network)
+        self._ticks = every * network.about.interface.decision_ticks
         self.rows: list[ObsArray] = []
 
-    def choose(self, rows: ObsArray, rng: np.random.Generator) -> np.ndarray:
-        if self._n_decisions % self._every == 0:
-            self.rows.append(rows.copy())
-        self._n_decisions += 1
-        return self._network.choose(rows, rng)
+    def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
+        actions = super().act(obs, active)
+        if (self.n_ticks - 1) % self._ticks == 0:
+            self.rows.append(self.seen.copy())
+        return actions
 
 
 def _changes(before: np.ndarray, after: np.ndarray, *, is_discrete: bool) -> NDArray[np.float64]:

@@ -28,8 +28,8 @@ from swarm_forage_env.contract.layout import (
     neighbours_row,
 )
 from swarm_forage_env.contract.policy import COMMANDS, ActionError, SwarmSpec
-from swarm_forage_env.contract.types import ActionArray, BoolArray, IntArray, ObsArray
-from swarm_forage_env.policies.kernels import (
+from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
+from swarm_forage_env.policies.kernels.learner import (
     COMPACT_COLUMNS,
     GRIP_COMMANDS,
     MOTION_WHEELS,
@@ -38,6 +38,7 @@ from swarm_forage_env.policies.kernels import (
     N_SITES,
     SITE_COLUMNS,
     SiteMemory,
+    Translation,
     automatic_grip,
     compact_view,
     mask_actions,
@@ -96,7 +97,7 @@ class InterfaceConfig:
     """Whether the learner sees what a robot's kind can do, where its scenario has two or more. None: as for
     `neighbours_seen`."""
     site_memory: bool = False
-    """Two places that a robot remembers, see `policies.kernels`: eight more columns."""
+    """Two places that a robot remembers, see `policies.kernels.learner`: eight more columns."""
     own_sensors: tuple[str, ...] | None = None
     """Names of own sensors that the learner sees beside the columns of the package, in this order. Where nothing is
     said (None), environments and trainings fill in those of their scenario, and a policy sees none."""
@@ -162,6 +163,7 @@ class LearnerInterface:
         layout: Columns of what the learner sees.
         shows_all: Whether that is the row of the environment as it is.
         passes_on: Whether actions are commands of the environment as they are.
+        translation: What kernels need for both ways.
         observation_space: Box of one robot's row, (d,) float32 in [-1, 1].
         action_space: Box or Discrete of one robot's action.
     """
@@ -174,18 +176,10 @@ class LearnerInterface:
             spec: The swarm: `SwarmSpec.of(scenario)`, or `swarm_spec` of an environment.
         """
         self.config = config
-        self._is_compact = config.observation == "compact"
-        self._is_discrete = config.actions == "discrete"
         self._n_choices = N_MOTIONS if config.automatic_gripper else N_MOTIONS + N_GRIPS
         self._dynamic_caches = spec.caches == "dynamic"
         source = spec.layout
         start = {part.name: part.start for part in source}
-        self._heading = source["heading"]
-        self._half_x, self._half_y = (float(scale) for scale in source.part("position").scale)
-        self._view_starts = tuple(start[name] for name in _COMPACT_READS)
-        self._behind_counts = spec.quirks.obstacle_behind_counts
-        self._carrying = start["carrying"]
-        self._grip_starts = (start["ground"], start["carrying"], start["los_object"])
         self._mask_starts = (
             start["ground"],
             start["carrying"],
@@ -193,23 +187,33 @@ class LearnerInterface:
             start["active"],
             start["los_object"],
         )
-        self._wheels = np.array(list(MOTION_WHEELS.values()), np.float32)
-        self._grips = np.array(list(GRIP_COMMANDS.values()), np.float32)
         self._commands = np.zeros((spec.n_robots, spec.action_size), np.float32)
-        self._n_driven = 2 if config.automatic_gripper else COMMANDS
         self.layout = learner_layout(source, config)
         self.shows_all = self.layout == source
         says_all = (config.message_size or 0) == spec.message_size
-        self.passes_on = says_all and not (self._is_discrete or config.automatic_gripper)
-        own = [source[name] for name in config.sensors]
-        self._own_columns = np.array([column for part in own for column in range(part.start, part.stop)], np.intp)
-        self._n_shown = (
-            self.layout.size - len(self._own_columns) - (N_SITES * SITE_COLUMNS if config.site_memory else 0)
+        self.passes_on = says_all and config.actions != "discrete" and not config.automatic_gripper
+        own = [column for name in config.sensors for column in range(source[name].start, source[name].stop)]
+        half_x, half_y = source.part("position").scale
+        self.translation = Translation(
+            is_compact=config.observation == "compact",
+            is_discrete=config.actions == "discrete",
+            grips_itself=config.automatic_gripper,
+            has_memory=config.site_memory,
+            behind_counts=spec.quirks.obstacle_behind_counts,
+            decision_ticks=config.decision_ticks,
+            n_shown=self.layout.size - len(own) - (N_SITES * SITE_COLUMNS if config.site_memory else 0),
+            n_driven=2 if config.automatic_gripper else COMMANDS,
+            own_columns=np.array(own, np.int32),
+            view_starts=tuple(start[name] for name in _COMPACT_READS),
+            pose_starts=(start["position"], start["heading"]),
+            cargo_starts=(start["carrying"], start["los_cell"], start["los_object"]),
+            grip_starts=(start["ground"], start["carrying"], start["los_object"]),
+            half=(float(half_x), float(half_y)),
+            reach_cells=np.array(spec.object_reach_cells, np.int32),
+            sites=new_site_memory(spec.n_robots),
+            wheels=np.array(list(MOTION_WHEELS.values()), np.float32),
+            grips=np.array(list(GRIP_COMMANDS.values()), np.float32),
         )
-        self._sites = new_site_memory(spec.n_robots) if config.site_memory else None
-        self._reach_cells: IntArray = np.array(spec.object_reach_cells, np.int32)
-        self._pose_starts = (start["position"], start["heading"])
-        self._cargo_starts = (start["carrying"], start["los_cell"], start["los_object"])
         self.observation_space = self.new_observation_space()
         self.action_space = self.new_action_space()
         self._actions_shape = (spec.n_robots, *(self.action_space.shape or ()))
@@ -220,9 +224,9 @@ class LearnerInterface:
 
     def new_action_space(self) -> spaces.Box | spaces.Discrete:
         """Return a new space, with its own random state, for one robot's action."""
-        if self._is_discrete:
+        if self.translation.is_discrete:
             return spaces.Discrete(self._n_choices)
-        return spaces.Box(-1.0, 1.0, (self._n_driven + (self.config.message_size or 0),), np.float32)
+        return spaces.Box(-1.0, 1.0, (self.translation.n_driven + (self.config.message_size or 0),), np.float32)
 
     @property
     def active_column(self) -> int:
@@ -231,18 +235,17 @@ class LearnerInterface:
 
     def forget(self) -> None:
         """Forget what robots remember: a run begins."""
-        if self._sites is not None:
-            for part in self._sites:
-                part[...] = 0
+        for part in self.translation.sites:
+            part[...] = 0
 
     def memory(self) -> SiteMemory | None:
         """Return a copy of what robots remember; None without memory."""
-        return copy.deepcopy(self._sites)
+        return copy.deepcopy(self.translation.sites) if self.config.site_memory else None
 
     def recall(self, memory: SiteMemory | None) -> None:
         """Let robots remember what `memory()` of an interface of the same choices and swarm returned."""
-        if self._sites is not None and memory is not None:
-            for part, kept in zip(self._sites, memory, strict=True):
+        if memory is not None:
+            for part, kept in zip(self.translation.sites, memory, strict=True):
                 np.copyto(part, kept)
 
     def observe(self, obs: ObsArray, out: ObsArray | None = None) -> ObsArray:
@@ -254,18 +257,18 @@ class LearnerInterface:
         """
         if out is None:
             out = np.empty((len(obs), self.layout.size), np.float32)
-        if self._is_compact:
-            compact_view(obs, self._view_starts, self._half_x, self._half_y, self._behind_counts, out)
+        t = self.translation
+        if t.is_compact:
+            compact_view(obs, t.view_starts, *t.half, t.behind_counts, out)
         else:
-            np.copyto(out[:, : self._n_shown], obs[:, : self._n_shown])
-        at = self._n_shown
-        if self._sites is not None:
-            half = self._half_x, self._half_y
-            remember_sites(obs, self._pose_starts, self._cargo_starts, half, self._reach_cells, self._sites)
-            show_sites(obs, self._pose_starts, half, self._sites, out[:, at:])
+            np.copyto(out[:, : t.n_shown], obs[:, : t.n_shown])
+        at = t.n_shown
+        if t.has_memory:
+            remember_sites(obs, t.pose_starts, t.cargo_starts, t.half, t.reach_cells, t.sites)
+            show_sites(obs, t.pose_starts, t.half, t.sites, out[:, at:])
             at += N_SITES * SITE_COLUMNS
-        if len(self._own_columns):
-            out[:, at:] = obs[:, self._own_columns]
+        if len(t.own_columns):
+            out[:, at:] = obs[:, t.own_columns]
         return out
 
     def command(self, actions: np.ndarray, obs: ObsArray) -> ActionArray:
@@ -287,7 +290,7 @@ class LearnerInterface:
                 f"Expected actions with shape {self._actions_shape}, one row per robot as in {self.action_space}, "
                 f"got {actions.shape}."
             )
-        if not self._is_discrete:
+        if not self.translation.is_discrete:
             return actions
         self._check_numbers(actions)
         return np.ascontiguousarray(actions, np.int32)
@@ -299,16 +302,16 @@ class LearnerInterface:
             actions: What `checked` returned.
             obs: As in `command`.
         """
-        commands = self._commands
-        if self._is_discrete:
-            numbered_actions(actions, self._wheels, self._grips, obs, self._carrying, commands)
+        commands, t = self._commands, self.translation
+        if t.is_discrete:
+            numbered_actions(actions, t.wheels, t.grips, obs, t.cargo_starts[0], commands)
         else:
-            driven = self._n_driven
+            driven = t.n_driven
             np.copyto(commands[:, :driven], actions[:, :driven], casting="same_kind")
             if self.config.message_size:
                 np.copyto(commands[:, COMMANDS:], actions[:, driven:], casting="same_kind")
-        if self.config.automatic_gripper:
-            automatic_grip(obs, self._grip_starts, commands)
+        if t.grips_itself:
+            automatic_grip(obs, t.grip_starts, commands)
         return commands
 
     def _check_numbers(self, actions: np.ndarray) -> None:
@@ -331,7 +334,7 @@ class LearnerInterface:
         Raises:
             ValueError: the actions are continuous.
         """
-        if not self._is_discrete:
+        if not self.translation.is_discrete:
             raise ValueError("Expected discrete actions: continuous ones have no mask. Set actions='discrete'.")
         mask = np.empty((len(obs), self._n_choices), np.bool_)
         mask_actions(obs, self._mask_starts, self._dynamic_caches, mask)

@@ -1,4 +1,4 @@
-"""LearnedPolicy: any trained controller that every robot shares, as a policy."""
+"""InterfacePolicy and LearnedPolicy: any trained controller that every robot shares, as a policy."""
 
 from collections.abc import Callable
 from functools import partial
@@ -17,22 +17,60 @@ Remember: TypeAlias = Callable[[ObsArray, Any, np.random.Generator], tuple[np.nd
 In the first decision of a run the memory is None."""
 
 
-class LearnedPolicy:
-    """A trained controller as a policy: it sees and acts through an interface, once per decision.
-
-    An instance drives one run. A controller with memory, such as a recurrent network, begins each run without any. It
-    is asked for all rows in every decision, so a robot in repair goes on remembering, as in training. The memory of a
-    dead robot no longer steers anything.
+class InterfacePolicy:
+    """What trained policies have in common: they see and act through an interface, once per decision.
 
     Attributes:
         reads: Observation slices that are used, None = all.
-        caches: Kind of caches that the controller was trained with; missing if that is unknown.
-        interface: The interface for the swarm; set by `reset`.
+        caches: Kind of caches that the policy was trained with; missing if that is unknown.
+        interface: The interface for the swarm; set by `_bind`.
         describe_memories: See `Policy`; missing without site memory.
     """
 
     interface: LearnerInterface
     describe_memories: Callable[[], Memories]
+
+    def __init__(self, interface: InterfaceConfig, *, caches: str | None) -> None:
+        """Take the interface.
+
+        Args:
+            interface: What the policy saw and did in training.
+            caches: Kind of caches that it was trained with; None = unknown, runs then use those of the scenario.
+        """
+        self.reads = interface.reads
+        if caches is not None:
+            self.caches = caches
+        self._config = interface
+        if interface.site_memory:
+            self.describe_memories = self._all_sites
+
+    def _bind(self, spec: SwarmSpec) -> None:
+        """Make the interface for a swarm."""
+        self.interface = LearnerInterface(self._config, spec)
+        self._middle_m = np.array(spec.arena_size_m) / 2.0
+
+    @property
+    def chosen(self) -> np.ndarray:
+        """Actions of the last decision as the controller gave them, one row per robot; see `LearnerInterface`."""
+        raise NotImplementedError
+
+    def _all_sites(self) -> Memories:
+        """Return the sites of all robots, where they expect objects."""
+        sites = self.interface.memory()
+        assert sites is not None, "only policies with site memory are asked"
+        robot, site = np.nonzero(sites.is_known)
+        return Memories(
+            robot.astype(np.int32), sites.place[robot, site] + self._middle_m, np.zeros(len(robot), np.bool_)
+        )
+
+
+class LearnedPolicy(InterfacePolicy):
+    """A trained controller as a policy: it sees and acts through an interface, once per decision.
+
+    An instance drives one run. A controller with memory, such as a recurrent network, begins each run without any. It
+    is asked for all rows in every decision, so a robot in repair goes on remembering, as in training. The memory of a
+    dead robot no longer steers anything.
+    """
 
     def __init__(
         self,
@@ -59,19 +97,13 @@ class LearnedPolicy:
             self._remember = remember
         else:
             raise TypeError("Expected either choose or remember, the controller without or with memory.")
-        self.reads = interface.reads
-        if caches is not None:
-            self.caches = caches
-        self._config = interface
-        if interface.site_memory:
-            self.describe_memories = self._all_sites
+        super().__init__(interface, caches=caches)
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run."""
+        self._bind(spec)
         self._rng = rng
-        self.interface = LearnerInterface(self._config, spec)
         self._view = np.empty((spec.n_robots, self.interface.layout.size), np.float32)
-        self._middle_m = np.array(spec.arena_size_m) / 2.0
         self._ticks_left = 0
         self._memory: Any = None
 
@@ -89,15 +121,6 @@ class LearnedPolicy:
             self._ticks_left = self._config.decision_ticks
         self._ticks_left -= 1
         return self.interface.carry_out(self._checked, obs)
-
-    def _all_sites(self) -> Memories:
-        """Return the sites of all robots, where they expect objects."""
-        sites = self.interface.memory()
-        assert sites is not None, "only policies with site memory are asked"
-        robot, site = np.nonzero(sites.is_known)
-        return Memories(
-            robot.astype(np.int32), sites.place[robot, site] + self._middle_m, np.zeros(len(robot), np.bool_)
-        )
 
 
 def _forgetful(choose: Choose, rows: ObsArray, memory: Any, rng: np.random.Generator) -> tuple[np.ndarray, Any]:

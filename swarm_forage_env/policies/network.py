@@ -1,4 +1,4 @@
-"""Trained policies without torch: a small network in a file, evaluated by numpy.
+"""Trained policies without torch: a small network in a file, evaluated by a kernel.
 
 A file is an `.npz` of plain arrays: the layers of the network ("weight_0", "bias_0", ...) and "about", the JSON text
 of `NetworkAbout`. Nothing in it is executed, so it is safe to open a file from an unknown source.
@@ -22,11 +22,12 @@ from gymnasium import spaces
 
 from swarm_forage_env._internal.fields import ConfigError, known_keys, one_of, switch, table
 from swarm_forage_env._internal.files import parse_json, replacing
+from swarm_forage_env.contract.kernel_policy import KernelPolicy
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ObsArray
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping
-from swarm_forage_env.policies.kernels import affine, tanh
-from swarm_forage_env.policies.learned import LearnedPolicy
+from swarm_forage_env.policies.kernels.network import LANES, Choice, Layers, forward, step_network
+from swarm_forage_env.policies.learned import InterfacePolicy
 from swarm_forage_env.scenarios.config import CACHE_KINDS
 
 ACTIVATIONS = ("tanh", "relu")
@@ -117,25 +118,24 @@ class Network:
     def outputs(self, rows: ObsArray) -> np.ndarray:
         """Return the last layer's values for observations (N, d), (N, m) float32, before any choice of actions.
 
-        A row has the same bits on every machine, and whatever other rows there are (`policies.kernels`).
+        A row has the same bits on every machine, and whatever other rows there are (`policies.kernels.network`).
         """
-        value = np.ascontiguousarray(rows, np.float32)
-        last = len(self.weights) - 1
-        for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
-            value = affine(value, np.ascontiguousarray(weight, np.float32), np.ascontiguousarray(bias, np.float32))
-            if layer < last:
-                value = tanh(value) if self.about.activation == "tanh" else np.maximum(value, 0.0)
-        return value
+        values = np.empty((len(rows), len(self.biases[-1])), np.float32)
+        forward(np.ascontiguousarray(rows, np.float32), self.layers(), np.ones(len(rows), np.bool_), values)
+        return values
 
-    def choose(self, rows: ObsArray, rng: np.random.Generator) -> np.ndarray:
-        """Return actions for observations (N, d): numbers (N,), or values in [-1, 1], one row per robot."""
-        outputs = self.outputs(rows)
-        if self.about.interface.actions != "discrete":
-            return np.clip(outputs, -1.0, 1.0)
-        if self.about.samples:
-            # Gumbel's trick: the largest of logits plus such noise is a draw by their probabilities.
-            outputs = outputs + rng.gumbel(size=outputs.shape)
-        return np.argmax(outputs, axis=1)
+    def layers(self) -> Layers:
+        """Return the layers as kernels take them, with room of their own to work in."""
+        width = -(-max(*(len(bias) for bias in self.biases), len(self.weights[0])) // LANES) * LANES
+        numbers = np.zeros((sum(len(weight) + 1 for weight in self.weights), width), np.float32)
+        row = 0
+        for weight, bias in zip(self.weights, self.biases, strict=True):
+            numbers[row, : len(bias)] = bias
+            numbers[row + 1 : row + 1 + len(weight), : len(bias)] = weight
+            row += len(weight) + 1
+        sizes = np.array([len(self.weights[0]), *(len(bias) for bias in self.biases)], np.int32)
+        room = np.zeros((2, width), np.float32), np.zeros((2, width), np.float32)
+        return Layers(sizes, numbers, self.about.activation == "tanh", self.about.samples, *room)
 
     @classmethod
     def from_state_dict(
@@ -231,13 +231,17 @@ def _array(tensor: Any) -> np.ndarray:
     return np.asarray(on_host, np.float32)
 
 
-class NetworkPolicy(LearnedPolicy):
-    """A network file as a policy."""
+class NetworkPolicy(KernelPolicy, InterfacePolicy):
+    """A network file as a policy.
+
+    Robots decide for themselves also while they are in repair. One that is not in the world decides nothing.
+    """
+
+    _kernel = staticmethod(step_network)
 
     def __init__(self, network: Network) -> None:
         """Take the network; `reset` checks that it fits its interface."""
-        about = network.about
-        super().__init__(about.interface, network.choose, caches=about.caches)
+        super().__init__(network.about.interface, caches=network.about.caches)
         self._network = network
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
@@ -246,13 +250,32 @@ class NetworkPolicy(LearnedPolicy):
         Raises:
             NetworkError: the network has another number of columns or actions than its interface.
         """
-        super().reset(spec, rng)
-        space = self.interface.action_space
+        self._bind(spec)
+        space, layers = self.interface.action_space, self._network.layers()
         n_actions = int(space.n) if isinstance(space, spaces.Discrete) else space.shape[0]
-        wanted = (self.interface.layout.size, n_actions)
-        found = (self._network.weights[0].shape[0], self._network.weights[-1].shape[1])
+        wanted, found = (self.interface.layout.size, n_actions), (int(layers.sizes[0]), int(layers.sizes[-1]))
         if wanted != found:
             raise NetworkError(
                 f"Expected a network from {wanted[0]} columns to {wanted[1]} actions, as its interface says, got one "
                 f"from {found[0]} to {found[1]}."
             )
+        n_robots = spec.n_robots
+        self._choice = Choice(
+            seen=np.zeros((n_robots, wanted[0]), np.float32),
+            outputs=np.zeros((n_robots, n_actions), np.float32),
+            number=np.zeros(n_robots, np.int32),
+            is_made=np.zeros(n_robots, np.bool_),
+        )
+        n_draws = 1 if layers.samples and self.interface.translation.is_discrete else 0
+        actions = np.zeros((n_robots, spec.action_size), np.float32)
+        self._start(spec, rng, n_draws, self.interface.translation, layers, self._choice, actions)
+
+    @property
+    def seen(self) -> ObsArray:
+        """(N, d) what robots saw in the last decision; the array is reused by the next one."""
+        return self._choice.seen
+
+    @property
+    def chosen(self) -> np.ndarray:
+        """Actions of the last decision, one row per robot; see `LearnerInterface`."""
+        return self._choice.number if self.interface.translation.is_discrete else self._choice.outputs

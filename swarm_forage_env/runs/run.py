@@ -12,7 +12,8 @@ import numpy as np
 
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.codes import Grip
-from swarm_forage_env.contract.policy import CompiledPolicy, Policy
+from swarm_forage_env.contract.kernel_policy import CompiledPolicy
+from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.record import RunRecord

@@ -18,7 +18,7 @@ from swarm_forage_env.policies.interface import (
     InterfaceConfig,
     LearnerInterface,
 )
-from swarm_forage_env.policies.kernels import SiteMemory
+from swarm_forage_env.policies.kernels.learner import SiteMemory
 from swarm_forage_env.scenarios.config import SECTIONS
 from swarm_forage_env.scenarios.overrides import field_sections
 from swarm_forage_env.views.plans import ArenaPlan

@@ -11,9 +11,10 @@ from swarm_forage_env._internal.fields import ConfigError, whole
 from swarm_forage_env._internal.held import hold
 from swarm_forage_env._internal.rng import Stream, TickDraws, stream_rng
 from swarm_forage_env.contract.codes import ObjectStatus
+from swarm_forage_env.contract.kernel_policy import CompiledPolicy
 from swarm_forage_env.contract.layout import MESSAGES, NEIGHBOURS
 from swarm_forage_env.contract.own_functions import OwnSensor, own_sensor
-from swarm_forage_env.contract.policy import CompiledPolicy, layout_for, refused_action, refused_tasks
+from swarm_forage_env.contract.policy import layout_for, refused_action, refused_tasks
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.scenarios.config import MAX_HANDLING_TICKS, ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELLS_PER_M

@@ -14,7 +14,8 @@ import numpy as np
 
 from swarm_forage_env._internal.compiling import compile_part, direct, is_new
 from swarm_forage_env._internal.held import held_type
-from swarm_forage_env.contract.policy import CompiledPolicy, layout_for
+from swarm_forage_env.contract.kernel_policy import CompiledPolicy
+from swarm_forage_env.contract.policy import layout_for
 from swarm_forage_env.contract.types import ActionArray, CodeArray, FloatArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.world.allocation import new_arrays, new_state

@@ -6,7 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from swarm_forage_env.contract.codes import Counter, Event, Task
-from swarm_forage_env.contract.policy import CompiledPolicy, refused_tasks
+from swarm_forage_env.contract.kernel_policy import CompiledPolicy
+from swarm_forage_env.contract.policy import refused_tasks
 from swarm_forage_env.contract.types import BoolArray, CodeArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.columns import part_column

@@ -8,9 +8,10 @@ import pytest
 from baselines.crw import CRWPolicy
 from baselines.dpo import DPOPolicy
 from baselines.object_choice import MemoryParameters
-from baselines.parameters import ControllerParameters, ObservationError, ParameterError, kernel_constants
+from baselines.parameters import ControllerParameters, ParameterError, kernel_constants
 from baselines.stochm import STOCHMPolicy
 from baselines.stochx import STOCHXPolicy
+from swarm_forage_env.contract.kernel_policy import ObservationError
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.quirks import Quirks

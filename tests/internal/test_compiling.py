@@ -136,6 +136,7 @@ NOT_COMPILED_IN = {
     for name in (
         "contract/types",  # annotations
         "contract/policy",  # a protocol and a dataclass, for the policies beside the kernels
+        "contract/kernel_policy",  # what calls the kernels
         "scenarios/quirks",  # a dataclass; kernels are handed single switches
         "_internal/numba_settings",  # where numba looks for settings
         "_internal/rng",  # kernels are handed the numbers

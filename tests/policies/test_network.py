@@ -10,6 +10,7 @@ import pytest
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.policies.kernels.network import pick, power
 from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkError, NetworkPolicy
 from swarm_forage_env.policies.registry import load_policy
@@ -66,20 +67,25 @@ def test_tanh_is_good_to_float32():
     np.testing.assert_allclose(network.outputs(x[:, None])[:, 0], np.tanh(x.astype(float)), rtol=4e-7, atol=1e-38)
 
 
-def test_continuous_choices_are_cut_to_the_range_of_actions():
-    rows = np.array([[1.0, 0.5]], np.float32)
-    chosen = small_network(activation="relu").choose(rows, np.random.default_rng(0))
-    assert chosen.tolist() == [[1.0, 1.0]]
-
-
 def test_discrete_choices_are_the_likeliest_or_drawn_by_their_probabilities():
-    interface = InterfaceConfig(actions="discrete")
-    rows = np.tile(np.array([[0.0, 0.0]], np.float32), (20_000, 1))
-    likeliest = small_network(interface=interface, activation="relu")
-    assert set(likeliest.choose(rows, np.random.default_rng(0)).tolist()) == {1}
-    drawn = small_network(interface=interface, activation="relu", samples=True).choose(rows, np.random.default_rng(0))
-    share = 1.0 / (1.0 + np.exp(0.25 - 1.5))  # softmax of the outputs 0.25 and 1.5
-    assert drawn.mean() == pytest.approx(share, abs=4 * np.sqrt(share * (1 - share) / len(rows)))
+    logits = np.array([0.25, 1.5, -2.0], np.float32)
+    chances = (np.arange(2000) + 0.5) / 2000
+    assert {pick(logits, False, chance) for chance in chances} == {1}
+    shares = np.bincount([pick(logits, True, chance) for chance in chances]) / len(chances)
+    assert shares == pytest.approx(perceptron.probabilities(logits), abs=1e-3)
+    assert pick(np.array([2.0, 2.0], np.float32), False, 0.0) == 0, "the first of several"
+
+
+def test_what_is_next_to_impossible_is_never_a_fault():
+    logits = np.array([-1e9, 0.0, -200.0, -np.inf], np.float32)
+    assert [pick(logits, True, chance) for chance in (0.0, 0.5, np.nextafter(1.0, 0.0))] == [0, 1, 1]
+
+
+def test_powers_are_good_enough_to_draw_by():
+    x = np.linspace(-10.0, 0.0, 1001)
+    np.testing.assert_allclose([power(one) for one in x], np.exp(x), rtol=1e-5)
+    assert power(0.0) == 1.0
+    assert 0.0 < power(-1e30) == power(-64.0) < 1e-20
 
 
 def test_files_give_back_what_was_written(tmp_path):

@@ -9,7 +9,7 @@ from swarm_forage_env import RunSpec, load_policy, run_policy
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
-from swarm_forage_env.policies.kernels import SiteMemory
+from swarm_forage_env.policies.kernels.learner import SiteMemory
 from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.robots import RobotKind

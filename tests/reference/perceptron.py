@@ -1,6 +1,10 @@
-"""A perceptron as numpy writes it, with sums and tanh in the order that `policies.kernels` promises."""
+"""A perceptron as numpy writes it, with sums and tanh in the order that `policies.kernels.network` promises."""
+
+import math
 
 import numpy as np
+
+from swarm_forage_env.policies.network import Network
 
 
 def outputs(weights: list[np.ndarray], biases: list[np.ndarray], rows: np.ndarray, activation: str) -> np.ndarray:
@@ -26,3 +30,33 @@ def tanh(value: np.ndarray) -> np.ndarray:
     for _ in range(2):
         n, d = np.float32(2.0) * n * d, d * d + n * n
     return n / d
+
+
+def probabilities(logits: np.ndarray) -> list[float]:
+    """Softmax of one row."""
+    powers = [math.exp(float(logit) - float(max(logits))) for logit in logits]
+    return [one / sum(powers) for one in powers]
+
+
+class SlowNetwork:
+    """A network as a controller of `LearnedPolicy`, with the draws of a policy that had the generator `rng`."""
+
+    def __init__(self, network: Network, n_robots: int, rng: np.random.Generator) -> None:
+        """Take the network, and the generator that belongs to nobody else."""
+        self.network, self.n_robots, self.rng = network, n_robots, rng
+
+    def __call__(self, rows: np.ndarray, _rng: np.random.Generator) -> np.ndarray:
+        """Return the actions of a decision; robots that are away, whose rows are zeros, stand."""
+        network, about = self.network, self.network.about
+        values = outputs(list(network.weights), list(network.biases), rows, about.activation)
+        here = rows.any(axis=1)
+        if about.interface.actions != "discrete":
+            return np.where(here[:, None], np.clip(values, np.float32(-1.0), np.float32(1.0)), np.float32(0.0))
+        if not about.samples:
+            return np.where(here, values.argmax(axis=1), 0)
+        chances = self.rng.random((about.interface.decision_ticks, self.n_robots))[0]  # those of other ticks are unused
+        drawn = [
+            int(np.searchsorted(np.cumsum(probabilities(row)), chance, side="right"))
+            for row, chance in zip(values, chances, strict=True)
+        ]
+        return np.where(here, drawn, 0)

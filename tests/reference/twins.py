@@ -63,27 +63,30 @@ TWINS = {
     "swarm_forage_env.contract.detection.sees_nest": COMPACT_VIEW,
     "swarm_forage_env.contract.detection.sees_object": CRW,
     "swarm_forage_env.contract.detection.sees_obstacle": INTERFERENCE,
-    "swarm_forage_env.policies.kernels.automatic_grip": Twin(
+    "swarm_forage_env.policies.kernels.learner.automatic_grip": Twin(
         "commands.automatic_grip",
         "policies/test_interface_twins.py",
         "swarm_forage_env.policies.interface.LearnerInterface.command",
     ),
-    "swarm_forage_env.policies.kernels.mask_actions": Twin(
+    "swarm_forage_env.policies.kernels.learner.mask_actions": Twin(
         "commands.allowed_actions",
         "policies/test_interface_twins.py",
         "swarm_forage_env.policies.interface.LearnerInterface.mask",
     ),
-    "swarm_forage_env.policies.kernels.numbered_actions": Twin(
+    "swarm_forage_env.policies.kernels.learner.numbered_actions": Twin(
         "commands.numbered_action",
         "policies/test_interface_twins.py",
         "swarm_forage_env.policies.interface.LearnerInterface.command",
     ),
-    "swarm_forage_env.policies.kernels.compact_view": COMPACT_VIEW,
-    "swarm_forage_env.policies.kernels._affine": PERCEPTRON,
-    "swarm_forage_env.policies.kernels._fraction": PERCEPTRON,
-    "swarm_forage_env.policies.kernels._tanh_fraction": PERCEPTRON,
-    "swarm_forage_env.policies.kernels.remember_sites": SITES,
-    "swarm_forage_env.policies.kernels.show_sites": SITES,
+    "swarm_forage_env.policies.kernels.learner.compact_view": COMPACT_VIEW,
+    "swarm_forage_env.policies.kernels.learner.remember_sites": SITES,
+    "swarm_forage_env.policies.kernels.learner.show_sites": SITES,
+    "swarm_forage_env.policies.kernels.network.forward": PERCEPTRON,
+    "swarm_forage_env.policies.kernels.network.step_network": Twin(
+        "perceptron.SlowNetwork",
+        "policies/test_network_twin.py",
+        "swarm_forage_env.policies.network.NetworkPolicy.reset",
+    ),
     "swarm_forage_env.rendering.kernels.paint_round": Twin(
         "painting.round_share", "rendering/test_paint.py", "swarm_forage_env.rendering.paint.paint_discs"
     ),

@@ -17,8 +17,9 @@ def started(policy, seed: int = 3) -> LiveRun:
     return LiveRun(build_stack(WORLD, reads=policy.reads), policy, seed)
 
 
-def test_pieces_make_one_run():
-    whole, pieces = started(load_policy("dpo")), started(load_policy("dpo"))
+@pytest.mark.parametrize("policy", ["dpo", "generalist"])
+def test_pieces_make_one_run(policy):
+    whole, pieces = started(load_policy(policy)), started(load_policy(policy))
     assert pieces.compiled_policy is not None
     whole.advance(to_tick=600)
     for tick in (1, 2, 7, 300, 301, 600):
@@ -41,11 +42,23 @@ def test_the_compiled_policy_is_kept_for_one_run_only():
     assert np.array_equal(again.forage_env.swarm.position, fresh.forage_env.swarm.position)
 
 
-def test_copies_in_the_middle_leave_compiled_functions_out():
-    policy = load_policy("dpo")
+@pytest.mark.parametrize("name", ["dpo", "generalist"])
+def test_copies_in_the_middle_leave_compiled_functions_out(name):
+    policy = load_policy(name)
     run = started(policy)
     run.advance(to_tick=100)
     copy = pickle.loads(pickle.dumps(policy))  # noqa: S301 - our own bytes
     assert copy.compiled() is not policy.compiled()
     snapshot = run.forage_env.snapshot()
     assert pickle.loads(pickle.dumps(snapshot)).seed == 3  # noqa: S301 - our own bytes
+
+
+@pytest.mark.parametrize("name", ["stochx", "generalist"])
+def test_a_run_and_its_copy_go_on_alike(name):
+    run = started(load_policy(name))
+    run.advance(to_tick=103)  # between two decisions of the network
+    copy = pickle.loads(pickle.dumps(run))  # noqa: S301 - our own bytes
+    for one in (run, copy):
+        one.advance(to_tick=400)
+    for array in ("position", "heading", "carried_object"):
+        assert np.array_equal(getattr(run.forage_env.swarm, array), getattr(copy.forage_env.swarm, array))

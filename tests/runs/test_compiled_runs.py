@@ -43,6 +43,8 @@ WORLDS = [
     ("dpo", "search_and_rescue", {}),
     ("stochm", "warehouse_small", {"nest_centre_m": (3.2, 8.0), "nest_size_m": (3.2, 12.8)}),
     ("stochx", "warehouse_medium", {}),
+    ("generalist", "search_and_rescue", {}),
+    ("ppo_warehouse_small", "warehouse_small", {"n_robots": 7}),
 ]
 
 

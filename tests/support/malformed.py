@@ -29,7 +29,7 @@ from swarm_forage_env.cli.errors import DEBUG_VARIABLE
 from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_USAGE
 from swarm_forage_env.cli.signals import EXIT_INTERRUPTED
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policies.learned import LearnedPolicy
+from swarm_forage_env.policies.learned import InterfacePolicy
 from swarm_forage_env.policies.pretrained import network_file, plan_file
 from swarm_forage_env.runs import run, runner
 from swarm_forage_env.studies.study_file import find_study
@@ -363,7 +363,7 @@ def _beginnings_only(*, trains: bool) -> Iterator[None]:
         build(env, config, *given, **named)
 
     def begin_and_stop(live: run.LiveRun, stack: Any, policy: Any, seed: int) -> None:
-        if isinstance(policy, LearnedPolicy):
+        if isinstance(policy, InterfacePolicy):
             begin(live, stack, policy, seed)
         else:  # a scripted controller refuses nothing then, and compiles for a minute
             stack.reset_batch(seed)

@@ -15,9 +15,10 @@ import torch
 from stable_baselines3 import DQN, PPO, SAC
 
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.policies.model_files import ModelError, ModelPolicy
-from swarm_forage_env.policies.network import Network, NetworkError
+from swarm_forage_env.policies.network import Network, NetworkError, NetworkPolicy
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.presets import search_and_rescue, warehouse_small
 from swarm_forage_env.training.evaluations import read_evaluations, write_evaluations
@@ -305,8 +306,10 @@ def test_a_policy_that_draws_its_actions_is_judged_and_kept_as_such(tmp_path):
     network = Network.load(tmp_path / "drawn" / "policy.npz")
     assert network.about.samples
     assert not Network.load(train(SHORT, tmp_path / "likeliest").policy_file).about.samples
-    rows = np.random.default_rng(0).uniform(-1, 1, (400, 23)).astype(np.float32)
-    assert len(set(network.choose(rows[:1].repeat(400, axis=0), np.random.default_rng(0)).tolist())) > 1
+    policy, env = NetworkPolicy(network), ForageEnv(warehouse_small(n_robots=400))
+    policy.reset(env.swarm_spec, np.random.default_rng(0))
+    policy.act(env.reset_batch(0)[:1].repeat(400, axis=0), env.active)
+    assert len(set(policy.chosen.tolist())) > 1
     assert same(weights(result.model), weights(train(SHORT, tmp_path / "same").model)), (
         "drawing takes no chance from learning"
     )
@@ -450,7 +453,8 @@ def test_exported_networks_choose_as_the_model_does(algorithm, interface, fields
     obs = env.reset()
     for _ in range(20):
         expected, _ = model.predict(obs, deterministic=True)
-        chosen = network.choose(obs, np.random.default_rng(0))
+        outputs = network.outputs(obs)
+        chosen = outputs.argmax(axis=1) if interface.actions == "discrete" else np.clip(outputs, -1.0, 1.0)
         np.testing.assert_allclose(chosen, expected, atol=1e-5)
         obs, *_ = env.step(expected)
 

@@ -20,7 +20,7 @@ from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.policy import COMMANDS, Policy, SwarmSpec
 from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
-from swarm_forage_env.policies.learned import LearnedPolicy
+from swarm_forage_env.policies.learned import InterfacePolicy
 from swarm_forage_env.policies.mixture import is_mixture, part_sizes
 from swarm_forage_env.policies.model_files import look_at_file
 from swarm_forage_env.policies.registry import file_of, is_policy_file, load_policy, part_labels, policy_label
@@ -192,7 +192,7 @@ def _learned_interface(spec: RunSpec, world: SwarmSpec) -> InterfaceConfig | Non
     if is_policy_file(spec.policy) and trust.only_looks_at(file_of(spec.policy)):
         return look_at_file(spec.policy, **spec.parameters).interface
     policy = load_policy(spec.policy, spec.parameters)
-    if not isinstance(policy, LearnedPolicy):
+    if not isinstance(policy, InterfacePolicy):
         return None
     policy.reset(world, stream_rng(spec.seed, Stream.POLICY))
     return policy.interface.config
@@ -344,7 +344,7 @@ def _record_run(plan: DatasetPlan, seed: int, folder: Path, tell: Callable[[int]
         for tick in range(config.decision_ticks):
             commands = policy.act(obs, world.active)
             if tick == 0:
-                is_learned = isinstance(policy, LearnedPolicy)
+                is_learned = isinstance(policy, InterfacePolicy)
                 chunk.actions[row] = policy.chosen if is_learned else env.unwrapped.checked_actions(commands)
             tasks = getattr(policy, "task", None)
             obs, rewards, dead, truncated = env.step_batch(commands, tasks=tasks)

@@ -6,18 +6,14 @@
   object while it carried another one. A robot without cargo that comes near a site and sees no object forgets it. Our
   choice: so little that a network can use it, and enough to come back to a cluster.
 * From a learner's actions to commands of the contract: motions by number, automatic gripper, masks.
-* Layers of a perceptron, with the same bits on every machine and for any number of rows. The product of a library of
-  linear algebra adds up in the order that suits the processor and the shape, and numpy's tanh has another last bit with
-  wider registers. Here a sum goes from the bias through the columns from left to right, and tanh is made of
-  multiplications, additions and divisions, which round alike everywhere.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import is_compiled, kernel
+from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.contract.detection import is_obstacle_vector, ring_sum, sees_cache, sees_nest
 from swarm_forage_env.contract.layout import GROUND_SENSORS, RING_SENSORS, WINDOW_CELLS
@@ -29,8 +25,6 @@ VIEW_REACH_M = 1.0
 """Distance at which a direction gets length 1: the side of the line-of-sight window."""
 _TIE_M2 = 1e-6
 """Squared distances that differ by less count as equal, so that rounding does not decide."""
-_TANH_LIMIT = np.float32(9.0)
-"""Where tanh rounds to 1 in float32."""
 _HALF_WINDOW = WINDOW_CELLS // 2
 _WINDOW = WINDOW_CELLS * WINDOW_CELLS
 _OWN_CELL = _WINDOW // 2
@@ -191,6 +185,42 @@ def new_site_memory(n_robots: int) -> SiteMemory:
     )
 
 
+class Translation(NamedTuple):
+    """What a `LearnerInterface` consists of."""
+
+    is_compact: bool
+    """Whether the view is the compact one; else it is the first `n_shown` columns as they are."""
+    is_discrete: bool
+    grips_itself: bool
+    has_memory: bool
+    behind_counts: bool
+    """Quirk `obstacle_behind_counts`."""
+    decision_ticks: int
+    n_shown: int
+    """Columns of the view before site memory and own columns."""
+    n_driven: int
+    """Values of a continuous action before those of the message."""
+    own_columns: IntArray
+    """(K,) columns of the observation that come last in the view."""
+    view_starts: tuple[int, ...]
+    """First columns of the observation, see `compact_view`."""
+    pose_starts: tuple[int, int]
+    """See `remember_sites`."""
+    cargo_starts: tuple[int, int, int]
+    """See `remember_sites`."""
+    grip_starts: tuple[int, int, int]
+    """See `automatic_grip`."""
+    half: tuple[float, float]
+    """Half the arena, m."""
+    reach_cells: IntArray
+    """(N,) see `is_near`."""
+    sites: SiteMemory
+    wheels: ActionArray
+    """(N_MOTIONS, 2)."""
+    grips: ActionArray
+    """(N_GRIPS,)."""
+
+
 @kernel
 def is_near(place: FloatArray, x: float, y: float, reach_cells: int) -> bool:
     """Return whether a place lies in the window of a robot at (x, y), wherever in its cell the robot is.
@@ -346,71 +376,3 @@ def mask_actions(obs: ObsArray, starts: tuple[int, int, int, int, int], dynamic_
             allowed[_CREATE_CACHE] = allowed[_SITE]
         else:
             allowed[_GRASP] = busy or is_over_object(row, window) or sees_cache(below)
-
-
-@kernel
-def _affine(rows: ObsArray, weight: ObsArray, bias: ObsArray, out: ObsArray) -> None:
-    n_columns, n_out = weight.shape
-    for i in range(rows.shape[0]):
-        for j in range(n_out):
-            out[i, j] = bias[j]
-        k = 0
-        while k + 4 <= n_columns:  # four at a time read and write the sum once; the order stays
-            a, b, c, d = rows[i, k], rows[i, k + 1], rows[i, k + 2], rows[i, k + 3]
-            for j in range(n_out):
-                total = out[i, j] + a * weight[k, j]
-                total = total + b * weight[k + 1, j]
-                total = total + c * weight[k + 2, j]
-                out[i, j] = total + d * weight[k + 3, j]
-            k += 4
-        while k < n_columns:
-            a = rows[i, k]
-            for j in range(n_out):
-                out[i, j] += a * weight[k, j]
-            k += 1
-
-
-@kernel
-def _fraction(x: Any) -> tuple[Any, Any]:
-    """Tanh 4x above and below the line, for |x| up to `_TANH_LIMIT` / 4; x is a number, or an array of them."""
-    s = x * x
-    n = x * (((s + np.float32(378.0)) * s + np.float32(17325.0)) * s + np.float32(135135.0))
-    d = ((np.float32(28.0) * s + np.float32(3150.0)) * s + np.float32(62370.0)) * s + np.float32(135135.0)
-    n, d = np.float32(2.0) * n * d, d * d + n * n
-    return np.float32(2.0) * n * d, d * d + n * n
-
-
-@kernel
-def _tanh_fraction(value: ObsArray, below: ObsArray) -> None:
-    for i in range(value.shape[0]):
-        for j in range(value.shape[1]):
-            x = value[i, j]
-            x = x if x < _TANH_LIMIT else _TANH_LIMIT
-            value[i, j], below[i, j] = _fraction(np.float32(0.25) * (x if x > -_TANH_LIMIT else -_TANH_LIMIT))
-
-
-def affine(rows: ObsArray, weight: ObsArray, bias: ObsArray) -> ObsArray:
-    """Return rows (N, d) @ weight (d, m) + bias (m,), (N, m); all are float32 and contiguous."""
-    out = np.empty((len(rows), weight.shape[1]), np.float32)
-    if is_compiled(_affine):
-        _affine(rows, weight, bias, out)
-        return out
-    out[:] = bias
-    for k in range(len(weight)):  # number by number a swarm would take seconds for each tick
-        out += rows[:, k : k + 1] * weight[k]
-    return out
-
-
-def tanh(value: ObsArray) -> ObsArray:
-    """Return tanh of (N, m) float32, at most 4e-7 of its value from the true one; `value` is overwritten.
-
-    Lambert's fraction to the seventh power, at a quarter of the number, where it is good to the last bits; then twice
-    tanh 2y = 2 t / (1 + t^2), with t = n / d as 2 n d / (d^2 + n^2). Our choice: an exponential's last bit would be
-    the C library's, and a single division, left to numpy, keeps the loop free of a check for zero.
-    """
-    below = np.empty_like(value)
-    if is_compiled(_tanh_fraction):
-        _tanh_fraction(value, below)
-    else:
-        value[:], below[:] = _fraction(np.float32(0.25) * np.clip(value, -_TANH_LIMIT, _TANH_LIMIT))
-    return np.divide(value, below, out=value)

@@ -1,0 +1,141 @@
+"""KernelPolicy: a policy whose tick is one kernel, called by Python or by the compiled tick of the world."""
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+
+from swarm_forage_env._internal.compiling import Callback, direct
+from swarm_forage_env._internal.rng import TickDraws
+from swarm_forage_env.contract.policy import SwarmSpec
+from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
+
+
+class ObservationError(ValueError):
+    """Observations that are not those of the swarm that the policy was reset for."""
+
+
+def require_inputs(obs: ObsArray, active: BoolArray, spec: SwarmSpec | None) -> None:
+    """Refuse arrays of another shape than the swarm; compiled kernels would read and write beyond their ends.
+
+    Args:
+        obs: Observations.
+        active: Which robots act.
+        spec: The specification given to `reset`; None = there was no reset.
+
+    Raises:
+        ObservationError: `obs` is not (n_robots, layout.size), `active` not (n_robots,), or there was no reset.
+    """
+    if spec is None:
+        raise ObservationError("Expected reset before act; call reset with the spec of the environment first.")
+    expected = (spec.n_robots, spec.layout.size)
+    if obs.shape != expected:
+        raise ObservationError(
+            f"Expected observations with shape (n_robots, columns) = {expected}, got {obs.shape}; "
+            "call reset with the spec of this environment."
+        )
+    if active.shape != expected[:1]:
+        raise ObservationError(
+            f"Expected active with shape (n_robots,) = {expected[:1]}, got {active.shape}; pass `active` of the "
+            "environment."
+        )
+
+
+class CompiledPolicy:
+    """A policy that was reset, for a run without Python between ticks. Policies offer it by a method `compiled`.
+
+    Attributes:
+        callback: The kernel. It must not raise: an exception inside of it is printed, but does not stop the run.
+        state: What the kernel edits; the last are the actions, (N, A) float32.
+        task: (N,) `Task` codes that the kernel keeps up to date, None for a policy without tasks.
+    """
+
+    def __init__(
+        self, kernel: Callable[..., None], state: tuple[Any, ...], policy: "KernelPolicy", chance: TickDraws
+    ) -> None:
+        """Take the kernel as one that other kernels call; it is compiled when it is used. See `KernelPolicy._start`."""
+        self.state = state
+        self.task: CodeArray | None = getattr(policy, "task", None)
+        self._policy = policy
+        self._chance = chance
+        self.callback = Callback(kernel, *example_of(state))
+
+    def next_ticks(self) -> tuple[int, FloatArray]:
+        """Return the number of the next tick, and the draws (ticks, N, draws) of it and of some that follow."""
+        tick = self._policy.n_ticks + 1
+        return tick, self._chance.rows(tick)
+
+    def count_ticks(self, n_ticks: int) -> None:
+        """Note that the kernel has done so many ticks."""
+        self._policy.n_ticks += n_ticks
+
+
+def example_of(state: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Return arguments of the types that a kernel with this state takes."""
+    return np.empty((1, 1), np.float32), np.empty(1, np.bool_), np.empty((1, 1)), state, 0
+
+
+class KernelPolicy:
+    """Every robot decides in one kernel, from what it sees and remembers. An instance drives one run.
+
+    A subclass names its kernel and calls `_start` at the end of its `reset`.
+
+    Attributes:
+        n_ticks: Ticks since reset.
+    """
+
+    _kernel: ClassVar[Callable[..., None]]
+    """One tick of all robots: (obs, active, draws, state, now). A static method of the class: a pickle would take a
+    copy of it along, which another process had to compile anew."""
+    _spec: SwarmSpec | None = None
+    _shapes: tuple[tuple[int, ...], tuple[int, ...]] | None = None
+    _compiled: CompiledPolicy | None = None
+
+    def _start(self, spec: SwarmSpec, rng: np.random.Generator, n_draws: int, *state: Any) -> None:
+        """Start a run.
+
+        Args:
+            spec: The swarm.
+            rng: Generator of the policy's stream.
+            n_draws: Draws per robot and tick.
+            state: What the kernel reads and edits; the last are the actions that it writes, (N, A) float32.
+        """
+        self._spec = spec
+        self._shapes = ((spec.n_robots, spec.layout.size), (spec.n_robots,))
+        self._chance = TickDraws(rng, spec.n_robots, n_draws)
+        self._state = state
+        self._actions: ActionArray = state[-1]
+        self.n_ticks = 0
+        self._compiled = None
+        self.__dict__.pop("_step", None)
+
+    @cached_property
+    def _step(self) -> Callable[..., None]:
+        """The compiled version of the kernel, found once and not in every tick."""
+        return direct(self._kernel, *example_of(self._state))
+
+    def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
+        """Choose actions; see `Policy.act`. The returned (N, A) array is reused by the next call."""
+        if (obs.shape, active.shape) != self._shapes:
+            require_inputs(obs, active, self._spec)
+        # The compiled version takes contiguous arrays of these types only. Most often nothing is copied here.
+        obs, active = np.ascontiguousarray(obs, np.float32), np.ascontiguousarray(active, np.bool_)
+        self.n_ticks += 1
+        self._draws = self._chance.row(self.n_ticks)
+        self._step(obs, active, self._draws, self._state, self.n_ticks)
+        return self._actions
+
+    def compiled(self) -> CompiledPolicy | None:
+        """The policy for runs without Python between ticks; None where somebody has put another `act` in its place."""
+        is_own = type(self).act is KernelPolicy.act and "act" not in vars(self)
+        if is_own and self._compiled is None:  # kept, because its types take milliseconds to find out
+            self._compiled = CompiledPolicy(self._kernel, self._state, self, self._chance)
+        return self._compiled if is_own else None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what copies are made of: everything but the compiled version, which cannot be stored."""
+        return {name: value for name, value in self.__dict__.items() if name not in ("_step", "_compiled")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)

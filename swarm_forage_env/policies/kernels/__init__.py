@@ -1,0 +1,1 @@
+"""Compiled functions of learned policies: what they see and do, and networks."""

@@ -1,0 +1,263 @@
+"""A perceptron that drives robots: its layers, its choice, and one tick of all robots.
+
+Bits are the same on every machine, and a robot's do not depend on what other robots there are. The product of a library
+of linear algebra adds up in the order that suits the processor and the shape, and the last bits of numpy's tanh and of
+the C library's exponential depend on the processor. Here a sum goes from the bias through the columns from left to
+right, and tanh and exponential are made of multiplications, additions and divisions, which round alike everywhere.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, IntArray, ObsArray, Row
+from swarm_forage_env.policies.kernels.learner import (
+    N_SITES,
+    SITE_COLUMNS,
+    Translation,
+    automatic_grip,
+    compact_view,
+    numbered_actions,
+    remember_sites,
+    show_sites,
+)
+
+LANES = 8
+"""Outputs of a layer are padded to a multiple of these: as many as the registers of most processors hold."""
+_TOGETHER = 2
+"""Rows that go through the layers together: a weight is read once for both."""
+_TANH_LIMIT = np.float32(9.0)
+"""Where tanh rounds to 1 in float32."""
+_LEAST_POWER = -64.0
+"""Where an exponential is nothing beside 1, and the fraction of `power` is still above zero."""
+
+
+class Layers(NamedTuple):
+    """A perceptron, and room to work in."""
+
+    sizes: IntArray
+    """(layers + 1,) columns into the first layer, and outputs of each."""
+    numbers: ObsArray
+    """(rows, width) float32: of each layer its biases, then its weights (columns, outputs); padded with zeros."""
+    is_tanh: bool
+    """Activation after every layer but the last; else relu."""
+    samples: bool
+    """Whether discrete actions are drawn, see `pick`."""
+    before: ObsArray
+    """(2, width) what goes into a layer."""
+    after: ObsArray
+    """(2, width) what comes out of it."""
+
+
+class Choice(NamedTuple):
+    """What robots saw and chose in the last decision."""
+
+    seen: ObsArray
+    """(N, d)."""
+    outputs: ObsArray
+    """(N, m) of the last layer; of continuous actions, cut to [-1, 1]."""
+    number: IntArray
+    """(N,) of discrete actions."""
+    is_made: BoolArray
+    """(N,) whether the robot was in the world; others stand until the next decision."""
+
+
+@kernel
+def _sum(x: ObsArray, numbers: ObsArray, at: int, n_columns: int, width: int, out: ObsArray) -> None:
+    """Write two rows of a layer's sums, `width` of them each; its biases are in row `at` of `numbers`."""
+    one, two, bias = out[0], out[1], numbers[at]
+    for j in range(width):
+        one[j] = bias[j]
+        two[j] = bias[j]
+    k = 0
+    while k + 4 <= n_columns:  # four at a time read and write the sum once; the order stays
+        w0, w1, w2, w3 = numbers[at + k + 1], numbers[at + k + 2], numbers[at + k + 3], numbers[at + k + 4]
+        a0, a1, a2, a3 = x[0, k], x[0, k + 1], x[0, k + 2], x[0, k + 3]
+        b0, b1, b2, b3 = x[1, k], x[1, k + 1], x[1, k + 2], x[1, k + 3]
+        for j in range(width):
+            one[j] = (((one[j] + a0 * w0[j]) + a1 * w1[j]) + a2 * w2[j]) + a3 * w3[j]
+            two[j] = (((two[j] + b0 * w0[j]) + b1 * w1[j]) + b2 * w2[j]) + b3 * w3[j]
+        k += 4
+    while k < n_columns:
+        w0, a0, b0 = numbers[at + k + 1], x[0, k], x[1, k]
+        for j in range(width):
+            one[j] += a0 * w0[j]
+            two[j] += b0 * w0[j]
+        k += 1
+
+
+@kernel
+def _tanh(values: Row, n: int) -> None:
+    """Tanh of the first `n` values, at most 4e-7 of its value from the true one.
+
+    Lambert's fraction to the seventh power, at a quarter of the number, where it is good to the last bits; then twice
+    tanh 2y = 2 t / (1 + t^2), with t = n / d as 2 n d / (d^2 + n^2). Our choice: it needs one division.
+    """
+    two = np.float32(2.0)
+    for j in range(n):
+        x = values[j]
+        x = x if x < _TANH_LIMIT else _TANH_LIMIT
+        x = np.float32(0.25) * (x if x > -_TANH_LIMIT else -_TANH_LIMIT)
+        s = x * x
+        above = x * (((s + np.float32(378.0)) * s + np.float32(17325.0)) * s + np.float32(135135.0))
+        below = ((np.float32(28.0) * s + np.float32(3150.0)) * s + np.float32(62370.0)) * s + np.float32(135135.0)
+        above, below = two * above * below, below * below + above * above
+        above, below = two * above * below, below * below + above * above
+        values[j] = np.divide(above, below)  # unlike /, it does not look for a zero, which is never there
+
+
+@kernel
+def _activate(values: ObsArray, n: int, is_tanh: bool) -> None:
+    for r in range(_TOGETHER):
+        if is_tanh:
+            _tanh(values[r], n)
+        else:
+            for j in range(n):
+                values[r, j] = max(values[r, j], np.float32(0.0))
+
+
+@kernel
+def forward(rows: ObsArray, layers: Layers, wanted: BoolArray, outputs: ObsArray) -> None:
+    """Write the last layer's values (N, m) for those rows (N, d) that are wanted."""
+    sizes, x, y = layers.sizes, layers.before, layers.after
+    last = sizes.shape[0] - 2
+    i = _next(wanted, 0)
+    while i < wanted.shape[0]:
+        k = _next(wanted, i + 1)
+        other = k if k < wanted.shape[0] else i  # a last row alone goes twice
+        for c in range(sizes[0]):
+            x[0, c] = rows[i, c]
+            x[1, c] = rows[other, c]
+        at = 0
+        for layer in range(last + 1):
+            n_columns, width = sizes[layer], _padded(sizes[layer + 1])
+            _sum(x, layers.numbers, at, n_columns, width, y)
+            if layer < last:
+                _activate(y, width, layers.is_tanh)
+            at += n_columns + 1
+            x, y = y, x
+        for c in range(outputs.shape[1]):
+            outputs[i, c] = x[0, c]
+            outputs[other, c] = x[1, c]
+        i = _next(wanted, k + 1)
+
+
+@kernel
+def _next(wanted: BoolArray, start: int) -> int:
+    """Return the first row from `start` on that is wanted, or one beyond the last."""
+    for i in range(start, wanted.shape[0]):
+        if wanted[i]:
+            return i
+    return max(start, wanted.shape[0])
+
+
+@kernel
+def _padded(size: int) -> int:
+    return (size + LANES - 1) // LANES * LANES
+
+
+@kernel
+def power(x: float) -> float:
+    """E to the power of x <= 0: Pade's fraction of degree 3 at a sixteenth of it, where it is good; squared four times.
+
+    At most 1e-5 of its value from the true one down to x = -10.
+    """
+    x = max(x, _LEAST_POWER) / 16.0
+    s = x * x
+    even, odd = 120.0 + 12.0 * s, x * (60.0 + s)
+    share = (even + odd) / (even - odd)
+    share *= share
+    share *= share
+    share *= share
+    return share * share
+
+
+@kernel
+def pick(logits: Row, samples: bool, chance: float) -> int:
+    """The number of the largest logit, the first of several; if it samples, one by their probabilities.
+
+    `chance` is uniform in [0, 1).
+    """
+    n = logits.shape[0]
+    best = 0
+    for k in range(n):
+        if logits[k] > logits[best]:
+            best = k
+    if not samples:
+        return best
+    most, total = float(logits[best]), 0.0
+    for k in range(n):
+        total += power(logits[k] - most)
+    left = chance * total
+    for k in range(n - 1):
+        left -= power(logits[k] - most)
+        if left < 0.0:
+            return k
+    return n - 1
+
+
+@kernel
+def see(obs: ObsArray, t: Translation, view: ObsArray) -> None:
+    """Write what robots see (N, d), as `LearnerInterface.observe` does, and let them remember it."""
+    if t.is_compact:
+        compact_view(obs, t.view_starts, t.half[0], t.half[1], t.behind_counts, view)
+    else:
+        for i in range(obs.shape[0]):
+            for c in range(t.n_shown):
+                view[i, c] = obs[i, c]
+    at = t.n_shown
+    if t.has_memory:
+        remember_sites(obs, t.pose_starts, t.cargo_starts, t.half, t.reach_cells, t.sites)
+        show_sites(obs, t.pose_starts, t.half, t.sites, view[:, at:])
+        at += N_SITES * SITE_COLUMNS
+    for i in range(obs.shape[0]):
+        for c in range(t.own_columns.shape[0]):
+            view[i, at + c] = obs[i, t.own_columns[c]]
+
+
+@kernel
+def decide(obs: ObsArray, draws: FloatArray, t: Translation, layers: Layers, choice: Choice) -> None:
+    """Make the decision of every robot that is in the world."""
+    see(obs, t, choice.seen)
+    heading = t.pose_starts[1]
+    for i in range(obs.shape[0]):
+        choice.is_made[i] = obs[i, heading] != 0.0 or obs[i, heading + 1] != 0.0
+        choice.outputs[i, :] = 0.0
+        choice.number[i] = 0
+    forward(choice.seen, layers, choice.is_made, choice.outputs)
+    for i in range(obs.shape[0]):
+        outputs = choice.outputs[i]
+        if not t.is_discrete:
+            for c in range(outputs.shape[0]):
+                outputs[c] = min(max(outputs[c], np.float32(-1.0)), np.float32(1.0))
+        elif choice.is_made[i]:
+            choice.number[i] = pick(outputs, layers.samples, draws[i, 0] if layers.samples else 0.0)
+
+
+@kernel
+def step_network(
+    obs: ObsArray,
+    _active: BoolArray,
+    draws: FloatArray,
+    state: tuple[Translation, Layers, Choice, ActionArray],
+    now: int,
+) -> None:
+    """One tick of all robots, those in repair too: a decision if it is time for one, then its commands.
+
+    `draws` is (N, 1) uniform in [0, 1), (N, 0) for a network that draws nothing.
+    """
+    t, layers, choice, actions = state
+    if (now - 1) % t.decision_ticks == 0:
+        decide(obs, draws, t, layers, choice)
+    if t.is_discrete:
+        numbered_actions(choice.number, t.wheels, t.grips, obs, t.cargo_starts[0], actions)
+    else:
+        n_driven, n_said = t.n_driven, choice.outputs.shape[1] - t.n_driven
+        for i in range(actions.shape[0]):
+            for c in range(n_driven):
+                actions[i, c] = choice.outputs[i, c]
+            for c in range(n_said):  # the message, if there is one, comes last in both
+                actions[i, actions.shape[1] - n_said + c] = choice.outputs[i, n_driven + c]
+    if t.grips_itself:
+        automatic_grip(obs, t.grip_starts, actions)
