@@ -29,6 +29,7 @@ from .machines import (
     explore_for_object,
     explore_freely,
     follow_cargo,
+    hold,
 )
 from .parameters import ControllerParameters, chosen_parameters, kernel_constants
 from .robots import ACQUIRE, DRAWS, HOMING, WAIT_PICKUP, new_robots, sense
@@ -45,14 +46,14 @@ def step_crw(
 ) -> None:
     """One tick of CRW for all robots. `state` = constants (1,), robots (N,) edited, actions (N, 3) written.
 
-    `draws` is (N, DRAWS) uniform in [0, 1). Inactive robots keep their state; their action is zero.
+    `draws` is (N, DRAWS) uniform in [0, 1). Inactive robots keep their state, and hold.
     """
     constants, robots, actions = state
     c = constants[0]
     for i in range(active.shape[0]):
         action = actions[i]
         if not active[i]:
-            action[:] = 0.0
+            hold(obs[i], c, action)
             continue
         robot = robots[i]
         row = obs[i]

@@ -21,6 +21,7 @@ from .machines import (
     explore_for_object,
     explore_freely,
     follow_cargo,
+    hold,
 )
 from .memory import (
     ObjectMemory,
@@ -48,14 +49,14 @@ def step_dpo(
 ) -> None:
     """One tick of DPO for all robots. `state` = constants (1,), robots (N,) and memory edited, actions (N, 3) written.
 
-    `draws` is (N, DRAWS) uniform in [0, 1). Inactive robots keep their state; their action is zero.
+    `draws` is (N, DRAWS) uniform in [0, 1). Inactive robots keep their state, and hold.
     """
     constants, robots, memory, actions = state
     c = constants[0]
     for i in range(active.shape[0]):
         action = actions[i]
         if not active[i]:
-            action[:] = 0.0
+            hold(obs[i], c, action)
             continue
         robot = robots[i]
         row = obs[i]

@@ -399,6 +399,17 @@ def deliver_and_leave(robot: np.record, senses: Senses, row: Row, c: np.record, 
 
 
 @kernel
+def hold(row: Row, c: np.record, action: Row) -> None:
+    """Write the action of a robot that is not at work: it stands and keeps its cargo.
+
+    The world heeds it in one tick only, that in which the robot comes back to work.
+    """
+    action[0] = 0.0
+    action[1] = 0.0
+    action[2] = GRASP if row[c.carrying] > 0.5 else RELEASE
+
+
+@kernel
 def _count_turning(robot: np.record, action: Row) -> None:
     """Count the ticks in a row in which a robot is told to turn on the spot or to stand."""
     robot.turn_ticks = 0 if action[0] + action[1] > 0.0 else robot.turn_ticks + 1

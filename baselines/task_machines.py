@@ -57,6 +57,7 @@ from .machines import (
     explore_for_object,
     follow_cargo,
     go_to_goal,
+    hold,
     random_walk,
     restart_acquiring,
     start_carrying,
@@ -305,15 +306,15 @@ def step_tasks(
     """One tick for all robots.
 
     `state` = constants (1,), robots (N,), memory and allocation edited, actions (N, 3) written. `draws` is
-    (N, TASK_DRAWS) uniform in [0, 1), `now` the number of this tick, from 1. Inactive robots keep their state; their
-    action is zero.
+    (N, TASK_DRAWS) uniform in [0, 1), `now` the number of this tick, from 1. Inactive robots keep their state, and
+    hold.
     """
     constants, robots, memory, allocation, actions = state
     c = constants[0]
     for i in range(active.shape[0]):
         action = actions[i]
         if not active[i]:
-            action[:] = 0.0
+            hold(obs[i], c, action)
             continue
         robot = robots[i]
         row = obs[i]

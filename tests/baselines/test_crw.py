@@ -254,7 +254,7 @@ def test_an_inactive_robot_is_frozen(robot):
     robot.seen.ground("object")
     robot.act(30)
     before = robot.policy.activity, robot.policy._robots.copy()
-    assert robot.act(100, active=False) == pytest.approx([0.0, 0.0, 0.0])
+    assert robot.act(100, active=False) == pytest.approx([0.0, 0.0, Grip.RELEASE])
     assert robot.policy._robots == before[1]
     robot.act(20)
     assert robot.activity is Activity.ACQUIRE

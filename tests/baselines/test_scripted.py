@@ -11,6 +11,7 @@ from baselines.dpo import DPOPolicy
 from baselines.stochm import STOCHMPolicy
 from baselines.stochx import STOCHXPolicy
 from tests.support.observations import Observations, make_spec
+from tests.support.stage import OPEN_CELL, load, stand, tidy_world
 
 N_ROBOTS = 5
 TICKS = 40
@@ -67,3 +68,18 @@ def test_the_layout_of_observations_in_memory_does_not_matter(policy_class):
     there[1::2] = True
     for other in (wide[::2, ::2], np.asfortranarray(obs), obs.astype(np.float64)):
         np.testing.assert_array_equal(twin.act(other, there[::2]), policy.act(obs, active))
+
+
+@pytest.mark.parametrize("policy_class", POLICIES)
+def test_a_robot_keeps_its_cargo_when_it_comes_back_to_work(policy_class):
+    """It does so in a step that policies do not foresee: for them the robot is still in repair."""
+    env = tidy_world(caches=policy_class.caches)
+    policy, at_work = policy_class(), np.ones(4, np.bool_)
+    policy.reset(env.swarm_spec, np.random.default_rng(0))
+    for robot in range(3):
+        load(env, robot, robot)
+        stand(env, robot, (OPEN_CELL[0] + 4 * robot, OPEN_CELL[1]))
+    actions = policy.act(env.arena.observe(), at_work & False)
+    env.step_batch(actions)
+    assert env.swarm.carried_object.tolist() == [0, 1, 2, -1]
+    assert not env.swarm.wheel_speed.any()

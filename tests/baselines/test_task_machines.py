@@ -428,7 +428,7 @@ def test_inactive_robots_keep_their_state_and_stand(robot, activity):
     robots, allocation = robot.policy._robots.copy(), [part.copy() for part in robot.policy._allocation]
     robot.seen.carry(3)
     robot.seen.caches(CACHE_SEEN)
-    assert robot.act(5, active=False).tolist() == [0.0, 0.0, 0.0]
+    assert robot.act(5, active=False).tolist() == [0.0, 0.0, Grip.GRASP], "what it carries is held"
     np.testing.assert_array_equal(robot.policy._robots, robots)
     for part, before in zip(robot.policy._allocation, allocation, strict=True):
         np.testing.assert_array_equal(part, before)
