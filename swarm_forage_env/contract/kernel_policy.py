@@ -49,6 +49,7 @@ class CompiledPolicy:
         callback: The kernel. It must not raise: an exception inside of it is printed, but does not stop the run.
         state: What the kernel edits; the last are the actions, (N, A) float32.
         task: (N,) `Task` codes that the kernel keeps up to date, None for a policy without tasks.
+        decision_ticks: See `KernelPolicy`.
     """
 
     def __init__(
@@ -57,6 +58,7 @@ class CompiledPolicy:
         """Take the kernel as one that other kernels call; it is compiled when it is used. See `KernelPolicy._start`."""
         self.state = state
         self.task: CodeArray | None = getattr(policy, "task", None)
+        self.decision_ticks = policy.decision_ticks
         self._policy = policy
         self._chance = chance
         self.callback = Callback(kernel, *example_of(state))
@@ -83,7 +85,10 @@ class KernelPolicy:
 
     Attributes:
         n_ticks: Ticks since reset.
+        decision_ticks: It looks at light in the first tick only, and in every so-many-th from then on.
     """
+
+    decision_ticks = 1
 
     _kernel: ClassVar[Callable[..., None]]
     """One tick of all robots: (obs, active, draws, state, now). A static method of the class: a pickle would take a

@@ -243,6 +243,7 @@ class NetworkPolicy(KernelPolicy, InterfacePolicy):
         """Take the network; `reset` checks that it fits its interface."""
         super().__init__(network.about.interface, caches=network.about.caches)
         self._network = network
+        self.decision_ticks = network.about.interface.decision_ticks
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run.

@@ -292,6 +292,7 @@ class ForagingArena:
                 policy.callback,
                 policy.state,
                 now,
+                policy.decision_ticks,
                 policy_draws,
                 picks,
                 walks,

@@ -82,7 +82,7 @@ class ExampleCalls:
     def run(self, policy: CompiledPolicy) -> Call:
         """Of `kernels.tick.run`, for a policy that has been reset; for compiled bodies only."""
         rows = self.draws[None]
-        of_policy = policy.callback, policy.state, 0, rows[None]
+        of_policy = policy.callback, policy.state, 0, 1, rows[None]
         tasks = tasks_of(policy), np.zeros(1)
         return tick.run, self._arrays, self.bodies, self._gain, 0, 0, False, *of_policy, rows, rows, *tasks
 

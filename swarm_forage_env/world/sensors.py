@@ -76,6 +76,7 @@ def new_sensors(config: ScenarioConfig, layout: ObservationLayout, reads: Collec
         obstacles=obstacle_rows(config),
         cache_half_side=config.cache_half_side_cells,
         reads_light="light" in read,
+        light_is_due=np.ones(1, np.bool_),
         light_of_carriers_only=reads is not None and "light" not in reads,
         reads_ground="ground" in read,
         reads_line_of_sight=not {"los_cell", "los_object", "los_cache"}.isdisjoint(read),

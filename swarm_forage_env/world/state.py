@@ -270,6 +270,8 @@ class Sensors(NamedTuple):
     """(B, 4) boxes on the floor: x low, y low, x high, y high in m."""
     cache_half_side: int
     reads_light: bool
+    light_is_due: BoolArray
+    """(1,) whether light is sensed in this tick; False only in `kernels.tick.run`, while no decision is near."""
     light_of_carriers_only: bool
     reads_ground: bool
     reads_line_of_sight: bool

@@ -21,9 +21,12 @@ def started(policy, seed: int = 3) -> LiveRun:
 def test_pieces_make_one_run(policy):
     whole, pieces = started(load_policy(policy)), started(load_policy(policy))
     assert pieces.compiled_policy is not None
+    by_ticks = LiveRun(build_stack(WORLD, reads=load_policy(policy).reads), load_policy(policy), 3, by_ticks=True)
     whole.advance(to_tick=600)
     for tick in (1, 2, 7, 300, 301, 600):
-        pieces.advance(to_tick=tick)
+        for run in (pieces, by_ticks):
+            run.advance(to_tick=tick)
+        assert pieces.forage_env.last_obs.tobytes() == by_ticks.forage_env.last_obs.tobytes()
     for name in ("position", "heading", "carried_object"):
         assert np.array_equal(getattr(whole.forage_env.swarm, name), getattr(pieces.forage_env.swarm, name))
 

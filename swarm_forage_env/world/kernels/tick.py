@@ -63,7 +63,7 @@ def sense(a: ArenaArrays) -> None:
     """Complete the observation after `look`; slices that are not read may stay zero."""
     swarm, objects, events, s = a.state.swarm, a.state.objects, a.state.events, a.sensors
     position, facing, present, c = swarm.position, swarm.facing, swarm.present, s.columns
-    if s.reads_light:
+    if s.reads_light and s.light_is_due[0]:
         floor.light(
             position,
             facing,
@@ -213,6 +213,7 @@ def run(
     policy: Callable[..., None],
     policy_state: tuple[Any, ...],
     policy_first: int,
+    decision_ticks: int,
     policy_draws: FloatArray,
     chances: FloatArray,
     walk_chances: FloatArray,
@@ -233,6 +234,7 @@ def run(
         policy: (obs, active, draws, state, tick); writes the actions, which are last in its state.
         policy_state: Its state.
         policy_first: Number of the first tick as the policy counts.
+        decision_ticks: See `KernelPolicy`; light, the dearest sense, is left out until the next decision, or the end.
         policy_draws: (ticks, N, draws of a robot).
         chances: (ticks, N) or, where they are not read, (1, N).
         walk_chances: (ticks, M) or, where they are not read, (1, N).
@@ -244,10 +246,14 @@ def run(
         robot. Tasks of a tick with a refused action are not looked at.
     """
     obs, active, actions = a.sensors.obs, a.state.swarm.active, policy_state[-1]
+    light_is_due = a.sensors.light_is_due
     for k in range(n_ticks):
         policy(obs, active, policy_draws[k], policy_state, policy_first + k)
         chance, walk_chance = chances[k % chances.shape[0]], walk_chances[k % walk_chances.shape[0]]
+        now_then = policy_first + k + 1  # the tick in which the policy sees what is sensed here
+        light_is_due[0] = (now_then - 1) % decision_ticks == 0 or k == n_ticks - 1
         outcome = whole(a, b, actions, wheel_gain, first + k, look_first and k == 0, chance, walk_chance)
+        light_is_due[0] = True  # for what Python may have to finish
         counted = outcome >= 0 or tasks.shape[0] == 0 or add_task_shares(tasks, active, task_shares)
         if outcome != DONE or not counted:
             return k + 1, outcome, counted
