@@ -9,7 +9,6 @@ from gymnasium import spaces
 from pettingzoo import ParallelEnv
 
 from swarm_forage_env._internal.fields import as_whole, instance, switch
-from swarm_forage_env.contract.kernel_policy import CompiledPolicy
 from swarm_forage_env.contract.layout import ObservationLayout
 from swarm_forage_env.contract.policy import COMMANDS, ActionError, SwarmSpec
 from swarm_forage_env.contract.reset_and_step import as_actions, checked_gain, is_over, no_options, refuse_not_finite
@@ -313,10 +312,6 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         if self._window is not None:
             self.render()
         return self.arena.obs, self._rewards.reward(), self._terminated, self.arena.tick >= self.max_cycles
-
-    def run(self, policy: CompiledPolicy, n_ticks: int, task_shares: FloatArray) -> None:
-        """Let a compiled policy drive the swarm for some ticks; see `ForagingArena.run`. Rewards are not computed."""
-        self._world.run(policy, n_ticks, task_shares)
 
     # Snapshots
 

@@ -47,7 +47,6 @@ _COMPILED_IN_EVERYWHERE = tuple(
 """Modules whose functions and constants are compiled into those of other folders."""
 _COMPILED_IN_BY_ROOM = {
     _PACKAGE / "world/kernels": (_PACKAGE / "world/state.py",),
-    _PACKAGE / "wrappers/kernels.py": (_PACKAGE / "world/kernels/drive.py", _PACKAGE / "world/kernels/kinds.py"),
 }
 """Further modules that are compiled into the functions of one room; see `room_of`."""
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int32]
 CodeArray: TypeAlias = NDArray[np.int8]
+BitArray: TypeAlias = NDArray[np.uint32]
 BoolArray: TypeAlias = NDArray[np.bool_]
 ObsArray: TypeAlias = NDArray[np.float32]
 """Observations, (N, D) float32 in [-1, 1]."""

@@ -68,7 +68,7 @@ class LiveRun:
             end = self.forage_env.max_cycles
             n_ticks = (end if to_tick is None else min(to_tick, end)) - self.forage_env.tick
             self._stack.run(compiled, max(0, n_ticks))
-            self.over = self.forage_env.tick >= end
+            self.over = self._stack.complete
             return
         world, policy, has_tasks, obs, over = self.forage_env, self._policy, self._has_tasks, self._obs, self.over
         act, step = policy.act, self._stack.step_batch
@@ -84,16 +84,19 @@ class LiveRun:
 def compiled_policy_of(stack: ForageEnv | SwarmWrapper, policy: Policy) -> CompiledPolicy | None:
     """Return a policy, which was reset, for a run without Python between ticks; None where anybody might have a say.
 
-    That is a wrapper other than the recorder, a subclass, a method that was replaced, neighbours, messages
-    or an own sensor that the policy reads, a mixed swarm, robots of several kinds, or Chipmunk.
+    That is a wrapper that does not tell what it does ahead, a recorder that is a subclass, a method that was replaced,
+    neighbours, messages or an own sensor that the policy reads, a mixed swarm, robots of several kinds, or Chipmunk.
     """
     env = stack.unwrapped
     if _told_apart(policy, env.scenario):  # parts are counted tick by tick
         return None
-    is_bare = type(stack) is RunRecorder and stack.env is env and type(env) is ForageEnv
-    if not is_bare or env.scenario.physics != "compiled" or not hasattr(type(policy), "compiled"):
+    if type(stack) is not RunRecorder or type(env) is not ForageEnv:
+        return None
+    if env.scenario.physics != "compiled" or not hasattr(type(policy), "compiled"):
         return None
     if "after_step" in vars(stack) or "step_batch" in {*vars(stack), *vars(env)}:
+        return None
+    if not all(wrapper.tells_ahead for wrapper in stack.stack[1:]):
         return None
     if env.arena.needs_python:
         return None

@@ -1,12 +1,11 @@
 """ForagingArena: the simulated world of an environment. It owns the state arrays and fixes the order of a tick."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import direct
 from swarm_forage_env._internal.fields import ConfigError, whole
 from swarm_forage_env._internal.held import hold
 from swarm_forage_env._internal.rng import Stream, TickDraws, stream_rng
@@ -27,9 +26,10 @@ from swarm_forage_env.world.caches import (
 )
 from swarm_forage_env.world.compiled import CompiledTick, tasks_of
 from swarm_forage_env.world.kernels.bodies import BodyState
+from swarm_forage_env.world.kernels.disturbances import Disturbances
 from swarm_forage_env.world.kernels.interact import drop_cargo
 from swarm_forage_env.world.kernels.kinds import blank
-from swarm_forage_env.world.kernels.tick import DONE, NO_ROOM, TO_PLACE, run
+from swarm_forage_env.world.kernels.tick import DONE, NO_ROOM, TO_PLACE
 from swarm_forage_env.world.kinds import blank_boxes
 from swarm_forage_env.world.neighbourhood import Neighbourhood
 from swarm_forage_env.world.placement import (
@@ -39,9 +39,11 @@ from swarm_forage_env.world.placement import (
     place_objects,
     static_cache_centres,
 )
-from swarm_forage_env.world.sensors import new_sensors, read_slices
+from swarm_forage_env.world.sensors import light_of_carriers_only, new_sensors, read_slices
 from swarm_forage_env.world.state import ArenaArrays, listed
 
+UNDISTURBED = Disturbances()
+_NO_TASKS, _NO_SHARES = np.zeros(0, np.int8), np.zeros(1)
 _OF_PROCESS = ("_compiled", "_held", "_own_sensors")
 """Attributes of an arena that hold functions and addresses: made when they are needed, for the arrays of a run."""
 
@@ -53,6 +55,7 @@ class ForagingArena:
         config: The scenario.
         layout: Layout of the observation rows.
         reads: Names of the observation slices that are used; sensors of others may stay zero.
+        light_of_carriers_only: Whether robots that carry nothing read no light.
         blanks: (B, 4) what robots of some kinds cannot observe, see `kernels.kinds.blank`.
         tick: Ticks done since reset.
         swarm, objects, caches, events: The state; read freely, write through the methods.
@@ -77,6 +80,7 @@ class ForagingArena:
         self.config = config
         self.layout = layout_for(config)
         self.reads = read_slices(reads, self.layout)
+        self.light_of_carriers_only = light_of_carriers_only(reads)
         self.blanks = blank_boxes(config.robots, self.layout)
         self._own_names = tuple(name for name in config.robots.own_sensors if name in self.reads)
         further = {NEIGHBOURS, MESSAGES, *config.robots.own_sensors}
@@ -264,50 +268,70 @@ class ForagingArena:
             self._restore_caches(tasks)
             self._compiled.close(self._held, walks[0])
 
-    def run(self, policy: CompiledPolicy, n_ticks: int, task_shares: FloatArray) -> None:
-        """Let a compiled policy drive the world for some ticks; what happens is what `step` and `act` do by turns.
+    def run(
+        self,
+        policy: CompiledPolicy,
+        n_ticks: int,
+        task_shares: FloatArray | None,
+        disturbances: Disturbances = UNDISTURBED,
+        *,
+        wheel_gain: FloatArray | None = None,
+        acts: bool = True,
+    ) -> int:
+        """Let a compiled policy drive the world for a while; what happens is what `act` and `step` do by turns.
 
-        Bodies must be compiled, too. `task_shares` (codes,) gets the share of active robots in each task, tick by tick.
+        Bodies must be compiled, too.
+
+        Args:
+            policy: The policy.
+            n_ticks: At most so many ticks, and at least one; it ends earlier where Python draws numbers or places
+                objects. With 0 the policy acts, and that is all.
+            task_shares: (codes,) gets the share of active robots in each task, tick by tick; None = they do not count.
+            disturbances: What wrappers do in so many ticks.
+            wheel_gain: See `step`.
+            acts: Whether the policy acts; else its actions stand as they are.
+
+        Returns:
+            How many ticks left their observation disturbed: of the last one it is true where Python had to end it.
 
         Raises:
             ActionError: as in `step`; the ticks before have happened.
             ValueError: task codes that cannot be counted; their tick has happened.
             RuntimeError: bodies that are not compiled.
         """
-        bodies, n_left = self.bodies, n_ticks
-        tasks = tasks_of(policy)
-        run_compiled: Callable[..., tuple[int, int, bool]] | None = None
-        while n_left:
-            first = self.tick + 1
-            now, policy_draws = policy.next_ticks()
-            picks, walks = self.draws(first)
-            n_drawn = min(len(rows) for rows in (policy_draws, picks, walks) if rows is not self._nothing)
-            arguments = (
-                self._held,
-                bodies.held,
-                self._unit_gain,
-                first,
-                min(n_left, n_drawn),
-                self.has_changed,
-                policy.callback,
-                policy.state,
-                now,
-                policy.decision_ticks,
-                policy_draws,
-                picks,
-                walks,
-                tasks,
-                task_shares,
-            )
-            if run_compiled is None:
-                run_compiled = direct(run, *arguments)
-            n_done, outcome, tasks_counted = run_compiled(*arguments)
-            policy.count_ticks(n_done)
-            self.tick, self.has_changed = self.tick + n_done - 1, self.has_changed and n_done == 1
-            self.conclude(outcome, policy.state[-1], self._unit_gain, policy.task)
-            if not tasks_counted:
-                raise refused_tasks(tasks, len(self.swarm.active))
-            n_left -= n_done
+        first, tasks = self.tick + 1, tasks_of(policy) if task_shares is not None else _NO_TASKS
+        gain = self._unit_gain if wheel_gain is None else wheel_gain
+        now, policy_draws = policy.next_ticks()
+        picks, walks = self.draws(first)
+        n_drawn = min(len(rows) for rows in (policy_draws, picks, walks) if rows is not self._nothing)
+        n_begun, outcome, tasks_counted = self._compiled.run(
+            policy,
+            *self.parts,
+            disturbances,
+            gain,
+            first,
+            min(n_ticks, n_drawn),
+            self.has_changed,
+            acts,
+            policy.callback,
+            policy.state,
+            now,
+            policy.decision_ticks,
+            policy_draws,
+            picks,
+            walks,
+            tasks,
+            _NO_SHARES if task_shares is None else task_shares,
+        )
+        if acts:
+            policy.count_ticks(max(1, n_begun))
+        if not n_begun:
+            return 0
+        self.tick, self.has_changed = first + n_begun - 2, self.has_changed and n_begun == 1
+        self.conclude(outcome, policy.state[-1], disturbances.gain if len(disturbances.gain) else gain, policy.task)
+        if not tasks_counted:
+            raise refused_tasks(tasks, len(self.swarm.active))
+        return n_begun - (outcome != DONE)
 
     @property
     def needs_python(self) -> bool:

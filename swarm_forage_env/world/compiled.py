@@ -22,6 +22,7 @@ from swarm_forage_env.world.allocation import new_arrays, new_state
 from swarm_forage_env.world.bodies import Bodies
 from swarm_forage_env.world.kernels import tick
 from swarm_forage_env.world.kernels.bodies import BodyState, move_bodies, tell_poses
+from swarm_forage_env.world.kernels.disturbances import Disturbances, disturb
 from swarm_forage_env.world.kernels.interact import serve
 from swarm_forage_env.world.sensors import new_sensors
 from swarm_forage_env.world.state import ArenaArrays
@@ -84,7 +85,8 @@ class ExampleCalls:
         rows = self.draws[None]
         of_policy = policy.callback, policy.state, 0, 1, rows[None]
         tasks = tasks_of(policy), np.zeros(1)
-        return tick.run, self._arrays, self.bodies, self._gain, 0, 0, False, *of_policy, rows, rows, *tasks
+        of_world = self._arrays, self.bodies, Disturbances(), self._gain
+        return tick.run, *of_world, 0, 0, False, True, *of_policy, rows, rows, *tasks
 
 
 def tasks_of(policy: CompiledPolicy) -> CodeArray:
@@ -107,6 +109,7 @@ class CompiledTick:
             bodies: Compiled bodies, None where Chipmunk has them.
         """
         self._calls = ExampleCalls.from_python(arrays, bodies)
+        self._driver: CompiledPolicy | None = None
 
     @cached_property
     def observe(self) -> Callable[[ArenaArrays], None]:
@@ -135,6 +138,12 @@ class CompiledTick:
         """See `kernels.tick.whole`; for compiled bodies only."""
         return direct(*self._calls.whole)
 
+    def run(self, policy: CompiledPolicy, *arguments: Any) -> tuple[int, int, bool]:
+        """See `kernels.tick.run`; for compiled bodies only. The types are the same in all calls for a policy."""
+        if policy is not self._driver:
+            self._driver, self._run = policy, direct(tick.run, *arguments)
+        return self._run(*arguments)
+
 
 def _empty_parts(config: ScenarioConfig) -> tuple[ArenaArrays, BodyState | None]:
     """Return an arena in which nothing is: its types are those of every run of the scenario."""
@@ -158,7 +167,10 @@ def compile_half(config: ScenarioConfig, half: int) -> None:
 
 
 def parts_of(config: ScenarioConfig, half: int) -> tuple[Call, ...]:
-    """Return the outer kernels of a half: what robots see and how they set out (0); what they do, and bodies (1)."""
+    """Return the outer kernels of a half: what robots see and how they set out (0); what they do, and bodies (1).
+
+    Disturbances of what robots see belong to the smaller half.
+    """
     arrays, bodies = _empty_parts(config)
     calls, swarm, motion = ExampleCalls(arrays, bodies), arrays.state.swarm, arrays.motion
     if half == 0:
@@ -167,7 +179,12 @@ def parts_of(config: ScenarioConfig, half: int) -> tuple[Call, ...]:
     if bodies is None:
         return (serving,)
     poses = bodies.poses, swarm.present, swarm.position, swarm.heading, swarm.facing
-    return serving, (move_bodies, bodies, motion.twist, swarm.present, motion.dt_s), (tell_poses, *poses)
+    moving = move_bodies, bodies, motion.twist, swarm.present, motion.dt_s
+    nothing, sensors = Disturbances(), arrays.sensors
+    numbers = np.zeros((0, 0), np.uint32), nothing.factors[0], nothing.noise
+    robots = sensors.obs, swarm.present, swarm.active, swarm.carried_object
+    disturbing = disturb, *robots, *numbers, sensors.blanks, 0, False
+    return serving, moving, (tell_poses, *poses), disturbing
 
 
 def outermost(config: ScenarioConfig, policy: CompiledPolicy | None) -> Call:

@@ -50,6 +50,11 @@ def read_slices(reads: Collection[str] | None, layout: ObservationLayout) -> tup
     return tuple("light" if name == LIGHT_IF_CARRYING else name for name in reads)
 
 
+def light_of_carriers_only(reads: Collection[str] | None) -> bool:
+    """Return whether the light of robots that carry nothing may stay zero; `reads` as given."""
+    return reads is not None and "light" not in reads
+
+
 def new_sensors(config: ScenarioConfig, layout: ObservationLayout, reads: Collection[str] | None) -> Sensors:
     """Allocate the sensors of one swarm; slices not named in `reads` may stay zero."""
     n_robots = config.robots.n_robots
@@ -77,7 +82,7 @@ def new_sensors(config: ScenarioConfig, layout: ObservationLayout, reads: Collec
         cache_half_side=config.cache_half_side_cells,
         reads_light="light" in read,
         light_is_due=np.ones(1, np.bool_),
-        light_of_carriers_only=reads is not None and "light" not in reads,
+        light_of_carriers_only=light_of_carriers_only(reads),
         reads_ground="ground" in read,
         reads_line_of_sight=not {"los_cell", "los_object", "los_cache"}.isdisjoint(read),
         behind_counts=config.quirks.obstacle_behind_counts,

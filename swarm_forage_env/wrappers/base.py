@@ -46,6 +46,8 @@ class SwarmWrapper(BaseParallelWrapper):
     state from `self.unwrapped` (`swarm`, `events`, `tick` ...) and change the world only by `set_population` and
     `set_handling_ticks` of `self.unwrapped`.
 
+    A wrapper that can tell what its hooks will do may spare them in runs without Python between the ticks; see `ahead`.
+
     Snapshots, copies and pickles hold all attributes of a wrapper. One that has something which cannot be pickled, or
     should not go back to what it was, leaves it out by `__getstate__`.
 
@@ -155,6 +157,32 @@ class SwarmWrapper(BaseParallelWrapper):
             terminated: (N,) bool, robots that are dead for good.
             truncated: Whether the horizon is reached.
         """
+
+    def ahead(self, n_ticks: int) -> tuple[int, dict[str, Any]]:
+        """Return for how many of the coming ticks, at most `n_ticks`, the hooks of a tick need not be called.
+
+        And what is done in these ticks instead, as fields of `world.kernels.disturbances.Disturbances`. With 0 the
+        hooks are called in the coming tick. A wrapper without this method, and one whose hooks were replaced, has them
+        called in all ticks.
+        """
+        return n_ticks, {}
+
+    def count_ticks(self, n_ticks: int, n_observed: int) -> None:
+        """Note that ticks have passed as `ahead` said.
+
+        Args:
+            n_ticks: How many.
+            n_observed: After how many of them the observation, too, was disturbed as it said. It is one less where
+                `observe` and `after_step` are still called for the last.
+        """
+
+    @property
+    def tells_ahead(self) -> bool:
+        """Whether `ahead` speaks for the hooks: for those of the class that has it, none of them replaced."""
+        teller = next(kind for kind in type(self).__mro__ if "ahead" in vars(kind))
+        return not any(
+            name in vars(self) or getattr(type(self), name) is not getattr(teller, name) for name in (*_HOOKS, "ahead")
+        )
 
     def interval_columns(self) -> dict[str, float]:
         """Return this wrapper's own columns of the run record for the recording interval that ends now.

@@ -3,22 +3,22 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import sqrt
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, known_name, number, one_of, several, table
-from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env._internal.rng import Stream, TickBits, stream_rng
 from swarm_forage_env.contract.layout import MESSAGES, NEIGHBOUR_FIELDS, NEIGHBOURS
-from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import from_mapping
+from swarm_forage_env.world.kernels.disturbances import NOT_NOISY, Noise, disturb, garble, noisy_gain, shift_neighbours
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
-from swarm_forage_env.wrappers.kernels import NOT_NOISY, disturb, garble, noisy_gain, shift_neighbours, to_normal
 from swarm_forage_env.wrappers.waveform import (
     Sigma,
-    Signal,
     Waveform,
+    WaveformAhead,
     check_sigma,
     gather_waveform,
     is_noisy,
@@ -43,15 +43,18 @@ _UNIFORM_WIDTH = 2.0 * sqrt(3.0)
 """Width of a uniform distribution with standard deviation 1."""
 
 
-def _append_span(spans: list[tuple[int, int, int]], lows: list[float], span: tuple[int, int, int], low: float) -> None:
-    """Append a run of columns, as `kernels.disturb` wants it.
+_Span: TypeAlias = tuple[int, int, int, int]
+
+
+def _append_span(spans: list[_Span], lows: list[float], span: _Span, low: float) -> None:
+    """Append a run of columns, as `Noise` has it.
 
     Where it goes on from the end of the last, it makes that longer, because few long runs are faster.
     """
     if spans and lows[-1] == low:
-        start, first, size = spans[-1]
-        if (start + size, first + size) == span[:2]:
-            spans[-1] = start, first, size + span[2]
+        start, first, size, of_carriers = spans[-1]
+        if (start + size, first + size, of_carriers) == (*span[:2], span[3]):
+            spans[-1] = start, first, size + span[2], of_carriers
             return
     spans.append(span)
     lows.append(low)
@@ -93,21 +96,26 @@ class SensorNoise(SwarmWrapper):
                 "leave the group out."
             )
         self.made_from = config
-        self._is_uniform = config.distribution == "uniform"
+        is_uniform = config.distribution == "uniform"
         exact = POSE_GROUPS if self.unwrapped.scenario.quirks.pose_sensors_exact else ()
         sigmas = config.group_sigmas().items()
-        self._place_groups({name: sigma for name, sigma in sigmas if is_noisy(sigma) and name not in exact})
-        self._draws: ObsArray = np.zeros((self.unwrapped.scenario.robots.n_robots, len(self._factors)), np.float32)
+        noisy = {name: sigma for name, sigma in sigmas if is_noisy(sigma) and name not in exact}
+        self._place_groups(noisy, is_uniform=is_uniform)
+        if hasattr(self, "_draws") and self._draws.rows().shape[-1] != len(self._units):
+            self._start_draws(self._draws.rng)
 
-    def _place_groups(self, sigmas: dict[str, Sigma]) -> None:
+    def _start_draws(self, rng: np.random.Generator) -> None:
+        self._draws = TickBits(rng, self.unwrapped.scenario.robots.n_robots, len(self._units))
+
+    def _place_groups(self, sigmas: dict[str, Sigma], *, is_uniform: bool) -> None:
         """Give each noisy group its columns of the draws, in a fixed order, and the factors from draws to noise."""
         parts = {part.noise_group: part for part in self.unwrapped.layout if part.noise_group in sigmas}
         units: list[float] = []
-        spans: list[tuple[int, int, int]] = []
+        spans: list[_Span] = []
         lows: list[float] = []
         constant: list[float] = []
-        self._varying: list[tuple[slice, Signal]] = []
-        self._heading = 0, NOT_NOISY
+        self._varying: list[tuple[slice, WaveformAhead]] = []
+        heading = 0, NOT_NOISY
         self._neighbours: tuple[int, int, int] | None = None
         for name in (name for name in ALL_GROUPS if name in sigmas):
             part, sigma, first = parts[name], sigmas[name], len(units)
@@ -116,7 +124,7 @@ class SensorNoise(SwarmWrapper):
             if name == "heading":
                 units.append(1.0)
                 if is_read:
-                    self._heading = part.start, first
+                    heading = part.start, first
             elif name == NEIGHBOURS:
                 n_seen = part.size // NEIGHBOUR_FIELDS
                 units += [1.0 / part.scale[0]] * (2 * n_seen)
@@ -124,58 +132,76 @@ class SensorNoise(SwarmWrapper):
             else:
                 units += [_NATURAL_UNITS.get(name, 1.0) / scale for scale in part.scale]
                 if is_read:
-                    _append_span(spans, lows, (part.start, first, part.size), 0.0 if name in _READINGS else -1.0)
+                    of_carriers = part.name == "light" and self.unwrapped.arena.light_of_carriers_only
+                    span = part.start, first, part.size, int(of_carriers)
+                    _append_span(spans, lows, span, 0.0 if name in _READINGS else -1.0)
             if isinstance(sigma, Waveform):
-                self._varying.append((slice(first, len(units)), sigma.signal(self.unwrapped.scenario.dt_s)))
+                signal = sigma.signal(self.unwrapped.scenario.dt_s)
+                self._varying.append((slice(first, len(units)), WaveformAhead(signal)))
             constant += [0.0 if isinstance(sigma, Waveform) else sigma] * (len(units) - first)
-        self._units: ObsArray = np.array(units, np.float32) * np.float32(_UNIFORM_WIDTH if self._is_uniform else 1.0)
-        self._factors: ObsArray = np.array(constant, np.float32) * self._units
-        self._spans: IntArray = np.array(spans, np.int32).reshape(-1, 3)
-        self._lows: ObsArray = np.array(lows, np.float32)
+        self._units: ObsArray = np.array(units, np.float32) * np.float32(_UNIFORM_WIDTH if is_uniform else 1.0)
+        self._constant: ObsArray = np.array(constant, np.float32) * self._units
+        self._noise = Noise(is_uniform, np.array(spans, np.int32).reshape(-1, 4), np.array(lows, np.float32), heading)
+
+    def _factors(self, tick: int, n_ticks: int) -> ObsArray:
+        """Return the factors (n_ticks, C) from draws to noise of some ticks, or (1, C) where they do not change."""
+        if not self._varying:
+            return self._constant[None]
+        factors = np.tile(self._constant, (n_ticks, 1))
+        for columns, waveform in self._varying:
+            sigmas = np.maximum(0.0, waveform.of(tick)[:n_ticks]).astype(np.float32)
+            factors[:, columns] = sigmas[:, None] * self._units[columns]
+        return factors
 
     def on_reset(self, seed: int) -> None:
         """Start the random stream."""
-        self._rng = stream_rng(seed, Stream.SENSOR_NOISE)
-        self._believing = 0.0
-        self._n_ticks = 0
+        self._start_draws(stream_rng(seed, Stream.SENSOR_NOISE))
+        self._believing = np.zeros(2)
 
     def observe(self, obs: ObsArray) -> ObsArray:
         """Perturb `obs` in place."""
         env = self.unwrapped
-        self._rng.random(out=self._draws, dtype=np.float32)
-        for columns, signal in self._varying:
-            self._factors[columns] = max(0.0, signal(env.tick)) * self._units[columns]
-        swarm = env.swarm
+        draws, factors, swarm = self._draws.rows()[0], self._factors(env.tick, 1)[0], env.swarm
+        self._draws.count_ticks(1)
         self._share_that_believes = disturb(
             obs,
             swarm.present,
             swarm.active,
-            self._draws,
-            self._is_uniform,
-            self._factors,
-            self._spans,
-            self._lows,
-            self._heading,
+            swarm.carried_object,
+            draws,
+            factors,
+            self._noise,
             env.arena.blanks,
             self._proximity,
             self._behind_counts,
         )
         if self._neighbours is not None:
-            centre = 0.5 if self._is_uniform else 0.0
-            shift_neighbours(obs, self._draws, centre, self._factors, *self._neighbours)
+            shift_neighbours(obs, draws, self._noise.is_uniform, factors, *self._neighbours)
         return obs
 
     def after_step(self, tasks: CodeArray | None, terminated: BoolArray, truncated: bool) -> None:
         """Count who believes in an obstacle."""
-        self._believing += self._share_that_believes
-        self._n_ticks += 1
+        self._believing += self._share_that_believes, 1.0
+
+    def ahead(self, n_ticks: int) -> tuple[int, dict[str, Any]]:
+        """Return what disturbs the observations after the coming ticks."""
+        if self._neighbours is not None:
+            return 0, {}
+        draws, tick = self._draws.rows(), self.unwrapped.tick + 1
+        known = (waveform.of(tick) for _, waveform in self._varying)
+        n_ticks = min(n_ticks, len(draws), *(len(values) for values in known))
+        told = {"draws": draws, "factors": self._factors(tick, n_ticks), "noise": self._noise}
+        return n_ticks, told | {"believing": self._believing}
+
+    def count_ticks(self, n_ticks: int, n_observed: int) -> None:
+        """Count the draws."""
+        self._draws.count_ticks(n_observed)
 
     def interval_columns(self) -> dict[str, float]:
         """Return the mean over ticks of the share of active robots that believed in an obstacle."""
-        mean = self._believing / self._n_ticks
-        self._believing = 0.0
-        self._n_ticks = 0
-        return {"believed_interference_fraction": mean}
+        believing, n_ticks = self._believing.tolist()
+        self._believing[:] = 0.0
+        return {"believed_interference_fraction": believing / n_ticks}
 
 
 class ActuatorNoise(SwarmWrapper):
@@ -189,7 +215,6 @@ class ActuatorNoise(SwarmWrapper):
         scenario = self.unwrapped.scenario
         self.reconfigure(config)
         self._unit_gain: FloatArray = np.ones((scenario.robots.n_robots, 2))
-        self._draws: ObsArray = np.zeros((scenario.robots.n_robots, 2), np.float32)
         self._gain: FloatArray = np.ones((scenario.robots.n_robots, 2))
 
     def reconfigure(self, config: "ActuatorNoiseConfig") -> None:
@@ -198,21 +223,38 @@ class ActuatorNoise(SwarmWrapper):
         sigma = config.sigma
         self._is_uniform = config.distribution == "uniform"
         self._is_noisy = is_noisy(sigma)
-        self._signal = sigma_signal(sigma, self.unwrapped.scenario.dt_s)
+        self._sigmas = WaveformAhead(sigma_signal(sigma, self.unwrapped.scenario.dt_s))
 
     def on_reset(self, seed: int) -> None:
         """Start the random stream."""
-        self._rng = stream_rng(seed, Stream.ACTUATOR_NOISE)
+        self._draws = TickBits(stream_rng(seed, Stream.ACTUATOR_NOISE), self.unwrapped.scenario.robots.n_robots, 2)
 
     def gain(self, actions: ActionArray, wheel_gain: FloatArray | None) -> FloatArray | None:
         """Multiply this tick's factors into the gains."""
         if not self._is_noisy:
             return wheel_gain
-        self._rng.random(out=self._draws, dtype=np.float32)
-        factor = max(0.0, self._signal(self.unwrapped.tick + 1)) * (_UNIFORM_WIDTH if self._is_uniform else 1.0)
         outer_gain = self._unit_gain if wheel_gain is None else wheel_gain
-        noisy_gain(self._draws, self._is_uniform, factor, outer_gain, self._gain)
+        noisy_gain(self._draws.rows()[0], self._is_uniform, self._factors(1)[0], outer_gain, self._gain)
+        self._draws.count_ticks(1)
         return self._gain
+
+    def _factors(self, n_ticks: int) -> FloatArray:
+        """Return the factors of the coming ticks, of `n_ticks` at most."""
+        sigmas = self._sigmas.of(self.unwrapped.tick + 1)[:n_ticks]
+        return np.maximum(0.0, sigmas) * (_UNIFORM_WIDTH if self._is_uniform else 1.0)
+
+    def ahead(self, n_ticks: int) -> tuple[int, dict[str, Any]]:
+        """Return the noise on wheels in the coming ticks."""
+        if not self._is_noisy:
+            return n_ticks, {}
+        draws, factors = self._draws.rows(), self._factors(n_ticks)
+        told = {"wheel_draws": draws, "wheel_factors": factors, "wheels_uniform": self._is_uniform}
+        return min(n_ticks, len(draws), len(factors)), told | {"gain": self._gain}
+
+    def count_ticks(self, n_ticks: int, n_observed: int) -> None:
+        """Count the draws."""
+        if self._is_noisy:
+            self._draws.count_ticks(n_ticks)
 
 
 class MessageNoise(SwarmWrapper):
@@ -238,8 +280,7 @@ class MessageNoise(SwarmWrapper):
         self._start = self.unwrapped.layout.part(MESSAGES).start
         # A slice that is not read is not rewritten either: noise would add up there.
         self._is_read = MESSAGES in self.unwrapped.arena.reads
-        self._draws: ObsArray = np.zeros((robots.n_robots, self._size), np.float32)
-        self._lost: FloatArray = np.zeros(robots.n_robots)
+        self._n_robots = robots.n_robots
         self.reconfigure(config)
 
     def reconfigure(self, config: "MessageNoiseConfig") -> None:
@@ -254,12 +295,11 @@ class MessageNoise(SwarmWrapper):
 
     def observe(self, obs: ObsArray) -> ObsArray:
         """Disturb `obs` in place."""
-        self._rng.random(out=self._draws, dtype=np.float32)
-        to_normal(self._draws)
-        self._rng.random(out=self._lost)
+        draws = self._rng.integers(2**32, size=(self._n_robots, self._size), dtype=np.uint32)
+        lost = self._rng.random(self._n_robots)
         if self._is_read:
             sigma = max(0.0, self._signal(self.unwrapped.tick))
-            garble(obs, self._draws, self._lost, self._start, sigma, self._loss, self._size)
+            garble(obs, draws, lost, self._start, sigma, self._loss, self._size)
         return obs
 
 

@@ -1,7 +1,7 @@
 """PopulationDynamics: robots that die, are born, break down and are repaired during a run."""
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -90,6 +90,14 @@ class PopulationDynamics(SwarmWrapper):
                 self._apply()
             self._next_tick = self._clocks.next_tick
         self._repair_ticks += len(self._state.repair_queue)
+
+    def ahead(self, n_ticks: int) -> tuple[int, dict[str, Any]]:
+        """Return how long nothing happens."""
+        return int(min(n_ticks, max(0, self._next_tick - 1 - self.unwrapped.tick))), {}
+
+    def count_ticks(self, n_ticks: int, n_observed: int) -> None:
+        """Count ticks of robots in repair."""
+        self._repair_ticks += n_ticks * len(self._state.repair_queue)
 
     def kill(self, row: int) -> bool:
         """Let one robot die now, between two ticks; returns whether it was alive."""

@@ -1,7 +1,7 @@
 """RunRecorder: turns the arena's cumulative counters into columns over recording intervals."""
 
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -9,11 +9,13 @@ from swarm_forage_env.contract.codes import Counter, Event, Task
 from swarm_forage_env.contract.kernel_policy import CompiledPolicy
 from swarm_forage_env.contract.policy import refused_tasks
 from swarm_forage_env.contract.types import BoolArray, CodeArray
-from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.env import BatchStep, ForageEnv
 from swarm_forage_env.scenarios.columns import part_column
 from swarm_forage_env.scenarios.config import whole_intervals
 from swarm_forage_env.scenarios.performance import performance_curve
+from swarm_forage_env.world.arena import UNDISTURBED
 from swarm_forage_env.world.kernels.counting import add_task_shares
+from swarm_forage_env.world.kernels.disturbances import Disturbances
 from swarm_forage_env.wrappers.base import SwarmWrapper
 
 TOTALS: dict[str, Counter] = {
@@ -38,6 +40,8 @@ TICK_MEANS: dict[str, Counter] = {
     "n_objects_cached": Counter.OBJECTS_CACHED,
 }
 """Columns that are means over the ticks of an interval."""
+
+_NO_REWARDS = np.zeros(0, np.float32)
 
 
 class _PartTally:
@@ -132,23 +136,55 @@ class RunRecorder(SwarmWrapper):
             self._close_interval(has_tasks=tasks is not None)
 
     def run(self, policy: CompiledPolicy, n_ticks: int) -> None:
-        """Let a compiled policy drive a swarm for some ticks, at most to the horizon.
+        """Let a compiled policy drive a swarm for some ticks, at most to the end of the run.
+
+        Wrappers inside are asked for what they do `ahead`; where one has to act, their hooks are called in that tick.
 
         Raises:
-            RuntimeError: there are other wrappers, which this would pass by, or bodies that are not compiled.
+            RuntimeError: bodies that are not compiled.
         """
         env = self.unwrapped
-        if self._inner is not env:
-            raise RuntimeError("Expected no wrapper besides the recorder; step tick by tick.")
-        n_ticks = min(n_ticks, env.max_cycles - env.tick)
-        while n_ticks > 0:
-            n_steps = min(n_ticks, self._ticks_left)
-            env.run(policy, n_steps, self._task_sums)
-            n_ticks -= n_steps
-            self._ticks_left -= n_steps
+        arena, end = env.arena, min(env.tick + n_ticks, env.max_cycles)
+        while env.tick < end and not self._complete:
+            n_ahead, disturbances = self._disturbances(min(end - env.tick, self._ticks_left))
+            if n_ahead == 0:
+                self._run_with_hooks(policy)
+                continue
+            before = env.tick
+            n_observed = arena.run(policy, n_ahead, self._task_sums, disturbances)
+            n_done = env.tick - before
+            for wrapper in self._inside:
+                wrapper.count_ticks(n_done, n_observed)
+            if n_observed < n_done and isinstance(self._inner, SwarmWrapper):
+                self._inner._after(self._stepped(), policy.task)
+            self._ticks_left -= n_done
             self._complete = env.tick >= env.max_cycles
             if self._ticks_left == 0 or self._complete:
                 self._close_interval(has_tasks=policy.task is not None)
+
+    def _disturbances(self, n_ticks: int) -> tuple[int, Disturbances]:
+        """Return in how many ticks, at most `n_ticks`, no hook is needed, and what the wrappers do in them."""
+        if not self._inside:
+            return n_ticks, UNDISTURBED
+        fields: dict[str, Any] = {}
+        for wrapper in self._inside:
+            n_ticks, told = wrapper.ahead(n_ticks)
+            fields |= told
+        # The last death may have come between two ticks; then the coming one ends the run.
+        return 0 if self.unwrapped.terminated.all() else n_ticks, Disturbances(**fields)
+
+    def _run_with_hooks(self, policy: CompiledPolicy) -> None:
+        """Run one tick as a step of the stack does: what robots want to do stands before any wrapper acts."""
+        arena = self.unwrapped.arena
+        arena.run(policy, 0, None)
+        _, wheel_gain = self._before(policy.state[-1], None)
+        arena.run(policy, 1, None, wheel_gain=wheel_gain, acts=False)
+        self._after(self._stepped(), policy.task)
+
+    def _stepped(self) -> BatchStep:
+        """Return the result of the last step, without rewards."""
+        env = self.unwrapped
+        return env.arena.obs, _NO_REWARDS, env.terminated, env.tick >= env.max_cycles
 
     def columns(self) -> dict[str, np.ndarray]:
         """Return the columns of the finished run by name, (T,) each.

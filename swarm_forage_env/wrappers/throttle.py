@@ -1,17 +1,17 @@
 """Throttle: robots lose part of their speed, by a waveform of time."""
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, instance, switch
 from swarm_forage_env.contract.types import ActionArray, FloatArray
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.world.kernels.disturbances import throttle
 from swarm_forage_env.world.motion import drive_limits
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
-from swarm_forage_env.wrappers.kernels import throttle
-from swarm_forage_env.wrappers.waveform import Waveform
+from swarm_forage_env.wrappers.waveform import Waveform, WaveformAhead
 
 IDEAL_THROTTLE = 0.10
 """Constant throttle that the paper's flexibility studies take as ideal conditions."""
@@ -43,6 +43,7 @@ class Throttle(SwarmWrapper):
         self.made_from = config
         self._only_carriers = config.carriers
         self._signal = config.waveform.signal(self.unwrapped.scenario.dt_s)
+        self._values = WaveformAhead(self._signal)
 
     def on_reset(self, seed: int) -> None:
         """Start the waveform."""
@@ -60,6 +61,22 @@ class Throttle(SwarmWrapper):
         outer_gain = self._unit_gain if wheel_gain is None else wheel_gain
         throttle(actions, value, self._only_carriers, carried_object, self._limits, outer_gain, self._gain)
         return self._gain
+
+    def ahead(self, n_ticks: int) -> tuple[int, dict[str, Any]]:
+        """Return the throttle of the coming ticks."""
+        values = self._values.of(self.unwrapped.tick + 1)
+        return min(n_ticks, len(values)), {
+            "throttles": values,
+            "only_carriers": self._only_carriers,
+            "gain": self._gain,
+        }
+
+    def count_ticks(self, n_ticks: int, n_observed: int) -> None:
+        """Add up the throttle of these ticks."""
+        for value in self._values.of(self.unwrapped.tick + 1 - n_ticks)[:n_ticks].tolist():
+            self._value = value
+            self._sum += value
+        self._ticks += n_ticks
 
     def interval_columns(self) -> dict[str, float]:
         """Return V at the last tick, and its mean over the ticks since the last call."""

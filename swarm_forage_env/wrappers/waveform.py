@@ -20,7 +20,10 @@ from dataclasses import dataclass, fields
 from functools import partial
 from typing import Any, TypeAlias
 
+import numpy as np
+
 from swarm_forage_env._internal.fields import ConfigError, known_keys, number, one_of, several
+from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.scenarios.config import from_mapping
 
 Signal: TypeAlias = Callable[[int], float]
@@ -169,6 +172,24 @@ class Waveform:
         assert self.period_s is not None, "checked at construction"
         function = {"sine": _sine, "square": _square, "sawtooth": _sawtooth}[self.kind]
         return partial(function, self.period_s / dt_s, amplitude, offset, phase)
+
+
+class WaveformAhead:
+    """Values of a signal, worked out for many ticks at a time."""
+
+    _TICKS = 64
+
+    def __init__(self, signal: Signal) -> None:
+        """Take the signal."""
+        self._signal = signal
+        self._first, self._values = 0, np.zeros(0)
+
+    def of(self, tick: int) -> FloatArray:
+        """Return the values (ticks,) of a tick and of those after it that are worked out already, at least one."""
+        if not 0 <= tick - self._first < len(self._values):
+            self._first = tick
+            self._values = np.array([self._signal(later) for later in range(tick, tick + self._TICKS)], float)
+        return self._values[tick - self._first :]
 
 
 def _constant(amplitude: float, _tick: int) -> float:

@@ -6,6 +6,7 @@ from collections import deque
 import numpy as np
 
 from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.world.kernels.disturbances import standard
 from swarm_forage_env.wrappers.population_process import EventRates
 from tests.reference.motion import limited_wheels
 
@@ -16,6 +17,12 @@ def throttle_gain(command: tuple[float, float], strength: float) -> float:
     if left == 0.0 and right == 0.0:
         return 1.0
     return 1.0 - max(0.0, strength) * abs(left + right) / (abs(left) + abs(right))
+
+
+def normal_of(uniform: np.ndarray) -> np.ndarray:
+    """Standard normal numbers of uniform ones, which are multiples of 2^-24."""
+    bits = (np.asarray(uniform, np.float64) * 2.0**32).astype(np.uint32)
+    return np.array([standard(each, False) for each in bits.ravel()], np.float32).reshape(bits.shape)
 
 
 def noisy_row(

@@ -104,9 +104,6 @@ TWINS = {
     "swarm_forage_env.world.kernels.drive.hold_inside": Twin(
         "motion.held_inside", "world/test_physics.py", "swarm_forage_env.world.kernels.drive.hold_inside"
     ),
-    "swarm_forage_env.world.kernels.drive.limit_command": Twin(
-        "motion.limited_wheels", "world/test_drive.py", "swarm_forage_env.env.ForageEnv.step_batch"
-    ),
     "swarm_forage_env.world.kernels.drive.unpack_poses": MOTION,
     "swarm_forage_env.world.kernels.floor.ground": OBSERVED,
     "swarm_forage_env.world.kernels.floor.light": OBSERVED,
@@ -130,11 +127,11 @@ TWINS = {
     "swarm_forage_env.world.kernels.walk.walk": Twin(
         "object_walk.walk_slowly", "world/test_object_motion.py", "swarm_forage_env.world.kernels.walk.walk"
     ),
-    "swarm_forage_env.wrappers.kernels.disturb": NOISE,
-    "swarm_forage_env.wrappers.kernels.garble": Twin(
+    "swarm_forage_env.world.kernels.disturbances.disturb": NOISE,
+    "swarm_forage_env.world.kernels.disturbances.garble": Twin(
         "adversity.garbled", "wrappers/test_messages.py", "swarm_forage_env.wrappers.base.SwarmWrapper.step_batch"
     ),
-    "swarm_forage_env.wrappers.kernels.shift_neighbours": Twin(
+    "swarm_forage_env.world.kernels.disturbances.shift_neighbours": Twin(
         "adversity.shifted_neighbours",
         "wrappers/test_messages.py",
         "swarm_forage_env.wrappers.base.SwarmWrapper.step_batch",
@@ -144,7 +141,7 @@ TWINS = {
         "wrappers/test_recorder.py",
         "swarm_forage_env.world.kernels.counting.add_task_shares",
     ),
-    "swarm_forage_env.wrappers.kernels.throttle": Twin(
+    "swarm_forage_env.world.kernels.disturbances.throttle": Twin(
         "adversity.throttle_gain", "wrappers/test_throttle.py", "swarm_forage_env.wrappers.base.SwarmWrapper.step_batch"
     ),
 }
@@ -169,8 +166,6 @@ WITHOUT = {
     "swarm_forage_env.world.kernels.lockstep.whole_each": "`tick.whole` for each world; compared with arenas that are "
     "stepped alone in tests/world/test_lockstep.py",
     "swarm_forage_env.world.kernels.reward.rewards": "a weighted sum; term by term in tests/world/test_rewards.py",
-    "swarm_forage_env.wrappers.kernels.to_normal": "held against the distribution function in "
-    "tests/wrappers/test_noise.py",
     "swarm_forage_env.world.kernels.tick.close": IN_ORDER,
     "swarm_forage_env.world.kernels.tick.meet_and_close": IN_ORDER,
     "swarm_forage_env.world.kernels.tick.observe": IN_ORDER,
@@ -178,6 +173,9 @@ WITHOUT = {
     "tests/runs/test_compiled_runs.py",
     "swarm_forage_env.world.kernels.tick.set_out": IN_ORDER,
     "swarm_forage_env.world.kernels.tick.whole": IN_ORDER,
-    "swarm_forage_env.wrappers.kernels.noisy_gain": "one product per wheel; by hand in tests/wrappers/test_noise.py",
+    "swarm_forage_env.world.kernels.disturbances.disturb_wheels": "`throttle` and `noisy_gain`; compared with "
+    "hooks in tests/runs/test_compiled_disturbances.py",
+    "swarm_forage_env.world.kernels.disturbances.noisy_gain": "one product per wheel; by hand in "
+    "tests/wrappers/test_noise.py",
 }
 """Kernel -> why it has no twin here."""

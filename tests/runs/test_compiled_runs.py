@@ -13,7 +13,6 @@ from swarm_forage_env.runs.run import LiveRun, build_env, build_stack
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.recorder import RunRecorder
-from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.support.foraging import quick_world
 from tests.support.stage import assert_same_world, snapshot
 
@@ -65,9 +64,8 @@ def test_a_run_without_python_is_the_run_with_it(policy, name, fields):
         assert one.columns()["first_picked"].sum() > 0
 
 
-def is_compiled(world: ScenarioConfig, policy: Policy, *wrappers: str) -> bool:
-    stack = build_stack(world, [parse_wrapper(text) for text in wrappers], reads=policy.reads)
-    return LiveRun(stack, policy, seed=0).compiled_policy is not None
+def is_compiled(world: ScenarioConfig, policy: Policy) -> bool:
+    return LiveRun(build_stack(world, reads=policy.reads), policy, seed=0).compiled_policy is not None
 
 
 class Proxy:
@@ -103,7 +101,6 @@ def test_python_is_asked_wherever_it_has_a_say():
     patched.after_step = lambda *arguments: None
     assert LiveRun(patched, CRWPolicy(), seed=0).compiled_policy is None
     assert not is_compiled(world, tick_by_tick(CRWPolicy()))
-    assert not is_compiled(world, CRWPolicy(), "sensor_noise:sigma=0.01")
     assert not is_compiled(scenario("warehouse_small", n_robots=2, physics="chipmunk"), CRWPolicy())
 
 

@@ -7,7 +7,6 @@ import pytest
 
 from swarm_forage_env import ConfigError, ForageEnv, scenario
 from swarm_forage_env._internal.rng import Stream, stream_rng
-from swarm_forage_env.wrappers.kernels import to_normal
 from swarm_forage_env.wrappers.noise import (
     NOISE_GROUPS,
     MessageNoise,
@@ -17,7 +16,7 @@ from swarm_forage_env.wrappers.noise import (
 )
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.waveform import Waveform
-from tests.reference.adversity import garbled, shifted_neighbours
+from tests.reference.adversity import garbled, normal_of, shifted_neighbours
 
 N_ROBOTS = 8
 SEED = 3
@@ -38,8 +37,7 @@ def test_messages_are_garbled_as_by_the_twin():
     for actions in (None, *ACTIONS):
         if actions is not None:
             true, seen = plain.step_batch(actions)[0], noisy.step_batch(actions)[0]
-        draws = rng.random((N_ROBOTS, 2), dtype=np.float32)
-        to_normal(draws)
+        draws = normal_of(rng.random((N_ROBOTS, 2), dtype=np.float32))
         lost = rng.random(N_ROBOTS)
         for robot in range(N_ROBOTS):
             row = true[robot, columns].tolist()
@@ -104,7 +102,7 @@ def test_neighbours_are_shifted_as_by_the_twin(distribution):
             true, seen = plain.step_batch(actions)[0], noisy.step_batch(actions)[0]
         draws = rng.random((N_ROBOTS, 6), dtype=np.float32)
         if distribution == "gaussian":
-            to_normal(draws)
+            draws = normal_of(draws)
         else:
             draws = (draws - 0.5) * np.float32(12.0**0.5)
         for robot in range(N_ROBOTS):

@@ -10,7 +10,6 @@ from swarm_forage_env.contract.detection import sees_cache, sees_nest, sees_obje
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import Quirks
-from swarm_forage_env.wrappers.kernels import to_normal
 from swarm_forage_env.wrappers.noise import (
     NOISE_GROUPS,
     ActuatorNoise,
@@ -20,7 +19,7 @@ from swarm_forage_env.wrappers.noise import (
     noise_levels,
 )
 from swarm_forage_env.wrappers.waveform import Waveform
-from tests.reference.adversity import by_group, noisy_row
+from tests.reference.adversity import by_group, noisy_row, normal_of
 from tests.support.fake_arena import FakeArena
 from tests.support.stage import assert_same_world, snapshot, tidy_world
 
@@ -108,8 +107,7 @@ def test_equals_the_slow_twin(world):
     heading = rng.uniform(-np.pi, np.pi, ROBOTS)
     obs[:, world.layout["heading"]] = np.column_stack((np.cos(heading), np.sin(heading)))
     seen = noisy(world, obs, 1, sigma=0.2)[0]
-    draws = stream_rng(1, Stream.SENSOR_NOISE).random((ROBOTS, 57), dtype=np.float32)
-    to_normal(draws)
+    draws = normal_of(stream_rng(1, Stream.SENSOR_NOISE).random((ROBOTS, 57), dtype=np.float32))
     for robot, groups in enumerate(by_group(draws)):
         expected = noisy_row(obs[robot].tolist(), groups, 0.2, (48.0, 48.0))
         np.testing.assert_allclose(seen[robot], expected, rtol=0, atol=2e-6)
@@ -321,21 +319,16 @@ def test_quirk_pose_sensors_exact(exact):
 
 def test_normal_draws_have_the_normal_distribution_function():
     steps = np.concatenate((np.arange(0, 2**24, 4099), np.arange(20_000), 2**24 - 1 - np.arange(20_000)))
-    uniform = (steps.astype(np.float32) * np.float32(2.0**-24)).reshape(1, -1)
-    normal = uniform.copy()
-    to_normal(normal)
+    normal = normal_of(steps * 2.0**-24)
     assert np.abs(special.ndtr(normal.astype(np.float64)) - (steps + 0.5) * 2.0**-24).max() < 2e-5
     assert np.abs(normal).max() == pytest.approx(5.42, abs=0.005)
-    mirrored = ((2**24 - 1 - steps).astype(np.float32) * np.float32(2.0**-24)).reshape(1, -1)
-    to_normal(mirrored)
-    np.testing.assert_allclose(mirrored, -normal, atol=1e-6)
+    np.testing.assert_allclose(normal_of((2**24 - 1 - steps) * 2.0**-24), -normal, atol=1e-6)
     rising = np.argsort(steps, kind="stable")
-    assert np.all(np.diff(normal[0, rising]) >= 0.0)
+    assert np.all(np.diff(normal[rising]) >= 0.0)
 
 
 def test_normal_draws_are_normal():
-    draws = np.random.default_rng(0).random((1000, 300), dtype=np.float32)
-    to_normal(draws)
+    draws = normal_of(np.random.default_rng(0).random((1000, 300), dtype=np.float32))
     assert stats.kstest(draws.ravel(), "norm").pvalue > 0.01
     assert stats.kurtosis(draws.ravel()) == pytest.approx(0.0, abs=4 * np.sqrt(24 / draws.size))
 

@@ -1,5 +1,6 @@
 """One tick, in its order. Here stand the phases that are compiled; each is a function of its own in another file.
 
+(wrappers disturb the wheels)
 drive           actions -> wheel speeds -> velocities                           set_out
 press           touching robots push with the force of their motors
 (bodies move: the physics of the scenario)
@@ -10,6 +11,7 @@ interact        pick-ups and drops
 walk            objects move by themselves                                      close
 count           caches
 sense           the rest of the observation
+(wrappers disturb it)
 """
 
 from collections.abc import Callable
@@ -22,6 +24,7 @@ from swarm_forage_env.world.kernels import beams, floor, kinds, proprioception
 from swarm_forage_env.world.kernels.bodies import BodyState, move_bodies, tell_poses
 from swarm_forage_env.world.kernels.contact import press
 from swarm_forage_env.world.kernels.counting import add_task_shares, mark
+from swarm_forage_env.world.kernels.disturbances import Disturbances, disturb, disturb_wheels
 from swarm_forage_env.world.kernels.drive import drive
 from swarm_forage_env.world.kernels.interact import serve
 from swarm_forage_env.world.kernels.neighbourhood import bin_robots
@@ -206,10 +209,12 @@ def whole(
 def run(
     a: ArenaArrays,
     b: BodyState,
+    d: Disturbances,
     wheel_gain: FloatArray,
     first: int,
     n_ticks: int,
     look_first: bool,
+    acts: bool,
     policy: Callable[..., None],
     policy_state: tuple[Any, ...],
     policy_first: int,
@@ -227,10 +232,12 @@ def run(
     Args:
         a: The arena.
         b: Its bodies.
+        d: What disturbs the robots. The observation after a tick that is not `DONE` is left as it is.
         wheel_gain: (N, 2), see `set_out`.
         first: Number of the first tick.
-        n_ticks: How many, at most as many as there are draws.
+        n_ticks: How many, at most as many as there are draws. With 0 the policy acts in the first, and that is all.
         look_first: See `set_out`.
+        acts: Whether the policy acts; else its actions stand as they are.
         policy: (obs, active, draws, state, tick); writes the actions, which are last in its state.
         policy_state: Its state.
         policy_first: Number of the first tick as the policy counts.
@@ -245,16 +252,35 @@ def run(
         How many ticks have begun, the outcome of the last of them, and whether its tasks were codes of `Task`, one per
         robot. Tasks of a tick with a refused action are not looked at.
     """
-    obs, active, actions = a.sensors.obs, a.state.swarm.active, policy_state[-1]
-    light_is_due = a.sensors.light_is_due
+    obs, swarm, s, actions = a.sensors.obs, a.state.swarm, a.sensors, policy_state[-1]
+    light_is_due = s.light_is_due
+    gain = d.gain if d.gain.shape[0] > 0 else wheel_gain
+    if n_ticks == 0:
+        policy(obs, swarm.active, policy_draws[0], policy_state, policy_first)
     for k in range(n_ticks):
-        policy(obs, active, policy_draws[k], policy_state, policy_first + k)
+        if acts:
+            policy(obs, swarm.active, policy_draws[k], policy_state, policy_first + k)
+        disturb_wheels(d, k, actions, swarm.carried_object, a.motion.drive_limits, wheel_gain)
         chance, walk_chance = chances[k % chances.shape[0]], walk_chances[k % walk_chances.shape[0]]
         now_then = policy_first + k + 1  # the tick in which the policy sees what is sensed here
         light_is_due[0] = (now_then - 1) % decision_ticks == 0 or k == n_ticks - 1
-        outcome = whole(a, b, actions, wheel_gain, first + k, look_first and k == 0, chance, walk_chance)
+        outcome = whole(a, b, actions, gain, first + k, look_first and k == 0, chance, walk_chance)
         light_is_due[0] = True  # for what Python may have to finish
-        counted = outcome >= 0 or tasks.shape[0] == 0 or add_task_shares(tasks, active, task_shares)
+        if outcome == DONE and d.draws.shape[0] > 0:
+            d.believing[0] += disturb(
+                obs,
+                swarm.present,
+                swarm.active,
+                swarm.carried_object,
+                d.draws[k],
+                d.factors[k % d.factors.shape[0]],
+                d.noise,
+                s.blanks,
+                s.columns.proximity,
+                s.behind_counts,
+            )
+            d.believing[1] += 1.0
+        counted = outcome >= 0 or tasks.shape[0] == 0 or add_task_shares(tasks, swarm.active, task_shares)
         if outcome != DONE or not counted:
             return k + 1, outcome, counted
     return n_ticks, DONE, True

@@ -1,0 +1,293 @@
+"""What wrappers do to robots in each tick: throttle, noise on wheels, on observations and on messages.
+
+Standard normal numbers come from random bits by the tabulated inverse of the distribution function. Noise needs
+thousands of them in every tick; numpy's own normal draws take three times as long. The upper 24 of 32 bits count, and
+each of their values stands for one number: interpolated between 4,096 equally likely cells, or looked up one by
+one in the outermost two. The distribution function is met to 2e-5 everywhere; no value is beyond 5.42.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import ndtri
+
+from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.detection import sees_obstacle
+from swarm_forage_env.contract.layout import NEIGHBOUR_FIELDS, RING_SENSORS
+from swarm_forage_env.contract.types import ActionArray, BitArray, BoolArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env.world.kernels.drive import limit_command
+from swarm_forage_env.world.kernels.kinds import blank
+
+_CELLS = 4096
+_EDGES = np.zeros(_CELLS + 1, np.float32)
+_EDGES[1:-1] = ndtri(np.arange(1, _CELLS) / _CELLS)
+"""Edges of the cells; the outermost are infinite and never used."""
+_TAIL = ndtri((np.arange(_CELLS) + 0.5) / _CELLS**2).astype(np.float32)
+"""Values of the lowest cell."""
+
+_OF_CELL, _WITHIN = np.uint32(20), np.uint32(8)
+"""Of 32 bits the upper 12 say which cell, and the next 12 where in it."""
+_LAST, _ONE = np.uint32(_CELLS - 1), np.uint32(1)
+_STEP, _HALF_STEP = np.float32(1.0 / _CELLS), np.float32(0.5 / _CELLS)
+_UNIT, _HALF = np.float32(2.0**-24), np.float32(0.5)
+NOT_NOISY = -1
+"""In place of a column of draws: the heading is exact."""
+
+
+class Noise(NamedTuple):
+    """Which columns of an observation are noisy, and how."""
+
+    is_uniform: bool
+    """Whether noise is uniform, else normal."""
+    spans: IntArray
+    """(S, 4) runs of neighbouring columns: first in obs, first in draws, length, 1 = only carriers read them."""
+    lows: ObsArray
+    """(S,) float32, lower clamp of each run."""
+    heading: tuple[int, int]
+    """First column of the heading in obs, and its column in draws, or `NOT_NOISY`."""
+
+
+def no_noise() -> Noise:
+    """Return noise on nothing."""
+    return Noise(False, np.zeros((0, 4), np.int32), np.zeros(0, np.float32), (0, NOT_NOISY))
+
+
+class Disturbances(NamedTuple):
+    """What wrappers do in some ticks that follow each other, for `tick.run`; as it is made here, nothing."""
+
+    throttles: FloatArray = np.zeros(0)
+    """(ticks,) strength in each; (0,) without."""
+    only_carriers: bool = False
+    """Whether only robots that carry are throttled."""
+    wheel_draws: BitArray = np.zeros((0, 0, 0), np.uint32)
+    """(ticks, N, 2) random bits of noise on wheels; (0, 0, 0) without."""
+    wheel_factors: FloatArray = np.zeros(0)
+    """(ticks,) see `noisy_gain`."""
+    wheels_uniform: bool = False
+    """Likewise."""
+    gain: FloatArray = np.zeros((0, 2))
+    """(N, 2) scratch for the gain of wheels; (0, 2) where nothing changes it."""
+    draws: BitArray = np.zeros((0, 0, 0), np.uint32)
+    """(ticks, N, C) random bits of noise on observations; (0, 0, 0) without."""
+    factors: ObsArray = np.zeros((1, 0), np.float32)
+    """(ticks, C), or (1, C) where they are always the same; see `disturb`."""
+    noise: Noise = no_noise()
+    believing: FloatArray = np.zeros(2)
+    """Sum over ticks of the share of active robots that see an obstacle under noise, and how many ticks."""
+
+
+@kernel
+def standard(bits: np.uint32, is_uniform: bool) -> np.float32:
+    """Return a random number of mean 0: normal with standard deviation 1, or uniform in [-0.5, 0.5)."""
+    if is_uniform:
+        return np.float32(np.int32(bits >> _WITHIN)) * _UNIT - _HALF
+    cell = np.uint32(bits >> _OF_CELL)
+    place = np.uint32((bits >> _WITHIN) & _LAST)
+    if cell == 0:
+        return _TAIL[place]
+    if cell == _LAST:
+        return -_TAIL[_LAST - place]
+    return _between_edges(bits)
+
+
+@kernel
+def _between_edges(bits: np.uint32) -> np.float32:
+    cell = np.uint32(bits >> _OF_CELL)
+    within = np.float32(np.int32((bits >> _WITHIN) & _LAST)) * _STEP
+    return _EDGES[cell] + (_EDGES[cell + _ONE] - _EDGES[cell]) * (within + _HALF_STEP)
+
+
+@kernel
+def disturb(
+    obs: ObsArray,
+    present: BoolArray,
+    active: BoolArray,
+    carried_object: IntArray,
+    draws: BitArray,
+    factors: ObsArray,
+    noise: Noise,
+    blanks: IntArray,
+    proximity: int,
+    behind_counts: bool,
+) -> float:
+    """Add noise to the rows of present robots, and return the share of active robots that then see an obstacle.
+
+    Args:
+        obs: (N, D), edited.
+        present: (N,) robots with a body; other rows stay as they are.
+        active: (N,) robots at work.
+        carried_object: (N,) row of the object that a robot carries, -1 for none.
+        draws: (N, C) random bits, one number per robot and noisy column.
+        factors: (C,) float32, observation units per unit of `standard`.
+        noise: Which columns.
+        blanks: (B, 4) what stays zero, as `kinds.blank` takes it: a sensor that is lacking has no noise.
+        proximity: First column of the proximity readings.
+        behind_counts: Quirk `obstacle_behind_counts`.
+
+    Returns:
+        The share, 0 if no robot is active.
+    """
+    start, turned = noise.heading
+    n_active = 0
+    n_seeing = 0
+    for i in range(obs.shape[0]):
+        if present[i]:
+            for k in range(noise.spans.shape[0]):
+                span = noise.spans[k]
+                if span[3] == 0 or carried_object[i] >= 0:
+                    row = obs[i, span[0] : span[0] + span[2]]
+                    bits = draws[i, span[1] : span[1] + span[2]]
+                    _add_noise(row, bits, factors[span[1] : span[1] + span[2]], noise.lows[k], noise.is_uniform)
+            if turned != NOT_NOISY:
+                angle = np.float64(standard(draws[i, turned], noise.is_uniform)) * np.float64(factors[turned])
+                _turn_heading(obs[i], start, angle)
+    blank(obs, blanks)
+    for i in range(obs.shape[0]):
+        if active[i]:
+            n_active += 1
+            n_seeing += sees_obstacle(obs[i, proximity : proximity + RING_SENSORS], behind_counts)
+    return n_seeing / n_active if n_active > 0 else 0.0
+
+
+@kernel
+def _add_noise(row: ObsArray, bits: BitArray, factors: ObsArray, low: np.float32, is_uniform: bool) -> None:
+    """Add random numbers times their factors to the columns of one run and clamp them to [low, 1]."""
+    one, least, most = np.float32(1.0), bits[0], bits[0]
+    for k in range(bits.shape[0]):
+        least, most = min(least, bits[k]), max(most, bits[k])
+    if is_uniform or least >> _OF_CELL == 0 or most >> _OF_CELL == _LAST:
+        for k in range(bits.shape[0]):
+            row[k] = min(one, max(low, row[k] + standard(bits[k], is_uniform) * factors[k]))
+    else:  # without branches the processor works on many at a time
+        for k in range(bits.shape[0]):
+            row[k] = min(one, max(low, row[k] + _between_edges(bits[k]) * factors[k]))
+
+
+@kernel
+def _turn_heading(obs: ObsArray, start: int, angle: float) -> None:
+    """Turn the heading (cos, sin), two columns of one row from `start`, by an angle in rad."""
+    cos = math.cos(angle)
+    sin = math.sin(angle)
+    x = float(obs[start])
+    y = float(obs[start + 1])
+    # Rounding to float32 can leave the unit circle by one unit in the last place.
+    obs[start] = min(1.0, max(-1.0, x * cos - y * sin))
+    obs[start + 1] = min(1.0, max(-1.0, x * sin + y * cos))
+
+
+@kernel
+def shift_neighbours(
+    obs: ObsArray, draws: BitArray, is_uniform: bool, factors: ObsArray, start: int, first: int, n_seen: int
+) -> None:
+    """Add noise to forward and left of neighbours that are there, and clamp them to [-1, 1].
+
+    Args:
+        obs: (N, D), edited.
+        draws: (N, C) as in `disturb`; two numbers per robot and neighbour.
+        is_uniform: As in `Noise`.
+        factors: (C,) float32, as in `disturb`.
+        start: First column of the neighbours in `obs`.
+        first: Their first column in `draws` and `factors`.
+        n_seen: Neighbours that an observation has room for.
+    """
+    one = np.float32(1.0)
+    for i in range(obs.shape[0]):
+        for k in range(n_seen):
+            at = start + NEIGHBOUR_FIELDS * k
+            if obs[i, at + NEIGHBOUR_FIELDS - 1] > 0.0:
+                for axis in range(2):
+                    column = first + 2 * k + axis
+                    noise = standard(draws[i, column], is_uniform) * factors[column]
+                    obs[i, at + axis] = min(one, max(-one, obs[i, at + axis] + noise))
+
+
+@kernel
+def garble(obs: ObsArray, draws: BitArray, lost: FloatArray, start: int, factor: float, loss: float, size: int) -> None:
+    """Disturb what was heard: some robots hear nothing, the others get normal noise added, clamped to [-1, 1].
+
+    Args:
+        obs: (N, D), edited.
+        draws: (N, m) random bits.
+        lost: (N,) uniform in [0, 1).
+        start: First column of the messages in `obs`.
+        factor: Standard deviation of the noise.
+        loss: Probability that a robot hears nothing.
+        size: m, numbers of a message; the column after them is 1 where anything was heard.
+    """
+    one = np.float32(1.0)
+    scale = np.float32(factor)
+    for i in range(obs.shape[0]):
+        if obs[i, start + size] == 0.0:
+            continue
+        if lost[i] < loss:
+            obs[i, start : start + size + 1] = 0.0
+            continue
+        for k in range(size):
+            obs[i, start + k] = min(one, max(-one, obs[i, start + k] + standard(draws[i, k], False) * scale))
+
+
+@kernel
+def throttle(
+    actions: ActionArray,
+    strength: float,
+    only_carriers: bool,
+    carried_object: IntArray,
+    limits: FloatArray,
+    outer_gain: FloatArray,
+    wheel_gain: FloatArray,
+) -> None:
+    """Write the gains `outer_gain` of both wheels, times 1 - strength |l + r| / (|l| + |r|), into `wheel_gain`; (N, 2).
+
+    l and r are the limited commands in m/s. The factor is 1 - strength with both wheels forward and 1 on the spot, and
+    continuous in between. Gains of robots with standing wheels stay; with `only_carriers`, those of robots without an
+    object stay, too. `limits` as in `world.kernels.drive.drive`.
+    """
+    scale, max_speed, max_difference = limits[0], limits[1], limits[2]
+    for i in range(carried_object.shape[0]):
+        wheel_gain[i, 0] = outer_gain[i, 0]
+        wheel_gain[i, 1] = outer_gain[i, 1]
+        if only_carriers and carried_object[i] < 0:
+            continue
+        left, right = limit_command(float(actions[i, 0]), float(actions[i, 1]), scale, max_speed, max_difference)
+        total = abs(left) + abs(right)
+        if total > 0.0:
+            factor = 1.0 - strength * (abs(left + right) / total)
+            wheel_gain[i, 0] *= factor
+            wheel_gain[i, 1] *= factor
+
+
+@kernel
+def noisy_gain(
+    draws: BitArray, is_uniform: bool, factor: float, outer_gain: FloatArray, wheel_gain: FloatArray
+) -> None:
+    """Write outer_gain * (1 + noise * factor) into `wheel_gain`, which may be the same array.
+
+    Args:
+        draws: (N, 2) random bits.
+        is_uniform: As in `Noise`.
+        factor: Per unit of `standard`.
+        outer_gain: (N, 2).
+        wheel_gain: (N, 2).
+    """
+    for i in range(draws.shape[0]):
+        for wheel in range(2):
+            noise = np.float64(standard(draws[i, wheel], is_uniform)) * factor
+            wheel_gain[i, wheel] = outer_gain[i, wheel] * (1.0 + noise)
+
+
+@kernel
+def disturb_wheels(
+    d: Disturbances, k: int, actions: ActionArray, carried_object: IntArray, limits: FloatArray, outer_gain: FloatArray
+) -> None:
+    """Write the gain of wheels in tick `k` of `d` into `d.gain`, if there is any; arguments as in `throttle`."""
+    if d.gain.shape[0] == 0:
+        return
+    if d.throttles.shape[0] > 0 and d.throttles[k] > 0.0:
+        throttle(actions, d.throttles[k], d.only_carriers, carried_object, limits, outer_gain, d.gain)
+    else:
+        for i in range(outer_gain.shape[0]):
+            for wheel in range(2):
+                d.gain[i, wheel] = outer_gain[i, wheel]
+    if d.wheel_draws.shape[0] > 0:
+        noisy_gain(d.wheel_draws[k], d.wheels_uniform, d.wheel_factors[k], d.gain, d.gain)
