@@ -58,7 +58,8 @@ def light_of_carriers_only(reads: Collection[str] | None) -> bool:
 def new_sensors(config: ScenarioConfig, layout: ObservationLayout, reads: Collection[str] | None) -> Sensors:
     """Allocate the sensors of one swarm; slices not named in `reads` may stay zero."""
     n_robots = config.robots.n_robots
-    n_bins = 1 << max(4, (4 * n_robots - 1).bit_length())
+    # So many that most bins beside a robot are empty, but not more than a processor's cache holds or robots fill.
+    n_bins = 1 << max(4, (max(4 * n_robots, min(16 * n_robots, 2**16)) - 1).bit_length())
     starts = {part.name: part.start for part in layout}
     read = read_slices(reads, layout)
     return Sensors(

@@ -169,6 +169,13 @@ def proximity(
         cell_y = cell_of(y, cell_m)
         # Each pair is met once: behind i in its own bin, or in one of the next cells on one side. A pair that hashing
         # shows twice gives the same readings twice.
+        # Most robots are alone. All bins are looked at before anything is decided: one branch, which can be foreseen.
+        found = next_in_bin[i]
+        for k in range(1, 5):
+            step_x, step_y = _HALF_RING[k]
+            found = max(found, first_in_bin[bin_of(cell_x + step_x, cell_y + step_y, n_bins)])
+        if found < 0:
+            continue
         for k in range(5):
             step_x, step_y = _HALF_RING[k]
             j = next_in_bin[i] if k == 0 else first_in_bin[bin_of(cell_x + step_x, cell_y + step_y, n_bins)]
