@@ -25,7 +25,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 # Without numba's memory runtime an allocation is a compile error, and arrays that are handed around, alone, in rows or
 # as fields of a named tuple, are not reference-counted. That halves the time of functions that call others often.
-# numpy's error model asks before no division whether it is one by zero, which would have to raise; kernels raise nothing.
+# With numpy's error model no division is first asked whether it is one by zero: kernels raise nothing.
 _OPTIONS: dict[str, Any] = {"_nrt": False, "error_model": "numpy"}
 _NOT_FROM_PYTHON: dict[str, Any] = {"no_cpython_wrapper": True}
 _NOT_FROM_C: dict[str, Any] = {"no_cfunc_wrapper": True}

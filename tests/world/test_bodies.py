@@ -9,8 +9,8 @@ from scipy.spatial.distance import pdist
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.bodies import PAIRS_PER_ROBOT
-from swarm_forage_env.world.kernels.bodies import find_pairs, move_bodies, sine_and_cosine, tell_poses
-from swarm_forage_env.world.kernels.drive import unpack_poses
+from swarm_forage_env.world.kernels.bodies import find_pairs, move_bodies, tell_poses
+from swarm_forage_env.world.kernels.drive import sinc_and_cosine, unpack_poses
 from swarm_forage_env.world.state import SwarmState
 from tests.reference.bodies import moved
 from tests.support.engines import SensedBodies, drive_at, make_bodies
@@ -185,7 +185,8 @@ def test_absent_robots_touch_nobody_and_stay():
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 0.1, -0.3, 0.4999, 0.51, -3.0])
 def test_sine_and_cosine_are_those_of_the_library(angle):
-    assert sine_and_cosine(angle) == pytest.approx((math.sin(angle), math.cos(angle)), rel=1e-15, abs=1e-17)
+    sinc, cosine = sinc_and_cosine(angle)
+    assert (angle * sinc, cosine) == pytest.approx((math.sin(angle), math.cos(angle)), rel=1e-15, abs=1e-17)
 
 
 def test_facing_stays_the_direction_of_the_heading_for_a_whole_run():

@@ -12,6 +12,7 @@ from swarm_forage_env.contract.codes import CELL_OBJECT, Event, Grip
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.kernels.beams import proximity_reading
+from swarm_forage_env.world.kernels.floor import fading, quarter_turns
 from tests.reference import sensing
 from tests.support.engines import in_each_engine
 from tests.support.foraging import NEAR
@@ -145,7 +146,7 @@ def test_light_is_brightest_ahead_and_dark_behind():
     lit = env.step_batch(actions)[0][0, env.layout["light"]]
     distance = np.hypot(4.0, 4.0)  # the light hangs 4 m high
     np.testing.assert_allclose(lit[:7], np.exp(-2 * distance / 16) * (1 - np.arange(7) / 6), atol=1e-6)
-    np.testing.assert_array_equal(lit[6:19], np.zeros(13))
+    np.testing.assert_allclose(lit[6:19], np.zeros(13), atol=1e-9)
 
 
 @in_each_engine
@@ -177,6 +178,15 @@ def test_nearest_four_caches_are_listed_nearest_first():
 
 
 # Reading less
+
+
+def test_light_fades_and_turns_as_the_library_says():
+    scaled = np.linspace(0.0, 2.5, 251)
+    np.testing.assert_allclose([fading(at) for at in scaled], np.exp(-2.0 * scaled), rtol=1e-9)
+    angles = np.concatenate((np.linspace(0.0, 2.0 * np.pi, 720, endpoint=False), np.pi / 4 * np.arange(8) + 1e-12))
+    turns = [quarter_turns(2.0 * np.cos(angle), 2.0 * np.sin(angle)) for angle in angles]
+    np.testing.assert_allclose(np.exp(0.5j * np.pi * np.array(turns)), np.exp(1j * angles), atol=2e-10)
+    assert quarter_turns(0.0, 0.0) == 0.0
 
 
 @pytest.mark.parametrize("reads", [(), ("light",), ("ground", "event"), ("los_cache",)])

@@ -30,7 +30,7 @@ from typing import NamedTuple
 
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray
-from swarm_forage_env.world.kernels.drive import hold_inside
+from swarm_forage_env.world.kernels.drive import hold_inside, sinc_and_cosine
 from swarm_forage_env.world.kernels.neighbourhood import bin_of, cell_of
 from swarm_forage_env.world.kernels.obstacles import hold_outside, is_within, nearest
 from swarm_forage_env.world.state import Bins
@@ -54,19 +54,6 @@ WALLS = 4
 """Most walls that a robot can touch, besides all the boxes."""
 MARGIN_M = 0.01
 """How much farther than by their commands two bodies may come closer in a tick, because others shove them."""
-
-SMALL_RAD = 0.5
-"""Turns up to here are taken from series: all that a tick holds."""
-_S3, _S5, _S7, _S9, _S11, _S13 = (-1.0 / 6, 1.0 / 120, -1.0 / 5040, 1.0 / 362880, -1.0 / 39916800, 1.0 / 6227020800)
-_C2, _C4, _C6, _C8, _C10, _C12, _C14 = (
-    -1.0 / 2,
-    1.0 / 24,
-    -1.0 / 720,
-    1.0 / 40320,
-    -1.0 / 3628800,
-    1.0 / 479001600,
-    -1.0 / 87178291200,
-)
 
 Work = tuple[FloatArray, IntArray, BoolArray, IntArray, FloatArray]
 """Arrays to work in: velocity (N, 5) = x, y, turn rate, push x, push y; rows of busy robots (N,); who is busy (N,);
@@ -377,17 +364,6 @@ def move_busy(poses: FloatArray, n_busy: int, substep_s: float, work: Work) -> N
 
 
 @kernel
-def sine_and_cosine(angle: float) -> tuple[float, float]:
-    """Sine and cosine, for small angles from their series; the first term left out is below 1e-17."""
-    if abs(angle) > SMALL_RAD:
-        return math.sin(angle), math.cos(angle)
-    s = angle * angle
-    sine = angle * (1.0 + s * (_S3 + s * (_S5 + s * (_S7 + s * (_S9 + s * (_S11 + s * _S13))))))
-    cosine = 1.0 + s * (_C2 + s * (_C4 + s * (_C6 + s * (_C8 + s * (_C10 + s * (_C12 + s * _C14))))))
-    return sine, cosine
-
-
-@kernel
 def tell_poses(
     poses: FloatArray, present: BoolArray, position: FloatArray, heading: FloatArray, facing: FloatArray
 ) -> None:
@@ -401,13 +377,14 @@ def tell_poses(
             position[i, 0] = poses[i, 0]
             position[i, 1] = poses[i, 1]
             angle = poses[i, 2]
-            wrapped = angle - 2.0 * math.pi * math.ceil((angle - math.pi) / (2.0 * math.pi))
+            wrapped = angle - 2.0 * math.pi * math.ceil((angle - math.pi) * (0.5 / math.pi))
             turn = wrapped - heading[i]
             if turn != 0.0:
                 heading[i] = wrapped
                 if abs(turn) > math.pi:  # past the back, where headings jump by a full turn
                     turn -= math.copysign(2.0 * math.pi, turn)
-                sine, cosine = sine_and_cosine(turn)
+                sinc, cosine = sinc_and_cosine(turn)
+                sine = turn * sinc
                 x = facing[i, 0] * cosine - facing[i, 1] * sine
                 y = facing[i, 0] * sine + facing[i, 1] * cosine
                 stretch = 1.5 - 0.5 * (x * x + y * y)

@@ -2,11 +2,36 @@
 
 import math
 
+import numpy as np
+
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray
 
 _MORE = 1.0 + 1e-12
 """What is this little above a limit is at the limit and was rounded: it stays as it is, bit for bit."""
+
+SMALL_RAD = 0.5
+"""Turns up to here are taken from series: all that a tick holds."""
+_SINC = np.array([1.0, -1.0 / 6, 1.0 / 120, -1.0 / 5040, 1.0 / 362880, -1.0 / 39916800, 1.0 / 6227020800])
+_COSINE = np.array(
+    [1.0, -1.0 / 2, 1.0 / 24, -1.0 / 720, 1.0 / 40320, -1.0 / 3628800, 1.0 / 479001600, -1.0 / 87178291200]
+)
+
+
+@kernel
+def sinc_and_cosine(angle: float) -> tuple[float, float]:
+    """sin(angle) / angle and cos(angle), for small angles from their series; the first term left out is below 1e-17.
+
+    The terms are summed as three polynomials, which a processor works out at the same time.
+    """
+    if abs(angle) > SMALL_RAD:
+        return math.sin(angle) / angle, math.cos(angle)
+    s = angle * angle
+    t = s * s
+    sinc = (1.0 + s * _SINC[1]) + t * ((_SINC[2] + s * _SINC[3]) + t * ((_SINC[4] + s * _SINC[5]) + t * _SINC[6]))
+    low = (1.0 + s * _COSINE[1]) + t * (_COSINE[2] + s * _COSINE[3])
+    high = (_COSINE[4] + s * _COSINE[5]) + t * (_COSINE[6] + s * _COSINE[7])
+    return sinc, low + t * t * high
 
 
 @kernel
@@ -61,7 +86,8 @@ def drive(
         for k in range(3, actions.shape[1]):  # what the robot says
             if not math.isfinite(actions[i, k]):
                 return i
-    scale, max_speed, max_difference, wheel_base = limits[0], limits[1], limits[2], limits[3]
+    scale, max_speed, max_difference = limits[0], limits[1], limits[2]
+    per_wheel_base = 1.0 / limits[3]
     for i in range(facing.shape[0]):
         left = 0.0
         right = 0.0
@@ -75,15 +101,11 @@ def drive(
                 left, right = limit_wheels(left, right, own_speed, own_difference)
         wheel_speed[i, 0] = left
         wheel_speed[i, 1] = right
-        turn = (right - left) / wheel_base
+        turn = (right - left) * per_wheel_base
         half_angle = 0.5 * turn * dt_s
-        chord = 0.5 * (left + right)
-        sin_half = 0.0
-        cos_half = 1.0
-        if half_angle != 0.0:
-            sin_half = math.sin(half_angle)
-            cos_half = math.cos(half_angle)
-            chord *= sin_half / half_angle
+        sinc, cos_half = sinc_and_cosine(half_angle)
+        sin_half = half_angle * sinc
+        chord = 0.5 * (left + right) * sinc
         twist[i, 0] = chord * (facing[i, 0] * cos_half - facing[i, 1] * sin_half)
         twist[i, 1] = chord * (facing[i, 1] * cos_half + facing[i, 0] * sin_half)
         twist[i, 2] = turn
