@@ -32,7 +32,7 @@ from .machines import (
     hold,
 )
 from .parameters import ControllerParameters, chosen_parameters, kernel_constants
-from .robots import ACQUIRE, DRAWS, HOMING, WAIT_PICKUP, new_robots, sense
+from .robots import ACQUIRE, DRAWS, HOMING, WAIT_PICKUP, fetch_ahead, new_robots, sense
 from .scripted import ScriptedPolicy
 
 
@@ -51,6 +51,7 @@ def step_crw(
     constants, robots, actions = state
     c = constants[0]
     for i in range(active.shape[0]):
+        fetch_ahead(obs, robots, i, c)
         action = actions[i]
         if not active[i]:
             hold(obs[i], c, action)

@@ -35,7 +35,7 @@ from .memory import (
 )
 from .object_choice import MemoryParameters, object_is_known, object_is_reached, select_object
 from .parameters import chosen_parameters, kernel_constants
-from .robots import ACQUIRE, DRAWS, HOMING, VECTOR_IDLE, WAIT_PICKUP, new_robots, sense
+from .robots import ACQUIRE, DRAWS, HOMING, VECTOR_IDLE, WAIT_PICKUP, fetch_ahead, new_robots, sense
 from .scripted import ScriptedPolicy
 
 
@@ -54,6 +54,7 @@ def step_dpo(
     constants, robots, memory, actions = state
     c = constants[0]
     for i in range(active.shape[0]):
+        fetch_ahead(obs, robots, i, c)
         action = actions[i]
         if not active[i]:
             hold(obs[i], c, action)

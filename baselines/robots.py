@@ -13,9 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.prefetching import AHEAD, LARGE, LINE, prefetch
 from swarm_forage_env.contract.detection import is_obstacle_vector, ring_is_empty, ring_sum, sees_nest
 from swarm_forage_env.contract.layout import EVENT_SCALE, GROUND_SENSORS, RING_SENSORS, WINDOW_CELLS
-from swarm_forage_env.contract.types import CodeArray, Row
+from swarm_forage_env.contract.types import CodeArray, ObsArray, Row
 
 
 class Activity(IntEnum):
@@ -161,6 +162,19 @@ def activity_codes(robots: np.ndarray) -> CodeArray:
     codes[without_goal & (robots["activity"] == Activity.ACQUIRE)] = EXPLORING
     codes[without_goal & (robots["activity"] == Activity.TRANSPORT)] = EXPLORING_LOADED
     return codes
+
+
+@kernel
+def fetch_ahead(obs: ObsArray, robots: np.ndarray, i: int, c: np.record) -> None:
+    """Ask the memory for a robot that is some rows further on, in a swarm that no cache of a processor holds."""
+    if obs.shape[0] < LARGE:
+        return
+    for byte in range(0, RING_SENSORS * obs.itemsize, LINE):
+        prefetch(obs, i + AHEAD, c.proximity * obs.itemsize + byte)
+    prefetch(obs, i + AHEAD, c.position * obs.itemsize)
+    prefetch(obs, i + AHEAD, c.event * obs.itemsize)
+    for byte in range(0, robots.itemsize, LINE):
+        prefetch(robots, i + AHEAD, byte)
 
 
 class Senses(NamedTuple):

@@ -38,6 +38,7 @@ _COMPILED_IN_EVERYWHERE = tuple(
         "_internal/compiled_parts",
         "_internal/compiling",
         "_internal/held",
+        "_internal/prefetching",
         "contract/codes",
         "contract/detection",
         "contract/layout",

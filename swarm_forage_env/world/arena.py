@@ -1,6 +1,7 @@
 """ForagingArena: the simulated world of an environment. It owns the state arrays and fixes the order of a tick."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from typing import Any
 
@@ -277,6 +278,7 @@ class ForagingArena:
         *,
         wheel_gain: FloatArray | None = None,
         acts: bool = True,
+        kept: bool = False,
     ) -> int:
         """Let a compiled policy drive the world for a while; what happens is what `act` and `step` do by turns.
 
@@ -290,6 +292,7 @@ class ForagingArena:
             disturbances: What wrappers do in so many ticks.
             wheel_gain: See `step`.
             acts: Whether the policy acts; else its actions stand as they are.
+            kept: Whether nobody has written into the observation since the last call.
 
         Returns:
             How many ticks left their observation disturbed: of the last one it is true where Python had to end it.
@@ -304,34 +307,46 @@ class ForagingArena:
         now, policy_draws = policy.next_ticks()
         picks, walks = self.draws(first)
         n_drawn = min(len(rows) for rows in (policy_draws, picks, walks) if rows is not self._nothing)
-        n_begun, outcome, tasks_counted = self._compiled.run(
-            policy,
-            *self.parts,
-            disturbances,
-            gain,
-            first,
-            min(n_ticks, n_drawn),
-            self.has_changed,
-            acts,
-            policy.callback,
-            policy.state,
-            now,
-            policy.decision_ticks,
-            policy_draws,
-            picks,
-            walks,
-            tasks,
-            _NO_SHARES if task_shares is None else task_shares,
-        )
-        if acts:
-            policy.count_ticks(max(1, n_begun))
-        if not n_begun:
-            return 0
-        self.tick, self.has_changed = first + n_begun - 2, self.has_changed and n_begun == 1
-        self.conclude(outcome, policy.state[-1], disturbances.gain if len(disturbances.gain) else gain, policy.task)
+        with self._observation_kept(kept):
+            n_begun, outcome, tasks_counted = self._compiled.run(
+                policy,
+                *self.parts,
+                disturbances,
+                gain,
+                first,
+                min(n_ticks, n_drawn),
+                self.has_changed,
+                acts,
+                policy.callback,
+                policy.state,
+                now,
+                policy.decision_ticks,
+                policy_draws,
+                picks,
+                walks,
+                tasks,
+                _NO_SHARES if task_shares is None else task_shares,
+            )
+            if acts:
+                policy.count_ticks(max(1, n_begun))
+            if not n_begun:
+                return 0
+            self.tick, self.has_changed = first + n_begun - 2, self.has_changed and n_begun == 1
+            own_gain = disturbances.gain if len(disturbances.gain) else gain
+            self.conclude(outcome, policy.state[-1], own_gain, policy.task)
         if not tasks_counted:
             raise refused_tasks(tasks, len(self.swarm.active))
         return n_begun - (outcome != DONE)
+
+    @contextmanager
+    def _observation_kept(self, kept: bool) -> Iterator[None]:
+        """Let the world rely on an observation that nobody writes into, but not longer than the context lasts."""
+        is_kept = self._arrays.sensors.kept
+        is_kept[0] = kept
+        try:
+            yield
+        finally:
+            is_kept[0] = False
 
     @property
     def needs_python(self) -> bool:

@@ -65,6 +65,8 @@ def new_sensors(config: ScenarioConfig, layout: ObservationLayout, reads: Collec
     return Sensors(
         obs=np.zeros((n_robots, layout.size), np.float32),
         near=np.zeros(n_robots, np.bool_),
+        lit=np.zeros(n_robots, np.bool_),
+        kept=np.zeros(1, np.bool_),
         bins=(
             2 * config.robots.radius_m + PROXIMITY_RANGE_M,
             np.full(n_bins, -1, np.int32),

@@ -250,6 +250,10 @@ class Sensors(NamedTuple):
     """(N, D), rewritten in every tick."""
     near: BoolArray
     """(N,) whether any proximity beam may have hit something in the last sweep."""
+    lit: BoolArray
+    """(N,) whether a robot looked for lights in the last tick."""
+    kept: BoolArray
+    """(1,) whether `obs` is as the last tick left it: only while nobody but the world has it, in `kernels.tick.run`."""
     bins: Bins
     columns: Columns
     interior: FloatArray

@@ -145,13 +145,15 @@ class RunRecorder(SwarmWrapper):
         """
         env = self.unwrapped
         arena, end = env.arena, min(env.tick + n_ticks, env.max_cycles)
+        kept = False
         while env.tick < end and not self._complete:
             n_ahead, disturbances = self._disturbances(min(end - env.tick, self._ticks_left))
             if n_ahead == 0:
                 self._run_with_hooks(policy)
                 continue
             before = env.tick
-            n_observed = arena.run(policy, n_ahead, self._task_sums, disturbances)
+            n_observed = arena.run(policy, n_ahead, self._task_sums, disturbances, kept=kept)
+            kept = not self._inside
             n_done = env.tick - before
             for wrapper in self._inside:
                 wrapper.count_ticks(n_done, n_observed)

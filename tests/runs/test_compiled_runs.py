@@ -6,7 +6,8 @@ import pytest
 from baselines.crw import CRWPolicy
 from baselines.stochm import STOCHMPolicy
 from swarm_forage_env._internal.compiling import kernel
-from swarm_forage_env.contract.codes import Task
+from swarm_forage_env._internal.prefetching import LARGE
+from swarm_forage_env.contract.codes import Counter, Task
 from swarm_forage_env.contract.policy import ActionError, Policy
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import LiveRun, build_env, build_stack
@@ -62,6 +63,35 @@ def test_a_run_without_python_is_the_run_with_it(policy, name, fields):
     np.testing.assert_array_equal(one.unwrapped.arena.obs, other.unwrapped.arena.obs)
     if not fields:
         assert one.columns()["first_picked"].sum() > 0
+
+
+@pytest.mark.compiled
+def test_in_a_large_swarm_memory_is_asked_ahead_and_nothing_else_changes():
+    world = scenario("warehouse_medium", n_robots=LARGE + 100, density=0.1, horizon_s=12.0, interval_s=12.0)
+    one, other = recorded(world, CRWPolicy(), 7, 30), recorded(world, tick_by_tick(CRWPolicy()))
+    assert one.columns()["first_picked"].sum() > 0
+    assert_same_world(snapshot(one.unwrapped), snapshot(other.unwrapped))
+    np.testing.assert_array_equal(one.unwrapped.arena.obs, other.unwrapped.arena.obs)
+
+
+@pytest.mark.parametrize("ticks", [1, 3])
+def test_what_somebody_writes_into_the_observation_between_two_pieces_is_gone_after_the_next_tick(ticks):
+    world = scenario("warehouse_small", n_robots=40, interval_s=1000.0, horizon_s=1000.0)
+    seen = []
+    for policy in (CRWPolicy(), tick_by_tick(CRWPolicy())):
+        run = LiveRun(build_stack(world, reads=policy.reads), policy, seed=4)
+        n_delivered = 0
+        for first in range(1000, 4900, 10):  # where objects are delivered, Python has to finish the tick
+            run.advance(to_tick=first)
+            run.forage_env.last_obs[:, 24:48] = 0.5  # light, and now and then proximity
+            run.forage_env.last_obs[:, : 24 * (first % 500 == 0)] = 0.5
+            before = run.forage_env.events.counters[Counter.COLLECTED]
+            run.advance(to_tick=first + ticks)
+            n_delivered += run.forage_env.events.counters[Counter.COLLECTED] - before
+            assert (run.forage_env.last_obs[:, :48] == 0.5).sum() == 0
+        assert n_delivered > 0
+        seen.append(run.forage_env.last_obs)
+    np.testing.assert_array_equal(*seen)
 
 
 def is_compiled(world: ScenarioConfig, policy: Policy) -> bool:

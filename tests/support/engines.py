@@ -42,7 +42,7 @@ class SensedBodies(Bodies):
         """Find out who is near whom."""
         s = self.sensors
         bin_robots(swarm.position, swarm.present, *s.bins)
-        seen = (s.bins, s.interior, s.obstacles, s.radius_m, s.reach_m, s.obs, s.columns.proximity, s.near)
+        seen = (s.bins, s.interior, s.obstacles, s.radius_m, s.reach_m, s.obs, s.columns.proximity, s.near, s.kept[0])
         proximity(swarm.position, swarm.facing, swarm.present, *seen)
 
     def advance(self, swarm: SwarmState) -> None:

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.prefetching import AHEAD, LARGE, prefetch
 from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
 from swarm_forage_env.contract.layout import RING_SENSORS
 from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray, Row
@@ -121,11 +122,10 @@ def _see_robot(dx: float, dy: float, facing: FloatArray, i: int, radius: float, 
 
 
 @kernel
-def proximity(
+def _see_what_stands(
     position: FloatArray,
     facing: FloatArray,
     present: BoolArray,
-    bins: Bins,
     interior: FloatArray,
     obstacles: FloatArray,
     radius: float,
@@ -133,21 +133,14 @@ def proximity(
     obs: ObsArray,
     start: int,
     near: BoolArray,
+    kept: bool,
 ) -> None:
-    """Write readings into `obs` from column `start`, and into `near` (N,) whether anything is within reach of a beam.
-
-    `bins` = (cell size in m, first_in_bin, next_in_bin) from `bin_robots` with cells of at least
-    2 radius + reach; `interior` = x low, y low, x high, y high of the free floor; `obstacles` (B, 4) likewise, of
-    boxes on it; `reach` is measured from the body.
-    """
-    cell_m, first_in_bin, next_in_bin = bins
-    n_bins = first_in_bin.shape[0]
-    sight = 2.0 * radius + reach
-    sight_squared = sight * sight
+    """Begin `proximity`: write readings of walls and boxes, and zeros where there are none; see there."""
     wall_sight = radius + reach
     for i in range(position.shape[0]):
         row = obs[i, start : start + RING_SENSORS]
-        row[:] = 0.0
+        if near[i] or not kept:
+            row[:] = 0.0
         near[i] = False
         if present[i]:
             x = position[i, 0]
@@ -160,7 +153,42 @@ def proximity(
                 if is_within(x, y, obstacles, b, wall_sight):
                     near[i] = True
                     _see_box((x, y), obstacles, b, facing, i, radius, reach, row)
-    for i in range(position.shape[0]):
+
+
+@kernel
+def proximity(
+    position: FloatArray,
+    facing: FloatArray,
+    present: BoolArray,
+    bins: Bins,
+    interior: FloatArray,
+    obstacles: FloatArray,
+    radius: float,
+    reach: float,
+    obs: ObsArray,
+    start: int,
+    near: BoolArray,
+    kept: bool,
+) -> None:
+    """Write readings into `obs` from column `start`, and into `near` (N,) whether anything is within reach of a beam.
+
+    `bins` = (cell size in m, first_in_bin, next_in_bin) from `bin_robots` with cells of at least
+    2 radius + reach; `interior` = x low, y low, x high, y high of the free floor; `obstacles` (B, 4) likewise, of
+    boxes on it; `reach` is measured from the body. `kept`: `near` and `obs` are as the last call left them, so the rows
+    of all that were not near are zeros already.
+    """
+    cell_m, first_in_bin, next_in_bin = bins
+    n_bins, n_robots = first_in_bin.shape[0], position.shape[0]
+    sight = 2.0 * radius + reach
+    sight_squared = sight * sight
+    _see_what_stands(position, facing, present, interior, obstacles, radius, reach, obs, start, near, kept)
+    for i in range(n_robots):
+        if n_robots >= LARGE:
+            ahead = min(i + AHEAD, n_robots - 1)
+            ahead_x = cell_of(position[ahead, 0], cell_m)
+            ahead_y = cell_of(position[ahead, 1], cell_m)
+            prefetch(first_in_bin, bin_of(ahead_x, ahead_y, n_bins), 0)
+            prefetch(first_in_bin, bin_of(ahead_x, ahead_y + 1, n_bins), 0)
         if not present[i]:
             continue
         x = position[i, 0]

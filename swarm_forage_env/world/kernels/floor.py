@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.prefetching import AHEAD, LARGE, prefetch
 from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_OBJECT
 from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
 from swarm_forage_env.contract.layout import (
@@ -21,6 +22,8 @@ from swarm_forage_env.world.state import CacheState
 
 _GROUND_X = np.array([0.063, 0.063, -0.063, -0.063])
 _GROUND_Y = np.array([0.0116, -0.0116, 0.0116, -0.0116])
+_GROUND_REACH_M = 0.065
+"""No ground sensor is farther from the robot's centre."""
 _GREYS = np.array([102.0 / 255.0, 1.0, 179.0 / 255.0, 1.0, 0.0])
 """Grey levels of the codes of `contract.codes` from CELL_CACHE to CELL_OBJECT: cache, obstacle, nest, empty, object."""
 _LIGHT_CUTOFF = 2.5
@@ -43,7 +46,14 @@ def ground(
 ) -> None:
     """Write four grey readings per robot into obs[:, start:start + 4]; outside the grid reads empty."""
     ny, nx = floor.shape
-    for i in range(position.shape[0]):
+    n_robots = position.shape[0]
+    for i in range(n_robots):
+        if n_robots >= LARGE:
+            ahead = min(i + AHEAD, n_robots - 1)
+            byte = int(position[ahead, 0] * CELLS_PER_M) * floor.itemsize
+            prefetch(floor, int((position[ahead, 1] - _GROUND_REACH_M) * CELLS_PER_M), byte)
+            prefetch(floor, int((position[ahead, 1] + _GROUND_REACH_M) * CELLS_PER_M), byte)
+            prefetch(obs, ahead, start * obs.itemsize)
         if not present[i]:
             obs[i, start : start + GROUND_SENSORS] = 0.0
             continue
@@ -70,18 +80,23 @@ def light(
     of_carriers_only: bool,
     obs: ObsArray,
     start: int,
+    lit: BoolArray,
+    kept: bool,
 ) -> None:
     """Write the ring of light readings of each robot into the columns of `obs` from `start`.
 
     Per light of `lights` (L, 3: x, y, height in m): exp(-2 distance / intensity), falling linearly to 0 at
     90 degrees between sensor axis and light; lights add up; clamped to 1. With `of_carriers_only` the rows of robots
-    that carry nothing stay zero.
+    that carry nothing stay zero. Writes into `lit` (N,) who looks for lights; `kept`: it and `obs` are as the last call
+    left them, so the rows of all that did not look are zeros already.
     """
     farthest = _LIGHT_CUTOFF * intensity
     for i in range(position.shape[0]):
         row = obs[i, start : start + RING_SENSORS]
-        row[:] = 0.0
-        if not present[i] or (of_carriers_only and carried_object[i] < 0):
+        if lit[i] or not kept:
+            row[:] = 0.0
+        lit[i] = present[i] and not (of_carriers_only and carried_object[i] < 0)
+        if not lit[i]:
             continue
         cos = facing[i, 0]
         sin = facing[i, 1]

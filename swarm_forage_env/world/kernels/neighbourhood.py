@@ -5,6 +5,7 @@ so that all robots in range are in the nine cells around a robot.
 """
 
 from swarm_forage_env._internal.compiling import inline_kernel, kernel
+from swarm_forage_env._internal.prefetching import AHEAD, LARGE, prefetch
 from swarm_forage_env.contract.layout import NEIGHBOUR_FIELDS
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.world.state import Bins
@@ -12,8 +13,8 @@ from swarm_forage_env.world.state import Bins
 
 @inline_kernel
 def bin_of(cell_x: int, cell_y: int, n_bins: int) -> int:
-    """Hash of a cell into [0, n_bins), n_bins a power of two."""
-    return ((cell_x * 73856093) ^ (cell_y * 19349663)) & (n_bins - 1)
+    """Hash of a cell into [0, n_bins), n_bins a power of two. Neighbours along x are beside each other in memory."""
+    return (cell_x + cell_y * 2654435769) & (n_bins - 1)
 
 
 @inline_kernel
@@ -29,7 +30,12 @@ def bin_robots(
     """Fill linked lists of present robots per bin: first_in_bin (bins,), next_in_bin (N,), -1 = end."""
     first_in_bin[:] = -1
     n_bins = first_in_bin.shape[0]
-    for i in range(position.shape[0]):
+    n_robots = position.shape[0]
+    for i in range(n_robots):
+        if n_robots >= LARGE:
+            ahead = min(i + AHEAD, n_robots - 1)
+            x, y = cell_of(position[ahead, 0], cell_m), cell_of(position[ahead, 1], cell_m)
+            prefetch(first_in_bin, bin_of(x, y, n_bins), 0)
         if present[i]:
             k = bin_of(cell_of(position[i, 0], cell_m), cell_of(position[i, 1], cell_m), n_bins)
             next_in_bin[i] = first_in_bin[k]

@@ -58,6 +58,7 @@ def look(a: ArenaArrays) -> None:
         s.obs,
         s.columns.proximity,
         s.near,
+        s.kept[0],
     )
 
 
@@ -77,6 +78,8 @@ def sense(a: ArenaArrays) -> None:
             s.light_of_carriers_only,
             s.obs,
             c.light,
+            s.lit,
+            s.kept[0],
         )
     if s.reads_ground:
         floor.ground(position, facing, present, objects.floor, s.obs, c.ground)
@@ -263,7 +266,8 @@ def run(
         disturb_wheels(d, k, actions, swarm.carried_object, a.motion.drive_limits, wheel_gain)
         chance, walk_chance = chances[k % chances.shape[0]], walk_chances[k % walk_chances.shape[0]]
         now_then = policy_first + k + 1  # the tick in which the policy sees what is sensed here
-        light_is_due[0] = (now_then - 1) % decision_ticks == 0 or k == n_ticks - 1
+        is_due = (now_then - 1) % decision_ticks == 0 or k == n_ticks - 1
+        light_is_due[0] = is_due
         outcome = whole(a, b, actions, gain, first + k, look_first and k == 0, chance, walk_chance)
         light_is_due[0] = True  # for what Python may have to finish
         if outcome == DONE and d.draws.shape[0] > 0:
@@ -280,6 +284,8 @@ def run(
                 s.behind_counts,
             )
             d.believing[1] += 1.0
+        if outcome == DONE:
+            s.kept[0] = d.draws.shape[0] == 0 and (is_due or s.kept[0])
         counted = outcome >= 0 or tasks.shape[0] == 0 or add_task_shares(tasks, swarm.active, task_shares)
         if outcome != DONE or not counted:
             return k + 1, outcome, counted
