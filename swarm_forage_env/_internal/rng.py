@@ -70,38 +70,3 @@ class TickDraws:
             self._rng.random(out=self._rows)
             self._block += 1
         return self._rows[place:]
-
-
-class TickBits:
-    """32 random bits for each tick and place: the numbers of `rng.random(dtype=np.float32)`, times 2^32.
-
-    Their upper 24 bits are those of one such call per tick, bit for bit. Two of them come from one step of the
-    generator (PCG64), which takes half the time, and are left whole, so that a kernel can use them as an index.
-    """
-
-    _NUMBERS_AT_ONCE = 65536
-    """At least so many: 256 KiB."""
-
-    def __init__(self, rng: np.random.Generator, *shape: int) -> None:
-        """Take the generator; nobody else may draw from it from now on.
-
-        Args:
-            rng: The generator.
-            shape: Of the numbers of one tick.
-        """
-        size = math.prod(shape)
-        ticks = max(1, self._NUMBERS_AT_ONCE // max(1, size))
-        self.rng = rng
-        self._shape = (ticks + ticks * size % 2, *shape)  # two numbers at a time
-        self._left = np.empty((0, *shape), np.uint32)
-
-    def rows(self) -> np.ndarray:
-        """Return the numbers (ticks, *shape) of the next tick and of those after it that are drawn already."""
-        if not len(self._left):
-            n_pairs = math.prod(self._shape) // 2
-            self._left = self.rng.integers(2**64, size=n_pairs, dtype=np.uint64).view(np.uint32).reshape(self._shape)
-        return self._left
-
-    def count_ticks(self, n_ticks: int) -> None:
-        """Note that the numbers of so many ticks were used, at most as many as there are rows."""
-        self._left = self._left[n_ticks:]

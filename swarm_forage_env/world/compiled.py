@@ -181,7 +181,7 @@ def parts_of(config: ScenarioConfig, half: int) -> tuple[Call, ...]:
     poses = bodies.poses, swarm.present, swarm.position, swarm.heading, swarm.facing
     moving = move_bodies, bodies, motion.twist, swarm.present, motion.dt_s
     nothing, sensors = Disturbances(), arrays.sensors
-    numbers = np.zeros((0, 0), np.uint32), nothing.factors[0], nothing.noise
+    numbers = nothing.draws, nothing.factors[0], nothing.noise
     robots = sensors.obs, swarm.present, swarm.active, swarm.carried_object
     disturbing = disturb, *robots, *numbers, sensors.blanks, 0, False
     return serving, moving, (tell_poses, *poses), disturbing

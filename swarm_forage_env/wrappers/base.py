@@ -167,13 +167,10 @@ class SwarmWrapper(BaseParallelWrapper):
         """
         return n_ticks, {}
 
-    def count_ticks(self, n_ticks: int, n_observed: int) -> None:
+    def count_ticks(self, n_ticks: int) -> None:
         """Note that ticks have passed as `ahead` said.
 
-        Args:
-            n_ticks: How many.
-            n_observed: After how many of them the observation, too, was disturbed as it said. It is one less where
-                `observe` and `after_step` are still called for the last.
+        For the last of them `observe` and `after_step` may yet be called, where Python had to end it.
         """
 
     @property

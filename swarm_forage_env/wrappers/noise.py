@@ -8,12 +8,22 @@ from typing import Any, ClassVar, TypeAlias
 import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, known_name, number, one_of, several, table
-from swarm_forage_env._internal.rng import Stream, TickBits, stream_rng
+from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.layout import MESSAGES, NEIGHBOUR_FIELDS, NEIGHBOURS
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import from_mapping
-from swarm_forage_env.world.kernels.disturbances import NOT_NOISY, Noise, disturb, garble, noisy_gain, shift_neighbours
+from swarm_forage_env.world.kernels.disturbances import (
+    NOT_NOISY,
+    Noise,
+    disturb,
+    draw_bits,
+    garble,
+    new_lanes,
+    noisy_gain,
+    room_for_draws,
+    shift_neighbours,
+)
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 from swarm_forage_env.wrappers.waveform import (
     Sigma,
@@ -101,11 +111,7 @@ class SensorNoise(SwarmWrapper):
         sigmas = config.group_sigmas().items()
         noisy = {name: sigma for name, sigma in sigmas if is_noisy(sigma) and name not in exact}
         self._place_groups(noisy, is_uniform=is_uniform)
-        if hasattr(self, "_draws") and self._draws.rows().shape[-1] != len(self._units):
-            self._start_draws(self._draws.rng)
-
-    def _start_draws(self, rng: np.random.Generator) -> None:
-        self._draws = TickBits(rng, self.unwrapped.scenario.robots.n_robots, len(self._units))
+        self._draws = room_for_draws(self.unwrapped.scenario.robots.n_robots * len(self._units))
 
     def _place_groups(self, sigmas: dict[str, Sigma], *, is_uniform: bool) -> None:
         """Give each noisy group its columns of the draws, in a fixed order, and the factors from draws to noise."""
@@ -155,20 +161,20 @@ class SensorNoise(SwarmWrapper):
 
     def on_reset(self, seed: int) -> None:
         """Start the random stream."""
-        self._start_draws(stream_rng(seed, Stream.SENSOR_NOISE))
+        self._lanes = new_lanes(stream_rng(seed, Stream.SENSOR_NOISE))
         self._believing = np.zeros(2)
 
     def observe(self, obs: ObsArray) -> ObsArray:
         """Perturb `obs` in place."""
         env = self.unwrapped
-        draws, factors, swarm = self._draws.rows()[0], self._factors(env.tick, 1)[0], env.swarm
-        self._draws.count_ticks(1)
+        factors, swarm = self._factors(env.tick, 1)[0], env.swarm
+        draw_bits(self._lanes, self._draws)
         self._share_that_believes = disturb(
             obs,
             swarm.present,
             swarm.active,
             swarm.carried_object,
-            draws,
+            self._draws,
             factors,
             self._noise,
             env.arena.blanks,
@@ -176,7 +182,7 @@ class SensorNoise(SwarmWrapper):
             self._behind_counts,
         )
         if self._neighbours is not None:
-            shift_neighbours(obs, draws, self._noise.is_uniform, factors, *self._neighbours)
+            shift_neighbours(obs, self._draws, self._noise.is_uniform, factors, *self._neighbours)
         return obs
 
     def after_step(self, tasks: CodeArray | None, terminated: BoolArray, truncated: bool) -> None:
@@ -187,15 +193,15 @@ class SensorNoise(SwarmWrapper):
         """Return what disturbs the observations after the coming ticks."""
         if self._neighbours is not None:
             return 0, {}
-        draws, tick = self._draws.rows(), self.unwrapped.tick + 1
-        known = (waveform.of(tick) for _, waveform in self._varying)
-        n_ticks = min(n_ticks, len(draws), *(len(values) for values in known))
-        told = {"draws": draws, "factors": self._factors(tick, n_ticks), "noise": self._noise}
-        return n_ticks, told | {"believing": self._believing}
-
-    def count_ticks(self, n_ticks: int, n_observed: int) -> None:
-        """Count the draws."""
-        self._draws.count_ticks(n_observed)
+        tick = self.unwrapped.tick + 1
+        n_ticks = min([n_ticks, *(len(waveform.of(tick)) for _, waveform in self._varying)])
+        return n_ticks, {
+            "lanes": self._lanes,
+            "draws": self._draws,
+            "factors": self._factors(tick, n_ticks),
+            "noise": self._noise,
+            "believing": self._believing,
+        }
 
     def interval_columns(self) -> dict[str, float]:
         """Return the mean over ticks of the share of active robots that believed in an obstacle."""
@@ -216,6 +222,7 @@ class ActuatorNoise(SwarmWrapper):
         self.reconfigure(config)
         self._unit_gain: FloatArray = np.ones((scenario.robots.n_robots, 2))
         self._gain: FloatArray = np.ones((scenario.robots.n_robots, 2))
+        self._draws = room_for_draws(2 * scenario.robots.n_robots)
 
     def reconfigure(self, config: "ActuatorNoiseConfig") -> None:
         """Go on under another configuration from the next tick on."""
@@ -227,15 +234,15 @@ class ActuatorNoise(SwarmWrapper):
 
     def on_reset(self, seed: int) -> None:
         """Start the random stream."""
-        self._draws = TickBits(stream_rng(seed, Stream.ACTUATOR_NOISE), self.unwrapped.scenario.robots.n_robots, 2)
+        self._lanes = new_lanes(stream_rng(seed, Stream.ACTUATOR_NOISE))
 
     def gain(self, actions: ActionArray, wheel_gain: FloatArray | None) -> FloatArray | None:
         """Multiply this tick's factors into the gains."""
         if not self._is_noisy:
             return wheel_gain
         outer_gain = self._unit_gain if wheel_gain is None else wheel_gain
-        noisy_gain(self._draws.rows()[0], self._is_uniform, self._factors(1)[0], outer_gain, self._gain)
-        self._draws.count_ticks(1)
+        draw_bits(self._lanes, self._draws)
+        noisy_gain(self._draws, self._is_uniform, self._factors(1)[0], outer_gain, self._gain)
         return self._gain
 
     def _factors(self, n_ticks: int) -> FloatArray:
@@ -247,14 +254,14 @@ class ActuatorNoise(SwarmWrapper):
         """Return the noise on wheels in the coming ticks."""
         if not self._is_noisy:
             return n_ticks, {}
-        draws, factors = self._draws.rows(), self._factors(n_ticks)
-        told = {"wheel_draws": draws, "wheel_factors": factors, "wheels_uniform": self._is_uniform}
-        return min(n_ticks, len(draws), len(factors)), told | {"gain": self._gain}
-
-    def count_ticks(self, n_ticks: int, n_observed: int) -> None:
-        """Count the draws."""
-        if self._is_noisy:
-            self._draws.count_ticks(n_ticks)
+        factors = self._factors(n_ticks)
+        return len(factors), {
+            "wheel_lanes": self._lanes,
+            "wheel_draws": self._draws,
+            "wheel_factors": factors,
+            "wheels_uniform": self._is_uniform,
+            "gain": self._gain,
+        }
 
 
 class MessageNoise(SwarmWrapper):

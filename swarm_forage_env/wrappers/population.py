@@ -95,7 +95,7 @@ class PopulationDynamics(SwarmWrapper):
         """Return how long nothing happens."""
         return int(min(n_ticks, max(0, self._next_tick - 1 - self.unwrapped.tick))), {}
 
-    def count_ticks(self, n_ticks: int, n_observed: int) -> None:
+    def count_ticks(self, n_ticks: int) -> None:
         """Count ticks of robots in repair."""
         self._repair_ticks += n_ticks * len(self._state.repair_queue)
 

@@ -156,7 +156,7 @@ class RunRecorder(SwarmWrapper):
             kept = not self._inside
             n_done = env.tick - before
             for wrapper in self._inside:
-                wrapper.count_ticks(n_done, n_observed)
+                wrapper.count_ticks(n_done)
             if n_observed < n_done and isinstance(self._inner, SwarmWrapper):
                 self._inner._after(self._stepped(), policy.task)
             self._ticks_left -= n_done

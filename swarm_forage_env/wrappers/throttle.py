@@ -71,7 +71,7 @@ class Throttle(SwarmWrapper):
             "gain": self._gain,
         }
 
-    def count_ticks(self, n_ticks: int, n_observed: int) -> None:
+    def count_ticks(self, n_ticks: int) -> None:
         """Add up the throttle of these ticks."""
         for value in self._values.of(self.unwrapped.tick + 1 - n_ticks)[:n_ticks].tolist():
             self._value = value

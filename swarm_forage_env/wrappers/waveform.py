@@ -177,7 +177,7 @@ class Waveform:
 class WaveformAhead:
     """Values of a signal, worked out for many ticks at a time."""
 
-    _TICKS = 64
+    _TICKS = 256
 
     def __init__(self, signal: Signal) -> None:
         """Take the signal."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from swarm_forage_env._internal.rng import Stream, TickBits, TickDraws, stream_rng
+from swarm_forage_env._internal.rng import Stream, TickDraws, stream_rng
 
 
 def test_stream_numbers_are_stored_history():
@@ -68,25 +68,3 @@ def test_a_tick_may_be_left_out():
     draws, again = TickDraws(np.random.default_rng(5), 4000), np.random.default_rng(5).random((9, 4000))
     for tick in (1, 4, 9):
         np.testing.assert_array_equal(draws.row(tick), again[tick - 1])
-
-
-@pytest.mark.parametrize("shape", [(1,), (7,), (0,), (3, 5), (301, 57), (200, 57), (70_001,)])
-def test_bits_by_tick_are_those_of_one_call_per_tick(shape):
-    """Also where a tick takes an odd number of them, half a step of the generator."""
-    draws, rng = TickBits(np.random.default_rng(5), *shape), np.random.default_rng(5)
-    for _ in range(12):
-        expected = rng.random(shape, dtype=np.float32)
-        bits = draws.rows()[0]
-        assert bits.dtype == np.uint32
-        np.testing.assert_array_equal((bits >> np.uint32(8)) * 2.0**-24, expected)
-        draws.count_ticks(1)
-
-
-def test_bits_of_several_ticks_at_once_are_the_same():
-    one, many = (TickBits(np.random.default_rng(5), 5000) for _ in range(2))
-    for n_ticks in (3, 1, 20, 2):
-        for _ in range(n_ticks):
-            rows = many.rows()
-            np.testing.assert_array_equal(rows[0], one.rows()[0])
-            one.count_ticks(1)
-            many.count_ticks(1)

@@ -211,9 +211,9 @@ def wheel_and_sensor_draws(*names: str) -> tuple[list[np.ndarray], list[np.ndarr
         wrapper = env
         while not isinstance(wrapper, ForageEnv):
             if isinstance(wrapper, ActuatorNoise):
-                wheels.append(wrapper._draws.rows()[0])
+                wheels.append(wrapper._draws.copy())
             elif isinstance(wrapper, SensorNoise):
-                sensors.append(wrapper._draws.rows()[0])
+                sensors.append(wrapper._draws.copy())
             wrapper = wrapper.env
     return wheels, sensors
 

@@ -2,6 +2,7 @@
 
 import math
 from collections import deque
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -19,9 +20,37 @@ def throttle_gain(command: tuple[float, float], strength: float) -> float:
     return 1.0 - max(0.0, strength) * abs(left + right) / (abs(left) + abs(right))
 
 
+def xoshiro128_plus(state: list[int]) -> Iterator[int]:
+    """Numbers of 32 bits, as Blackman and Vigna publish the generator."""
+    a, b, c, d = state
+    while True:
+        yield (a + d) % 2**32
+        shifted = (b << 9) % 2**32
+        c ^= a
+        d ^= b
+        b ^= c
+        a ^= d
+        c ^= shifted
+        d = (d << 11) % 2**32 | d >> 21
+
+
+def noise_bits(seed: int, stream: Stream, n_robots: int, n_columns: int) -> Iterator[np.ndarray]:
+    """The bits of each tick, (n_robots, n_columns): number by number from 64 generators in turn."""
+    columns = stream_rng(seed, stream).integers(2**32, size=(4, 64), dtype=np.uint32).T
+    generators = [xoshiro128_plus(column) for column in columns.tolist()]
+    while True:
+        size = n_robots * n_columns
+        numbers = [next(generator) for _ in range(-(-size // 64)) for generator in generators]
+        yield np.array(numbers[:size], np.uint32).reshape(n_robots, n_columns)
+
+
 def normal_of(uniform: np.ndarray) -> np.ndarray:
     """Standard normal numbers of uniform ones, which are multiples of 2^-24."""
-    bits = (np.asarray(uniform, np.float64) * 2.0**32).astype(np.uint32)
+    return normal_of_bits((np.asarray(uniform, np.float64) * 2.0**32).astype(np.uint32))
+
+
+def normal_of_bits(bits: np.ndarray) -> np.ndarray:
+    """Standard normal numbers of random bits."""
     return np.array([standard(each, False) for each in bits.ravel()], np.float32).reshape(bits.shape)
 
 

@@ -128,6 +128,9 @@ TWINS = {
         "object_walk.walk_slowly", "world/test_object_motion.py", "swarm_forage_env.world.kernels.walk.walk"
     ),
     "swarm_forage_env.world.kernels.disturbances.disturb": NOISE,
+    "swarm_forage_env.world.kernels.disturbances.draw_bits": Twin(
+        "adversity.noise_bits", "wrappers/test_noise.py", "swarm_forage_env.world.kernels.disturbances.draw_bits"
+    ),
     "swarm_forage_env.world.kernels.disturbances.garble": Twin(
         "adversity.garbled", "wrappers/test_messages.py", "swarm_forage_env.wrappers.base.SwarmWrapper.step_batch"
     ),

@@ -16,7 +16,7 @@ from swarm_forage_env.wrappers.noise import (
 )
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.waveform import Waveform
-from tests.reference.adversity import garbled, normal_of, shifted_neighbours
+from tests.reference.adversity import garbled, noise_bits, normal_of, normal_of_bits, shifted_neighbours
 
 N_ROBOTS = 8
 SEED = 3
@@ -95,16 +95,16 @@ def test_what_makes_no_sense_is_refused(word, fields, expected):
 def test_neighbours_are_shifted_as_by_the_twin(distribution):
     plain, env = made(), made()
     noisy = SensorNoise(env, SensorNoiseConfig(sigma=1.5, groups=("neighbours",), distribution=distribution))
-    rng, columns = stream_rng(SEED, Stream.SENSOR_NOISE), plain.layout["neighbours"]
+    bits, columns = noise_bits(SEED, Stream.SENSOR_NOISE, N_ROBOTS, 6), plain.layout["neighbours"]
     true, seen = plain.reset_batch(SEED), noisy.reset_batch(SEED)
     for actions in (None, *ACTIONS):
         if actions is not None:
             true, seen = plain.step_batch(actions)[0], noisy.step_batch(actions)[0]
-        draws = rng.random((N_ROBOTS, 6), dtype=np.float32)
+        draws = next(bits)
         if distribution == "gaussian":
-            draws = normal_of(draws)
+            draws = normal_of_bits(draws)
         else:
-            draws = (draws - 0.5) * np.float32(12.0**0.5)
+            draws = ((draws >> 8) * 2.0**-24 - 0.5) * 12.0**0.5
         for robot in range(N_ROBOTS):
             expected = shifted_neighbours(true[robot, columns].tolist(), draws[robot].tolist(), 1.5, 6.0)
             np.testing.assert_allclose(seen[robot, columns], expected, atol=1e-5)

@@ -10,6 +10,7 @@ from swarm_forage_env.contract.detection import sees_cache, sees_nest, sees_obje
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import Quirks
+from swarm_forage_env.world.kernels.disturbances import LANES, draw_bits, new_lanes, room_for_draws
 from swarm_forage_env.wrappers.noise import (
     NOISE_GROUPS,
     ActuatorNoise,
@@ -19,7 +20,7 @@ from swarm_forage_env.wrappers.noise import (
     noise_levels,
 )
 from swarm_forage_env.wrappers.waveform import Waveform
-from tests.reference.adversity import by_group, noisy_row, normal_of
+from tests.reference.adversity import by_group, noise_bits, noisy_row, normal_of, normal_of_bits
 from tests.support.fake_arena import FakeArena
 from tests.support.stage import assert_same_world, snapshot, tidy_world
 
@@ -107,7 +108,7 @@ def test_equals_the_slow_twin(world):
     heading = rng.uniform(-np.pi, np.pi, ROBOTS)
     obs[:, world.layout["heading"]] = np.column_stack((np.cos(heading), np.sin(heading)))
     seen = noisy(world, obs, 1, sigma=0.2)[0]
-    draws = normal_of(stream_rng(1, Stream.SENSOR_NOISE).random((ROBOTS, 57), dtype=np.float32))
+    draws = normal_of_bits(next(noise_bits(1, Stream.SENSOR_NOISE, ROBOTS, 57)))
     for robot, groups in enumerate(by_group(draws)):
         expected = noisy_row(obs[robot].tolist(), groups, 0.2, (48.0, 48.0))
         np.testing.assert_allclose(seen[robot], expected, rtol=0, atol=2e-6)
@@ -331,6 +332,33 @@ def test_normal_draws_are_normal():
     draws = normal_of(np.random.default_rng(0).random((1000, 300), dtype=np.float32))
     assert stats.kstest(draws.ravel(), "norm").pvalue > 0.01
     assert stats.kurtosis(draws.ravel()) == pytest.approx(0.0, abs=4 * np.sqrt(24 / draws.size))
+
+
+@pytest.mark.parametrize("n_draws", [0, 64, 64 * 5])
+def test_random_bits_are_those_of_the_twin(n_draws):
+    lanes, room = new_lanes(stream_rng(7, Stream.SENSOR_NOISE)), room_for_draws(n_draws)
+    twin = noise_bits(7, Stream.SENSOR_NOISE, 1, n_draws)
+    for _ in range(4):
+        draw_bits(lanes, room)
+        np.testing.assert_array_equal(room, next(twin)[0])
+
+
+def test_random_bits_are_random():
+    lanes, room = new_lanes(stream_rng(0, Stream.SENSOR_NOISE)), room_for_draws(LANES * 20_000)
+    draw_bits(lanes, room)
+    uniform = (room >> np.uint32(8)) * 2.0**-24
+    assert stats.kstest(uniform, "uniform").pvalue > 0.01
+    assert np.abs(np.corrcoef(uniform.reshape(-1, LANES).T) - np.eye(LANES)).max() < 5 / np.sqrt(20_000), "of lanes"
+    for lag in (1, 2, 57, LANES, 57 * 200, LANES * 100):  # neighbours in a row, robots, ticks
+        assert abs(np.corrcoef(uniform[:-lag], uniform[lag:])[0, 1]) < 4 / np.sqrt(uniform.size), lag
+    ones = ((room[:, None] >> np.arange(8, 32, dtype=np.uint32)) & np.uint32(1)).mean(axis=0)
+    assert np.abs(ones - 0.5).max() < 4 * 0.5 / np.sqrt(uniform.size), "of each bit"
+    counts = np.bincount(room >> np.uint32(20), minlength=4096)
+    assert stats.chisquare(counts).pvalue > 0.01
+
+
+def test_room_is_for_whole_rounds_of_the_lanes():
+    assert [len(room_for_draws(n)) for n in (0, 1, 64, 65)] == [0, 64, 64, 128]
 
 
 # Actuators

@@ -24,7 +24,7 @@ from swarm_forage_env.world.kernels import beams, floor, kinds, proprioception
 from swarm_forage_env.world.kernels.bodies import BodyState, move_bodies, tell_poses
 from swarm_forage_env.world.kernels.contact import press
 from swarm_forage_env.world.kernels.counting import add_task_shares, mark
-from swarm_forage_env.world.kernels.disturbances import Disturbances, disturb, disturb_wheels
+from swarm_forage_env.world.kernels.disturbances import Disturbances, disturb, disturb_wheels, draw_bits
 from swarm_forage_env.world.kernels.drive import drive
 from swarm_forage_env.world.kernels.interact import serve
 from swarm_forage_env.world.kernels.neighbourhood import bin_robots
@@ -270,13 +270,14 @@ def run(
         light_is_due[0] = is_due
         outcome = whole(a, b, actions, gain, first + k, look_first and k == 0, chance, walk_chance)
         light_is_due[0] = True  # for what Python may have to finish
-        if outcome == DONE and d.draws.shape[0] > 0:
+        if outcome == DONE and d.lanes.shape[0] > 0:
+            draw_bits(d.lanes, d.draws)
             d.believing[0] += disturb(
                 obs,
                 swarm.present,
                 swarm.active,
                 swarm.carried_object,
-                d.draws[k],
+                d.draws,
                 d.factors[k % d.factors.shape[0]],
                 d.noise,
                 s.blanks,
