@@ -26,7 +26,8 @@ from swarm_forage_env.contract.kernel_policy import KernelPolicy
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ObsArray
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping
-from swarm_forage_env.policies.kernels.network import LANES, Choice, Layers, forward, step_network
+from swarm_forage_env.policies.kernels.network import Choice, Layers, forward, step_network
+from swarm_forage_env.policies.kernels.products import LANES, ROWS
 from swarm_forage_env.policies.learned import InterfacePolicy
 from swarm_forage_env.scenarios.config import CACHE_KINDS
 
@@ -134,8 +135,16 @@ class Network:
             numbers[row + 1 : row + 1 + len(weight), : len(bias)] = weight
             row += len(weight) + 1
         sizes = np.array([len(self.weights[0]), *(len(bias) for bias in self.biases)], np.int32)
-        room = np.zeros((2, width), np.float32), np.zeros((2, width), np.float32)
-        return Layers(sizes, numbers, self.about.activation == "tanh", self.about.samples, *room)
+        return Layers(
+            sizes=sizes,
+            numbers=numbers,
+            is_tanh=self.about.activation == "tanh",
+            samples=self.about.samples,
+            before=np.zeros((ROWS, width), np.float32),
+            after=np.zeros((ROWS, width), np.float32),
+            places=np.zeros(ROWS, np.int32),
+            powers=np.zeros(len(self.biases[-1])),
+        )
 
     @classmethod
     def from_state_dict(

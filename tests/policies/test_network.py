@@ -68,17 +68,17 @@ def test_tanh_is_good_to_float32():
 
 
 def test_discrete_choices_are_the_likeliest_or_drawn_by_their_probabilities():
-    logits = np.array([0.25, 1.5, -2.0], np.float32)
+    logits, room = np.array([0.25, 1.5, -2.0], np.float32), np.zeros(3)
     chances = (np.arange(2000) + 0.5) / 2000
-    assert {pick(logits, False, chance) for chance in chances} == {1}
-    shares = np.bincount([pick(logits, True, chance) for chance in chances]) / len(chances)
+    assert {pick(logits, False, chance, room) for chance in chances} == {1}
+    shares = np.bincount([pick(logits, True, chance, room) for chance in chances]) / len(chances)
     assert shares == pytest.approx(perceptron.probabilities(logits), abs=1e-3)
-    assert pick(np.array([2.0, 2.0], np.float32), False, 0.0) == 0, "the first of several"
+    assert pick(np.array([2.0, 2.0], np.float32), False, 0.0, room) == 0, "the first of several"
 
 
 def test_what_is_next_to_impossible_is_never_a_fault():
-    logits = np.array([-1e9, 0.0, -200.0, -np.inf], np.float32)
-    assert [pick(logits, True, chance) for chance in (0.0, 0.5, np.nextafter(1.0, 0.0))] == [0, 1, 1]
+    logits, room = np.array([-1e9, 0.0, -200.0, -np.inf], np.float32), np.zeros(4)
+    assert [pick(logits, True, chance, room) for chance in (0.0, 0.5, np.nextafter(1.0, 0.0))] == [0, 1, 1]
 
 
 def test_powers_are_good_enough_to_draw_by():

@@ -22,11 +22,8 @@ from swarm_forage_env.policies.kernels.learner import (
     remember_sites,
     show_sites,
 )
+from swarm_forage_env.policies.kernels.products import LANES, ROWS, add_products
 
-LANES = 8
-"""Outputs of a layer are padded to a multiple of these: as many as the registers of most processors hold."""
-_TOGETHER = 2
-"""Rows that go through the layers together: a weight is read once for both."""
 _TANH_LIMIT = np.float32(9.0)
 """Where tanh rounds to 1 in float32."""
 _LEAST_POWER = -64.0
@@ -45,9 +42,13 @@ class Layers(NamedTuple):
     samples: bool
     """Whether discrete actions are drawn, see `pick`."""
     before: ObsArray
-    """(2, width) what goes into a layer."""
+    """(ROWS, width) what goes into a layer."""
     after: ObsArray
-    """(2, width) what comes out of it."""
+    """(ROWS, width) what comes out of it."""
+    places: IntArray
+    """(ROWS,) which rows these are."""
+    powers: FloatArray
+    """(m,) see `pick`."""
 
 
 class Choice(NamedTuple):
@@ -61,30 +62,6 @@ class Choice(NamedTuple):
     """(N,) of discrete actions."""
     is_made: BoolArray
     """(N,) whether the robot was in the world; others stand until the next decision."""
-
-
-@kernel
-def _sum(x: ObsArray, numbers: ObsArray, at: int, n_columns: int, width: int, out: ObsArray) -> None:
-    """Write two rows of a layer's sums, `width` of them each; its biases are in row `at` of `numbers`."""
-    one, two, bias = out[0], out[1], numbers[at]
-    for j in range(width):
-        one[j] = bias[j]
-        two[j] = bias[j]
-    k = 0
-    while k + 4 <= n_columns:  # four at a time read and write the sum once; the order stays
-        w0, w1, w2, w3 = numbers[at + k + 1], numbers[at + k + 2], numbers[at + k + 3], numbers[at + k + 4]
-        a0, a1, a2, a3 = x[0, k], x[0, k + 1], x[0, k + 2], x[0, k + 3]
-        b0, b1, b2, b3 = x[1, k], x[1, k + 1], x[1, k + 2], x[1, k + 3]
-        for j in range(width):
-            one[j] = (((one[j] + a0 * w0[j]) + a1 * w1[j]) + a2 * w2[j]) + a3 * w3[j]
-            two[j] = (((two[j] + b0 * w0[j]) + b1 * w1[j]) + b2 * w2[j]) + b3 * w3[j]
-        k += 4
-    while k < n_columns:
-        w0, a0, b0 = numbers[at + k + 1], x[0, k], x[1, k]
-        for j in range(width):
-            one[j] += a0 * w0[j]
-            two[j] += b0 * w0[j]
-        k += 1
 
 
 @kernel
@@ -109,52 +86,45 @@ def _tanh(values: Row, n: int) -> None:
 
 @kernel
 def _activate(values: ObsArray, n: int, is_tanh: bool) -> None:
-    for r in range(_TOGETHER):
+    for r in range(values.shape[0]):
         if is_tanh:
             _tanh(values[r], n)
         else:
             for j in range(n):
-                values[r, j] = max(values[r, j], np.float32(0.0))
+                values[r, j] = values[r, j] if values[r, j] > 0.0 else np.float32(0.0)
+
+
+@kernel
+def _through(layers: Layers, n_taken: int, outputs: ObsArray) -> None:
+    """Take the rows in `before` through all layers, and write what comes out to the first `n_taken` of `places`."""
+    sizes, x, y, at = layers.sizes, layers.before, layers.after, 0
+    last = sizes.shape[0] - 2
+    for layer in range(last + 1):
+        for first in range(0, sizes[layer + 1], LANES):
+            add_products(x, layers.numbers, at, sizes[layer], first, y)
+        if layer < last:
+            _activate(y, sizes[layer + 1], layers.is_tanh)
+        at += sizes[layer] + 1
+        x, y = y, x
+    for k in range(n_taken):
+        for c in range(outputs.shape[1]):
+            outputs[layers.places[k], c] = x[k, c]
 
 
 @kernel
 def forward(rows: ObsArray, layers: Layers, wanted: BoolArray, outputs: ObsArray) -> None:
     """Write the last layer's values (N, m) for those rows (N, d) that are wanted."""
-    sizes, x, y = layers.sizes, layers.before, layers.after
-    last = sizes.shape[0] - 2
-    i = _next(wanted, 0)
-    while i < wanted.shape[0]:
-        k = _next(wanted, i + 1)
-        other = k if k < wanted.shape[0] else i  # a last row alone goes twice
-        for c in range(sizes[0]):
-            x[0, c] = rows[i, c]
-            x[1, c] = rows[other, c]
-        at = 0
-        for layer in range(last + 1):
-            n_columns, width = sizes[layer], _padded(sizes[layer + 1])
-            _sum(x, layers.numbers, at, n_columns, width, y)
-            if layer < last:
-                _activate(y, width, layers.is_tanh)
-            at += n_columns + 1
-            x, y = y, x
-        for c in range(outputs.shape[1]):
-            outputs[i, c] = x[0, c]
-            outputs[other, c] = x[1, c]
-        i = _next(wanted, k + 1)
-
-
-@kernel
-def _next(wanted: BoolArray, start: int) -> int:
-    """Return the first row from `start` on that is wanted, or one beyond the last."""
-    for i in range(start, wanted.shape[0]):
+    places, before = layers.places, layers.before
+    n_rows, n_taken = wanted.shape[0], 0
+    for i in range(n_rows):
         if wanted[i]:
-            return i
-    return max(start, wanted.shape[0])
-
-
-@kernel
-def _padded(size: int) -> int:
-    return (size + LANES - 1) // LANES * LANES
+            for c in range(rows.shape[1]):
+                before[n_taken, c] = rows[i, c]
+            places[n_taken] = i
+            n_taken += 1
+        if n_taken == ROWS or (n_taken > 0 and i == n_rows - 1):
+            _through(layers, n_taken, outputs)
+            n_taken = 0
 
 
 @kernel
@@ -166,7 +136,7 @@ def power(x: float) -> float:
     x = max(x, _LEAST_POWER) / 16.0
     s = x * x
     even, odd = 120.0 + 12.0 * s, x * (60.0 + s)
-    share = (even + odd) / (even - odd)
+    share = np.divide(even + odd, even - odd)  # see _tanh
     share *= share
     share *= share
     share *= share
@@ -174,10 +144,10 @@ def power(x: float) -> float:
 
 
 @kernel
-def pick(logits: Row, samples: bool, chance: float) -> int:
+def pick(logits: Row, samples: bool, chance: float, powers: FloatArray) -> int:
     """The number of the largest logit, the first of several; if it samples, one by their probabilities.
 
-    `chance` is uniform in [0, 1).
+    `chance` is uniform in [0, 1); `powers` is room for as many numbers as there are logits.
     """
     n = logits.shape[0]
     best = 0
@@ -188,10 +158,12 @@ def pick(logits: Row, samples: bool, chance: float) -> int:
         return best
     most, total = float(logits[best]), 0.0
     for k in range(n):
-        total += power(logits[k] - most)
+        powers[k] = power(logits[k] - most)
+    for k in range(n):
+        total += powers[k]
     left = chance * total
     for k in range(n - 1):
-        left -= power(logits[k] - most)
+        left -= powers[k]
         if left < 0.0:
             return k
     return n - 1
@@ -232,7 +204,8 @@ def decide(obs: ObsArray, draws: FloatArray, t: Translation, layers: Layers, cho
             for c in range(outputs.shape[0]):
                 outputs[c] = min(max(outputs[c], np.float32(-1.0)), np.float32(1.0))
         elif choice.is_made[i]:
-            choice.number[i] = pick(outputs, layers.samples, draws[i, 0] if layers.samples else 0.0)
+            chance = draws[i, 0] if layers.samples else 0.0
+            choice.number[i] = pick(outputs, layers.samples, chance, layers.powers)
 
 
 @kernel
