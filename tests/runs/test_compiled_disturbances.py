@@ -48,7 +48,7 @@ POOLS = (
     ),
 )
 """Of each wrapper that tells what it does ahead, some; a stack has one of each, or none."""
-POLICIES = ("crw", "dpo", "stochm", "stochx", "ppo_warehouse_small")
+POLICIES = ("crw", "dpo", "stochm", "stochx", "generalist")
 TICKS = 500
 
 
