@@ -86,6 +86,7 @@ def new_sensors(config: ScenarioConfig, layout: ObservationLayout, reads: Collec
         reads_light="light" in read,
         light_is_due=np.ones(1, np.bool_),
         light_of_carriers_only=light_of_carriers_only(reads),
+        light_seen=np.zeros((2, n_robots)),
         reads_ground="ground" in read,
         reads_line_of_sight=not {"los_cell", "los_object", "los_cache"}.isdisjoint(read),
         behind_counts=config.quirks.obstacle_behind_counts,

@@ -277,6 +277,8 @@ class Sensors(NamedTuple):
     light_is_due: BoolArray
     """(1,) whether light is sensed in this tick; False only in `kernels.tick.run`, while no decision is near."""
     light_of_carriers_only: bool
+    light_seen: FloatArray
+    """(2, N) scratch."""
     reads_ground: bool
     reads_line_of_sight: bool
     behind_counts: bool

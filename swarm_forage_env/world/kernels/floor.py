@@ -16,7 +16,7 @@ from swarm_forage_env.contract.layout import (
     VISIBLE_CACHES,
     WINDOW_CELLS,
 )
-from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray, Row
 from swarm_forage_env.scenarios.floor import CELLS_PER_M
 from swarm_forage_env.world.state import CacheState
 
@@ -82,36 +82,57 @@ def light(
     start: int,
     lit: BoolArray,
     kept: bool,
+    seen: FloatArray,
 ) -> None:
     """Write the ring of light readings of each robot into the columns of `obs` from `start`.
 
     Per light of `lights` (L, 3: x, y, height in m): exp(-2 distance / intensity), falling linearly to 0 at
     90 degrees between sensor axis and light; lights add up; clamped to 1. With `of_carriers_only` the rows of robots
     that carry nothing stay zero. Writes into `lit` (N,) who looks for lights; `kept`: it and `obs` are as the last call
-    left them, so the rows of all that did not look are zeros already.
+    left them, so the rows of all that did not look are zeros already. `seen` (2, N) is scratch.
     """
-    farthest = _LIGHT_CUTOFF * intensity
     for i in range(position.shape[0]):
-        row = obs[i, start : start + RING_SENSORS]
         if lit[i] or not kept:
-            row[:] = 0.0
+            obs[i, start : start + RING_SENSORS] = 0.0
         lit[i] = present[i] and not (of_carriers_only and carried_object[i] < 0)
-        if not lit[i]:
-            continue
-        cos = facing[i, 0]
-        sin = facing[i, 1]
-        for lamp in range(lights.shape[0]):
-            dx = lights[lamp, 0] - position[i, 0]
-            dy = lights[lamp, 1] - position[i, 1]
-            height = lights[lamp, 2]
-            distance = math.sqrt(dx * dx + dy * dy + height * height)
-            if distance > farthest:
-                continue
-            base = fading(distance / intensity)
-            bearing = quarter_turns(dx * cos + dy * sin, dy * cos - dx * sin)
-            for k in range(RING_SENSORS):  # all of them, without a branch: processors take several at once
-                away = 2.0 - abs(abs(_LIGHT_AXES[k] - bearing) - 2.0)
-                row[k] = min(1.0, row[k] + base * max(0.0, 1.0 - away))
+    for lamp in range(lights.shape[0]):
+        _look_at(position, facing, (lights[lamp, 0], lights[lamp, 1], lights[lamp, 2]), intensity, seen[0], seen[1])
+        for i in range(position.shape[0]):
+            base = seen[0, i]
+            bearing = seen[1, i]
+            if lit[i] and base > 0.0:
+                row = obs[i, start : start + RING_SENSORS]
+                for k in range(RING_SENSORS):  # all of them, without a branch: processors take several at once
+                    away = 2.0 - abs(abs(_LIGHT_AXES[k] - bearing) - 2.0)
+                    row[k] = min(1.0, row[k] + base * max(0.0, 1.0 - away))
+
+
+@kernel
+def _look_at(
+    position: FloatArray,
+    facing: FloatArray,
+    lamp: tuple[float, float, float],
+    intensity: float,
+    base: Row,
+    bearing: Row,
+) -> None:
+    """Write what every robot reads of a lamp head-on, 0 beyond the cutoff, and where it is, in quarter turns.
+
+    Flat arrays have steps that are known when this is compiled, and there is no branch: so processors take several
+    robots at once.
+    """
+    x, y, height = lamp
+    farthest = _LIGHT_CUTOFF * intensity
+    place, ahead = position.reshape(position.size), facing.reshape(facing.size)
+    for i in range(base.shape[0]):
+        dx = x - place[2 * i]
+        dy = y - place[2 * i + 1]
+        cos = ahead[2 * i]
+        sin = ahead[2 * i + 1]
+        distance = math.sqrt(dx * dx + dy * dy + height * height)
+        share = fading(distance / intensity)
+        base[i] = share if distance <= farthest else 0.0
+        bearing[i] = quarter_turns(dx * cos + dy * sin, dy * cos - dx * sin)
 
 
 @kernel
@@ -142,10 +163,8 @@ def quarter_turns(x: float, y: float) -> float:
     for k in range(_ARC_ODD.shape[0] - 1, -1, -1):
         odd = odd * step + _ARC_ODD[k]
     turn = slope * (even + square * odd)
-    if across > along:
-        turn = 1.0 - turn
-    if x < 0.0:
-        turn = 2.0 - turn
+    turn = 1.0 - turn if across > along else turn
+    turn = 2.0 - turn if x < 0.0 else turn
     return 4.0 - turn if y < 0.0 else turn
 
 

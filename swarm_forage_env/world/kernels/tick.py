@@ -80,6 +80,7 @@ def sense(a: ArenaArrays) -> None:
             c.light,
             s.lit,
             s.kept[0],
+            s.light_seen,
         )
     if s.reads_ground:
         floor.ground(position, facing, present, objects.floor, s.obs, c.ground)
