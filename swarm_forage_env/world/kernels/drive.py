@@ -20,12 +20,18 @@ _COSINE = np.array(
 
 @kernel
 def sinc_and_cosine(angle: float) -> tuple[float, float]:
-    """sin(angle) / angle and cos(angle), for small angles from their series; the first term left out is below 1e-17.
+    """sin(angle) / angle and cos(angle), for small angles from their series; the first term left out is below 1e-17."""
+    if abs(angle) > SMALL_RAD:
+        return math.sin(angle) / angle, math.cos(angle)
+    return small_sinc_and_cosine(angle)
+
+
+@kernel
+def small_sinc_and_cosine(angle: float) -> tuple[float, float]:
+    """The same for small angles only: without a branch, so that loops take several robots at once.
 
     The terms are summed as three polynomials, which a processor works out at the same time.
     """
-    if abs(angle) > SMALL_RAD:
-        return math.sin(angle) / angle, math.cos(angle)
     s = angle * angle
     t = s * s
     sinc = (1.0 + s * _SINC[1]) + t * ((_SINC[2] + s * _SINC[3]) + t * ((_SINC[4] + s * _SINC[5]) + t * _SINC[6]))
@@ -101,15 +107,38 @@ def drive(
                 left, right = limit_wheels(left, right, own_speed, own_difference)
         wheel_speed[i, 0] = left
         wheel_speed[i, 1] = right
+    _drive_arcs(wheel_speed, facing, per_wheel_base, dt_s, twist)
+    if 0.5 * _MORE * max_difference * per_wheel_base * dt_s > SMALL_RAD:
+        for i in range(facing.shape[0]):
+            half_angle = 0.5 * twist[i, 2] * dt_s
+            if abs(half_angle) > SMALL_RAD:
+                sinc, cosine = sinc_and_cosine(half_angle)
+                chord = 0.5 * (wheel_speed[i, 0] + wheel_speed[i, 1]) * sinc
+                sine = half_angle * sinc
+                twist[i, 0] = chord * (facing[i, 0] * cosine - facing[i, 1] * sine)
+                twist[i, 1] = chord * (facing[i, 1] * cosine + facing[i, 0] * sine)
+    return -1
+
+
+@kernel
+def _drive_arcs(
+    wheel_speed: FloatArray, facing: FloatArray, per_wheel_base: float, dt_s: float, twist: FloatArray
+) -> None:
+    """Write the twists of wheel speeds, for small turns. Flat arrays: their steps are known to compilers."""
+    wheels, ahead, flat = wheel_speed.reshape(wheel_speed.size), facing.reshape(facing.size), twist.reshape(twist.size)
+    for i in range(facing.shape[0]):
+        left = wheels[2 * i]
+        right = wheels[2 * i + 1]
+        cos = ahead[2 * i]
+        sin = ahead[2 * i + 1]
         turn = (right - left) * per_wheel_base
         half_angle = 0.5 * turn * dt_s
-        sinc, cos_half = sinc_and_cosine(half_angle)
-        sin_half = half_angle * sinc
+        sinc, cosine = small_sinc_and_cosine(half_angle)
+        sine = half_angle * sinc
         chord = 0.5 * (left + right) * sinc
-        twist[i, 0] = chord * (facing[i, 0] * cos_half - facing[i, 1] * sin_half)
-        twist[i, 1] = chord * (facing[i, 1] * cos_half + facing[i, 0] * sin_half)
-        twist[i, 2] = turn
-    return -1
+        flat[3 * i] = chord * (cos * cosine - sin * sine)
+        flat[3 * i + 1] = chord * (sin * cosine + cos * sine)
+        flat[3 * i + 2] = turn
 
 
 @kernel
