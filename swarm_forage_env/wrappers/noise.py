@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from math import sqrt
 from typing import Any, ClassVar, TypeAlias
 
@@ -27,6 +28,7 @@ from swarm_forage_env.world.kernels.disturbances import (
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 from swarm_forage_env.wrappers.waveform import (
     Sigma,
+    Signal,
     Waveform,
     WaveformAhead,
     check_sigma,
@@ -56,18 +58,17 @@ _UNIFORM_WIDTH = 2.0 * sqrt(3.0)
 _Span: TypeAlias = tuple[int, int, int, int]
 
 
-def _append_span(spans: list[_Span], lows: list[float], span: _Span, low: float) -> None:
+def _append_span(spans: list[_Span], span: _Span) -> None:
     """Append a run of columns, as `Noise` has it.
 
     Where it goes on from the end of the last, it makes that longer, because few long runs are faster.
     """
-    if spans and lows[-1] == low:
+    if spans:
         start, first, size, of_carriers = spans[-1]
         if (start + size, first + size, of_carriers) == (*span[:2], span[3]):
             spans[-1] = start, first, size + span[2], of_carriers
             return
     spans.append(span)
-    lows.append(low)
 
 
 class SensorNoise(SwarmWrapper):
@@ -140,7 +141,8 @@ class SensorNoise(SwarmWrapper):
                 if is_read:
                     of_carriers = part.name == "light" and self.unwrapped.arena.light_of_carriers_only
                     span = part.start, first, part.size, int(of_carriers)
-                    _append_span(spans, lows, span, 0.0 if name in _READINGS else -1.0)
+                    _append_span(spans, span)
+            lows += [0.0 if name in _READINGS else -1.0] * (len(units) - first)
             if isinstance(sigma, Waveform):
                 signal = sigma.signal(self.unwrapped.scenario.dt_s)
                 self._varying.append((slice(first, len(units)), WaveformAhead(signal)))
@@ -230,7 +232,8 @@ class ActuatorNoise(SwarmWrapper):
         sigma = config.sigma
         self._is_uniform = config.distribution == "uniform"
         self._is_noisy = is_noisy(sigma)
-        self._sigmas = WaveformAhead(sigma_signal(sigma, self.unwrapped.scenario.dt_s))
+        width = _UNIFORM_WIDTH if self._is_uniform else 1.0
+        self._factors = WaveformAhead(partial(_factor, sigma_signal(sigma, self.unwrapped.scenario.dt_s), width))
 
     def on_reset(self, seed: int) -> None:
         """Start the random stream."""
@@ -242,26 +245,27 @@ class ActuatorNoise(SwarmWrapper):
             return wheel_gain
         outer_gain = self._unit_gain if wheel_gain is None else wheel_gain
         draw_bits(self._lanes, self._draws)
-        noisy_gain(self._draws, self._is_uniform, self._factors(1)[0], outer_gain, self._gain)
+        factor = self._factors.of(self.unwrapped.tick + 1)[0]
+        noisy_gain(self._draws, self._is_uniform, factor, outer_gain, self._gain)
         return self._gain
-
-    def _factors(self, n_ticks: int) -> FloatArray:
-        """Return the factors of the coming ticks, of `n_ticks` at most."""
-        sigmas = self._sigmas.of(self.unwrapped.tick + 1)[:n_ticks]
-        return np.maximum(0.0, sigmas) * (_UNIFORM_WIDTH if self._is_uniform else 1.0)
 
     def ahead(self, n_ticks: int) -> tuple[int, dict[str, Any]]:
         """Return the noise on wheels in the coming ticks."""
         if not self._is_noisy:
             return n_ticks, {}
-        factors = self._factors(n_ticks)
-        return len(factors), {
+        factors = self._factors.of(self.unwrapped.tick + 1)
+        return min(n_ticks, len(factors)), {
             "wheel_lanes": self._lanes,
             "wheel_draws": self._draws,
             "wheel_factors": factors,
             "wheels_uniform": self._is_uniform,
             "gain": self._gain,
         }
+
+
+def _factor(signal: Signal, width: float, tick: int) -> float:
+    """Return the factor from draws to noise at a tick, for draws of standard deviation 1 / width."""
+    return max(0.0, signal(tick)) * width
 
 
 class MessageNoise(SwarmWrapper):

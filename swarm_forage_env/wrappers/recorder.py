@@ -150,10 +150,11 @@ class RunRecorder(SwarmWrapper):
             n_ahead, disturbances = self._disturbances(min(end - env.tick, self._ticks_left))
             if n_ahead == 0:
                 self._run_with_hooks(policy)
+                kept = False
                 continue
             before = env.tick
             n_observed = arena.run(policy, n_ahead, self._task_sums, disturbances, kept=kept)
-            kept = not self._inside
+            kept = len(disturbances.lanes) == 0
             n_done = env.tick - before
             for wrapper in self._inside:
                 wrapper.count_ticks(n_done)

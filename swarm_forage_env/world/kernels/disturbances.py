@@ -8,7 +8,6 @@ bits count, and each of their values stands for one number: interpolated between
 up one by one in the outermost two. The distribution function is met to 2e-5 everywhere; no value is beyond 5.42.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +17,7 @@ from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.detection import sees_obstacle
 from swarm_forage_env.contract.layout import NEIGHBOUR_FIELDS, RING_SENSORS
 from swarm_forage_env.contract.types import ActionArray, BitArray, BoolArray, FloatArray, IntArray, ObsArray
-from swarm_forage_env.world.kernels.drive import limit_command
+from swarm_forage_env.world.kernels.drive import limit_command, sinc_and_cosine
 from swarm_forage_env.world.kernels.kinds import blank
 
 _CELLS = 4096
@@ -49,7 +48,7 @@ class Noise(NamedTuple):
     spans: IntArray
     """(S, 4) runs of neighbouring columns: first in obs, first in draws, length, 1 = only carriers read them."""
     lows: ObsArray
-    """(S,) float32, lower clamp of each run."""
+    """(C,) float32, lower clamp of each column of draws."""
     heading: tuple[int, int]
     """First column of the heading in obs, and its column in draws, or `NOT_NOISY`."""
 
@@ -181,8 +180,8 @@ def disturb(
                 span = noise.spans[k]
                 if span[3] == 0 or carried_object[i] >= 0:
                     row = obs[i, span[0] : span[0] + span[2]]
-                    bits = own[span[1] : span[1] + span[2]]
-                    _add_noise(row, bits, factors[span[1] : span[1] + span[2]], noise.lows[k], noise.is_uniform)
+                    first, end = span[1], span[1] + span[2]
+                    _add_noise(row, own[first:end], factors[first:end], noise.lows[first:end], noise.is_uniform)
             if turned != NOT_NOISY:
                 angle = np.float64(standard(own[turned], noise.is_uniform)) * np.float64(factors[turned])
                 _turn_heading(obs[i], start, angle)
@@ -195,24 +194,24 @@ def disturb(
 
 
 @kernel
-def _add_noise(row: ObsArray, bits: BitArray, factors: ObsArray, low: np.float32, is_uniform: bool) -> None:
+def _add_noise(row: ObsArray, bits: BitArray, factors: ObsArray, lows: ObsArray, is_uniform: bool) -> None:
     """Add random numbers times their factors to the columns of one run and clamp them to [low, 1]."""
     one, least, most = np.float32(1.0), bits[0], bits[0]
     for k in range(bits.shape[0]):
         least, most = min(least, bits[k]), max(most, bits[k])
     if is_uniform or least >> _OF_CELL == 0 or most >> _OF_CELL == _LAST:
         for k in range(bits.shape[0]):
-            row[k] = min(one, max(low, row[k] + standard(bits[k], is_uniform) * factors[k]))
+            row[k] = min(one, max(lows[k], row[k] + standard(bits[k], is_uniform) * factors[k]))
     else:  # without branches the processor works on many at a time
         for k in range(bits.shape[0]):
-            row[k] = min(one, max(low, row[k] + _between_edges(bits[k]) * factors[k]))
+            row[k] = min(one, max(lows[k], row[k] + _between_edges(bits[k]) * factors[k]))
 
 
 @kernel
 def _turn_heading(obs: ObsArray, start: int, angle: float) -> None:
     """Turn the heading (cos, sin), two columns of one row from `start`, by an angle in rad."""
-    cos = math.cos(angle)
-    sin = math.sin(angle)
+    sinc, cos = sinc_and_cosine(angle)
+    sin = sinc * angle
     x = float(obs[start])
     y = float(obs[start + 1])
     # Rounding to float32 can leave the unit circle by one unit in the last place.
@@ -235,14 +234,15 @@ def shift_neighbours(
         first: Their first column in `draws` and `factors`.
         n_seen: Neighbours that an observation has room for.
     """
-    one = np.float32(1.0)
+    one, n_columns = np.float32(1.0), factors.shape[0]
     for i in range(obs.shape[0]):
+        own = draws[i * n_columns : (i + 1) * n_columns]
         for k in range(n_seen):
             at = start + NEIGHBOUR_FIELDS * k
             if obs[i, at + NEIGHBOUR_FIELDS - 1] > 0.0:
                 for axis in range(2):
                     column = first + 2 * k + axis
-                    noise = standard(draws[i * factors.shape[0] + column], is_uniform) * factors[column]
+                    noise = standard(own[column], is_uniform) * factors[column]
                     obs[i, at + axis] = min(one, max(-one, obs[i, at + axis] + noise))
 
 
