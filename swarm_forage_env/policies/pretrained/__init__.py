@@ -1,4 +1,4 @@
-"""Policies that were trained with this package and come with it: small networks, run by numpy alone.
+"""Policies that were trained with this package and come with it: small networks, run without torch.
 
 Beside each network `NAME.npz` lies its card, `NAME.md`, and the plan that it was trained by, `NAME.toml`.
 """
