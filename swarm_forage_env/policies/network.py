@@ -120,7 +120,14 @@ class Network:
         """Return the last layer's values for observations (N, d), (N, m) float32, before any choice of actions.
 
         A row has the same bits on every machine, and whatever other rows there are (`policies.kernels.network`).
+
+        Raises:
+            NetworkError: rows of another number of columns than the network takes.
         """
+        if rows.ndim != 2 or rows.shape[1] != len(self.weights[0]):
+            raise NetworkError(
+                f"Expected observations (N, {len(self.weights[0])}), as the network takes, got {rows.shape}."
+            )
         values = np.empty((len(rows), len(self.biases[-1])), np.float32)
         forward(np.ascontiguousarray(rows, np.float32), self.layers(), np.ones(len(rows), np.bool_), values)
         return values

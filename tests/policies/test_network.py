@@ -59,6 +59,12 @@ def test_outputs_are_those_of_the_slow_twin_bit_for_bit(activation, sizes):
         assert network.outputs(rows[row : row + 1]).tobytes() == ours[row].tobytes(), "whatever rows are beside it"
 
 
+def test_rows_of_another_number_of_columns_are_refused():
+    for shape in ((3, 1), (3, 40), (2,)):
+        with pytest.raises(NetworkError, match=r"observations \(N, 2\), as the network takes, got \("):
+            small_network().outputs(np.zeros(shape, np.float32))
+
+
 def test_tanh_is_good_to_float32():
     identity = np.eye(1, dtype=np.float32), np.zeros(1, np.float32)
     about = NetworkAbout(interface=InterfaceConfig(), activation="tanh")

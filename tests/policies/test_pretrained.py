@@ -4,14 +4,17 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from swarm_forage_env.policies import pretrained
 from swarm_forage_env.policies.network import Network
+from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import warehouse_small
 from swarm_forage_env.training.plan import TrainingPlan, read_plan
+from tests.support.stage import OPEN_CELL, load, stand, tidy_world
 
 FOLDER = Path(pretrained.__file__).parent
 SHIPPED = sorted(path.stem for path in FOLDER.glob("*.npz"))
@@ -58,3 +61,14 @@ def test_a_run_with_it_is_reproducible():
 def test_it_is_made_for_a_world_without_caches():
     spec = plan_run(warehouse_small(caches="static"), "ppo_warehouse_small")
     assert spec.scenario.caches == "none"
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_robot_keeps_its_cargo_when_it_comes_back_to_work(name):
+    """It does so in a step that policies do not foresee: for them the robot is still in repair."""
+    env, policy = tidy_world(), load_policy(name)
+    policy.reset(env.swarm_spec, np.random.default_rng(0))
+    load(env, 0, 0)
+    stand(env, 0, OPEN_CELL)
+    env.step_batch(policy.act(env.arena.observe(), np.zeros(4, np.bool_)))
+    assert env.swarm.carried_object.tolist() == [0, -1, -1, -1]
