@@ -169,7 +169,7 @@ def answers(results: StudyVerdict) -> str:
     return (
         "## The answers\n\n"
         f"{rows(('rules', *ANSWERS, 'waiting for runs'), counts, right=range(1, 2 + len(ANSWERS)))}\n\n"
-        "An answer is by intervals of paired runs, our rule, with the measures corrected. In brackets stands the "
+        "An answer is by intervals, our rule, with the measures corrected. In brackets stands the "
         "answer by the paper's rule, overlapping bands of two standard deviations, where it is another."
         f"{_otherwise(results)}{_on_fewer_values(results)}\n\n{rows(('claim', 'text', *results.rules), lines)}"
     )

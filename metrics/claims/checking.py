@@ -18,21 +18,38 @@ class PanelName(NamedTuple):
     """In `METRICS`."""
     form: Form = "marginal"
     """Of a measure that compares two sizes."""
+    is_relative: bool = False
+    """Whether scores are shares of the performance that they are compared with."""
 
     @property
     def words(self) -> str:
         """The name for people."""
-        words = (self.experiment, self.measure, "" if self.form == "marginal" else self.form)
+        relative = "relative" if self.is_relative else ""
+        words = (self.experiment, self.measure, "" if self.form == "marginal" else self.form, relative)
         return " ".join(word for word in words if word).replace("_", " ")
 
 
-Place: TypeAlias = tuple[str, str] | tuple[str, str, Form]
-"""A panel: experiment, measure and, if it is not the marginal one, form."""
+Place: TypeAlias = tuple[str, str] | tuple[str, str, Form] | tuple[str, str, Form, bool]
+"""A panel: experiment, measure, form if it is not the marginal one, and whether it is relative."""
+RELATIVE_TOO = ("reactivity", "adaptability", "noise_robustness", "population_robustness")
+"""Measures in amounts of performance that rank policies by how much they do: claims about them are judged relative to
+performance, too."""
+
+
+RELATIVE = "relative to performance"
+"""Name of these verdicts among the others."""
 
 
 def named(place: Place) -> PanelName:
     """Return the name of a panel."""
+    if len(place) == 4:
+        return PanelName(*place)
     return PanelName(place[0], place[1], place[2] if len(place) == 3 else "marginal")
+
+
+def relative_name(name: PanelName) -> PanelName:
+    """Return the name of the relative panel, where the measure is one of `RELATIVE_TOO`; else the same."""
+    return name._replace(is_relative=True) if name.measure in RELATIVE_TOO else name
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,6 +110,14 @@ class Claim:
         return tuple(name for name in needed if name not in self.panels)
 
 
+def relative_claim(claim: Claim) -> Claim:
+    """Return what a claim says if its measures are read relative to performance; itself where none of them can be."""
+    statements = tuple(
+        replace(statement, panels=tuple(map(relative_name, statement.panels))) for statement in claim.statements
+    )
+    return claim if statements == claim.statements else replace(claim, statements=statements, otherwise={})
+
+
 def _panels_of(statements: Iterable[Statement]) -> tuple[PanelName, ...]:
     return tuple(dict.fromkeys(name for statement in statements for name in statement.panels))
 
@@ -103,7 +128,7 @@ class Verdict:
 
     claim: str
     answer: Answer
-    """By intervals of paired runs, our rule."""
+    """By intervals, our rule."""
     by_bands: Answer
     """By overlapping bands of two standard deviations, the paper's rule."""
     statistic: float
@@ -116,7 +141,8 @@ class Verdict:
     why: str
     """What was found and the limit that it was held against; one line per statement."""
     otherwise: Mapping[str, "Verdict"] = field(default_factory=dict[str, "Verdict"])
-    """Verdicts on what else the claim may mean; those without any scores are left out."""
+    """Verdicts on what else the claim may mean, and under `RELATIVE` on `relative_claim`; those without any scores are
+    left out."""
 
 
 def check_claim(claim: Claim, panels: Mapping[PanelName, Panel] | Mapping[tuple[str, str], Panel]) -> Verdict:
@@ -124,13 +150,16 @@ def check_claim(claim: Claim, panels: Mapping[PanelName, Panel] | Mapping[tuple[
 
     Args:
         claim: One of `CLAIMS`, or of your own.
-        panels: (experiment, measure) or (experiment, measure, form) -> scores of all policies.
+        panels: (experiment, measure), (experiment, measure, form) or `PanelName` -> scores of all policies.
 
     Raises:
         CurveError: A panel lacks a policy that the claim speaks of.
     """
     by_name = {named(name): panel for name, panel in panels.items()}
     others = {words: _verdict(claim, statements, by_name) for words, statements in claim.otherwise.items()}
+    again = relative_claim(claim)
+    if again is not claim:
+        others[RELATIVE] = _verdict(again, again.statements, by_name)
     scored = {words: verdict for words, verdict in others.items() if verdict.answer != "no scores"}
     return replace(_verdict(claim, claim.statements, by_name), otherwise=scored)
 

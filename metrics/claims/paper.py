@@ -13,7 +13,7 @@ import numpy as np
 
 from ..population import availability, ratio_for_team
 from .checking import Claim, Place, Statement
-from .orders import opposite_order, same_order, unrelated
+from .orders import LOOSE, opposite_order, same_order, unrelated
 from .outcomes import Answer, Outcome
 from .predicates import (
     differ,
@@ -22,7 +22,6 @@ from .predicates import (
     is_constant,
     is_higher,
     is_narrow,
-    is_not_higher,
     is_wide,
     is_wider,
     leads_by_little,
@@ -31,7 +30,17 @@ from .predicates import (
     ties,
     varies,
 )
-from .shapes import ZERO, bend_of, changes_before, changes_within, is_linear, rise_of, slope_of, with_zero
+from .shapes import (
+    ZERO,
+    bend_of,
+    changes_before,
+    changes_within,
+    from_undisturbed,
+    is_linear,
+    rise_of,
+    slope_of,
+    with_zero,
+)
 from .statements import (
     ALL_PAIRS,
     COMPLEX,
@@ -49,6 +58,7 @@ from .statements import (
     N,
     P,
     R,
+    as_shares,
     best_of,
     better,
     direction_of,
@@ -102,9 +112,9 @@ def _flexibility(letter: str, measure: str) -> tuple[Claim, ...]:
         ),
         Claim(
             name=f"{letter}2",
-            text="DPO is not better than CRW.",
+            text="DPO is worse than CRW.",
             figure=f"{where}, both warehouses",
-            statements=tuple(states(is_not_higher, panel, first="crw", second="dpo") for panel in (small, medium)),
+            statements=tuple(better(panel, ("crw",), ("dpo",)) for panel in (small, medium)),
         ),
         Claim(
             name=f"{letter}3",
@@ -128,7 +138,8 @@ def _flexibility(letter: str, measure: str) -> tuple[Claim, ...]:
 def _about_small_swarms(panel: Place) -> dict[str, tuple[Statement, ...]]:
     """What E1 to E3 say of spatial self-organisation in the small warehouse."""
     return {
-        "E1": (states(is_constant, panel, policies=POLICIES),),
+        # The figure shows the share of performance that is lost.
+        "E1": (states(is_constant, as_shares(panel), policies=POLICIES),),
         "E2": (best_of(panel, "crw"),),
         "E3": (states(ties, panel, pairs=(COMPLEX,)),),
     }
@@ -231,7 +242,10 @@ _SCALING = (
         name="C4",
         text="There are no significant differences at all.",
         figure="scenario 2, scalability (no figure), objects at rest and moving",
-        statements=tuple(states(never_differ, (experiment, C), pairs=ALL_PAIRS) for experiment in _ALL_WALKS),
+        statements=tuple(
+            states(never_differ, (experiment, C), pairs=ALL_PAIRS, n_panels=len(_ALL_WALKS))
+            for experiment in _ALL_WALKS
+        ),
     ),
     Claim(
         name="P1",
@@ -253,8 +267,8 @@ _SCALING = (
         ),
         figure="scenario 2, raw performance and self-organisation, objects at rest and at their fastest",
         statements=(
-            states(opposite_order, ("S2a still", E_T), ("S2a still", P), policies=POLICIES),
-            states(opposite_order, spatial("S2a fast"), ("S2a fast", P), policies=POLICIES),
+            states(opposite_order, ("S2a still", E_T), ("S2a still", P), policies=POLICIES, least=LOOSE),
+            states(opposite_order, spatial("S2a fast"), ("S2a fast", P), policies=POLICIES, least=LOOSE),
             better(("S2a still", P), SIMPLE, COMPLEX),
             better(("S2a fast", P), SIMPLE, COMPLEX),
         ),
@@ -325,7 +339,7 @@ _NOISE = (
         name="N3",
         text="From a standard deviation of about 0.017 on, all algorithms change their behaviour.",
         figure="scenario 1, noise, small warehouse",
-        statements=(states(changes_within, ("S1e", N), policies=POLICIES, between=ONSET),),
+        statements=(states(changes_within, ("S1e", N), views=(from_undisturbed,), policies=POLICIES, between=ONSET),),
     ),
     Claim(
         name="N4",
@@ -339,7 +353,7 @@ _NOISE = (
         figure="scenario 1, noise, medium warehouse",
         statements=(
             states(differs_more, ("S1e", N), ("S1f", N), pairs=ALL_PAIRS),
-            states(changes_within, ("S1f", N), policies=POLICIES, between=ONSET),
+            states(changes_within, ("S1f", N), views=(from_undisturbed,), policies=POLICIES, between=ONSET),
             states(is_higher, ("S1f", N), views=(rise_of,), upper=UNSTEADY, lower=STEADY),
         ),
     ),
@@ -361,14 +375,22 @@ _NOISE = (
                 upper=("dpo", "stochm", "stochx"),
                 lower=(ZERO,),
             ),
-            states(changes_within, ("S2c 320", N), policies=("dpo", "stochm", "stochx"), between=LARGER),
+            states(
+                changes_within,
+                ("S2c 320", N),
+                views=(from_undisturbed,),
+                policies=("dpo", "stochm", "stochx"),
+                between=LARGER,
+            ),
         ),
     ),
     Claim(
         name="N8",
         text="STOCHM changes under weaker noise than DPO and STOCHX.",
         figure="scenario 2, noise, 320 robots",
-        statements=(states(changes_before, ("S2c 320", N), first="stochm", others=("dpo", "stochx")),),
+        statements=(
+            states(changes_before, ("S2c 320", N), views=(from_undisturbed,), first="stochm", others=("dpo", "stochx")),
+        ),
     ),
 )
 
@@ -442,7 +464,7 @@ _TOGETHER = (
         text="Higher self-organisation goes with better flexibility and robustness.",
         figure="scenarios 1 and 2, self-organisation beside flexibility and robustness",
         statements=tuple(
-            states(same_order, organised, panel, policies=POLICIES, better=(1, direction_of(panel[1])))
+            states(same_order, organised, panel, policies=POLICIES, better=(1, direction_of(panel[1])), least=LOOSE)
             for organised, disturbed in _ORGANISED_AND_DISTURBED
             for panel in disturbed
         ),

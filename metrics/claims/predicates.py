@@ -4,12 +4,13 @@ A statement about several levels is supported if it holds at more than half of t
 than half; else it is undecided. The thresholds are the same for every claim.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 from typing import TypeAlias
 
 import numpy as np
+from scipy.special import stdtrit  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
 
 from ..curves import FloatArray
 from .outcomes import (
@@ -49,6 +50,8 @@ FLAT = 0.25
 one, as a share of the panel's scale (our choice)."""
 MORE = 0.1
 """Share of comparisons by which one panel has more differences than another (our choice)."""
+CLEAR = 2.0
+"""Student's t at which a difference is half as clear as can be: about where it becomes significant."""
 WIDER = 1.5
 """Ratio of the widths of two bands from which on one looks wider (our choice)."""
 
@@ -69,16 +72,22 @@ def ties(panel: Panel, *, pairs: Pairs, levels: Levels = "all", rule: Rule = "in
     )
 
 
-def never_differ(panel: Panel, *, pairs: Pairs, rule: Rule = "intervals") -> Outcome:
+def never_differ(panel: Panel, *, pairs: Pairs, n_panels: int = 1, rule: Rule = "intervals") -> Outcome:
     """Whether no pair of policies differs at any level.
 
     Supported if all comparisons tie. Contradicted if one differs: by intervals after Bonferroni's correction, so that
     one difference by chance among many comparisons does not count.
+
+    Args:
+        panel: The scores.
+        pairs: Of policies.
+        n_panels: Panels of which a claim says this; a difference in one of them contradicts it.
+        rule: As everywhere.
     """
     names = sorted({name for pair in pairs for name in pair})
     if not panel.n_runs(names):
         return without_scores(" and ".join(names))
-    confidence = 1.0 - (1.0 - CONFIDENCE) / (len(pairs) * panel.levels.size)
+    confidence = 1.0 - (1.0 - CONFIDENCE) / (len(pairs) * panel.levels.size * n_panels)
     found = np.array([signs(panel, first, second, rule, confidence) for first, second in pairs])
     n_tied, n_apart = int((found == 0.0).sum()), int((np.abs(found) == 1.0).sum())
     answer: Answer = "contradicted" if n_apart else "supported" if n_tied == found.size else "undecided"
@@ -90,13 +99,14 @@ def never_differ(panel: Panel, *, pairs: Pairs, rule: Rule = "intervals") -> Out
 
 def _gap(panel: Panel, pairs: Pairs) -> float:
     """Mean distance of the means of pairs, as a share of the scale."""
-    gaps = np.array([panel.scores[a] - panel.scores[b] for a, b in pairs])
-    return float(mean_over_runs(np.abs(mean_over_runs(gaps)).ravel())) / panel.scale
+    gaps = np.array([mean_over_runs(panel.scores[a]) - mean_over_runs(panel.scores[b]) for a, b in pairs])
+    return float(mean_over_runs(np.abs(gaps).ravel())) / panel.scale
 
 
 def stays_alike(first: Panel, second: Panel, *, policy: str, rule: Rule = "intervals") -> Outcome:
     """Whether a policy scores alike in two panels of the same levels and runs: it ties with itself at most levels."""
-    both = Panel(levels=first.levels, scores={"first": first.scores[policy], "second": second.scores[policy]})
+    scores = {"first": first.scores[policy], "second": second.scores[policy]}
+    both = replace(first, scores=scores, margins=np.maximum(first.tie_margins, second.tie_margins))
     outcome = ties(both, pairs=(("first", "second"),), rule=rule)
     return replace(outcome, why=f"{policy} in both panels: {outcome.why}")
 
@@ -160,7 +170,7 @@ def _leads(panel: Panel, leader: str, other: str, rule: Rule) -> FloatArray:
     """Bounds of the lead at each level, (L, 2): NaN where there are too few runs."""
     a, b = panel.of((leader, other))
     if rule == "intervals":
-        return np.array([interval_of(level[np.isfinite(level)]) for level in a - b])
+        return np.array([interval_of(x[np.isfinite(x)], y[np.isfinite(y)]) for x, y in zip(a, b, strict=True)])
     gap = mean_over_runs(a) - mean_over_runs(b)
     apart = signs(panel, leader, other, rule)
     return np.stack([np.where(apart > 0.0, gap, -np.inf), np.where(apart < 0.0, gap, np.maximum(gap, 0.0))], axis=1)
@@ -230,27 +240,68 @@ def reaches_higher(panel: Panel, *, upper: Sequence[str], lower: Sequence[str], 
 
 
 def differs_more(few: Panel, many: Panel, *, pairs: Pairs, rule: Rule = "intervals") -> Outcome:
-    """Whether the second panel has more pairs and levels that differ than the first, by `MORE` of all comparisons.
+    """Whether the second panel has more pairs and levels that differ than the first.
 
-    Of both, equally many runs are looked at: as many as the panel with fewer of them has.
+    Of both, equally many runs are looked at: as many as the panel with fewer of them has. By intervals each comparison
+    counts by its clarity, t^2 / (t^2 + 4), which is a half where it becomes significant and lets a comparison count for
+    more the clearer it is. Supported if the gain in mean clarity is surely above 0, contradicted if it is surely below
+    `MORE`. By bands the share of comparisons that differ must gain, or lose, `MORE`.
     """
     names = {name for pair in pairs for name in pair}
     if not few.n_runs(names) or not many.n_runs(names):
         return without_scores(" and ".join(sorted(names)))
-    shares: list[float] = []
     equal = of_equal_runs(few, many, names)
-    for panel in equal:
-        found = np.array([signs(panel, first, second, rule) for first, second in pairs])
-        shares.append(float((np.abs(found) == 1.0).mean()))
-    gain, n_runs = shares[1] - shares[0], equal[0].n_runs(names)
-    answer: Answer = "supported" if gain >= MORE else "contradicted" if gain <= -MORE else "undecided"
+    n_runs = equal[0].n_runs(names)
     if n_runs < LEAST_RUNS[rule]:
-        answer = "undecided"
+        why = f"{n_runs} runs of each panel, {LEAST_RUNS[rule]} are needed"
+        return Outcome(answer="undecided", statistic=np.nan, effect=np.nan, n_runs=n_runs, why=why)
+    if rule == "bands":
+        shares = [_share_apart(panel, pairs) for panel in equal]
+        gain, words = shares[1] - shares[0], "of the comparisons differ"
+        answer: Answer = "supported" if gain >= MORE else "contradicted" if gain <= -MORE else "undecided"
+        ends = ""
+    else:
+        clarities = [_clarity(panel, pairs) for panel in equal]
+        shares, deviations = zip(*clarities, strict=True)
+        gain, words = shares[1] - shares[0], "clear are the differences"
+        half = float(stdtrit(n_runs - 1.0, 0.5 + 0.5 * CONFIDENCE) * np.hypot(*deviations))
+        answer = "supported" if gain > half else "contradicted" if gain + half < MORE else "undecided"
+        ends = f", {gain:.0%} more ({gain - half:.0%} to {gain + half:.0%})"
     why = (
-        f"{shares[1]:.0%} of the comparisons differ, {shares[0]:.0%} in the first panel, of {n_runs} runs each; "
+        f"{shares[1]:.0%} {words}, {shares[0]:.0%} in the first panel{ends}, of {n_runs} runs each; "
         f"{MORE:.0%} more count as more"
     )
     return Outcome(answer=answer, statistic=gain, effect=np.nan, n_runs=n_runs, why=why)
+
+
+def _share_apart(panel: Panel, pairs: Pairs) -> float:
+    """Share of comparisons whose bands do not overlap."""
+    return float((np.abs([signs(panel, first, second, "bands") for first, second in pairs]) == 1.0).mean())
+
+
+def _clarity(panel: Panel, pairs: Pairs) -> tuple[float, float]:
+    """Mean clarity of the comparisons of a panel, and its standard deviation by the jackknife.
+
+    The jackknife leaves out a run of one policy at all levels: levels may share what they are compared with.
+    """
+    names = sorted({name for pair in pairs for name in pair})
+    scores = {name: panel.scores[name] for name in names}
+    found = _mean_clarity(scores, pairs)
+    variance = 0.0
+    for name in names:
+        n_runs = scores[name].shape[-1]
+        fewer = [{**scores, name: np.delete(scores[name], run, axis=-1)} for run in range(n_runs)]
+        variance += (n_runs - 1.0) * float(np.var([_mean_clarity(some, pairs) for some in fewer]))
+    return found, variance**0.5
+
+
+def _mean_clarity(scores: Mapping[str, FloatArray], pairs: Pairs) -> float:
+    gaps = np.array([mean_over_runs(scores[a]) - mean_over_runs(scores[b]) for a, b in pairs])
+    of_mean = {name: std_over_runs(values) ** 2 / np.isfinite(values).sum(axis=-1) for name, values in scores.items()}
+    noise = np.array([of_mean[a] + of_mean[b] for a, b in pairs])
+    with np.errstate(divide="ignore", invalid="ignore"):  # equal runs are as clear as can be, or no difference at all
+        clarity = np.where(gaps == 0.0, 0.0, gaps**2 / (gaps**2 + CLEAR**2 * noise))
+    return float(mean_over_runs(clarity.ravel()))
 
 
 def every_pair(policies: Sequence[str]) -> Pairs:

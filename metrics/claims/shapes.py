@@ -1,14 +1,14 @@
 """Statements about the shape of curves: from where on they change, how steep and how straight they are."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..checks import CurveError
 from ..curves import FloatArray
 from .outcomes import Answer, Outcome, all_of, where_scored
-from .panel import CONFIDENCE, TIE, Panel, Rule, bounds, mean_over_runs, resampled_means, std_over_runs
+from .panel import CONFIDENCE, Panel, Rule, bounds, mean_over_runs, resampled_means, std_over_runs
 
 ROUNDING = 1e-9
 """Share by which a level may be off its place in the ladder."""
@@ -22,14 +22,14 @@ MIN_LEVELS = 4
 
 def rise_of(panel: Panel) -> Panel:
     """Return a panel of one level: the score at the last level less that at the first, run by run."""
-    return _reduced(panel, {name: values[-1] - values[0] for name, values in panel.scores.items()})
+    return panel.reduced({name: values[-1] - values[0] for name, values in panel.scores.items()})
 
 
 def slope_of(panel: Panel) -> Panel:
     """Return a panel of one level: the slope of the line through the scores of each run, times the span of levels."""
     x = panel.levels - panel.levels.mean()
     span = panel.levels[-1] - panel.levels[0]
-    return _reduced(panel, {name: span * (x @ values) / (x @ x) for name, values in panel.scores.items()})
+    return panel.reduced({name: span * (x @ values) / (x @ x) for name, values in panel.scores.items()})
 
 
 def bend_of(panel: Panel) -> Panel:
@@ -50,17 +50,22 @@ def bend_of(panel: Panel) -> Panel:
         return span * (x @ values[kept]) / (x @ x)
 
     upper, lower = slice(panel.levels.size - half, None), slice(None, half)
-    return _reduced(panel, {name: slope(upper, v) - slope(lower, v) for name, v in panel.scores.items()})
+    return panel.reduced({name: slope(upper, v) - slope(lower, v) for name, v in panel.scores.items()})
 
 
 def with_zero(panel: Panel) -> Panel:
     """Return the panel with a policy `zero` that always scores 0, to hold others against."""
     first = next(iter(panel.scores.values()))
-    return Panel(levels=panel.levels, scores={**panel.scores, ZERO: np.zeros_like(first)})
+    return replace(panel, scores={**panel.scores, ZERO: np.zeros_like(first)})
 
 
-def _reduced(panel: Panel, scores: Mapping[str, FloatArray]) -> Panel:
-    return Panel(levels=panel.levels[-1:], scores={name: values[None] for name, values in scores.items()})
+def from_undisturbed(panel: Panel) -> Panel:
+    """Return the panel with level 0 in front, where it knows the scores of undisturbed swarms; else as it is."""
+    if panel.undisturbed is None:
+        return panel
+    scores = {name: np.vstack([panel.undisturbed[name], values]) for name, values in panel.scores.items()}
+    margins = np.concatenate([panel.tie_margins[:1], panel.tie_margins])
+    return Panel(levels=np.concatenate([[0.0], panel.levels]), scores=scores, margins=margins, unit=panel.unit)
 
 
 def changes_within(
@@ -70,11 +75,12 @@ def changes_within(
 
     By intervals: two lines that meet at one of the inner levels are fitted to the means. The change must be real (the
     slope differs before and after, with its interval), and 95 % of the resamples must have the bend between the two
-    values; it is contradicted if at most 5 % have it there, or if the slope changes by less than `TIE`. By bands: the
+    values; it is contradicted if at most 5 % have it there, or if the slope changes by less than a tie. By bands: the
     first level whose band does not overlap that of the first level lies between the values.
 
     Where the change is real, its place is undecided if the levels cannot tell it: to support it, one level below the
-    two values and one above must have been possible; to contradict it, one between them.
+    two values and one above must have been possible; to contradict it, one between them. Where the first level is 0,
+    undisturbed, nothing below is needed: what changes from there on is a straight line, without a bend.
     """
     return all_of([_change(panel, policy, between, rule) for policy in policies])
 
@@ -91,7 +97,7 @@ def is_linear(panel: Panel, *, policies: Sequence[str], rule: Rule = "intervals"
     """Whether each policy grows nearly linearly with the level.
 
     A rising line explains `LINEAR` of the variance between the means; by intervals, with its interval. Contradicted if
-    it explains less, or surely rises by less than `TIE` of the scale over all levels. By bands: the same of the means
+    it explains less, or surely rises by less than a tie over all levels. By bands: the same of the means
     alone, however little they rise, if the bands of two levels are apart; else nothing is seen to grow: undecided.
     """
     return all_of([_straightness(panel, policy, rule) for policy in policies])
@@ -136,6 +142,8 @@ class _Bends:
     """Of the slope, over the span of levels, as a share of the scale."""
     chance: float
     """How much the runs may have added to it by chance, at `CONFIDENCE`."""
+    tie: float
+    """Margin of a tie, as a share of the scale: a smaller change is none."""
 
     @property
     def is_real(self) -> bool:
@@ -143,7 +151,7 @@ class _Bends:
 
     @property
     def is_none(self) -> bool:
-        return abs(self.change) + self.chance <= TIE
+        return abs(self.change) + self.chance <= self.tie
 
 
 def _bends(panel: Panel, policy: str) -> _Bends:
@@ -155,7 +163,12 @@ def _bends(panel: Panel, policy: str) -> _Bends:
     # The bend is put where it fits best, so chance may add what it adds at its best place.
     _, by_chance = broken_line(panel.levels, drawn - means)
     chance = float(np.quantile(np.abs(by_chance), CONFIDENCE)) * unit
-    return _Bends(places=places, change=float(change[0]) * unit, chance=chance)
+    return _Bends(places=places, change=float(change[0]) * unit, chance=chance, tie=_tie(panel))
+
+
+def _tie(panel: Panel) -> float:
+    """Margin of a tie, mean of levels, as a share of the scale."""
+    return float(panel.tie_margins.mean()) / panel.scale
 
 
 def _few_levels(panel: Panel, policies: Sequence[str]) -> Outcome | None:
@@ -167,13 +180,16 @@ def _few_levels(panel: Panel, policies: Sequence[str]) -> Outcome | None:
     return Outcome(answer="undecided", statistic=np.nan, effect=np.nan, n_runs=n_runs, why=why)
 
 
-def _located(answer: Answer, possible: FloatArray, between: tuple[float, float]) -> tuple[Answer, str]:
-    """Return the answer as far as the levels can tell it, and why not if they cannot."""
+def _located(
+    answer: Answer, levels: FloatArray, possible: FloatArray, between: tuple[float, float]
+) -> tuple[Answer, str]:
+    """Return the answer as far as the levels can tell it, and why not if they cannot; `possible` ones can show it."""
     low, high = between
     where = f"{low:.3g} to {high:.3g}"
     if answer == "contradicted" and not ((possible >= low) & (possible <= high)).any():
         return "undecided", f"no level that was run could show a change at {where}"
-    lacking = [word for word, has in (("below", possible < low), ("above", possible > high)) if not has.any()]
+    has_below, has_above = bool((possible < low).any()) or levels[0] == 0.0, bool((possible > high).any())
+    lacking = [word for word, has in (("below", has_below), ("above", has_above)) if not has]
     if answer == "supported" and lacking:
         return "undecided", f"no level that was run could show a change {' or '.join(lacking)} {where}"
     return answer, ""
@@ -194,7 +210,7 @@ def _change(panel: Panel, policy: str, between: tuple[float, float], rule: Rule)
         if np.isinf(onset):
             why = f"band of {policy} never leaves that of the first level"
         else:
-            answer, reason = _located(answer, part.levels[1:], (low, high))
+            answer, reason = _located(answer, part.levels, part.levels[1:], (low, high))
             why = f"{why}; {reason}" if reason else why
         n_runs = part.n_runs((policy,))
         return Outcome(answer=answer, statistic=onset, effect=np.nan, n_runs=n_runs, why=why)
@@ -209,11 +225,11 @@ def _change(panel: Panel, policy: str, between: tuple[float, float], rule: Rule)
         answer: Answer = "undecided"
         why = f"slope of {policy} changes by {found.change:.2f} of the scale, by chance alone up to {found.chance:.2f}"
         if found.is_none:
-            answer, why = "contradicted", f"{why}: no change, {TIE:g} would be one"
+            answer, why = "contradicted", f"{why}: no change, {found.tie:.2g} would be one"
         elif found.is_real:
             answer = "supported" if inside >= CONFIDENCE else answer
             answer = "contradicted" if inside <= 1.0 - CONFIDENCE else answer
-            answer, reason = _located(answer, part.levels[1:-1], (low, high))
+            answer, reason = _located(answer, part.levels, part.levels[1:-1], (low, high))
             where = f"at {middle:.3g}, in {inside:.0%} of the resamples between {between[0]:.3g} and {between[1]:.3g}"
             why = f"slope of {policy} changes {where}" + (f"; {reason}" if reason else "")
         return Outcome(answer=answer, statistic=middle, effect=found.change, n_runs=n_runs, why=why)
@@ -267,7 +283,7 @@ def _straightness(panel: Panel, policy: str, rule: Rule) -> Outcome:
             most = _ratio(rest**0.5 + rests**0.5, total**0.5 - totals**0.5)
             least = _ratio(rest**0.5 - rests**0.5, total**0.5 + totals**0.5)
             answer = "supported" if 1.0 - most >= LINEAR and lower > 0.0 else "undecided"
-            answer = "contradicted" if 1.0 - least < LINEAR or upper <= TIE else answer
+            answer = "contradicted" if 1.0 - least < LINEAR or upper <= _tie(part) else answer
             words = f"{1.0 - most:.2f} to {1.0 - least:.2f} with its interval; "
         why = f"a line explains {explained:.2f} of the variance of {policy} ({words}{LINEAR:g} is nearly linear)"
         why = f"{why} and rises by {rise:.2f} of the scale" + ("" if rise > 0.0 else ": it does not grow")

@@ -65,6 +65,11 @@ def spatial(experiment: str) -> tuple[str, str, Form]:
     return (experiment, E_S, "interactive" if experiment.startswith("S1") else "marginal")
 
 
+def as_shares(panel: Place) -> Place:
+    """Return a panel whose scores are shares of performance."""
+    return named(panel)._replace(is_relative=True)
+
+
 def best_of(panel: Place, policy: str, levels: str = "all") -> Statement:
     """Statement that a policy is better than the three others."""
     return better(panel, (policy,), others_of(policy), levels)

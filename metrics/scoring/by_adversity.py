@@ -5,7 +5,7 @@ Of a changing population, a forecast too: what the queue model predicts, beside 
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -139,6 +139,7 @@ def _distance_scores(name: str, study: StudyCurves, variant: Variant, _: Form) -
         if name == "reactivity":
             _check_conditions(reference, level, variant)
         floor = float(_floor(reference, variant).mean()) if len(reference.seeds) > 1 else None
+        floors = _floor_per_seed(name, reference, variant)
         beside = _beside_distance(reference, level)
         unit = "objects (DTW with clock)" if variant == "sierra" else "objects (DTW)"
         yield _score(
@@ -149,8 +150,18 @@ def _distance_scores(name: str, study: StudyCurves, variant: Variant, _: Form) -
             unit=unit,
             beside=beside,
             floor=floor,
+            floor_per_seed=floors,
             order_matters=True,
         )
+
+
+def _floor_per_seed(name: str, reference: RunCurves, variant: Variant) -> dict[int, float]:
+    """Return the distance of each reference run to the next, the last one's to the first; empty for a single run."""
+    if len(reference.seeds) < 2:
+        return {}
+    others = replace(reference, curves={name: np.roll(curve, -1, axis=0) for name, curve in reference.curves.items()})
+    found = _DISTANCES[name](reference, others, variant=variant)
+    return dict(zip(reference.seeds, found.tolist(), strict=True))
 
 
 def _check_conditions(reference: RunCurves, level: RunCurves, variant: Variant) -> None:

@@ -26,6 +26,8 @@ UPSIDE_DOWN = (
 )
 _OVER_A_RUN = re.compile(r"(per run|in [\d,]+ s)$")
 """End of a unit of what is summed over a run."""
+SHARES = "share of performance"
+"""Unit of amounts that are divided by performance."""
 _NO_SUM = "this performance is no sum over robots, and the measure compares with growth in proportion to them"
 _OTHER_SWARMS = {"one robot", "two sizes", "rates", "robots at work"}
 """Input of measures that know how many robots made a performance, and expect it of as many others."""
@@ -132,7 +134,7 @@ BY_SIZE: dict[str, _SizeMeasure] = {
     "spatial_emergence": _SizeMeasure(
         values=_spatial_emergence,
         unit="objects {span}",
-        sierra_unit="share of performance",
+        sierra_unit=SHARES,
         from_one=True,
         one_drops_out=True,
         of_two_sizes=True,

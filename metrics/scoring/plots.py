@@ -21,7 +21,7 @@ from swarm_forage_env.rendering.figures import (
 from swarm_forage_env.wrappers.world import SIZE
 
 from ..catalog import METRICS
-from ..claims.panel import MIN_PAIRS
+from ..claims.panel import MIN_RUNS
 from ..statistics import Summary
 from .run_curves import NOISE, POPULATION, THROTTLE
 from .scores import MEASURE_CRITERIA
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from .score_tables import ScoreTable  # a table draws itself by this
     from .scores import Score  # a table draws itself by this
 
-FEWEST_RUNS = MIN_PAIRS
+FEWEST_RUNS = MIN_RUNS
 """Fewer runs are drawn without an interval: they decide nothing, and that of two runs reaches nine standard deviations
 to either side, which would leave nothing else to be seen."""
 LONG_TITLE = 48

@@ -171,6 +171,10 @@ class Score:
     """For distances: mean distance between two different reference runs, what a perfect swarm scores by chance."""
     relative_floor: float | None = None
     """The noise floor over the mean performance that relative values are compared with."""
+    floor_per_seed: Mapping[int, float] = field(default_factory=dict[int, float])
+    """For distances: that of each reference run to the next one, a sample of what the noise floor is the mean of."""
+    compared_total: float = math.nan
+    """Mean total performance that relative values are compared with; NaN for measures without them."""
     relative_per_seed: Mapping[int, float] = field(default_factory=dict[int, float])
     """For amounts and distances: the values over the total performance that they are compared with, which makes
     policies of different performance comparable; NaN where that performance is zero."""
@@ -309,6 +313,7 @@ def score_runs(
     n_lost = max(experiment.n_lost + len(experiment.seeds) for experiment in experiments) - len(seeds)
     per_run = np.atleast_1d(np.asarray(values(*paired), dtype=np.float64)) if seeds else np.empty(0)
     relative = relative_floor = None
+    mean_total = math.nan
     if compared_with is not None and seeds:
         total = paired[compared_with].performance.sum(axis=-1)
         mean_total = float(total.mean())
@@ -323,6 +328,7 @@ def score_runs(
         n_lost=n_lost,
         noise_floor=floor,
         relative_floor=relative_floor,
+        compared_total=mean_total,
         of_mean_curves=_of_mean_curves(values, paired) if order_matters and seeds else None,
         note="; ".join(filter(None, (remark, _note(per_run, n_lost, relative)))),
         **told,

@@ -5,9 +5,9 @@ A panel has the scores of every run. It is drawn as it is, and the claims of the
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -17,11 +17,12 @@ from ..breakdown import breakdown_probability, find_breakdowns, time_to_breakdow
 from ..catalog import METRICS
 from ..checks import CurveError
 from ..claims import Panel, PanelName
+from ..claims.panel import TIE
 from ..curves import FloatArray, Form, Variant
 from ..distributions import interquartile_mean, probability_of_improvement
 from ..significance import SIGNIFICANT, holm, paired_p
 from ..statistics import Estimate
-from .measures import score_study
+from .measures import SHARES, score_study
 from .run_curves import THROTTLE, RunCurves, StudyCurves, StudyLine, study_lines
 from .scores import DISTURBANCES, MEASURE_CRITERIA, Score, ScoreForms, label_of
 
@@ -62,10 +63,16 @@ _EXPERIMENTS: dict[tuple[Any, ...], str] = {
 """Name of a set, and value on its first axis where it has two -> experiment that claims speak of."""
 _SEED = 1
 """Fixed, so that the same runs give the same table."""
+TIE_OF_FRACTIONS = 0.02
+"""Largest difference of fractions that is a tie (our choice)."""
 ENOUGH = 20.0
 """What the reference must achieve in a window: with fewer objects, breakdowns are chance (`find_breakdowns`)."""
 LEAST_WINDOW = 5
 """Intervals: deliveries come in bursts, and a single poor interval at the end of a run is no breakdown."""
+
+
+_ByLevel: TypeAlias = Mapping[str, Mapping[float, Mapping[int, float]]]
+"""Policy -> level -> seed -> value."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -96,6 +103,12 @@ class StudyPanel:
     """Seed of each run, (R,)."""
     scores: Mapping[str, FloatArray]
     """Policy -> one score per level and run, (L, R); NaN is a run without a score."""
+    relative: Mapping[str, FloatArray] = field(default_factory=dict[str, FloatArray])
+    """The same as shares of the performance that they are compared with; empty for measures without such shares."""
+    compared_with: FloatArray | None = None
+    """That performance, mean of runs and policies, (L,)."""
+    floors: Mapping[str, FloatArray] = field(default_factory=dict[str, FloatArray])
+    """For distances, policy -> distances between undisturbed runs, (R,)."""
 
     @property
     def experiment(self) -> str | None:
@@ -112,9 +125,30 @@ class StudyPanel:
         """Direction of the measure."""
         return METRICS[self.measure].higher_is_better
 
-    def for_claims(self) -> Panel:
-        """Return the scores as claims want them."""
-        return Panel(levels=self.levels, scores=self.scores)
+    @property
+    def shares(self) -> Mapping[str, FloatArray]:
+        """`relative`, or the scores where they are shares of performance already; else empty."""
+        return self.scores if self.unit == SHARES else self.relative
+
+    def for_claims(self, *, relative: bool = False) -> Panel:
+        """Return the scores as claims want them, or as shares of performance.
+
+        Margins of ties are in the measure's own unit (our choice): a tenth of the performance that an amount is
+        compared with, a tenth of 1 for scalability, 0.02 for fractions. Else they are shares of the scores.
+        """
+        measure, n_levels = METRICS[self.measure], len(self.levels)
+        total = self.compared_with
+        if self.measure == "scalability":
+            return Panel(levels=self.levels, scores=self.scores, margins=np.full(n_levels, TIE), unit=1.0)
+        if (measure.lowest, measure.highest) == (0.0, 1.0):
+            return Panel(levels=self.levels, scores=self.scores, margins=np.full(n_levels, TIE_OF_FRACTIONS), unit=1.0)
+        if relative:
+            floors = None if total is None else {name: floor / total[0] for name, floor in self.floors.items()}
+            margins = np.full(n_levels, TIE)
+            return Panel(levels=self.levels, scores=self.shares, margins=margins, undisturbed=floors or None)
+        is_known = total is not None and bool((total > 0.0).all())
+        margins = TIE * total if total is not None and is_known else None
+        return Panel(levels=self.levels, scores=self.scores, margins=margins, undisturbed=self.floors or None)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -200,7 +234,7 @@ def _scores(curves: StudyCurves, measure: str, variant: Variant, form: Form) -> 
 def _panel(
     table: "StudyTable",
     line: StudyLine,
-    values: Mapping[str, Mapping[float, Mapping[int, float]]],
+    values: _ByLevel,
     distances: Mapping[float, float],
     **told: Any,
 ) -> StudyPanel:
@@ -213,7 +247,7 @@ def _panel(
         distances: Level -> distance of its conditions from the ideal ones, where it is known.
         told: Fields of `StudyPanel` that no value tells.
     """
-    x = sorted({level for of_policy in values.values() for level in of_policy})
+    x = _levels_of(values)
     seeds = tuple(sorted(table.spec.seeds))
     far = np.array([distances.get(level, np.nan) for level in x])
     return StudyPanel(
@@ -224,12 +258,22 @@ def _panel(
         x=np.array(x),
         levels=far if np.isfinite(far).all() and (np.diff(far) > 0.0).all() else np.array(x),
         seeds=seeds,
-        scores={
-            policy: np.array([[of_policy.get(level, {}).get(seed, np.nan) for seed in seeds] for level in x])
-            for policy, of_policy in values.items()
-        },
+        scores=_arrays(values, seeds),
         **told,
     )
+
+
+def _levels_of(values: _ByLevel) -> list[float]:
+    return sorted({level for of_policy in values.values() for level in of_policy})
+
+
+def _arrays(values: _ByLevel, seeds: Sequence[int]) -> dict[str, FloatArray]:
+    """Return policy -> (L, R), NaN where there is no value."""
+    x = _levels_of(values)
+    return {
+        policy: np.array([[of_policy.get(level, {}).get(seed, np.nan) for seed in seeds] for level in x])
+        for policy, of_policy in values.items()
+    }
 
 
 def _score_panel(
@@ -237,14 +281,31 @@ def _score_panel(
 ) -> StudyPanel:
     scores = [score for of_policy in found.values() for score in of_policy]
     values: dict[str, dict[float, dict[int, float]]] = {policy: {} for policy in found}
+    shares: dict[str, dict[float, dict[int, float]]] = {policy: {} for policy in found}
+    totals: dict[float, list[float]] = {}
     for policy, of_policy in found.items():
         for score in of_policy:
             values[policy].setdefault(score.x, {}).update(score.per_seed)
+            shares[policy].setdefault(score.x, {}).update(score.relative_per_seed)
+            totals.setdefault(score.x, []).append(score.compared_total)
     far = "environment_distance"
     distances = {score.x: score.beside[far] for score in scores if far in score.beside}
-    first = scores[0]
-    about = {"measure": first.measure, "criterion": first.criterion, "unit": first.unit}
+    first, seeds = scores[0], sorted(table.spec.seeds)
+    about: dict[str, Any] = {"measure": first.measure, "criterion": first.criterion, "unit": first.unit}
+    if any(score.relative_per_seed for score in scores):
+        about["relative"] = _arrays(shares, seeds)
+        about["compared_with"] = np.array([_mean(np.array(totals[level])) for level in sorted(totals)])
+    elif first.measure == "raw_performance":  # an amount that is compared with itself
+        about["compared_with"] = np.array([_mean(_flat(values, level)) for level in sorted(totals)])
+    floors = {policy: of_policy[0].floor_per_seed for policy, of_policy in found.items() if of_policy}
+    if all(floors.values()):
+        about["floors"] = {name: np.array([of.get(seed, np.nan) for seed in seeds]) for name, of in floors.items()}
     return _panel(table, line, values, distances, variant=variant, form=form, **about)
+
+
+def _flat(values: _ByLevel, level: float) -> FloatArray:
+    """Return the values of all policies and seeds at a level."""
+    return np.array([value for of_policy in values.values() for value in of_policy.get(level, {}).values()])
 
 
 def _performance_panels(table: "StudyTable", groups: Sequence[Sequence[StudyLine]]) -> list[StudyPanel]:

@@ -13,6 +13,7 @@ from swarm_forage_env.studies.study_file import is_set_of_paper
 from ..catalog import METRICS
 from ..checks import CurveError
 from ..claims import CLAIMS, INTUITIONS, Claim, PanelName, Verdict, check_claim
+from ..claims.checking import RELATIVE, relative_claim
 from ..claims.outcomes import Answer as ClaimAnswer
 from ..claims.statements import POLICIES
 from ..curves import Variant
@@ -26,7 +27,7 @@ VARIANTS: tuple[Variant, ...] = ("corrected", "paper", "sierra")
 ANSWERS: tuple[ClaimAnswer, ...] = get_args(ClaimAnswer)
 WAITS = "waits"
 """What stands in place of an answer for which runs are missing."""
-HEADER = ("claim", "text", "by intervals", "by bands", "statistic", "effect", "runs", "why")
+HEADER = ("claim", "text", "by intervals", "relative", "by bands", "statistic", "effect", "runs", "why")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,12 +170,17 @@ def _variant_of(measure: str, variant: Variant) -> Variant:
 
 
 def _judge(claim: Claim, rules: str, variant: Variant, found: _Found) -> Judged | Waiting:
+    names = (*claim.panels, *claim.other_panels, *relative_claim(claim).panels)
     places: dict[PanelName, tuple[str, Variant, PanelName]] = {
-        name: (rules, _variant_of(name.measure, variant), name) for name in (*claim.panels, *claim.other_panels)
+        name: (rules, _variant_of(name.measure, variant), name._replace(is_relative=False)) for name in names
     }
     lacks = tuple(name for name in claim.panels if places[name] not in found.panels)
     if not lacks:
-        panels = {name: found.panels[place].for_claims() for name, place in places.items() if place in found.panels}
+        panels = {
+            name: found.panels[place].for_claims(relative=name.is_relative)
+            for name, place in places.items()
+            if place in found.panels and (not name.is_relative or found.panels[place].shares)
+        }
         return Judged(claim=claim, rules=rules, variant=variant, verdict=check_claim(claim, panels))
     keys = [
         (name.experiment.split()[0], label_of(name.measure, "corrected", name.form), _variant_of(name.measure, variant))
@@ -336,4 +342,5 @@ def waiting_lines(waiting: Sequence[Waiting]) -> list[str]:
 def _row(one: Judged) -> tuple[str, ...]:
     found = one.verdict
     numbers = (number(found.statistic), percent(found.effect), str(found.n_runs))
-    return (one.claim.name, one.claim.text, found.answer, found.by_bands, *numbers, found.why)
+    relative = found.otherwise[RELATIVE].answer if RELATIVE in found.otherwise else ""
+    return (one.claim.name, one.claim.text, found.answer, relative, found.by_bands, *numbers, found.why)

@@ -1,6 +1,7 @@
 """Statements about figures in their three answers, by intervals and by bands."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -30,8 +31,10 @@ LEAD = {"leader": "a", "others": ("b", "c")}
 def test_signs_by_hand():
     scores = {"a": [[1.0, 1.2, 1.1, 0.9]] * 3, "b": [[3.0, 3.1, 3.2, 2.9], [1.0, 1.2, 1.1, 0.9], [1.0, 1.3, 0.7, 2.0]]}
     found = Panel(levels=[1, 2, 3], scores=scores)
-    assert signs(found, "a", "b", "intervals").tolist()[:2] == [-1.0, 0.0]
-    assert math.isnan(signs(found, "a", "b", "intervals")[2])
+    # Means 1.05 +- 0.065 and 3.05 +- 0.065; 1.05 each, so that Welch's t of six degrees reaches 0.18 to either side;
+    # and 1.05 +- 0.065 and 1.25 +- 0.278, which leaves anything open.
+    assert signs(replace(found, margins=[0.2] * 3), "a", "b", "intervals").tolist()[:2] == [-1.0, 0.0]
+    assert np.isnan(signs(replace(found, margins=[0.17] * 3), "a", "b", "intervals")[1:]).all()
     # Means 1.05 and 1.25 with standard deviations 0.129 and 0.557: 0.2 is less than twice their sum.
     assert signs(found, "a", "b", "bands").tolist() == [-1.0, 0.0, 0.0]
 
@@ -49,18 +52,23 @@ def test_equal_policies_seldom_differ(rule, n_runs):
     assert (np.abs(found) == 1.0).mean() < 0.065
 
 
-def test_the_interval_of_a_mean_by_hand():
-    # Mean 2, standard deviation sqrt(20 / 3 / 4) = 1.291 of the mean of four, Student's t of three degrees 3.1824.
-    lower, upper = interval_of(np.array([-1.0, 1.0, 3.0, 5.0]))
+def test_the_interval_of_a_difference_by_hand():
+    # Means 2 and 0, their variances 20 / 3 / 4 each, 10 / 3 together; six degrees of freedom, Student's t 2.4469.
+    some = np.array([-1.0, 1.0, 3.0, 5.0])
+    lower, upper = interval_of(some, some - 2.0)
+    assert (lower, upper) == pytest.approx((2.0 - 2.4469 * 1.82574, 2.0 + 2.4469 * 1.82574), abs=1e-3)
+    # Against numbers without scatter, three degrees and 3.1824.
+    lower, upper = interval_of(some, np.zeros(4))
     assert (lower, upper) == pytest.approx((2.0 - 3.1824 * 1.29099, 2.0 + 3.1824 * 1.29099), abs=1e-3)
-    assert np.isnan(interval_of(np.array([1.0, 2.0, 3.0]))).all()
+    assert interval_of(np.ones(4), np.zeros(5)) == (1.0, 1.0)
+    assert np.isnan(interval_of(some, some[:3])).all()
 
 
 def test_resampled_means_vary_as_students_interval_says():
     (values,) = panel({"a": 1.0}, levels=[1.0], n_runs=16).of(("a",))
     _, drawn = resampled_means(values)
     width = np.diff(np.quantile(drawn, [0.025, 0.975]))[0]
-    assert width == pytest.approx(np.diff(interval_of(values[0]))[0], rel=0.1)
+    assert width == pytest.approx(np.diff(interval_of(values[0], np.zeros(16)))[0], rel=0.1)
 
 
 @pytest.mark.parametrize(
@@ -173,6 +181,11 @@ def test_where_levels_cannot_tell_the_place_of_a_change_it_is_undecided():
         )
         assert outcome.answer == "undecided"
         assert "no level that was run could show a change below" in outcome.why
+    whole = SIGMAS[[0, 3, 5, 7]]  # with the undisturbed swarm nothing can be hidden below
+    bent = np.maximum(0.0, whole - whole[1])
+    found = panel({"a": bent / bent[-1]}, levels=whole)
+    outcome = shapes.changes_within(found, policies=("a",), between=(ONSET[0], 0.9 * ONSET[1]))
+    assert outcome.answer == "supported"
     flat = shapes.changes_within(panel({"a": 1.0}, levels=few), policies=("a",), between=ONSET)
     assert flat.answer == "contradicted", "no change at all needs no place"
     outside = panel({"a": [0, 0, 0, 1, 2, 3]})
@@ -206,14 +219,14 @@ def test_which_panel_has_more_differences():
     apart, alike = panel({"a": 1.0, "b": 2.0}), panel({"a": 1.0, "b": 1.0})
     assert answers(general.differs_more, alike, apart, **AB) == BOTH
     assert answers(general.differs_more, apart, alike, **AB) == NEITHER
-    assert answers(general.differs_more, apart, apart, **AB) == OPEN
+    assert answers(general.differs_more, apart, apart, **AB) == ("contradicted", "undecided"), "surely no more"
     assert answers(general.differs_more, alike, panel({"a": 1.0, "b": 2.0}, n_runs=1), **AB) == OPEN
 
 
 def test_differences_are_counted_in_equally_many_runs():
     few, many = panel({"a": 1.0, "b": 2.0}, n_runs=4), panel({"a": 1.0, "b": 2.0}, n_runs=8)
     outcome = general.differs_more(few, many, pairs=AB["pairs"])
-    assert (outcome.answer, outcome.n_runs) == ("undecided", 4)
+    assert (outcome.answer, outcome.n_runs) == ("contradicted", 4)
     assert "of 4 runs each" in outcome.why
     alike = panel({"a": 1.0, "b": 1.0}, n_runs=8)
     assert answers(general.differs_more, alike, few, **AB) == BOTH
@@ -272,8 +285,8 @@ def test_views_of_a_panel_by_hand():
 
 
 def test_missing_runs_are_left_out_and_counted():
-    scores = {"a": [[1.0, 1.1, 0.9, 1.0, math.nan]], "b": [[2.0, 2.1, 1.9, math.inf, 7.0]]}
-    assert general.ties(Panel(levels=[1], scores=scores), **AB).answer == "undecided"  # three pairs are left
+    scores = {"a": [[1.0, 1.1, 0.9, 1.0, math.nan]], "b": [[2.0, 2.1, 1.9, math.inf, math.nan]]}
+    assert general.ties(Panel(levels=[1], scores=scores), **AB).answer == "undecided"  # three runs of b are left
     assert general.ties(Panel(levels=[1], scores=scores), **AB).n_runs == 3
 
 

@@ -1,0 +1,200 @@
+"""Simulate how often the rules that judge claims are wrong, and how often they decide; prints a table in Markdown.
+
+    scripts/judge_rules.py                      five minutes or more
+    scripts/judge_rules.py --worlds 50 --runs 4 16
+
+Each rule meets made worlds: one in which what it states holds, one in which it does not, and one at the border, where
+either answer is wrong or all that can be said is nothing. Scores scatter normally around given curves.
+"""
+
+import argparse
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from metrics.claims import orders, shapes
+from metrics.claims import predicates as general
+from metrics.claims.outcomes import Outcome
+from metrics.claims.panel import Panel
+
+LEVELS = np.arange(1.0, 8.0)
+Curves = Mapping[str, Any]
+"""Policy -> height at each level, or a number."""
+Make = Callable[[np.random.Generator], Sequence[Curves]]
+"""The curves of each panel in a world."""
+FOUR = ("a", "b", "c", "d")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rule:
+    """A rule, and worlds in which it is tried."""
+
+    predicate: Callable[..., Outcome]
+    border: Make
+    """A world in which some answers are wrong."""
+    wrong: tuple[str, ...]
+    """Which, there."""
+    holds: Make
+    fails: Make
+    parameters: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    sd: float = 0.2
+    sds: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
+    """World -> policy -> its own scatter."""
+
+
+def fixed(*panels: Curves) -> Make:
+    """The same curves in every world."""
+    return lambda _: panels
+
+
+def shuffled(*fields: Curves) -> Make:
+    """A panel as it is, then one whose policies have changed places at random."""
+
+    def make(rng: np.random.Generator) -> Sequence[Curves]:
+        first = fields[0]
+        return first, dict(zip(rng.permutation(list(first)).tolist(), first.values(), strict=True))
+
+    return make
+
+
+def bent(place: float, height: float = 3.0) -> NDArray[np.float64]:
+    """A curve that is flat and rises from a level on."""
+    return 1.0 + height * np.maximum(0.0, LEVELS - place)
+
+
+PAIR = {"pairs": (("a", "b"),)}
+ALIKE, APART = {"a": 1.0, "b": 1.0}, {"a": 2.0, "b": 1.0}
+LADDER = {"a": 4.0, "b": 3.0, "c": 2.0, "d": 1.0}
+ONE = {"policies": ("a",)}
+RULES: dict[str, Rule] = {
+    "ties, at the margin": Rule(
+        predicate=general.ties, parameters=PAIR, border=fixed({"a": 1.1, "b": 1.0, "c": 1.0}), wrong=("supported",),
+        holds=fixed(ALIKE), fails=fixed(APART),
+    ),
+    "ties, of equal policies": Rule(
+        predicate=general.ties, parameters=PAIR, border=fixed(ALIKE), wrong=("contradicted",), holds=fixed(ALIKE),
+        fails=fixed(APART),
+    ),
+    "never differ, in three panels": Rule(
+        predicate=lambda *panels, **given: general.all_of([general.never_differ(p, **given) for p in panels]),
+        parameters={**PAIR, "n_panels": 3}, border=fixed(*[ALIKE] * 3), wrong=("contradicted",),
+        holds=fixed(*[ALIKE] * 3), fails=fixed(ALIKE, ALIKE, APART), sd=0.1,
+    ),
+    "is higher": Rule(
+        predicate=general.is_higher, parameters={"upper": ("a",), "lower": ("b",)}, border=fixed(ALIKE),
+        wrong=("supported",), holds=fixed(APART), fails=fixed({"a": 1.0, "b": 2.0}),
+    ),
+    "is not higher": Rule(
+        predicate=general.is_not_higher, parameters={"first": "a", "second": "b"}, border=fixed(ALIKE),
+        wrong=("contradicted",), holds=fixed(ALIKE), fails=fixed(APART),
+    ),
+    "leads by little": Rule(
+        predicate=general.leads_by_little, parameters={"leader": "a", "others": ("b",)}, border=fixed(ALIKE),
+        wrong=("supported",), holds=fixed({"a": 1.15, "b": 1.0}), fails=fixed(APART),
+    ),
+    "is constant, at the limit": Rule(
+        predicate=general.is_constant, parameters=ONE, border=fixed({"a": np.linspace(0.875, 1.125, 7)}),
+        wrong=("supported", "contradicted"), holds=fixed({"a": 1.0}), fails=fixed({"a": LEVELS}),
+    ),
+    "is narrow, at the limit": Rule(
+        predicate=general.is_narrow, parameters=ONE, border=fixed({"a": 1.0}), wrong=("supported", "contradicted"),
+        holds=fixed({"a": 1.0}), fails=fixed({"a": 1.0}), sd=0.0625,
+        sds={"holds": {"a": 0.03}, "fails": {"a": 0.2}},
+    ),
+    "scatters more": Rule(
+        predicate=general.is_wider, parameters={"upper": ("a",), "lower": ("b",)}, border=fixed(ALIKE),
+        wrong=("supported", "contradicted"), holds=fixed(ALIKE), fails=fixed(ALIKE),
+        sds={"holds": {"a": 0.5}, "fails": {"b": 0.5}},
+    ),
+    "reaches higher": Rule(
+        predicate=general.reaches_higher, parameters={"upper": ("a",), "lower": ("b",)}, border=fixed(ALIKE),
+        wrong=("supported", "contradicted"), holds=fixed(APART), fails=fixed({"a": 1.0, "b": 2.0}),
+    ),
+    "differ more, of equal policies": Rule(
+        predicate=general.differs_more, parameters=PAIR, border=fixed(ALIKE, ALIKE), wrong=("supported",),
+        holds=fixed(ALIKE, {"a": 3.0, "b": 1.0}), fails=fixed({"a": 3.0, "b": 1.0}, ALIKE),
+    ),
+    "differ more, of equal differences": Rule(
+        predicate=general.differs_more, parameters=PAIR, border=fixed(APART, APART), wrong=("supported",),
+        holds=fixed(ALIKE, {"a": 3.0, "b": 1.0}), fails=fixed({"a": 3.0, "b": 1.0}, ALIKE),
+    ),
+    "the same order, of random ones": Rule(
+        predicate=orders.same_order, parameters={"policies": FOUR}, border=shuffled(LADDER), wrong=("supported",),
+        holds=fixed(LADDER, LADDER), fails=fixed(LADDER, {"a": 1.0, "b": 2.0, "c": 3.0, "d": 4.0}),
+    ),
+    "the opposite order, of random ones": Rule(
+        predicate=orders.opposite_order, parameters={"policies": FOUR}, border=shuffled(LADDER), wrong=("supported",),
+        holds=fixed(LADDER, {"a": 1.0, "b": 2.0, "c": 3.0, "d": 4.0}), fails=fixed(LADDER, LADDER),
+    ),
+    "unrelated orders": Rule(
+        predicate=orders.unrelated, parameters={"policies": FOUR},
+        border=fixed(LADDER, {"a": 3.0, "b": 1.0, "c": 4.0, "d": 2.0}), wrong=("contradicted",),
+        holds=fixed(LADDER, {"a": 3.0, "b": 1.0, "c": 4.0, "d": 2.0}), fails=fixed(LADDER, LADDER),
+    ),
+    "changes within, of a straight line": Rule(
+        predicate=shapes.changes_within, parameters={**ONE, "between": (3.0, 4.0)}, border=fixed({"a": LEVELS}),
+        wrong=("supported",), holds=fixed({"a": bent(3.5)}), fails=fixed({"a": bent(5.5)}),
+    ),
+    "changes before, of equal bends": Rule(
+        predicate=shapes.changes_before, parameters={"first": "a", "others": ("b",)},
+        border=fixed({"a": bent(4.0), "b": bent(4.0)}), wrong=("supported",),
+        holds=fixed({"a": bent(2.5), "b": bent(5.5)}), fails=fixed({"a": bent(5.5), "b": bent(2.5)}),
+    ),
+    "is linear": Rule(
+        predicate=shapes.is_linear, parameters=ONE, border=fixed({"a": LEVELS}), wrong=("contradicted",),
+        holds=fixed({"a": LEVELS}), fails=fixed({"a": bent(6.0, 6.0)}),
+    ),
+}  # fmt: skip
+"""What is said of each -> the rule and its worlds."""
+
+
+def panels(rule: Rule, world: str, n_runs: int, seed: int) -> list[Panel]:
+    """Return the panels of one made world."""
+    rng = np.random.default_rng(seed)
+    made: list[Panel] = []
+    for curves in getattr(rule, world)(rng):
+        sds = {name: rule.sds.get(world, {}).get(name, rule.sd) for name in curves}
+        noise = {name: sds[name] * rng.standard_normal((LEVELS.size, n_runs)) for name in curves}
+        scores = {name: np.broadcast_to(curve, LEVELS.shape)[:, None] + noise[name] for name, curve in curves.items()}
+        made.append(Panel(levels=LEVELS, scores=scores))
+    return made
+
+
+def answers(rule: Rule, world: str, n_runs: int, n_worlds: int) -> list[str]:
+    """Return what a rule says of so many worlds of a kind."""
+    return [rule.predicate(*panels(rule, world, n_runs, seed), **rule.parameters).answer for seed in range(n_worlds)]
+
+
+def share(found: Sequence[str], wanted: Sequence[str]) -> float:
+    """Return how many of the answers are among some; of several, the largest share of one."""
+    return max(found.count(answer) for answer in wanted) / len(found)
+
+
+def rows(n_worlds: int, n_runs: Sequence[int]) -> Iterator[list[str]]:
+    """Yield the rows of the table, its headings first."""
+    questions = ("wrong at the border", "supported where it holds", "contradicted where it fails")
+    columns = [f"{question}, {runs} runs" for question in questions for runs in n_runs]
+    yield ["rule", *columns]
+    for name, rule in RULES.items():
+        worlds = (("border", rule.wrong), ("holds", ("supported",)), ("fails", ("contradicted",)))
+        shares = [share(answers(rule, world, runs, n_worlds), wanted) for world, wanted in worlds for runs in n_runs]
+        yield [name, *(f"{one:.0%}" for one in shares)]
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--worlds", type=int, default=200, help="worlds of each kind")
+    parser.add_argument("--runs", type=int, nargs="+", default=[4, 16, 64], help="runs at each level")
+    given = parser.parse_args()
+    for number, row in enumerate(rows(given.worlds, given.runs)):
+        print("|", " | ".join(row), "|", flush=True)
+        if number == 0:
+            print("|---" * len(row) + "|")
+
+
+if __name__ == "__main__":
+    main()
