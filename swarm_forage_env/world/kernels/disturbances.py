@@ -324,7 +324,7 @@ def noisy_gain(
 def disturb_wheels(
     d: Disturbances, k: int, actions: ActionArray, carried_object: IntArray, limits: FloatArray, outer_gain: FloatArray
 ) -> None:
-    """Write the gain of wheels in tick `k` of `d` into `d.gain`, if there is any; arguments as in `throttle`."""
+    """Write the gain of wheels in tick `k` of `d`, if there is any, into its array; arguments as in `throttle`."""
     if d.gain.shape[0] == 0:
         return
     if d.throttles.shape[0] > 0 and d.throttles[k] > 0.0:
