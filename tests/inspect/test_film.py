@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,14 +11,15 @@ from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.inspect import film as film_module
 from swarm_forage_env.inspect.film import record_run
-from swarm_forage_env.policies.registry import RandomPolicy
+from swarm_forage_env.policies.registry import RandomPolicy, load_policy
 from swarm_forage_env.rendering.video import check_film, write_film
 from swarm_forage_env.rendering.view import PALETTE, THEMES, RenderError
-from swarm_forage_env.runs.run import run_one
+from swarm_forage_env.runs.run import run_policy
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.recorder import TOTALS
 from swarm_forage_env.wrappers.registry import parse_wrapper
+from tests.support.drivers import tick_by_tick
 
 Image = pytest.importorskip("PIL.Image")
 
@@ -237,9 +237,7 @@ DISTURBED = (
 @pytest.mark.compiled
 @pytest.mark.parametrize(("policy", "wrappers"), [("crw", ()), ("crw", DISTURBED), ("stochm", DISTURBED)])
 def test_a_film_shows_the_run_that_its_name_promises(filmed, tmp_path, monkeypatch, policy, wrappers):
-    # Without wrappers a run with compiled bodies goes many ticks at a time.
-    world = CROWDED if wrappers else replace(CROWDED, physics="chipmunk")
-    spec = plan_run(world, policy, wrappers=wrappers, seed=5)
+    spec = plan_run(CROWDED, policy, wrappers=wrappers, seed=5)
     step, states = ForageEnv.step_batch, {}
 
     def note(self, *arguments, **options):
@@ -249,9 +247,9 @@ def test_a_film_shows_the_run_that_its_name_promises(filmed, tmp_path, monkeypat
 
     with monkeypatch.context() as patch:
         patch.setattr(ForageEnv, "step_batch", note)
-        record = run_one(spec)
+        record = run_policy(tick_by_tick(load_policy(policy)), spec)
     options = {"seconds": 80.0, "speedup": 40.0, "fps": 20.0, "wrappers": wrappers, "seed": 5}
-    record_run(world, policy, tmp_path / "run.gif", **options)
+    record_run(CROWDED, policy, tmp_path / "run.gif", **options)
     assert [tick for tick, *_ in filmed] == list(range(0, 401, 10))
     for tick, *state in filmed[1:]:
         for mine, theirs in zip(state, states[tick], strict=True):

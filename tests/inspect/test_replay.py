@@ -21,13 +21,14 @@ from swarm_forage_env.inspect.replay.files import read_replays, write_replays
 from swarm_forage_env.inspect.replay.frames import HEADING_STEPS, Replay, ReplayError, Status
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.rendering.view import RenderError
-from swarm_forage_env.runs.run import LiveRun, build_env, run_one
+from swarm_forage_env.runs.run import LiveRun, build_env, run_one, run_policy
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.robots import RobotKind, kind_sizes
 from swarm_forage_env.wrappers.recorder import TOTALS
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.world import World
+from tests.support.drivers import tick_by_tick
 
 CROWDED = scenario(
     "warehouse_small",
@@ -104,7 +105,7 @@ def test_frames_show_the_run_within_half_a_step(tmp_path, monkeypatch):
 
     with monkeypatch.context() as patch:
         patch.setattr(ForageEnv, "step_batch", note)
-        run_one(spec_of())
+        run_policy(tick_by_tick(load_policy("stochm")), spec_of())
     (kept,) = read_replays(write_replays(tmp_path / "run.html", record_replay(spec_of(), frame_s=1.0)[0]))
     table = np.full((60, 3), -9)
     for frame, tick in enumerate(kept.ticks.tolist()):

@@ -14,15 +14,9 @@ from swarm_forage_env.runs.run import LiveRun, build_env, build_stack
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.recorder import RunRecorder
+from tests.support.drivers import tick_by_tick
 from tests.support.foraging import quick_world
 from tests.support.stage import assert_same_world, snapshot
-
-
-def tick_by_tick(policy: Policy) -> Policy:
-    """The policy with an `act` of somebody else, so that Python is asked in every tick."""
-    act = policy.act
-    policy.act = lambda obs, active: act(obs, active)
-    return policy
 
 
 def recorded(world: ScenarioConfig, policy: Policy, *stops: int) -> RunRecorder:
