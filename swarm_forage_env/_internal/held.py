@@ -92,7 +92,7 @@ def _read(builder: Any, place: Any) -> Any:
 
 @lower_getattr_generic(HeldType)
 def _field(context: Any, builder: Any, held: HeldType, address: Any, name: str) -> Any:
-    k = held.of.fields.index(name)  # type: ignore[attr-defined]
+    k = held.of.fields.index(name)  # type: ignore[attr-defined] - asked of named tuples only
     return _read(builder, cgutils.gep_inbounds(builder, _place(context, builder, address, held), 0, k))
 
 
@@ -124,7 +124,7 @@ def _write(typingctx: Any, value: Any, room: Any) -> Any:  # noqa: ARG001 - numb
 def _at(typingctx: Any, held: Any, address: Any) -> Any:  # noqa: ARG001 - as above
     """Say what compiled code has of a tuple at another address."""
 
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:  # noqa: ARG001
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:  # noqa: ARG001 - as above
         return builder.inttoptr(args[1], args[0].type)
 
     return held(held, address), generate
