@@ -151,13 +151,14 @@ def arena_view(scenario: ScenarioConfig, size_px: int = 900, theme: str = "dark"
     robot_gap = (area_px / scenario.robots.n_robots) ** 0.5
     object_gap = (area_px / scenario.objects.n_objects) ** 0.5
     grow = size_px / _REFERENCE_PX
+    least_px = min(1.2, 0.3 * robot_gap)  # where they are as many as pixels, a dot each would cover all
     return View(
         width=width,
         height=header + floor_px + footer,
         scale=scale,
         left=(width - width_m * scale) / 2 + WALL_M * scale,
         bottom=header + floor_px - WALL_M * scale,
-        robot_px=max(scenario.robots.radius_m * scale, min(4.6 * grow, max(1.2, 0.065 * robot_gap))),
+        robot_px=max(scenario.robots.radius_m * scale, min(4.6 * grow, max(least_px, 0.065 * robot_gap))),
         object_px=max(0.9 * CELL_M * scale, min(2.6 * grow, max(0.8, 0.35 * object_gap))),
         palette=THEMES[theme],
     )

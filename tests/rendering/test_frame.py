@@ -336,6 +336,12 @@ def test_sixteen_thousand_robots_leave_the_floor_visible():
     assert world.view.robot_px >= 1.0
 
 
+def test_a_million_robots_leave_the_floor_visible_in_a_large_picture():
+    view = arena_view(scenario("warehouse_quad", density=0.05, n_robots=2**20), 2000)
+    arena_px = (view.scale * 4579.6) ** 2
+    assert 0.2 < 2**20 * np.pi * view.robot_px**2 / arena_px < 0.4
+
+
 def test_without_pillow_the_message_tells_what_to_install(world, monkeypatch):
     monkeypatch.setitem(sys.modules, "PIL", None)
     view.text_font.cache_clear()
