@@ -223,9 +223,13 @@ def first_run(engine: str, _effort: float) -> float:
     return time.perf_counter() - started
 
 
-def most_memory(engine: str, _effort: float) -> float:
-    """Memory of a process of its own that makes a large run."""
-    return float(printed_by([sys.executable, __file__], f"crw-16384 {engine} 0.1\nheld {engine} 1\n").split()[-1])
+def most_memory(name: str) -> Measure:
+    """Memory of a process of its own that makes the run of a case."""
+
+    def measure(engine: str, _effort: float) -> float:
+        return float(printed_by([sys.executable, __file__], f"{name} {engine} 0.1\nheld {engine} 1\n").split()[-1])
+
+    return measure
 
 
 def held(_engine: str, _effort: float) -> float:
@@ -273,6 +277,7 @@ CASES = {
     "seeds-50": Case("CRW, 16 runs of 1,000 s", runs("crw", SMALL, 5_000, n_seeds=16), beside="crw-50"),
     "crw-4096": Case("CRW, 5 % density", large(4_096, 500), beside="crw-200"),
     "crw-16384": Case("CRW, 5 % density", large(16_384, 200), TICK, "1.2 x crw-200", "crw-200"),
+    "crw-131072": Case("CRW, 5 % density", large(131_072, 40), TICK, "190", "crw-200"),
     "dict-200": Case("dict API", dicts, STEP),
     "vec-50": Case("vector environment, one arena", vector_env(3_000), STEP),
     "vec-495": Case("vector environment, as dense", vector_env(500, n_robots=495, density=50 / (32 * 16)), STEP),
@@ -282,7 +287,8 @@ CASES = {
     "window-200": Case("picture of the window, STOCHX", window, "ms", "33"),
     "import": Case("import of the package", import_seconds, "s", "0.2"),
     "first-run": Case("first run after installation", first_run, "s", "12", once=True),
-    "memory-16384": Case("most memory of a run", most_memory, "GiB", "2", once=True),
+    "memory-16384": Case("most memory of a run", most_memory("crw-16384"), "GiB", "2", once=True),
+    "memory-131072": Case("most memory of a run", most_memory("crw-131072"), "GiB", "1", once=True),
 }
 """Name -> case, in the order of the table."""
 

@@ -102,7 +102,7 @@ class ArenaConfig:
         _require(
             math.prod(self.n_cells) <= MAX_CELLS,
             f"Expected an arena of at most {MAX_CELLS:,} cells of {CELL_M} m, whose floor takes up to 4 GiB of memory, "
-            f"got {self.width_m} x {self.height_m} m; choose a smaller one, or fewer robots at a density.",
+            f"got {self.width_m} x {self.height_m} m; choose a smaller one, or fewer robots where a density sets it.",
         )
         fields.pair("arena.nest_centre_m", self.nest_centre_m)
         fields.pair("arena.nest_size_m", self.nest_size_m)

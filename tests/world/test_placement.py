@@ -1,5 +1,8 @@
 """Where objects appear: uniform over free cells, one per cell, and a waiting list for those without a place."""
 
+import resource
+import sys
+
 import numpy as np
 import pytest
 from scipy.stats import chisquare
@@ -120,6 +123,17 @@ def test_place_all_leaves_objects_in_caches_alone():
     assert objects.status.tolist() == [0, 2, 0, 0, 2, 0]
     assert objects.cache_slot.tolist() == [-1, 0, -1, -1, 0, -1]
     assert np.all(objects.floor[14:17, 14:17] == CELL_CACHE)
+
+
+def test_a_huge_floor_takes_memory_only_where_something_lies():
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    arena = ArenaConfig(width_m=4000.0, height_m=4000.0, nest_centre_m=(2000.0, 2000.0), nest_size_m=(8.0, 8.0))
+    floor = new_objects(scenario("warehouse_medium", arena=arena)).floor
+    assert floor.nbytes == 1_600_000_000
+    assert floor[10_000, 10_000] == CELL_NEST
+    assert floor[0, 0] == floor[19_999, 19_999] == CELL_EMPTY
+    after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    assert (after - before) * (1 if sys.platform == "darwin" else 1024) < floor.nbytes / 10
 
 
 @pytest.mark.compiled
