@@ -343,6 +343,7 @@ def test_random_bits_are_those_of_the_twin(n_draws):
         np.testing.assert_array_equal(room, next(twin)[0])
 
 
+@pytest.mark.compiled
 def test_random_bits_are_random():
     lanes, room = new_lanes(stream_rng(0, Stream.SENSOR_NOISE)), room_for_draws(LANES * 20_000)
     draw_bits(lanes, room)
