@@ -288,7 +288,7 @@ class WrapperConfig:
 
     def __init_subclass__(cls) -> None:
         """Refuse a class that does not say what it configures; TypeError."""
-        if not hasattr(cls, "wrapper") and "wrap" not in vars(cls):
+        if not hasattr(cls, "wrapper") and cls.wrap is WrapperConfig.wrap:
             raise TypeError(
                 f"Expected {cls.__name__} to say what it is a configuration of; add a line "
                 '"wrapper: ClassVar[type[SwarmWrapper]] = ..." with your subclass of SwarmWrapper.'
