@@ -9,12 +9,9 @@ The statements are the general ones of `predicates`, `shapes` and `orders`. Some
 had been seen: see docs/metrics.md, "Rules that changed after runs were seen".
 """
 
-import numpy as np
-
-from ..population import availability, ratio_for_team
 from .checking import Claim, Place, Statement
+from .formulas import availability_is, needs_larger_team
 from .orders import LOOSE, opposite_order, same_order, unrelated
-from .outcomes import Answer, Outcome
 from .predicates import (
     differ,
     differs_more,
@@ -66,31 +63,6 @@ from .statements import (
     spatial,
     states,
 )
-
-
-def availability_is(*, n: int, n_min: int, team: float, expected: float, within: float) -> Outcome:
-    """Whether the availability of n_min of n robots with a mean team at work has an expected value, up to rounding."""
-    p_v = availability(n, n_min, ratio_for_team(team))
-    answer: Answer = "supported" if abs(p_v - expected) <= within else "contradicted"
-    why = f"availability of {n_min} of {n} robots, mean team {team:g}, is {p_v:.4f}"
-    return Outcome(answer=answer, statistic=p_v, effect=np.nan, n_runs=0, why=why)
-
-
-def needs_larger_team(*, few: tuple[int, int], many: tuple[int, int], team: float) -> Outcome:
-    """Whether a second swarm needs a larger mean team for the availability that a team gives the first.
-
-    Args:
-        few: Swarm size and robots needed of the first.
-        many: The same of the second.
-        team: Mean robots at work in the first.
-    """
-    wanted = availability(*few, ratio_for_team(team))
-    got = availability(*many, ratio_for_team(team))
-    answer: Answer = "supported" if got < wanted else "contradicted"
-    why = (
-        f"a mean team of {team:g} gives {got:.4f} for {many[1]} of {many[0]} and {wanted:.4f} for {few[1]} of {few[0]}"
-    )
-    return Outcome(answer=answer, statistic=got, effect=np.nan, n_runs=0, why=why)
 
 
 def _flexibility(letter: str, measure: str) -> tuple[Claim, ...]:
