@@ -442,7 +442,10 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         size = packed.shape[1]
         rows = packed if complete else np.empty((len(agents), size), np.float32)
         try:
-            np.stack([actions[agent] for agent in agents], out=rows, casting="same_kind")
+            given = np.array([actions[agent] for agent in agents])  # a third of the time of numpy.stack
+            if given.shape != rows.shape:  # copying would spread single numbers
+                raise ValueError("another shape")
+            np.copyto(rows, given, casting="same_kind")
         except (TypeError, ValueError) as error:
             shapes = {np.shape(actions[agent]) for agent in agents}
             raise ActionError(

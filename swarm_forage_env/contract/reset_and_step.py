@@ -65,22 +65,26 @@ def as_actions(actions: ActionArray, n_robots: int, message_size: int = 0) -> Ac
         ActionError: values that are not numbers, or another shape.
     """
     expected = (n_robots, COMMANDS + message_size)
-    columns = f"{COMMANDS} + message_size" if message_size else f"{COMMANDS}"
     try:
         # Kernels are compiled for contiguous float32 only; another type would have all compiled anew.
         checked = np.ascontiguousarray(actions, np.float32)
     except (TypeError, ValueError) as error:
-        raise ActionError(f"Expected actions with shape (n_robots, {columns}) = {expected}: {error}.") from error
+        raise ActionError(f"Expected actions with {_shape_in_words(expected)}: {error}.") from error
     if message_size and checked.shape == (n_robots, COMMANDS):
         silent = np.zeros(expected, np.float32)
         silent[:, :COMMANDS] = checked
         return silent
     if checked.shape != expected:
         raise ActionError(
-            f"Expected actions with shape (n_robots, {columns}) = {expected}, got {checked.shape}; "
+            f"Expected actions with {_shape_in_words(expected)}, got {checked.shape}; "
             "pass one row per robot, inactive ones included."
         )
     return checked
+
+
+def _shape_in_words(expected: tuple[int, int]) -> str:
+    columns = f"{COMMANDS} + message_size" if expected[1] > COMMANDS else f"{COMMANDS}"
+    return f"shape (n_robots, {columns}) = {expected}"
 
 
 def checked_gain(wheel_gain: FloatArray | None, n_robots: int) -> FloatArray | None:

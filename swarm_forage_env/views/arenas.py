@@ -233,14 +233,14 @@ class ArenaBatch:
         shape, columns = (self.n_arenas, self.n_robots), self._n_columns
         obs = np.empty((*shape, columns), np.float32)
         rewards = np.zeros(shape, np.float32)
-        terminated, _, active = flags = np.zeros((3, *shape), np.bool_)
+        flags = np.zeros((3, *shape), np.bool_)
         lockstep, books = self._chosen_ways()
         actions = actions.reshape(*shape, *actions.shape[1:])
         if lockstep is not None:
             ticks = self._together(lockstep, books, actions, rewards)
         else:
             ticks = [self._alone(number, actions[number], rewards[number]) for number in range(self.n_arenas)]
-        n_terminated = self._book(books, ticks, rewards, (terminated, active), obs)
+        n_terminated = self._book(books, ticks, rewards, (flags[0], flags[2]), obs)
         endings: _Endings | None = None
         for number, (dead, all_dead, at_horizon) in enumerate(ticks):
             if n_terminated[number] or all_dead or at_horizon:
@@ -248,10 +248,10 @@ class ArenaBatch:
                 out = obs[number], *flags[:, number]
                 self._conclude(number, dead, all_dead or at_horizon, out, endings)
         obs = obs.reshape(self.n_rows, columns)
-        terminated, truncated, active = flags.reshape(3, self.n_rows)
+        rows = flags.reshape(3, self.n_rows)
         ended = endings.joined(columns) if endings else self._no_endings
         return ArenaStep(
-            obs=obs, rewards=rewards.ravel(), terminated=terminated, truncated=truncated, active=active, **ended
+            obs=obs, rewards=rewards.ravel(), terminated=rows[0], truncated=rows[1], active=rows[2], **ended
         )
 
     def _together(
@@ -266,7 +266,7 @@ class ArenaBatch:
             rewards: (A, N), to be added to.
         """
         payer = books if books is not None and books.pays else None
-        ticks: list[tuple[BoolArray, bool, bool]] = [(np.zeros(0, np.bool_), False, False)] * self.n_arenas
+        ticks: list[tuple[BoolArray, bool, bool]] = [(_NOBODY, False, False)] * self.n_arenas
         going = list(range(self.n_arenas))
         for _ in range(self.interface.config.decision_ticks):
             if payer is not None and self.interface.passes_on and actions.shape == self._commands.shape:
@@ -461,6 +461,9 @@ def _steps_in_parts(arena: LearnerArena) -> bool:
     return all(
         type(layer).step_batch in ours and "step_batch" not in vars(layer) for layer in (arena.env, arena.forage_env)
     )
+
+
+_NOBODY: BoolArray = np.zeros(0, np.bool_)
 
 
 def _joined(parts: list[np.ndarray], nothing: np.ndarray) -> np.ndarray:

@@ -147,6 +147,7 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
         self.single_action_space = self.interface.action_space
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self._everybody: BoolArray = np.ones(self.num_envs, np.bool_)
         self._started = time.perf_counter()
 
     def reset(
@@ -207,7 +208,7 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
         return infos
 
     def _with_masks(self, columns: dict[str, np.ndarray]) -> dict[str, Any]:
-        return columns | {f"_{name}": np.ones(self.num_envs, np.bool_) for name in columns}
+        return columns | {f"_{name}": self._everybody.copy() for name in columns}
 
     def action_masks(self) -> BoolArray:
         """Return which discrete actions make sense now, (num_envs, number of actions)."""

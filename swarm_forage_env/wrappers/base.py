@@ -85,6 +85,8 @@ class SwarmWrapper(BaseParallelWrapper):
         self._inner = env
         self._unwrapped: ForageEnv = env.unwrapped
         self._inside: tuple[SwarmWrapper, ...] = env.stack if isinstance(env, SwarmWrapper) else ()
+        hooks = SwarmWrapper.before_step, SwarmWrapper.gain
+        self._acts_first = any((type(each).before_step, type(each).gain) != hooks for each in self.stack)
 
     def _check_hooks_only(self, inner: "type[SwarmWrapper]") -> None:
         replaced = [name for name in _STEPS if getattr(inner, name) is not getattr(SwarmWrapper, name)]
@@ -230,7 +232,8 @@ class SwarmWrapper(BaseParallelWrapper):
         env = self._unwrapped
         actions = env.checked_actions(actions)
         self._require_reset()
-        env.refuse_bad_step(actions, wheel_gain)  # before any wrapper draws a number or lets a robot die
+        if self._acts_first:
+            env.refuse_bad_step(actions, wheel_gain)  # before any wrapper draws a number or lets a robot die
         for wrapper in self.stack:
             wrapper.before_step()
             wheel_gain = wrapper.gain(actions, wheel_gain)
