@@ -57,9 +57,9 @@ PAPER = "paper"
 """Name of the budget that every study has: as long, and as many runs, as in the paper."""
 FORMER_RULES = "readings"
 """Key of `rules` in study files of earlier versions."""
-_KEYS = ("name", "title", "scenario", "policies", "rules", FORMER_RULES, "set", "wrappers", "axis", "budget")
-_AXIS_KEYS = ("criterion", "field", "values", "reference")
-_BUDGET_KEYS = ("seeds", "horizon_s", "interval_s", "values")
+FILE_KEYS = ("name", "title", "scenario", "policies", "rules", FORMER_RULES, "set", "wrappers", "axis", "budget")
+AXIS_KEYS = ("criterion", "field", "values", "reference")
+BUDGET_KEYS = ("seeds", "horizon_s", "interval_s", "values")
 
 
 def set_names() -> tuple[str, ...]:
@@ -166,7 +166,7 @@ def _read(file: Path) -> dict[str, Any]:
 def _study(
     content: Mapping[str, Any], folder: Path, budget: str | None, n_seeds: int | None, rules: Sequence[str] | None
 ) -> StudySpec:
-    known_keys(content, _KEYS, "key of a study file")
+    known_keys(content, FILE_KEYS, "key of a study file")
     for key in ("name", "scenario", "policies"):
         if key not in content:
             raise ConfigError(f"Missing key {key!r} of a study file.")
@@ -205,7 +205,7 @@ def _budgets(content: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
     """Name -> keys of each budget; `PAPER` is always there."""
     given = {name: table(f"budget.{name}", keys) for name, keys in table("budget", content.get("budget", {})).items()}
     for name, keys in given.items():
-        known_keys(keys, _BUDGET_KEYS, "key of a budget", prefix=f"budget.{name}.")
+        known_keys(keys, BUDGET_KEYS, "key of a budget", prefix=f"budget.{name}.")
     return {**given, PAPER: given.get(PAPER, {})}
 
 
@@ -249,7 +249,7 @@ def _axes(
     axes: list[Axis] = []
     reference: Value | None = None
     for number, entry in enumerate(entries, 1):
-        known_keys(entry, _AXIS_KEYS, "key of an axis")
+        known_keys(entry, AXIS_KEYS, "key of an axis")
         name = _axis_name(entry)
         given = _listed(f"values of axis {name}", entry.get("values") or _of_paper(content, settings, name))
         values = [_place(value) for value in given]
