@@ -15,10 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from metrics import noise_robustness
 from metrics.claims import orders, shapes
 from metrics.claims import predicates as general
 from metrics.claims.outcomes import Outcome
 from metrics.claims.panel import Panel
+from metrics.scoring.run_curves import RunCurves
+from metrics.scoring.scores import pseudo_values
 
 LEVELS = np.arange(1.0, 8.0)
 Curves = Mapping[str, Any]
@@ -39,6 +42,8 @@ class Rule:
     """Which, there."""
     holds: Make
     fails: Make
+    failing: str = "contradicted"
+    """The right answer where it fails."""
     parameters: Mapping[str, Any] = field(default_factory=dict[str, Any])
     sd: float = 0.2
     sds: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
@@ -65,8 +70,26 @@ def bent(place: float, height: float = 3.0) -> NDArray[np.float64]:
     return 1.0 + height * np.maximum(0.0, LEVELS - place)
 
 
+def of_mean_curves(panel: Panel) -> Panel:
+    """The distances of the mean curves of a and b from their ideal ones, where levels are intervals of runs."""
+
+    def runs(name: str) -> RunCurves:
+        curves = panel.scores[name].T
+        return RunCurves(
+            criterion="noise", value=1.0, n_robots=1, seeds=tuple(range(len(curves))), curves={"performance": curves}
+        )
+
+    def apart(ideal: RunCurves, noisy: RunCurves) -> NDArray[np.float64]:
+        return noise_robustness(ideal.performance, noisy.performance)
+
+    scores = {name: next(pseudo_values(apart, (runs(f"ideal {name}"), runs(name)), None))[None] for name in "ab"}
+    return Panel(levels=LEVELS[:1], scores=scores)
+
+
 PAIR = {"pairs": (("a", "b"),)}
 ALIKE, APART = {"a": 1.0, "b": 1.0}, {"a": 2.0, "b": 1.0}
+MARGIN = {"a": 1.12, "b": 1.0}
+IDEAL = {"ideal a": 1.0, "ideal b": 1.0}
 LADDER = {"a": 4.0, "b": 3.0, "c": 2.0, "d": 1.0}
 ONE = {"policies": ("a",)}
 RULES: dict[str, Rule] = {
@@ -86,6 +109,20 @@ RULES: dict[str, Rule] = {
     "is higher": Rule(
         predicate=general.is_higher, parameters={"upper": ("a",), "lower": ("b",)}, border=fixed(ALIKE),
         wrong=("supported",), holds=fixed(APART), fails=fixed({"a": 1.0, "b": 2.0}),
+    ),
+    "is higher, a tie at the margin": Rule(
+        predicate=general.is_higher, parameters={"upper": ("a",), "lower": ("b",)}, border=fixed(MARGIN),
+        wrong=("tie",), holds=fixed(APART), fails=fixed(ALIKE), failing="tie",
+    ),
+    "differ, a tie at the margin": Rule(
+        predicate=general.differ, parameters=PAIR, border=fixed(MARGIN), wrong=("tie",), holds=fixed(APART),
+        fails=fixed(ALIKE), failing="tie",
+    ),
+    "is higher, of mean curves": Rule(
+        predicate=lambda panel, **given: general.is_higher(of_mean_curves(panel), **given),
+        parameters={"upper": ("a",), "lower": ("b",)}, border=fixed({**IDEAL, "a": 2.0, "b": 2.0}),
+        wrong=("supported", "contradicted"), holds=fixed({**IDEAL, "a": 3.0, "b": 2.0}),
+        fails=fixed({**IDEAL, "a": 2.0, "b": 3.0}), sd=0.5,
     ),
     "is not higher": Rule(
         predicate=general.is_not_higher, parameters={"first": "a", "second": "b"}, border=fixed(ALIKE),
@@ -175,11 +212,11 @@ def share(found: Sequence[str], wanted: Sequence[str]) -> float:
 
 def rows(n_worlds: int, n_runs: Sequence[int]) -> Iterator[list[str]]:
     """Yield the rows of the table, its headings first."""
-    questions = ("wrong at the border", "supported where it holds", "contradicted where it fails")
+    questions = ("wrong at the border", "supported where it holds", "contradicted (or a tie) where it fails")
     columns = [f"{question}, {runs} runs" for question in questions for runs in n_runs]
     yield ["rule", *columns]
     for name, rule in RULES.items():
-        worlds = (("border", rule.wrong), ("holds", ("supported",)), ("fails", ("contradicted",)))
+        worlds = (("border", rule.wrong), ("holds", ("supported",)), ("fails", (rule.failing,)))
         shares = [share(answers(rule, world, runs, n_worlds), wanted) for world, wanted in worlds for runs in n_runs]
         yield [name, *(f"{one:.0%}" for one in shares)]
 

@@ -20,12 +20,21 @@ from PIL import Image
 
 from metrics import verdict
 from metrics.claims import CLAIMS, INTUITIONS, Verdict
-from metrics.claims.outcomes import Answer
 from metrics.scoring import StudyFigure, StudyVerdict, draw_figure, study_figures
 from metrics.scoring.study_models import model_figures
 from metrics.scoring.study_numbers import place_distributions
 from metrics.scoring.study_report import command_of
-from metrics.scoring.study_verdict import ANSWERS, VARIANTS, WAITS, claims_about, claims_of, waiting_lines
+from metrics.scoring.study_verdict import (
+    ANSWERS,
+    BANDS,
+    OURS,
+    RELATIVELY,
+    VARIANTS,
+    WAITS,
+    claims_about,
+    claims_of,
+    waiting_lines,
+)
 from swarm_forage_env import read_study
 from swarm_forage_env._internal.wording import counted, number, percent
 from swarm_forage_env.runs.store import DONE
@@ -45,7 +54,14 @@ PICTURES = Path("images/results")
 PAGE, DETAILS = "results.md", "results_in_detail.md"
 COLOURS = 64
 """Of a picture; with more, its file is several times as large and looks the same."""
-SIGNS: dict[Answer, str] = {"supported": "✓", "contradicted": "✗", "undecided": "?", "no scores": "-"}
+SIGNS: dict[str, str] = {
+    "supported": "✓",
+    "contradicted": "✗",
+    "tie": "=",
+    "too vague": "~",
+    "undecided": "?",
+    "no scores": "-",
+}
 
 INTRODUCTION = f"""Each claim of the paper is held against these runs, under both [readings](readings.md) of its rules.
 A claim that is contradicted is a result like any other. Some rules were wrong and were changed after runs were seen:
@@ -156,22 +172,19 @@ def what_the_rest_takes(results: StudyVerdict) -> str:
 
 def answers(results: StudyVerdict) -> str:
     """Return how many claims have which answer, and the answer to each, measures corrected."""
-    formulas = results.counts("", "corrected")
-    counts: list[tuple[Any, ...]] = []
-    for rules in results.rules:
-        mine = results.counts(rules, "corrected")
-        counts.append((rules, *(mine[word] + formulas[word] for word in (*ANSWERS, WAITS))))
-    found = results.found
+    counts = [(rules, *results.counts(rules, "corrected").values()) for rules in results.rules]
     lines: list[tuple[str, ...]] = []
     for name, claim in CLAIMS.items():
-        cells = [_answer(found.get((name, rules if claim.panels else "", "corrected"))) for rules in results.rules]
+        cells = [_signed(cell) for rules in results.rules for cell in results.cells(claim, rules)]
         lines.append((f"[{name}]({DETAILS}#{name.lower()})", claim.text, *cells))
+    columns = [f"{rules}: {word}" for rules in results.rules for word in (BANDS, OURS, RELATIVELY)]
     return (
         "## The answers\n\n"
         f"{rows(('rules', *ANSWERS, 'waiting for runs'), counts, right=range(1, 2 + len(ANSWERS)))}\n\n"
-        "An answer is by intervals, our rule, with the measures corrected. In brackets stands the "
-        "answer by the paper's rule, overlapping bands of two standard deviations, where it is another."
-        f"{_otherwise(results)}{_on_fewer_values(results)}\n\n{rows(('claim', 'text', *results.rules), lines)}"
+        "Measures are corrected. The paper's bands are two standard deviations of runs to either side of the mean, and "
+        "two policies differ where they do not overlap. Ours is by intervals; claims about flexibility and robustness "
+        "are answered relative to performance, too. A tie is the answer where a claim says that there is a difference."
+        f"{_otherwise(results)}{_on_fewer_values(results)}\n\n{rows(('claim', 'the paper', *columns), lines)}"
     )
 
 
@@ -200,8 +213,13 @@ def _on_fewer_values(results: StudyVerdict) -> str:
 def _answer(found: Verdict | None) -> str:
     if found is None:
         return WAITS
-    words = f"{SIGNS[found.answer]} {found.answer}"
+    words = _signed(found.answer)
     return words if found.by_bands == found.answer else f"{words} ({found.by_bands})"
+
+
+def _signed(answer: str) -> str:
+    """An answer behind its sign."""
+    return f"{SIGNS[answer]} {answer}" if answer in SIGNS else answer
 
 
 def in_short(results: StudyVerdict) -> str:
@@ -214,7 +232,7 @@ def in_short(results: StudyVerdict) -> str:
     header = ("rules", "measures", *ANSWERS, *(f"{word} by bands" for word in ANSWERS), "waiting")
     return (
         f"## How many\n\n{rows(header, lines, right=range(2, 3 + 2 * len(ANSWERS)))}\n\n"
-        "Claims that follow from formulas alone, V1 and V2, are not counted."
+        "Claims that need no run, about formulas or too vague, are counted with the corrected measures."
     )
 
 
@@ -300,8 +318,8 @@ def intuitions(results: StudyVerdict) -> str:
     ]
     return (
         "## What the paper expected\n\nIts tables of intuitions, written before its experiments, in our words, with "
-        'what we take "modest" and "low" to mean. Left out: that STOCHM is congested near its caches, since no measure '
-        f"says where time is lost.\n\n{rows(('name', 'where', 'expected', *results.rules), lines)}"
+        'what we take "modest" and "low" to mean. Left out: that STOCHM is congested near its caches, since records '
+        f"do not hold where time is lost.\n\n{rows(('name', 'where', 'expected', *results.rules), lines)}"
     )
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from math import nan
 from typing import Any, Literal, NamedTuple, TypeAlias
 
 from ..curves import Form
@@ -20,36 +21,56 @@ class PanelName(NamedTuple):
     """Of a measure that compares two sizes."""
     is_relative: bool = False
     """Whether scores are shares of the performance that they are compared with."""
+    of_mean_curves: bool = False
+    """Whether it shows the measure of the mean curves, which leaves less of what chance adds to distances."""
 
     @property
     def words(self) -> str:
         """The name for people."""
-        relative = "relative" if self.is_relative else ""
-        words = (self.experiment, self.measure, "" if self.form == "marginal" else self.form, relative)
+        relative, means = "relative" if self.is_relative else "", "of mean curves" if self.of_mean_curves else ""
+        words = (self.experiment, self.measure, "" if self.form == "marginal" else self.form, relative, means)
         return " ".join(word for word in words if word).replace("_", " ")
 
 
-Place: TypeAlias = tuple[str, str] | tuple[str, str, Form] | tuple[str, str, Form, bool]
-"""A panel: experiment, measure, form if it is not the marginal one, and whether it is relative."""
-RELATIVE_TOO = ("reactivity", "adaptability", "noise_robustness", "population_robustness")
+Place: TypeAlias = tuple[str, str] | tuple[str, str, Form] | PanelName
+"""A panel: experiment, measure, and the form if it is not the marginal one; or its whole name."""
+DISTANCES = ("reactivity", "adaptability", "noise_robustness")
+RELATIVE_TOO = (*DISTANCES, "population_robustness")
 """Measures in amounts of performance that rank policies by how much they do: claims about them are judged relative to
 performance, too."""
-
-
 RELATIVE = "relative to performance"
 """Name of these verdicts among the others."""
 
 
 def named(place: Place) -> PanelName:
     """Return the name of a panel."""
-    if len(place) == 4:
-        return PanelName(*place)
+    if isinstance(place, PanelName):
+        return place
     return PanelName(place[0], place[1], place[2] if len(place) == 3 else "marginal")
 
 
-def relative_name(name: PanelName) -> PanelName:
-    """Return the name of the relative panel, where the measure is one of `RELATIVE_TOO`; else the same."""
+def _relative(name: PanelName) -> PanelName:
     return name._replace(is_relative=True) if name.measure in RELATIVE_TOO else name
+
+
+def _of_mean_curves(name: PanelName) -> PanelName:
+    return name._replace(of_mean_curves=True) if name.measure in DISTANCES else name
+
+
+def _recorded(name: PanelName) -> PanelName:
+    is_expected = name.measure == "population_robustness"
+    return name._replace(measure=f"recorded_{name.measure}") if is_expected else name
+
+
+READINGS: Mapping[str, Callable[[PanelName], PanelName]] = {
+    RELATIVE: _relative,
+    "of mean curves": _of_mean_curves,
+    f"of mean curves, {RELATIVE}": lambda name: _of_mean_curves(_relative(name)),
+    "with the robots recorded at work": _recorded,
+    f"with the robots recorded at work, {RELATIVE}": lambda name: _recorded(_relative(name)),
+}
+"""How else measures can be read, in words -> what makes the name of a panel that of the panel read so, which is the
+same name where it cannot be."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,12 +112,14 @@ class Claim:
     """What is claimed, in our words."""
     figure: str
     """Where it is shown."""
-    statements: tuple[Statement, ...]
+    statements: tuple[Statement, ...] = ()
     needs: Literal["all", "most"] = "all"
     """How many of the statements must hold."""
     otherwise: Mapping[str, tuple[Statement, ...]] = field(default_factory=dict[str, tuple[Statement, ...]])
     """Where the paper's words, its captions, its file names or its program disagree on what was meant: what else the
     claim may mean, in words -> statements of that."""
+    vague: str = ""
+    """Of a claim without statements, why no run can answer it, told from its text alone."""
 
     @property
     def panels(self) -> tuple[PanelName, ...]:
@@ -110,12 +133,14 @@ class Claim:
         return tuple(name for name in needed if name not in self.panels)
 
 
-def relative_claim(claim: Claim) -> Claim:
-    """Return what a claim says if its measures are read relative to performance; itself where none of them can be."""
-    statements = tuple(
-        replace(statement, panels=tuple(map(relative_name, statement.panels))) for statement in claim.statements
-    )
-    return claim if statements == claim.statements else replace(claim, statements=statements, otherwise={})
+def read_otherwise(claim: Claim) -> dict[str, Claim]:
+    """Return what a claim says in each of `READINGS` that makes a difference, by the words of the reading."""
+    found: dict[str, Claim] = {}
+    for words, read in READINGS.items():
+        statements = tuple(replace(one, panels=tuple(map(read, one.panels))) for one in claim.statements)
+        if all(statements != other.statements for other in (claim, *found.values())):
+            found[words] = replace(claim, statements=statements, otherwise={})
+    return found
 
 
 def _panels_of(statements: Iterable[Statement]) -> tuple[PanelName, ...]:
@@ -141,8 +166,8 @@ class Verdict:
     why: str
     """What was found and the limit that it was held against; one line per statement."""
     otherwise: Mapping[str, "Verdict"] = field(default_factory=dict[str, "Verdict"])
-    """Verdicts on what else the claim may mean, and under `RELATIVE` on `relative_claim`; those without any scores are
-    left out."""
+    """Verdicts on what else the claim may mean, and on how else it can be read (`READINGS`); those without any scores
+    are left out."""
 
 
 def check_claim(claim: Claim, panels: Mapping[PanelName, Panel] | Mapping[tuple[str, str], Panel]) -> Verdict:
@@ -155,11 +180,11 @@ def check_claim(claim: Claim, panels: Mapping[PanelName, Panel] | Mapping[tuple[
     Raises:
         CurveError: A panel lacks a policy that the claim speaks of.
     """
+    if claim.vague:
+        return _told(claim, Outcome(answer="too vague", statistic=nan, effect=nan, n_runs=0, why=claim.vague))
     by_name = {named(name): panel for name, panel in panels.items()}
     others = {words: _verdict(claim, statements, by_name) for words, statements in claim.otherwise.items()}
-    again = relative_claim(claim)
-    if again is not claim:
-        others[RELATIVE] = _verdict(again, again.statements, by_name)
+    others |= {words: _verdict(claim, read.statements, by_name) for words, read in read_otherwise(claim).items()}
     scored = {words: verdict for words, verdict in others.items() if verdict.answer != "no scores"}
     return replace(_verdict(claim, claim.statements, by_name), otherwise=scored)
 
@@ -168,10 +193,15 @@ def _verdict(claim: Claim, statements: tuple[Statement, ...], panels: Mapping[Pa
     join = all_of if claim.needs == "all" else most_of
     rules: tuple[Rule, Rule] = ("intervals", "bands")
     ours, bands = (join([statement.outcome(panels, rule) for statement in statements]) for rule in rules)
+    return _told(claim, ours, bands)
+
+
+def _told(claim: Claim, ours: Outcome, bands: Outcome | None = None) -> Verdict:
+    """The verdict of an outcome by our rule and one by the paper's, or of one that needs no rule."""
     return Verdict(
         claim=claim.name,
         answer=ours.answer,
-        by_bands=bands.answer,
+        by_bands=(bands or ours).answer,
         statistic=ours.statistic,
         effect=ours.effect,
         n_runs=ours.n_runs,

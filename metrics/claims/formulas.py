@@ -14,13 +14,16 @@ def availability_is(*, n: int, n_min: int, team: float, expected: float, within:
     return Outcome(answer=answer, statistic=p_v, effect=np.nan, n_runs=0, why=why)
 
 
-def needs_larger_team(*, few: tuple[int, int], many: tuple[int, int], team: float) -> Outcome:
-    """Whether a second swarm needs a larger mean team for the availability that a team gives the first.
+def is_less_available(*, few: tuple[int, int], many: tuple[int, int], team: float) -> Outcome:
+    """Whether a second swarm is less available than the first with the same mean team at work.
+
+    Then it needs a larger team for the same availability. Availability is 1 where no robot is needed, so it has also
+    dropped more steeply on the way there.
 
     Args:
         few: Swarm size and robots needed of the first.
         many: The same of the second.
-        team: Mean robots at work in the first.
+        team: Mean robots at work in both.
     """
     wanted = availability(*few, ratio_for_team(team))
     got = availability(*many, ratio_for_team(team))

@@ -3,7 +3,8 @@
 The paper has two tables of intuitions, one per scenario. Their words are vague: "modest", "moderate", "low". Here each
 is a comparison with the other algorithms: high is better than all three others, low is worse than CRW and STOCHX or, of
 one of these, worse than both others; modest lies between. That is our choice. One
-intuition is left out: that STOCHM is congested near its caches. No measure says where time is lost.
+intuition is left out: that STOCHM is congested near its caches. Records of runs hold how much time is lost, not where;
+`swarm-forage maps` makes runs again to see it.
 """
 
 from .checking import Claim, Place, Statement

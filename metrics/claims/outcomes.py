@@ -11,9 +11,10 @@ from ..checks import check_option
 from ..curves import FloatArray
 from .panel import LEAST_RUNS, MANY, Panel, Rule, bounds
 
-Answer: TypeAlias = Literal["supported", "contradicted", "undecided", "no scores"]
-"""`undecided`: the runs leave it open. `no scores`: there was nothing to judge, because runs are missing or a measure
-has no finite value."""
+Answer: TypeAlias = Literal["supported", "contradicted", "tie", "too vague", "undecided", "no scores"]
+"""`tie`: the claim says that there is a difference, and what it compares ties. `too vague`: its text alone leaves open
+what would speak against it, and no run is looked at. `undecided`: the runs leave it open. `no scores`: there was
+nothing to judge, because runs are missing or a measure has no finite value."""
 BoolArray: TypeAlias = NDArray[np.bool_]
 
 
@@ -91,25 +92,33 @@ def within_limit(interval: tuple[float, float], limit: float) -> Answer:
 
 
 def contrary(outcome: Outcome) -> Outcome:
-    """Return the outcome of the contrary statement; what is undecided or without scores stays so."""
+    """Return the outcome of the contrary statement; what is neither supported nor contradicted stays so."""
     turned: dict[Answer, Answer] = {"supported": "contradicted", "contradicted": "supported"}
     return replace(outcome, answer=turned.get(outcome.answer, outcome.answer))
 
 
 def all_of(outcomes: Sequence[Outcome]) -> Outcome:
-    """Return one outcome for several statements that must all hold: one that fails contradicts them."""
+    """Return one outcome for several statements that must all hold: one that fails, or is a tie, decides."""
     answers = [outcome.answer for outcome in outcomes]
-    order: tuple[Answer, ...] = ("contradicted", "no scores", "undecided", "supported")
+    order: tuple[Answer, ...] = ("contradicted", "tie", "no scores", "undecided", "supported")
     return _joined(outcomes, next(answer for answer in order if answer in answers))
 
 
 def most_of(outcomes: Sequence[Outcome]) -> Outcome:
     """Return one outcome for several statements of which more than half must hold."""
     answers = [outcome.answer for outcome in outcomes]
-    choices: tuple[Answer, ...] = ("supported", "contradicted")
-    most: list[Answer] = [choice for choice in choices if answers.count(choice) > MANY * len(answers)]
+    counts = [answers.count(answer) for answer in ("supported", "contradicted", "tie")]
     answer: Answer = "no scores" if "no scores" in answers else "undecided"
-    return _joined(outcomes, most[0] if most else answer)
+    return _joined(outcomes, _of_most(*counts, total=len(answers)) or answer)
+
+
+def _of_most(n_for: int, n_against: int, n_tied: int, *, total: int) -> Answer | None:
+    """The answer that more than half of the votes give, if one does; ties speak against what is stated, too."""
+    if n_for > MANY * total:
+        return "supported"
+    if n_tied > MANY * total:
+        return "tie"
+    return "contradicted" if n_against + n_tied > MANY * total else None
 
 
 def _joined(outcomes: Sequence[Outcome], answer: Answer) -> Outcome:
@@ -130,12 +139,22 @@ def _joined(outcomes: Sequence[Outcome], answer: Answer) -> Outcome:
 
 
 def by_majority(
-    holds: BoolArray, fails: BoolArray, what: str, *, effect: float, n_runs: int, against: str = "do not"
+    holds: BoolArray,
+    fails: BoolArray,
+    what: str,
+    *,
+    effect: float,
+    n_runs: int,
+    against: str = "do not",
+    tied: BoolArray | None = None,
 ) -> Outcome:
-    """Outcome of a statement from where it holds and where it fails, boolean arrays of the same shape."""
+    """Outcome of a statement from where it holds and where it fails, boolean arrays of the same shape.
+
+    `tied`: where it fails only because what it compares ties.
+    """
     total, n_for, n_against = holds.size, int(holds.sum()), int(fails.sum())
-    answer: Answer = "supported" if n_for > MANY * total else "undecided"
-    if n_against > MANY * total:
-        answer = "contradicted"
-    why = f"{n_for} of {total} {what}, {n_against} {against}, {total - n_for - n_against} open"
+    n_tied = 0 if tied is None else int(tied.sum())
+    answer = _of_most(n_for, n_against - n_tied, n_tied, total=total) or "undecided"
+    ties = f" ({n_tied} of them tie)" if n_tied else ""
+    why = f"{n_for} of {total} {what}, {n_against} {against}{ties}, {total - n_for - n_against} open"
     return Outcome(answer=answer, statistic=n_for / total, effect=effect, n_runs=n_runs, why=why)

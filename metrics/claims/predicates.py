@@ -113,7 +113,8 @@ def stays_alike(first: Panel, second: Panel, *, policy: str, rule: Rule = "inter
 
 def differ(panel: Panel, *, pairs: Pairs, levels: Levels = "all", rule: Rule = "intervals") -> Outcome:
     """Whether pairs of policies mostly differ; the contrary of `ties`."""
-    return contrary(ties(panel, pairs=pairs, levels=levels, rule=rule))
+    outcome = ties(panel, pairs=pairs, levels=levels, rule=rule)
+    return replace(outcome, answer="tie") if outcome.answer == "supported" else contrary(outcome)
 
 
 def is_higher(
@@ -121,7 +122,8 @@ def is_higher(
 ) -> Outcome:
     """Whether each of some policies is higher than each of others, at more than half of the levels.
 
-    A level speaks against it if one of the pairs ties or is the other way round.
+    A level speaks against it if one of the pairs ties or is the other way round. The answer is a tie if at more than
+    half of the levels pairs tie and none is the other way round.
     """
     part = panel.part(levels)
     names = (*upper, *lower)
@@ -135,6 +137,7 @@ def is_higher(
         f"levels have {' and '.join(upper)} above {' and '.join(lower)}",
         effect=float(mean_over_runs(gap)) / part.scale,
         n_runs=part.n_runs(names),
+        tied=np.any(found == 0.0, axis=0) & ~np.any(found < 0.0, axis=0),
     )
 
 

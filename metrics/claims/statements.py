@@ -33,6 +33,7 @@ EXPERIMENTS: dict[str, str] = {
     "S2b 12": "search and rescue, 12 robots, throttled motion",
     "S2b 115": "search and rescue, 115 robots, throttled motion",
     "S2b 320": "search and rescue, 320 robots, throttled motion",
+    "S2c 115": "search and rescue, 115 robots, noise",
     "S2c 320": "search and rescue, 320 robots, noise",
     "S2d 115": "search and rescue, 115 robots, deaths",
     "S2d 320": "search and rescue, 320 robots, deaths",

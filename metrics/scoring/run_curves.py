@@ -183,6 +183,12 @@ class RunCurves:
         means: dict[str, FloatArray] = {name: curve.mean(axis=0) for name, curve in self.curves.items()}
         return replace(self, curves=means | {"performance": performance})
 
+    def without_each(self) -> "RunCurves":
+        """Return means over all runs but one, (R, T): row i leaves out run i."""
+        n_others = len(self.seeds) - 1
+        means = {name: (curve.sum(axis=0) - curve) / n_others for name, curve in self.curves.items()}
+        return replace(self, curves=means)
+
     def at_seeds(self, seeds: Sequence[int]) -> "RunCurves":
         """Return the same experiment with some of its runs only."""
         places = [self.seeds.index(seed) for seed in seeds]

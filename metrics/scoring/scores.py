@@ -3,7 +3,7 @@
 import difflib
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias, get_args
 
 import numpy as np
@@ -180,6 +180,10 @@ class Score:
     policies of different performance comparable; NaN where that performance is zero."""
     of_mean_curves: Summary | None = None
     """For scalability and distances: the measure of the mean curves with a bootstrap interval."""
+    mean_curves_per_seed: Mapping[int, float] = field(default_factory=dict[int, float])
+    """The same as one number per seed, its pseudo-value, so that it can be tested like a mean; see `pseudo_values`."""
+    relative_mean_curves_per_seed: Mapping[int, float] = field(default_factory=dict[int, float])
+    """The same of the measure over the total performance that it is compared with."""
     beside: Mapping[str, float] = field(default_factory=dict[str, float])
     """Further numbers to read with the value."""
     note: str = ""
@@ -314,6 +318,7 @@ def score_runs(
     per_run = np.atleast_1d(np.asarray(values(*paired), dtype=np.float64)) if seeds else np.empty(0)
     relative = relative_floor = None
     mean_total = math.nan
+    of_means = pseudo_values(values, paired, compared_with) if order_matters and len(seeds) > 1 else ()
     if compared_with is not None and seeds:
         total = paired[compared_with].performance.sum(axis=-1)
         mean_total = float(total.mean())
@@ -330,6 +335,10 @@ def score_runs(
         relative_floor=relative_floor,
         compared_total=mean_total,
         of_mean_curves=_of_mean_curves(values, paired) if order_matters and seeds else None,
+        **{
+            name: dict(zip(seeds, found.tolist(), strict=True))
+            for name, found in zip(_OF_MEANS, of_means, strict=False)
+        },
         note="; ".join(filter(None, (remark, _note(per_run, n_lost, relative)))),
         **told,
     )
@@ -343,6 +352,31 @@ def _of_mean_curves(values: Values, paired: tuple[RunCurves, ...]) -> Summary:
 
     performances = [experiment.performance for experiment in paired]
     return bootstrap_measure(of_curves, *performances, order="mean_curve", seed=_BOOTSTRAP_SEED)
+
+
+_OF_MEANS = ("mean_curves_per_seed", "relative_mean_curves_per_seed")
+
+
+def pseudo_values(values: Values, paired: tuple[RunCurves, ...], compared_with: int | None) -> Iterator[FloatArray]:
+    """Yield the pseudo-values of the measure of mean curves, (R,), and of its shares of performance if it has such.
+
+    With R runs, v of all and v_i without run i they are R v - (R - 1) v_i. Their mean is v with less bias, and they
+    scatter like R independent values of which v is the mean (Tukey 1958; Miller 1974, "The jackknife - a review").
+    """
+    n_runs = len(paired[0].seeds)
+    whole = [
+        replace(e, curves={name: curve.mean(axis=0, keepdims=True) for name, curve in e.curves.items()}) for e in paired
+    ]
+    parts = [e.without_each() for e in paired]
+    of_all, without = (np.asarray(values(*curves), dtype=np.float64) for curves in (whole, parts))
+    yield n_runs * of_all - (n_runs - 1) * without
+    if compared_with is not None:
+        totals = [curves[compared_with].performance.sum(axis=-1) for curves in (whole, parts)]
+        shares = [
+            np.divide(found, total, out=np.full(found.shape, math.nan), where=total > 0.0)
+            for found, total in zip((of_all, without), totals, strict=True)
+        ]
+        yield n_runs * shares[0] - (n_runs - 1) * shares[1]
 
 
 def _note(per_run: FloatArray, n_lost: int, relative: FloatArray | None) -> str:

@@ -17,6 +17,7 @@ from ..breakdown import breakdown_probability, find_breakdowns, time_to_breakdow
 from ..catalog import METRICS
 from ..checks import CurveError
 from ..claims import Panel, PanelName
+from ..claims.checking import DISTANCES
 from ..claims.panel import TIE
 from ..curves import FloatArray, Form, Variant
 from ..distributions import interquartile_mean, probability_of_improvement
@@ -41,8 +42,9 @@ FIGURE_MEASURES = (
     "adaptability",
     "noise_robustness",
     "population_robustness",
+    "recorded_population_robustness",
 )
-"""Measures that the paper's figures show."""
+"""Measures that the paper's figures show, and population robustness with the robots that were at work."""
 FIGURE_FORMS: dict[str, tuple[Form, ...]] = {"spatial_emergence": ("interactive", "marginal")}
 """Measure -> forms that the figures show, where it is not the marginal one alone: in the warehouses a swarm is held
 beside as many robots that work alone, in search and rescue, where no robot works alone, beside the next smaller swarm.
@@ -56,6 +58,7 @@ _EXPERIMENTS: dict[tuple[Any, ...], str] = {
     ("S2b", 12): "S2b 12",
     ("S2b", 115): "S2b 115",
     ("S2b", 320): "S2b 320",
+    ("S2c", 115): "S2c 115",
     ("S2c", 320): "S2c 320",
     ("S2d", 115): "S2d 115",
     ("S2d", 320): "S2d 320",
@@ -107,6 +110,10 @@ class StudyPanel:
     """The same as shares of the performance that they are compared with; empty for measures without such shares."""
     compared_with: FloatArray | None = None
     """That performance, mean of runs and policies, (L,)."""
+    of_mean_curves: Mapping[str, FloatArray] = field(default_factory=dict[str, FloatArray])
+    """For distances, policy -> pseudo-values of the distance of mean curves per level and run, (L, R)."""
+    relative_of_mean_curves: Mapping[str, FloatArray] = field(default_factory=dict[str, FloatArray])
+    """The same as shares of the performance that they are compared with."""
     floors: Mapping[str, FloatArray] = field(default_factory=dict[str, FloatArray])
     """For distances, policy -> distances between undisturbed runs, (R,)."""
 
@@ -130,8 +137,14 @@ class StudyPanel:
         """`relative`, or the scores where they are shares of performance already; else empty."""
         return self.scores if self.unit == SHARES else self.relative
 
-    def for_claims(self, *, relative: bool = False) -> Panel:
-        """Return the scores as claims want them, or as shares of performance.
+    def scores_of(self, name: PanelName) -> Mapping[str, FloatArray]:
+        """Return the scores that a panel of claims shows, (L, R) each; empty where it has none."""
+        if name.of_mean_curves:
+            return self.relative_of_mean_curves if name.is_relative else self.of_mean_curves
+        return self.shares if name.is_relative else self.scores
+
+    def for_claims(self, name: PanelName | None = None) -> Panel:
+        """Return the scores as claims want them, or those of this name: shares of performance, of mean curves.
 
         Margins of ties are in the measure's own unit (our choice): a tenth of the performance that an amount is
         compared with, a tenth of 1 for scalability, 0.02 for fractions. Else they are shares of the scores.
@@ -142,13 +155,14 @@ class StudyPanel:
             return Panel(levels=self.levels, scores=self.scores, margins=np.full(n_levels, TIE), unit=1.0)
         if (measure.lowest, measure.highest) == (0.0, 1.0):
             return Panel(levels=self.levels, scores=self.scores, margins=np.full(n_levels, TIE_OF_FRACTIONS), unit=1.0)
-        if relative:
-            floors = None if total is None else {name: floor / total[0] for name, floor in self.floors.items()}
+        shown = self.name if name is None else name
+        floors = None if shown.of_mean_curves else self.floors or None  # undisturbed runs have no second mean curve
+        margins = TIE * total if total is not None and bool((total > 0.0).all()) else None
+        if shown.is_relative:
             margins = np.full(n_levels, TIE)
-            return Panel(levels=self.levels, scores=self.shares, margins=margins, undisturbed=floors or None)
-        is_known = total is not None and bool((total > 0.0).all())
-        margins = TIE * total if total is not None and is_known else None
-        return Panel(levels=self.levels, scores=self.scores, margins=margins, undisturbed=self.floors or None)
+            if floors is not None and total is not None:
+                floors = {policy: floor / total[0] for policy, floor in floors.items()}
+        return Panel(levels=self.levels, scores=self.scores_of(shown), margins=margins, undisturbed=floors)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -280,13 +294,15 @@ def _score_panel(
     table: "StudyTable", line: StudyLine, variant: Variant, form: Form, found: Mapping[str, Sequence[Score]]
 ) -> StudyPanel:
     scores = [score for of_policy in found.values() for score in of_policy]
-    values: dict[str, dict[float, dict[int, float]]] = {policy: {} for policy in found}
-    shares: dict[str, dict[float, dict[int, float]]] = {policy: {} for policy in found}
+    kinds = ("per_seed", "relative_per_seed", "mean_curves_per_seed", "relative_mean_curves_per_seed")
+    values, shares, means, mean_shares = of_kinds = [
+        {policy: dict[float, dict[int, float]]() for policy in found} for _ in kinds
+    ]
     totals: dict[float, list[float]] = {}
     for policy, of_policy in found.items():
         for score in of_policy:
-            values[policy].setdefault(score.x, {}).update(score.per_seed)
-            shares[policy].setdefault(score.x, {}).update(score.relative_per_seed)
+            for kind, of_kind in zip(kinds, of_kinds, strict=True):
+                of_kind[policy].setdefault(score.x, {}).update(getattr(score, kind))
             totals.setdefault(score.x, []).append(score.compared_total)
     far = "environment_distance"
     distances = {score.x: score.beside[far] for score in scores if far in score.beside}
@@ -297,6 +313,9 @@ def _score_panel(
         about["compared_with"] = np.array([_mean(np.array(totals[level])) for level in sorted(totals)])
     elif first.measure == "raw_performance":  # an amount that is compared with itself
         about["compared_with"] = np.array([_mean(_flat(values, level)) for level in sorted(totals)])
+    if first.measure in DISTANCES:
+        about["of_mean_curves"] = _arrays(means, seeds)
+        about["relative_of_mean_curves"] = _arrays(mean_shares, seeds)
     floors = {policy: of_policy[0].floor_per_seed for policy, of_policy in found.items() if of_policy}
     if all(floors.values()):
         about["floors"] = {name: np.array([of.get(seed, np.nan) for seed in seeds]) for name, of in floors.items()}

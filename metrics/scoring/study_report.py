@@ -27,6 +27,7 @@ from swarm_forage_env.studies.study import StudySpec
 from swarm_forage_env.studies.study_file import is_set_of_paper
 
 from ..claims import CLAIMS, INTUITIONS, Claim, Verdict
+from ..claims.checking import RELATIVE
 from .study_models import ModelFigure, model_figures
 from .study_numbers import StudyPanels, place_distributions, policy_pairs
 from .study_plots import Band, Draw, StudyFigure, checked_band, drawn_by, snapshot_written, study_figures
@@ -37,6 +38,7 @@ from .study_verdict import (
     StudyVerdict,
     Waiting,
     claims_about,
+    relative_answer,
     scored_studies,
     verdict_of,
     why_no_claims,
@@ -220,14 +222,18 @@ def _claim_rows(
         of_formula = not claim.panels
         for column in [("", "corrected")] if of_formula else columns:
             span = len(columns) if of_formula else 1
-            where = "formula" if of_formula else ", ".join(column)
+            where = ("text alone" if claim.vague else "formula") if of_formula else ", ".join(column)
             verdict, later = found.get((name, *column)), waits.get((name, *column))
             if verdict is not None:
-                cells.append({"answer": verdict.answer, "by_bands": verdict.by_bands, "why": "", "span": span})
+                relative = relative_answer(verdict)
+                answers = {"answer": verdict.answer, "by_bands": verdict.by_bands, "relative": relative}
+                cells.append({**answers, "why": "", "span": span})
                 behind.append({"where": where, **_numbers_of(verdict)})
+                if relative:
+                    behind.append({"where": f"{where}; {RELATIVE}", **_numbers_of(verdict.otherwise[RELATIVE])})
             else:
                 why = "no such form" if later is None else WAITS
-                cells.append({"answer": "", "by_bands": "", "why": why, "span": span})
+                cells.append({"answer": "", "by_bands": "", "relative": "", "why": why, "span": span})
                 if later is not None:
                     behind.append({"where": where, "answer": "", "words": f"waits for {lacking(later)}"})
         rows.append({"name": name, "text": claim.text, "where": claim.figure, "cells": cells, "behind": behind})
@@ -323,7 +329,7 @@ def _model(figure: ModelFigure) -> dict[str, Any]:
 def _theory(tables: "Sequence[StudyTable]", judged: Sequence[Judged]) -> list[dict[str, Any]]:
     """Return the figures that need no runs, all of them where claims are judged, with the claims about formulas."""
     figures = theory_figures() if judged else [figure for table in tables for figure in theory_of(table.spec)]
-    formulas = [one for one in judged if not one.claim.panels]
+    formulas = [one for one in judged if not one.claim.panels and not one.claim.vague]
     return [
         {
             "title": figure.title,

@@ -1,7 +1,7 @@
 """What runs of the paper's sets say of its claims and of its intuitions, under all rules and in all variants."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING, Any, get_args
@@ -13,7 +13,7 @@ from swarm_forage_env.studies.study_file import is_set_of_paper
 from ..catalog import METRICS
 from ..checks import CurveError
 from ..claims import CLAIMS, INTUITIONS, Claim, PanelName, Verdict, check_claim
-from ..claims.checking import RELATIVE, relative_claim
+from ..claims.checking import RELATIVE, read_otherwise
 from ..claims.outcomes import Answer as ClaimAnswer
 from ..claims.statements import POLICIES
 from ..curves import Variant
@@ -27,7 +27,9 @@ VARIANTS: tuple[Variant, ...] = ("corrected", "paper", "sierra")
 ANSWERS: tuple[ClaimAnswer, ...] = get_args(ClaimAnswer)
 WAITS = "waits"
 """What stands in place of an answer for which runs are missing."""
-HEADER = ("claim", "text", "by intervals", "relative", "by bands", "statistic", "effect", "runs", "why")
+HEADER = ("claim", "text", "by intervals", "relative", "by bands", "statistic", "effect", "runs", "why", "otherwise")
+OURS, RELATIVELY, BANDS = "ours", "ours, relative", "the paper's bands"
+"""Columns of the table that says it all, under each of the rules."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +38,7 @@ class Judged:
 
     claim: Claim
     rules: str
-    """Empty for a claim about formulas, which needs no runs."""
+    """Empty for a claim that no run answers: about formulas, or too vague."""
     variant: Variant
     verdict: Verdict
 
@@ -121,14 +123,15 @@ def judge_claims(
         claims: By name; those of the paper's text, or its `INTUITIONS`.
 
     Returns:
-        The answered claims, by rules, variant and claim, formulas first; and those that wait for runs.
+        The answered claims, by rules, variant and claim, those first that need no runs; and those that wait for runs.
 
     Raises:
-        CurveError: a study twice, one without the policies of the paper, or none of its sets.
+        CurveError: a study twice under the same rules, one without the policies of the paper, or none of its sets.
     """
     names = [table.spec.name for table in tables]
-    if len(set(names)) < len(names):
-        raise CurveError(f"Expected each study once, got {', '.join(names)}.")
+    under = [f"{table.spec.name} ({rules})" for table in tables for rules in table.spec.rules]
+    if len(set(under)) < len(under):
+        raise CurveError(f"Expected each study once under the same rules, got {', '.join(under)}.")
     for reason in filter(None, map(why_no_claims, tables)):
         raise CurveError(reason)
     found = _Found(
@@ -170,16 +173,18 @@ def _variant_of(measure: str, variant: Variant) -> Variant:
 
 
 def _judge(claim: Claim, rules: str, variant: Variant, found: _Found) -> Judged | Waiting:
-    names = (*claim.panels, *claim.other_panels, *relative_claim(claim).panels)
+    names = [*claim.panels, *claim.other_panels]
+    names += [name for read in read_otherwise(claim).values() for name in read.panels]
     places: dict[PanelName, tuple[str, Variant, PanelName]] = {
-        name: (rules, _variant_of(name.measure, variant), name._replace(is_relative=False)) for name in names
+        name: (rules, _variant_of(name.measure, variant), name._replace(is_relative=False, of_mean_curves=False))
+        for name in names
     }
     lacks = tuple(name for name in claim.panels if places[name] not in found.panels)
     if not lacks:
         panels = {
-            name: found.panels[place].for_claims(relative=name.is_relative)
+            name: found.panels[place].for_claims(name)
             for name, place in places.items()
-            if place in found.panels and (not name.is_relative or found.panels[place].shares)
+            if place in found.panels and found.panels[place].scores_of(name)
         }
         return Judged(claim=claim, rules=rules, variant=variant, verdict=check_claim(claim, panels))
     keys = [
@@ -202,6 +207,8 @@ class StudyVerdict(Answer):
     expected: tuple[Judged, ...] = ()
     """Intuitions, by corrected measures only."""
     expected_later: tuple[Waiting, ...] = ()
+    is_short: bool = False
+    """Whether `sheets` are the counts and the table that says it all, without what is behind the answers."""
 
     @property
     def rules(self) -> tuple[str, ...]:
@@ -221,9 +228,9 @@ class StudyVerdict(Answer):
     def counts(self, rules: str, variant: str, *, by_bands: bool = False) -> dict[str, int]:
         """Return answer -> how many claims have it by these rules; and how many wait for runs, as `WAITS`.
 
-        Claims about formulas are counted by the rules "".
+        Claims that no run answers are counted with the corrected measures, under all rules.
         """
-        mine = [one.verdict for one in self.judged if (one.rules, one.variant) == (rules, variant)]
+        mine = [one.verdict for one in self.judged if one.rules in (rules, "") and one.variant == variant]
         answers = Counter(verdict.by_bands if by_bands else verdict.answer for verdict in mine)
         waiting = sum((one.rules, one.variant) == (rules, variant) for one in self.waiting)
         return {**{word: answers[word] for word in ANSWERS}, WAITS: waiting}
@@ -235,14 +242,39 @@ class StudyVerdict(Answer):
         return tuple(f"{name} has the name of one of the paper's sets and other settings" for name in others)
 
     def sheets(self) -> Sequence[Sheet]:
-        """Return one table per rules and variant, the intuitions, and what waits for which runs."""
+        """Return how many have which answer, all claims at a glance, what is behind each answer, and what waits."""
+        return [self._counted(), *self._at_a_glance(), *([] if self.is_short else self._behind())]
+
+    def _counted(self) -> Sheet:
+        rows = [(rules, *map(str, self.counts(rules, "corrected").values())) for rules in self.rules]
+        return Sheet(title="how many claims, measures corrected", header=("rules", *ANSWERS, WAITS), rows=rows)
+
+    def _at_a_glance(self) -> Iterator[Sheet]:
+        """Each claim with its answers under all rules, measures corrected; the same of the intuitions."""
+        columns = [f"{rules}: {word}" for rules in self.rules for word in (BANDS, OURS, RELATIVELY)]
+        for title, claims in (("all claims at a glance", CLAIMS), ("what the paper expected", INTUITIONS)):
+            rows = [
+                (name, claim.text, *(cell for rules in self.rules for cell in self.cells(claim, rules)))
+                for name, claim in claims.items()
+            ]
+            yield Sheet(title=title, header=("claim", "the paper", *columns), rows=rows)
+
+    def cells(self, claim: Claim, rules: str) -> tuple[str, str, str]:
+        """Return the answers to a claim by the paper's bands, by ours, and by ours relative to performance."""
+        found = self.found.get((claim.name, rules if claim.panels else "", "corrected"))
+        if found is None:
+            return WAITS, WAITS, ""
+        return found.by_bands, found.answer, relative_answer(found)
+
+    def _behind(self) -> Sequence[Sheet]:
+        """One table per rules and variant with what is behind the answers, and what waits for which runs."""
         groups: dict[tuple[str, str, str], list[Judged]] = {}
         for what, some in (("", self.judged), ("intuitions, ", self.expected)):
             for one in some:
                 groups.setdefault((what, one.rules, one.variant), []).append(one)
         sheets: list[Sheet] = []
         for (what, rules, variant), some in groups.items():
-            title = f"rules {rules}, measures {variant}" if rules else "from formulas alone"
+            title = f"rules {rules}, measures {variant}" if rules else "without any run"
             sheets.append(Sheet(title=f"{what}{title}", header=HEADER, rows=[_row(one) for one in some]))
         first, *others = waiting_lines((*self.waiting, *self.expected_later))
         return [*sheets, Sheet(title=first, notes=others)]
@@ -271,11 +303,11 @@ def verdict(*tables: "StudyTable", tell: Callable[[str], None] | None = None) ->
     """Hold the claims of the paper, and its intuitions, against runs of its sets.
 
     Args:
-        tables: From `swarm_forage_env.read_study`.
+        tables: From `swarm_forage_env.read_study`. Runs of a set under different rules may be in different studies.
         tell: Called with words about what is under way: with many runs it takes minutes.
 
     Raises:
-        CurveError: a study twice, one without the policies of the paper, or none of its sets.
+        CurveError: as in `judge_claims`.
     """
     refused = [why for table in tables if (why := why_no_claims(table))]
     if refused:
@@ -342,5 +374,11 @@ def waiting_lines(waiting: Sequence[Waiting]) -> list[str]:
 def _row(one: Judged) -> tuple[str, ...]:
     found = one.verdict
     numbers = (number(found.statistic), percent(found.effect), str(found.n_runs))
-    relative = found.otherwise[RELATIVE].answer if RELATIVE in found.otherwise else ""
-    return (one.claim.name, one.claim.text, found.answer, relative, found.by_bands, *numbers, found.why)
+    others = "\n".join(f"{words}: {other.answer}" for words, other in found.otherwise.items() if words != RELATIVE)
+    answers = (found.answer, relative_answer(found), found.by_bands)
+    return (one.claim.name, one.claim.text, *answers, *numbers, found.why, others)
+
+
+def relative_answer(found: Verdict) -> str:
+    """Return the answer relative to performance; empty where there is none."""
+    return found.otherwise[RELATIVE].answer if RELATIVE in found.otherwise else ""

@@ -1,6 +1,7 @@
 """The commands of studies: what there is, running them, and what came of them."""
 
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -153,6 +154,7 @@ Places = Annotated[list[Path], typer.Argument(metavar="DIR|FILE...", help="Folde
 
 def verdict(
     places: Places,
+    table: Annotated[bool, typer.Option("--table", help="Counts and the table of all claims only.")] = False,
     file: Annotated[
         Path | None, typer.Option("--file", help="Write it, too: .txt, .md, .csv or .json, with more numbers.")
     ] = None,
@@ -160,7 +162,8 @@ def verdict(
 ) -> None:
     """Hold the claims of the paper against runs of its sets: what they support, contradict or leave open.
 
-    Below them the same for its intuitions, what it expected of each algorithm before the experiments.
+    First how many have which answer, and all claims in one table; below them what is behind each answer. The same for
+    the paper's intuitions, what it expected of each algorithm before the experiments.
     """
     from metrics import verdict as verdict_of
     from swarm_forage_env._internal.fields import ConfigError
@@ -175,7 +178,7 @@ def verdict(
     tables = [read_study(place) for place in places]
     if file is not None:
         check_file(file)
-    found = verdict_of(*tables, tell=aside.print)
+    found = replace(verdict_of(*tables, tell=aside.print), is_short=table)
     for remark in found.remarks:
         aside.print(f"note: {remark}")
     if as_json:

@@ -49,9 +49,9 @@ def ran(command):
 def test_claims_are_held_against_a_study(ran):
     code, out, err = ran("study", "verdict", "done", "--file", "there/verdict.json")
     assert code == 0
-    assert "from formulas alone" in out
+    assert "without any run" in out
     assert "rules described, measures sierra" in out
-    assert "E4, E5, E6, C1, C2, C3, P1, H1, H3" in out, "claims and intuitions that wait for S1b"
+    assert "E4, E5, E6, E10, C1, C2, C3, C6, P1, H1, H3" in out, "claims and intuitions that wait for S1b"
     assert "scoring S1a" in err
     assert "note: S1a has the name of one of the paper's sets and other settings" in err
     document = json.loads(Path("there/verdict.json").read_text())
@@ -62,6 +62,10 @@ def test_claims_are_held_against_a_study(ran):
     assert {one["claim"] for one in document["waiting"]} >= {"E4", "X1"}
     assert {one["claim"] for one in document["intuitions_waiting"]} >= {"H1", "H22"}
     assert ran("study", "verdict", "done/S1a.parquet")[1] == out
+    code, short, _ = ran("study", "verdict", "done", "--table")
+    assert (code, out.startswith(short.rstrip())) == (0, True)
+    assert "all claims at a glance" in short
+    assert "why" not in short
 
 
 def test_a_study_of_ones_own_has_no_claims(ran):
@@ -162,7 +166,7 @@ def test_a_report_on_a_study_of_ones_own_has_no_claims(ran):
 def test_what_a_report_refuses(ran, monkeypatch):
     for words, message in (
         (("done", "--file", "report.htm"), "ending in .html, .md, .txt, .csv, .json, got 'report.htm'"),
-        (("done", "done"), "Expected each study once, got S1a, S1a"),
+        (("done", "done"), "Expected each study once under the same rules, got S1a (described)"),
         (("done", "--out", "report.html"), "No such option: --out; for this command it is --file."),
     ):
         code, _, err = ran("study", "report", *words)

@@ -22,6 +22,7 @@ def answers(predicate, *panels, **parameters):
 
 BOTH = ("supported", "supported")
 NEITHER = ("contradicted", "contradicted")
+TIED = ("tie", "tie")
 OPEN = ("undecided", "undecided")
 AB = {"pairs": (("a", "b"),)}
 UP = {"upper": ("a",), "lower": ("b", "c")}
@@ -110,8 +111,10 @@ def test_noise_has_no_order(statement):
         (general.ties, {"a": [1, 1, 1, 2, 2, 2], "b": 1.0}, {}, {**AB, "levels": "high"}, NEITHER),
         (general.ties, {"a": [1, 1, 1, 2, 2, 2], "b": 1.0}, {}, AB, OPEN),
         (general.is_higher, {"a": 3.0, "b": 2.0, "c": 1.0}, {}, UP, BOTH),
-        (general.is_higher, {"a": 2.0, "b": 2.0, "c": 1.0}, {}, UP, NEITHER),
-        (general.is_higher, {"a": 2.0, "b": 1.9, "c": 1.0}, {"sd": 1.0}, UP, ("undecided", "contradicted")),
+        (general.is_higher, {"a": 2.0, "b": 2.0, "c": 1.0}, {}, UP, TIED),
+        (general.is_higher, {"a": [1, 1, 1, 2, 1, 2], "b": 1.0, "c": [2, 2, 1, 1, 2, 1]}, {}, UP, NEITHER),
+        (general.is_higher, {"a": 2.0, "b": 1.9, "c": 1.0}, {"sd": 1.0}, UP, ("undecided", "tie")),
+        (general.differ, {"a": 1.0, "b": 1.0}, {}, AB, TIED),
         (general.is_not_higher, {"a": 1.0, "b": 2.0}, {}, {"first": "a", "second": "b"}, BOTH),
         (general.is_not_higher, {"a": 1.0, "b": 1.0}, {}, {"first": "a", "second": "b"}, BOTH),
         (general.is_not_higher, {"a": 2.0, "b": 1.0}, {}, {"first": "a", "second": "b"}, NEITHER),
@@ -326,7 +329,12 @@ def test_several_statements_make_one_answer():
     def outcome(answer, effect=0.1):
         return Outcome(answer=answer, statistic=0.0, effect=effect, n_runs=4, why="w")
 
-    yes, no, open_, nothing = map(outcome, ("supported", "contradicted", "undecided", "no scores"))
+    yes, no, open_, nothing, tie = map(outcome, ("supported", "contradicted", "undecided", "no scores", "tie"))
+    assert all_of([yes, tie, open_, nothing]).answer == "tie"
+    assert all_of([tie, no]).answer == "contradicted"
+    assert most_of([tie, tie, no]).answer == "tie"
+    assert most_of([tie, no, yes]).answer == "contradicted", "two of three fail"
+    assert most_of([tie, yes]).answer == "undecided"
     assert all_of([yes, yes]).answer == "supported"
     assert all_of([yes, nothing, open_, no]).answer == "contradicted"
     assert all_of([yes, nothing, open_]).answer == "no scores"

@@ -98,8 +98,8 @@ def test_results_say_which_sets_and_conditions_they_are_of(run):
     forms = [line.split(" | ")[:2] for line in of_p2.splitlines() if line.startswith(("| described", "| program"))]
     assert forms == [["| described", "corrected"], ["| described", "sierra"]], "it is of one set of rules"
     assert "Waits for runs of S1b" in details
-    assert "| `S1a` | population_size 2, 8, 32, 128 | 2 of 192 | E1, E2, E3, P2, X2, X3 |" in page
-    assert "Judged [on fewer values than the paper's](#what-is-left-out): E1, E2, E3, P2, R1" in page
+    assert "| `S1a` | population_size 2, 8, 32, 128 | 2 of 192 | E1, E2, E3, C5, P2, X2, X3 |" in page
+    assert "Judged [on fewer values than the paper's](#what-is-left-out): E1, E2, E3, C5, P2, R1" in page
     assert f"| `S1c` | {len(whole.places)} | 0 | 0 | - |" in page, "four intervals are too short for breakdowns"
 
 
