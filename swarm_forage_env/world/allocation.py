@@ -52,7 +52,10 @@ def _painted_floor(config: ScenarioConfig) -> IntArray:
 def new_arrays(
     config: ScenarioConfig, state: WorldState, sensors: Sensors, twist: FloatArray, n_static_caches: int
 ) -> ArenaArrays:
-    """Return everything that a tick needs, around the state of a run, its sensors and the velocities of its bodies."""
+    """Return everything that a tick needs, around the state of a run, its sensors and the velocities of its bodies.
+
+    Whole numbers of a configuration become floats: equal configurations have arrays and constants of equal types.
+    """
     return ArenaArrays(
         state=state,
         rules=Rules(
@@ -67,7 +70,7 @@ def new_arrays(
         motion=new_motion(config, twist),
         sensors=sensors,
         wandering=Wandering(
-            probability=config.objects.walk_probability,
+            probability=float(config.objects.walk_probability),
             area=config.arena.distributable_cells,
             self_conflict=config.quirks.motion_self_conflict,
         ),

@@ -55,7 +55,7 @@ class Bodies:
         self.twist: FloatArray = np.zeros((n_robots + 1, 3))
         poses = np.zeros((n_robots + 1, 3))
         poses[:-1, :2], poses[:-1, 2] = position, heading
-        self._dt_s = config.dt_s
+        self._dt_s = float(config.dt_s)
         obstacles = obstacle_rows(config)
         self.state = BodyState(
             poses=poses,
@@ -63,7 +63,7 @@ class Bodies:
             bins=bins,
             room=room_of_centres(config),
             obstacles=obstacles,
-            radius_m=config.robots.radius_m,
+            radius_m=float(config.robots.radius_m),
             n_substeps=len(config.physics_substeps),
             **_room_for(n_robots, PAIRS_PER_ROBOT * n_robots, WALLS + len(obstacles)),
         )

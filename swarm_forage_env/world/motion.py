@@ -56,7 +56,7 @@ def new_motion(config: ScenarioConfig, twist: FloatArray) -> Motion:
         command=np.zeros((n_robots, 2)),
         drive_limits=drive_limits(config),
         speeds=speeds(config.robots),
-        dt_s=config.dt_s,
+        dt_s=float(config.dt_s),
         touch_m=2 * config.robots.radius_m + TOUCH_SLACK_M,
         touching=(_nobody_touching(n_robots), _nobody_touching(n_robots)),
     )

@@ -76,7 +76,7 @@ def new_sensors(config: ScenarioConfig, layout: ObservationLayout, reads: Collec
         interior=np.array(config.arena.interior_m),
         lights=np.array(config.arena.lights_m),
         intensity=config.arena.light_intensity,
-        radius_m=config.robots.radius_m,
+        radius_m=float(config.robots.radius_m),
         reach_m=PROXIMITY_RANGE_M,
         scales=np.array([WHEEL_SCALE_MPS, config.arena.width_m, config.arena.height_m]),
         sizes=(*config.arena.n_cells, config.objects.n_objects),

@@ -262,6 +262,19 @@ def test_who_may_go_in_lockstep():
     assert not can_go_in_lockstep([ForagingArena(scenario("warehouse_small", physics="chipmunk"))] * 2)
 
 
+def test_whole_numbers_among_fractions_are_the_same_world():
+    """Configurations that say 1 and 1.0 are equal, so their arenas may sit side by side."""
+    worlds = [scenario("warehouse_small", n_robots=2, n_objects=60, walk_probability=one) for one in (1.0, 1)]
+    together, alone = [ForagingArena(world) for world in worlds], ForagingArena(worlds[1])
+    for arena in (*together, alone):
+        arena.reset(3)
+    actions = np.zeros((2, 2, 3), np.float32)
+    Lockstep(together).step({0: None, 1: None}, actions)
+    alone.step(actions[1])
+    for arena in together:
+        np.testing.assert_array_equal(arena.objects.cell, alone.objects.cell)
+
+
 def test_a_stack_whose_step_was_replaced_is_stepped_by_it(monkeypatch):
     batch = ArenaBatch(plan("throttle:waveform=sine,amplitude=0.2,offset=0.2,period_s=20"), 2)
     batch.reset([0, 1], [None] * 2)
