@@ -303,7 +303,7 @@ class ForagingArena:
             RuntimeError: bodies that are not compiled.
         """
         first, tasks = self.tick + 1, tasks_of(policy) if task_shares is not None else _NO_TASKS
-        gain = self._unit_gain if wheel_gain is None else wheel_gain
+        gain = self._unit_gain if wheel_gain is None else np.ascontiguousarray(wheel_gain, np.float64)
         now, policy_draws = policy.next_ticks()
         picks, walks = self.draws(first)
         n_drawn = min(len(rows) for rows in (policy_draws, picks, walks) if rows is not self._nothing)

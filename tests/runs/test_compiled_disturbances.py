@@ -224,6 +224,65 @@ def test_wrappers_that_do_not_speak_for_their_hooks_are_asked_in_every_tick():
     assert not is_compiled(RunRecorder(patched))
 
 
+class Gain(SwarmWrapper):
+    """Slows the left wheels in every other tick, by a gain that a user may well make; the others have no hooks."""
+
+    stack_position = 3
+    given: Any = None
+
+    def gain(self, actions, wheel_gain):
+        return self.given if self.unwrapped.tick % 2 == 0 else wheel_gain
+
+    def ahead(self, n_ticks):
+        return -(self.unwrapped.tick % 2 == 0) * 3 + 1, {}  # below 0 is as good as 0
+
+
+N_ROBOTS = 6
+HALF = np.array([[0.5, 1.0]])
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        np.broadcast_to(HALF, (N_ROBOTS, 2)),
+        np.asfortranarray(np.repeat(HALF, N_ROBOTS, axis=0)),
+        np.repeat(HALF, N_ROBOTS, axis=0).astype(np.float32),
+    ],
+)
+def test_gains_of_every_type_and_order_are_taken(given):
+    speeds = []
+    for by_ticks in (False, True):
+        stack = Gain(build_env(scenario("warehouse_small", n_robots=N_ROBOTS)))
+        stack.given = given
+        run = LiveRun(RunRecorder(stack), CRWPolicy(), seed=1, by_ticks=by_ticks)
+        assert by_ticks or run.compiled_policy is not None
+        run.advance(to_tick=3)
+        speeds.append(run.forage_env.swarm.wheel_speed.copy())
+    np.testing.assert_array_equal(*speeds)
+
+
+def test_a_gain_of_another_shape_is_refused():
+    stack = Gain(build_env(scenario("warehouse_small", n_robots=N_ROBOTS)))
+    stack.given = np.ones(N_ROBOTS)
+    run = LiveRun(RunRecorder(stack), CRWPolicy(), seed=1)
+    with pytest.raises(ActionError, match=r"wheel_gain with shape \(n_robots, 2\) = \(6, 2\), got \(6,\)"):
+        run.advance(to_tick=3)
+
+
+class Second(Throttle):
+    stack_position = 4
+
+
+def test_two_wrappers_that_do_the_same_thing_both_do_it():
+    runs = []
+    for by_ticks in (False, True):
+        inner, outer = (ThrottleConfig(waveform=Waveform(kind="constant", amplitude=share)) for share in (0.2, 0.5))
+        stack = Throttle(Second(build_env(scenario("warehouse_small", n_robots=2)), inner), outer)
+        runs.append(LiveRun(RunRecorder(stack), CRWPolicy(), seed=1, by_ticks=by_ticks))
+        runs[-1].advance(to_tick=20)
+    assert_same(*runs)
+
+
 # Faults
 
 LAST_TICK = 5
