@@ -132,8 +132,13 @@ class KernelPolicy:
         return self._actions
 
     def compiled(self) -> CompiledPolicy | None:
-        """The policy for runs without Python between ticks; None where somebody has put another `act` in its place."""
+        """The policy for runs without Python between ticks.
+
+        None where somebody has put another `act` in its place, or tells tasks by an array that is made when it is
+        asked for: no kernel keeps that up to date.
+        """
         is_own = type(self).act is KernelPolicy.act and "act" not in vars(self)
+        is_own = is_own and getattr(self, "task", None) is getattr(self, "task", None)
         if is_own and self._compiled is None:  # kept, because its types take milliseconds to find out
             self._compiled = CompiledPolicy(self._kernel, self._state, self, self._chance)
         return self._compiled if is_own else None

@@ -85,7 +85,8 @@ def compiled_policy_of(stack: ForageEnv | SwarmWrapper, policy: Policy) -> Compi
     """Return a policy, which was reset, for a run without Python between ticks; None where anybody might have a say.
 
     That is a wrapper that does not tell what it does ahead, a recorder that is a subclass, a method that was replaced,
-    neighbours, messages or an own sensor that the policy reads, a mixed swarm, robots of several kinds, or Chipmunk.
+    neighbours, messages or an own sensor that the policy reads, a mixed swarm, robots of several kinds, Chipmunk, or a
+    window in which every tick is shown.
     """
     env = stack.unwrapped
     if _told_apart(policy, env.scenario):  # parts are counted tick by tick
@@ -93,6 +94,8 @@ def compiled_policy_of(stack: ForageEnv | SwarmWrapper, policy: Policy) -> Compi
     if type(stack) is not RunRecorder or type(env) is not ForageEnv:
         return None
     if env.scenario.physics != "compiled" or not hasattr(type(policy), "compiled"):
+        return None
+    if env.render_mode == "human":  # every tick is shown
         return None
     if "after_step" in vars(stack) or "step_batch" in {*vars(stack), *vars(env)}:
         return None

@@ -9,6 +9,7 @@ from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env._internal.prefetching import LARGE
 from swarm_forage_env.contract.codes import Counter, Task
 from swarm_forage_env.contract.policy import ActionError, Policy
+from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import LiveRun, build_env, build_stack
 from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -126,6 +127,29 @@ def test_python_is_asked_wherever_it_has_a_say():
     assert LiveRun(patched, CRWPolicy(), seed=0).compiled_policy is None
     assert not is_compiled(world, tick_by_tick(CRWPolicy()))
     assert not is_compiled(scenario("warehouse_small", n_robots=2, physics="chipmunk"), CRWPolicy())
+
+
+def test_every_tick_is_shown_in_a_window(monkeypatch):
+    shown = []
+    monkeypatch.setattr("swarm_forage_env.env._new_window", lambda: None)
+    monkeypatch.setattr(ForageEnv, "render", lambda env: shown.append(env.tick))
+    env = ForageEnv(scenario("warehouse_small", n_robots=2), render_mode="human")
+    env._window = object()  # type: ignore[assignment] - only that there is one counts
+    run = LiveRun(RunRecorder(env), CRWPolicy(), seed=0)
+    run.advance(to_tick=3)
+    assert shown == [0, 1, 2, 3]
+
+
+class TellsAnew(CRWPolicy):
+    """Tells tasks by a new array each time it is asked."""
+
+    @property
+    def task(self):
+        return np.where(self.activity > 1, Task.GENERALIST, Task.NONE).astype(np.int8)
+
+
+def test_tasks_that_no_kernel_keeps_up_to_date_are_asked_for_in_every_tick():
+    assert not is_compiled(scenario("warehouse_small", n_robots=2), TellsAnew())
 
 
 LAST_TICK = 5
