@@ -1,9 +1,12 @@
-"""docs/results.md with its pictures, and docs/results_in_detail.md: what runs of the paper's sets say of its claims.
+"""docs/results.md with its pictures and data: what runs of the paper's sets say of its claims.
 
     scripts/write_results DIR|FILE ...               from folders of studies, or from their packed files
-    scripts/write_results --out FOLDER DIR|FILE ...  the same into another folder than docs
+    scripts/write_results                            from the packed runs of docs/results, those of an earlier call
+    scripts/write_results --check                    say whether page and tables are those of these runs; exit 1 if not
+    scripts/write_results --out FOLDER DIR|FILE ...  the same with another folder than docs
 
-Folders also say how long the runs took; packed files do not.
+What is given is packed into docs/results, with the columns that are needed, and all that is written comes of these
+files; `results_data.py` says what lies there. Folders also say how long the runs took.
 
 Needs the extra "plots". The interpreter is $PYTHON, else that of the active environment or of .venv, else python3.
 """
@@ -11,12 +14,14 @@ Needs the extra "plots". The interpreter is $PYTHON, else that of the active env
 import argparse
 import math
 import sys
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from PIL import Image
+from results_data import MEASURES, RUNS, VERDICTS, run_words, runs_of, ship, shipped, write_numbers
 
 from metrics import verdict
 from metrics.claims import CLAIMS, INTUITIONS, Verdict
@@ -36,7 +41,7 @@ from metrics.scoring.study_verdict import (
     waiting_lines,
 )
 from swarm_forage_env import read_study
-from swarm_forage_env._internal.wording import counted, number, percent
+from swarm_forage_env._internal.wording import counted, number
 from swarm_forage_env.runs.store import DONE
 from swarm_forage_env.studies.study import StudySpec
 from swarm_forage_env.studies.study_file import (
@@ -51,7 +56,7 @@ from swarm_forage_env.studies.study_table import StudyTable
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 PICTURES = Path("images/results")
-PAGE, DETAILS = "results.md", "results_in_detail.md"
+PAGE, DATA = "results.md", "results"
 COLOURS = 64
 """Of a picture; with more, its file is several times as large and looks the same."""
 SIGNS: dict[str, str] = {
@@ -66,15 +71,18 @@ SIGNS: dict[str, str] = {
 INTRODUCTION = f"""Each claim of the paper is held against these runs, under both [readings](readings.md) of its rules.
 A claim that is contradicted is a result like any other. Some rules were wrong and were changed after runs were seen:
 [which, and why](metrics.md#rules-that-changed-after-runs-were-seen). How claims are decided is in
-[metrics.md](metrics.md#the-papers-claims), how studies are run in [studies.md](studies.md); statistics, effects and
-numbers of runs are in [{DETAILS}]({DETAILS}). `scripts/write_results` writes both pages and their pictures;
-nothing in them is typed by hand."""
+[metrics.md](metrics.md#the-papers-claims), how studies are run in [studies.md](studies.md).
+
+The runs lie beside this page, packed, so that everybody can check it without running anything: [runs]({DATA}/runs.csv),
+[every measure with its interval]({DATA}/measures.csv), and
+[every verdict with what it was decided on]({DATA}/verdicts.csv). Behind the name of a set stand the first digits of the
+digest of its runs. `swarm-forage study verdict docs/{DATA}/*.parquet` gives the answers, `scripts/write_results` this
+page with its tables and pictures; nothing in it is typed by hand."""
 
 
-def gathered(places: Sequence[Path]) -> StudyVerdict:
-    """Read, score and judge studies; the order is that of their names."""
-    tables = sorted((read_study(place) for place in places), key=lambda table: table.spec.name)
-    return verdict(*tables, tell=lambda words: print(words, file=sys.stderr))
+def judged(folder: Path) -> StudyVerdict:
+    """Score and judge the studies whose runs lie in a folder."""
+    return verdict(*shipped(folder), tell=lambda words: print(words, file=sys.stderr))
 
 
 def rows(header: Sequence[str], lines: Sequence[Sequence[Any]], right: Sequence[int] = ()) -> str:
@@ -133,20 +141,19 @@ def what_ran(results: StudyVerdict) -> str:
     for table in results.tables:
         done = [state.n_runs[DONE] for state in table.place_states()]
         took = "-" if table.wall_time_s is None else f"{table.wall_time_s / 3600.0:.2f}"
-        where = (f"`{table.spec.name}`", table.spec.title, table.spec.budget, ", ".join(table.spec.rules))
+        where = (run_words(table), table.spec.title, table.spec.budget, ", ".join(table.spec.rules))
         lines.append(
             (*where, f"{sum(done):,} of {plan_of(table).n_runs:,}", min(done), f"{table.spec.horizon_s:,.0f}", took)
         )
     known = [table.wall_time_s for table in results.tables if table.wall_time_s is not None]
     total = f"\n\nAll runs together took {sum(known) / 3600.0:.1f} hours of one core.{what_the_rest_takes(results)}"
     total = total if known else ""
-    header = ("set", "about", "budget", "rules", "runs", "fewest per condition", "length, s", "hours")
+    header = ("runs", "about", "budget", "rules", "finished", "fewest per condition", "length, s", "hours")
     return (
         "## What was run\n\n"
         f"{rows(header, lines, right=(4, 5, 6, 7))}\n\n"
-        "Hours are those of one core by the clock, other work of the machine included; a dash where only a packed file "
-        "was at hand, which does not keep them. Fewer than four runs of a condition decide nothing by intervals."
-        + total
+        "Hours are those of one core by the clock, other work of the machine included; a dash where they are not "
+        "known. Fewer than four runs of a condition decide nothing by intervals." + total
     )
 
 
@@ -172,19 +179,32 @@ def what_the_rest_takes(results: StudyVerdict) -> str:
 
 def answers(results: StudyVerdict) -> str:
     """Return how many claims have which answer, and the answer to each, measures corrected."""
-    counts = [(rules, *results.counts(rules, "corrected").values()) for rules in results.rules]
+    names = {table.spec.name: run_words(table) for table in results.tables}
     lines: list[tuple[str, ...]] = []
     for name, claim in CLAIMS.items():
         cells = [_signed(cell) for rules in results.rules for cell in results.cells(claim, rules)]
-        lines.append((f"[{name}]({DETAILS}#{name.lower()})", claim.text, *cells))
+        lines.append((name, claim.text, *cells, runs_of(claim, names) or "-"))
     columns = [f"{rules}: {word}" for rules in results.rules for word in (BANDS, OURS, RELATIVELY)]
     return (
-        "## The answers\n\n"
-        f"{rows(('rules', *ANSWERS, 'waiting for runs'), counts, right=range(1, 2 + len(ANSWERS)))}\n\n"
+        f"## The answers\n\n{how_many(results)}\n\n"
         "Measures are corrected. The paper's bands are two standard deviations of runs to either side of the mean, and "
         "two policies differ where they do not overlap. Ours is by intervals; claims about flexibility and robustness "
         "are answered relative to performance, too. A tie is the answer where a claim says that there is a difference."
-        f"{_otherwise(results)}{_on_fewer_values(results)}\n\n{rows(('claim', 'the paper', *columns), lines)}"
+        f"{_otherwise(results)}{_on_fewer_values(results)}\n\n{rows(('claim', 'the paper', *columns, 'runs'), lines)}"
+    )
+
+
+def how_many(results: StudyVerdict) -> str:
+    """Return how many claims have which answer, with each form of the measures and by each rule."""
+    lines: list[tuple[Any, ...]] = []
+    for rules in results.rules:
+        for variant in VARIANTS:
+            counts, by_bands = (results.counts(rules, variant, by_bands=each) for each in (False, True))
+            lines.append((rules, variant, *(counts[word] for word in ANSWERS), *by_bands.values()))
+    header = ("rules", "measures", *ANSWERS, *(f"{word} by bands" for word in ANSWERS), "waiting for runs")
+    return (
+        f"{rows(header, lines, right=range(2, 3 + 2 * len(ANSWERS)))}\n\n"
+        "Claims that need no run, about formulas or too vague, are counted with the corrected measures."
     )
 
 
@@ -195,7 +215,7 @@ def _otherwise(results: StudyVerdict) -> str:
         answers_here = given.setdefault((one.claim.name, one.rules), set())
         answers_here |= {verdict.answer for verdict in (one.verdict, *one.verdict.otherwise.values())} - {"no scores"}
     names = [name for name in CLAIMS if any(len(given.get((name, rules), ())) > 1 for rules in results.rules)]
-    words = f"[some of them]({DETAILS}#answers-that-hang-on-a-slip) give another answer"
+    words = f"[some of them]({DATA}/{VERDICTS}) give another answer"
     return (
         f" With other forms of the measures, or in another sense of the paper's words, {words} to {', '.join(names)}."
         if names
@@ -222,94 +242,12 @@ def _signed(answer: str) -> str:
     return f"{SIGNS[answer]} {answer}" if answer in SIGNS else answer
 
 
-def in_short(results: StudyVerdict) -> str:
-    """Return how many claims have which answer, with each form of the measures and by each rule."""
-    lines: list[tuple[Any, ...]] = []
-    for rules in results.rules:
-        for variant in VARIANTS:
-            counts, by_bands = (results.counts(rules, variant, by_bands=each) for each in (False, True))
-            lines.append((rules, variant, *(counts[word] for word in ANSWERS), *by_bands.values()))
-    header = ("rules", "measures", *ANSWERS, *(f"{word} by bands" for word in ANSWERS), "waiting")
-    return (
-        f"## How many\n\n{rows(header, lines, right=range(2, 3 + 2 * len(ANSWERS)))}\n\n"
-        "Claims that need no run, about formulas or too vague, are counted with the corrected measures."
-    )
-
-
-def every_verdict(results: StudyVerdict) -> str:
-    """Return each claim with all its verdicts: rules, forms of the measures, both rules."""
-    parts = [
-        "## Claim by claim\n\nMeasures are as corrected, as printed in the paper, and as in the authors' program "
-        "(`sierra`); behind a colon stands another sense of the claim. The statistic is what was decided on, in words "
-        "in the last column, and of several statements the share that holds; the effect is a share of the largest mean "
-        "in the figure; runs are the fewest behind any number."
-    ]
-    header = ("rules", "measures", "by intervals", "by bands", "statistic", "effect", "runs", "why")
-    for name, claim in {**CLAIMS, **INTUITIONS}.items():
-        here = [one for one in (*results.judged, *results.expected) if one.claim.name == name]
-        lines = [
-            (
-                one.rules or "-",
-                (f"{one.variant}: {sense}" if sense else one.variant) if one.rules else "-",
-                verdict.answer,
-                verdict.by_bands,
-                number(verdict.statistic),
-                percent(verdict.effect),
-                verdict.n_runs,
-                "<br>".join(verdict.why.splitlines()),
-            )
-            for one in here
-            for sense, verdict in {"": one.verdict, **one.verdict.otherwise}.items()
-        ]
-        later = {one.lacks for one in (*results.waiting, *results.expected_later) if one.claim.name == name}
-        waits = sorted({experiment for lacks in later for experiment, *_ in lacks})
-        words = f"{claim.text} ({claim.figure})"
-        parts.append(f"### {name}\n\n{words}" + (f"\n\n{rows(header, lines, right=(4, 5, 6))}" if lines else ""))
-        if waits:
-            parts.append(f"Waits for runs of {', '.join(waits)}.")
-    return "\n\n".join(parts)
-
-
-def what_hangs_on_what(results: StudyVerdict) -> str:
-    """Return the claims whose answer depends on the rules, on the form, on what is meant or on the rule."""
-    found = {key: verdict for key, verdict in results.found.items() if key[1] and verdict.answer != "no scores"}
-    lines: list[tuple[str, ...]] = []
-    for name in CLAIMS:
-        here = {key[1:]: verdict.answer for key, verdict in found.items() if key[0] == name}
-        by_rules = {rules: here[rules, "corrected"] for rules in results.rules if (rules, "corrected") in here}
-        if len(set(by_rules.values())) > 1:
-            words = ", ".join(f"{rules}: {answer}" for rules, answer in by_rules.items())
-            lines.append((name, "the rules", words))
-        for rules, base in by_rules.items():
-            others = {v: here[rules, v] for v in VARIANTS if (rules, v) in here and here[rules, v] != base}
-            if others:
-                words = ", ".join(f"{variant}: {answer}" for variant, answer in {"corrected": base, **others}.items())
-                lines.append((name, f"the form of the measure ({rules})", words))
-            verdict = found[name, rules, "corrected"]
-            lines += [
-                (name, f"what is meant ({rules})", f"as judged: {base}, {sense}: {other.answer}")
-                for sense, other in verdict.otherwise.items()
-                if other.answer != base
-            ]
-            by_bands = verdict.by_bands
-            if by_bands not in (base, "no scores"):
-                lines.append((name, f"the rule ({rules})", f"intervals: {base}, bands: {by_bands}"))
-    text = rows(("claim", "hangs on", "answers"), lines) if lines else "No answer does."
-    return (
-        "## Answers that hang on a slip\n\nThe paper's description and the authors' program differ "
-        "([readings.md](readings.md)), and so do the measures as meant, as printed (`paper`) and as programmed "
-        "(`sierra`, [errata.md](errata.md)). Of some claims the paper's text, captions, file names or program leave "
-        "open what is meant. These answers are not the same in all of them; where there are no scores, nothing is "
-        f"compared:\n\n{text}"
-    )
-
-
 def intuitions(results: StudyVerdict) -> str:
     """Return what the paper expected, with the answers."""
     found = results.found
     lines = [
         (
-            f"[{name}]({DETAILS}#{name.lower()})",
+            name,
             claim.figure.split(",")[0],
             claim.text,
             *(_answer(found.get((name, rules, "corrected"))) for rules in results.rules),
@@ -340,11 +278,12 @@ def pictured(results: StudyVerdict) -> Iterator[tuple[StudyTable, list[StudyFigu
         yield table, shown
 
 
-def figures(results: StudyVerdict, folder: Path) -> str:
-    """Draw the pictures and return the part that shows them."""
-    (folder / PICTURES).mkdir(parents=True, exist_ok=True)
-    for old in (folder / PICTURES).glob("*.png"):
-        old.unlink()
+def figures(results: StudyVerdict, folder: Path | None) -> str:
+    """Draw the pictures into a folder, if there is one, and return the part that shows them."""
+    if folder is not None:
+        (folder / PICTURES).mkdir(parents=True, exist_ok=True)
+        for old in (folder / PICTURES).glob("*.png"):
+            old.unlink()
     parts = [
         "## Figures",
         "Those that claims are about, measures corrected, and models beside runs ([laws.md](laws.md)). The second "
@@ -364,13 +303,14 @@ def figures(results: StudyVerdict, folder: Path) -> str:
     return "\n\n".join(parts)
 
 
-def _pictured(name: str, title: str, folder: Path, draw: Callable[[Path], None]) -> str:
+def _pictured(name: str, title: str, folder: Path | None, draw: Callable[[Path], None]) -> str:
     """Draw a picture, make its file small, and return what shows it."""
     path = PICTURES / f"{name}.png"
-    draw(folder / path)
-    with Image.open(folder / path) as picture:
-        fewer = picture.convert("RGB").quantize(COLOURS)
-    fewer.save(folder / path, optimize=True)
+    if folder is not None:
+        draw(folder / path)
+        with Image.open(folder / path) as picture:
+            fewer = picture.convert("RGB").quantize(COLOURS)
+        fewer.save(folder / path, optimize=True)
     return f"![{title}]({path.as_posix()})"
 
 
@@ -412,7 +352,7 @@ def left_out(results: StudyVerdict) -> str:
     return (
         f"## What is left out\n\n{fewer_values(results)}"
         + ("\n".join(lines) or "Nothing waits.")
-        + f"\n\n## To run it again\n\n```bash\n{commands}\nscripts/write_results results/studies/*_reduced\n```"
+        + f"\n\n## To run it again\n\n```bash\n{commands}\nscripts/write_results results/studies/*\n```"
     )
 
 
@@ -435,39 +375,54 @@ def fewer_values(results: StudyVerdict) -> str:
     return f"Fewer runs and values than in the paper:\n\n{rows(header, lines)}\n\n" if lines else ""
 
 
-def main(words: Sequence[str] | None = None) -> int:
-    """Write the page that the options ask for; returns the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("places", nargs="+", type=Path, metavar="DIR|FILE")
-    parser.add_argument("--out", type=Path, default=DOCS, metavar="FOLDER", help="default docs")
-    arguments = parser.parse_args(words)
-    try:
-        results = gathered(arguments.places)
-    except ValueError as error:  # no study, or one that no claim is about
-        print(f"write_results: {error}", file=sys.stderr)
-        return 2
+def page(results: StudyVerdict, folder: Path | None) -> str:
+    """Draw the pictures into a folder, if there is one, and return the page."""
     parts = [
         "# Results",
         what_is_there(results),
         INTRODUCTION,
         answers(results),
-        figures(results, arguments.out),
+        intuitions(results),
+        figures(results, folder),
         breakdowns(results),
         what_ran(results),
         left_out(results),
     ]
-    details = [
-        "# Results in detail",
-        f"The numbers behind [{PAGE}]({PAGE}).",
-        in_short(results),
-        what_hangs_on_what(results),
-        intuitions(results),
-        every_verdict(results),
-    ]
-    for name, texts in ((PAGE, parts), (DETAILS, details)):
-        (arguments.out / name).write_text("\n\n".join(texts) + "\n", encoding="utf-8")
-    n_pictures = len(list((arguments.out / PICTURES).glob("*.png")))
-    print(f"written {arguments.out / PAGE}, {DETAILS} beside it, {counted(n_pictures, 'picture')}")
+    return "\n\n".join(parts) + "\n"
+
+
+def differing(results: StudyVerdict, folder: Path) -> list[str]:
+    """Return which files in a folder are not those of the results; pictures are not looked at."""
+    with tempfile.TemporaryDirectory() as there:
+        write_numbers(results, Path(there))
+        tables = {f"{DATA}/{name}": Path(there, name).read_text(encoding="utf-8") for name in (MEASURES, VERDICTS)}
+    expected = {PAGE: page(results, None), **tables}
+    return [name for name, text in expected.items() if (folder / name).read_text(encoding="utf-8") != text]
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Write the page that the options ask for; returns the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("places", nargs="*", type=Path, metavar="DIR|FILE")
+    parser.add_argument("--check", action="store_true", help="write nothing; exit 1 if page or tables differ")
+    parser.add_argument("--out", type=Path, default=DOCS, metavar="FOLDER", help="default docs")
+    arguments = parser.parse_args(words)
+    out = arguments.out
+    try:
+        if arguments.places:
+            ship((read_study(place) for place in arguments.places), out / DATA)
+        results = judged(out / DATA)
+    except ValueError as error:  # no study, or one that no claim is about
+        print(f"write_results: {error}", file=sys.stderr)
+        return 2
+    if arguments.check:
+        others = differing(results, out)
+        print(f"not those of the runs in {out / DATA}: {', '.join(others)}" if others else "as the runs have it")
+        return int(bool(others))
+    (out / PAGE).write_text(page(results, out), encoding="utf-8")
+    write_numbers(results, out / DATA)
+    n_pictures = len(list((out / PICTURES).glob("*.png")))
+    print(f"written {out / PAGE}, {RUNS}, {MEASURES} and {VERDICTS} in {out / DATA}, {counted(n_pictures, 'picture')}")
     return 0
 
 

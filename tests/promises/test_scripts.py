@@ -4,10 +4,13 @@ import importlib
 import re
 import runpy
 import sys
+from dataclasses import replace
 from pathlib import Path
 
+import polars as pl
 import pytest
 
+from metrics import verdict
 from metrics.claims import CLAIMS, INTUITIONS
 from metrics.laws import ALL_LAWS
 from swarm_forage_env.runs.run import run_one
@@ -15,6 +18,7 @@ from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.runs.store import RunStore
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.studies.study_file import load_study, set_names
+from swarm_forage_env.studies.study_table import read_study
 from tests.support.foraging_table import foraging_table
 from tests.support.made_tables import made_table
 
@@ -90,17 +94,43 @@ def test_results_say_which_sets_and_conditions_they_are_of(run):
     assert f"{len(pictures)} pictures" in out
     assert pictures
     assert "swarm-forage study run S1c --budget smoke --seeds 2 --rules both" in page
-    details = Path("page/results_in_detail.md").read_text(encoding="utf-8")
-    headings = re.findall(r"^### (\w+)$", details, flags=re.MULTILINE)
-    assert headings == [*CLAIMS, *INTUITIONS]
-    assert re.findall(r"\(results_in_detail\.md#(\w+)\)", page) == [name.lower() for name in CLAIMS]
-    (of_p2,) = re.findall(r"### P2\n\n(.+?)\n\n###", details, flags=re.DOTALL)
-    forms = [line.split(" | ")[:2] for line in of_p2.splitlines() if line.startswith(("| described", "| program"))]
-    assert forms == [["| described", "corrected"], ["| described", "sierra"]], "it is of one set of rules"
-    assert "Waits for runs of S1b" in details
+    assert set(re.findall(r"^\| (\w+) \|", page, flags=re.MULTILINE)) >= {*CLAIMS, *INTUITIONS}
+    names = {name: read_study(f"page/results/{name}.parquet").digest[:8] for name in ("S1a", "S1c")}
+    verdicts = pl.read_csv("page/results/verdicts.csv", infer_schema=False)
+    of_p2 = verdicts.filter((pl.col("claim") == "P2") & pl.col("sense").is_null())
+    assert of_p2["measures"].to_list() == ["corrected", "sierra"], "it is of one set of rules"
+    assert of_p2["runs"].to_list() == [f"S1a {names['S1a']}"] * 2
+    measures = pl.read_csv("page/results/measures.csv")
+    assert set(measures["runs"]) == {f"{name} {digest}" for name, digest in names.items()}
+    assert "for S1b" in page, "what waits for runs"
     assert "| `S1a` | population_size 2, 8, 32, 128 | 2 of 192 | E1, E2, E3, C5, P2, X2, X3 |" in page
     assert "Judged [on fewer values than the paper's](#what-is-left-out): E1, E2, E3, C5, P2, R1" in page
     assert f"| `S1c` | {len(whole.places)} | 0 | 0 | - |" in page, "four intervals are too short for breakdowns"
+
+
+def test_the_results_page_comes_of_the_runs_beside_it(run):
+    """They lie there packed; without them the page is another one."""
+    pytest.importorskip("matplotlib", reason="needs the plots extra: matplotlib")
+    spec = load_study("S1c", "smoke")
+    given = made_table(spec, lambda cell: 10.0 + cell.values[0], adversity=lambda cell: cell.values[0])
+    replace(given, frame=given.frame.with_columns(throttle=0.1, n_carrying=1.0), wall_time_s=5400.0).write(
+        "S1c.parquet"
+    )
+    Path("page").mkdir()
+    assert run("write_results", "--out", "page", "S1c.parquet")[0] == 0
+    text = Path("page/results.md").read_text(encoding="utf-8")
+    kept = read_study("page/results/S1c.parquet")
+    assert set(kept.frame.columns) >= {"performance", "adversity", "throttle", "run_id"}
+    assert "n_carrying" not in kept.frame.columns, "no measure of this set reads it"
+    assert verdict(kept).csv() == verdict(read_study("S1c.parquet")).csv()
+    assert run("write_results", "--out", "page", "--check")[:2] == (0, "as the runs have it\n")
+    pictures = [path.name for path in Path("page").rglob("*.png")]
+    assert run("write_results", "--out", "page")[0] == 0, "once more, from what is there"
+    assert Path("page/results.md").read_text(encoding="utf-8") == text
+    assert [path.name for path in Path("page").rglob("*.png")] == pictures
+    Path("page/results.md").write_text(text.replace("supported", "contradicted", 1), encoding="utf-8")
+    code, out, _ = run("write_results", "--out", "page", "--check")
+    assert (code, out) == (1, "not those of the runs in page/results: results.md\n")
 
 
 @pytest.mark.compiled
