@@ -19,7 +19,7 @@ from swarm_forage_env.studies.study import RULES_NAMES
 TABLES = {"verdicts": CLAIMS, "intuitions": INTUITIONS}
 """Table of the page -> what it lists."""
 
-ANSWERED = r'<b>{}, corrected</b> <span class="answer [\w ]+">.*statistic'
+ANSWERED = r'<b>(?:[^<]*; )?{}, corrected(?:;[^<]*)?</b> <span class="answer [\w ]+">.*statistic'
 """What a row of such a table has for the rules."""
 
 
@@ -53,8 +53,8 @@ def missing_in(page: str, experiments: Sequence[str]) -> list[str]:
 
 
 def _rows(page: str, table: str) -> dict[str, str]:
-    """Return claim -> its part of a table."""
-    (text,) = re.findall(rf'<table[^>]* id="{table}">(.*?)</table>', page, re.DOTALL) or [""]
+    """Return claim -> its part of a table, or of that of the claims that wait."""
+    text = "".join(re.findall(rf'<table[^>]* id="{table}(?:-waiting)?">(.*?)</table>', page, re.DOTALL))
     return {name: part for part in text.split("<tbody>")[1:] for name in re.findall(r'class="name">(\w+)<', part)}
 
 

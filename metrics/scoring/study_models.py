@@ -28,8 +28,9 @@ from ..checks import CurveError
 from ..curves import FloatArray
 from ..foraging_model import ForagingRates, estimate_rates, mean_field
 from ..ladder import Ladder, fit_ladder
-from ..queues import PopulationComparison, compare_population
+from ..queues import compare_population
 from ..statistics import aggregate
+from .plots import FEWEST_RUNS
 from .run_curves import RunCurves, StudyLine, study_lines
 
 if TYPE_CHECKING:
@@ -98,6 +99,14 @@ class ModelFigure:
         """Name of its files."""
         return f"{self.study}_{self.kind}_{self.rules}"
 
+    @property
+    def caption(self) -> str:
+        """What is shaded and dashed."""
+        edges = [curve.lower for panel in self.panels for curve in panel.seen if curve.lower is not None]
+        is_shaded = any(np.isfinite(edge).any() for edge in edges)
+        few = f"no interval: fewer than {FEWEST_RUNS} runs tell too little"
+        return f"{'shaded: 95 % interval of the mean' if is_shaded else few}; dashed: models"
+
     def to_frame(self) -> "pl.DataFrame":
         """Return the numbers behind the picture, one row per point of a curve."""
         import polars as pl
@@ -123,13 +132,13 @@ class ModelFigure:
         return pl.DataFrame(rows, infer_schema_length=None).fill_nan(None)
 
     def draw(self, paths: Sequence[Path], style: FigureStyle = SCREEN) -> None:
-        """Draw what was seen, solid with its 95 % interval, and what models say, dashed.
+        """Draw what was seen, solid with its 95 % interval where there are `FEWEST_RUNS`, and what models say, dashed.
 
         Args:
             paths: Files to write; as in `saved_figure`, whose errors this has.
             style: Of the figure.
         """
-        title = f"{self.title}\nshaded: 95 % interval of the mean; dashed: models"
+        title = f"{self.title}\n{self.caption}"
         with saved_panels(paths, len(self.panels), (3.6, 3.0), title=title, style=style) as places:
             for place, panel in zip(places, self.panels, strict=True):
                 _draw_panel(place, panel, self)
@@ -218,13 +227,11 @@ def _law_panel(table: "StudyTable", line: StudyLine) -> ModelPanel | None:
     n = np.array(sizes, dtype=np.float64)
     at: FloatArray = np.exp2(np.linspace(math.log2(sizes[0]), math.log2(sizes[-1]), 8 * (len(sizes) - 1) + 1))
     means = [aggregate(total) for total in totals]
-    seen = Curve(
-        name="runs",
-        x=n,
-        y=np.array([mean.mean for mean in means]) / n,
-        lower=np.array([mean.lower for mean in means]) / n,
-        upper=np.array([mean.upper for mean in means]) / n,
+    lower, upper = (
+        np.array([getattr(mean, name) if mean.n_used >= FEWEST_RUNS else math.nan for mean in means]) / n
+        for name in ("lower", "upper")
     )
+    seen = Curve(name="runs", x=n, y=np.array([mean.mean for mean in means]) / n, lower=lower, upper=upper)
     laws = [Curve(name=name, x=at, y=ladder.laws[name].law.performance(at) / at) for name in DRAWN_LAWS]
     continued, knows = _mean_field(foraging_runs(table, line), sizes)
     return ModelPanel(
@@ -365,18 +372,15 @@ def _mean_field(runs: ForagingRuns | None, sizes: list[int]) -> tuple[tuple[Curv
 def _population_panels(lines: Sequence[StudyLine]) -> list[ModelPanel]:
     """Robots at work over time at each level of the population dynamics, beside the queue of its rates.
 
-    Policies with the same runs of the population, as they have with the same seeds, share a panel.
+    The rates alone decide who is at work, so a panel has the runs of all policies; those that are the same in several,
+    because seeds are, count once.
     """
-    panels: dict[tuple[Any, ...], tuple[list[str], StudyLine, RunCurves, PopulationComparison]] = {}
+    together: dict[tuple[Any, ...], list[tuple[StudyLine, RunCurves]]] = {}
     for line in lines:
         for runs in line.curves.experiments:
-            if runs.rates is None or not runs.seeds or "n_active" not in runs.curves:
-                continue
-            held = compare_population(runs.curves["n_active"], runs.rates, runs.n_robots, _ends(line))
-            key = (*line.others.values(), runs.value, held.observed.tobytes())
-            policies, *_ = panels.setdefault(key, ([], line, runs, held))
-            policies.append(line.policy)
-    return [_population_panel(*one) for one in panels.values()]
+            if runs.rates is not None and runs.seeds and "n_active" in runs.curves:
+                together.setdefault((*line.others.values(), runs.value), []).append((line, runs))
+    return [_population_panel(some) for some in together.values()]
 
 
 def _ends(line: StudyLine) -> FloatArray:
@@ -384,22 +388,30 @@ def _ends(line: StudyLine) -> FloatArray:
     return line.curves.t_end_s
 
 
-def _population_panel(
-    policies: Sequence[str], line: StudyLine, runs: RunCurves, held: PopulationComparison
-) -> ModelPanel:
-    ends = _ends(line)
+def _population_panel(together: Sequence[tuple[StudyLine, RunCurves]]) -> ModelPanel:
+    line, first = together[0]
+    rates, ends = first.rates, _ends(line)
+    assert rates is not None, "others are left out"
+    curves = {
+        (seed, curve.tobytes()): curve
+        for _, runs in together
+        for seed, curve in zip(runs.seeds, runs.curves["n_active"], strict=True)
+    }
+    at_work = np.array(list(curves.values()))
+    held = compare_population(at_work, rates, first.n_robots, ends)
     middle = ends - 0.5 * ends[0]
-    seen = Curve(name="runs", x=middle, y=held.observed, lower=held.lower, upper=held.upper)
+    edges = (held.lower, held.upper) if len(at_work) >= FEWEST_RUNS else (None, None)
+    seen = Curve(name="runs", x=middle, y=held.observed, lower=edges[0], upper=edges[1])
     facts = {
         "observed": float(held.observed.mean()),
         "predicted": float(held.predicted.mean()),
         "rms_error": held.rms_error,
         "share_inside": held.inside,
-        "n_runs": len(runs.seeds),
+        "n_runs": len(at_work),
     }
     return ModelPanel(
-        place={**line.others, "level": runs.value, "policy": ", ".join(policies)},
-        words=", ".join([*_axis_words(line), f"level {number(runs.value)}", *policies]),
+        place={**line.others, "level": first.value},
+        words=", ".join([*_axis_words(line), f"{number(1000.0 * rates.lam)} departures per 1,000 s"]),
         seen=(seen,),
         expected=(Curve(name="queue", x=middle, y=held.predicted),),
         facts=(facts,),

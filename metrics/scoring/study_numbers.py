@@ -116,6 +116,13 @@ class StudyPanel:
     """The same as shares of the performance that they are compared with."""
     floors: Mapping[str, FloatArray] = field(default_factory=dict[str, FloatArray])
     """For distances, policy -> distances between undisturbed runs, (R,)."""
+    departures: FloatArray | None = None
+    """Of a changing population, robots that die or fail per 1,000 s at each level, (L,)."""
+
+    @property
+    def drawn_at(self) -> FloatArray:
+        """Where the levels are in our figures, (L,): rates of a population in events, not in the paper's words."""
+        return self.levels if self.departures is None else self.departures
 
     @property
     def experiment(self) -> str | None:
@@ -264,6 +271,7 @@ def _panel(
     x = _levels_of(values)
     seeds = tuple(sorted(table.spec.seeds))
     far = np.array([distances.get(level, np.nan) for level in x])
+    leaving = {runs.value: 1000.0 * runs.rates.lam for runs in line.curves.experiments if runs.rates is not None}
     return StudyPanel(
         study=table.spec.name,
         rules=line.rules,
@@ -273,6 +281,7 @@ def _panel(
         levels=far if np.isfinite(far).all() and (np.diff(far) > 0.0).all() else np.array(x),
         seeds=seeds,
         scores=_arrays(values, seeds),
+        departures=np.array([leaving[level] for level in x]) if x and leaving.keys() >= {*x} else None,
         **told,
     )
 

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swarm_forage_env._internal.fields import known_name
 from swarm_forage_env._internal.wording import number
@@ -22,7 +21,6 @@ from swarm_forage_env.rendering.figures import (
     looks,
     policy_words,
     saved_panels,
-    shade,
     size_axis,
 )
 from swarm_forage_env.studies.study import StudySpec
@@ -45,14 +43,19 @@ if TYPE_CHECKING:
     from swarm_forage_env.studies.study_table import StudyTable
 
 Band: TypeAlias = Literal["ci", "sd"]
-"""What is shaded: the 95 % confidence interval of the mean, or the mean plus and minus two standard deviations."""
+"""What bars are: the 95 % confidence interval of the mean, or the mean plus and minus two standard deviations."""
 
 _BANDS: dict[Band, str] = {"ci": "95 % interval of the mean", "sd": "mean ± 2 standard deviations of runs"}
 _NOTHING = Summary.without_interval()
-_APART = 0.012
-"""Distance between the dots of different policies at one level, as a share of the axis."""
+_APART, _OF_GAP = 0.022, 0.17
+"""Distance between policies at one level: a share of the axis, at most this one of the least gap between levels."""
+_DOTS_ASIDE = 0.35
+"""Distance of dots from the bar of their policy, in the same unit as those of policies."""
 MANY_DOTS = 500
 """More dots in a panel are put into vector pictures as an image: as single marks they take a megabyte and more."""
+FENCE = 10.0
+"""Means so many interquartile ranges of all means beyond their quartiles are wild (our choice): they are marked at the
+edge of the picture, with their value, so that all others can be seen."""
 Draw: TypeAlias = Callable[[Sequence[Path], FigureStyle], None]
 
 
@@ -89,6 +92,14 @@ class StudyFigure:
             numbers and len(others) > 1 and all(panel.x.tolist() == self.panels[0].x.tolist() for panel in self.panels)
         )
 
+    @property
+    def has_log_height(self) -> bool:
+        """Whether it is of performance over swarm sizes: on a linear axis, all small swarms lie on the ground."""
+        first = self.panels[0]
+        return (first.measure, first.criterion) == ("raw_performance", SIZE) and all(
+            any((scores > 0.0).any() for scores in panel.scores.values()) for panel in self.panels
+        )
+
     def to_frame(self) -> "pl.DataFrame":
         """Return the numbers behind the picture: one row per panel, policy and level, and a column per run."""
         import polars as pl
@@ -121,28 +132,33 @@ def checked_band(word: str) -> Band:
 
 
 def draw_figure(figure: StudyFigure, paths: Sequence[Path], *, band: Band = "ci", style: FigureStyle = SCREEN) -> None:
-    """Draw a figure into picture files: lines are means, dots are runs, and bands are where there are `FEWEST_RUNS`.
+    """Draw a figure into picture files: lines are means, dots are runs, and bars are where there are `FEWEST_RUNS`.
+
+    Policies stand beside each other at each level. Performance over swarm sizes has two logarithmic axes.
 
     Args:
         figure: From `study_figures`.
         paths: Files to write; as in `saved_figure`, whose errors this has.
-        band: What is shaded.
+        band: What bars are.
         style: Of the figure.
     """
     title = f"{figure.title}\n{caption(figure, band)}"
     with saved_panels(paths, len(figure.panels), (3.6, 3.2), sharey=True, title=title, style=style) as places:
         for place, panel in zip(places, figure.panels, strict=True):
-            _draw_panel(place, panel, band)
+            _draw_panel(place, panel, band, is_log_high=figure.has_log_height)
         limit_height(places[0], figure)
+        for place, panel in zip(places, figure.panels, strict=True):
+            _mark_wild(place, panel)
 
 
 def caption(figure: StudyFigure, band: Band) -> str:
-    """Return what dots and bands are, and why some or all bands are missing."""
+    """Return what dots, bars and dotted lines are, and why some or all bars are missing."""
     n_runs = [s.n_used for panel in figure.panels for scores in panel.scores.values() for s in _summaries(scores)]
+    floor = "; dotted: two undisturbed runs" if any(panel.floors for panel in figure.panels) else ""
     if max(n_runs) < FEWEST_RUNS:
-        return f"lines: means; dots: runs\nno bands: fewer than {FEWEST_RUNS} runs of a condition tell too little"
-    lacking = f"\nno band: conditions with fewer than {FEWEST_RUNS} runs, which tell too little"
-    return f"shaded: {_BANDS[band]}; dots: runs" + (lacking if any(0 < n < FEWEST_RUNS for n in n_runs) else "")
+        return f"lines: means; dots: runs{floor}\nno bars: fewer than {FEWEST_RUNS} runs of a condition tell too little"
+    lacking = f"\nno bar: conditions with fewer than {FEWEST_RUNS} runs, which tell too little"
+    return f"bars: {_BANDS[band]}; dots: runs{floor}" + (lacking if any(0 < n < FEWEST_RUNS for n in n_runs) else "")
 
 
 def draw_map(figure: StudyFigure, paths: Sequence[Path], *, style: FigureStyle = SCREEN) -> None:
@@ -169,60 +185,109 @@ def draw_map(figure: StudyFigure, paths: Sequence[Path], *, style: FigureStyle =
         ]
         for policy, place in zip(means, places, strict=True):
             place.set_title(policy_words(policy))
-            place.set_xticks(range(len(first.x)), [number(value) for value in first.levels], rotation=45)
+            place.set_xticks(range(len(first.x)), [number(value) for value in first.drawn_at], rotation=45)
             place.set_xlabel(_x_label(first))
             place.set_yticks(range(len(figure.panels)), [panel.words[axis] for panel in figure.panels])
             place.set_ylabel(axis.replace("_", " "))
         places[0].figure.colorbar(images[0], ax=places, label=first.unit)
 
 
-def _draw_panel(place: Panel, panel: StudyPanel, band: Band) -> None:
-    is_log = panel.criterion == SIZE
-    levels = np.log2(panel.levels) if is_log else panel.levels
-    step = _APART * (float(np.ptp(levels)) or abs(float(levels[0])) or 1.0)
+def _draw_panel(place: Panel, panel: StudyPanel, band: Band, *, is_log_high: bool) -> None:
+    if panel.criterion == SIZE:
+        size_axis(place, panel.drawn_at)
+    if is_log_high:
+        place.set_yscale("log", nonpositive="mask")
+        place.yaxis.set_major_formatter("{x:,g}")
     are_many = sum(scores.size for scores in panel.scores.values()) > MANY_DOTS
-    for index, (look, scores) in enumerate(zip(looks(panel.scores), panel.scores.values(), strict=True)):
-        beside = levels + step * (index - 0.5 * (len(panel.scores) - 1))
-        dots = np.repeat(2.0**beside if is_log else beside, scores.shape[1])
-        (marks,) = place.plot(dots, scores.ravel(), ".", color=look.colour, alpha=0.35, zorder=2.5)
+    for (look, x, scores), (_, aside, _) in zip(_beside(panel), _beside(panel, aside=_DOTS_ASIDE), strict=True):
+        style = {"color": look.colour, "alpha": 0.4, "markersize": 3.0, "zorder": 2.5}
+        (marks,) = place.plot(np.repeat(aside, scores.shape[1]), scores.ravel(), ".", **style)
         marks.set_rasterized(are_many)
-        _draw_policy(place, panel, _summaries(scores), look, band)
+        _draw_policy(place, panel, x, _summaries(scores), look, band)
+    for look, floor in zip(looks(panel.floors), panel.floors.values(), strict=True):
+        place.axhline(_mean_of(floor), color=look.colour, linestyle=":", linewidth=1.0, zorder=1)
     neutral = METRICS[panel.measure].neutral
     if neutral is not None and panel.variant == "corrected":
         place.axhline(neutral, color="0.5", linewidth=0.8, zorder=0)
-    if is_log:
-        size_axis(place, panel.levels)
     if panel.others:
         words = ", ".join(f"{name.replace('_', ' ')} {word}" for name, word in panel.words.items())
         place.set_title(words)
     place.set_xlabel(_x_label(panel))
-    place.set_ylabel(panel.unit)
+    place.set_ylabel(f"{METRICS[panel.measure].symbol}, {panel.unit}")
 
 
-def _draw_policy(place: Panel, panel: StudyPanel, summaries: Sequence[Summary], look: Look, band: Band) -> None:
-    """Draw the means of a policy with their bands."""
+def _beside(panel: StudyPanel, aside: float = 0.0) -> Iterator[tuple[Look, FloatArray, FloatArray]]:
+    """Yield the look of each policy, where it stands at each level, or so many steps aside of it, and its scores."""
+    is_log = panel.criterion == SIZE
+    levels = np.log2(panel.drawn_at) if is_log else panel.drawn_at
+    whole = float(np.ptp(levels)) or abs(float(levels[0])) or 1.0
+    step = min(_APART * whole, _OF_GAP * float(np.diff(levels).min(initial=whole)))
+    for index, (look, scores) in enumerate(zip(looks(panel.scores), panel.scores.values(), strict=True)):
+        beside = levels + step * (index + aside - 0.5 * (len(panel.scores) - 1))
+        yield look, np.exp2(beside) if is_log else beside, scores
+
+
+def _draw_policy(
+    place: Panel, panel: StudyPanel, x: FloatArray, summaries: Sequence[Summary], look: Look, band: Band
+) -> None:
+    """Draw the means of a policy with their bars."""
     mean = np.array([summary.mean for summary in summaries])
     lower, upper = _band(panel, summaries, band)
-    place.plot(panel.levels, mean, color=look.colour, marker=look.marker, label=look.name, zorder=3)
-    shade(place, panel.levels, lower, upper, look.colour)
-    equal = np.where(lower == upper, mean, np.nan)  # all runs are equal: a band without height would not be seen
-    place.plot(panel.levels, equal, color=look.colour, linewidth=5.0, alpha=0.2, zorder=2)
-    alone = _alone(np.isfinite(lower))  # a band without neighbours has no width
-    place.vlines(panel.levels[alone], lower[alone], upper[alone], color=look.colour, linewidth=3.0, alpha=0.4, zorder=2)
+    reach = np.array([mean - lower, upper - mean]).clip(min=0.0)
+    place.errorbar(x, mean, yerr=reach, color=look.colour, marker=look.marker, label=look.name, zorder=3)
+
+
+def _mark_wild(place: Panel, panel: StudyPanel) -> None:
+    """Mark means, with their value, and runs that lie beyond the picture at its edge."""
+    bottom, top = place.get_ylim()
+    for look, x, scores in _beside(panel):
+        for at, runs, mean in zip(x, scores, (summary.mean for summary in _summaries(scores)), strict=True):
+            for edge, is_beyond, marker, align in (
+                (bottom, np.less, "v", "bottom"),
+                (top, np.greater, "^", "top"),
+            ):
+                style = {"color": look.colour, "linestyle": "", "marker": marker, "clip_on": False, "zorder": 4}
+                if is_beyond(mean, edge):
+                    place.plot(at, edge, markersize=6.0, **style)
+                    told = {"color": look.colour, "fontsize": "x-small", "ha": "left", "va": align}
+                    place.annotate(number(mean), (at, edge), (5, 0), textcoords="offset points", **told)
+                elif is_beyond(runs, edge).any():
+                    place.plot(at, edge, markersize=3.0, alpha=0.5, **style)
 
 
 def limit_height(place: Panel, figure: StudyFigure) -> None:
-    """Let bands reach beyond the runs by half of their range at most: the interval of two runs is of any size."""
-    known = np.concatenate([scores[np.isfinite(scores)] for panel in figure.panels for scores in panel.scores.values()])
-    low, high = float(known.min()), float(known.max())
-    reach = 0.5 * (high - low) or abs(high) or 1.0
+    """Leave wild means out, and let bars reach beyond the runs by half of their range at most."""
+    is_log = figure.has_log_height
+    scores = [scores for panel in figure.panels for scores in panel.scores.values()]
+    means = np.array([summary.mean for of_policy in scores for summary in _summaries(of_policy)])
+    floors = [_mean_of(floor) for panel in figure.panels for floor in panel.floors.values()]
+    known = np.concatenate([*(of_policy.ravel() for of_policy in scores), means, floors])
+    means, known = (values[np.isfinite(values) & ((values > 0.0) | (not is_log))] for values in (means, known))
+    if not means.size:
+        return
+    if is_log:
+        means, known = np.log10(means), np.log10(known)
+    quartiles = np.percentile(means, (25.0, 75.0))
+    fence = FENCE * float(max(np.ptp(quartiles), np.ptp(np.percentile(known, (25.0, 75.0))))) or math.inf
+    tame = known[(known >= quartiles[0] - fence) & (known <= quartiles[1] + fence)]
+    low, high = float(tame.min()), float(tame.max())
+    reach = (0.1 if is_log else 0.5) * (high - low) or abs(high) or 1.0
+    limits = np.array([low - reach, high + reach])
     bottom, top = place.get_ylim()
-    place.set_ylim(max(bottom, low - reach), min(top, high + reach))
+    lowest, highest = 10.0**limits if is_log else limits
+    place.set_ylim(max(bottom, float(lowest)), min(top, float(highest)))
+
+
+def _mean_of(values: FloatArray) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if known.size else math.nan
 
 
 def _x_label(panel: StudyPanel) -> str:
     if panel.criterion == SIZE:
-        return "robots"
+        return "robots N"
+    if panel.departures is not None:
+        return "departures per 1,000 s"
     if panel.x.tolist() != panel.levels.tolist():
         return "distance from ideal conditions"
     return X_LABELS.get(panel.criterion, panel.criterion.replace("_", " "))
@@ -243,12 +308,6 @@ def _edges(summary: Summary, band: Band) -> tuple[float, float]:
     if band == "ci":
         return summary.lower, summary.upper
     return summary.mean - 2.0 * summary.std, summary.mean + 2.0 * summary.std
-
-
-def _alone(known: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which levels have a band while their neighbours have none."""
-    beside = np.concatenate([[False], known, [False]])
-    return known & ~beside[:-2] & ~beside[2:]
 
 
 def _summaries(scores: FloatArray) -> list[Summary]:

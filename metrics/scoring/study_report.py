@@ -17,7 +17,7 @@ from swarm_forage_env._internal.wording import counted, install_command, number,
 from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.mixture import is_mixture, mixture_parts
 from swarm_forage_env.policies.registry import file_of, is_policy_file
-from swarm_forage_env.rendering.figures import SCREEN
+from swarm_forage_env.rendering.figures import FigureStyle
 from swarm_forage_env.rendering.pages import build_report, picture_address, shown
 from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.store import DONE
@@ -27,10 +27,9 @@ from swarm_forage_env.studies.study import StudySpec
 from swarm_forage_env.studies.study_file import is_set_of_paper
 
 from ..claims import CLAIMS, INTUITIONS, Claim, Verdict
-from ..claims.checking import RELATIVE
 from .study_models import ModelFigure, model_figures
 from .study_numbers import StudyPanels, place_distributions, policy_pairs
-from .study_plots import Band, Draw, StudyFigure, checked_band, drawn_by, snapshot_written, study_figures
+from .study_plots import Band, Draw, StudyFigure, caption, checked_band, drawn_by, snapshot_written, study_figures
 from .study_verdict import (
     ANSWERS,
     WAITS,
@@ -55,6 +54,8 @@ FORMS = {
     "sierra": "The same, measured as in the authors' program",
 }
 """Variant of a measure -> the words above its picture."""
+UNTITLED = FigureStyle(title=False)
+"""Of the pictures in the page, which has their titles and captions as text."""
 NO_REPORT = f"No report without matplotlib and Jinja2: {install_command('plots')}."
 COST_HEADER = (
     "study",
@@ -225,19 +226,26 @@ def _claim_rows(
             where = ("text alone" if claim.vague else "formula") if of_formula else ", ".join(column)
             verdict, later = found.get((name, *column)), waits.get((name, *column))
             if verdict is not None:
-                relative = relative_answer(verdict)
-                answers = {"answer": verdict.answer, "by_bands": verdict.by_bands, "relative": relative}
+                answers = {"answer": verdict.answer, "by_bands": verdict.by_bands, "relative": relative_answer(verdict)}
                 cells.append({**answers, "why": "", "span": span})
-                behind.append({"where": where, **_numbers_of(verdict)})
-                if relative:
-                    behind.append({"where": f"{where}; {RELATIVE}", **_numbers_of(verdict.otherwise[RELATIVE])})
+                for sense, found_so in {"": verdict, **verdict.otherwise}.items():
+                    behind.append({"where": f"{where}: {sense}" if sense else where, **_numbers_of(found_so)})
             else:
                 why = "no such form" if later is None else WAITS
                 cells.append({"answer": "", "by_bands": "", "relative": "", "why": why, "span": span})
                 if later is not None:
                     behind.append({"where": where, "answer": "", "words": f"waits for {lacking(later)}"})
-        rows.append({"name": name, "text": claim.text, "where": claim.figure, "cells": cells, "behind": behind})
-    return rows
+        row = {"name": name, "text": claim.text, "where": claim.figure, "cells": cells, "behind": _each_once(behind)}
+        rows.append({**row, "waits": not any(cell["answer"] for cell in cells)})
+    return sorted(rows, key=lambda row: row["waits"])  # those that wait for runs of other sets come last
+
+
+def _each_once(found: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return what stands behind answers, each reason once with all the places where it holds."""
+    places: dict[tuple[str, str], list[str]] = {}
+    for one in found:
+        places.setdefault((one["answer"], one["words"]), []).append(one["where"])
+    return [{"answer": answer, "words": words, "where": "; ".join(of)} for (answer, words), of in places.items()]
 
 
 def _numbers_of(verdict: Verdict) -> dict[str, str]:
@@ -300,10 +308,9 @@ def _figure(
     """Return a figure, and below it those of the measure's other forms, if claims are judged by them."""
 
     def drawn(one: StudyFigure) -> list[dict[str, str]]:
+        told = (("curves", caption(one, band)), ("heat maps", "means of runs"))
         draws = drawn_by(one, band).values()
-        return [
-            _picture(f"{one.title}, {kind}", draw) for kind, draw in zip(("curves", "heat maps"), draws, strict=False)
-        ]
+        return [_picture(f"{one.title}, {kind}", draw, words) for (kind, words), draw in zip(told, draws, strict=False)]
 
     frame = figure.to_frame()
     claims = _claims_about(figure, (*found.judged, *found.waiting))
@@ -321,7 +328,7 @@ def _model(figure: ModelFigure) -> dict[str, Any]:
 
     return {
         "title": figure.title,
-        "pictures": [_picture(f"{figure.title}, runs and models", figure.draw)],
+        "pictures": [_picture(f"{figure.title}, runs and models", figure.draw, figure.caption)],
         "facts": _numbers(figure.facts()),
     }
 
@@ -338,7 +345,7 @@ def _theory(tables: "Sequence[StudyTable]", judged: Sequence[Judged]) -> list[di
                 {
                     "name": one.claim.name,
                     "text": one.claim.text,
-                    "found": [{"where": "formula", **_numbers_of(one.verdict)}],
+                    "found": [{"where": "formula", "answer": one.verdict.answer, "words": ""}],
                 }
                 for one in formulas
                 if figure.kind == "availability"
@@ -366,12 +373,12 @@ def _snapshot(table: "StudyTable") -> dict[str, str]:
         return {"address": picture_address(file.read_bytes(), "image/png"), "words": words}
 
 
-def _picture(words: str, draw: Draw) -> dict[str, str]:
-    """Return a picture as the page holds it; only SVG is drawn."""
+def _picture(words: str, draw: Draw, told: str = "") -> dict[str, str]:
+    """Return a picture as the page holds it, without the title that stands above it; only SVG is drawn."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "picture.svg")
-        draw([file], SCREEN)
-        return {"address": picture_address(file.read_bytes()), "words": words}
+        draw([file], UNTITLED)
+        return {"address": picture_address(file.read_bytes()), "words": words, "caption": told}
 
 
 def _claims_about(figure: StudyFigure, judged: Sequence[Judged | Waiting]) -> list[dict[str, Any]]:
@@ -384,13 +391,14 @@ def _claims_about(figure: StudyFigure, judged: Sequence[Judged | Waiting]) -> li
             continue
         entry = found.setdefault(one.claim.name, {"name": one.claim.name, "text": one.claim.text, "found": []})
         if isinstance(one, Waiting):
-            entry["found"].append({"answer": "", "words": f"waits for {lacking(one)}", "where": one.variant})
+            entry["found"].append({"answer": "", "words": WAITS, "where": one.variant})
             continue
-        entry["found"].append({**_numbers_of(one.verdict), "where": one.variant})
+        entry["found"].append({"answer": one.verdict.answer, "words": "", "where": one.variant})
         entry["found"] += [
-            {**_numbers_of(other), "where": f"{one.variant}; {sense}"} for sense, other in one.verdict.otherwise.items()
+            {"answer": other.answer, "words": "", "where": f"{one.variant}: {sense}"}
+            for sense, other in one.verdict.otherwise.items()
         ]
-    return list(found.values())
+    return [{**entry, "found": _each_once(entry["found"])} for entry in found.values()]
 
 
 def _cost(table: "StudyTable") -> list[str | int | float]:

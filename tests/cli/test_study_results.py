@@ -101,7 +101,7 @@ def test_figures_for_a_paper_have_its_width_and_no_headline(ran):
     for file in Path("paper").glob("*.svg"):
         assert 'width="252pt"' in file.read_text(), "72 points per inch"
     words = words_in(Path("paper/S1a_raw_performance_described.svg"))
-    assert {"CRW", "robots"} <= {*words}
+    assert {"CRW", "robots N"} <= {*words}
     assert not any("higher is better" in line for line in words)
 
 

@@ -7,7 +7,7 @@ from swarm_forage_env.rendering.pages import build_report, picture_address
 
 FIGURE = {
     "title": "a < b",
-    "pictures": [{"address": picture_address(b"<svg/>"), "words": "curves"}],
+    "pictures": [{"address": picture_address(b"<svg/>"), "words": "curves", "caption": "bars"}],
     "claims": [],
     "others": [],
     "numbers": {"header": ["policy", "mean"], "rows": [("crw", 0.12345678), ("dpo", None)]},

@@ -43,7 +43,7 @@ def test_facts_of_laws_have_intervals(laws):
 def test_models_are_drawn(laws, tmp_path):
     files = [tmp_path / "laws.svg", tmp_path / "laws.png"]
     laws.draw(files)
-    words = {"hamann", "mean field", "robots", "shaded: 95 % interval of the mean; dashed: models"}
+    words = {"hamann", "mean field", "robots", "no interval: fewer than 4 runs tell too little; dashed: models"}
     assert words <= {*words_in(files[0])}
 
 
@@ -67,7 +67,8 @@ def test_robots_at_work_stand_beside_the_queue():
     )
     (figure,) = model_figures(made_table(spec, lambda place: 5.0))
     assert figure.name == "S1g_population_described"
-    assert [panel.words for panel in figure.panels] == ["level 1, crw, dpo", "level 2, crw, dpo"], "they share a panel"
+    assert [panel.words for panel in figure.panels] == ["5 departures per 1,000 s", "10 departures per 1,000 s"]
+    assert figure.facts()["n_runs"].to_list() == [2, 2], "those of the same seed are the same runs"
     place = next(place for place in spec.places if place.values == (1.0,))
     world, rates = spec.world(place).scenario, spec.world(place).population
     per_s = PopulationRates(lambda_bd=rates.malfunction_per_tick / world.dt_s, mu_bd=rates.repair_per_tick / world.dt_s)

@@ -58,8 +58,8 @@ def test_a_figure_is_drawn(tmp_path, band):
     assert files[1].read_bytes().startswith(PNG)
     drawn = words_in(files[0])
     title = "S1a: raw performance (higher is better), rules described"
-    assert {"CRW", "DPO", "STOCHM", "STOCHX", "robots", "objects in 40 s", title} <= {*drawn}
-    assert ("shaded: 95 % interval of the mean; dots: runs" in drawn) == (band == "ci")
+    assert {"CRW", "DPO", "STOCHM", "STOCHX", "robots N", "P(N), objects in 40 s", title} <= {*drawn}
+    assert ("bars: 95 % interval of the mean; dots: runs" in drawn) == (band == "ci")
     again = tmp_path / "again.svg"
     draw_figure(figure, [again], band=band)
     assert again.read_bytes() == files[0].read_bytes()
@@ -87,62 +87,95 @@ def few_figures(n_seeds, *, performance=by_policy, lost=(), levels=SIZES):
     return next(one for one in drawn if one.panels[0].measure == "raw_performance")
 
 
-def bands_of(monkeypatch, figure, tmp_path):
-    """The corners of each band that is drawn, the lines of each isolated one, and the widths of lines."""
+def bars_of(monkeypatch, figure, tmp_path):
+    """Where the policies stand, and how far their bars reach down and up, (policies, 2, levels)."""
     from matplotlib.axes import Axes
 
-    drawn = {"fill_between": [], "vlines": []}
-    for name, kept in drawn.items():
-        monkeypatch.setattr(Axes, name, lambda _, x, low, high, kept=kept, **__: kept.append((low, high)))
+    drawn = []
+    monkeypatch.setattr(Axes, "errorbar", lambda _, x, mean, yerr, **__: drawn.append((x, mean, yerr)))
     draw_figure(figure, [tmp_path / "figure.svg"])
     monkeypatch.undo()
-    return drawn["fill_between"], drawn["vlines"]
+    return [np.array(part) for part in zip(*drawn, strict=True)]
+
+
+def with_scores(figure, scores):
+    """The same figure with these scores (L, R) of every policy, or of each by name."""
+    panel = figure.panels[0]
+    given = scores if isinstance(scores, dict) else dict.fromkeys(panel.scores, np.asarray(scores))
+    return replace(figure, panels=(replace(panel, scores=given),))
 
 
 def test_fewer_than_four_runs_are_dots_and_a_mean_and_the_caption_says_why(tmp_path, monkeypatch):
     figure = few_figures(3)
-    bands, alone = bands_of(monkeypatch, figure, tmp_path)
-    assert all(np.isnan(edge).all() for band in bands for edge in band)
-    assert all(low.size == 0 for low, _ in alone)
+    assert np.isnan(bars_of(monkeypatch, figure, tmp_path)[2]).all()
     assert (
-        caption(figure, "ci") == "lines: means; dots: runs\nno bands: fewer than 4 runs of a condition tell too little"
+        caption(figure, "ci") == "lines: means; dots: runs\nno bars: fewer than 4 runs of a condition tell too little"
     )
-    bands, _ = bands_of(monkeypatch, few_figures(4), tmp_path)
-    assert all(np.isfinite(edge).all() for band in bands for edge in band)
-    assert caption(few_figures(4), "ci") == "shaded: 95 % interval of the mean; dots: runs"
-
-
-def test_a_band_with_no_neighbours_is_a_line(tmp_path, monkeypatch):
+    assert np.isfinite(bars_of(monkeypatch, few_figures(4), tmp_path)[2]).all()
+    assert caption(few_figures(4), "ci") == "bars: 95 % interval of the mean; dots: runs"
     places = made_study("S1a", SIZES, seeds=(0, 1, 2, 3)).places
     figure = few_figures(4, lost={(place, 3) for place in places if place.values[-1] != 4})
-    bands, alone = bands_of(monkeypatch, figure, tmp_path)
-    assert [np.isfinite(low).tolist() for low, _ in bands] == [[False, True, False]] * len(FOUR)
-    assert [low.size for low, _ in alone] == [1] * len(FOUR)
-    assert caption(figure, "ci").endswith("no band: conditions with fewer than 4 runs, which tell too little")
+    assert np.isfinite(bars_of(monkeypatch, figure, tmp_path)[2]).tolist() == [[[False, True, False]] * 2] * len(FOUR)
+    assert caption(figure, "ci").endswith("no bar: conditions with fewer than 4 runs, which tell too little")
 
 
-def test_bands_stay_within_the_range_of_the_measure(tmp_path, monkeypatch):
+def test_bars_stay_within_the_range_of_the_measure(tmp_path, monkeypatch):
     """Objects are counted: fewer than none cannot be, however far runs lie apart."""
-    figure = few_figures(4)
-    panel = figure.panels[0]
-    scores = {name: np.tile([0.0, 0.0, 0.0, 100.0], (3, 1)) for name in panel.scores}
-    bands, _ = bands_of(monkeypatch, replace(figure, panels=(replace(panel, scores=scores),)), tmp_path)
-    assert [low.tolist() for low, _ in bands] == [[0.0, 0.0, 0.0]] * len(FOUR)
+    figure = with_scores(few_figures(4), np.tile([0.0, 0.0, 0.0, 100.0], (3, 1)))
+    _, mean, reach = bars_of(monkeypatch, figure, tmp_path)
+    assert (mean - reach[:, 0]).tolist() == [[0.0, 0.0, 0.0]] * len(FOUR)
 
 
-@pytest.mark.filterwarnings("error")
-def test_equal_runs_have_a_band_that_is_seen(tmp_path):
-    figure = few_figures(4)
-    panel = figure.panels[0]
-    widths = []
-    for spread in (0.0, 1.0):
-        scores = {name: np.tile(7.0 + spread * np.arange(4), (3, 1)) for name in panel.scores}
-        file = tmp_path / f"{spread}.svg"
-        draw_figure(replace(figure, panels=(replace(panel, scores=scores),)), [file])
-        widths.append(
-            len(re.findall(r"<path d=\"M [^z]*?\" [^>]*stroke-opacity: 0.2[^>]*stroke-width: 5", file.read_text()))
-        )
-    assert widths == [len(FOUR), 0]
+def test_policies_stand_beside_each_other_and_closer_than_levels(tmp_path, monkeypatch):
+    close = Axis(name="noise", values=(0.0, 0.001, 0.002, 0.1))
+    x, *_ = bars_of(monkeypatch, figures(close, name="S1e", reference=0.0)[0], tmp_path)
+    assert (np.diff(x, axis=0) > 0.0).all(), "no bar covers another"
+    assert (x[-1, :-1] < x[0, 1:]).all(), "nor stands at the next level"
+
+
+def test_a_wild_mean_is_marked_at_the_edge_with_its_value(tmp_path):
+    """It would flatten all others."""
+    figure = next(one for one in figures() if one.panels[0].measure == "scalability")
+    calm = {name: 1.0 + 0.1 * place + np.zeros((2, 6)) for place, name in enumerate(FOUR)}
+    draw_figure(with_scores(figure, calm), [tmp_path / "calm.svg"])
+    wild = calm | {"stochx": np.array([np.full(6, -23.4), np.full(6, 1.0)])}
+    draw_figure(with_scores(figure, wild), [tmp_path / "wild.svg"])
+    assert "-23.4" in words_in(tmp_path / "wild.svg")
+    minus = "\N{MINUS SIGN}"
+    assert not any(word.startswith(f"{minus}2") for word in words_in(tmp_path / "wild.svg")), "no axis reaches there"
+
+
+def test_performance_over_sizes_has_two_logarithmic_axes(tmp_path):
+    from matplotlib.figure import Figure
+
+    figure = next(one for one in figures() if one.panels[0].measure == "raw_performance")
+    grown = np.array([[1.0] * 6, [100.0] * 6, [10_000.0] * 6])
+    draw_figure(with_scores(figure, grown), [tmp_path / "grown.svg"])
+    assert {"1", "100", "10,000"} <= {*words_in(tmp_path / "grown.svg")}
+    place = Figure().subplots()
+    place.set_yscale("log")
+    place.plot([1, 2, 4], grown)
+    limit_height(place, with_scores(figure, grown))
+    assert 0.1 < place.get_ylim()[0] < 1.0, "all sizes are seen"
+    draw_figure(with_scores(figure, 0.0 * grown), [tmp_path / "nothing.svg"])
+
+
+def test_distances_have_their_noise_floor(tmp_path):
+    spec = made_study("S1e", Axis(name="noise", values=(0.0, 0.01, 0.02)), reference=0.0)
+    (figure,) = study_figures(study_panels(made_table(spec, lambda place: 10.0 + place.values[0])))
+    assert caption(figure, "ci").endswith("; dotted: two undisturbed runs")
+    draw_figure(figure, [tmp_path / "floors.svg"])
+    assert len(re.findall(r"stroke-dasharray: 1,1\.65", (tmp_path / "floors.svg").read_text())) == len(FOUR)
+
+
+def test_rates_of_a_population_are_shown_as_events(tmp_path):
+    spec = made_study("S1g", Axis(name="population_dynamics", values=(0.0, 1.0, 2.0)), reference=0.0)
+    drawn = study_figures(study_panels(made_table(spec, lambda place: 10.0)))
+    figure = next(one for one in drawn if one.panels[0].measure == "population_robustness")
+    assert figure.panels[0].levels.tolist() == [1.0, 2.0], "of which claims speak"
+    assert figure.panels[0].drawn_at.tolist() == pytest.approx([5.0, 10.0])
+    draw_figure(figure, [tmp_path / "rates.svg"])
+    assert "departures per 1,000 s" in words_in(tmp_path / "rates.svg")
 
 
 def test_two_axes_give_a_panel_per_value_and_a_map(tmp_path):
@@ -181,7 +214,7 @@ def test_words_on_the_last_axis_and_studies_without_runs_have_no_figure():
 def test_the_interval_of_two_runs_does_not_flatten_the_picture():
     from matplotlib.figure import Figure
 
-    (figure,) = (one for one in figures(seeds=(0, 1)) if one.panels[0].measure == "raw_performance")
+    (figure,) = (one for one in figures(seeds=(0, 1)) if one.panels[0].measure == "task_emergence")
     place = Figure().subplots()
     place.set_ylim(-1e6, 1e6)
     limit_height(place, figure)
