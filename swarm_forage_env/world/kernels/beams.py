@@ -1,10 +1,12 @@
 """Proximity readings: a ring of beams against the discs of other robots, the four walls and boxes on the floor."""
 
 import math
+from collections.abc import Callable
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.compiling import inline_kernel, kernel
 from swarm_forage_env._internal.prefetching import AHEAD, LARGE, prefetch
 from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
 from swarm_forage_env.contract.layout import RING_SENSORS
@@ -21,6 +23,9 @@ _READING_OFFSET_M = 0.000163144
 _HALF_RING = ((0, 0), (1, 0), (1, 1), (0, 1), (-1, 1))
 """Steps to a cell itself and to half of its eight neighbours; the other half meets it from its own side."""
 
+Sides: TypeAlias = tuple[float, float, float, float]
+"""Lines along x, y, x and y, as distances in m from the centre of a robot."""
+
 
 @kernel
 def proximity_reading(gap_m: float) -> float:
@@ -31,8 +36,9 @@ def proximity_reading(gap_m: float) -> float:
 
 
 @kernel
-def _beam_to_disc(dx: float, dy: float, cos: float, sin: float, radius: float) -> float:
-    """Distance from a disc's centre along (cos, sin) to a disc of equal radius at (dx, dy), minus the radius."""
+def _beam_to_disc(centre: tuple[float, float], cos: float, sin: float, radius: float) -> float:
+    """Free distance of a disc along (cos, sin) to a disc of equal radius, whose centre is so far away along x and y."""
+    dx, dy = centre
     along = dx * cos + dy * sin
     if along <= 0.0:
         return math.inf
@@ -54,15 +60,24 @@ def _beam_to_wall(to_low: float, to_high: float, direction: float, radius: float
 
 
 @kernel
-def _beam_to_box(x: float, y: float, cos: float, sin: float, obstacles: FloatArray, b: int, radius: float) -> float:
-    """Free distance from a disc at (x, y) along (cos, sin) to box b: the beam is in the box while it is in both slabs.
+def _beam_to_walls(gaps: Sides, cos: float, sin: float, radius: float) -> float:
+    """Free distance of a disc along (cos, sin); `gaps` = distance of its centre to west, south, east, north wall."""
+    west, south, east, north = gaps
+    return min(_beam_to_wall(west, east, cos, radius), _beam_to_wall(south, north, sin, radius))
 
-    The small number stands for 0 in a direction, so that nothing is divided by 0.
+
+@kernel
+def _beam_to_box(sides: Sides, cos: float, sin: float, radius: float) -> float:
+    """Free distance of a disc along (cos, sin) to a box: the beam is in the box while it is in both slabs.
+
+    `sides` = west, south, east, north of the box, seen from the centre. The small number stands for 0 in a direction,
+    so that nothing is divided by 0.
     """
+    west, south, east, north = sides
     cos = cos if abs(cos) > 1e-12 else 1e-12
     sin = sin if abs(sin) > 1e-12 else 1e-12
-    to_west, to_east = (obstacles[b, 0] - x) / cos, (obstacles[b, 2] - x) / cos
-    to_south, to_north = (obstacles[b, 1] - y) / sin, (obstacles[b, 3] - y) / sin
+    to_west, to_east = west / cos, east / cos
+    to_south, to_north = south / sin, north / sin
     enters = max(min(to_west, to_east), min(to_south, to_north))
     leaves = min(max(to_west, to_east), max(to_south, to_north))
     if leaves < max(0.0, enters):
@@ -70,53 +85,23 @@ def _beam_to_box(x: float, y: float, cos: float, sin: float, obstacles: FloatArr
     return enters - radius
 
 
-@kernel
-def _see_walls(
-    gaps: tuple[float, float, float, float], facing: FloatArray, i: int, radius: float, reach: float, row: Row
-) -> None:
-    """Write robot i's readings of the walls into `row`; `gaps` = distance of its centre to west, east, south, north."""
-    west, east, south, north = gaps
-    cos_h = facing[i, 0]
-    sin_h = facing[i, 1]
-    for k in range(RING_SENSORS):
-        cos = cos_h * _BEAM_COS[k] - sin_h * _BEAM_SIN[k]
-        sin = sin_h * _BEAM_COS[k] + cos_h * _BEAM_SIN[k]
-        gap = min(_beam_to_wall(west, east, cos, radius), _beam_to_wall(south, north, sin, radius))
-        if gap <= reach:
-            row[k] = proximity_reading(gap)
-
-
-@kernel
-def _see_box(
-    place: tuple[float, float],
-    obstacles: FloatArray,
-    b: int,
+@inline_kernel
+def _see(
+    free_m: Callable[[Any, float, float, float], float],
+    place: Any,
     facing: FloatArray,
     i: int,
     radius: float,
     reach: float,
     row: Row,
 ) -> None:
-    """Raise robot i's readings in `row` to those of box b; `place` = x, y of the robot."""
+    """Raise robot i's readings in `row` to those of a thing; `free_m` tells how far a beam to its `place` is free."""
     cos_h = facing[i, 0]
     sin_h = facing[i, 1]
     for k in range(RING_SENSORS):
         cos = cos_h * _BEAM_COS[k] - sin_h * _BEAM_SIN[k]
         sin = sin_h * _BEAM_COS[k] + cos_h * _BEAM_SIN[k]
-        gap = _beam_to_box(place[0], place[1], cos, sin, obstacles, b, radius)
-        if gap <= reach:
-            row[k] = max(row[k], proximity_reading(gap))
-
-
-@kernel
-def _see_robot(dx: float, dy: float, facing: FloatArray, i: int, radius: float, reach: float, row: Row) -> None:
-    """Raise robot i's readings in `row` to those of a robot whose centre is dx, dy away."""
-    cos_h = facing[i, 0]
-    sin_h = facing[i, 1]
-    for k in range(RING_SENSORS):
-        cos = cos_h * _BEAM_COS[k] - sin_h * _BEAM_SIN[k]
-        sin = sin_h * _BEAM_COS[k] + cos_h * _BEAM_SIN[k]
-        gap = _beam_to_disc(dx, dy, cos, sin, radius)
+        gap = free_m(place, cos, sin, radius)
         if gap <= reach:
             row[k] = max(row[k], proximity_reading(gap))
 
@@ -145,14 +130,15 @@ def _see_what_stands(
         if present[i]:
             x = position[i, 0]
             y = position[i, 1]
-            gaps = (x - interior[0], interior[2] - x, y - interior[1], interior[3] - y)
+            gaps = (x - interior[0], y - interior[1], interior[2] - x, interior[3] - y)
             if min(gaps[0], gaps[1], gaps[2], gaps[3]) < wall_sight:
                 near[i] = True
-                _see_walls(gaps, facing, i, radius, reach, row)
+                _see(_beam_to_walls, gaps, facing, i, radius, reach, row)
             for b in range(obstacles.shape[0]):
                 if is_within(x, y, obstacles, b, wall_sight):
                     near[i] = True
-                    _see_box((x, y), obstacles, b, facing, i, radius, reach, row)
+                    sides = (obstacles[b, 0] - x, obstacles[b, 1] - y, obstacles[b, 2] - x, obstacles[b, 3] - y)
+                    _see(_beam_to_box, sides, facing, i, radius, reach, row)
 
 
 @kernel
@@ -213,6 +199,6 @@ def proximity(
                 if j != i and dx * dx + dy * dy <= sight_squared:
                     near[i] = True
                     near[j] = True
-                    _see_robot(dx, dy, facing, i, radius, reach, obs[i, start : start + RING_SENSORS])
-                    _see_robot(-dx, -dy, facing, int(j), radius, reach, obs[j, start : start + RING_SENSORS])
+                    _see(_beam_to_disc, (dx, dy), facing, i, radius, reach, obs[i, start : start + RING_SENSORS])
+                    _see(_beam_to_disc, (-dx, -dy), facing, int(j), radius, reach, obs[j, start : start + RING_SENSORS])
                 j = next_in_bin[j]
