@@ -49,12 +49,14 @@ from .cache_memory import (
 )
 from .cache_sites import select_site
 from .machines import (
+    GRASP,
     RELEASE,
     acquire,
     command,
     deliver_and_leave,
     explore,
     explore_for_object,
+    explore_freely,
     follow_cargo,
     go_to_goal,
     hold,
@@ -296,6 +298,21 @@ def run_machine(
 
 
 @kernel
+def wanders_on(robot: np.record, senses: Senses, c: np.record, draws: Row, memory: OneTaskMemory) -> bool:
+    """Whether a robot that walks at random, in search of an object or a cache, has found nothing to go to.
+
+    If so, it walks on; `explore_freely` does that quickly.
+    """
+    if robot.vector_state != VECTOR_IDLE or robot.explore_ticks == NOT_EXPLORING or senses.obstacle:
+        return False
+    if robot.activity not in (ACQUIRE, TRANSPORT):
+        return False
+    if robot.goal_kind == _CACHE:
+        return not select_cache(robot, senses, c, draws, memory)
+    return robot.goal_kind != _SITE and robot.n_known == 0
+
+
+@kernel
 def step_tasks(
     obs: ObsArray,
     active: BoolArray,
@@ -325,9 +342,13 @@ def step_tasks(
         follow_events(allocation, i, robot, senses, row, c, known)
         has_started = manage_task(allocation, i, robot, senses, now, c, draws[i], known)
         task = allocation.task[i]
-        x, y = run_machine(robot, task, senses, row, c, draws[i], known)
+        wanders = wanders_on(robot, senses, c, draws[i], known)
+        if wanders and explore_freely(robot, senses, row, c, draws[i], action):
+            action[2] = GRASP if robot.activity == TRANSPORT else RELEASE
+        else:
+            x, y = run_machine(robot, task, senses, row, c, draws[i], known)
+            command(robot, x, y, c, float(DROP_GRIP[task]), action)
         if not has_started:
             after_tick(allocation, i, now, robot.activity, c)
-        command(robot, x, y, c, float(DROP_GRIP[task]), action)
         if robot.activity == WAIT_PICKUP and SOURCE[task] == _CACHE and not cache_is_known(robot, c, known):
             action[2] = RELEASE  # quirk waits_for_cache: it stands there without asking
