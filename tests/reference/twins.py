@@ -155,6 +155,7 @@ IN_ORDER = "only calls others, each with its twin; whole runs are in tests/promi
 ONE_BY_ONE = "compared with arenas that are taken one by one in tests/world/test_lockstep.py"
 
 WITHOUT = {
+    "swarm_forage_env._internal.pcg64.write_uniform": "compared with numpy itself in tests/internal/test_rng.py",
     "swarm_forage_env._internal.held.keep": "a copy; read again in tests/internal/test_held.py",
     "swarm_forage_env.world.kernels.reward.book_rows": "sums row by row; the lives of rows are told by hand in "
     "tests/views/test_arenas.py",
