@@ -11,9 +11,11 @@ from swarm_forage_env.world.state import (
     ArenaArrays,
     CacheState,
     ObjectState,
+    PlacementDraws,
     Requests,
     Rules,
     Sensors,
+    Source,
     StepEvents,
     SwarmState,
     Wandering,
@@ -50,7 +52,13 @@ def _painted_floor(config: ScenarioConfig) -> IntArray:
 
 
 def new_arrays(
-    config: ScenarioConfig, state: WorldState, sensors: Sensors, twist: FloatArray, n_static_caches: int
+    config: ScenarioConfig,
+    state: WorldState,
+    sensors: Sensors,
+    twist: FloatArray,
+    source: Source,
+    placement_draws: PlacementDraws,
+    n_static_caches: int,
 ) -> ArenaArrays:
     """Return everything that a tick needs, around the state of a run, its sensors and the velocities of its bodies.
 
@@ -74,6 +82,8 @@ def new_arrays(
             area=config.arena.distributable_cells,
             self_conflict=config.quirks.motion_self_conflict,
         ),
+        source=source,
+        placement_draws=placement_draws,
         n_static_caches=n_static_caches,
         has_caches=config.caches != "none",
     )

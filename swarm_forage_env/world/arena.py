@@ -34,14 +34,17 @@ from swarm_forage_env.world.kernels.tick import DONE, NO_ROOM, TO_PLACE
 from swarm_forage_env.world.kinds import blank_boxes
 from swarm_forage_env.world.neighbourhood import Neighbourhood
 from swarm_forage_env.world.placement import (
+    draw_ahead,
     draw_source,
     draw_start_poses,
+    give_back,
+    new_draws,
     place_all,
     place_objects,
     static_cache_centres,
 )
 from swarm_forage_env.world.sensors import light_of_carriers_only, new_sensors, read_slices
-from swarm_forage_env.world.state import ArenaArrays, listed
+from swarm_forage_env.world.state import ArenaArrays, Source, listed
 
 UNDISTURBED = Disturbances()
 _NO_TASKS, _NO_SHARES = np.zeros(0, np.int8), np.zeros(1)
@@ -104,7 +107,8 @@ class ForagingArena:
         self._walk_chance = TickDraws(stream_rng(seed, Stream.OBJECT_MOTION), config.objects.n_objects)
         self._pick_chance = TickDraws(stream_rng(seed, Stream.INTERACTION), n_robots)
         self._cache_rng = stream_rng(seed, Stream.CACHE)
-        self._furnish()
+        source, placement_draws = self._furnish(), new_draws()
+        draw_ahead(placement_draws, self._placement_rng)
         position, heading = draw_start_poses(config, stream_rng(seed, Stream.START_POSE))
         self.swarm.position[:], self.swarm.heading[:] = position, heading
         self.swarm.facing[:] = np.column_stack((np.cos(heading), np.sin(heading)))
@@ -116,7 +120,8 @@ class ForagingArena:
 
             self._physics = ChipmunkBodies(config, position, heading, keeps_history=self._snapshots)
         self.obs = sensors.obs
-        self._arrays = new_arrays(config, state, sensors, self._physics.twist, self._static_caches)
+        twist = self._physics.twist
+        self._arrays = new_arrays(config, state, sensors, twist, source, placement_draws, self._static_caches)
         self._forget_addresses()
         self._neighbourhood = Neighbourhood(config.robots, self.layout, self.reads)
         self.has_changed = False
@@ -179,16 +184,20 @@ class ForagingArena:
         if self._needs_python:
             blank(self.obs, self.blanks)
 
-    def _furnish(self) -> None:
-        """Place all objects and create static caches: before the clusters if placement is "power_law", else after."""
+    def _furnish(self) -> Source:
+        """Place all objects and create static caches: before the clusters if placement is "power_law", else after.
+
+        Returns the regions that objects come from.
+        """
         config = self.config
         clustered = config.objects.placement == "power_law"
         if self._static_caches and clustered:
             create_static_caches(config, self.objects, self.caches, self.events, supply=ObjectStatus.WAITING)
-        self._source = draw_source(config, self.objects.floor, self._placement_rng)
-        place_all(self.objects, self._source, config.arena.distributable_cells, self._placement_rng)
+        source = draw_source(config, self.objects.floor, self._placement_rng)
+        place_all(self.objects, source, config.arena.distributable_cells, self._placement_rng)
         if self._static_caches and not clustered:
             create_static_caches(config, self.objects, self.caches, self.events)
+        return source
 
     def step(
         self,
@@ -267,6 +276,7 @@ class ForagingArena:
             self._create_dynamic_caches()
             self._replace_displaced()
             self._restore_caches(tasks)
+            self._arrays.sensors.kept[0] = False  # nobody has listed which squares of the floor have changed
             self._compiled.close(self._held, walks[0])
 
     def run(
@@ -373,7 +383,7 @@ class ForagingArena:
             create_dynamic_caches(
                 creators,
                 self.config,
-                self._source,
+                self._arrays.source,
                 self._robot_squares(),
                 self.objects,
                 self.caches,
@@ -389,8 +399,10 @@ class ForagingArena:
     def _replace_displaced(self) -> None:
         rows = listed(self._requests.displaced)
         if len(rows):
-            area = self.config.arena.distributable_cells
-            place_objects(rows, self.objects, self._source, area, self._placement_rng)
+            area, draws = self.config.arena.distributable_cells, self._arrays.placement_draws
+            give_back(draws, self._placement_rng)
+            place_objects(rows, self.objects, self._arrays.source, area, self._placement_rng)
+            draw_ahead(draws, self._placement_rng)
 
     def _restore_caches(self, tasks: CodeArray | None) -> None:
         if np.count_nonzero(self.caches.alive) < self._static_caches:

@@ -9,8 +9,8 @@ from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_OBJECT,
 from swarm_forage_env.contract.types import BoolArray, CodeArray, IntArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M, Box, overlap_cells, square_box
-from swarm_forage_env.world.placement import Source, static_cache_centres
-from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState, listed, make_list
+from swarm_forage_env.world.placement import static_cache_centres
+from swarm_forage_env.world.state import CacheState, ObjectState, Source, StepEvents, SwarmState, listed, make_list
 
 MAX_PASSES = 100
 """Attempts to push a new dynamic cache clear of nest, sources and caches before the place is given up."""

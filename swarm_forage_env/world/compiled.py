@@ -24,8 +24,10 @@ from swarm_forage_env.world.kernels import tick
 from swarm_forage_env.world.kernels.bodies import BodyState, move_bodies, tell_poses
 from swarm_forage_env.world.kernels.disturbances import Disturbances, disturb
 from swarm_forage_env.world.kernels.interact import serve
+from swarm_forage_env.world.kernels.placement import place_displaced
+from swarm_forage_env.world.placement import new_draws
 from swarm_forage_env.world.sensors import new_sensors
-from swarm_forage_env.world.state import ArenaArrays
+from swarm_forage_env.world.state import ArenaArrays, Source
 
 Call = tuple[Callable[..., Any], *tuple[Any, ...]]
 """A kernel and arguments of the types that it is called with."""
@@ -152,7 +154,9 @@ def _empty_parts(config: ScenarioConfig) -> tuple[ArenaArrays, BodyState | None]
     twist, bodies = np.zeros((config.robots.n_robots + 1, 3)), None
     if config.physics == "compiled":
         bodies = Bodies(config, state.swarm.position, state.swarm.heading, sensors.near, sensors.bins).state
-    return new_arrays(config, state, sensors, twist, 0), bodies
+    nothing = np.zeros((0, 4), np.int32)
+    source = Source(nothing, nothing[:, 0].copy(), nothing[:, 0].copy())
+    return new_arrays(config, state, sensors, twist, source, new_draws(), 0), bodies
 
 
 def compile_half(config: ScenarioConfig, half: int) -> None:
@@ -175,16 +179,19 @@ def parts_of(config: ScenarioConfig, half: int) -> tuple[Call, ...]:
     calls, swarm, motion = ExampleCalls(arrays, bodies), arrays.state.swarm, arrays.motion
     if half == 0:
         return (calls.close,) if bodies is None else (calls.close, calls.set_out)
-    serving = serve, arrays.state, arrays.rules, calls.actions, 0, calls.draws
+    state = arrays.state
+    serving = serve, state, arrays.rules, calls.actions, 0, calls.draws
+    where = arrays.source, arrays.wandering.area, arrays.placement_draws
+    placing = place_displaced, state.requests, state.objects, *where
     if bodies is None:
-        return (serving,)
+        return serving, placing
     poses = bodies.poses, swarm.present, swarm.position, swarm.heading, swarm.facing
     moving = move_bodies, bodies, motion.twist, swarm.present, motion.dt_s
     nothing, sensors = Disturbances(), arrays.sensors
     numbers = nothing.draws, nothing.factors[0], nothing.noise
     robots = sensors.obs, swarm.present, swarm.active, swarm.carried_object
     disturbing = disturb, *robots, *numbers, sensors.blanks, 0, False
-    return serving, moving, (tell_poses, *poses), disturbing
+    return serving, placing, moving, (tell_poses, *poses), disturbing
 
 
 def outermost(config: ScenarioConfig, policy: CompiledPolicy | None) -> Call:

@@ -4,7 +4,7 @@ Every object lies on its own free cell: inside the distributable box, empty, nei
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +18,12 @@ from swarm_forage_env.scenarios.floor import CELL_M, Box, overlap_cells, square_
 from swarm_forage_env.scenarios.obstacles import distances_m
 from swarm_forage_env.world.clusters import draw_clusters
 from swarm_forage_env.world.kernels.placement import DRAWS, UNLIMITED, scatter
-from swarm_forage_env.world.state import ObjectState, listed, make_list
+from swarm_forage_env.world.state import ObjectState, PlacementDraws, Source, listed, make_list
 
 _CHUNK = 8192
 """Objects whose random numbers are held in memory at once."""
+_AHEAD = 64
+"""Objects for which random numbers are drawn ahead of time."""
 
 _TRIALS = 1000
 """Redraws of start positions before giving up, as in the study."""
@@ -67,18 +69,6 @@ def _overlaps_of_moved(position: FloatArray, is_moved: BoolArray, tree: KDTree, 
     return np.concatenate((among, others[~is_moved[found["j"]]]))
 
 
-@dataclass(frozen=True, slots=True)
-class Source:
-    """Where objects come from in one run: regions of the floor, in groups of equal capacity."""
-
-    regions: IntArray
-    """(R, 4) boxes in cells, half-open: x low, y low, x high, y high; rows of one group are neighbours."""
-    capacity: IntArray
-    """(R,) most objects in a region, also counting those dropped there; `UNLIMITED` = as many as it has free cells."""
-    group_start: IntArray
-    """(G + 1,) first region of each group, then R."""
-
-
 def draw_source(config: ScenarioConfig, floor: IntArray, rng: np.random.Generator) -> Source:
     """Return the source regions of a run; only power-law clusters are random.
 
@@ -103,7 +93,7 @@ def draw_source(config: ScenarioConfig, floor: IntArray, rng: np.random.Generato
             "objects or a larger arena."
         )
     order = np.argsort(capacity, kind="stable")
-    regions, capacity = regions[order], capacity[order]
+    regions, capacity = regions[order], capacity[order].astype(np.int32)
     group_start = np.concatenate(([0], np.flatnonzero(np.diff(capacity)) + 1, [len(capacity)]))
     return Source(regions, capacity, group_start.astype(np.int32))
 
@@ -138,6 +128,24 @@ def place_objects(
     if n_placed == 0:
         queue = np.concatenate((listed(objects.waiting), newest))
     make_list(objects.waiting, queue[n_placed:])
+
+
+def new_draws() -> PlacementDraws:
+    """Return room for the numbers of the next objects, without any."""
+    return PlacementDraws(np.zeros((_AHEAD, DRAWS)), np.full(1, _AHEAD, np.int32))
+
+
+def draw_ahead(draws: PlacementDraws, rng: np.random.Generator) -> None:
+    """Draw the numbers of the next objects, as `place_objects` would draw them one by one."""
+    rng.random(out=draws.rows)
+    draws.n_used[0] = 0
+
+
+def give_back(draws: PlacementDraws, rng: np.random.Generator) -> None:
+    """Let the generator draw again what was drawn ahead and is not used."""
+    bits: Any = rng.bit_generator
+    bits.advance(-draws.rows[draws.n_used[0] :].size)
+    draws.n_used[0] = len(draws.rows)
 
 
 def place_all(objects: ObjectState, source: Source, distributable_box: Box, rng: np.random.Generator) -> None:

@@ -15,6 +15,8 @@ from swarm_forage_env.contract.types import BoolArray, CodeArray, FloatArray, In
 
 N_HANDLERS = 5
 """Kinds of interactions of which a tick can finish one, see `kernels.interact`."""
+CHANGES = 16
+"""Squares of the floor that may change in a tick before robots look at all squares again."""
 
 
 def listed(entries: IntArray) -> IntArray:
@@ -179,6 +181,9 @@ class Requests(NamedTuple):
     """(N + 1,) list of objects to re-place: delivered, or dropped without a free square."""
     creators: IntArray
     """(N + 1,) list of robots whose CREATE_CACHE drop left an object lying at their square."""
+    changed: IntArray
+    """(`CHANGES` + 1, 2) squares (x, y) of the floor that changed in this tick outside of Python; in the last row first
+    how many, which is more than `CHANGES` where they are not all listed."""
     handling_ticks: IntArray
     """(2,) ticks that a pick-up and a drop take which start in this tick, at least 1."""
 
@@ -190,6 +195,7 @@ class Requests(NamedTuple):
             handler_used=np.zeros(N_HANDLERS, np.bool_),
             displaced=np.zeros(n_robots + 1, np.int32),
             creators=np.zeros(n_robots + 1, np.int32),
+            changed=np.zeros((CHANGES + 1, 2), np.int32),
             handling_ticks=np.array([pickup_ticks, drop_ticks], np.int32),
         )
 
@@ -326,6 +332,27 @@ class Wandering(NamedTuple):
     """Quirk `motion_self_conflict`."""
 
 
+class Source(NamedTuple):
+    """Where objects come from in one run: regions of the floor, in groups of equal capacity."""
+
+    regions: IntArray
+    """(R, 4) boxes in cells, half-open: x low, y low, x high, y high; rows of one group are neighbours."""
+    capacity: IntArray
+    """(R,) most objects in a region, also counting those dropped there; `kernels.placement.UNLIMITED` = as many as it
+    has free cells."""
+    group_start: IntArray
+    """(G + 1,) first region of each group, then R."""
+
+
+class PlacementDraws(NamedTuple):
+    """Random numbers for the next objects that are placed, drawn ahead."""
+
+    rows: FloatArray
+    """(rows, `kernels.placement.DRAWS`) a row for each object."""
+    n_used: IntArray
+    """(1,) how many of the rows are used up."""
+
+
 class ArenaArrays(NamedTuple):
     """Everything that a tick of an arena reads and writes."""
 
@@ -334,6 +361,8 @@ class ArenaArrays(NamedTuple):
     motion: Motion
     sensors: Sensors
     wandering: Wandering
+    source: Source
+    placement_draws: PlacementDraws
     n_static_caches: int
     """Caches that are there again when they were used up; 0 where there are none or they are dynamic."""
     has_caches: bool

@@ -8,7 +8,7 @@ from swarm_forage_env.contract.codes import CELL_EMPTY, CELL_NEST, CELL_OBJECT, 
 from swarm_forage_env.contract.types import FloatArray, IntArray
 from swarm_forage_env.scenarios.floor import Box
 from swarm_forage_env.world.kernels.placement import TRIES, UNLIMITED
-from swarm_forage_env.world.placement import Source
+from swarm_forage_env.world.state import Source
 
 Cell = tuple[int, int]
 

@@ -169,6 +169,8 @@ WITHOUT = {
     "swarm_forage_env.world.kernels.lockstep.pay_each": "`rewards` for each world; " + ONE_BY_ONE,
     "swarm_forage_env.world.kernels.lockstep.whole_each": "`tick.whole` for each world; compared with arenas that are "
     "stepped alone in tests/world/test_lockstep.py",
+    "swarm_forage_env.world.kernels.placement.place_displaced": "`scatter`, and what follows from it; compared with "
+    "`place_objects` in tests/world/test_placement.py",
     "swarm_forage_env.world.kernels.reward.rewards": "a weighted sum; term by term in tests/world/test_rewards.py",
     "swarm_forage_env.world.kernels.tick.close": IN_ORDER,
     "swarm_forage_env.world.kernels.tick.meet_and_close": IN_ORDER,

@@ -38,6 +38,10 @@ WORLDS = [
     ("dpo", "search_and_rescue", {}),
     ("stochm", "warehouse_small", {"nest_centre_m": (3.2, 8.0), "nest_size_m": (3.2, 12.8)}),
     ("stochx", "warehouse_medium", {}),
+    # Where objects lie still, robots look at the floor again only near what has changed.
+    ("dpo", "search_and_rescue", {"walk_probability": 0.0}),
+    ("stochm", "warehouse_dual", {"walk_probability": 0.0, "nest_size_m": (3.2, 12.8)}),
+    ("stochx", "warehouse_medium", {"walk_probability": 0.0, "n_robots": 150}),
     ("generalist", "search_and_rescue", {}),
     ("ppo_warehouse_small", "warehouse_small", {"n_robots": 7}),
 ]

@@ -11,8 +11,8 @@ from swarm_forage_env.scenarios.floor import overlap_cells, square_box
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.world.caches import MAX_PASSES, cache_members, clear_centre, protected_boxes
-from swarm_forage_env.world.placement import Source, place_objects
-from swarm_forage_env.world.state import listed
+from swarm_forage_env.world.placement import place_objects
+from swarm_forage_env.world.state import Source, listed
 from tests.support.engines import in_each_engine
 from tests.support.stage import act, assert_conserved, build_cache, clear, depot, lay, lift, load, stand, tidy_world
 
@@ -164,7 +164,7 @@ def test_clusters_are_protected():
     env.reset_batch(0)
     rows = np.flatnonzero(env.objects.status == ObjectStatus.FREE).tolist()
     assert len(rows) == 368
-    protected = protected_boxes(env.scenario, env.arena._source)
+    protected = protected_boxes(env.scenario, env.arena._arrays.source)
     for row in rows:
         assert cache_members(row, env.scenario, env.objects, protected).size == 0
     assert cache_members(rows[0], env.scenario, env.objects, []).size >= 2
@@ -173,7 +173,7 @@ def test_clusters_are_protected():
 def test_random_placement_protects_nothing():
     env = ForageEnv(scenario("warehouse_medium", n_robots=1, caches="dynamic"))
     env.reset_batch(0)
-    assert protected_boxes(env.scenario, env.arena._source) == []
+    assert protected_boxes(env.scenario, env.arena._arrays.source) == []
     row = int(np.argmin(np.abs(env.objects.cell - (60, 120)).sum(axis=1)))
     cell = tuple((env.objects.cell[row] + (1, 0)).tolist())
     other = next(row for row in range(800) if env.objects.floor[cell[1], cell[0]] != CELL_OBJECT + row)
@@ -326,9 +326,11 @@ def clustered_world(clusters=EVERYWHERE, *, n_objects: int = 4, **overrides) -> 
     env.reset_batch(0)
     clear(env)
     n_clusters = len(clusters)
-    env.arena._source = Source(
+    source = Source(
         np.array(clusters, np.int32), np.full(n_clusters, 16, np.int32), np.array([0, n_clusters], np.int32)
     )
+    env.arena._arrays = env.arena._arrays._replace(source=source)
+    env.arena._forget_addresses()
     return env
 
 
@@ -388,9 +390,8 @@ def test_a_cluster_takes_objects_on_the_cells_that_a_cache_leaves_to_it():
     slot = build_cache(env, [0, 1], (64, 60))  # the cells 41 .. 87, 37 .. 83: column 40 is left, 6 cells
     for row in range(2, 10):
         lift(env, row)
-    place_objects(
-        range(2, 10), env.objects, env.arena._source, env.scenario.arena.distributable_cells, np.random.default_rng(0)
-    )
+    area, source = env.scenario.arena.distributable_cells, env.arena._arrays.source
+    place_objects(range(2, 10), env.objects, source, area, np.random.default_rng(0))
     assert sorted(env.objects.cell[2:8].tolist()) == [[40, y] for y in range(44, 50)]
     assert listed(env.objects.waiting).tolist() == [8, 9]
     assert np.count_nonzero(env.objects.floor == CELL_CACHE - slot) == 47 * 47

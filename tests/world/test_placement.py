@@ -16,9 +16,16 @@ from swarm_forage_env.scenarios.floor import PLACEMENTS, Box, source_boxes
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.robots import RobotConfig
 from swarm_forage_env.world.allocation import new_objects
-from swarm_forage_env.world.kernels.placement import DRAWS, UNLIMITED, count_objects, draw_source_cell, scatter
-from swarm_forage_env.world.placement import Source, draw_source, place_all, place_objects
-from swarm_forage_env.world.state import ObjectState, listed, make_list
+from swarm_forage_env.world.kernels.placement import (
+    DRAWS,
+    UNLIMITED,
+    count_objects,
+    draw_source_cell,
+    place_displaced,
+    scatter,
+)
+from swarm_forage_env.world.placement import draw_ahead, draw_source, give_back, new_draws, place_all, place_objects
+from swarm_forage_env.world.state import ObjectState, Requests, Source, listed, make_list
 from tests.reference.object_placement import choose_cell, random_source, scatter_slowly, waiting_by_the_word
 
 SIGNIFICANCE = 0.001
@@ -242,6 +249,40 @@ def test_a_region_outside_the_distributable_box_is_passed_over():
     objects = bare_objects(9, 10, 10)
     place_all(objects, source, (4, 5, 7, 10), np.random.default_rng(0))
     assert np.all(objects.floor[5:8, 4:7] >= CELL_OBJECT)
+
+
+@pytest.mark.parametrize("capacity", [UNLIMITED, 13], ids=["room for all", "too few places"])
+def test_the_tick_places_as_python_does(capacity):
+    """From the same generator, whoever places; what waits, or what is too much at once, is left to Python."""
+    area, source = (0, 0, 12, 9), one_region((2, 1, 9, 8), capacity)
+    slow, fast = bare_objects(40, 12, 9), bare_objects(40, 12, 9)
+    slow_rng, fast_rng, chance = (np.random.default_rng(seed) for seed in (5, 5, 6))
+    for objects in (slow, fast):
+        make_list(objects.waiting, [])
+        objects.status[:] = ObjectStatus.CARRIED
+    draws, requests, n_fast = new_draws(), Requests.empty(40, 1, 1), 0
+    displaced = requests.displaced
+    draw_ahead(draws, fast_rng)
+    for _ in range(300):
+        lying = np.flatnonzero(slow.status == ObjectStatus.FREE)
+        for row in chance.permutation(lying)[: chance.integers(4)].tolist():
+            lift(slow, row)
+            lift(fast, row)
+        carried = chance.permutation(np.flatnonzero(slow.status == ObjectStatus.CARRIED))[: chance.integers(4)]
+        place_objects(carried, slow, source, area, slow_rng)
+        make_list(displaced, carried)
+        place_displaced(requests, fast, source, area, draws)
+        n_fast += len(carried) > 0 and displaced[-1] == 0
+        if displaced[-1]:
+            give_back(draws, fast_rng)
+            place_objects(carried, fast, source, area, fast_rng)
+            draw_ahead(draws, fast_rng)
+        for name, values in slow._asdict().items():
+            np.testing.assert_array_equal(getattr(fast, name), values, err_msg=name)
+    give_back(draws, fast_rng)
+    assert slow_rng.random() == fast_rng.random()
+    assert n_fast > 50
+    assert (len(waiting(slow)) > 0) == (capacity != UNLIMITED)
 
 
 def test_placed_objects_start_anew():

@@ -18,7 +18,7 @@ from swarm_forage_env.contract.layout import (
 )
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray, Row
 from swarm_forage_env.scenarios.floor import CELLS_PER_M
-from swarm_forage_env.world.state import CacheState
+from swarm_forage_env.world.state import CHANGES, CacheState
 
 _GROUND_X = np.array([0.063, 0.063, -0.063, -0.063])
 _GROUND_Y = np.array([0.0116, -0.0116, 0.0116, -0.0116])
@@ -169,10 +169,31 @@ def quarter_turns(x: float, y: float) -> float:
 
 
 @kernel
+def note_change(changed: IntArray, x: int, y: int) -> None:
+    """Add a square to the list `Requests.changed`."""
+    n_changed = changed[-1, 0]
+    if n_changed < CHANGES:
+        changed[n_changed, 0] = x
+        changed[n_changed, 1] = y
+    changed[-1, 0] = n_changed + 1
+
+
+@kernel
+def _is_near_change(changed: IntArray, cell_x: int, cell_y: int) -> bool:
+    """Whether a square in the window around a cell has changed."""
+    for k in range(changed[-1, 0]):
+        if max(abs(changed[k, 0] - cell_x), abs(changed[k, 1] - cell_y)) <= _HALF_WINDOW:
+            return True
+    return False
+
+
+@kernel
 def line_of_sight(
     position: FloatArray,
     present: BoolArray,
     floor: IntArray,
+    changed: IntArray,
+    kept: bool,
     shares: ObsArray,
     caches: CacheState,
     half_side: int,
@@ -182,6 +203,8 @@ def line_of_sight(
 ) -> None:
     """Write the robot's cell, the objects of its 5 x 5 window and the caches that meet it.
 
+    `changed` = see `Requests`; `kept`: `obs` is as the last call left it, so that only robots that have come to another
+    cell, or near a change, or see caches, look again;
     `shares` (M + 1,) = what is written for no object, and for each object (row + 1) / M;
     `half_side` = (cache side in squares - 1) / 2; `half_windows` (N,) = squares that a robot sees on either side of its
     own, the others of its window hold nothing;
@@ -191,6 +214,7 @@ def line_of_sight(
     cell_start, object_start, cache_start = starts
     n_objects = shares.shape[0] - 1
     n_slots = caches.alive.shape[0]
+    lists_changes = kept and changed[-1, 0] <= CHANGES
     while n_slots > 0 and not caches.alive[n_slots - 1]:  # new caches take the first free slot, so few are in use
         n_slots -= 1
     for i in range(position.shape[0]):
@@ -200,15 +224,22 @@ def line_of_sight(
             continue
         cell_x = min(nx - 1, max(0, int(position[i, 0] * CELLS_PER_M)))
         cell_y = min(ny - 1, max(0, int(position[i, 1] * CELLS_PER_M)))
-        obs[i, cell_start] = (2 * cell_x + 1) / nx - 1.0
-        obs[i, cell_start + 1] = (2 * cell_y + 1) / ny - 1.0
-        window = obs[i, object_start:cache_start]
-        if _HALF_WINDOW <= cell_x < nx - _HALF_WINDOW and _HALF_WINDOW <= cell_y < ny - _HALF_WINDOW:
-            _whole_window(floor, cell_x - _HALF_WINDOW, cell_y - _HALF_WINDOW, shares, window)
-        else:
-            _cut_window(floor, cell_x - _HALF_WINDOW, cell_y - _HALF_WINDOW, shares, window)
-        if half_windows[i] < _HALF_WINDOW:
-            _narrow_window(half_windows[i], window)
+        here_x = np.float32((2 * cell_x + 1) / nx - 1.0)
+        here_y = np.float32((2 * cell_y + 1) / ny - 1.0)
+        stays = lists_changes and obs[i, cell_start] == here_x and obs[i, cell_start + 1] == here_y
+        stays = stays and not _is_near_change(changed, cell_x, cell_y)
+        if not stays:
+            obs[i, cell_start] = here_x
+            obs[i, cell_start + 1] = here_y
+            window = obs[i, object_start:cache_start]
+            if _HALF_WINDOW <= cell_x < nx - _HALF_WINDOW and _HALF_WINDOW <= cell_y < ny - _HALF_WINDOW:
+                _whole_window(floor, cell_x - _HALF_WINDOW, cell_y - _HALF_WINDOW, shares, window)
+            else:
+                _cut_window(floor, cell_x - _HALF_WINDOW, cell_y - _HALF_WINDOW, shares, window)
+            if half_windows[i] < _HALF_WINDOW:
+                _narrow_window(half_windows[i], window)
+        if stays and obs[i, cache_start] == 0.0:  # none in sight; a new one, or the end of one, changes many squares
+            continue
         for k in range(cache_start, cache_start + CACHE_FIELDS * VISIBLE_CACHES):
             obs[i, k] = 0.0
         if n_slots > 0:

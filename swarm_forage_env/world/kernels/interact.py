@@ -17,7 +17,8 @@ from swarm_forage_env.contract.codes import (
 )
 from swarm_forage_env.contract.types import ActionArray, FloatArray, IntArray
 from swarm_forage_env.scenarios.floor import CELL_M, CELLS_PER_M
-from swarm_forage_env.world.state import CacheState, ObjectState, Rules, StepEvents, SwarmState, WorldState
+from swarm_forage_env.world.kernels.floor import note_change
+from swarm_forage_env.world.state import CHANGES, CacheState, ObjectState, Rules, StepEvents, SwarmState, WorldState
 
 NO_REQUEST = 0
 DELIVER = 1
@@ -223,6 +224,7 @@ def lay_on_floor(state: WorldState, rules: Rules, i: int) -> bool:
     events.counters[_FLOOR_DROPS] += 1
     if inside and objects.floor[y, x] == CELL_EMPTY:
         objects.floor[y, x] = CELL_OBJECT + row
+        note_change(state.requests.changed, x, y)
         objects.status[row] = _FREE
         objects.cell[row, 0] = x
         objects.cell[row, 1] = y
@@ -249,7 +251,9 @@ def _lift(swarm: SwarmState, objects: ObjectState, events: StepEvents, i: int, r
 def take_from_floor(state: WorldState, i: int, row: int) -> None:
     """Robot i picks up the free object under its centre."""
     objects, events = state.objects, state.events
-    objects.floor[objects.cell[row, 1], objects.cell[row, 0]] = CELL_EMPTY
+    x, y = objects.cell[row, 0], objects.cell[row, 1]
+    objects.floor[y, x] = CELL_EMPTY
+    note_change(state.requests.changed, x, y)
     _lift(state.swarm, objects, events, i, row)
     state.swarm.cargo_from_cache[i] = False
     events.counters[_FREE_PICKUPS] += 1
@@ -276,6 +280,7 @@ def take_from_cache(state: WorldState, rules: Rules, i: int, slot: int, chance: 
     _report(events, caches, i, _PICKED_FROM_CACHE, taken, slot)
     if caches.count[slot] == 1:
         _dissolve(objects, caches, slot, rules.cache_half_side)
+        state.requests.changed[-1, 0] = CHANGES + 1
         events.counters[_DEPLETED] += 1
 
 
@@ -439,6 +444,7 @@ def serve(state: WorldState, rules: Rules, gripper: ActionArray, tick: int, chan
     """Rewrite the events and lists of a tick: clear them, and `interact` if any robot has a request."""
     state.requests.displaced[-1] = 0
     state.requests.creators[-1] = 0
+    state.requests.changed[-1, 0] = 0
     state.events.happened[0] = clear_events(state.swarm, state.events, gripper)
     if state.events.happened[0]:
         interact(state, rules, gripper, tick, chance)

@@ -6,8 +6,10 @@ Floor codes are those of `contract.codes`.
 import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
-from swarm_forage_env.contract.codes import CELL_EMPTY, CELL_OBJECT
+from swarm_forage_env.contract.codes import CELL_EMPTY, CELL_OBJECT, ObjectStatus
 from swarm_forage_env.contract.types import FloatArray, IntArray
+from swarm_forage_env.world.kernels.floor import note_change
+from swarm_forage_env.world.state import ObjectState, PlacementDraws, Requests, Source
 
 UNLIMITED = int(np.iinfo(np.int32).max)
 """Capacity of a region that takes as many objects as it has free cells."""
@@ -15,6 +17,7 @@ TRIES = 16
 """Random cells tried before the free cells of a region are listed; either way the choice is exactly uniform."""
 DRAWS = 3 + 2 * TRIES
 """Uniform numbers per object: group, region, listed cell, then x and y of each try."""
+_FREE, _WAITING = int(ObjectStatus.FREE), int(ObjectStatus.WAITING)
 
 
 @kernel
@@ -121,3 +124,42 @@ def scatter(
         cell[rows[i], 0] = x
         cell[rows[i], 1] = y
     return rows.shape[0]
+
+
+@kernel
+def place_displaced(
+    requests: Requests, objects: ObjectState, source: Source, area: tuple[int, int, int, int], draws: PlacementDraws
+) -> None:
+    """Place displaced objects and empty their list: `world.placement.place_objects` where no object waits.
+
+    Where one does, or there are not enough draws, nothing happens.
+    """
+    displaced = requests.displaced
+    n_rows = displaced[-1]
+    first = draws.n_used[0]
+    if n_rows == 0 or objects.waiting[-1] > 0 or first + n_rows > draws.rows.shape[0]:
+        return
+    rows = displaced[:n_rows]
+    n_placed = scatter(
+        rows,
+        objects.floor,
+        objects.cell,
+        source.regions,
+        source.capacity,
+        source.group_start,
+        area,
+        draws.rows[first : first + n_rows],
+    )
+    for k in range(n_rows):
+        objects.cache_slot[rows[k]] = -1
+        if k < n_placed:
+            objects.status[rows[k]] = _FREE
+            objects.carriers[rows[k]] = 0
+            note_change(requests.changed, objects.cell[rows[k], 0], objects.cell[rows[k], 1])
+        else:
+            objects.status[rows[k]] = _WAITING
+            objects.cell[rows[k], :] = -1
+            objects.waiting[k - n_placed] = rows[k]
+    objects.waiting[-1] = n_rows - n_placed
+    draws.n_used[0] += n_rows
+    displaced[-1] = 0

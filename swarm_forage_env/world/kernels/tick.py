@@ -7,7 +7,8 @@ press           touching robots push with the force of their motors
 look            who is near; proximity readings                                 meet
 interfere       who loses time to avoidance
 interact        pick-ups and drops
-(objects and caches are placed, where anything is to be placed: Python, rare)
+place_displaced delivered objects come back on the floor
+(caches, and objects for which there was no room, are placed: Python, rare)
 walk            objects move by themselves                                      close
 count           caches
 sense           the rest of the observation
@@ -28,13 +29,14 @@ from swarm_forage_env.world.kernels.disturbances import Disturbances, disturb, d
 from swarm_forage_env.world.kernels.drive import drive
 from swarm_forage_env.world.kernels.interact import serve
 from swarm_forage_env.world.kernels.neighbourhood import bin_robots
+from swarm_forage_env.world.kernels.placement import place_displaced
 from swarm_forage_env.world.kernels.walk import walk
-from swarm_forage_env.world.state import ArenaArrays, CacheState
+from swarm_forage_env.world.state import CHANGES, ArenaArrays, CacheState
 
 DONE = -1
 """No action was refused and nothing is left to do. Rows of refused actions are 0 and above."""
 TO_PLACE = -2
-"""Objects or caches are to be placed, then `close` is still to come."""
+"""Caches, or objects that wait, are to be placed, then `close` is still to come."""
 NO_ROOM = -3
 """There is no room for all pairs of robots that might touch. `set_out` is done, nobody was moved."""
 _CACHES_ALIVE, _OBJECTS_CACHED = int(Counter.CACHES_ALIVE), int(Counter.OBJECTS_CACHED)
@@ -91,6 +93,8 @@ def sense(a: ArenaArrays) -> None:
             position,
             present,
             objects.floor,
+            a.state.requests.changed,
+            s.kept[0],
             s.shares,
             a.state.caches,
             s.cache_half_side,
@@ -148,7 +152,10 @@ def meet(a: ArenaArrays, actions: ActionArray, tick: int, chance: FloatArray) ->
     look(a)
     mark(s.obs, s.columns.proximity, s.near, s.behind_counts, state.swarm, state.events)
     serve(state, a.rules, actions, tick, chance)
-    is_to_place = state.requests.displaced[-1] > 0 or state.requests.creators[-1] > 0
+    displaced, creators = state.requests.displaced, state.requests.creators
+    if creators[-1] == 0:  # new caches come first
+        place_displaced(state.requests, state.objects, a.source, a.wandering.area, a.placement_draws)
+    is_to_place = displaced[-1] > 0 or creators[-1] > 0
     return is_to_place or (a.n_static_caches > 0 and _alive(state.caches) < a.n_static_caches)
 
 
@@ -171,6 +178,7 @@ def close(a: ArenaArrays, walk_chance: FloatArray) -> None:
         counters[_OBJECTS_MOVED] += walk(
             objects.floor, objects.status, objects.cell, walk_chance, w.probability, w.area, w.self_conflict
         )
+        a.state.requests.changed[-1, 0] = CHANGES + 1
     if a.has_caches:
         counters[_CACHES_ALIVE] += _alive(caches)
         for slot in range(caches.count.shape[0]):
