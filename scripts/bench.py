@@ -4,6 +4,8 @@
     scripts/bench crw-200 dpo-200 --quick     some, in shorter measurements
     scripts/bench --against 860cf6a           in turn with another revision, or the folder of a checkout, as ratios
     scripts/bench --peers ../peers            other packages beside ours; each is installed into a folder of that one
+    scripts/bench --phases                    what the phases of a tick take, for the scripted controllers
+    scripts/bench --phases stochx generalist  the same for these policies
 
 Times are processor time on one core, where nothing else is said. A value is the median of the rounds. A ratio is that
 of one round, so that what else the machine does counts as little as possible; the table has the median, and the
@@ -27,7 +29,10 @@ from bench_peers import PEERS
 from rich.console import Console
 
 ROOT = Path(__file__).resolve().parents[1]
-CASES_FILE, PEERS_FILE = (Path(__file__).with_name(f"bench_{name}.py") for name in ("cases", "peers"))
+CASES_FILE, PEERS_FILE, PHASES_FILE = (
+    Path(__file__).with_name(f"bench_{name}.py") for name in ("cases", "peers", "phases")
+)
+CONTROLLERS = ("crw", "dpo", "stochm", "stochx")
 ALONE = {
     **dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"),
     "JAX_PLATFORMS": "cpu",
@@ -38,6 +43,11 @@ ALONE = {
 
 class BenchError(RuntimeError):
     """A case cannot be measured; the message is one line."""
+
+
+def alone(folder: Path) -> dict[str, str]:
+    """Return the environment of a process with the package of a folder, and with one thread per library."""
+    return {**os.environ, **ALONE, "PYTHONPATH": str(folder)}
 
 
 class Subject:
@@ -51,7 +61,7 @@ class Subject:
             stdout=subprocess.PIPE,
             text=True,
             cwd=folder,
-            env={**os.environ, **ALONE, "PYTHONPATH": str(folder)},
+            env=alone(folder),
         )
 
     def measure(self, case: str, engine: str, effort: float) -> float:
@@ -188,11 +198,15 @@ def main() -> int:
     parser.add_argument("cases", nargs="*", metavar="CASE", help=f"default all of: {', '.join(CASES)}")
     parser.add_argument("--against", metavar="REVISION", help="another revision, or the folder of a checkout")
     parser.add_argument("--peers", type=Path, metavar="FOLDER", help=f"other packages: {', '.join(PEERS)}")
+    parser.add_argument("--phases", action="store_true", help="phases of a tick; CASE is then the name of a policy")
     parser.add_argument("--physics", choices=("compiled", "chipmunk"), default="compiled", help="default compiled")
     parser.add_argument("--quick", action="store_true", help="three short rounds instead of seven whole ones")
     given = parser.parse_args()
-    names = chosen_cases(given, parser)
     rounds, effort = (3, 0.2) if given.quick else (7, 1.0)
+    if given.phases:
+        command = [sys.executable, PHASES_FILE, str(effort), *(given.cases or CONTROLLERS)]
+        return subprocess.run(command, env=alone(ROOT), check=False).returncode
+    names = chosen_cases(given, parser)
     found: dict[str, list[Values]] = {}
     failed: list[str] = []
     progress = Console(stderr=True)

@@ -7,18 +7,22 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import polars as pl
 import pytest
 
 from metrics import verdict
 from metrics.claims import CLAIMS, INTUITIONS
 from metrics.laws import ALL_LAWS
-from swarm_forage_env.runs.run import run_one
+from swarm_forage_env.contract.codes import Counter
+from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.runs.run import LiveRun, build_env, run_one
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.runs.store import RunStore
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.studies.study_file import load_study, set_names
 from swarm_forage_env.studies.study_table import read_study
+from tests.support.foraging import quick_world
 from tests.support.foraging_table import foraging_table
 from tests.support.made_tables import made_table
 
@@ -213,6 +217,23 @@ def bench(monkeypatch):
 )
 def test_what_is_measured_is_still_there(case, bench):
     assert bench.CASES[case].measure("compiled", 0.01) > 0.0
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("policy", ["crw", "stochm", "stochx"])
+def test_phases_one_by_one_are_the_tick(policy, monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "scripts")
+    caches = getattr(load_policy(policy), "caches", "none")
+    world = quick_world("warehouse_medium", caches=caches, walk_probability=0.0)
+    phased = importlib.import_module("bench_phases").PhasedRun(policy, world, seed=3)
+    run = LiveRun(build_env(world, reads=phased.policy.reads), load_policy(policy), 3, by_ticks=True)
+    for tick in range(1, 601):
+        phased.tick()
+        run.advance(to_tick=tick)
+        np.testing.assert_array_equal(phased.arena.obs, run.forage_env.arena.obs, err_msg=f"tick {tick}")
+    counters = run.forage_env.arena.events.counters
+    np.testing.assert_array_equal(phased.arena.events.counters, counters)
+    assert counters[Counter.FREE_PICKUPS] > 0
 
 
 def test_a_table_has_values_targets_and_ratios_of_rounds(bench):
