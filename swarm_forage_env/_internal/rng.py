@@ -5,6 +5,7 @@ the randomness of another robot, and runs that share a seed stay paired.
 """
 
 import math
+from collections.abc import Iterable
 from enum import IntEnum
 
 import numpy as np
@@ -28,14 +29,17 @@ class Stream(IntEnum):
     SCENARIO = 12
 
 
-def stream_rng(seed: int, stream: Stream) -> np.random.Generator:
+def stream_rng(seed: int, stream: Stream, level: Iterable[float] = ()) -> np.random.Generator:
     """Return the generator of one named stream.
 
     Args:
         seed: Run seed, a non-negative integer.
         stream: Which source of chance the generator serves.
+        level: Numbers that tell strengths of a disturbance apart, where each is to have chance of its own.
     """
-    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(int(stream),))))
+    bits = (np.array([*level], "<f8") + 0.0).view("<u4")  # + 0.0: what equals 0.0 has its bits
+    sequence = np.random.SeedSequence(seed, spawn_key=(int(stream), *bits.tolist()))
+    return np.random.Generator(np.random.PCG64(sequence))
 
 
 class TickDraws:

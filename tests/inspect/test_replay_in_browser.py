@@ -47,7 +47,7 @@ PHONE = {"width": 390, "height": 844, "touch": True}
 @pytest.fixture(scope="module")
 def replays(tmp_path_factory):
     chromium()  # skips before anything is run
-    specs = [plan_run(WORLD, name, wrappers=DISTURBED, seed=2) for name in ("stochm", "crw")]
+    specs = [plan_run(WORLD, name, wrappers=DISTURBED, seed=0) for name in ("stochm", "crw")]
     return [record_replay(spec)[0] for spec in specs]
 
 

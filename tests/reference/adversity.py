@@ -99,7 +99,7 @@ class SlowPopulation:
 
     def __init__(self, rates: EventRates, n_robots: int, seed: int, *, initial: int, most: int) -> None:
         self.rates = {name: getattr(rates, name) for name in ("death", "birth", "malfunction", "repair")}
-        streams = stream_rng(seed, Stream.POPULATION).spawn(8)
+        streams = stream_rng(seed, Stream.POPULATION, self.rates.values()).spawn(8)
         self.times = dict(zip(self.rates, streams[0::2], strict=True))
         self.choices = dict(zip(self.rates, streams[1::2], strict=True))
         self.n_robots, self.most = n_robots, most

@@ -20,7 +20,7 @@ from swarm_forage_env.wrappers.population import PopulationConfig
 from swarm_forage_env.wrappers.registry import parse_wrapper
 
 WORLD = scenario("warehouse_small", n_robots=4, n_objects=400, horizon_s=20.0, interval_s=20.0, physics="compiled")
-DEADLY = (PopulationConfig(death_per_tick=0.02),)
+DEADLY = (PopulationConfig(death_per_tick=0.03),)
 
 
 @pytest.fixture(autouse=True)

@@ -18,6 +18,7 @@ from swarm_forage_env.wrappers.population_process import (
     simulate_population,
 )
 from tests.reference.adversity import SlowPopulation
+from tests.reference.population_chain import generator, mean_away_by_exponential
 
 RUN_TICKS = 50_000
 SURE = 0.001
@@ -77,29 +78,55 @@ def test_a_tiny_rate_may_wait_for_ever():
     assert clock(1e-320).next_tick > 1e300
 
 
-def test_the_same_choices_are_made_at_any_rate():
-    """Runs of a sweep stay paired: events come at times that scale, to the same robots."""
-    slow, fast = (PopulationState.start(30) for _ in range(2))
-    victims = {}
-    for state, rate in ((slow, 0.01), (fast, 0.02)):
-        clocks = EventClocks(EventRates(death=rate), seed=5)
-        order, ticks = [], []
-        while len(order) < 20:
-            tick = int(max(clocks.next_tick, 1))
-            before = state.dead.copy()
-            advance_population(state, clocks, tick)
-            order += np.flatnonzero(state.dead & ~before).tolist()
-            ticks.append(tick)
-        victims[rate] = order
-        assert ticks == sorted(ticks)
-    assert victims[0.01] == victims[0.02]
+LEVELS = malfunction_levels(50)
+N_SEEDS = 60
 
 
-def test_another_process_does_not_shift_the_events_of_this_one():
-    alone = simulate_population(EventRates(death=0.002), 50, 10_000, seed=9)
-    among = simulate_population(EventRates(death=0.002, malfunction=0.01, repair=0.01), 50, 10_000, seed=9)
-    np.testing.assert_array_equal(alone.n_present, among.n_present)
-    assert among.tally.malfunctions > 0
+@pytest.fixture(scope="module")
+def at_work():
+    """(levels, seeds) mean robots at work over a run."""
+    return np.array(
+        [
+            [simulate_population(level.rates, 50, RUN_TICKS, seed).n_active.mean() for seed in range(N_SEEDS)]
+            for level in LEVELS
+        ]
+    )
+
+
+def test_every_level_has_a_history_of_its_own(at_work):
+    """Over seeds the robots at work of two levels do not go together."""
+    correlations = np.corrcoef(at_work)[np.triu_indices(len(LEVELS), 1)]
+    # Of independent histories each is around 0 by 1 / sqrt(seeds - 1).
+    deviation = 1.0 / np.sqrt(N_SEEDS - 1)
+    assert abs(correlations.mean()) < 3.3 * deviation / np.sqrt(correlations.size)
+    assert np.abs(correlations).max() < 4.0 * deviation
+
+
+def test_robots_at_work_are_those_of_the_chain_with_few_seeds_too(at_work):
+    """At every level, and in the first four seeds of all levels together."""
+    chains = [generator(level.malfunction_per_tick, level.repair_per_tick, 50) for level in LEVELS]
+    expected = np.array([50.0 - mean_away_by_exponential(chain, RUN_TICKS) for chain in chains])
+    deviation = at_work.std(axis=1, ddof=1)
+    assert (abs(at_work.mean(axis=1) - expected) < 3.3 * deviation / np.sqrt(N_SEEDS)).all()
+    few = (at_work[:, :4].mean(axis=1) - expected) / (deviation / np.sqrt(4))
+    assert abs(few.mean()) < 3.3 / np.sqrt(len(LEVELS))
+
+
+@pytest.mark.parametrize("process", ["death", "birth", "malfunction", "repair"])
+def test_any_rate_that_differs_changes_the_victims(process):
+    rates = {"death": 0.01, "birth": 0.01, "malfunction": 0.01, "repair": 0.01}
+
+    def victims(**changed: float) -> list[int]:
+        clocks = EventClocks(EventRates(**rates | changed), seed=5)
+        return [clocks.death.choose(np.ones(1000, np.bool_)) for _ in range(3)]
+
+    assert victims() == victims() != victims(**{process: 0.02})
+
+
+def test_rates_that_are_equal_have_the_same_history():
+    """A run is told by its specification, in which 0, 0.0 and -0.0 are the same."""
+    plain, signed = EventRates(death=1, birth=0), EventRates(death=1.0, birth=-0.0)
+    assert EventClocks(plain, 3).death.choices.random() == EventClocks(signed, 3).death.choices.random()
 
 
 # Choices
