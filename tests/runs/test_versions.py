@@ -1,13 +1,25 @@
 """What made a run: versions, and the digest of our code."""
 
 import ast
+import io
 import sys
+import tokenize
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from swarm_forage_env.runs import versions
-from swarm_forage_env.runs.versions import PACKAGES, VERSION_NAMES, code_digest, digest_of, identity, software_versions
+from swarm_forage_env.runs.versions import (
+    CODE_OF_RUNS,
+    PACKAGES,
+    VERSION_NAMES,
+    code_digest,
+    code_of,
+    digest_of,
+    identity,
+    software_versions,
+)
 
 
 def test_versions_are_known_for_every_package():
@@ -55,7 +67,7 @@ def _installed(folder):
     for name in ("swarm_forage_env/world/tick.py", "swarm_forage_env/env.py", "baselines/dpo.py"):
         file = folder / name
         file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(f"# {name}")
+        file.write_text(f"name = {name!r}")
     return folder / "swarm_forage_env", folder / "baselines"
 
 
@@ -78,6 +90,70 @@ def test_the_digest_changes_with_code_that_runs_depend_on_alone(tmp_path):
     (package / "world" / "new.py").rename(package / "world" / "newer.py")
     found.add(digest_of(package, baselines))
     assert len(found) == 6
+
+
+PLAIN = """def drive(row):
+    text = "# no comment", '"#" '
+    return [
+        "a string",
+        row,
+    ]"""
+TOLD = '''"""What it is."""
+# Why.
+
+def drive(row):  # a note
+    """Drive.
+
+    No comment: #. Not the end: \\""" " '
+    """
+
+    'said in passing'  # as well
+    text = "# no comment", '"#" '
+    return [
+        "a string",  # the first
+
+        # And then
+        row,
+    ]
+'''
+
+
+def test_comments_docstrings_and_blank_lines_are_no_code():
+    assert code_of(TOLD) == code_of(PLAIN) == PLAIN
+
+
+@pytest.mark.parametrize("changed", ["# no comment", '"#" ', "a string", "row,"])
+def test_strings_are_code(changed):
+    assert code_of(PLAIN.replace(changed, "other")) != PLAIN
+
+
+def _slowly(source):
+    """The same by Python's own tokens: no comments, and no statement that is a string alone."""
+    others = (tokenize.COMMENT, tokenize.NL, tokenize.INDENT, tokenize.DEDENT)
+    tokens = [token for token in tokenize.generate_tokens(io.StringIO(source).readline) if token.type not in others]
+    kept, statement = [], []
+    for token in tokens:
+        statement.append(token)
+        if token.type == tokenize.NEWLINE:
+            if [part.type for part in statement] != [tokenize.STRING, tokenize.NEWLINE]:
+                kept += [part.string for part in statement]
+            statement = []
+    return _squeezed("".join(kept))
+
+
+def _squeezed(text):
+    """Without spaces, and without braces, which tokens of newer Pythons tell otherwise in f-strings."""
+    return "".join(text.translate({ord("{"): None, ord("}"): None}).split())
+
+
+def test_what_is_left_of_our_code_is_what_python_reads():
+    package = Path(versions.__file__).parents[1]
+    parts = [package / part for part in CODE_OF_RUNS] + [package.parent / "baselines"]
+    files = [file for part in parts for file in (part.rglob("*.py") if part.is_dir() else (part,))]
+    assert len(files) > 100
+    for file in files:
+        source = file.read_text(encoding="utf-8")
+        assert _squeezed(code_of(source)) == _slowly(source), file
 
 
 def test_runs_are_told_apart_by_code_and_not_by_commits():
