@@ -163,3 +163,13 @@ class Counter(IntEnum):
     """Object-ticks inside caches."""
     CARRYING = 15
     """Robot-ticks of active robots that carry an object, counted before the grippers of the tick move."""
+    AVOIDANCES = 16
+    """Robots that came into interference and were not in it, or not active, a tick before."""
+    SEARCHING = 17
+    """Robot-ticks of active robots out of interference that carry nothing and ask for nothing; counted as CARRYING."""
+    HOMING = 18
+    """The same of robots that carry an object."""
+    HANDLING = 19
+    """The same of robots in a pick-up from the floor, or in a drop that no cache takes."""
+    AT_CACHES = 20
+    """The same of robots in a pick-up from a cache, or in a drop into one."""

@@ -75,6 +75,33 @@ INTERVAL_COLUMNS: Mapping[str, Column] = {
 """One value per interval, in every record."""
 
 CONTRIBUTED_COLUMNS: Mapping[str, Column] = {
+    "avoidances": _total(
+        "avoidances", "begun by active robots; the mean duration is interference_ticks / avoidances, in ticks"
+    ),
+    "n_searching": Column(
+        "amount",
+        "robots",
+        "mean over ticks of active robots that neither avoid, nor handle an object, nor carry one",
+        words="robots searching",
+    ),
+    "n_homing": Column(
+        "amount",
+        "robots",
+        "the same of robots that carry an object, to the nest or elsewhere, and neither avoid nor handle it",
+        words="robots homing",
+    ),
+    "n_handling": Column(
+        "amount",
+        "robots",
+        "the same of robots in a pick-up or a drop away from caches, and not avoiding",
+        words="robots handling",
+    ),
+    "n_at_caches": Column(
+        "amount",
+        "robots",
+        "the same of robots in a pick-up from a cache or a drop into one, their wait for their turn included",
+        words="robots waiting at caches",
+    ),
     "task_share_none": Column("fraction", "1", "mean over ticks of the share of active robots without a task"),
     "task_share_generalist": Column("fraction", "1", "the same for the task Generalist"),
     "task_share_harvester": Column("fraction", "1", "the same for the task Harvester"),

@@ -10,7 +10,7 @@ from swarm_forage_env.contract.kernel_policy import CompiledPolicy
 from swarm_forage_env.contract.policy import refused_tasks
 from swarm_forage_env.contract.types import BoolArray, CodeArray
 from swarm_forage_env.env import BatchStep, ForageEnv
-from swarm_forage_env.scenarios.columns import part_column
+from swarm_forage_env.scenarios.columns import INTERVAL_COLUMNS, part_column
 from swarm_forage_env.scenarios.config import whole_intervals
 from swarm_forage_env.scenarios.performance import performance_curve
 from swarm_forage_env.world.arena import UNDISTURBED
@@ -30,6 +30,7 @@ TOTALS: dict[str, Counter] = {
     "caches_created": Counter.CACHES_CREATED,
     "caches_depleted": Counter.CACHES_DEPLETED,
     "interference_ticks": Counter.INTERFERING,
+    "avoidances": Counter.AVOIDANCES,
 }
 """Columns that are totals per interval."""
 TICK_MEANS: dict[str, Counter] = {
@@ -38,6 +39,10 @@ TICK_MEANS: dict[str, Counter] = {
     "n_carrying": Counter.CARRYING,
     "n_caches": Counter.CACHES_ALIVE,
     "n_objects_cached": Counter.OBJECTS_CACHED,
+    "n_searching": Counter.SEARCHING,
+    "n_homing": Counter.HOMING,
+    "n_handling": Counter.HANDLING,
+    "n_at_caches": Counter.AT_CACHES,
 }
 """Columns that are means over the ticks of an interval."""
 
@@ -192,7 +197,7 @@ class RunRecorder(SwarmWrapper):
         return env.arena.obs, _NO_REWARDS, env.terminated, env.tick >= env.max_cycles
 
     def columns(self) -> dict[str, np.ndarray]:
-        """Return the columns of the finished run by name, (T,) each.
+        """Return the columns of the finished run that every record has by name, (T,) each.
 
         Raises:
             RuntimeError: the run has not ended yet.
@@ -206,10 +211,14 @@ class RunRecorder(SwarmWrapper):
             "interference_fraction": self._interference,
             "adversity": self._adversity(),
         }
-        columns |= {name: self._counts[:, counter] for name, counter in TOTALS.items()}
-        columns |= {name: self._counts[:, counter] / self._interval_ticks for name, counter in TICK_MEANS.items()}
-        columns["performance"] = performance_curve(scenario.performance, columns | self._contributed)
+        columns |= {name: values for name, values in self._counted().items() if name in INTERVAL_COLUMNS}
+        columns["performance"] = performance_curve(scenario.performance, columns | self.contributed())
         return columns
+
+    def _counted(self) -> dict[str, np.ndarray]:
+        """What the arena counts, as columns."""
+        totals = {name: self._counts[:, counter] for name, counter in TOTALS.items()}
+        return totals | {name: self._counts[:, counter] / self._interval_ticks for name, counter in TICK_MEANS.items()}
 
     def _adversity(self) -> np.ndarray:
         """Conditions, (T,): the throttle if there is one, else what handling takes under its cost, else zero."""
@@ -219,9 +228,13 @@ class RunRecorder(SwarmWrapper):
         return np.zeros(self._n_intervals)
 
     def contributed(self) -> dict[str, np.ndarray]:
-        """Return the columns that other wrappers and the policy's tasks add, (T,) each; raises as `columns`."""
+        """Return the columns that not every record has, (T,) each; raises as `columns`.
+
+        They come from other wrappers, from the policy's tasks, and from counters that earlier records lack.
+        """
         self._require_complete()
-        return dict(self._contributed)
+        later = {name: values for name, values in self._counted().items() if name not in INTERVAL_COLUMNS}
+        return self._contributed | later
 
     def _require_complete(self) -> None:
         if not self._complete:

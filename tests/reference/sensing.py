@@ -5,8 +5,10 @@ import math
 
 import numpy as np
 
-from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, CELL_OBJECT, CELL_OBSTACLE
+from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, CELL_OBJECT, CELL_OBSTACLE, Counter
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.world.kernels import interact
+from swarm_forage_env.world.state import SwarmState
 
 RADIUS_M = 0.085036758
 REACH_M = 0.1
@@ -70,6 +72,16 @@ def interferes(env: ForageEnv, robot: int) -> bool:
     if abs(cmath.phase(away)) > 2.61:
         return env.scenario.quirks.obstacle_behind_counts
     return abs(away) > 0.1
+
+
+def work(swarm: SwarmState, robot: int) -> Counter:
+    """What a robot at work that avoids nothing is counted as."""
+    pending = swarm.pending_kind[robot]
+    if pending in (interact.CACHE_PICKUP, interact.CACHE_DROP):
+        return Counter.AT_CACHES
+    if pending != interact.NO_REQUEST:
+        return Counter.HANDLING
+    return Counter.SEARCHING if swarm.carried_object[robot] < 0 else Counter.HOMING
 
 
 def light(env: ForageEnv, robot: int) -> list[float]:

@@ -61,6 +61,8 @@ class FakeArena(ForageEnv):
         counters[Counter.PRESENT] += swarm.present.sum()
         counters[Counter.CARRYING] += np.count_nonzero(swarm.active & (swarm.carried_object >= 0))
         counters[Counter.INTERFERING] += 1
+        counters[Counter.AVOIDANCES] += 1
+        counters[Counter.SEARCHING] += swarm.active.sum() - 1
         self.events.interference_sum[0] += 0.25
         dead = np.full(len(swarm.active), self.tick >= self.dies_at)
         return self._obs(), np.zeros(len(dead), np.float32), dead, self.tick >= self.max_cycles

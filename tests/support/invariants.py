@@ -113,3 +113,8 @@ def look_at_record(recorder: RunRecorder, first_counters: np.ndarray) -> None:
     assert np.all(columns["n_active"] <= columns["n_present"])
     assert np.all((columns["interference_fraction"] >= 0.0) & (columns["interference_fraction"] <= 1.0 + 1e-12))
     assert counters[Counter.INTERFERING] <= counters[Counter.ACTIVE]
+    assert columns["avoidances"].sum() <= columns["interference_ticks"].sum()
+    busy = ("n_searching", "n_homing", "n_handling", "n_at_caches")
+    avoiding = columns["interference_ticks"] / env.scenario.interval_ticks
+    at_work = avoiding + sum(columns[name] for name in busy)
+    assert np.allclose(at_work, columns["n_active"]), "a robot at work does exactly one of five things"

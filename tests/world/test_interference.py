@@ -1,5 +1,6 @@
 """Interference: which robots lose time to avoidance, measured by one rule from true readings."""
 
+import collections
 import math
 
 import numpy as np
@@ -13,6 +14,8 @@ from tests.reference import sensing
 from tests.support.engines import in_each_engine
 from tests.support.stage import act, lay, load, put, stand, tidy_world
 
+WORK = (Counter.SEARCHING, Counter.HANDLING, Counter.HOMING, Counter.AT_CACHES, Counter.INTERFERING)
+"""What a robot at work can do, one at a time."""
 PAIR = ((16.0, 8.0, 0.0), (16.25, 8.0, math.pi))
 """Places and headings of two robots that face each other."""
 
@@ -124,21 +127,73 @@ def test_counters_are_sums_over_ticks():
     assert env.events.interference_sum[0] == pytest.approx(5 * 2 / 4)
 
 
+@in_each_engine
+def test_an_avoidance_begins_once_and_again_after_a_break():
+    env = tidy_world()
+    for places in ((), PAIR, PAIR, (), PAIR):
+        for robot in range(4):
+            put(env, robot, 6.0 + 2.0 * robot, 12.0)
+        for robot, place in enumerate(places):
+            put(env, robot, *place)
+        act(env, {})
+    assert env.events.counters[Counter.INTERFERING] == 6
+    assert env.events.counters[Counter.AVOIDANCES] == 4
+
+
+@in_each_engine
+def test_who_comes_back_from_repair_beside_another_begins_anew():
+    env = tidy_world()
+    met(env, 0, 1)
+    for at_work in (True, False, True):
+        env.set_population(active=np.array([at_work, True, True, True]), present=np.ones(4, np.bool_))
+        act(env, {})
+    assert env.events.counters[Counter.AVOIDANCES] == 3
+
+
+@in_each_engine
+def test_time_of_robots_is_divided_by_what_they_do():
+    """Robot 0 lays hands on an object for three ticks and carries it; robots 1 and 2 avoid each other; 3 searches."""
+    env = tidy_world(pickup_ticks=3)
+    met(env, 1, 2)
+    lay(env, 0, (30, 20))
+    stand(env, 0, (30, 20))
+    for _ in range(6):
+        act(env, {0: Grip.GRASP})
+    counted = {counter: int(env.events.counters[counter]) for counter in WORK}
+    # Seen before the grippers move: the request of the first tick counts from the second on.
+    assert counted == {
+        Counter.SEARCHING: 6 + 1,
+        Counter.HANDLING: 3,
+        Counter.HOMING: 2,
+        Counter.AT_CACHES: 0,
+        Counter.INTERFERING: 12,
+    }
+
+
 @pytest.mark.parametrize("quirks", [Quirks(), Quirks(obstacle_behind_counts=True)], ids=["described", "program"])
 def test_flags_and_sums_equal_those_of_the_slow_rule_on_slow_readings(quirks):
-    env = ForageEnv(scenario("warehouse_small", n_robots=60, n_objects=5, start_margin_m=6.5, quirks=quirks))
+    env = ForageEnv(
+        scenario("warehouse_small", n_robots=60, n_objects=400, start_margin_m=6.5, caches="static", quirks=quirks)
+    )
     env.reset_batch(2)
     present, active = np.arange(60) % 12 != 0, np.arange(60) % 6 != 0
     env.set_population(active=active, present=present)
     rng = np.random.default_rng(2)
-    flagged, share = 0, 0.0
-    for _ in range(12):
+    counted, share, before = collections.Counter[Counter](), 0.0, [False] * 60
+    for _ in range(40):
+        robots_do = [sensing.work(env.swarm, robot) for robot in range(60)]  # before the grippers of the tick move
         env.step_batch(rng.uniform(-1, 1, (60, 3)).astype(np.float32))
         expected = [sensing.interferes(env, robot) for robot in range(60)]
         assert env.events.interfering.tolist() == expected
-        flagged += sum(expected)
+        counted[Counter.INTERFERING] += sum(expected)
+        counted[Counter.AVOIDANCES] += sum(now and not then for now, then in zip(expected, before, strict=True))
+        counted.update(robots_do[robot] for robot in range(60) if active[robot] and not expected[robot])
         share += sum(expected) / 50
-    assert flagged > 20
-    assert env.events.counters[Counter.INTERFERING] == flagged
+        before = expected
+    assert counted[Counter.INTERFERING] > counted[Counter.AVOIDANCES] > 10
+    assert {counter: int(env.events.counters[counter]) for counter in (*WORK, Counter.AVOIDANCES)} == {
+        counter: counted[counter] for counter in (*WORK, Counter.AVOIDANCES)
+    }
+    assert min(counted[counter] for counter in WORK) > 0, "the test knows each of them"
     assert env.events.interference_sum[0] == pytest.approx(share)
-    assert [int(env.events.counters[c]) for c in (Counter.ACTIVE, Counter.PRESENT)] == [12 * 50, 12 * 55]
+    assert [int(env.events.counters[c]) for c in (Counter.ACTIVE, Counter.PRESENT)] == [40 * 50, 40 * 55]

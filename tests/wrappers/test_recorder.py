@@ -23,6 +23,11 @@ def drive(recorder: RunRecorder, ticks: int = 15, tasks=None) -> RunRecorder:
     return recorder
 
 
+def told(recorder: RunRecorder) -> dict[str, np.ndarray]:
+    """What not every record has, without counters of the world."""
+    return {name: values for name, values in recorder.contributed().items() if name not in TOTALS | TICK_MEANS}
+
+
 class Contributor(SwarmWrapper):
     """Contributes the tick at the end of each interval."""
 
@@ -47,6 +52,15 @@ def test_totals_are_differences_and_means_are_over_ticks():
 
 def test_every_counter_of_the_world_is_recorded():
     assert {*TOTALS.values(), *TICK_MEANS.values()} == set(Counter)
+
+
+def test_counters_that_earlier_records_lack_are_recorded_beside_the_others():
+    recorder = drive(RunRecorder(FakeArena(small_scenario(performance="1/avoidances"))))
+    contributed = recorder.contributed()
+    assert contributed["avoidances"].tolist() == [5, 5, 5]
+    assert contributed["n_searching"].tolist() == [3.0, 3.0, 3.0]
+    assert not contributed.keys() & recorder.columns().keys()
+    assert recorder.columns()["performance"].tolist() == [0.2, 0.2, 0.2]
 
 
 def test_performance_is_what_the_scenario_declares():
@@ -144,7 +158,7 @@ def test_a_reset_forgets_the_tasks_of_a_run_that_was_broken_off():
     recorder = drive(RunRecorder(FakeArena()), ticks=7, tasks=tasks)
     shares = drive(recorder, tasks=tasks).contributed()
     assert shares["task_share_generalist"].tolist() == [0.5, 0.5, 0.5]
-    assert drive(recorder).contributed() == {}
+    assert told(drive(recorder)) == {}
 
 
 def test_other_wrappers_contribute_columns():
@@ -161,7 +175,7 @@ def test_task_shares_are_means_over_ticks_of_active_robots():
         if tick == 5:
             recorder.unwrapped.set_population(active=np.array([True, False, True, False]), present=np.ones(4, np.bool_))
         recorder.step_batch(STILL, tasks=tasks)
-    shares = recorder.contributed()
+    shares = told(recorder)
     assert set(shares) == {f"task_share_{task.name.lower()}" for task in Task}
     np.testing.assert_allclose(shares["task_share_harvester"], [0.5, 0.5, 0.5])
     np.testing.assert_allclose(shares["task_share_collector"], [0.25, 0.5, 0.5])
@@ -170,7 +184,7 @@ def test_task_shares_are_means_over_ticks_of_active_robots():
 
 
 def test_policies_without_tasks_leave_no_task_columns():
-    assert drive(RunRecorder(FakeArena())).contributed() == {}
+    assert told(drive(RunRecorder(FakeArena()))) == {}
 
 
 @pytest.mark.parametrize("tasks", [[1, 2, 3], [1, 2, 3, 8], [1, 2, -1, 0]], ids=["too few", "unknown", "negative"])

@@ -72,7 +72,7 @@ class Replay:
     """(R, N) number of things that a robot remembers, at every `remembered_frames`-th frame; None without memory."""
     remembered_frames: int
     counters: Whole
-    """(F, 16) what the world has counted since the start, by `Counter` code."""
+    """(F, counters) what the world has counted since the start, by `Counter` code."""
     object_events: Whole
     """(E, 5) frame, object row, `ObjectStatus`, and cell x, y; of a carried object robot row and -1. Frame 0 has all
     objects, later ones those that changed. So a change that is undone within a frame is missing; counters miss none."""

@@ -1,14 +1,17 @@
-"""What is counted in every tick: who is in interference, who is at work, and how the swarm divides over tasks."""
+"""What is counted in every tick: who is in interference, who does what, and how the swarm divides over tasks."""
 
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.detection import sees_obstacle
 from swarm_forage_env.contract.layout import RING_SENSORS
 from swarm_forage_env.contract.types import BoolArray, CodeArray, FloatArray, ObsArray
+from swarm_forage_env.world.kernels.interact import CACHE_DROP, CACHE_PICKUP, NO_REQUEST
 from swarm_forage_env.world.state import StepEvents, SwarmState
 
 _INTERFERING, _ACTIVE, _PRESENT = int(Counter.INTERFERING), int(Counter.ACTIVE), int(Counter.PRESENT)
-_CARRYING = int(Counter.CARRYING)
+_CARRYING, _AVOIDANCES = int(Counter.CARRYING), int(Counter.AVOIDANCES)
+_SEARCHING, _HOMING = int(Counter.SEARCHING), int(Counter.HOMING)
+_HANDLING, _AT_CACHES = int(Counter.HANDLING), int(Counter.AT_CACHES)
 
 
 @kernel
@@ -22,7 +25,8 @@ def mark(
 ) -> None:
     """Flag active robots for which the obstacle rule holds in this tick, walls and boxes included, and count the tick.
 
-    The rule uses geometry only, so it is the same for every policy.
+    The rule uses geometry only, so it is the same for every policy. An active robot is in interference, or handles an
+    object, at a cache or elsewhere, or carries one, or does nothing of this, which is called searching.
 
     Args:
         obs: (N, D) with true proximity readings.
@@ -30,22 +34,40 @@ def mark(
         near: (N,) whether any beam may have hit something; others are skipped.
         behind_counts: Quirk `obstacle_behind_counts`.
         swarm: Read.
-        events: `interfering` is written, `counters` are added to, and the share of active robots (0/0 = 0) is added to
-            `interference_sum`.
+        events: `interfering` is that of the last tick, and written, `counters` are added to, and the share of active
+            robots (0/0 = 0) is added to `interference_sum`.
     """
     active, counters = swarm.active, events.counters
     n_interfering = 0
+    n_begun = 0
     n_active = 0
     n_present = 0
     n_carrying = 0
+    n_homing = 0
+    n_handling = 0
+    n_at_caches = 0
     for i in range(active.shape[0]):
         ring = obs[i, proximity : proximity + RING_SENSORS]
         flag = active[i] and near[i] and sees_obstacle(ring, behind_counts)
+        carries = active[i] and swarm.carried_object[i] >= 0
+        n_begun += flag and not events.interfering[i]
         events.interfering[i] = flag
         n_interfering += flag
         n_active += active[i]
         n_present += swarm.present[i]
-        n_carrying += active[i] and swarm.carried_object[i] >= 0
+        n_carrying += carries
+        kind = swarm.pending_kind[i]
+        if kind == NO_REQUEST:
+            n_homing += carries and not flag
+        elif active[i] and not flag:
+            is_at_cache = kind == CACHE_PICKUP or kind == CACHE_DROP
+            n_at_caches += is_at_cache
+            n_handling += not is_at_cache
+    counters[_AVOIDANCES] += n_begun
+    counters[_SEARCHING] += n_active - n_interfering - n_homing - n_handling - n_at_caches
+    counters[_HOMING] += n_homing
+    counters[_HANDLING] += n_handling
+    counters[_AT_CACHES] += n_at_caches
     counters[_INTERFERING] += n_interfering
     counters[_ACTIVE] += n_active
     counters[_PRESENT] += n_present
