@@ -72,7 +72,9 @@ def step_crw(
 
 
 class CRWPolicy(ScriptedPolicy):
-    """Correlated random walk for every robot. An instance drives one run.
+    """Correlated random walk for every robot.
+
+    An instance drives one run.
 
     Args:
         parameters: All numbers of the controller; default those of the paper's study.

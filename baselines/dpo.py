@@ -90,7 +90,9 @@ def step_dpo(
 
 
 class DPOPolicy(ScriptedPolicy):
-    """Decaying pheromone objects for every robot. An instance drives one run.
+    """Decaying pheromone objects for every robot.
+
+    An instance drives one run.
 
     Args:
         parameters: All numbers of the controller; default those of the paper's study.

@@ -12,7 +12,10 @@ from .tasks import STOCHM_PARAMETERS, TaskParameters
 
 
 class STOCHMPolicy(TaskPolicy):
-    """Generalists, Harvesters and Collectors around static caches; see `TaskPolicy`."""
+    """Generalists, Harvesters and Collectors around static caches.
+
+    See `TaskPolicy`.
+    """
 
     caches: ClassVar[str] = "static"
     default_parameters: ClassVar[TaskParameters] = STOCHM_PARAMETERS

@@ -13,7 +13,10 @@ from .tasks import STOCHX_PARAMETERS, TaskParameters
 
 
 class STOCHXPolicy(TaskPolicy):
-    """All seven tasks around dynamic caches; see `TaskPolicy`."""
+    """All seven tasks around dynamic caches.
+
+    See `TaskPolicy`.
+    """
 
     caches: ClassVar[str] = "dynamic"
     default_parameters: ClassVar[TaskParameters] = STOCHX_PARAMETERS

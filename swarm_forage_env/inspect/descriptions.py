@@ -160,12 +160,27 @@ def _policy_lines(name: str) -> Iterator[str]:
     policy = policy_class(name)
     network = network_file(name)
     reads = getattr(policy, "reads", None) if network is None else Network.load(network).about.interface.reads
-    yield f"{name}: {inspect.getdoc(policy) or 'no description'}"
+    yield f"{name}: {_first_paragraph(policy)}"
     yield ""
     yield f"  defined in  {policy.__module__}"
-    yield f"  parameters  {inspect.signature(policy)}"
     yield f"  caches      {_caches(policy, ' (the caches it is made for)')}"
     yield f"  reads       {'all slices' if reads is None else ', '.join(reads) or 'nothing'}"
+    settings = tuple(_settings(policy))
+    if settings:
+        yield ""
+        yield "Parameters (change them in a study file, or in Python with plan_run(..., parameters={name: value})):"
+        yield from (f"  {field:<34}{_plain(value)}" for field, value in settings)
+
+
+def _settings(policy: Callable[..., Any]) -> Iterator[tuple[str, Any]]:
+    """What a policy can be told by name, with the values that it has by default."""
+    arguments = inspect.signature(policy).parameters
+    if "parameters" in arguments and arguments["parameters"].default is None:  # numbers of a controller, see baselines
+        yield from dataclasses.asdict(policy().parameters).items()
+        return
+    for name, argument in arguments.items():
+        if argument.kind not in (argument.VAR_KEYWORD, argument.VAR_POSITIONAL):
+            yield name, "to be given" if argument.default is argument.empty else argument.default
 
 
 def _caches(policy: object, if_stated: str = "") -> str:
@@ -205,8 +220,12 @@ def _file_lines(file: Path) -> Iterator[str]:
                 yield f"    {_plain(values)}"
 
 
+def _first_paragraph(documented: Any) -> str:
+    return (inspect.getdoc(documented) or "no description").split("\n\n")[0]
+
+
 def _first_line(documented: Any) -> str:
-    return (inspect.getdoc(documented) or "no description").splitlines()[0]
+    return _first_paragraph(documented).splitlines()[0]
 
 
 def _plain(value: Any) -> str:
