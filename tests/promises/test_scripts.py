@@ -151,6 +151,17 @@ def test_stochx_is_held_beside_the_program(run):
     assert 49.0 < sum(of_robots) <= 50.1, "everybody has a task but in the first tick"
 
 
+@pytest.mark.compiled
+def test_the_floor_near_the_nest_empties(run):
+    title, _, crw, dpo, _ = run("emptying_floor", "--seeds", "2", "--horizon", "4000")[1].splitlines()
+    assert title == "warehouse_medium, 200 robots: the first 1,000 s, and from 3,000 s on"
+    for line, policy in ((crw, "crw"), (dpo, "dpo")):
+        first, later, _, _, begin_m, end_m = (float(word) for word in re.findall(r"(\S+) ±", line))
+        assert line.startswith(policy)
+        assert first > later
+        assert begin_m < end_m
+
+
 def test_laws_are_written_beside_the_runs_of_a_study(run):
     pytest.importorskip("matplotlib", reason="needs the plots extra: matplotlib")
     foraging_table().write("laws.parquet")
