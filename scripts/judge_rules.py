@@ -2,14 +2,15 @@
 
     scripts/judge_rules.py                      five minutes or more
     scripts/judge_rules.py --worlds 50 --runs 4 16
+    scripts/judge_rules.py --looks 64           judged after 4, 8, 16, 32 and 64 runs, as until claims are decided
 
 Each rule meets made worlds: one in which what it states holds, one in which it does not, and one at the border, where
 either answer is wrong or all that can be said is nothing. Scores scatter normally around given curves.
 """
 
 import argparse
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,9 @@ from numpy.typing import NDArray
 from metrics import noise_robustness
 from metrics.claims import orders, shapes
 from metrics.claims import predicates as general
-from metrics.claims.outcomes import Outcome
-from metrics.claims.panel import Panel
+from metrics.claims.looks import at_last_look, looks_up_to
+from metrics.claims.outcomes import DECIDED, Outcome
+from metrics.claims.panel import Looks, Panel
 from metrics.scoring.run_curves import RunCurves
 from metrics.scoring.scores import pseudo_values
 
@@ -205,6 +207,30 @@ def answers(rule: Rule, world: str, n_runs: int, n_worlds: int) -> list[str]:
     return [rule.predicate(*panels(rule, world, n_runs, seed), **rule.parameters).answer for seed in range(n_worlds)]
 
 
+def answers_over_looks(rule: Rule, world: str, looks: Looks, n_worlds: int) -> list[list[str]]:
+    """Return what a rule says at each look at so many worlds of a kind."""
+
+    def at(look: int, seed: int) -> str:
+        seen = [
+            replace(panel, looks=looks, reached=dict.fromkeys(panel.scores, look))
+            for panel in panels(rule, world, looks[-1], seed)
+        ]
+        return rule.predicate(*at_last_look(seen, ()), **rule.parameters).answer
+
+    return [[at(look, seed) for look in looks] for seed in range(n_worlds)]
+
+
+def first_decided(found: Sequence[str]) -> str:
+    """Return the first answer that decides, of those of all looks; with it one stops."""
+    return next((answer for answer in found if answer in DECIDED), found[-1])
+
+
+def wrong_over_looks(rule: Rule, looks: Looks, n_worlds: int) -> float:
+    """Return the share of worlds at the border in which a wrong answer is given at any look."""
+    found = answers_over_looks(rule, "border", looks, n_worlds)
+    return max(sum(answer in seen for seen in found) for answer in rule.wrong) / n_worlds
+
+
 def share(found: Sequence[str], wanted: Sequence[str]) -> float:
     """Return how many of the answers are among some; of several, the largest share of one."""
     return max(found.count(answer) for answer in wanted) / len(found)
@@ -221,16 +247,41 @@ def rows(n_worlds: int, n_runs: Sequence[int]) -> Iterator[list[str]]:
         yield [name, *(f"{one:.0%}" for one in shares)]
 
 
+def rows_of_looks(n_worlds: int, looks: Looks) -> Iterator[list[str]]:
+    """Yield the rows of the table of looking several times, its headings first."""
+    most = f"{looks[-1]} runs"
+    columns = ["wrong at any look"]
+    for words in ("supported where it holds", "contradicted (or a tie) where it fails"):
+        columns += [f"{words}, looks up to {most}", f"{words}, one look at {most}"]
+    yield ["rule", *columns, "runs until decided"]
+    for name, rule in RULES.items():
+        row, stops = [wrong_over_looks(rule, looks, n_worlds)], list[int]()
+        for world, wanted in (("holds", "supported"), ("fails", rule.failing)):
+            found = answers_over_looks(rule, world, looks, n_worlds)
+            row.append(sum(first_decided(seen) == wanted for seen in found) / n_worlds)
+            row.append(share(answers(rule, world, looks[-1], n_worlds), (wanted,)))
+            stops += [
+                next((n for n, one in zip(looks, seen, strict=True) if one in DECIDED), looks[-1]) for seen in found
+            ]
+        yield [name, *(f"{one:.0%}" for one in row), f"{np.mean(stops):.0f}"]
+
+
+def show(rows: Iterable[list[str]]) -> None:
+    """Print the rows as they are made."""
+    for number, row in enumerate(rows):
+        print("|", " | ".join(row), "|", flush=True)
+        if number == 0:
+            print("|---" * len(row) + "|")
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--worlds", type=int, default=200, help="worlds of each kind")
     parser.add_argument("--runs", type=int, nargs="+", default=[4, 16, 64], help="runs at each level")
+    parser.add_argument("--looks", type=int, metavar="MOST", help="instead: looking several times, up to so many runs")
     given = parser.parse_args()
-    for number, row in enumerate(rows(given.worlds, given.runs)):
-        print("|", " | ".join(row), "|", flush=True)
-        if number == 0:
-            print("|---" * len(row) + "|")
+    show(rows_of_looks(given.worlds, looks_up_to(given.looks)) if given.looks else rows(given.worlds, given.runs))
 
 
 if __name__ == "__main__":

@@ -194,8 +194,9 @@ def study() -> Schema:
         "horizon_s": NUMBER,
         "interval_s": NUMBER,
         "file": TEXT,
+        "looks": listed(COUNT, minItems=1),
     }
-    return keyed(fields, [name for name in fields if name != "file"])
+    return keyed(fields, [name for name in fields if name not in ("file", "looks")])
 
 
 def packed_study() -> Schema:

@@ -1,11 +1,13 @@
 """Claims held against scores: which statements a claim makes of which panels, and the verdict on it."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import nan
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias, cast
 
+from ..controllers import PAPER_POLICIES
 from ..curves import Form
+from .looks import at_last_look
 from .outcomes import Answer, Outcome, all_of, most_of, without_scores
 from .panel import Panel, Rule
 
@@ -84,17 +86,29 @@ class Statement:
     views: tuple[Callable[[Panel], Panel], ...] = ()
     """Applied to each panel first, in this order: its rise, its slope, ..."""
 
+    @property
+    def policies(self) -> tuple[str, ...]:
+        """Policies that it speaks of: those of the paper among its parameters, in any depth."""
+        return tuple(name for name in PAPER_POLICIES if name in _words_in(list(self.parameters.values())))
+
     def outcome(self, panels: Mapping[PanelName, Panel], rule: Rule) -> Outcome:
         """Return what comes of it, with the names of the panels in its reason."""
         absent = [name.words for name in self.panels if name not in panels]
         if absent:
             return without_scores(", ".join(absent))
-        seen = [panels[name] for name in self.panels]
+        seen = at_last_look([panels[name] for name in self.panels], self.policies)
         for view in self.views:
             seen = [view(panel) for panel in seen]
         rules = {"rule": rule} if seen else {}  # what follows from formulas alone has no runs to compare
         outcome = self.predicate(*seen, **self.parameters, **rules)
         return _placed(outcome, " and ".join(name.words for name in self.panels)) if seen else outcome
+
+
+def _words_in(value: Any) -> set[str]:
+    if isinstance(value, str):
+        return {value}
+    entries = cast("Sequence[Any]", value) if isinstance(value, list | tuple) else ()
+    return {word for entry in entries for word in _words_in(entry)}
 
 
 def _placed(outcome: Outcome, where: str) -> Outcome:
@@ -189,10 +203,14 @@ def check_claim(claim: Claim, panels: Mapping[PanelName, Panel] | Mapping[tuple[
     return replace(_verdict(claim, claim.statements, by_name), otherwise=scored)
 
 
+def joined(claim: Claim, outcomes: Sequence[Outcome]) -> Outcome:
+    """Return the outcome of a claim from those of its statements."""
+    return all_of(outcomes) if claim.needs == "all" else most_of(outcomes)
+
+
 def _verdict(claim: Claim, statements: tuple[Statement, ...], panels: Mapping[PanelName, Panel]) -> Verdict:
-    join = all_of if claim.needs == "all" else most_of
     rules: tuple[Rule, Rule] = ("intervals", "bands")
-    ours, bands = (join([statement.outcome(panels, rule) for statement in statements]) for rule in rules)
+    ours, bands = (joined(claim, [statement.outcome(panels, rule) for statement in statements]) for rule in rules)
     return _told(claim, ours, bands)
 
 

@@ -118,7 +118,9 @@ def _of_tau(
         found = [_by_bands(part, policies) * side for part, side in zip(parts, better, strict=True)]
         drawn = None
     else:
-        curves = [resampled_means(part.of(policies) * side) for part, side in zip(parts, better, strict=True)]
+        curves = [
+            resampled_means(part.of(policies) * side, part.confidence) for part, side in zip(parts, better, strict=True)
+        ]
         found = [_by_means(means, part.tie_margins) for (means, _), part in zip(curves, parts, strict=True)]
         drawn = [_by_means(means, part.tie_margins) for (_, means), part in zip(curves, parts, strict=True)]
     n_ordered, n_pairs = int((found[0] * found[1] != 0.0).sum()), found[0].size

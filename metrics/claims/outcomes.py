@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import check_option
-from ..curves import FloatArray
-from .panel import LEAST_RUNS, MANY, Panel, Rule, bounds
+from .panel import LEAST_RUNS, MANY, Panel, Rule
 
 Answer: TypeAlias = Literal["supported", "contradicted", "tie", "too vague", "undecided", "no scores"]
 """`tie`: the claim says that there is a difference, and what it compares ties. `too vague`: its text alone leaves open
 what would speak against it, and no run is looked at. `undecided`: the runs leave it open. `no scores`: there was
 nothing to judge, because runs are missing or a measure has no finite value."""
+DECIDED: tuple[Answer, ...] = ("supported", "contradicted", "tie")
+"""Answers that runs give."""
 BoolArray: TypeAlias = NDArray[np.bool_]
 
 
@@ -80,13 +81,8 @@ def where_scored(panel: Panel, policies: Sequence[str], rule: Rule, judge: Calla
     return replace(outcome, why=f"{outcome.why}; {n_out} of {panel.levels.size} levels left out: too few scores")
 
 
-def against_limit(resampled: FloatArray, limit: float) -> Answer:
-    """Return whether the interval of a resampled number is at or below a limit (supported) or above (contradicted)."""
-    return within_limit(bounds(resampled), limit)
-
-
 def within_limit(interval: tuple[float, float], limit: float) -> Answer:
-    """The same of the bounds themselves."""
+    """Return whether an interval is at or below a limit (supported) or above (contradicted)."""
     lower, upper = interval
     return "supported" if upper <= limit else "contradicted" if lower > limit else "undecided"
 

@@ -1,7 +1,7 @@
 """A figure as numbers, and the two rules by which the heights of two curves in it are told apart."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, TypeAlias
 
@@ -19,6 +19,8 @@ tie where two one-sided tests find it within the margin of the panel (Schuirmann
 leaves out zero, and else it is open which."""
 Levels: TypeAlias = Literal["all", "low", "high"]
 """All levels of a panel, or its lower or upper half; of an odd number the middle one is in neither half."""
+Looks: TypeAlias = tuple[int, ...]
+"""Numbers of runs, rising."""
 
 TIE = 0.1
 """Margin of a tie, as a share of the scale, where a panel has none of its own (our choice: what looks alike in a
@@ -57,6 +59,12 @@ class Panel:
     """Policy -> scores without any disturbance, (R,), which are no level here; see `shapes.from_undisturbed`."""
     unit: float | None = None
     """What shares are shares of, such as 1 for scalability. None: the `scale` of the scores."""
+    looks: Looks = ()
+    """Numbers of runs after which the scores are looked at (`looks`); empty: once, when all runs are there."""
+    reached: Mapping[str, int] = field(default_factory=dict[str, int])
+    """Where `looks` are several, policy -> the last one that its runs have reached; 0 before the first."""
+    confidence: float = CONFIDENCE
+    """Of intervals; of scores that are looked at several times that of one look."""
 
     def __post_init__(self) -> None:
         levels = np.asarray(self.levels, dtype=np.float64)
@@ -119,17 +127,15 @@ class Panel:
 
     def at(self, kept: NDArray[np.bool_]) -> "Panel":
         """Return the panel with the levels of a mask, (L,); its scale stays that of the whole."""
-        return Panel(
-            levels=self.levels[kept],
-            scores={name: values[kept] for name, values in self.scores.items()},
-            margins=self.tie_margins[kept],
-            unit=self.scale,
-        )
+        scores = {name: values[kept] for name, values in self.scores.items()}
+        margins, unit = self.tie_margins[kept], self.scale
+        return replace(self, levels=self.levels[kept], scores=scores, margins=margins, unit=unit, undisturbed=None)
 
     def reduced(self, scores: Mapping[str, FloatArray]) -> "Panel":
         """Return a panel of one level, the last, with other scores, (R,) per policy, and the mean margin."""
         rows = {name: values[None] for name, values in scores.items()}
-        return Panel(levels=self.levels[-1:], scores=rows, margins=self.tie_margins.mean(keepdims=True))
+        margins = self.tie_margins.mean(keepdims=True)
+        return replace(self, levels=self.levels[-1:], scores=rows, margins=margins, unit=None, undisturbed=None)
 
     def runs_at_levels(self, policies: Iterable[str]) -> NDArray[np.int64]:
         """Return the number of runs with a score at each level, of the policy that has fewest of these, (L,)."""
@@ -171,15 +177,19 @@ def std_over_runs(values: FloatArray) -> FloatArray:
         return np.sqrt(squares.sum(axis=-1) / (known.sum(axis=-1) - 1.0))
 
 
-def widening(n_runs: NDArray[np.int64]) -> FloatArray:
+def widening(n_runs: NDArray[np.int64], confidence: float = CONFIDENCE) -> FloatArray:
     """Factor by which the mean of resampled runs has to vary more, so that its percentile interval is Student's.
 
     The mean of n resampled runs varies by sqrt((n - 1) / n) too little, and its percentiles take the standard deviation
     of a few runs for the true one: with four runs the factor is 1.87, with sixteen 1.12.
+
+    Args:
+        n_runs: Of each mean.
+        confidence: Of Student's interval; percentiles are always at `CONFIDENCE`, and a thousand draws suffice.
     """
-    tail = 0.5 + 0.5 * CONFIDENCE
     with np.errstate(divide="ignore", invalid="ignore"):  # a single run
-        return stdtrit(n_runs - 1.0, tail) / ndtri(tail) * np.sqrt(n_runs / (n_runs - 1.0))
+        students = stdtrit(n_runs - 1.0, 0.5 + 0.5 * confidence)
+        return students / ndtri(0.5 + 0.5 * CONFIDENCE) * np.sqrt(n_runs / (n_runs - 1.0))
 
 
 def complete_runs(values: FloatArray) -> FloatArray:
@@ -208,16 +218,16 @@ def resampled_runs(values: FloatArray) -> FloatArray:
     return drawn
 
 
-def resampled_means(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def resampled_means(values: FloatArray, confidence: float = CONFIDENCE) -> tuple[FloatArray, FloatArray]:
     """Return the means of scores (..., L, R) over runs, (..., L), and those of resampled runs, (N_RESAMPLES, ..., L).
 
     The latter are moved away from the former by `widening`.
     """
     complete = complete_runs(values)
-    return _widened(values, mean_over_runs(complete), mean_over_runs(resampled_runs(values)))
+    return _widened(values, mean_over_runs(complete), mean_over_runs(resampled_runs(values)), confidence)
 
 
-def resampled_deviations(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def resampled_deviations(values: FloatArray, confidence: float = CONFIDENCE) -> tuple[FloatArray, FloatArray]:
     """Return the same for standard deviations, made right on average.
 
     That of four normal numbers is 8 % too small on average, and that of n resampled ones another sqrt((n - 1) / n).
@@ -229,13 +239,15 @@ def resampled_deviations(values: FloatArray) -> tuple[FloatArray, FloatArray]:
     with np.errstate(divide="ignore", invalid="ignore"):  # a single run has no deviation
         share = np.sqrt(2.0 / (n_runs - 1.0)) * np.exp(gammaln(0.5 * n_runs) - gammaln(0.5 * n_runs - 0.5))
         drawn = std_over_runs(resampled_runs(values)) * np.sqrt(n_runs / (n_runs - 1.0)) / share
-    found, widened = _widened(values, std_over_runs(complete) / share, drawn)
+    found, widened = _widened(values, std_over_runs(complete) / share, drawn, confidence)
     return found, 2.0 * found - widened
 
 
-def _widened(values: FloatArray, found: FloatArray, drawn: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _widened(
+    values: FloatArray, found: FloatArray, drawn: FloatArray, confidence: float
+) -> tuple[FloatArray, FloatArray]:
     n_runs = np.isfinite(complete_runs(values)).sum(axis=-1)
-    return found, found + widening(n_runs) * (drawn - found)
+    return found, found + widening(n_runs, confidence) * (drawn - found)
 
 
 def bounds(resampled: FloatArray) -> tuple[float, float]:
@@ -244,7 +256,7 @@ def bounds(resampled: FloatArray) -> tuple[float, float]:
     return float(lower), float(upper)
 
 
-def signs(panel: Panel, first: str, second: str, rule: Rule, confidence: float = CONFIDENCE) -> FloatArray:
+def signs(panel: Panel, first: str, second: str, rule: Rule, n_tests: int = 1) -> FloatArray:
     """Which of two policies is higher at each level: 1 the first, -1 the second, 0 a tie, NaN open; (L,).
 
     Args:
@@ -252,7 +264,7 @@ def signs(panel: Panel, first: str, second: str, rule: Rule, confidence: float =
         first: One policy.
         second: The other.
         rule: How they are told apart.
-        confidence: Of intervals that leave out zero; ties are always tested at `CONFIDENCE`.
+        n_tests: Of how many tests one alone must not be wrong by chance (Bonferroni); ties are not corrected by it.
 
     Raises:
         CurveError: A policy without scores.
@@ -265,7 +277,7 @@ def signs(panel: Panel, first: str, second: str, rule: Rule, confidence: float =
         reach = 2.0 * (std_over_runs(a) + std_over_runs(b))
         return np.where(np.isnan(gap + reach), np.nan, np.sign(gap) * (np.abs(gap) > reach))
     found = [
-        _sign(of_a[np.isfinite(of_a)], of_b[np.isfinite(of_b)], margin, confidence)
+        _sign(of_a[np.isfinite(of_a)], of_b[np.isfinite(of_b)], margin, 1.0 - panel.confidence, n_tests)
         for of_a, of_b, margin in zip(a, b, panel.tie_margins, strict=True)
     ]
     return np.array(found)
@@ -294,11 +306,11 @@ def interval_of(first: FloatArray, second: FloatArray, confidence: float = CONFI
     return gap - half, gap + half
 
 
-def _sign(first: FloatArray, second: FloatArray, margin: float, confidence: float) -> float:
+def _sign(first: FloatArray, second: FloatArray, margin: float, alpha: float, n_tests: int) -> float:
     """Sign of the difference of two means, by the rule `intervals`; NaN where it is open."""
     # Two one-sided tests at 5 % each are an interval at 90 %.
-    lower, upper = interval_of(first, second, 2.0 * CONFIDENCE - 1.0)
+    lower, upper = interval_of(first, second, 1.0 - 2.0 * alpha)
     if -margin <= lower and upper <= margin:
         return 0.0
-    lower, upper = interval_of(first, second, confidence)
+    lower, upper = interval_of(first, second, 1.0 - alpha / n_tests)
     return 1.0 if lower > 0.0 else -1.0 if upper < 0.0 else np.nan

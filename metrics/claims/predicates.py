@@ -17,7 +17,6 @@ from .outcomes import (
     Answer,
     BoolArray,
     Outcome,
-    against_limit,
     all_of,
     by_majority,
     contrary,
@@ -87,8 +86,8 @@ def never_differ(panel: Panel, *, pairs: Pairs, n_panels: int = 1, rule: Rule = 
     names = sorted({name for pair in pairs for name in pair})
     if not panel.n_runs(names):
         return without_scores(" and ".join(names))
-    confidence = 1.0 - (1.0 - CONFIDENCE) / (len(pairs) * panel.levels.size * n_panels)
-    found = np.array([signs(panel, first, second, rule, confidence) for first, second in pairs])
+    n_tests = len(pairs) * panel.levels.size * n_panels
+    found = np.array([signs(panel, first, second, rule, n_tests) for first, second in pairs])
     n_tied, n_apart = int((found == 0.0).sum()), int((np.abs(found) == 1.0).sum())
     answer: Answer = "contradicted" if n_apart else "supported" if n_tied == found.size else "undecided"
     why = f"{n_apart} of {found.size} comparisons differ, {n_tied} tie, {found.size - n_apart - n_tied} open"
@@ -173,7 +172,8 @@ def _leads(panel: Panel, leader: str, other: str, rule: Rule) -> FloatArray:
     """Bounds of the lead at each level, (L, 2): NaN where there are too few runs."""
     a, b = panel.of((leader, other))
     if rule == "intervals":
-        return np.array([interval_of(x[np.isfinite(x)], y[np.isfinite(y)]) for x, y in zip(a, b, strict=True)])
+        known = ((x[np.isfinite(x)], y[np.isfinite(y)]) for x, y in zip(a, b, strict=True))
+        return np.array([interval_of(x, y, panel.confidence) for x, y in known])
     gap = mean_over_runs(a) - mean_over_runs(b)
     apart = signs(panel, leader, other, rule)
     return np.stack([np.where(apart > 0.0, gap, -np.inf), np.where(apart < 0.0, gap, np.maximum(gap, 0.0))], axis=1)
@@ -267,7 +267,7 @@ def differs_more(few: Panel, many: Panel, *, pairs: Pairs, rule: Rule = "interva
         clarities = [_clarity(panel, pairs) for panel in equal]
         shares, deviations = zip(*clarities, strict=True)
         gain, words = shares[1] - shares[0], "clear are the differences"
-        half = float(stdtrit(n_runs - 1.0, 0.5 + 0.5 * CONFIDENCE) * np.hypot(*deviations))
+        half = float(stdtrit(n_runs - 1.0, 0.5 + 0.5 * few.confidence) * np.hypot(*deviations))
         answer = "supported" if gain > half else "contradicted" if gain + half < MORE else "undecided"
         ends = f", {gain:.0%} more ({gain - half:.0%} to {gain + half:.0%})"
     why = (
@@ -315,7 +315,7 @@ def every_pair(policies: Sequence[str]) -> Pairs:
 def _constancy(panel: Panel, policy: str, rule: Rule) -> Outcome:
     def judge(part: Panel) -> Outcome:
         (values,) = part.of((policy,))
-        means, drawn = resampled_means(values)
+        means, drawn = resampled_means(values, part.confidence)
         spread, n_runs = float(np.ptp(means)) / part.scale, part.n_runs((policy,))
         if rule == "bands":
             reach = 2.0 * std_over_runs(values)
@@ -336,24 +336,23 @@ def _constancy(panel: Panel, policy: str, rule: Rule) -> Outcome:
 def _narrowness(panel: Panel, policy: str, rule: Rule) -> Outcome:
     def judge(part: Panel) -> Outcome:
         (values,) = part.of((policy,))
-        found, drawn = resampled_deviations(values)
+        found, drawn = resampled_deviations(values, part.confidence)
         width, n_runs = 4.0 * float(found.mean()) / part.scale, part.n_runs((policy,))
         if rule == "bands":
             widths = 4.0 * std_over_runs(values) / part.scale
             answer: Answer = "supported" if (widths <= FLAT).mean() > MANY else "contradicted"
             why = f"bands of {policy} are at most {FLAT:g} of the scale wide at {(widths <= FLAT).mean():.0%} of levels"
             return Outcome(answer=answer, statistic=width, effect=width, n_runs=n_runs, why=why)
-        of_draws = 4.0 * drawn.mean(axis=-1) / part.scale
-        interval = bounds(of_draws)
+        interval = bounds(4.0 * drawn.mean(axis=-1) / part.scale)
         why = f"bands of {policy} are {width:.2f} of the scale wide ({_ends(interval)}); {FLAT:g} is still narrow"
-        return Outcome(answer=against_limit(of_draws, FLAT), statistic=width, effect=width, n_runs=n_runs, why=why)
+        return Outcome(answer=within_limit(interval, FLAT), statistic=width, effect=width, n_runs=n_runs, why=why)
 
     return where_scored(panel, (policy,), rule, judge)
 
 
 def _more_scatter(panel: Panel, first: str, second: str, rule: Rule) -> Outcome:
     def judge(part: Panel) -> Outcome:
-        found, drawn = resampled_deviations(part.of((first, second)))
+        found, drawn = resampled_deviations(part.of((first, second)), part.confidence)
         if rule == "bands":
             wider, narrower = found[0] >= WIDER * found[1], found[1] >= WIDER * found[0]
             what = f"levels have the band of {first} {WIDER:g} times as wide as that of {second}"
@@ -366,7 +365,8 @@ def _more_scatter(panel: Panel, first: str, second: str, rule: Rule) -> Outcome:
 def _higher_edge(panel: Panel, first: str, second: str, rule: Rule) -> Outcome:
     def judge(part: Panel) -> Outcome:
         both = part.of((first, second))
-        (means, drawn_means), (widths, drawn_widths) = resampled_means(both), resampled_deviations(both)
+        means, drawn_means = resampled_means(both, part.confidence)
+        widths, drawn_widths = resampled_deviations(both, part.confidence)
         edges = means + 2.0 * widths
         if rule == "bands":
             gap, limit = edges[0] - edges[1], TIE * part.scale

@@ -65,7 +65,9 @@ def from_undisturbed(panel: Panel) -> Panel:
         return panel
     scores = {name: np.vstack([panel.undisturbed[name], values]) for name, values in panel.scores.items()}
     margins = np.concatenate([panel.tie_margins[:1], panel.tie_margins])
-    return Panel(levels=np.concatenate([[0.0], panel.levels]), scores=scores, margins=margins, unit=panel.unit)
+    return replace(
+        panel, levels=np.concatenate([[0.0], panel.levels]), scores=scores, margins=margins, undisturbed=None
+    )
 
 
 def changes_within(
@@ -156,7 +158,7 @@ class _Bends:
 
 def _bends(panel: Panel, policy: str) -> _Bends:
     (values,) = panel.of((policy,))
-    means, drawn = resampled_means(values)
+    means, drawn = resampled_means(values, panel.confidence)
     unit = (panel.levels[-1] - panel.levels[0]) / panel.scale
     _, change = broken_line(panel.levels, means[None])
     places, _ = broken_line(panel.levels, drawn)
@@ -266,7 +268,7 @@ def _earlier(panel: Panel, first: str, second: str, rule: Rule) -> Outcome:
 def _straightness(panel: Panel, policy: str, rule: Rule) -> Outcome:
     def judge(part: Panel) -> Outcome:
         (values,) = part.of((policy,))
-        means, drawn = resampled_means(values)
+        means, drawn = resampled_means(values, part.confidence)
         rest, total, rise = (float(one[0]) for one in _line(part.levels, means[None]))
         explained = 1.0 - rest / total if total > 0.0 else 0.0
         rise, n_runs = rise / part.scale, part.n_runs((policy,))

@@ -24,6 +24,7 @@ from .study_plots import PlottedStudy, StudyFigure, draw_figure, draw_map, plot,
 from .study_report import StudyReport, report
 from .study_verdict import Judged, StudyVerdict, Waiting, judge_claims, verdict
 from .summary import RunQuestion, RunSummary, run_question, summarize_runs
+from .until_decided import Outlook, run_until_decided
 
 __all__ = [
     "score_policy",
@@ -48,6 +49,7 @@ __all__ = [
     "diff",
     "plot",
     "report",
+    "run_until_decided",
     "draw_scores",
     "predict_policy",
     "predict_curves",
@@ -71,6 +73,7 @@ __all__ = [
     "StudyDiff",
     "PlottedStudy",
     "StudyReport",
+    "Outlook",
     "Judged",
     "Waiting",
     "Performance",

@@ -3,8 +3,9 @@
 Run records of `swarm_forage_env` and curves from other sources share the names of columns.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import takewhile
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -23,13 +24,14 @@ from swarm_forage_env.studies.study import value_words
 from swarm_forage_env.wrappers.world import SIZE, UNDISTURBED, World
 
 from ..checks import CurveError
+from ..claims.looks import last_look
 from ..curves import FloatArray
 from ..queues import PopulationRates
 
 if TYPE_CHECKING:
     import polars as pl
 
-    from swarm_forage_env.studies.study import Place, Value
+    from swarm_forage_env.studies.study import Place, StudySpec, Value
     from swarm_forage_env.studies.study_table import StudyTable
 
 DELIVERIES = performance_of("collected")
@@ -360,7 +362,8 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
     """Return the lines of a study, in the order of its conditions.
 
     Args:
-        table: From `swarm_forage_env.read_study`. Failed and missing runs count as planned and lost.
+        table: From `swarm_forage_env.read_study`. Failed and missing runs count as planned and lost. Of a study that is
+            looked at several times, lines have the runs up to their last look.
         performance: What P(N, t) is, by a name as in `score_policy`; default that of the scenario.
 
     Raises:
@@ -377,6 +380,10 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
         first = places[0]
         read_as = performance_of(performance or spec.world(first).scenario.performance)
         runs = [(spec.world(place), _place_curves(table, place, performance)) for place in places]
+        n_planned = len(spec.seeds)
+        if spec.looks:
+            n_planned = runs_looked_at(spec, [seeds for _, (seeds, _) in runs])
+            runs = [(world, _first(curves, n_planned)) for world, curves in runs]
         lines.append(
             StudyLine(
                 rules=first.rules,
@@ -386,7 +393,7 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
                 places=tuple(places),
                 curves=curves_in_worlds(
                     runs,
-                    len(spec.seeds),
+                    n_planned,
                     controller=first.policy,
                     read_as=read_as,
                     reference_value=_reference_value(table, places),
@@ -395,6 +402,18 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
             )
         )
     return tuple(lines)
+
+
+def runs_looked_at(spec: "StudySpec", done: "Iterable[Collection[int]]") -> int:
+    """Return after how many runs the conditions of a line were looked at last, from the seeds that each has done."""
+    everywhere = set(spec.seeds).intersection(*done)
+    leading = len(list(takewhile(everywhere.__contains__, sorted(spec.seeds))))
+    return last_look(spec.looks, leading)
+
+
+def _first(curves: Curves, n_runs: int) -> Curves:
+    seeds, columns = curves
+    return seeds[:n_runs], {name: values[:n_runs] for name, values in columns.items()}
 
 
 def _place_curves(table: "StudyTable", place: "Place", performance: str | None) -> Curves:

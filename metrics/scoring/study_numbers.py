@@ -5,7 +5,7 @@ A panel has the scores of every run. It is drawn as it is, and the claims of the
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -18,7 +18,7 @@ from ..catalog import METRICS
 from ..checks import CurveError
 from ..claims import Panel, PanelName
 from ..claims.checking import DISTANCES
-from ..claims.panel import TIE
+from ..claims.panel import TIE, Looks
 from ..curves import FloatArray, Form, Variant
 from ..distributions import interquartile_mean, probability_of_improvement
 from ..significance import SIGNIFICANT, holm, paired_p
@@ -118,6 +118,10 @@ class StudyPanel:
     """For distances, policy -> distances between undisturbed runs, (R,)."""
     departures: FloatArray | None = None
     """Of a changing population, robots that die or fail per 1,000 s at each level, (L,)."""
+    looks: Looks = ()
+    """Of the study: after how many runs it is looked at; empty if once."""
+    reached: Mapping[str, int] = field(default_factory=dict[str, int])
+    """Policy -> the last look that its runs have reached."""
 
     @property
     def drawn_at(self) -> FloatArray:
@@ -158,18 +162,20 @@ class StudyPanel:
         """
         measure, n_levels = METRICS[self.measure], len(self.levels)
         total = self.compared_with
+        panel = Panel(levels=self.levels, scores=self.scores, looks=self.looks, reached=self.reached)
         if self.measure == "scalability":
-            return Panel(levels=self.levels, scores=self.scores, margins=np.full(n_levels, TIE), unit=1.0)
+            return replace(panel, margins=np.full(n_levels, TIE), unit=1.0)
         if (measure.lowest, measure.highest) == (0.0, 1.0):
-            return Panel(levels=self.levels, scores=self.scores, margins=np.full(n_levels, TIE_OF_FRACTIONS), unit=1.0)
+            return replace(panel, margins=np.full(n_levels, TIE_OF_FRACTIONS), unit=1.0)
         shown = self.name if name is None else name
         floors = None if shown.of_mean_curves else self.floors or None  # undisturbed runs have no second mean curve
         margins = TIE * total if total is not None and bool((total > 0.0).all()) else None
         if shown.is_relative:
             margins = np.full(n_levels, TIE)
             if floors is not None and total is not None:
-                floors = {policy: floor / total[0] for policy, floor in floors.items()}
-        return Panel(levels=self.levels, scores=self.scores_of(shown), margins=margins, undisturbed=floors)
+                with np.errstate(divide="ignore", invalid="ignore"):  # where nothing was delivered there are no shares
+                    floors = {policy: floor / total[0] for policy, floor in floors.items()}
+        return replace(panel, scores=self.scores_of(shown), margins=margins, undisturbed=floors)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -209,6 +215,8 @@ def study_panels(
     missing: dict[tuple[str, str], str] = {}
     is_scored = bool(table.spec.axes) and table.spec.axes[-1].is_criterion
     for together in lines.values() if is_scored else ():
+        looked = {line.policy: len(line.curves.experiments[0].seeds) for line in together}
+        about = {"looks": table.spec.looks, "reached": looked if table.spec.looks else {}}
         for variant in variants:
             for measure, form in _measures_in(measures, variant, together[0].curves):
                 found: dict[str, tuple[Score, ...]] = {}
@@ -218,7 +226,7 @@ def study_panels(
                     if why:
                         missing[label_of(measure, "corrected", form), variant] = why
                 if any(found.values()):
-                    panels.append(_score_panel(table, together[0], variant, form, found))
+                    panels.append(replace(_score_panel(table, together[0], variant, form, found), **about))
     if not panels and "raw_performance" in measures:
         panels = _performance_panels(table, list(lines.values()))
     return StudyPanels(panels=tuple(panels), missing=missing)

@@ -161,7 +161,7 @@ def report(*tables: "StudyTable", band: Band = "ci", tell: Callable[[str], None]
     """
     checked_band(band)
     scored = scored_studies(tables, tell=tell)
-    about = [pair for pair in zip(tables, scored, strict=True) if not why_no_claims(pair[0])]
+    about = [pair for pair in zip(tables, scored, strict=True) if not why_no_claims(pair[0].spec)]
     sets, panels = [table for table, _ in about], [panels for _, panels in about]
     found = verdict_of(sets, panels) if about else StudyVerdict(tables=())
     try:

@@ -21,6 +21,7 @@ from .scores import label_of
 from .study_numbers import StudyPanel, StudyPanels, study_panels
 
 if TYPE_CHECKING:
+    from swarm_forage_env.studies.study import StudySpec
     from swarm_forage_env.studies.study_table import StudyTable
 
 VARIANTS: tuple[Variant, ...] = ("corrected", "paper", "sierra")
@@ -90,16 +91,16 @@ class Waiting:
         }
 
 
-def why_no_claims(table: "StudyTable") -> str:
+def why_no_claims(spec: "StudySpec") -> str:
     """Return why the claims cannot be held against a study; empty if they can."""
-    name = table.spec.name
+    name = spec.name
     if not claims_of(name):
         sets = {name.split()[0] for claim in CLAIMS.values() for name, *_ in claim.panels}
         return (
             f"Expected studies of the paper's sets, {', '.join(sorted(sets))}, which its claims are about; got study "
             f"{name!r}."
         )
-    absent = [label for label in POLICIES if label not in {policy.label for policy in table.spec.policies}]
+    absent = [label for label in POLICIES if label not in {policy.label for policy in spec.policies}]
     if absent:
         return (
             f"Expected the policies {', '.join(POLICIES)} in study {name}, which the claims of the paper are about; "
@@ -132,7 +133,7 @@ def judge_claims(
     under = [f"{table.spec.name} ({rules})" for table in tables for rules in table.spec.rules]
     if len(set(under)) < len(under):
         raise CurveError(f"Expected each study once under the same rules, got {', '.join(under)}.")
-    for reason in filter(None, map(why_no_claims, tables)):
+    for reason in filter(None, (why_no_claims(table.spec) for table in tables)):
         raise CurveError(reason)
     found = _Found(
         panels={(panel.rules, panel.variant, panel.name): panel for one in scored for panel in one.panels},
@@ -239,7 +240,15 @@ class StudyVerdict(Answer):
     def remarks(self) -> tuple[str, ...]:
         """What to know of the studies."""
         others = [table.spec.name for table in self.tables if not is_set_of_paper(table.spec)]
-        return tuple(f"{name} has the name of one of the paper's sets and other settings" for name in others)
+        remarks = [f"{name} has the name of one of the paper's sets and other settings" for name in others]
+        several = [table.spec for table in self.tables if table.spec.looks]
+        for looks in dict.fromkeys(spec.looks for spec in several):
+            names = ", ".join(spec.name for spec in several if spec.looks == looks)
+            remarks.append(
+                f"{names}: looked at after {', '.join(map(str, looks))} runs until claims are decided; intervals are "
+                "wider, so that all looks together are wrong once in twenty"
+            )
+        return tuple(remarks)
 
     def sheets(self) -> Sequence[Sheet]:
         """Return how many have which answer, all claims at a glance, what is behind each answer, and what waits."""
@@ -309,7 +318,7 @@ def verdict(*tables: "StudyTable", tell: Callable[[str], None] | None = None) ->
     Raises:
         CurveError: as in `judge_claims`.
     """
-    refused = [why for table in tables if (why := why_no_claims(table))]
+    refused = [why for table in tables if (why := why_no_claims(table.spec))]
     if refused:
         raise CurveError(f"{refused[0]} 'swarm-forage study plot' and 'report' take any study.")
     return verdict_of(tables, scored_studies(tables, tell=tell))

@@ -11,6 +11,8 @@ from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, Band, DryRun, Job
 from swarm_forage_env.cli.signals import EXIT_INTERRUPTED
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from swarm_forage_env.runs.plan_summary import PlanSummary
     from swarm_forage_env.studies.study import StudySpec
     from swarm_forage_env.studies.study_folder import StudyFolder
@@ -48,11 +50,29 @@ def show(
 
 
 def run(  # long: one parameter per option
-    name: Name,
+    names: Annotated[
+        list[str], typer.Argument(metavar="NAME|FILE...", help="Sets of the paper (S1a to S2d), or study files.")
+    ],
     budget: Budget = None,
-    out: Annotated[Path | None, typer.Option("--out", help="Folder; default results/studies/NAME_BUDGET.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", help="Folder; default results/studies/NAME_BUDGET. Of several studies the folder around theirs."
+        ),
+    ] = None,
     seeds: Seeds = None,
     rules: Rules = "file",
+    until_decided: Annotated[
+        bool,
+        typer.Option(
+            "--until-decided",
+            help="Judge the paper's claims again and again, and run what decides most for least (docs/studies.md). "
+            "--seeds is the most runs per condition, default 192.",
+        ),
+    ] = False,
+    hours: Annotated[
+        float | None, typer.Option("--hours", min=0.0, help="With --until-decided: how long, by the clock.")
+    ] = None,
     shard: Annotated[str, typer.Option("--shard", metavar="I/N", help="Only the I-th of N equal parts.")] = "1/1",
     jobs: Jobs = None,
     cluster: Annotated[
@@ -65,34 +85,91 @@ def run(  # long: one parameter per option
     ] = None,
     dry_run: DryRun = False,
 ) -> None:
-    """Run what is missing of a study, and pack its runs into one file.
+    """Run what is missing of studies, and pack the runs of each into one file.
 
     Finished runs are kept: after Ctrl-C, or with more seeds, the same command does the rest.
     """
-    from swarm_forage_env.cli.printer import notes
     from swarm_forage_env.runs.cluster import cluster_executor
-    from swarm_forage_env.runs.store import FAILED
-    from swarm_forage_env.studies.description import StudyOutcome
-    from swarm_forage_env.studies.study_folder import StudyFolder, parse_shard, run_study
+    from swarm_forage_env.studies.study_folder import StudyFolder, parse_shard
 
-    spec = _chosen(name, budget, seeds, rules)
+    specs = [_chosen(name, budget, None if until_decided else seeds, rules) for name in names]
     part = parse_shard(shard)
-    folder = StudyFolder(out or Path("results", "studies", f"{spec.name}_{spec.budget}"))
-    if dry_run:
-        typer.echo(_summary(spec, folder, part, jobs))
+    places = [_folder(spec, out, is_one=len(specs) == 1) for spec in specs]
+    studies = [(spec, StudyFolder(place)) for spec, place in zip(specs, places, strict=True)]
+    _check_until_decided(until_decided, hours, part, dry_run)
+    if dry_run and not until_decided:
+        typer.echo("\n\n".join(str(_summary(spec, folder, part, jobs)) for spec, folder in studies))
         return
     try:
-        with nullcontext() if cluster is None else cluster_executor(cluster, jobs) as executor:
-            state = run_study(spec, folder, part=part, jobs=jobs, executor=executor, progress=True)
+        with nullcontext() if cluster is None or dry_run else cluster_executor(cluster, jobs) as executor:
+            if until_decided:
+                _run_until_decided(studies, seeds, 0.0 if dry_run else hours or 0.0, jobs, executor)
+                n_failed = 0
+            else:
+                n_failed = sum(_run_all(spec, folder, part, jobs, executor) for spec, folder in studies)
     except KeyboardInterrupt:
-        words = f"Interrupted. Finished runs are kept in {folder.folder}; the same command does the rest."
+        kept = ", ".join(str(folder.folder) for _, folder in studies)
+        words = f"Interrupted. Finished runs are kept in {kept}; the same command does the rest."
         raise typer.Exit(complain(words, EXIT_INTERRUPTED)) from None
-    if part == (1, 1):
-        packed = _pack(folder.folder, None)
-        notes().print(f"packed into {packed}")
-    typer.echo(StudyOutcome(outcomes=state, folder=folder))
-    if state.count(FAILED):
+    if n_failed:
         raise typer.Exit(EXIT_FAILURE)
+
+
+def _folder(spec: "StudySpec", out: Path | None, *, is_one: bool) -> Path:
+    own = f"{spec.name}_{spec.budget}"
+    return Path("results", "studies", own) if out is None else out if is_one else out / own
+
+
+def _check_until_decided(until_decided: bool, hours: float | None, part: tuple[int, int], dry_run: bool) -> None:
+    from swarm_forage_env._internal.fields import ConfigError
+
+    if hours is not None and not until_decided:
+        raise ConfigError("Expected --hours with --until-decided only.")
+    if until_decided and hours is None and not dry_run:
+        raise ConfigError("Expected --hours with --until-decided, such as --hours 6.")
+    if until_decided and part != (1, 1):
+        raise ConfigError("Expected no --shard with --until-decided: which runs come next depends on all others.")
+
+
+def _run_all(
+    spec: "StudySpec", folder: "StudyFolder", part: tuple[int, int], jobs: int | None, executor: "Executor | None"
+) -> int:
+    """Run what is missing of a study, and return how many runs failed."""
+    from swarm_forage_env.cli.printer import notes
+    from swarm_forage_env.runs.store import FAILED
+    from swarm_forage_env.studies.description import StudyOutcome
+    from swarm_forage_env.studies.study_folder import run_study
+
+    state = run_study(spec, folder, part=part, jobs=jobs, executor=executor, progress=True)
+    if part == (1, 1):
+        notes().print(f"packed into {_pack(folder.folder, None)}")
+    typer.echo(StudyOutcome(outcomes=state, folder=folder))
+    return state.count(FAILED)
+
+
+def _run_until_decided(
+    studies: "list[tuple[StudySpec, StudyFolder]]",
+    seeds: int | None,
+    hours: float,
+    jobs: int | None,
+    executor: "Executor | None",
+) -> None:
+    from metrics.claims.looks import LOOKS, looks_up_to
+    from metrics.scoring import run_until_decided
+    from swarm_forage_env.cli.printer import notes
+
+    outlook = run_until_decided(
+        studies,
+        hours=hours,
+        looks=looks_up_to(seeds or LOOKS[-1]),
+        jobs=jobs,
+        executor=executor,
+        progress=True,
+        tell=notes().print,
+    )
+    for _, folder in studies if hours > 0.0 else ():
+        notes().print(f"packed into {_pack(folder.folder, None)}")
+    typer.echo(outlook)
 
 
 def _summary(spec: "StudySpec", folder: "StudyFolder", part: tuple[int, int], jobs: int | None) -> "PlanSummary":

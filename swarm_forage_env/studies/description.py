@@ -139,6 +139,8 @@ class StudyStatus(Answer):
         spec, versions, states = self.table.spec, self.table.versions, self.table.place_states()
         left = [state for state in states if not state.is_complete]
         lines = [f"{len(states) - len(left):,} of {counted(len(states), 'condition')} complete"]
+        if spec.looks:
+            lines.append(f"Runs are made until claims are decided, looks after {', '.join(map(str, spec.looks))}.")
         if len(versions) > 1:
             lines.append(f"The runs were made by {len(versions)} versions or commits of the packages.")
         sheets = [Sheet(title=self.headline, notes=lines)]

@@ -178,6 +178,9 @@ class StudySpec:
     interval_s: float
     file: str = field(default="", compare=False)
     """Path of the study file as it was given; empty for the paper's sets, and for studies made in Python."""
+    looks: tuple[int, ...] = ()
+    """Numbers of runs of a condition after which claims are judged, while more are being made; empty: once, at the end.
+    Whoever judges takes the same first runs, and corrects for looking several times."""
 
     def __post_init__(self) -> None:
         check_file_name("name of a study", self.name)
@@ -200,6 +203,10 @@ class StudySpec:
         ):
             if len(set(names)) < len(names):
                 raise ConfigError(f"Expected different {what} in study {self.name}, got {', '.join(map(str, names))}.")
+        for looked in self.looks:
+            whole("looks", looked, at_least=1)
+        if list(self.looks) != sorted(set(self.looks)):
+            raise ConfigError(f"Expected looks as rising numbers of runs, got {list(self.looks)}.")
         if {SIZE, "n_robots"} <= {axis.name for axis in self.axes}:
             raise ConfigError(f"Expected one axis for the swarm size, got {SIZE} and n_robots.")
         if self.reference is not None and (not self.axes or self.reference not in self.axes[-1].values):
@@ -273,7 +280,7 @@ class StudySpec:
     def study_id(self) -> str:
         """Short hexadecimal hash of all that decides which runs there are and how they are addressed."""
         mapping = self.to_mapping()
-        for told in ("title", "budget", "file"):
+        for told in ("title", "budget", "file", "looks"):
             mapping.pop(told, None)
         return identity_of(mapping)
 
@@ -294,6 +301,7 @@ class StudySpec:
             "horizon_s": self.horizon_s,
             "interval_s": self.interval_s,
             **({"file": self.file} if self.file else {}),
+            **({"looks": list(self.looks)} if self.looks else {}),
         }
 
     @classmethod
@@ -319,7 +327,7 @@ class StudySpec:
         """
         own = [_STORED.get(item.name, item.name) for item in fields(cls)]
         known_keys(table("a study", mapping), own, "key of a study")
-        missing = [key for key in own if key not in mapping and key != "file"]
+        missing = [key for key in own if key not in mapping and key not in ("file", "looks")]
         if missing:
             raise ConfigError(f"Missing key {missing[0]!r} of a study.")
         values: dict[str, Any] = dict(mapping)
@@ -333,6 +341,7 @@ class StudySpec:
         values["wrappers"] = wrappers_from_list(values["wrappers"])
         values["settings"] = plain_settings(values["settings"])
         values["seeds"] = tuple(values["seeds"])
+        values["looks"] = tuple(values.get("looks", ()))
         values["rules"] = tuple(values.pop(_STORED["rules"]))
         return cls(**values)
 

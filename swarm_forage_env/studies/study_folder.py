@@ -84,9 +84,10 @@ class StudyFolder:
                 spec,
                 seeds=tuple(sorted({*there.seeds, *spec.seeds})),
                 rules=tuple(name for name in RULES_NAMES if name in {*there.rules, *spec.rules}),
+                looks=spec.looks or there.looks,
             )
             mine, other = kept.to_mapping(), there.to_mapping()
-            told = ("seeds", "readings", "title", "budget", "file")
+            told = ("seeds", "readings", "title", "budget", "file", *(() if there.looks else ("looks",)))
             differing = [key for key in mine if key not in told and mine[key] != other[key]]
             if differing:
                 raise RecordError(

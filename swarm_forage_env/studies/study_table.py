@@ -243,19 +243,28 @@ def place_columns(spec: StudySpec, place: Place) -> dict[str, Any]:
     return {"rules": place.rules, "policy": place.policy, **values}
 
 
-def gather_study(folder: StudyFolder) -> StudyTable:
+def gather_study(
+    folder: StudyFolder, spec: StudySpec | None = None, places: Collection[Place] | None = None
+) -> StudyTable:
     """Return all runs of a study's folder as a table.
+
+    Args:
+        folder: Of the study.
+        spec: The study, if it is another than the folder says. None: that one.
+        places: Conditions whose runs are read; the table has no rows of others. None: all.
 
     Raises:
         RecordError: the folder holds no study, or a file of a failure is none.
     """
     import polars as pl
 
-    spec = folder.study()
+    spec = spec or folder.study()
     versions: set[tuple[tuple[str, str], ...]] = set()
     frames: list[pl.DataFrame] = []
     wall_time_s = 0.0
     for number, place in enumerate(spec.places):
+        if places is not None and place not in places:
+            continue
         records: list[RunRecord] = []
         lost: list[dict[str, Any]] = []
         for run in spec.specs_of(place):

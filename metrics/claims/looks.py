@@ -1,0 +1,129 @@
+"""Scores that are looked at while runs are still being made, and what each look may decide.
+
+Whoever looks seven times and stops when the answer is there is wrong more often than once in twenty. So each look has a
+part of these 5 %, in proportion to the runs that it adds (Lan and DeMets 1983; Kim and DeMets 1987), and judges by
+intervals of a higher confidence. All intervals hold at once, so it does not matter when and why one stops (repeated
+confidence intervals, Jennison and Turnbull 1990). The same confidence serves Welch's t, the two one-sided tests of a
+tie and resampled numbers: a level that follows from the normal distribution is used for any test.
+
+Policies and panels may have unequally many runs. A statement is judged on the first runs of each, as many as all that
+it speaks of have had looked at, so that no look at it is more than one.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+from numpy.polynomial.legendre import leggauss
+from scipy.special import ndtr  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
+
+from ..curves import FloatArray
+from .panel import CONFIDENCE, Looks, Panel, mean_over_runs
+
+LOOKS: Looks = (4, 8, 16, 32, 64, 128, 192)
+"""Doubled each time, up to the runs of the paper."""
+N_NODES = 200
+N_HALVINGS = 60
+FARTHEST = 30.0
+"""Standard deviations, farther than any bound."""
+
+
+def looks_up_to(most: int) -> Looks:
+    """Return looks of which the last is after so many runs."""
+    return (*(n_runs for n_runs in LOOKS if n_runs < most), most)
+
+
+def confidence_at(looks: Looks, n_runs: int) -> float:
+    """Return the confidence of the intervals at one of the looks."""
+    return 1.0 - _levels(looks)[looks.index(n_runs)]
+
+
+@cache
+def _levels(looks: Looks) -> tuple[float, ...]:
+    """Two-sided level of each look, by which all together are wrong once in twenty.
+
+    Sums of normal numbers that stayed within the bounds of all looks before are followed from look to look (Armitage,
+    McPherson and Rowe 1969), by Gauss-Legendre quadrature.
+    """
+    nodes, weights = leggauss(N_NODES)
+    sums, masses = np.zeros(1), np.ones(1)  # before the first run
+    levels: list[float] = []
+    for before, after in pairwise((0, *looks)):
+        share = (1.0 - CONFIDENCE) * (after - before) / looks[-1]
+        sd = (after - before) ** 0.5
+        bound = _bound(sums, masses, sd, share)
+        levels.append(2.0 * float(ndtr(-bound / after**0.5)))
+        here = nodes * bound
+        density = np.exp(-0.5 * ((here[:, None] - sums) / sd) ** 2) @ masses / (sd * (2.0 * np.pi) ** 0.5)
+        sums, masses = here, weights * bound * density
+    return tuple(levels)
+
+
+def _bound(sums: FloatArray, masses: FloatArray, sd: float, share: float) -> float:
+    """Size that so many sums exceed after a normal number is added to each; by halving."""
+    low, high = 0.0, float(np.abs(sums).max()) + FARTHEST * sd
+    for _ in range(N_HALVINGS):
+        middle = 0.5 * (low + high)
+        outside = masses @ (ndtr((sums - middle) / sd) + ndtr((-sums - middle) / sd))
+        low, high = (middle, high) if outside > share else (low, middle)
+    return high
+
+
+def last_look(looks: Looks, n_runs: int) -> int:
+    """Return the last look that so many runs have reached; 0 before the first."""
+    return max((after for after in looks if after <= n_runs), default=0)
+
+
+def at_last_look(panels: Sequence[Panel], policies: Collection[str]) -> list[Panel]:
+    """Return panels with the runs that some policies have in all of them, and the confidence of the last look at these.
+
+    Panels that are looked at once stay as they are, but for the confidence if others are looked at several times.
+    """
+    reached = [panel.reached.get(name, 0) for panel in panels if panel.looks for name in policies or panel.scores]
+    if not reached:
+        return list(panels)
+    n_runs, looks = min(reached), next(panel.looks for panel in panels if panel.looks)
+    confidence = confidence_at(looks, n_runs) if n_runs else CONFIDENCE
+    return [
+        replace(_with_runs(panel, n_runs) if panel.looks else panel, looks=(), reached={}, confidence=confidence)
+        for panel in panels
+    ]
+
+
+def _with_runs(panel: Panel, n_runs: int) -> Panel:
+    scores, undisturbed = _first(panel.scores, n_runs), panel.undisturbed
+    return replace(panel, scores=scores, undisturbed=None if undisturbed is None else _first(undisturbed, n_runs))
+
+
+def _first(scores: Mapping[str, FloatArray], n_runs: int) -> dict[str, FloatArray]:
+    return {name: values[..., :n_runs] for name, values in scores.items()}
+
+
+def as_if(panel: Panel, n_runs: int) -> Panel:
+    """Return a panel as it would be if all policies had so many runs, and further ones were like those there are.
+
+    Means and standard deviations stay as they are. Policies without runs stay without.
+    """
+    reached = {name: n_runs if before else 0 for name, before in panel.reached.items()}
+
+    def grown(scores: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        return {name: _grown(values, panel.reached.get(name, 0), n_runs) for name, values in scores.items()}
+
+    undisturbed = None if panel.undisturbed is None else grown(panel.undisturbed)
+    return replace(panel, scores=grown(panel.scores), undisturbed=undisturbed, reached=reached)
+
+
+def _grown(values: FloatArray, reached: int, n_runs: int) -> FloatArray:
+    if reached >= n_runs:
+        return values[..., :n_runs]
+    return _repeated(values[..., :reached], n_runs) if reached else np.full((*values.shape[:-1], n_runs), np.nan)
+
+
+def _repeated(values: FloatArray, n_runs: int) -> FloatArray:
+    """Repeat the runs, (..., R) to (..., n_runs), without a change of the standard deviation."""
+    few = values.shape[-1]
+    middle = mean_over_runs(values)[..., None]
+    stretched = middle + (values - middle) * ((1.0 - 1.0 / n_runs) / (1.0 - 1.0 / few)) ** 0.5
+    return stretched[..., np.arange(n_runs) % few]

@@ -1,0 +1,136 @@
+"""Studies that run until claims are decided: tiny runs, and forecasts of made scores."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from metrics import CurveError
+from metrics.claims import CLAIMS, Panel, PanelName
+from metrics.claims.looks import LOOKS
+from metrics.scoring import run_until_decided, study_panels, until_decided
+from metrics.scoring.open_claims import both_forms, open_claim
+from swarm_forage_env.runs import runner
+from swarm_forage_env.runs.policy_spec import policy_specs
+from swarm_forage_env.runs.record import RecordError
+from swarm_forage_env.studies.study import Axis
+from swarm_forage_env.studies.study_folder import StudyFolder, run_study
+from swarm_forage_env.studies.study_table import read_study
+from tests.support.made_tables import FOUR, made_study
+
+FEW = (4, 8)
+NOISE = PanelName("S1e", "noise_robustness")
+
+
+def tiny(name="S1e", **changes):
+    """A study of noise whose runs are two intervals of two seconds."""
+    given = {"policies": policy_specs(FOUR), "horizon_s": 4.0, "interval_s": 2.0}
+    given |= {"settings": {"n_objects": 20, "n_robots": 3, "physics": "compiled"}}
+    return made_study(name, Axis(name="noise", values=(0.0, 0.02, 0.04)), reference=0.0, **given | changes)
+
+
+def panels_of(means, *, reached=4, sd=0.2, n_levels=3):
+    """A panel of noise with flat curves."""
+    rng = np.random.default_rng(5)
+    scores = {name: mean + sd * rng.normal(size=(n_levels, 16)) for name, mean in means.items()}
+    panel = Panel(
+        levels=np.arange(1.0, n_levels + 1.0),
+        scores=scores,
+        margins=np.full(n_levels, 0.2),
+        looks=LOOKS,
+        reached=dict.fromkeys(means, reached),
+    )
+    return {NOISE: panel}
+
+
+def test_a_claim_has_a_forecast_of_the_runs_that_decide_it():
+    equal = dict.fromkeys(FOUR, 1.0)
+    found = open_claim(CLAIMS["N1"], False, panels_of(equal))
+    assert found.words == "N1"
+    assert 8 < found.n_runs <= 192
+    assert [statement.policies for (statement,) in found.ways] == [("crw", "stochx")]
+    assert open_claim(CLAIMS["N1"], False, panels_of(equal, reached=16, sd=0.01)) is None  # a tie
+    assert open_claim(CLAIMS["N1"], False, panels_of(equal, sd=9.0, n_levels=2)).n_runs is None
+    assert open_claim(CLAIMS["N1"], False, {}) is None  # nothing to judge
+    assert [is_relative for _, is_relative in both_forms([CLAIMS["N1"], CLAIMS["C1"]])] == [False, True, False]
+
+
+def test_one_statement_that_fails_is_enough():
+    """N2 says that two tie under weak noise and differ under strong noise; these are equal everywhere."""
+    found = open_claim(CLAIMS["N2"], False, panels_of(dict.fromkeys(FOUR, 1.0), n_levels=6, sd=0.1))
+    assert len(found.ways) == 1
+    assert found.ways[0][0].parameters["levels"] == "high"
+
+
+def test_a_study_runs_until_the_last_look(tmp_path, monkeypatch):
+    monkeypatch.setattr(until_decided, "ROUND_S", 0.0)
+    spec, folder = tiny(), StudyFolder(tmp_path / "S1e")
+    told = []
+    found = run_until_decided([(spec, folder)], hours=1.0, looks=FEW, jobs=1, tell=told.append)
+    assert folder.study().looks == FEW
+    assert max(found.reached.values()) in FEW
+    assert {line.policy for line in found.reached} == set(FOUR)
+    assert json.loads(found.json())["looks"] == list(FEW)
+    assert "first look: S1e crw, dpo, stochm, stochx to 4 runs" in told[0]
+    assert "scoring S1e described" in told
+    table = read_study(folder.folder)
+    table.write(tmp_path / "packed.parquet")
+    panels = study_panels(read_study(tmp_path / "packed.parquet")).panels
+    assert panels[0].looks == FEW
+    assert dict(panels[0].reached) == {line.policy: n_runs for line, n_runs in found.reached.items()}
+    again = run_until_decided([(spec, folder)], hours=1.0, looks=FEW, jobs=1, tell=told.append)
+    assert again.reached == found.reached
+
+
+def test_what_was_interrupted_goes_on(tmp_path, monkeypatch):
+    spec, folder = tiny(), StudyFolder(tmp_path / "S1e")
+    run_study(replace(spec, seeds=(0, 1)), folder, jobs=1)
+    made = runner.run_each
+
+    def two(*args, **options):
+        for number, outcome in enumerate(made(*args, **options)):
+            if number == 2:
+                raise KeyboardInterrupt
+            yield outcome
+
+    with monkeypatch.context() as patched:
+        patched.setattr(runner, "run_each", two)
+        with pytest.raises(KeyboardInterrupt):
+            run_until_decided([(spec, folder)], hours=1.0, looks=FEW, jobs=1)
+    assert len(folder.store.run_ids()) == 4 * 3 * 2 + 3
+    dry = run_until_decided([(spec, folder)], hours=0.0, looks=FEW)
+    assert set(dry.reached.values()) == {0}
+    assert "first look" in str(dry)
+    run_until_decided([(spec, folder)], hours=1.0, looks=FEW, jobs=1)
+    assert len(folder.store.run_ids()) >= 4 * 3 * 4
+
+
+def test_a_dry_look_leaves_the_folder_alone(tmp_path):
+    found = run_until_decided([(tiny(), StudyFolder(tmp_path / "none"))], hours=0.0)
+    assert not (tmp_path / "none").exists()
+    assert found.to_mapping()["open"][0]["core_hours"] is None
+
+
+def test_what_cannot_be(tmp_path):
+    spec, folder = tiny(), StudyFolder(tmp_path / "S1e")
+    with pytest.raises(CurveError, match="each study once"):
+        run_until_decided([(spec, folder), (spec, folder)], hours=0.0)
+    with pytest.raises(CurveError, match="paper's sets"):
+        run_until_decided([(tiny("mine"), folder)], hours=0.0)
+    folder.take(replace(spec, looks=FEW))
+    with pytest.raises(RecordError, match="other looks"):
+        run_until_decided([(spec, folder)], hours=1.0, looks=(4, 16))
+    assert folder.take(spec).looks == FEW  # whoever runs more of it later does not forget that it was looked at
+
+
+@pytest.mark.parametrize("damage", ["{", '"looks": [8, 4]', '"looks": ["often"]'])
+def test_a_damaged_study_file_is_told(tmp_path, damage):
+    folder = StudyFolder(tmp_path / "S1e")
+    folder.take(replace(tiny(), looks=FEW))
+    content = json.loads(folder.study_file.read_text())
+    if damage != "{":
+        content |= json.loads(f"{{{damage}}}")
+    folder.study_file.write_text(damage if damage == "{" else json.dumps(content))
+    with pytest.raises(RecordError, match="Cannot use"):
+        run_until_decided([(tiny(), folder)], hours=1.0, looks=FEW)
