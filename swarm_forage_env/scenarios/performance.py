@@ -10,6 +10,7 @@ Performance is a way to read a run and no part of it: a record holds all columns
 run. The paper proposes such measures beside deliveries in its discussion.
 """
 
+import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -110,9 +111,10 @@ def task_balance(columns: Columns) -> Curve:
     shares = np.stack([_column(name, columns) for name in _TASKS])
     assigned = shares.sum(axis=0)
     parts = np.divide(shares, assigned, out=np.zeros_like(shares), where=assigned > 0.0)
-    # 0 ln 0 is 0, its limit; the logarithm of 1 stands in for it.
-    entropy = -(parts * np.log(np.where(parts > 0.0, parts, 1.0))).sum(axis=0)
-    return np.clip(entropy / np.log(len(_TASKS)), 0.0, 1.0)
+    # 0 ln 0 is 0, its limit; the logarithm of 1 stands in for it. The last bits of numpy's depend on the processor.
+    logarithms = np.array([math.log(part) if part > 0.0 else 0.0 for part in parts.ravel().tolist()])
+    entropy = -(parts * logarithms.reshape(parts.shape)).sum(axis=0)
+    return np.clip(entropy / math.log(len(_TASKS)), 0.0, 1.0)
 
 
 def cache_load(columns: Columns) -> Curve:

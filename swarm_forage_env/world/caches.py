@@ -3,6 +3,8 @@
 What robots do with caches (adding, taking, the last pair dissolving) is in `kernels.interact`.
 """
 
+import math
+
 import numpy as np
 
 from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_OBJECT, Counter, ObjectStatus, Task
@@ -95,7 +97,7 @@ def restoration_probability(n_harvesters: int, n_collectors: int, scale: float) 
     1 - exp(-s n_h / n_c), or 1 - exp(-s n_h) without collectors (authors' restoration law of static caches).
     """
     ratio = n_harvesters / n_collectors if n_collectors else float(n_harvesters)
-    return float(-np.expm1(-scale * ratio))
+    return -math.expm1(-scale * ratio)  # numpy's depends on the processor
 
 
 def count_cache_users(swarm: SwarmState, tasks: CodeArray | None) -> tuple[int, int]:
