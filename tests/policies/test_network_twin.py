@@ -14,7 +14,7 @@ from swarm_forage_env.scenarios.presets import scenario
 from tests.reference.perceptron import SlowNetwork
 from tests.support.busy import change_population
 
-N_ROBOTS = 9  # an odd number: rows go through the layers in pairs
+N_ROBOTS = 9  # no multiple of the rows that go through the layers together
 DISCRETE = {"actions": "discrete", "automatic_gripper": True}
 COMPACT = {"observation": "compact", "decision_ticks": 3, "site_memory": True}
 
