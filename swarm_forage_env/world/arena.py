@@ -267,7 +267,7 @@ class ForagingArena:
             self._sense_further()
 
     def _finish(self, outcome: int, actions: ActionArray, tasks: CodeArray | None) -> None:
-        """Do what of a tick compiled code cannot do: more room for pairs of robots, and placing objects."""
+        """Do what of a tick compiled code cannot do: more room for pairs of robots, and placing the rest."""
         picks, walks = self.draws(self.tick)
         if outcome == NO_ROOM:
             self._physics.advance(self.swarm)

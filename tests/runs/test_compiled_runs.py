@@ -80,7 +80,7 @@ def test_what_somebody_writes_into_the_observation_between_two_pieces_is_gone_af
     for policy in (CRWPolicy(), tick_by_tick(CRWPolicy())):
         run = LiveRun(build_stack(world, reads=policy.reads), policy, seed=4)
         n_delivered = 0
-        for first in range(1000, 4900, 10):  # where objects are delivered, Python has to finish the tick
+        for first in range(1000, 4900, 10):
             run.advance(to_tick=first)
             run.forage_env.last_obs[:, 24:48] = 0.5  # light, and now and then proximity
             run.forage_env.last_obs[:, : 24 * (first % 500 == 0)] = 0.5
