@@ -245,6 +245,7 @@ def test_phases_one_by_one_are_the_tick(policy, monkeypatch):
     counters = run.forage_env.arena.events.counters
     np.testing.assert_array_equal(phased.arena.events.counters, counters)
     assert counters[Counter.FREE_PICKUPS] > 0
+    assert phased.watch.spent_ns.keys() <= set(importlib.import_module("bench_phases").ROWS)
 
 
 def test_a_table_has_values_targets_and_ratios_of_rounds(bench):
