@@ -107,9 +107,13 @@ class StudyFigure:
         rows: list[dict[str, Any]] = []
         for panel in self.panels:
             for policy, scores in panel.scores.items():
-                for x, level, runs, summary in zip(panel.x, panel.levels, scores, _summaries(scores), strict=True):
+                of_means = panel.of_mean_curves.get(policy, np.full_like(scores, np.nan))
+                levels = zip(panel.x, panel.levels, scores, _summaries(scores), of_means, strict=True)
+                for x, level, runs, summary, of_mean in levels:
                     place = {"rules": panel.rules, **panel.others, "policy": policy}
                     means = {"mean": summary.mean, "lower": summary.lower, "upper": summary.upper, "sd": summary.std}
+                    if policy in panel.floors:
+                        means |= {"of_mean_curves": _mean_of(of_mean), "noise_floor": _mean_of(panel.floors[policy])}
                     of_runs = {f"seed_{seed}": value for seed, value in zip(panel.seeds, runs.tolist(), strict=True)}
                     where = {panel.criterion: float(x), "level": float(level)}
                     rows.append({**place, **where, **means, "n_runs": summary.n_used, **of_runs})
@@ -152,9 +156,11 @@ def draw_figure(figure: StudyFigure, paths: Sequence[Path], *, band: Band = "ci"
 
 
 def caption(figure: StudyFigure, band: Band) -> str:
-    """Return what dots, bars and dotted lines are, and why some or all bars are missing."""
+    """Return what dots, bars and others are, and why some or all bars are missing."""
     n_runs = [s.n_used for panel in figure.panels for scores in panel.scores.values() for s in _summaries(scores)]
-    floor = "; dotted: two undisturbed runs" if any(panel.floors for panel in figure.panels) else ""
+    floor = (
+        "\ndotted: two undisturbed runs; hollow: mean curves" if any(panel.floors for panel in figure.panels) else ""
+    )
     if max(n_runs) < FEWEST_RUNS:
         return f"lines: means; dots: runs{floor}\nno bars: fewer than {FEWEST_RUNS} runs of a condition tell too little"
     lacking = f"\nno bar: conditions with fewer than {FEWEST_RUNS} runs, which tell too little"
@@ -206,6 +212,9 @@ def _draw_panel(place: Panel, panel: StudyPanel, band: Band, *, is_log_high: boo
         _draw_policy(place, panel, x, _summaries(scores), look, band)
     for look, floor in zip(looks(panel.floors), panel.floors.values(), strict=True):
         place.axhline(_mean_of(floor), color=look.colour, linestyle=":", linewidth=1.0, zorder=1)
+    for (look, x, _), of_means in zip(_beside(panel), panel.of_mean_curves.values(), strict=False):
+        style = {"color": look.colour, "marker": look.marker, "markerfacecolor": "w", "linestyle": "", "zorder": 4}
+        place.plot(x, [_mean_of(runs) for runs in of_means], **style)
     neutral = METRICS[panel.measure].neutral
     if neutral is not None and panel.variant == "corrected":
         place.axhline(neutral, color="0.5", linewidth=0.8, zorder=0)

@@ -9,8 +9,9 @@ import metrics
 from metrics import CurveError, PopulationRates, ScoreForms
 from metrics.scoring.curves_file import study_curves
 from metrics.scoring.measures import score_study
+from metrics.scoring.run_curves import RunCurves
 from metrics.scoring.score_tables import ScoreTable
-from metrics.scoring.scores import HEADER
+from metrics.scoring.scores import HEADER, pseudo_values
 from tests.support.curve_tables import CLOCK, IDEAL, SIGNAL, SLOWED, rows, scored, table, throttled
 
 SIZES = (
@@ -40,6 +41,16 @@ def test_variants_of_measures_of_size_by_hand(label):
     np.testing.assert_allclose(list(found[-1].per_seed.values()), BY_HAND[label]())
     assert ("reverses the order" in found[-1].note) == (measure == "scalability")
     assert variant != "sierra" or found[-1].relative is None
+
+
+def test_pseudo_values_by_hand():
+    curves = {"performance": np.array([[1.0], [3.0]])}
+    runs = RunCurves(criterion="noise", value=1.0, n_robots=1, seeds=(0, 1), curves=curves)
+    # The square of the mean is 4, without the first run 9, without the second 1; their mean, 3, is 4 less half of the
+    # variance 2, which is not biased.
+    squares, shares = pseudo_values(lambda it: it.performance[..., 0] ** 2, (runs,), 0)
+    assert squares.tolist() == [2 * 4.0 - 9.0, 2 * 4.0 - 1.0]
+    assert shares.tolist() == [1.0, 3.0], "of what is a mean, the values of the runs"
 
 
 def test_a_measure_without_the_asked_forms_is_scored_once():

@@ -160,12 +160,17 @@ def test_performance_over_sizes_has_two_logarithmic_axes(tmp_path):
     draw_figure(with_scores(figure, 0.0 * grown), [tmp_path / "nothing.svg"])
 
 
-def test_distances_have_their_noise_floor(tmp_path):
+def test_distances_have_their_noise_floor_and_those_of_mean_curves_beside_them(tmp_path):
     spec = made_study("S1e", Axis(name="noise", values=(0.0, 0.01, 0.02)), reference=0.0)
     (figure,) = study_figures(study_panels(made_table(spec, lambda place: 10.0 + place.values[0])))
-    assert caption(figure, "ci").endswith("; dotted: two undisturbed runs")
+    assert caption(figure, "ci").endswith("\ndotted: two undisturbed runs; hollow: mean curves")
     draw_figure(figure, [tmp_path / "floors.svg"])
     assert len(re.findall(r"stroke-dasharray: 1,1\.65", (tmp_path / "floors.svg").read_text())) == len(FOUR)
+    (panel,) = figure.panels
+    for row in figure.to_frame().filter(noise=0.02).rows(named=True):
+        assert row["noise_floor"] == pytest.approx(panel.floors[row["policy"]].mean())
+        assert row["of_mean_curves"] == pytest.approx(panel.of_mean_curves[row["policy"]][-1].mean())
+    assert "noise_floor" not in figures()[0].to_frame().columns
 
 
 def test_rates_of_a_population_are_shown_as_events(tmp_path):
