@@ -163,8 +163,9 @@ class SwarmWrapper(BaseParallelWrapper):
     def ahead(self, n_ticks: int) -> tuple[int, dict[str, Any]]:
         """Return for how many of the coming ticks, at most `n_ticks`, the hooks of a tick need not be called.
 
-        And what is done in these ticks instead, as fields of `world.kernels.disturbances.Disturbances`. With 0 the
-        hooks are called in the coming tick. A wrapper without this method, and one whose hooks were replaced, has them
+        And what is done in these ticks instead, as fields of `world.kernels.disturbances.Disturbances`, of its types;
+        compiled code reads them unchecked but for type, order and number of ticks. With 0 the hooks are called in the
+        coming tick. A wrapper without this method, and one whose hooks were replaced, has them
         called in all ticks.
         """
         return n_ticks, {}

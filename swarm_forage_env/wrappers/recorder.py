@@ -84,6 +84,28 @@ class _PartTally:
         return columns
 
 
+def _refuse_unreadable(told: Disturbances, n_ticks: int) -> None:
+    """Refuse what compiled code would read wrongly, or beyond its end; ValueError."""
+    per_tick = {"throttles"} if len(told.throttles) else set[str]()
+    per_tick |= {"wheel_factors"} if len(told.wheel_lanes) else set[str]()
+    for name, expected in UNDISTURBED._asdict().items():
+        value = getattr(told, name)
+        if not isinstance(expected, np.ndarray):
+            continue
+        n_rows = n_ticks if name in per_tick else 0
+        if (
+            not isinstance(value, np.ndarray)
+            or (value.dtype, value.ndim) != (expected.dtype, expected.ndim)
+            or not value.flags.c_contiguous
+            or len(value) < n_rows
+        ):
+            raise ValueError(
+                f"Expected `ahead` to tell {name} as a contiguous array of {expected.dtype} with {expected.ndim} "
+                f"dimensions and at least {n_rows} rows, got {np.shape(value)} of "
+                f"{getattr(value, 'dtype', type(value))}."
+            )
+
+
 class RunRecorder(SwarmWrapper):
     """Outermost wrapper: records a run interval by interval.
 
@@ -181,7 +203,10 @@ class RunRecorder(SwarmWrapper):
                 n_ticks = 0
             fields |= told
         # The last death may have come between two ticks; then the coming one ends the run.
-        return 0 if self.unwrapped.terminated.all() else max(0, n_ticks), Disturbances(**fields)
+        n_ticks = 0 if self.unwrapped.terminated.all() else max(0, n_ticks)
+        disturbances = Disturbances(**fields)
+        _refuse_unreadable(disturbances, n_ticks)
+        return n_ticks, disturbances
 
     def _run_with_hooks(self, policy: CompiledPolicy) -> None:
         """Run one tick as a step of the stack does: what robots want to do stands before any wrapper acts."""

@@ -269,6 +269,34 @@ def test_a_gain_of_another_shape_is_refused():
         run.advance(to_tick=3)
 
 
+class Teller(SwarmWrapper):
+    """Tells something ahead of the ticks."""
+
+    stack_position = 3
+    told: Any = None
+
+    def ahead(self, n_ticks):
+        return 5, self.told
+
+
+@pytest.mark.parametrize(
+    ("told", "field"),
+    [
+        ({"throttles": np.full(3, 0.5)}, "throttles"),  # two ticks too few
+        ({"throttles": np.full(10, 0.5)[::2]}, "throttles"),
+        ({"throttles": np.full(5, 0.5, np.float32)}, "throttles"),
+        ({"throttles": [0.5] * 5}, "throttles"),
+        ({"wheel_lanes": np.ones((4, 64), np.uint32), "wheel_factors": np.ones(4)}, "wheel_factors"),
+    ],
+)
+def test_what_compiled_code_cannot_read_is_refused(told, field):
+    stack = Teller(build_env(scenario("warehouse_small", n_robots=N_ROBOTS)))
+    stack.told = told
+    run = LiveRun(RunRecorder(stack), CRWPolicy(), seed=1)
+    with pytest.raises(ValueError, match=f"Expected `ahead` to tell {field} as a contiguous array of float64"):
+        run.advance(to_tick=5)
+
+
 class Second(Throttle):
     stack_position = 4
 
