@@ -20,8 +20,10 @@ from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, Obs
 from swarm_forage_env.scenarios.floor import CELLS_PER_M
 from swarm_forage_env.world.state import CHANGES, CacheState
 
-_GROUND_X = np.array([0.063, 0.063, -0.063, -0.063])
-_GROUND_Y = np.array([0.0116, -0.0116, 0.0116, -0.0116])
+GROUND_X_M = np.array([0.063, 0.063, -0.063, -0.063])
+"""Places of the ground sensors in the robot's frame, ahead of its centre."""
+GROUND_Y_M = np.array([0.0116, -0.0116, 0.0116, -0.0116])
+"""To its left."""
 _GROUND_REACH_M = 0.065
 """No ground sensor is farther from the robot's centre."""
 _GREYS = np.array([102.0 / 255.0, 1.0, 179.0 / 255.0, 1.0, 0.0])
@@ -60,8 +62,8 @@ def ground(
         cos = facing[i, 0]
         sin = facing[i, 1]
         for k in range(GROUND_SENSORS):
-            x = position[i, 0] + cos * _GROUND_X[k] - sin * _GROUND_Y[k]
-            y = position[i, 1] + sin * _GROUND_X[k] + cos * _GROUND_Y[k]
+            x = position[i, 0] + cos * GROUND_X_M[k] - sin * GROUND_Y_M[k]
+            y = position[i, 1] + sin * GROUND_X_M[k] + cos * GROUND_Y_M[k]
             cell_x = int(x * CELLS_PER_M)
             cell_y = int(y * CELLS_PER_M)
             inside = x >= 0.0 and y >= 0.0 and cell_x < nx and cell_y < ny
