@@ -1,5 +1,6 @@
 """Scripts of measurements run: short, to see that they still fit the packages."""
 
+import ast
 import importlib
 import re
 import runpy
@@ -14,17 +15,21 @@ import pytest
 from metrics import verdict
 from metrics.claims import CLAIMS, INTUITIONS
 from metrics.laws import ALL_LAWS
+from metrics.scoring.study_numbers import FIGURE_MEASURES
+from scripts import results_data
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import LiveRun, build_env, run_one
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.runs.store import RunStore
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.studies.study import Axis
 from swarm_forage_env.studies.study_file import load_study, set_names
 from swarm_forage_env.studies.study_table import read_study
+from tests.reference import read_results
 from tests.support.foraging import quick_world
 from tests.support.foraging_table import foraging_table
-from tests.support.made_tables import made_table
+from tests.support.made_tables import FOUR, made_study, made_table
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -135,6 +140,71 @@ def test_the_results_page_comes_of_the_runs_beside_it(run):
     Path("page/results.md").write_text(text.replace("supported", "contradicted", 1), encoding="utf-8")
     code, out, _ = run("write_results", "--out", "page", "--check")
     assert (code, out) == (1, "not those of the runs in page/results: results.md\n")
+
+
+SETS = {
+    "S1a": (Axis(name="population_size", values=(1, 2, 4)),),
+    "S1c": (Axis(name="throttle", values=(0.0, 0.1, 0.4)),),
+    "S1e": (Axis(name="noise", values=(0.0, 0.01, 3.0 / 70.0)),),
+    "S1g": (Axis(name="population_dynamics", values=(1.0, 2.0, 5.0)),),
+    "S2a": (Axis(name="walk_probability", values=(0.0, 0.051)), Axis(name="population_size", values=(2, 4))),
+    "S2d": (Axis(name="population_size", values=(2, 3)), Axis(name="population_dynamics", values=(1e-4, 9e-4))),
+}
+
+
+def varied_table(name):
+    """Runs of a set in few conditions with curves by chance, one run of which is lost."""
+    axes = SETS[name]
+    reference = None if axes[-1].name == "population_size" else axes[-1].values[0]
+    about = {"scenario": "search_and_rescue", "settings": {}} if name == "S2d" else {}
+    spec = made_study(name, *axes, reference=reference, seeds=tuple(range(5)), **about)
+    lost = {(spec.places[1], 2)}
+    table = made_table(spec, lambda place: 10.0 + 3.0 * FOUR.index(place.policy), lost=lost)
+    shape, rng = len(table.frame), np.random.default_rng(1)
+    sizes = [spec.world(spec.places[cell]).n_robots for cell in table.frame["cell"]]
+    varied = {
+        "n_robots": pl.Series(sizes),
+        "reading": pl.lit("described"),
+        "policy": pl.Series([spec.places[cell].policy for cell in table.frame["cell"]]),
+        **{
+            f"axis_{axis.name}": pl.Series([float(spec.places[cell].values[at]) for cell in table.frame["cell"]])
+            for at, axis in enumerate(axes)
+        },
+        "performance": pl.col("performance") * pl.Series(rng.uniform(0.5, 1.5, shape)),
+        "interference_fraction": pl.col("interference_fraction") * pl.Series(rng.uniform(0.5, 1.5, shape)),
+        "n_active": pl.col("n_active") * pl.Series(rng.uniform(0.5, 1.0, shape)),
+        "adversity": pl.col("adversity") * pl.Series(rng.uniform(0.5, 1.0, shape)),
+    }
+    return replace(table, frame=table.frame.with_columns(**varied))
+
+
+def test_every_printed_measure_is_that_of_the_runs_by_other_code(tmp_path, capsys):
+    tables = [varied_table(name) for name in SETS]
+    results_data.ship(tables, tmp_path)
+    results_data.write_numbers(verdict(*results_data.shipped(tmp_path)), tmp_path)
+    n_rows = len(pl.read_csv(tmp_path / "measures.csv"))
+    assert read_results.main(tmp_path) == 0, capsys.readouterr().out
+    assert capsys.readouterr().out == f"{n_rows} of {n_rows} printed measures are those of the runs\n"
+    names = set(pl.read_csv(tmp_path / "measures.csv")["measure"])
+    assert names == set(FIGURE_MEASURES), "all that the page has"
+    text = (tmp_path / "measures.csv").read_text(encoding="utf-8")
+    first = text.splitlines()[1]
+    *before, mean, lower, upper, sd = first.split(",")
+    for changed in (
+        ",".join([*before, str(1.001 * float(mean)), lower, upper, sd]),
+        ",".join([*before, mean, str(float(lower) - 0.1), upper, sd]),
+        first.replace("S1a ", "S1a 0", 1),
+    ):
+        (tmp_path / "measures.csv").write_text(text.replace(first, changed), encoding="utf-8")
+        assert read_results.main(tmp_path) == 1
+        assert f"of {n_rows}" not in capsys.readouterr().out.splitlines()[0]
+
+
+def test_the_other_code_imports_polars_and_numpy_alone():
+    tree = ast.parse(Path(read_results.__file__).read_text(encoding="utf-8"))
+    imported = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
+    imported |= {node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    assert {name.split(".")[0] for name in imported} - set(sys.stdlib_module_names) == {"numpy", "polars"}
 
 
 @pytest.mark.compiled
