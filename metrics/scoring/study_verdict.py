@@ -301,6 +301,7 @@ class StudyVerdict(Answer):
                 }
                 for table in self.tables
             ],
+            "counts": {rules: self.counts(rules, "corrected") for rules in self.rules},
             "verdicts": [one.to_mapping() for one in self.judged],
             "waiting": [one.to_mapping() for one in self.waiting],
             "intuitions": [one.to_mapping() for one in self.expected],

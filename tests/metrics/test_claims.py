@@ -127,12 +127,13 @@ COUNTER = {
 where CRW has changed places with DPO, and STOCHM with STOCHX."""
 
 
-def world(*, n_runs=N_RUNS, names=None, other=None):
-    """Panels of all figures; `names` renames policies, `other` has what is otherwise."""
+def world(*, n_runs=N_RUNS, names=None, other=None, scatter=None):
+    """Panels of all figures; `names` renames policies, `other` has what is otherwise, `scatter` is that of all."""
     panels = {}
     for number, (name, (levels, curves)) in enumerate(SHOWN.items()):
         has_wide = name.experiment in ("S1a", "S1b") and name.measure == "scalability"
         sd = {k: 0.13 if has_wide and k.startswith("stoch") else 0.01 for k in curves}
+        sd = sd if scatter is None else dict.fromkeys(curves, scatter)
         change = (other or {}).get(name, {})
         if set(change) == set(curves):
             curves = change
@@ -246,6 +247,17 @@ def test_claims_that_compare_are_a_tie_where_policies_tie():
     verdict = check_claim(CLAIMS["P1"], level)
     assert (verdict.answer, verdict.by_bands) == ("tie", "tie")
     assert "8 do not (8 of them tie)" in verdict.why
+
+
+def test_where_all_policies_are_equal_only_claims_of_likeness_are_supported():
+    alike = world(n_runs=64, other={name: four(*[1.0] * 4) for name in SHOWN}, scatter=0.1)
+    answers = {name: check_claim(CLAIMS[name], alike).answer for name in JUDGED}
+    ties = {"E3", "E4", "E10", "C4", "A5", "N1", "N6", "D4"}
+    assert {name for name, answer in answers.items() if answer == "supported"} == {*ties, "E1", "X3", "C2"}, (
+        "all bands are wide"
+    )
+    lead = {"E2", "E5", "C6", "P1", "P2", "R1", "R2", "R5", "A1", "A2", "A6", "N4", "D1", "D3", "X1", "X4", "X5"}
+    assert {answers[name] for name in lead} == {"tie"}
 
 
 def test_claims_are_read_in_each_way_that_makes_a_difference():

@@ -50,6 +50,8 @@ def test_claims_are_counted_and_at_a_glance_under_both_rules_of_two_studies():
         for rules in ("described", "program")
         for word in ("the paper's bands", "ours", "ours, relative")
     )
+    told = found.to_mapping()["counts"]["program"]
+    assert [str(n) for n in told.values()] == list(counts.rows[1][1:])
     answers = {row[0]: row[2:] for row in claims.rows}
     assert answers["P2"] == ("tie", "tie", "") * 2, "all four achieve the same"
     assert answers["V1"] == ("supported", "supported", "") * 2
