@@ -42,9 +42,10 @@ SIGNIFICANT = 6
 def ship(tables: Iterable[StudyTable], folder: Path) -> None:
     """Write the runs of studies into the folder, and what is known of all runs there into `RUNS`."""
     given = [table.with_columns(NEEDED[table.spec.axes[-1].name]) for table in tables]
+    names = [table.spec.name for table in given]
     for table in given:
-        table.write(folder / f"{table.spec.name}.parquet")
-    names = {table.spec.name for table in given}
+        rules = "" if names.count(table.spec.name) == 1 else f"_{'_'.join(table.spec.rules)}"
+        table.write(folder / f"{table.spec.name}{rules}.parquet")
     there = given + [table for table in shipped(folder) if table.spec.name not in names]
     _write(folder / RUNS, map(_about, sorted(there, key=lambda table: table.spec.name)))
 
@@ -58,9 +59,8 @@ def shipped(folder: Path) -> list[StudyTable]:
 
 def write_numbers(results: StudyVerdict, folder: Path) -> None:
     """Write `MEASURES` and `VERDICTS` of the studies."""
-    names = {table.spec.name: run_words(table) for table in results.tables}
-    _write(folder / MEASURES, measures(results, names))
-    _write(folder / VERDICTS, verdicts(results, names))
+    _write(folder / MEASURES, measures(results))
+    _write(folder / VERDICTS, verdicts(results))
 
 
 def run_words(table: StudyTable) -> str:
@@ -68,14 +68,14 @@ def run_words(table: StudyTable) -> str:
     return f"{table.spec.name} {table.digest[:DIGITS]}"
 
 
-def measures(results: StudyVerdict, names: Mapping[str, str]) -> Iterator[dict[str, Any]]:
+def measures(results: StudyVerdict) -> Iterator[dict[str, Any]]:
     """Yield one row per measure, in its corrected form, policy and level."""
-    for panels in results.scored:
+    for table, panels in zip(results.tables, results.scored, strict=True):
         for figure in study_figures(panels):
             first = figure.panels[0]
             if first.variant != "corrected":
                 continue
-            about = {"runs": names[first.study], "measure": first.measure, "form": first.form, "unit": first.unit}
+            about = {"runs": run_words(table), "measure": first.measure, "form": first.form, "unit": first.unit}
             for row in figure.to_frame().iter_rows(named=True):
                 others = " ".join(f"{name} {row[name]:g}" for name in first.others)
                 place = {"rules": row["rules"], "others": others, "policy": row["policy"]}
@@ -83,7 +83,7 @@ def measures(results: StudyVerdict, names: Mapping[str, str]) -> Iterator[dict[s
                 yield {**about, **place, "value": row[first.criterion], **{name: row[name] for name in numbers}}
 
 
-def verdicts(results: StudyVerdict, names: Mapping[str, str]) -> Iterator[dict[str, Any]]:
+def verdicts(results: StudyVerdict) -> Iterator[dict[str, Any]]:
     """Yield one row per claim or intuition, rules and form of the measures, and one per other sense of its words."""
     for one in (*results.judged, *results.expected):
         for sense, found in {"": one.verdict, **one.verdict.otherwise}.items():
@@ -100,14 +100,14 @@ def verdicts(results: StudyVerdict, names: Mapping[str, str]) -> Iterator[dict[s
                 "effect": found.effect,
                 "n_runs": found.n_runs,
                 "why": found.why,
-                "runs": runs_of(one.claim, names),
+                "runs": runs_of(one.claim, results),
             }
 
 
-def runs_of(claim: Claim, names: Mapping[str, str]) -> str:
+def runs_of(claim: Claim, results: StudyVerdict) -> str:
     """Return the runs that a claim is held against."""
-    sets = dict.fromkeys(panel.experiment.split()[0] for panel in claim.panels)
-    return ", ".join(names[name] for name in sets if name in names)
+    sets = {panel.experiment.split()[0] for panel in claim.panels}
+    return ", ".join(run_words(table) for table in results.tables if table.spec.name in sets)
 
 
 def _about(table: StudyTable) -> dict[str, Any]:

@@ -106,55 +106,77 @@ def plan_of(table: StudyTable) -> StudySpec:
 
 
 def _of_budget(results: StudyVerdict, budget: str) -> str:
-    tables = {table.spec.name: table for table in results.tables if table.spec.budget == budget}
+    tables: dict[str, list[StudyTable]] = {}
+    for table in results.tables:
+        if table.spec.budget == budget:
+            tables.setdefault(table.spec.name, []).append(table)
     plans = {name: load_study(name, budget) for name in set_names() if budget in budget_names(name)}
-    plans |= {name: plan_of(table) for name, table in tables.items()}
-    n_there, n_planned = 0, 0
-    whole: list[str] = []
-    nothing: list[str] = []
+    plans |= {name: plan_of(some[0]) for name, some in tables.items()}
+    sets: dict[str, list[str]] = {"Sets with all runs": [], "Sets run until claims are decided": [], "Sets not run": []}
+    whole, decided, nothing = sets.values()
     in_part: list[str] = []
+    n_there = 0
     for name, plan in sorted(plans.items()):
-        done = [state.n_runs[DONE] for state in tables[name].place_states()] if name in tables else []
+        done = [count for table in tables.get(name, ()) for count in n_done(table)]
         n_places, n_seeds = len(plan.places), len(plan.seeds)
         n_there += sum(done)
-        n_planned += plan.n_runs
         n_whole, n_begun = (sum(count >= least for count in done) for least in (n_seeds, 1))
         if n_begun == 0:
             nothing.append(name)
         elif n_whole == n_places:
             whole.append(name)
+        elif any(table.spec.looks for table in tables[name]):
+            decided.append(name)
         else:
             in_part.append(
                 f"\n- {name}: {n_whole:,} of {counted(n_places, 'condition')} whole, with {counted(n_seeds, 'run')} "
                 f"each; {n_begun - n_whole:,} begun, {n_places - n_begun:,} not run"
             )
     of = f" of the paper's sets at budget `{budget}`" if budget else ""
+    n_planned = sum(plan.n_runs for plan in plans.values())
     text = f"**This page is of {n_there:,} of {counted(n_planned, 'run')}{of}.**"
-    for words, names in (("Sets with all runs", whole), ("Sets not run", nothing)):
-        text += f" {words}: {', '.join(names) or 'none'}."
+    for words, names in sets.items():
+        text += f" {words}: {', '.join(names) or 'none'}." if names or names is not decided else ""
     return text + (" Sets of which runs are still to be made:\n" + "".join(in_part) if in_part else "")
+
+
+def n_done(table: StudyTable) -> list[int]:
+    """Return how many runs of each condition there are."""
+    return [state.n_runs[DONE] for state in table.place_states()]
 
 
 def what_ran(results: StudyVerdict) -> str:
     """Return the part on runs and what they took."""
     lines: list[tuple[Any, ...]] = []
     for table in results.tables:
-        done = [state.n_runs[DONE] for state in table.place_states()]
+        done = n_done(table)
         took = "-" if table.wall_time_s is None else f"{table.wall_time_s / 3600.0:.2f}"
         where = (run_words(table), table.spec.title, table.spec.budget, ", ".join(table.spec.rules))
         lines.append(
-            (*where, f"{sum(done):,} of {plan_of(table).n_runs:,}", min(done), f"{table.spec.horizon_s:,.0f}", took)
+            (
+                *where,
+                f"{sum(done):,} of {plan_of(table).n_runs:,}",
+                per_condition(table),
+                f"{table.spec.horizon_s:,.0f}",
+                took,
+            )
         )
     known = [table.wall_time_s for table in results.tables if table.wall_time_s is not None]
     total = f"\n\nAll runs together took {sum(known) / 3600.0:.1f} hours of one core.{what_the_rest_takes(results)}"
     total = total if known else ""
-    header = ("runs", "about", "budget", "rules", "finished", "fewest per condition", "length, s", "hours")
+    header = ("runs", "about", "budget", "rules", "finished", "per condition", "length, s", "hours")
     return (
         "## What was run\n\n"
         f"{rows(header, lines, right=(4, 5, 6, 7))}\n\n"
         "Hours are those of one core by the clock, other work of the machine included; a dash where they are not "
         "known. Fewer than four runs of a condition decide nothing by intervals." + total
     )
+
+
+def per_condition(table: StudyTable) -> str:
+    """Return how many runs conditions have, "4" or "4 to 192"."""
+    done = n_done(table)
+    return f"{min(done)} to {max(done)}" if min(done) < max(done) else str(min(done))
 
 
 def what_the_rest_takes(results: StudyVerdict) -> str:
@@ -179,11 +201,10 @@ def what_the_rest_takes(results: StudyVerdict) -> str:
 
 def answers(results: StudyVerdict) -> str:
     """Return how many claims have which answer, and the answer to each, measures corrected."""
-    names = {table.spec.name: run_words(table) for table in results.tables}
     lines: list[tuple[str, ...]] = []
     for name, claim in CLAIMS.items():
         cells = [_signed(cell) for rules in results.rules for cell in results.cells(claim, rules)]
-        lines.append((name, claim.text, *cells, runs_of(claim, names) or "-"))
+        lines.append((name, claim.text, *cells, runs_of(claim, results) or "-"))
     columns = [f"{rules}: {word}" for rules in results.rules for word in (BANDS, OURS, RELATIVELY)]
     return (
         f"## The answers\n\n{how_many(results)}\n\n"
@@ -363,8 +384,8 @@ def fewer_values(results: StudyVerdict) -> str:
         spec = table.spec
         n_paper = len(load_study(spec.name, PAPER).seeds) if is_set_of_paper(spec) else len(spec.seeds)
         words = left_out_words(spec)
-        if words or len(spec.seeds) < n_paper:
-            runs = f"{len(spec.seeds)} of {n_paper}"
+        if words or len(spec.seeds) < n_paper or spec.looks:
+            runs = f"{per_condition(table)} of {n_paper}"
             lines.append((f"`{spec.name}`", words or "-", runs, ", ".join(claims_of(spec.name)) if words else "-"))
     header = (
         "set",

@@ -421,6 +421,7 @@ def command_of(table: "StudyTable") -> str:
     # Other seeds than the first ones are chosen by the budget.
     words += ["--seeds", str(len(spec.seeds))] if spec.seeds == tuple(range(len(spec.seeds))) else []
     words += ["--rules", "both" if others else rules]
+    words += ["--until-decided"] if spec.looks else []
     command = shlex.join(words)
     return command if is_set_of_paper(spec) else f"{command}  # study {spec.name}, identity {spec.study_id}"
 

@@ -152,11 +152,15 @@ class StudyTable(Table):
     def with_columns(self, names: Collection[str]) -> "StudyTable":
         """Return the table with some columns of records only, and those that say which run and interval a row is of.
 
-        Its curves are the same; no whole record can be made of it.
+        Its curves are the same; no whole record can be made of it. Runs that are missing have no `run_id`.
         """
-        spec, frame = self.spec, self.frame
-        always = ("cell", "reading", "policy", *(AXIS + axis.name for axis in spec.axes), *_OF_ROWS, *LOSS_COLUMNS)
-        return replace(self, frame=frame.select([name for name in frame.columns if name in {*always, *names}]))
+        import polars as pl
+
+        axes = (AXIS + axis.name for axis in self.spec.axes)
+        kept = {"cell", "reading", "policy", *axes, *_OF_ROWS, *LOSS_COLUMNS, *names}
+        frame = self.frame.select([name for name in self.frame.columns if name in kept])
+        is_there = pl.col("state") != MISSING  # what is not there takes most of the room otherwise: ids are by chance
+        return replace(self, frame=frame.with_columns(run_id=pl.when(is_there).then("run_id")))
 
     def write(self, path: str | Path) -> None:
         """Write the table to a Parquet file, whole or not at all."""

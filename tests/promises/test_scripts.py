@@ -112,7 +112,7 @@ def test_results_say_which_sets_and_conditions_they_are_of(run):
     measures = pl.read_csv("page/results/measures.csv")
     assert set(measures["runs"]) == {f"{name} {digest}" for name, digest in names.items()}
     assert "for S1b" in page, "what waits for runs"
-    assert "| `S1a` | population_size 2, 8, 32, 128 | 2 of 192 | E1, E2, E3, C5, P2, X2, X3 |" in page
+    assert "| `S1a` | population_size 2, 8, 32, 128 | 0 to 2 of 192 | E1, E2, E3, C5, P2, X2, X3 |" in page
     assert "Judged [on fewer values than the paper's](#what-is-left-out): E1, E2, E3, C5, P2, R1" in page
     assert f"| `S1c` | {len(whole.places)} | 0 | 0 | - |" in page, "four intervals are too short for breakdowns"
 
@@ -120,8 +120,9 @@ def test_results_say_which_sets_and_conditions_they_are_of(run):
 def test_the_results_page_comes_of_the_runs_beside_it(run):
     """They lie there packed; without them the page is another one."""
     pytest.importorskip("matplotlib", reason="needs the plots extra: matplotlib")
-    spec = load_study("S1c", "smoke")
-    given = made_table(spec, lambda cell: 10.0 + cell.values[0], adversity=lambda cell: cell.values[0])
+    spec = replace(load_study("S1c", "smoke"), looks=(1, 2))
+    lost = {(spec.places[0], 1)}
+    given = made_table(spec, lambda cell: 10.0 + cell.values[0], lost=lost, adversity=lambda cell: cell.values[0])
     replace(given, frame=given.frame.with_columns(throttle=0.1, n_carrying=1.0), wall_time_s=5400.0).write(
         "S1c.parquet"
     )
@@ -132,6 +133,10 @@ def test_the_results_page_comes_of_the_runs_beside_it(run):
     assert set(kept.frame.columns) >= {"performance", "adversity", "throttle", "run_id"}
     assert "n_carrying" not in kept.frame.columns, "no measure of this set reads it"
     assert verdict(kept).csv() == verdict(read_study("S1c.parquet")).csv()
+    assert kept.frame.filter(pl.col("run_id").is_null())["state"].to_list() == ["missing"], "an id takes room"
+    assert "Sets run until claims are decided: S1c. Sets not run: S1a" in text
+    assert f"| {spec.n_runs - 1} of {spec.n_runs} | 1 to 2 |" in text
+    assert "study run S1c --budget smoke --seeds 2 --rules both --until-decided" in text
     assert run("write_results", "--out", "page", "--check")[:2] == (0, "as the runs have it\n")
     pictures = [path.name for path in Path("page").rglob("*.png")]
     assert run("write_results", "--out", "page")[0] == 0, "once more, from what is there"
@@ -144,6 +149,7 @@ def test_the_results_page_comes_of_the_runs_beside_it(run):
 
 SETS = {
     "S1a": (Axis(name="population_size", values=(1, 2, 4)),),
+    "S1b": (Axis(name="population_size", values=(1, 2, 4)),),
     "S1c": (Axis(name="throttle", values=(0.0, 0.1, 0.4)),),
     "S1e": (Axis(name="noise", values=(0.0, 0.01, 3.0 / 70.0)),),
     "S1g": (Axis(name="population_dynamics", values=(1.0, 2.0, 5.0)),),
@@ -157,6 +163,7 @@ def varied_table(name):
     axes = SETS[name]
     reference = None if axes[-1].name == "population_size" else axes[-1].values[0]
     about = {"scenario": "search_and_rescue", "settings": {}} if name == "S2d" else {}
+    about |= {"looks": (2, 4)} if name == "S1b" else {}
     spec = made_study(name, *axes, reference=reference, seeds=tuple(range(5)), **about)
     lost = {(spec.places[1], 2)}
     table = made_table(spec, lambda place: 10.0 + 3.0 * FOUR.index(place.policy), lost=lost)

@@ -45,6 +45,21 @@ def runs_of(rows: pl.DataFrame) -> Runs:
     return {**runs, "seed": seeds, "n_robots": rows["n_robots"][0]}
 
 
+def looked_at(line: dict[float, Runs], study: dict) -> dict[float, Runs]:
+    """Of a study that is looked at several times, the first runs of each condition, as many as the last look has."""
+    if not study.get("looks"):
+        return line
+    n_values = len(study["axes"][-1]["values"])
+    everywhere = set.intersection(*(set(runs["seed"].tolist()) for runs in line.values()))
+    missing = [seed for seed in sorted(study["seeds"]) if seed not in everywhere]
+    n_leading = sum(seed < min(missing, default=math.inf) for seed in study["seeds"]) if len(line) == n_values else 0
+    last = max((look for look in study["looks"] if look <= n_leading), default=0)
+    return {
+        value: {name: part[:last] if isinstance(part, np.ndarray) else part for name, part in runs.items()}
+        for value, runs in line.items()
+    }
+
+
 def paired(*conditions: Runs) -> list[Runs]:
     """The runs of several conditions whose seed all of them have."""
     seeds = set.intersection(*(set(runs["seed"].tolist()) for runs in conditions))
@@ -186,7 +201,8 @@ def measured(file: Path) -> Iterator[tuple[tuple, Values]]:
     lines: dict[tuple, dict[float, Runs]] = {}
     for place, condition in rows.group_by("reading", "policy", *(f"axis_{name}" for name in (*others, last))):
         lines.setdefault(place[:-1], {})[float(place[-1])] = runs_of(condition)
-    for (rules, policy, *values), line in lines.items():
+    for (rules, policy, *values), whole in lines.items():
+        line = looked_at(whole, study)
         where = " ".join(f"{name} {value:g}" for name, value in zip(others, values, strict=True))
         found = over_sizes(line) if last == "population_size" else over_levels(last, line, study)
         for measure, form, value, of_runs in found:
