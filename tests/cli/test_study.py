@@ -98,6 +98,23 @@ def test_shards_are_not_packed_until_asked(written):
     assert [place["n_missing"] for place in json.loads(out)["conditions"]] == [1, 1]
 
 
+def test_several_studies_have_a_folder_around_theirs(written):
+    Path("other.toml").write_text(FILE.replace('"mine"', '"other"'))
+    code, out, _ = written("study", "run", "mine.toml", "other.toml", "--jobs", "1", "--out", "all")
+    assert code == 0
+    assert out.splitlines() == [f"8 of 8 runs done, in all/{name}_tiny" for name in ("mine", "other")]
+    plans = written("study", "run", "mine.toml", "other.toml", "--jobs", "1", "--out", "all", "--dry-run")[1]
+    assert plans.count("8 runs, 0 to do") == 2
+
+
+def test_what_is_not_decided_is_told_before_any_run(command):
+    code, out, _ = command("study", "run", "S1a", "S1b", "--until-decided", "--dry-run", "--rules", "described")
+    assert code == 0
+    assert "first look  described  0" in out
+    assert "8 lines without the first 4 runs." in out
+    assert not Path("results").exists()
+
+
 def test_failures_are_told_with_the_command_that_makes_them_again(written, monkeypatch):
     Path("mine.toml").write_text(FILE.replace('"random"', '{ policy = "random", parameters = { speed = 3 } }'))
     code, out, _ = written(*RUN, "--seeds", "3")
@@ -146,6 +163,10 @@ def test_an_interrupt_keeps_what_is_done(written, monkeypatch):
         (("run", "mine.toml", "--budget", "tini"), "Did you mean 'tiny'?"),
         (("run", "mine.toml", "--rules", "progam"), "Did you mean 'program'?"),
         (("run", "mine.toml", "--shard", "3/2"), "the shard to be a whole number from 1 to 2"),
+        (("run", "mine.toml", "--hours", "1"), "Expected --hours with --until-decided only"),
+        (("run", "S1a", "--until-decided"), "such as --hours 6"),
+        (("run", "S1a", "--until-decided", "--hours", "1", "--shard", "1/2"), "Expected no --shard"),
+        (("run", "mine.toml", "--until-decided", "--hours", "1"), "Expected studies of the paper's sets"),
         (("status", "nowhere"), "No such file"),
         (("pack", "."), "without study.json"),
     ],

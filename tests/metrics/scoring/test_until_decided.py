@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from metrics import CurveError
+from metrics import CurveError, verdict
 from metrics.claims import CLAIMS, Panel, PanelName
 from metrics.claims.looks import LOOKS
 from metrics.scoring import run_until_decided, study_panels, until_decided
@@ -14,10 +14,11 @@ from metrics.scoring.open_claims import both_forms, open_claim
 from swarm_forage_env.runs import runner
 from swarm_forage_env.runs.policy_spec import policy_specs
 from swarm_forage_env.runs.record import RecordError
+from swarm_forage_env.studies.description import status
 from swarm_forage_env.studies.study import Axis
 from swarm_forage_env.studies.study_folder import StudyFolder, run_study
 from swarm_forage_env.studies.study_table import read_study
-from tests.support.made_tables import FOUR, made_study
+from tests.support.made_tables import FOUR, made_study, made_table
 
 FEW = (4, 8)
 NOISE = PanelName("S1e", "noise_robustness")
@@ -79,8 +80,34 @@ def test_a_study_runs_until_the_last_look(tmp_path, monkeypatch):
     panels = study_panels(read_study(tmp_path / "packed.parquet")).panels
     assert panels[0].looks == FEW
     assert dict(panels[0].reached) == {line.policy: n_runs for line, n_runs in found.reached.items()}
+    words = f"looked at after {', '.join(map(str, FEW))} runs until claims are decided"
+    assert words in verdict(table).remarks[-1]
+    assert "Runs are made until claims are decided, looks after 4, 8." in str(status(table))
     again = run_until_decided([(spec, folder)], hours=1.0, looks=FEW, jobs=1, tell=told.append)
     assert again.reached == found.reached
+
+
+def test_verdicts_take_the_levels_of_several_looks():
+    """Two policies are within the margin by the interval of one look, and not by that of the first of seven."""
+    axis = Axis(name="noise", values=(0.0, 0.02, 0.04))
+    spec = made_study("S1e", axis, reference=0.0, seeds=tuple(range(4)))
+
+    def performance(place):
+        return 60.0 if place.values[0] == 0.0 else {"crw": 50.0, "stochx": 44.3}.get(place.policy, 45.0)
+
+    once, several = (
+        {name: found.verdict for name, found in verdicts_of(made_table(one, performance)).items()}
+        for one in (spec, replace(spec, looks=LOOKS))
+    )
+    assert once["N1"].answer == "supported"
+    assert several["N1"].answer != "supported"
+    assert several["N1"].n_runs == once["N1"].n_runs == 4
+    short = replace(spec, looks=LOOKS, seeds=tuple(range(3)))
+    assert verdicts_of(made_table(short, performance))["N1"].verdict.answer in ("no scores", "undecided")
+
+
+def verdicts_of(table):
+    return {one.claim.name: one for one in verdict(table).judged if one.variant == "corrected"}
 
 
 def test_what_was_interrupted_goes_on(tmp_path, monkeypatch):
