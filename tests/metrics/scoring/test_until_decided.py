@@ -1,6 +1,7 @@
 """Studies that run until claims are decided: tiny runs, and forecasts of made scores."""
 
 import json
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -9,10 +10,11 @@ import pytest
 from metrics import CurveError, verdict
 from metrics.claims import CLAIMS, Panel, PanelName
 from metrics.claims.looks import LOOKS
-from metrics.scoring import run_until_decided, study_panels, until_decided
+from metrics.scoring import Outlook, run_until_decided, study_panels, until_decided
 from metrics.scoring.open_claims import both_forms, open_claim
 from swarm_forage_env.runs import runner
-from swarm_forage_env.runs.policy_spec import policy_specs
+from swarm_forage_env.runs.cost import MeasuredCost
+from swarm_forage_env.runs.policy_spec import PolicySpec, policy_specs
 from swarm_forage_env.runs.record import RecordError
 from swarm_forage_env.studies.description import status
 from swarm_forage_env.studies.study import Axis
@@ -131,6 +133,35 @@ def test_what_was_interrupted_goes_on(tmp_path, monkeypatch):
     assert "first look" in str(dry)
     run_until_decided([(spec, folder)], hours=1.0, looks=FEW, jobs=1)
     assert len(folder.store.run_ids()) >= 4 * 3 * 4
+
+
+def test_a_line_whose_runs_fail_gets_no_more(tmp_path):
+    broken = PolicySpec(label="dpo", policy="random", parameters={"speed": 3})
+    spec = tiny(policies=(*policy_specs(["crw", "stochm", "stochx"]), broken))
+    found = run_until_decided([(spec, StudyFolder(tmp_path / "S1e"))], hours=1.0, looks=(4,), jobs=1)
+    assert {line.policy: n_runs for line, n_runs in found.reached.items()} == {
+        "crw": 4,
+        "stochm": 4,
+        "stochx": 4,
+        "dpo": 0,
+    }
+    assert "Runs of S1e described dpo failed; it gets no more." in str(found)
+
+
+def test_what_would_take_longer_than_the_time_is_not_begun(tmp_path, monkeypatch):
+    spec, folder = tiny(), StudyFolder(tmp_path / "S1e")
+    run_study(replace(spec, seeds=(0,)), folder, jobs=1)
+    monkeypatch.setattr(MeasuredCost, "seconds", lambda self, specs: 1e6)
+    found = run_until_decided([(spec, folder)], hours=1.0, looks=FEW, jobs=1)
+    assert set(found.reached.values()) == {0}
+    assert len(folder.store.run_ids()) == 4 * 3
+    with ThreadPoolExecutor(1) as executor:  # how fast others are is not known before they have made a run
+        assert run_until_decided([(spec, folder)], hours=1.0, looks=FEW, executor=executor).reached == found.reached
+
+
+def test_nothing_is_left_to_decide():
+    found = Outlook(wanted=(), reached={}, looks=FEW)
+    assert str(found) == "Every claim that these studies are about is decided."
 
 
 def test_a_dry_look_leaves_the_folder_alone(tmp_path):
