@@ -41,7 +41,7 @@ from metrics.scoring.study_verdict import (
     waiting_lines,
 )
 from swarm_forage_env import read_study
-from swarm_forage_env._internal.wording import counted, number
+from swarm_forage_env._internal.wording import counted, number, percent
 from swarm_forage_env.runs.store import DONE
 from swarm_forage_env.studies.study import StudySpec
 from swarm_forage_env.studies.study_file import (
@@ -59,6 +59,8 @@ PICTURES = Path("images/results")
 PAGE, DATA = "results.md", "results"
 COLOURS = 64
 """Of a picture; with more, its file is several times as large and looks the same."""
+NIGHT_CORE_H = 80.0
+"""A night of ten hours on eight cores."""
 SIGNS: dict[str, str] = {
     "supported": "✓",
     "contradicted": "✗",
@@ -196,7 +198,11 @@ def what_the_rest_takes(results: StudyVerdict) -> str:
         for budget in budgets
     }
     words = " and ".join(f"{number(rate_h * n)} at budget `{budget}`" for budget, n in ticks.items() if n)
-    return f" In proportion to robots times ticks, all {len(set_names())} sets take {words}, in core-hours."
+    night = percent(min(1.0, NIGHT_CORE_H / (rate_h * ticks[PAPER])))
+    return (
+        f" In proportion to robots times ticks, all {len(set_names())} sets under both rules take {words}, in "
+        f"core-hours. A night of ten hours on eight cores makes {night} of the latter."
+    )
 
 
 def answers(results: StudyVerdict) -> str:
