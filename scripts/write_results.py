@@ -278,13 +278,14 @@ def intuitions(results: StudyVerdict) -> str:
             claim.figure.split(",")[0],
             claim.text,
             *(_answer(found.get((name, rules, "corrected"))) for rules in results.rules),
+            runs_of(claim, results) or "-",
         )
         for name, claim in INTUITIONS.items()
     ]
     return (
         "## What the paper expected\n\nIts tables of intuitions, written before its experiments, in our words, with "
         'what we take "modest" and "low" to mean. Left out: that STOCHM is congested near its caches, since records '
-        f"do not hold where time is lost.\n\n{rows(('name', 'where', 'expected', *results.rules), lines)}"
+        f"do not hold where time is lost.\n\n{rows(('name', 'where', 'expected', *results.rules, 'runs'), lines)}"
     )
 
 
@@ -318,7 +319,7 @@ def figures(results: StudyVerdict, folder: Path | None) -> str:
     ]
     found = results.found
     for table, shown in pictured(results):
-        parts += [f"### {table.spec.name}: {table.spec.title}"] if shown else []
+        parts += [f"### {table.spec.name}: {table.spec.title}", f"Runs: {run_words(table)}."] if shown else []
         for figure in shown:
             parts.append(_pictured(figure.name, figure.title, folder, lambda path, it=figure: draw_figure(it, [path])))
             rules = figure.panels[0].rules
@@ -356,8 +357,8 @@ def breakdowns(results: StudyVerdict) -> str:
             half = "" if math.isinf(row["half_broken_s"]) else f", half by {row['half_broken_s']:,.0f} s"
             share = f"{round(row['broken'] * row['n_runs'])} of {counted(row['n_runs'], 'run')}"
             worst = f"{row['policy']}, {row['rules']}, {place}: {share}{half}"
-        lines.append((f"`{table.spec.name}`", len(places), len(judged), len(broken), worst or "-"))
-    header = ("set", "conditions", "judged", "with a breakdown", "most often")
+        lines.append((run_words(table), len(places), len(judged), len(broken), worst or "-"))
+    header = ("runs", "conditions", "judged", "with a breakdown", "most often")
     return (
         "## Breakdowns\n\nA mean hides runs that broke down: they end below half of the reference and stay there "
         "([metrics.md](metrics.md#all-runs-not-means-alone)). The reference is the undisturbed swarm; where sizes "
