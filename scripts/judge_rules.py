@@ -28,6 +28,8 @@ from metrics.scoring.scores import pseudo_values
 
 LEVELS = np.arange(1.0, 8.0)
 N_SUMS = 200_000
+ABOVE_ZERO = 4.0
+"""Added to curves, which must not be negative; distances stay as they are."""
 Curves = Mapping[str, Any]
 """Policy -> height at each level, or a number."""
 Make = Callable[[np.random.Generator], Sequence[Curves]]
@@ -78,7 +80,7 @@ def of_mean_curves(panel: Panel) -> Panel:
     """The distances of the mean curves of a and b from their ideal ones, where levels are intervals of runs."""
 
     def runs(name: str) -> RunCurves:
-        curves = panel.scores[name].T
+        curves = panel.scores[name].T + ABOVE_ZERO
         return RunCurves(
             criterion="noise", value=1.0, n_robots=1, seeds=tuple(range(len(curves))), curves={"performance": curves}
         )
@@ -87,7 +89,7 @@ def of_mean_curves(panel: Panel) -> Panel:
         return noise_robustness(ideal.performance, noisy.performance)
 
     scores = {name: next(pseudo_values(apart, (runs(f"ideal {name}"), runs(name)), None))[None] for name in "ab"}
-    return Panel(levels=LEVELS[:1], scores=scores)
+    return Panel(levels=LEVELS[:1], scores=scores, confidence=panel.confidence)
 
 
 PAIR = {"pairs": (("a", "b"),)}
