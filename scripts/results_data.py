@@ -69,14 +69,14 @@ def run_words(table: StudyTable) -> str:
 
 
 def measures(results: StudyVerdict) -> Iterator[dict[str, Any]]:
-    """Yield one row per measure, in its corrected form, policy and level."""
+    """Yield one row per measure, in its corrected form, policy and level at which it has a number."""
     for table, panels in zip(results.tables, results.scored, strict=True):
         for figure in study_figures(panels):
             first = figure.panels[0]
             if first.variant != "corrected":
                 continue
             about = {"runs": run_words(table), "measure": first.measure, "form": first.form, "unit": first.unit}
-            for row in figure.to_frame().iter_rows(named=True):
+            for row in figure.to_frame().filter(pl.col("n_runs") > 0).iter_rows(named=True):
                 others = " ".join(f"{name} {row[name]:g}" for name in first.others)
                 place = {"rules": row["rules"], "others": others, "policy": row["policy"]}
                 numbers = ("level", "n_runs", "mean", "lower", "upper", "sd")

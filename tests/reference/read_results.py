@@ -245,12 +245,10 @@ def main(folder: Path) -> int:
     for file in sorted(folder.glob("*.parquet")):
         for key, values in measured(file):
             row = rows.pop(key, None)
-            if row is None or not len(values):
-                # A level at which no policy has a number is not printed.
-                faults = ["is not printed"] if len(values) else []
-                faults += [f"{row['n_runs']} runs printed, none found"] if row is not None and row["n_runs"] else []
+            if not len(values):
+                faults = [] if row is None else [f"{row['n_runs']} runs printed, none found"]
             else:
-                faults = faults_of(row, values)
+                faults = ["is not printed"] if row is None else faults_of(row, values)
             wrong += [f"{', '.join(map(str, key))}: {fault}" for fault in faults]
             n_right += row is not None and not faults
     wrong += [f"{', '.join(map(str, key))}: no runs of it" for key in rows]
