@@ -68,6 +68,18 @@ def test_it_fits_and_asks_for_nothing(written, tmp_path, width):
         assert browser.ask(shown) == 17, "five and four figures, four of them with a map, and four of theory"
 
 
+def test_all_answers_are_seen_at_1300_pixels(tmp_path):
+    (tmp_path / "report.html").write_text(page(made_study(rules=("described", "program"))))
+    with Browser(tmp_path, width=1300, height=900) as browser:
+        browser.open(tmp_path / "report.html", LOADED)
+        headings = "[...document.querySelectorAll('#verdicts th')].map((one) => one.innerText)"
+        assert len(browser.ask(headings)) == 2 + 6
+        assert (
+            browser.ask("(box => box.scrollWidth - box.clientWidth)(document.querySelector('#verdicts').parentElement)")
+            == 0
+        )
+
+
 def test_tables_are_sorted_by_a_click(written, tmp_path):
     names = "[...document.querySelectorAll('#verdicts .name')].map((condition) => condition.textContent)"
     with Browser(tmp_path, width=1280, height=900) as browser:
