@@ -376,12 +376,25 @@ def left_out(results: StudyVerdict) -> str:
     for table, panels in zip(results.tables, results.scored, strict=True):
         missing = {f"{measure}, {variant}: {why}" for (measure, variant), why in panels.missing.items()}
         lines += [f"- {table.spec.name}, {words}" for words in sorted(missing)]
-    commands = "\n".join(command_of(table) for table in results.tables)
+    commands = "\n".join(dict.fromkeys(commands_of(results.tables)))
     return (
         f"## What is left out\n\n{fewer_values(results)}"
         + ("\n".join(lines) or "Nothing waits.")
         + f"\n\n## To run it again\n\n```bash\n{commands}\nscripts/write_results results/studies/*\n```"
     )
+
+
+def commands_of(tables: Sequence[StudyTable]) -> Iterator[str]:
+    """Yield the commands that make the runs again: one of all sets that share the hours until claims are decided."""
+    decided = [table for table in tables if table.spec.looks and is_set_of_paper(table.spec)]
+    yield from (command_of(table) for table in tables if table not in decided)
+    if decided:
+        took = [table.wall_time_s for table in decided]
+        known_s = None if None in took else sum(second or 0.0 for second in took)
+        first = decided[0].spec.name
+        names = " ".join(dict.fromkeys(table.spec.name for table in decided))
+        command = command_of(replace(decided[0], wall_time_s=known_s))
+        yield command.replace(f" {first} ", f" {names} ", 1).replace(" --until", " --out results/studies --until", 1)
 
 
 def fewer_values(results: StudyVerdict) -> str:

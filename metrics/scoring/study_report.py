@@ -419,9 +419,11 @@ def command_of(table: "StudyTable") -> str:
     words += [spec.name if is_set_of_paper(spec) else spec.file or "FILE"]
     words += ["--budget", spec.budget] if spec.budget else []
     # Other seeds than the first ones are chosen by the budget.
-    words += ["--seeds", str(len(spec.seeds))] if spec.seeds == tuple(range(len(spec.seeds))) else []
+    most = spec.looks[-1] if spec.looks else len(spec.seeds)
+    words += ["--seeds", str(most)] if spec.seeds == tuple(range(len(spec.seeds))) else []
     words += ["--rules", "both" if others else rules]
-    words += ["--until-decided"] if spec.looks else []
+    if spec.looks:
+        words += ["--until-decided", "--hours", str(math.ceil((table.wall_time_s or 0.0) / 3600.0) or 1)]
     command = shlex.join(words)
     return command if is_set_of_paper(spec) else f"{command}  # study {spec.name}, identity {spec.study_id}"
 

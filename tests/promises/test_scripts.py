@@ -136,7 +136,8 @@ def test_the_results_page_comes_of_the_runs_beside_it(run):
     assert kept.frame.filter(pl.col("run_id").is_null())["state"].to_list() == ["missing"], "an id takes room"
     assert "Sets run until claims are decided: S1c. Sets not run: S1a" in text
     assert f"| {spec.n_runs - 1} of {spec.n_runs} | 1 to 2 |" in text
-    assert "study run S1c --budget smoke --seeds 2 --rules both --until-decided" in text
+    command = "study run S1c --budget smoke --seeds 2 --rules both --out results/studies --until-decided --hours 1\n"
+    assert command in text
     assert run("write_results", "--out", "page", "--check")[:2] == (0, "as the runs have it\n")
     pictures = [path.name for path in Path("page").rglob("*.png")]
     assert run("write_results", "--out", "page")[0] == 0, "once more, from what is there"
