@@ -166,7 +166,9 @@ def _policy_lines(name: str) -> Iterator[str]:
     yield f"  caches      {_caches(policy, ' (the caches it is made for)')}"
     yield f"  reads       {'all slices' if reads is None else ', '.join(reads) or 'nothing'}"
     settings = tuple(_settings(policy))
-    if settings:
+    if not settings:
+        yield "  parameters  none"
+    else:
         yield ""
         yield "Parameters (change them in a study file, or in Python with plan_run(..., parameters={name: value})):"
         yield from (f"  {field:<34}{_plain(value)}" for field, value in settings)
