@@ -42,7 +42,7 @@ LOSS_COLUMNS = ("state", "error", "traceback", "rerun")
 that makes the run again, given in the folder of the study."""
 _PREFIX = "swarm_forage_env.study."
 _FILE_KEYS = tuple(_PREFIX + name for name in ("table_version", "study", "versions", "digest"))
-_OF_ROWS = ("study", "run_id", "n_robots", "seed", "interval", "t_end_s", "performance")
+OF_ROWS = ("study", "run_id", "n_robots", "seed", "interval", "t_end_s", "performance")
 """Columns that every table has."""
 _COMPRESSION = 19
 """Of Zstandard; it takes a second for a thousand runs, and files are read as quickly."""
@@ -157,7 +157,7 @@ class StudyTable(Table):
         import polars as pl
 
         axes = (AXIS + axis.name for axis in self.spec.axes)
-        kept = {"cell", "reading", "policy", *axes, *_OF_ROWS, *LOSS_COLUMNS, *names}
+        kept = {"cell", "reading", "policy", *axes, *OF_ROWS, *LOSS_COLUMNS, *names}
         frame = self.frame.select([name for name in self.frame.columns if name in kept])
         is_there = pl.col("state") != MISSING  # what is not there takes most of the room otherwise: ids are by chance
         return replace(self, frame=frame.with_columns(run_id=pl.when(is_there).then("run_id")))
