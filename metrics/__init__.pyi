@@ -27,6 +27,7 @@ from .scoring import StudyReport as StudyReport
 # decisions: larger swarms, and which policy
 from .scoring import predict_policy as predict_policy
 from .scoring import predict_curves as predict_curves
+from .scoring import predict_from_scenario as predict_from_scenario
 from .scoring import choose_policy as choose_policy
 from .scoring import ablate_quirks as ablate_quirks
 from .scoring import PredictionTable as PredictionTable
@@ -102,6 +103,14 @@ from .foraging_model import steady_state as steady_state
 from .foraging_model import ForagingRates as ForagingRates
 from .foraging_model import MeanField as MeanField
 from .foraging_model import SteadyState as SteadyState
+
+# foraging from the scenario alone
+from .random_search import search_curves as search_curves
+from .random_search import heading_diffusion as heading_diffusion
+from .random_search import seen_strip as seen_strip
+from .random_search import Walker as Walker
+from .random_search import SearchFloor as SearchFloor
+from .random_search import SearchCurves as SearchCurves
 
 # statistics
 from .statistics import normalize as normalize

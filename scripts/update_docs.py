@@ -95,6 +95,7 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("generalist", "likeliest"),
     ),
     "stochx_program": ((f"python {ROOT}/scripts/stochx_beside_program.py",), ()),
+    "from_scenario": ((f"python {ROOT}/scripts/from_scenario.py",), ()),
     "emptying": ((f"python {ROOT}/scripts/emptying_floor.py",), ("crw", "dpo")),
 }
 """Name -> commands, of which the last prints the table, and what its rows are called in blocks."""

@@ -4,6 +4,13 @@ from swarm_forage_env.scenarios.performance import Performance
 
 from .ablation import Ablation, AblationQuestion, ablate_quirks, ablation_question
 from .choosing import Choice, ChoiceQuestion, choice_question, choose_policy
+from .from_scenario import (
+    ScenarioPrediction,
+    ScenarioPredictions,
+    ScenarioQuestion,
+    predict_from_scenario,
+    scenario_question,
+)
 from .plots import draw_predictions, draw_scores
 from .policy_scores import ScoreQuestion, compare_policies, score_curves, score_policy, score_question
 from .prediction import (
@@ -36,6 +43,8 @@ __all__ = [
     "summarize_runs",
     "score_question",
     "prediction_question",
+    "predict_from_scenario",
+    "scenario_question",
     "choice_question",
     "ablate_quirks",
     "ablation_question",
@@ -62,6 +71,9 @@ __all__ = [
     "Question",
     "ScoreQuestion",
     "PredictionQuestion",
+    "ScenarioQuestion",
+    "ScenarioPrediction",
+    "ScenarioPredictions",
     "ChoiceQuestion",
     "RunQuestion",
     "AblationQuestion",

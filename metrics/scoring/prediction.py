@@ -328,7 +328,7 @@ def prediction_question(
     chosen = world_of(world)
     fitted, held = _checked_sizes(fit_sizes(chosen.scenario) if fit is None else fit, hold)
     worlds = [
-        World(_with_robots(chosen.scenario, size), chosen.wrappers, criterion=SIZE, value=size)
+        World(with_robots(chosen.scenario, size), chosen.wrappers, criterion=SIZE, value=size)
         for size in (*fitted, *held)
     ]
     plan = plan_totals(policies, worlds, seeds=seeds, parameters=parameters, caches=caches)
@@ -421,7 +421,7 @@ def _checked_sizes(fit: Sequence[int], hold: Sequence[int]) -> tuple[tuple[int, 
     return fitted, held
 
 
-def _with_robots(scenario: "ScenarioConfig", n_robots: int) -> "ScenarioConfig":
+def with_robots(scenario: "ScenarioConfig", n_robots: int) -> "ScenarioConfig":
     """Return the scenario for a swarm size, as scores have it in their size sweep."""
     if scenario.objects.placement == "power_law":
         worlds = _growing_worlds(scenario)

@@ -177,6 +177,14 @@ def predict(
         str | None, typer.Option(help="Larger sizes that are run, or in the file, but not fitted: the test.")
     ] = None,
     seeds: Annotated[int, typer.Option(min=2, help="Runs per size.")] = 4,
+    from_scenario: Annotated[
+        bool,
+        typer.Option(
+            "--from-scenario",
+            help="Predict performance, time lost, E_S, E_T and C from arena, objects and walk alone, for the sizes of "
+            "--fit and --hold: nothing is fitted, only --hold is run. For policies that search at random, as crw.",
+        ),
+    ] = False,
     picture: Picture = None,
 ) -> None:
     """Fit performance to small swarms; predict twice and four times the largest, with intervals, and the critical size.
@@ -184,6 +192,7 @@ def predict(
     The critical size is the swarm size of the largest performance. Sizes of --hold are run as well and held against
     the prediction. Runs that the folder holds already are not repeated.
     """
+    from metrics.scoring.from_scenario import predict_from_scenario, scenario_question
     from metrics.scoring.prediction import Predictions, predict_curves, prediction_question
     from swarm_forage_env.cli.printer import ask_and_show, refusing, show
     from swarm_forage_env.cli.scenario_options import default_folder, described_world, split_numbers
@@ -199,10 +208,20 @@ def predict(
     if any(word.partition("=")[0] == "n_robots" for word in described.settings):
         raise typer.BadParameter("Expected no --set n_robots=..., because sizes are varied; use --fit and --hold.")
     world, caches = described_world(described)
+    names = policies.names()
+    if from_scenario and not held:
+        with refusing():
+            found = predict_from_scenario(names, world, fitted, caches=caches)
+        show(found, picture, as_json=options.as_json)
+        return
     with refusing():
-        question = prediction_question(policies.names(), world, fit=fitted, hold=held, seeds=seeds, caches=caches)
+        question = (
+            scenario_question(names, world, fitted, hold=held, seeds=seeds, caches=caches)
+            if from_scenario
+            else prediction_question(names, world, fit=fitted, hold=held, seeds=seeds, caches=caches)
+        )
     folder = options.out or default_folder(world.scenario.name)
-    file = picture or folder / "prediction.png"
+    file = picture or folder / f"{'from_scenario' if from_scenario else 'prediction'}.png"
     ask_and_show(question, folder, options, picture=file)
 
 

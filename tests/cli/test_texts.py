@@ -53,6 +53,7 @@ FORMS = "--variant corrected,paper,sierra --form marginal,interactive --band --m
 CURVES = "score --curves curves.csv"
 COMPARE = f"compare --policy crw,dpo --budget quick --seeds 2 --horizon 400 {ROOM}"
 FEW = "--measures t_lost_fraction,raw_performance,adaptability"
+FROM_SCENARIO = "predict --policy crw --from-scenario"
 PREDICT = f"predict --policy crw --fit 2,4,6,8 --hold 12 --seeds 2 --jobs 1 {SMALL} {SECONDS}"
 CHOOSE = (
     f"choose --policy crw,dpo --deliver 4 --keep 0.5 --failures 0.01 --deaths 1 --noise 0.01 --seeds 2 {ROOM} {SECONDS}"
@@ -91,6 +92,8 @@ CASES = {
     "predict.txt": PREDICT,
     "predict.json": f"{PREDICT} --json",
     "predict_plan.txt": f"{PREDICT} --horizon 800 --dry-run",
+    "predict_from_scenario.txt": f"{FROM_SCENARIO} --fit 1,2,4 --jobs 1 {SMALL} {SECONDS}",
+    "predict_from_scenario.json": f"{FROM_SCENARIO} --fit 1 --hold 6 --seeds 2 --jobs 1 {SMALL} {SECONDS} --json",
     "predict_curves.txt": "predict --curves law.csv --hold 32",
     "predict_curves.json": "predict --curves law.csv --hold 32 --json",
     "choose.txt": CHOOSE,
