@@ -130,6 +130,12 @@ RULES: dict[str, Rule] = {
         wrong=("supported", "contradicted"), holds=fixed({**IDEAL, "a": 3.0, "b": 2.0}),
         fails=fixed({**IDEAL, "a": 2.0, "b": 3.0}), sd=0.5,
     ),
+    "is higher, of mean curves without a distance": Rule(
+        predicate=lambda panel, **given: general.is_higher(of_mean_curves(panel), **given),
+        parameters={"upper": ("a",), "lower": ("b",)}, border=fixed({**IDEAL, **ALIKE}),
+        wrong=("supported", "contradicted"), holds=fixed({**IDEAL, "a": 2.0, "b": 1.0}),
+        fails=fixed({**IDEAL, "a": 1.0, "b": 2.0}), sd=0.5,
+    ),
     "is not higher": Rule(
         predicate=general.is_not_higher, parameters={"first": "a", "second": "b"}, border=fixed(ALIKE),
         wrong=("contradicted",), holds=fixed(ALIKE), fails=fixed(APART),
@@ -232,12 +238,12 @@ def first_decided(found: Sequence[str]) -> str:
 def wrong_over_looks(rule: Rule, looks: Looks, n_worlds: int) -> float:
     """Return the share of worlds at the border in which a wrong answer is given at any look."""
     found = answers_over_looks(rule, "border", looks, n_worlds)
-    return max(sum(answer in seen for seen in found) for answer in rule.wrong) / n_worlds
+    return sum(not set(rule.wrong).isdisjoint(seen) for seen in found) / n_worlds
 
 
 def share(found: Sequence[str], wanted: Sequence[str]) -> float:
-    """Return how many of the answers are among some; of several, the largest share of one."""
-    return max(found.count(answer) for answer in wanted) / len(found)
+    """Return how many of the answers are among some."""
+    return sum(answer in wanted for answer in found) / len(found)
 
 
 def rows(n_worlds: int, n_runs: Sequence[int]) -> Iterator[list[str]]:

@@ -360,23 +360,30 @@ _OF_MEANS = ("mean_curves_per_seed", "relative_mean_curves_per_seed")
 def pseudo_values(values: Values, paired: tuple[RunCurves, ...], compared_with: int | None) -> Iterator[FloatArray]:
     """Yield the pseudo-values of the measure of mean curves, (R,), and of its shares of performance if it has such.
 
-    With R runs, v of all and v_i without run i they are R v - (R - 1) v_i. Their mean is v with less bias, and they
-    scatter like R independent values of which v is the mean (Tukey 1958; Miller 1974, "The jackknife - a review").
+    With R runs, v of all and v_i without run i they are v + (R - 1) (m - v_i), where m is the mean of all v_i. Their
+    mean is v, and they scatter like R independent values of which v is the mean (Tukey 1958), on average no less than
+    v does (Efron and Stein 1981). Tukey's own, R v - (R - 1) v_i, have a mean with less bias. But a distance has bends,
+    where curves cross and where its path through time turns, and at these that mean varies several times as much as
+    the pseudo-values tell.
     """
-    n_runs = len(paired[0].seeds)
     whole = [
         replace(e, curves={name: curve.mean(axis=0, keepdims=True) for name, curve in e.curves.items()}) for e in paired
     ]
     parts = [e.without_each() for e in paired]
     of_all, without = (np.asarray(values(*curves), dtype=np.float64) for curves in (whole, parts))
-    yield n_runs * of_all - (n_runs - 1) * without
+    yield _pseudo(of_all, without)
     if compared_with is not None:
         totals = [curves[compared_with].performance.sum(axis=-1) for curves in (whole, parts)]
         shares = [
             np.divide(found, total, out=np.full(found.shape, math.nan), where=total > 0.0)
             for found, total in zip((of_all, without), totals, strict=True)
         ]
-        yield n_runs * shares[0] - (n_runs - 1) * shares[1]
+        yield _pseudo(*shares)
+
+
+def _pseudo(of_all: FloatArray, without: FloatArray) -> FloatArray:
+    with np.errstate(invalid="ignore"):  # infinite without each run
+        return of_all + (without.size - 1) * (without.mean() - without)
 
 
 def _note(per_run: FloatArray, n_lost: int, relative: FloatArray | None) -> str:

@@ -46,10 +46,9 @@ def test_variants_of_measures_of_size_by_hand(label):
 def test_pseudo_values_by_hand():
     curves = {"performance": np.array([[1.0], [3.0]])}
     runs = RunCurves(criterion="noise", value=1.0, n_robots=1, seeds=(0, 1), curves=curves)
-    # The square of the mean is 4, without the first run 9, without the second 1; their mean, 3, is 4 less half of the
-    # variance 2, which is not biased.
+    # The square of the mean is 4, without the first run 9, without the second 1, 5 on average.
     squares, shares = pseudo_values(lambda it: it.performance[..., 0] ** 2, (runs,), 0)
-    assert squares.tolist() == [2 * 4.0 - 9.0, 2 * 4.0 - 1.0]
+    assert squares.tolist() == [4.0 + (5.0 - 9.0), 4.0 + (5.0 - 1.0)]
     assert shares.tolist() == [1.0, 3.0], "of what is a mean, the values of the runs"
 
 
