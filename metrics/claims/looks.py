@@ -2,9 +2,9 @@
 
 Whoever looks seven times and stops when the answer is there is wrong more often than once in twenty. So each look has a
 part of these 5 %, in proportion to the runs that it adds (Lan and DeMets 1983; Kim and DeMets 1987), and judges by
-intervals of a higher confidence. All intervals hold at once, so it does not matter when and why one stops (repeated
-confidence intervals, Jennison and Turnbull 1990). The same confidence serves Welch's t, the two one-sided tests of a
-tie and resampled numbers: a level that follows from the normal distribution is used for any test.
+intervals of a higher confidence. All intervals of one comparison hold at once, so it does not matter when and why one
+stops (repeated confidence intervals, Jennison and Turnbull 1990). The same confidence serves Welch's t, the two
+one-sided tests of a tie and resampled numbers: a level that follows from the normal distribution is used for any test.
 
 Policies and panels may have unequally many runs. A statement is judged on the first runs of each, as many as all that
 it speaks of have had looked at, so that no look at it is more than one.
@@ -79,13 +79,16 @@ def last_look(looks: Looks, n_runs: int) -> int:
 def at_last_look(panels: Sequence[Panel], policies: Collection[str]) -> list[Panel]:
     """Return panels with the runs that some policies have in all of them, and the confidence of the last look at these.
 
-    Panels that are looked at once stay as they are, but for the confidence if others are looked at several times.
+    Panels that are looked at once stay as they are, but for the confidence if others are looked at several times. Of
+    panels with different looks it is a look of all, and the highest confidence.
     """
-    reached = [panel.reached.get(name, 0) for panel in panels if panel.looks for name in policies or panel.scores]
-    if not reached:
+    several = [panel for panel in panels if panel.looks]
+    if not several:
         return list(panels)
-    n_runs, looks = min(reached), next(panel.looks for panel in panels if panel.looks)
-    confidence = confidence_at(looks, n_runs) if n_runs else CONFIDENCE
+    reached = min(panel.reached.get(name, 0) for panel in several for name in policies or panel.scores)
+    shared = tuple(look for look in several[0].looks if all(look in panel.looks for panel in several))
+    n_runs = last_look(shared, reached)
+    confidence = max(confidence_at(panel.looks, n_runs) for panel in several) if n_runs else CONFIDENCE
     return [
         replace(_with_runs(panel, n_runs) if panel.looks else panel, looks=(), reached={}, confidence=confidence)
         for panel in panels

@@ -60,6 +60,14 @@ def test_a_statement_is_judged_on_the_runs_that_all_policies_have():
     assert statement.outcome(dict.fromkeys(statement.panels, looked_at(16, 0)), "intervals").answer == "no scores"
 
 
+def test_panels_with_different_looks_are_judged_at_one_that_both_have():
+    early = replace(looked_at(16, 16), looks=looks_up_to(12), reached={"crw": 12, "dpo": 12})
+    for panels in ((early, looked_at(16, 16)), (looked_at(16, 16), early)):
+        seen = at_last_look(panels, ("crw", "dpo"))
+        assert [panel.scores["crw"].shape for panel in seen] == [(1, 8), (1, 8)]
+        assert {panel.confidence for panel in seen} == {confidence_at(LOOKS, 8)}
+
+
 def test_as_if_there_were_more_runs():
     found = looked_at(8, 4, undisturbed={"crw": np.arange(16.0), "dpo": np.arange(16.0)})
     more = as_if(found, 16)
