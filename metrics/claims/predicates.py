@@ -20,6 +20,7 @@ from .outcomes import (
     all_of,
     by_majority,
     contrary,
+    scored_levels,
     where_scored,
     within_limit,
     without_scores,
@@ -212,9 +213,9 @@ def varies(panel: Panel, *, policies: Sequence[str], rule: Rule = "intervals") -
 
 
 def is_narrow(panel: Panel, *, policies: Sequence[str], rule: Rule = "intervals") -> Outcome:
-    """Whether the bands of policies, four standard deviations wide, are at most `FLAT` of the scale, mean of levels.
+    """Whether the bands of policies, four standard deviations wide, are at most `FLAT` of the scale at most levels.
 
-    By bands: at more than half of the levels.
+    By intervals: their median over the levels, which one wild level does not move.
     """
     return all_of([_narrowness(panel, policy, rule) for policy in policies])
 
@@ -227,7 +228,7 @@ def is_wide(panel: Panel, *, policies: Sequence[str], rule: Rule = "intervals") 
 def is_wider(panel: Panel, *, upper: Sequence[str], lower: Sequence[str], rule: Rule = "intervals") -> Outcome:
     """Whether each of some policies scatters more between runs than each of others.
 
-    By intervals: mean over the levels. By bands: at more than half of the levels the band is `WIDER` times as wide;
+    By intervals: median over the levels. By bands: at more than half of the levels the band is `WIDER` times as wide;
     contradicted if that holds of the other policy, else undecided.
     """
     return all_of([_more_scatter(panel, a, b, rule) for a in upper for b in lower])
@@ -236,7 +237,7 @@ def is_wider(panel: Panel, *, upper: Sequence[str], lower: Sequence[str], rule: 
 def reaches_higher(panel: Panel, *, upper: Sequence[str], lower: Sequence[str], rule: Rule = "intervals") -> Outcome:
     """Whether the upper edges of the bands of some policies are above those of others.
 
-    By intervals: mean over the levels. By bands: at more than half of the levels the edge is above the other by `TIE`
+    By intervals: median over the levels. By bands: at more than half of the levels the edge is above the other by `TIE`
     of the scale; contradicted if that holds of the other policy, else undecided.
     """
     return all_of([_higher_edge(panel, a, b, rule) for a in upper for b in lower])
@@ -250,10 +251,14 @@ def differs_more(few: Panel, many: Panel, *, pairs: Pairs, rule: Rule = "interva
     more the clearer it is. Supported if the gain in mean clarity is surely above 0, contradicted if it is surely below
     `MORE`. By bands the share of comparisons that differ must gain, or lose, `MORE`.
     """
-    names = {name for pair in pairs for name in pair}
-    if not few.n_runs(names) or not many.n_runs(names):
-        return without_scores(" and ".join(sorted(names)))
-    equal = of_equal_runs(few, many, names)
+    names = sorted({name for pair in pairs for name in pair})
+    parts: list[Panel] = []
+    for panel in (few, many):
+        part = scored_levels(panel, names, rule)
+        if isinstance(part, Outcome):
+            return part
+        parts.append(part)
+    equal = of_equal_runs(parts[0], parts[1], names)
     n_runs = equal[0].n_runs(names)
     if n_runs < LEAST_RUNS[rule]:
         why = f"{n_runs} runs of each panel, {LEAST_RUNS[rule]} are needed"
@@ -337,13 +342,13 @@ def _narrowness(panel: Panel, policy: str, rule: Rule) -> Outcome:
     def judge(part: Panel) -> Outcome:
         (values,) = part.of((policy,))
         found, drawn = resampled_deviations(values, part.confidence)
-        width, n_runs = 4.0 * float(found.mean()) / part.scale, part.n_runs((policy,))
+        width, n_runs = 4.0 * float(np.median(found)) / part.scale, part.n_runs((policy,))
         if rule == "bands":
             widths = 4.0 * std_over_runs(values) / part.scale
             answer: Answer = "supported" if (widths <= FLAT).mean() > MANY else "contradicted"
             why = f"bands of {policy} are at most {FLAT:g} of the scale wide at {(widths <= FLAT).mean():.0%} of levels"
             return Outcome(answer=answer, statistic=width, effect=width, n_runs=n_runs, why=why)
-        interval = bounds(4.0 * drawn.mean(axis=-1) / part.scale)
+        interval = bounds(4.0 * np.median(drawn, axis=-1) / part.scale)
         why = f"bands of {policy} are {width:.2f} of the scale wide ({_ends(interval)}); {FLAT:g} is still narrow"
         return Outcome(answer=within_limit(interval, FLAT), statistic=width, effect=width, n_runs=n_runs, why=why)
 
@@ -391,9 +396,9 @@ def _by_sight(
 
 
 def _by_draws(panel: Panel, names: tuple[str, str], found: FloatArray, drawn: FloatArray, what: str) -> Outcome:
-    """Whether a statistic at levels, (2, L), is larger for the first of two policies, in the mean over levels."""
-    gap = float((found[0] - found[1]).mean()) / panel.scale
-    lower, upper = bounds((drawn[:, 0] - drawn[:, 1]).mean(axis=-1) / panel.scale)
+    """Whether a statistic at levels, (2, L), is larger for the first of two policies, in the median over levels."""
+    gap = float(np.median(found[0] - found[1])) / panel.scale
+    lower, upper = bounds(np.median(drawn[:, 0] - drawn[:, 1], axis=-1) / panel.scale)
     answer: Answer = "supported" if lower >= 0.0 else "contradicted" if upper < 0.0 else "undecided"
     ends = _ends((lower, upper))
     why = f"{what} of {names[0]} less that of {names[1]} is {gap:.2f} of the scale ({ends}); above 0 it is larger"

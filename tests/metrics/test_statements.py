@@ -307,6 +307,23 @@ def test_one_score_that_is_not_finite_costs_its_level_alone():
     assert (outcome.answer, outcome.why) == ("undecided", "6 of 9 levels have fewer than 4 runs with a score of a")
 
 
+def test_a_level_without_scores_does_not_keep_others_from_being_compared():
+    alike, apart = panel({"a": 1.0, "b": 1.0}), panel({"a": 1.0, "b": 3.0})
+    alike.scores["a"][0] = math.nan
+    assert answers(general.differs_more, alike, apart, **AB) == BOTH
+    alike.scores["a"][1:] = math.nan
+    assert general.differs_more(alike, apart, **AB).answer == "no scores"
+
+
+def test_one_wild_level_says_nothing_about_the_others():
+    made = panel({"a": 1.0, "b": 2.0}, levels=np.arange(7.0), sd={"a": 0.02, "b": 0.1})
+    made.scores["a"][0] = 1000.0 * made.scores["a"][0] - 1023.0
+    made = replace(made, unit=1.0)
+    assert general.is_narrow(made, policies=("a",)).answer == "supported"
+    assert general.is_wider(made, upper="a", lower="b").answer == "contradicted"
+    assert general.reaches_higher(made, upper="a", lower="b").answer == "contradicted"
+
+
 def test_nothing_to_judge_has_its_own_answer():
     made = panel({"a": 1.0, "b": math.nan, "c": 1.0})
     found = [
