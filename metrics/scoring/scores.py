@@ -361,10 +361,10 @@ def pseudo_values(values: Values, paired: tuple[RunCurves, ...], compared_with: 
     """Yield the pseudo-values of the measure of mean curves, (R,), and of its shares of performance if it has such.
 
     With R runs, v of all and v_i without run i they are v + (R - 1) (m - v_i), where m is the mean of all v_i. Their
-    mean is v, and they scatter like R independent values of which v is the mean (Tukey 1958), on average no less than
-    v does (Efron and Stein 1981). Tukey's own, R v - (R - 1) v_i, have a mean with less bias. But a distance has bends,
-    where curves cross and where its path through time turns, and at these that mean varies several times as much as
-    the pseudo-values tell.
+    mean is v, and they scatter like R independent values of which v is the mean (Miller 1974), on average no less than
+    v does (Efron and Stein 1981). The usual ones, R v - (R - 1) v_i, have a mean with less bias. But a distance has
+    bends, where curves cross and where its path through time turns, and at these that mean varies several times as much
+    as the pseudo-values tell.
     """
     whole = [
         replace(e, curves={name: curve.mean(axis=0, keepdims=True) for name, curve in e.curves.items()}) for e in paired
