@@ -449,6 +449,11 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=DOCS, metavar="FOLDER", help="default docs")
     arguments = parser.parse_args(words)
     out = arguments.out
+    if not arguments.places and not list((out / DATA).glob("*.parquet")):
+        print(
+            f"write_results: expected packed studies in {out / DATA}, or folders of studies, got none", file=sys.stderr
+        )
+        return 2
     try:
         if arguments.places:
             ship((read_study(place) for place in arguments.places), out / DATA)

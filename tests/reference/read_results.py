@@ -258,4 +258,7 @@ def main(folder: Path) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[1])))
+    place = Path(sys.argv[1] if len(sys.argv) == 2 else "")
+    if not (place / "measures.csv").is_file():
+        sys.exit(f"Expected a folder with measures.csv and packed studies, such as docs/results, got {sys.argv[1:]}.")
+    sys.exit(main(place))
