@@ -11,6 +11,7 @@ from collections.abc import Collection
 import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, known_name
+from swarm_forage_env._internal.prefetching import LARGE
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.layout import KIND, LIGHT_IF_CARRYING, MESSAGES, NEIGHBOURS, ObservationLayout
 from swarm_forage_env.contract.types import ObsArray
@@ -72,6 +73,7 @@ def new_sensors(config: ScenarioConfig, layout: ObservationLayout, reads: Collec
             np.full(n_bins, -1, np.int32),
             np.full(n_robots, -1, np.int32),
         ),
+        occupied=np.zeros(1 << (2 * n_robots - 1).bit_length() if n_robots >= LARGE else 1, np.uint32),
         columns=Columns(**{name: starts[name] for name in Columns._fields}),
         interior=np.array(config.arena.interior_m),
         lights=np.array(config.arena.lights_m),

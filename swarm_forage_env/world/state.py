@@ -11,7 +11,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from swarm_forage_env.contract.codes import Counter, ObjectStatus
-from swarm_forage_env.contract.types import BoolArray, CodeArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env.contract.types import BitArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 
 N_HANDLERS = 5
 """Kinds of interactions of which a tick can finish one, see `kernels.interact`."""
@@ -261,6 +261,8 @@ class Sensors(NamedTuple):
     kept: BoolArray
     """(1,) whether `obs` is as the last tick left it: only while nobody but the world has it, in `kernels.tick.run`."""
     bins: Bins
+    occupied: BitArray
+    """(words,) a bit for each cell of `bins` with a robot, see `kernels.neighbourhood`; one word in small swarms."""
     columns: Columns
     interior: FloatArray
     """x low, y low, x high, y high of the free floor in m."""

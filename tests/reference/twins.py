@@ -162,6 +162,8 @@ WITHOUT = {
     "swarm_forage_env.rendering.kernels.paint_share": "one product per colour; by hand in "
     "tests/rendering/test_paint.py",
     "swarm_forage_env.rendering.kernels.take_picture": "compared with `numpy.rint` in tests/rendering/test_paint.py",
+    "swarm_forage_env.world.kernels.neighbourhood.mark_cells": "what is seen with and without it is compared in "
+    "tests/world/test_marked_cells.py",
     "swarm_forage_env.world.kernels.bodies.tell_poses": "compared with `unpack_poses` in tests/world/test_bodies.py",
     "swarm_forage_env.world.kernels.interact.drop_cargo": "two rules of `interact`, which has a twin; by hand in "
     "tests/world/test_interactions_timing.py",

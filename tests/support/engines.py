@@ -8,7 +8,7 @@ from swarm_forage_env.scenarios.config import PHYSICS_ENGINES, ScenarioConfig
 from swarm_forage_env.world.bodies import Bodies
 from swarm_forage_env.world.chipmunk import ChipmunkBodies
 from swarm_forage_env.world.kernels.beams import proximity
-from swarm_forage_env.world.kernels.neighbourhood import bin_robots
+from swarm_forage_env.world.kernels.neighbourhood import bin_robots, mark_cells
 from swarm_forage_env.world.sensors import new_sensors
 from swarm_forage_env.world.state import SwarmState
 
@@ -42,7 +42,9 @@ class SensedBodies(Bodies):
         """Find out who is near whom."""
         s = self.sensors
         bin_robots(swarm.position, swarm.present, *s.bins)
-        seen = (s.bins, s.interior, s.obstacles, s.radius_m, s.reach_m, s.obs, s.columns.proximity, s.near, s.kept[0])
+        mark_cells(swarm.position, swarm.present, s.bins[0], s.occupied)
+        standing = s.bins, s.occupied, s.interior
+        seen = (*standing, s.obstacles, s.radius_m, s.reach_m, s.obs, s.columns.proximity, s.near, s.kept[0])
         proximity(swarm.position, swarm.facing, swarm.present, *seen)
 
     def advance(self, swarm: SwarmState) -> None:

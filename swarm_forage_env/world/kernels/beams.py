@@ -10,8 +10,8 @@ from swarm_forage_env._internal.compiling import inline_kernel, kernel
 from swarm_forage_env._internal.prefetching import AHEAD, LARGE, prefetch
 from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
 from swarm_forage_env.contract.layout import RING_SENSORS
-from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray, Row
-from swarm_forage_env.world.kernels.neighbourhood import bin_of, cell_of
+from swarm_forage_env.contract.types import BitArray, BoolArray, FloatArray, ObsArray, Row
+from swarm_forage_env.world.kernels.neighbourhood import bin_of, cell_of, may_be_beside, word_of
 from swarm_forage_env.world.kernels.obstacles import is_within
 from swarm_forage_env.world.state import Bins
 
@@ -147,6 +147,7 @@ def proximity(
     facing: FloatArray,
     present: BoolArray,
     bins: Bins,
+    occupied: BitArray,
     interior: FloatArray,
     obstacles: FloatArray,
     radius: float,
@@ -164,7 +165,7 @@ def proximity(
     of all that were not near are zeros already.
     """
     cell_m, first_in_bin, next_in_bin = bins
-    n_bins, n_robots = first_in_bin.shape[0], position.shape[0]
+    n_bins, n_words, n_robots = first_in_bin.shape[0], occupied.shape[0], position.shape[0]
     sight = 2.0 * radius + reach
     sight_squared = sight * sight
     _see_what_stands(position, facing, present, interior, obstacles, radius, reach, obs, start, near, kept)
@@ -173,8 +174,8 @@ def proximity(
             ahead = min(i + AHEAD, n_robots - 1)
             ahead_x = cell_of(position[ahead, 0], cell_m)
             ahead_y = cell_of(position[ahead, 1], cell_m)
-            prefetch(first_in_bin, bin_of(ahead_x, ahead_y, n_bins), 0)
-            prefetch(first_in_bin, bin_of(ahead_x, ahead_y + 1, n_bins), 0)
+            prefetch(occupied, word_of(ahead_x, ahead_y, n_words), 0)
+            prefetch(occupied, word_of(ahead_x, ahead_y + 1, n_words), 0)
         if not present[i]:
             continue
         x = position[i, 0]
@@ -184,13 +185,14 @@ def proximity(
         # Each pair is met once: behind i in its own bin, or in one of the next cells on one side. A pair that hashing
         # shows twice gives the same readings twice.
         # Most robots are alone. All bins are looked at before anything is decided: one branch, which can be foreseen.
+        n_cells = 5 if may_be_beside(cell_x, cell_y, occupied) else 1
         found = next_in_bin[i]
-        for k in range(1, 5):
+        for k in range(1, n_cells):
             step_x, step_y = _HALF_RING[k]
             found = max(found, first_in_bin[bin_of(cell_x + step_x, cell_y + step_y, n_bins)])
         if found < 0:
             continue
-        for k in range(5):
+        for k in range(n_cells):
             step_x, step_y = _HALF_RING[k]
             j = next_in_bin[i] if k == 0 else first_in_bin[bin_of(cell_x + step_x, cell_y + step_y, n_bins)]
             while j >= 0:

@@ -28,7 +28,7 @@ from swarm_forage_env.world.kernels.counting import add_task_shares, mark
 from swarm_forage_env.world.kernels.disturbances import Disturbances, disturb, disturb_wheels, draw_bits
 from swarm_forage_env.world.kernels.drive import drive
 from swarm_forage_env.world.kernels.interact import serve
-from swarm_forage_env.world.kernels.neighbourhood import bin_robots
+from swarm_forage_env.world.kernels.neighbourhood import bin_robots, mark_cells
 from swarm_forage_env.world.kernels.placement import place_displaced
 from swarm_forage_env.world.kernels.walk import walk
 from swarm_forage_env.world.state import CHANGES, ArenaArrays, CacheState
@@ -48,11 +48,13 @@ def look(a: ArenaArrays) -> None:
     """Find out who is near whom, and write the proximity readings: a ring of beams, 1 at contact, 0 without a hit."""
     swarm, s = a.state.swarm, a.sensors
     bin_robots(swarm.position, swarm.present, s.bins[0], s.bins[1], s.bins[2])
+    mark_cells(swarm.position, swarm.present, s.bins[0], s.occupied)
     beams.proximity(
         swarm.position,
         swarm.facing,
         swarm.present,
         s.bins,
+        s.occupied,
         s.interior,
         s.obstacles,
         s.radius_m,
