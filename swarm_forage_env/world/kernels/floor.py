@@ -55,7 +55,6 @@ def ground(
             byte = int(position[ahead, 0] * CELLS_PER_M) * floor.itemsize
             prefetch(floor, int((position[ahead, 1] - _GROUND_REACH_M) * CELLS_PER_M), byte)
             prefetch(floor, int((position[ahead, 1] + _GROUND_REACH_M) * CELLS_PER_M), byte)
-            prefetch(obs, ahead, start * obs.itemsize)
         if not present[i]:
             obs[i, start : start + GROUND_SENSORS] = 0.0
             continue
