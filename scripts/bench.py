@@ -6,6 +6,7 @@
     scripts/bench --peers ../peers            other packages beside ours; each is installed into a folder of that one
     scripts/bench --phases                    what the phases of a tick take, for the scripted controllers
     scripts/bench --phases stochx generalist  the same for these policies
+    scripts/bench --phases crw --robots 200 131072   and for swarms of these sizes
 
 Times are processor time on one core, where nothing else is said. A value is the median of the rounds. A ratio is that
 of one round, so that what else the machine does counts as little as possible; the table has the median, and the
@@ -24,6 +25,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import IO
 
+from arguments import whole
 from bench_cases import CASES
 from bench_peers import PEERS
 from rich.console import Console
@@ -199,12 +201,21 @@ def main() -> int:
     parser.add_argument("--against", metavar="REVISION", help="another revision, or the folder of a checkout")
     parser.add_argument("--peers", type=Path, metavar="FOLDER", help=f"other packages: {', '.join(PEERS)}")
     parser.add_argument("--phases", action="store_true", help="phases of a tick; CASE is then the name of a policy")
+    parser.add_argument(
+        "--robots",
+        nargs="+",
+        type=whole(at_least=1),
+        default=[200],
+        metavar="N",
+        help="sizes for --phases, default 200",
+    )
     parser.add_argument("--physics", choices=("compiled", "chipmunk"), default="compiled", help="default compiled")
     parser.add_argument("--quick", action="store_true", help="three short rounds instead of seven whole ones")
     given = parser.parse_args()
     rounds, effort = (3, 0.2) if given.quick else (7, 1.0)
     if given.phases:
-        command = [sys.executable, PHASES_FILE, str(effort), *(given.cases or CONTROLLERS)]
+        command = [sys.executable, PHASES_FILE, str(effort), ",".join(given.cases or CONTROLLERS)]
+        command.append(",".join(map(str, given.robots)))
         return subprocess.run(command, env=alone(ROOT), check=False).returncode
     names = chosen_cases(given, parser)
     found: dict[str, list[Values]] = {}

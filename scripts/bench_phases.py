@@ -1,6 +1,6 @@
 """What the phases of a tick take; `scripts/bench --phases` runs this.
 
-    python scripts/bench_phases.py EFFORT POLICY ...
+    python scripts/bench_phases.py EFFORT POLICY,... ROBOTS,...
 
 A run is made phase by phase: Python calls each compiled phase of `world.kernels.tick` by itself and looks at the clock
 in between. What calls and clock take is measured, too, and left out. So a phase sees what it sees in a run: where
@@ -28,8 +28,10 @@ from swarm_forage_env.world.kernels.placement import place_displaced
 from swarm_forage_env.world.kernels.tick import look, sense, set_out
 from swarm_forage_env.world.kernels.walk import walk
 
-TICKS, WARM_UP_TICKS = 5_000, 500
-"""Of a measurement with effort 1; what is left out, because robots have not spread yet."""
+ROBOT_TICKS, LEAST_TICKS = 1_000_000, 50
+"""Of a measurement with effort 1; what it has at least."""
+WARM_UP_TICKS, WARM_UP_OF_LARGE_TICKS = 500, 50
+"""What is left out, because robots have not spread yet; the second for large swarms, whose ticks are few and long."""
 SENSES = ("light", "ground", "line_of_sight")
 SUM, WHOLE = "all phases", "a run, in one piece"
 ROWS = (
@@ -182,17 +184,20 @@ class PhasedRun:
         a.sensors.light_is_due[0] = True
 
 
-def world_of(policy: str, n_ticks: int) -> ScenarioConfig:
-    """Return `warehouse_medium` with the caches of a policy, in one recording interval."""
+def world_of(policy: str, n_robots: int, n_ticks: int) -> ScenarioConfig:
+    """Return `warehouse_medium` with the caches of a policy, in one recording interval; 0.05 robots per m2."""
     seconds, caches = n_ticks * 0.2, getattr(load_policy(policy), "caches", "none")
-    return scenario("warehouse_medium", horizon_s=seconds, interval_s=seconds, caches=caches)
+    swarm = {} if n_robots == 200 else {"n_robots": n_robots, "density": 0.05}
+    return scenario("warehouse_medium", horizon_s=seconds, interval_s=seconds, caches=caches, **swarm)
 
 
-def phases(policy: str, n_ticks: int) -> dict[str, float]:
+def phases(policy: str, n_robots: int, effort: float) -> dict[str, float]:
     """Return the nanoseconds per robot-tick of each phase, and of a run in one piece."""
-    scene = world_of(policy, WARM_UP_TICKS + n_ticks)
+    n_ticks = max(LEAST_TICKS, round(ROBOT_TICKS * effort / n_robots))
+    warm_up = WARM_UP_TICKS if n_ticks > WARM_UP_TICKS else WARM_UP_OF_LARGE_TICKS
+    scene = world_of(policy, n_robots, warm_up + n_ticks)
     run = PhasedRun(policy, scene)
-    for _ in range(WARM_UP_TICKS):
+    for _ in range(warm_up):
         run.tick()
     run.watch.spent_ns.clear()
     for _ in range(n_ticks):
@@ -203,21 +208,27 @@ def phases(policy: str, n_ticks: int) -> dict[str, float]:
         if name in found:
             found[name] -= found["own state"]
     found[SUM] = sum(found.values())
-    found[WHOLE] = (spent_on_run(policy, WARM_UP_TICKS + n_ticks) - spent_on_run(policy, WARM_UP_TICKS)) / n_robot_ticks
+    short, long = (spent_on_run(policy, n_robots, ticks) for ticks in (warm_up, warm_up + n_ticks))
+    found[WHOLE] = (long - short) / n_robot_ticks
     return found
 
 
-def spent_on_run(policy: str, n_ticks: int) -> float:
+def spent_on_run(policy: str, n_robots: int, n_ticks: int) -> float:
     """Return the nanoseconds of processor time of a run as studies make it, once everything is compiled."""
-    spec = plan_run(world_of(policy, n_ticks), policy, seed=0)
+    spec = plan_run(world_of(policy, n_robots, n_ticks), policy, seed=0)
     run_one(spec)
     return spent_ns(run_one, spec)[0]
 
 
 if __name__ == "__main__":
-    effort, *policies = sys.argv[1:]
-    tables = {policy: phases(policy, round(TICKS * float(effort))) for policy in policies}
-    print(f"| ns per robot-tick | {' | '.join(policies)} |\n|---|{'--:|' * len(policies)}")
+    effort, policies, sizes = sys.argv[1:]
+    robots = [int(size) for size in sizes.split(",")]
+    tables = {
+        policy if len(robots) == 1 else f"{policy}, {n_robots:,} robots": phases(policy, n_robots, float(effort))
+        for policy in policies.split(",")
+        for n_robots in robots
+    }
+    print(f"| ns per robot-tick | {' | '.join(tables)} |\n|---|{'--:|' * len(tables)}")
     for phase in ROWS:
         cells = [f"{table[phase]:.0f}" if phase in table else "" for table in tables.values()]
         if any(cells):
