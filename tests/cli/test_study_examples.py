@@ -19,7 +19,7 @@ SHORT = "\n[budget.short]\nseeds = 1\nhorizon_s = 2.0\ninterval_s = 1.0\n"
 
 
 def test_the_page_has_examples():
-    assert [*FILES] == ["speed", "share"]
+    assert [*FILES] == ["speed", "densities", "share"]
 
 
 @pytest.mark.compiled
@@ -37,7 +37,7 @@ def test_a_study_file_of_the_page_runs(command, name):
     assert code == 0, err
     table = read_study(Path("done"))
     assert all(state.is_complete for state in table.place_states())
-    assert len(table.place_states()) == {"speed": 12, "share": 5}[name], "every policy at every value"
+    assert len(table.place_states()) == {"speed": 12, "densities": 9, "share": 5}[name], "every policy at every value"
 
 
 @pytest.mark.compiled
