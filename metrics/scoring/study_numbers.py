@@ -158,7 +158,8 @@ class StudyPanel:
         """Return the scores as claims want them, or those of this name: shares of performance, of mean curves.
 
         Margins of ties are in the measure's own unit (our choice): a tenth of the performance that an amount is
-        compared with, a tenth of 1 for scalability, 0.02 for fractions. Else they are shares of the scores.
+        compared with, a tenth of 1 for scalability, 0.02 for fractions. Else, and at levels where nothing was
+        delivered, they are shares of the scores.
         """
         measure, n_levels = METRICS[self.measure], len(self.levels)
         total = self.compared_with
@@ -169,7 +170,7 @@ class StudyPanel:
             return replace(panel, margins=np.full(n_levels, TIE_OF_FRACTIONS), unit=1.0)
         shown = self.name if name is None else name
         floors = None if shown.of_mean_curves else self.floors or None  # undisturbed runs have no second mean curve
-        margins = TIE * total if total is not None and bool((total > 0.0).all()) else None
+        margins = None if total is None else np.where(total > 0.0, TIE * total, panel.tie_margins)
         if shown.is_relative:
             margins = np.full(n_levels, TIE)
             if floors is not None and total is not None:

@@ -52,6 +52,17 @@ def test_measures_that_compare_sizes_leave_the_smallest_out(of_sizes):
     assert only(study_panels(of_sizes).panels, "scalability").x.tolist() == [2.0, 4.0]
 
 
+def test_a_level_without_deliveries_leaves_the_margins_of_others():
+    panel = only(
+        study_panels(made_table(made_study(), lambda place: 0.0 if place.values[-1] == 1 else by_policy(place))).panels,
+        "raw_performance",
+    )
+    margins = panel.for_claims().margins
+    assert panel.compared_with[0] == 0.0
+    np.testing.assert_allclose(margins[1:], 0.1 * panel.compared_with[1:])
+    assert margins[0] > 0.0
+
+
 def test_a_missing_run_is_no_score():
     spec = made_study()
     place = spec.places[2]  # four robots
