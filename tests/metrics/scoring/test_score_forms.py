@@ -50,6 +50,8 @@ def test_pseudo_values_by_hand():
     squares, shares = pseudo_values(lambda it: it.performance[..., 0] ** 2, (runs,), 0)
     assert squares.tolist() == [4.0 + (5.0 - 9.0), 4.0 + (5.0 - 1.0)]
     assert shares.tolist() == [1.0, 3.0], "of what is a mean, the values of the runs"
+    (infinite,) = pseudo_values(lambda it: it.performance[..., 0] + np.inf, (runs,), None)
+    assert np.isnan(infinite).all(), "and there is no warning"
 
 
 def test_a_measure_without_the_asked_forms_is_scored_once():
