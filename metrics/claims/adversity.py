@@ -200,11 +200,8 @@ _TEAMS = (5.0, 10.0, 20.0)
 
 def _less_available(times: int) -> tuple[Statement, ...]:
     """Statements that 200 robots are less available than 50 at each number needed, or at so many times that number."""
-    return tuple(
-        states(is_less_available, few=(50, needed), many=(200, times * needed), team=team)
-        for team in _TEAMS
-        for needed in _NEEDED
-    )
+    needed = tuple((robots, times * robots) for robots in _NEEDED)
+    return tuple(states(is_less_available, few=50, many=200, needed=needed, team=team) for team in _TEAMS)
 
 
 POPULATION = (
@@ -218,7 +215,7 @@ POPULATION = (
         name="V2",
         text="With 200 robots and 20 needed, larger teams are needed for the same availability.",
         figure="scenario 1, availability (formula)",
-        statements=tuple(states(is_less_available, few=(50, 5), many=(200, 20), team=team) for team in _TEAMS),
+        statements=tuple(states(is_less_available, few=50, many=200, needed=((5, 20),), team=team) for team in _TEAMS),
     ),
     Claim(
         name="V3",

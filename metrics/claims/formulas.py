@@ -1,5 +1,7 @@
 """Statements about availability that follow from formulas alone, without any run."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..population import availability, ratio_for_team
@@ -14,21 +16,26 @@ def availability_is(*, n: int, n_min: int, team: float, expected: float, within:
     return Outcome(answer=answer, statistic=p_v, effect=np.nan, n_runs=0, why=why)
 
 
-def is_less_available(*, few: tuple[int, int], many: tuple[int, int], team: float) -> Outcome:
+def is_less_available(*, few: int, many: int, needed: Sequence[tuple[int, int]], team: float) -> Outcome:
     """Whether a second swarm is less available than the first with the same mean team at work.
 
     Then it needs a larger team for the same availability. Availability is 1 where no robot is needed, so it has also
     dropped more steeply on the way there.
 
     Args:
-        few: Swarm size and robots needed of the first.
-        many: The same of the second.
+        few: Size of the first swarm.
+        many: Size of the second.
+        needed: Robots needed of the first and of the second; it must be so for all.
         team: Mean robots at work in both.
     """
-    wanted = availability(*few, ratio_for_team(team))
-    got = availability(*many, ratio_for_team(team))
-    answer: Answer = "supported" if got < wanted else "contradicted"
-    why = (
-        f"a mean team of {team:g} gives {got:.4f} for {many[1]} of {many[0]} and {wanted:.4f} for {few[1]} of {few[0]}"
+    ratio = ratio_for_team(team)
+    robots = dict(zip((few, many), zip(*needed, strict=True), strict=True))
+    found = {n: [availability(n, n_min, ratio) for n_min in robots[n]] for n in (many, few)}
+    share = float(np.mean(np.array(found[many]) < found[few]))
+    answer: Answer = "supported" if share == 1.0 else "contradicted"
+    told = (
+        f"{', '.join(f'{p_v:.4f}' for p_v in of)} for {', '.join(map(str, robots[n]))} of {n}"
+        for n, of in found.items()
     )
-    return Outcome(answer=answer, statistic=got, effect=np.nan, n_runs=0, why=why)
+    why = f"{'; '.join(told)}; mean team {team:g}"
+    return Outcome(answer=answer, statistic=share, effect=np.nan, n_runs=0, why=why)
