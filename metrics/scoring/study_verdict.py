@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from swarm_forage_env._internal.wording import number, percent, plain
 from swarm_forage_env.runs.answer import Answer, Sheet
-from swarm_forage_env.studies.study_file import is_set_of_paper
+from swarm_forage_env.studies.study_file import PAPER, is_set_of_paper, load_study
 
 from ..catalog import METRICS
 from ..checks import CurveError
@@ -241,6 +241,7 @@ class StudyVerdict(Answer):
         """What to know of the studies."""
         others = [table.spec.name for table in self.tables if not is_set_of_paper(table.spec)]
         remarks = [f"{name} has the name of one of the paper's sets and other settings" for name in others]
+        remarks += _other_than_the_paper([table.spec for table in self.tables if is_set_of_paper(table.spec)])
         several = [table.spec for table in self.tables if table.spec.looks]
         for looks in dict.fromkeys(spec.looks for spec in several):
             names = ", ".join(spec.name for spec in several if spec.looks == looks)
@@ -307,6 +308,26 @@ class StudyVerdict(Answer):
             "intuitions": [one.to_mapping() for one in self.expected],
             "intuitions_waiting": [one.to_mapping() for one in self.expected_later],
         }
+
+
+def _other_than_the_paper(specs: "Sequence[StudySpec]") -> Iterator[str]:
+    """Yield what is shorter or less than in the paper, one line for each budget of its sets."""
+    by_budget: dict[str, list[StudySpec]] = {}
+    for spec in specs:
+        by_budget.setdefault(spec.budget, []).append(spec)
+    for budget, some in by_budget.items():
+        words: dict[str, None] = {}
+        for spec in some:
+            whole = load_study(spec.name, PAPER, rules=spec.rules[:1])
+            if spec.horizon_s != whole.horizon_s:
+                words[f"runs of {spec.horizon_s:,g} s instead of {whole.horizon_s:,g} s"] = None
+            for axis, planned in zip(spec.axes, whole.axes, strict=True):
+                if len(axis.values) < len(planned.values):
+                    fewer = f"{len(axis.values)} of {len(planned.values)} values of {axis.name}"
+                    words[f"{spec.name} {fewer}" if len(some) > 1 else fewer] = None
+        if words:
+            names = ", ".join(dict.fromkeys(spec.name for spec in some))
+            yield f"{names}, budget {budget}: {', '.join(words)}"
 
 
 def verdict(*tables: "StudyTable", tell: Callable[[str], None] | None = None) -> StudyVerdict:

@@ -1,5 +1,7 @@
 """From tables of studies to panels, and from panels to verdicts on the paper's claims."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import polars as pl
 import pytest
@@ -8,7 +10,7 @@ from metrics import CurveError
 from metrics.claims import EXPERIMENTS, INTUITIONS, PanelName
 from metrics.scoring import judge_claims, study_panels
 from metrics.scoring.study_numbers import experiment_of
-from metrics.scoring.study_verdict import VARIANTS
+from metrics.scoring.study_verdict import VARIANTS, StudyVerdict
 from swarm_forage_env.runs.policy_spec import PolicySpec
 from swarm_forage_env.studies.study import Axis
 from swarm_forage_env.studies.study_file import load_study, set_names
@@ -25,6 +27,18 @@ def by_policy(place):
 @pytest.fixture
 def of_sizes():
     return made_table(made_study(), by_policy)
+
+
+def test_what_sets_have_less_of_than_the_paper_is_told_in_a_line():
+    def told(budget, *names):
+        tables = tuple(SimpleNamespace(spec=load_study(name, budget)) for name in names)
+        return StudyVerdict(tables=tables).remarks
+
+    assert told("smoke", "S1a") == (
+        "S1a, budget smoke: runs of 1,000 s instead of 10,000 s, 4 of 8 values of population_size",
+    )
+    assert told("reduced", "S1a", "S1c") == ("S1a, S1c, budget reduced: S1c 5 of 7 values of throttle",)
+    assert told("paper", "S1a", "S1c") == ()
 
 
 def only(panels, measure, **where):
