@@ -418,9 +418,10 @@ def command_of(table: "StudyTable") -> str:
     words = ["swarm-forage", *([trust.TRUST_OPTION] if trusted else []), "study", "run"]
     words += [spec.name if is_set_of_paper(spec) else spec.file or "FILE"]
     words += ["--budget", spec.budget] if spec.budget else []
-    # Other seeds than the first ones are chosen by the budget.
-    most = spec.looks[-1] if spec.looks else len(spec.seeds)
-    words += ["--seeds", str(most)] if spec.seeds == tuple(range(len(spec.seeds))) else []
+    if spec.looks:
+        words += ["--seeds", str(spec.looks[-1])]
+    elif spec.seeds == tuple(range(len(spec.seeds))):  # others than the first ones are chosen by the budget
+        words += ["--seeds", str(len(spec.seeds))]
     words += ["--rules", "both" if others else rules]
     if spec.looks:
         words += ["--until-decided", "--hours", str(math.ceil((table.wall_time_s or 0.0) / 3600.0) or 1)]

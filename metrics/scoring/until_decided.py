@@ -102,22 +102,24 @@ class Outlook(Answer):
     """Lines with runs that failed; they get no more."""
 
     def sheets(self) -> Sequence[Sheet]:
-        """Return the claims that are open, and what each would take."""
-        rows = [self._row(one) for one in self.wanted]
-        first = [line for line, n_runs in self.reached.items() if n_runs == 0]
-        notes = [f"{counted(len(first), 'line')} without the first {self.looks[0]} runs."] if first else []
-        notes += [f"Runs of {line.describe()} failed; it gets no more." for line in self.failed]
-        if not rows:
-            return (Sheet(title="Every claim that these studies are about is decided.", notes=notes),)
-        notes.append(f'"never": if further runs are like those there are, {self.looks[-1]} do not decide it.')
-        header = ("claim", "rules", "runs", "decided after", "core-hours", "needs runs of")
-        return (Sheet(title=f"not decided yet: {len(rows)}", header=header, rows=rows, notes=notes),)
+        """Return what has had no look yet, the claims that are open, and what each would take."""
+        failed = [f"Runs of {line.describe()} failed; it gets no more." for line in self.failed]
+        if not self.wanted:
+            return (Sheet(title="Every claim that these studies are about is decided.", notes=failed),)
+        sheets: list[Sheet] = []
+        if first := [(one.rules, _hours(one), _words(one.lines)) for one in self.wanted if one.open is None]:
+            title = f"before claims are judged, {self.looks[0]} runs of each condition are made"
+            sheets.append(Sheet(title=title, header=("rules", "core-hours", "needs runs of"), rows=first))
+        if rows := [self._row(one, one.open) for one in self.wanted if one.open is not None]:
+            never = f'"never": if further runs are like those there are, {self.looks[-1]} do not decide it.'
+            notes = [never] if any(one.open and one.open.n_runs is None for one in self.wanted) else []
+            header = ("claim", "rules", "runs", "decided after", "core-hours", "needs runs of")
+            sheets.append(Sheet(title=f"not decided yet: {len(rows)}", header=header, rows=rows, notes=notes))
+        return (*sheets, *([Sheet(notes=failed)] if failed else []))
 
-    def _row(self, one: Wanted) -> tuple[str, ...]:
-        after = "" if one.open is None else str(one.open.n_runs or "never")
-        hours = "" if one.seconds is None else f"{one.seconds / 3600.0:.2g}"
+    def _row(self, one: Wanted, claim: OpenClaim) -> tuple[str, ...]:
         n_runs = str(min(self.reached[line] for line in one.lines))
-        return (one.why or "first look", one.rules, n_runs, after, hours, _words(one.lines))
+        return (one.why, one.rules, n_runs, str(claim.n_runs or "never"), _hours(one), _words(one.lines))
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the same as plain values."""
@@ -127,6 +129,11 @@ class Outlook(Answer):
             "runs": {line.describe(): n_runs for line, n_runs in self.reached.items()},
             "failed": [line.describe() for line in self.failed],
         }
+
+
+def _hours(one: Wanted) -> str:
+    """Core-hours; empty where no run was made yet."""
+    return "" if one.seconds is None else f"{one.seconds / 3600.0:.2g}"
 
 
 def _words(lines: Iterable[Line]) -> str:

@@ -67,7 +67,7 @@ def run(  # long: one parameter per option
         typer.Option(
             "--until-decided",
             help="Judge the paper's claims again and again, and run what decides most for least (docs/studies.md). "
-            "--seeds is the most runs per condition, default 192.",
+            "--budget is then paper by default; --seeds is the most runs per condition, default 192.",
         ),
     ] = False,
     hours: Annotated[
@@ -90,9 +90,13 @@ def run(  # long: one parameter per option
     Finished runs are kept: after Ctrl-C, or with more seeds, the same command does the rest.
     """
     from swarm_forage_env.runs.cluster import cluster_executor
+    from swarm_forage_env.studies.study_file import PAPER
     from swarm_forage_env.studies.study_folder import StudyFolder, parse_shard
 
-    specs = [_chosen(name, budget, None if until_decided else seeds, rules) for name in names]
+    if until_decided:
+        specs = [_chosen(name, budget or PAPER, None, rules) for name in names]
+    else:
+        specs = [_chosen(name, budget, seeds, rules) for name in names]
     part = parse_shard(shard)
     places = [_folder(spec, out, is_one=len(specs) == 1) for spec in specs]
     studies = [(spec, StudyFolder(place)) for spec, place in zip(specs, places, strict=True)]

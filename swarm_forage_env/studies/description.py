@@ -187,8 +187,11 @@ class StudyOutcome(Answer):
         """Return how many are done, and how to make each failed one again."""
         files = [str(file) for file in self._failed()]
         lines = [f"  again, alone: swarm-forage rerun {file}" for file in files[:FAILURES_SHOWN]]
-        counts = _counts([self.outcomes.count(name) for name in STATES])
-        return (Sheet(title=f"{counts}, in {self.folder.folder}", notes=[*lines, *_more(len(files))]),)
+        numbers = [self.outcomes.count(name) for name in STATES]
+        whole = self.folder.study().n_runs
+        lines += _more(len(files))
+        lines += [f"The study in this folder has {whole:,} runs in all."] if whole > sum(numbers) else []
+        return (Sheet(title=f"{_counts(numbers)}, in {self.folder.folder}", notes=lines),)
 
     def to_mapping(self) -> dict[str, Any]:
         """Return how many runs are in which state, and the files of the failed ones."""

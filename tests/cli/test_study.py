@@ -103,6 +103,8 @@ def test_several_studies_have_a_folder_around_theirs(written):
     code, out, _ = written("study", "run", "mine.toml", "other.toml", "--jobs", "1", "--out", "all")
     assert code == 0
     assert out.splitlines() == [f"8 of 8 runs done, in all/{name}_tiny" for name in ("mine", "other")]
+    code, out, _ = written(*RUN, "--out", "all/mine_tiny", "--rules", "program")
+    assert out.splitlines() == ["4 of 4 runs done, in all/mine_tiny", "The study in this folder has 8 runs in all."]
     plans = written("study", "run", "mine.toml", "other.toml", "--jobs", "1", "--out", "all", "--dry-run")[1]
     assert plans.count("8 runs, 0 to do") == 2
 
@@ -110,9 +112,23 @@ def test_several_studies_have_a_folder_around_theirs(written):
 def test_what_is_not_decided_is_told_before_any_run(command):
     code, out, _ = command("study", "run", "S1a", "S1b", "--until-decided", "--dry-run", "--rules", "described")
     assert code == 0
-    assert "first look  described  0" in out
-    assert "8 lines without the first 4 runs." in out
+    assert out.startswith("before claims are judged, 4 runs of each condition are made\n")
+    assert "S1b crw, dpo, stochm, stochx" in out
+    assert "claim " not in out
+    assert "never" not in out
     assert not Path("results").exists()
+
+
+def test_claims_are_decided_by_runs_as_long_as_the_papers(command, monkeypatch):
+    budgets = []
+
+    def run(studies, **_):
+        budgets.extend(spec.budget for spec, _ in studies)
+
+    monkeypatch.setattr("metrics.scoring.run_until_decided", run)
+    for words in ((), ("--budget", "smoke")):
+        command("study", "run", "S1a", "--until-decided", "--dry-run", *words)
+    assert budgets == ["paper", "smoke"]
 
 
 def test_failures_are_told_with_the_command_that_makes_them_again(written, monkeypatch):
