@@ -52,12 +52,11 @@ class Case:
 
 
 def world(name: str, engine: str, ticks: int, **fields: Any) -> Any:
-    """Return a preset that lasts `ticks`, in one recording interval; version 0.1.0 knows no choice of engine."""
+    """Return a preset that lasts `ticks`, in one recording interval."""
     from swarm_forage_env import scenario
 
     seconds = ticks * 0.2
-    fields |= {"physics": engine} if engine == "compiled" else {}
-    return scenario(name, horizon_s=seconds, interval_s=seconds, **fields)
+    return scenario(name, horizon_s=seconds, interval_s=seconds, **{"physics": engine, **fields})
 
 
 def spent(act: Callable[[int], object], times: int) -> float:
@@ -214,8 +213,7 @@ def import_seconds(_engine: str, _effort: float) -> float:
 
 def first_run(engine: str, _effort: float) -> float:
     """Seconds by the clock, because two processes compile."""
-    words = ["run", "crw", "--robots", "50", "--horizon", "200"]
-    words += ["--set", f"physics={engine}"] if engine == "compiled" else []
+    words = ["run", "crw", "--robots", "50", "--horizon", "200", "--set", f"physics={engine}"]
     started = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
         program = [sys.executable, "-m", "swarm_forage_env.cli", *words, "--out", f"{folder}/results"]
@@ -275,6 +273,8 @@ CASES = {
     "adverse-200": Case("DPO, all of these", runs("dpo", MEDIUM, 5_000, wrappers=NOISE + THROTTLE + FAILURES)),
     "crw-1": Case("CRW, one robot", runs("crw", SMALL, 50_000, n_robots=1)),
     "seeds-50": Case("CRW, 16 runs of 1,000 s", runs("crw", SMALL, 5_000, n_seeds=16), beside="crw-50"),
+    "chipmunk-50": Case("CRW, Chipmunk's bodies", runs("crw", SMALL, 10_000, physics="chipmunk"), beside="crw-50"),
+    "chipmunk-200": Case("CRW, Chipmunk's bodies", runs("crw", MEDIUM, 5_000, physics="chipmunk"), beside="crw-200"),
     "crw-4096": Case("CRW, 5 % density", large(4_096, 500), beside="crw-200"),
     "crw-16384": Case("CRW, 5 % density", large(16_384, 200), TICK, "1.2 x crw-200", "crw-200"),
     "crw-131072": Case("CRW, 5 % density", large(131_072, 40), TICK, "190", "crw-200"),
