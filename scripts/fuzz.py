@@ -30,6 +30,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from importlib.util import find_spec
 from pathlib import Path
 from random import Random
 
@@ -120,6 +121,8 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--count", type=whole(at_least=1), default=None, help="cases; default as many as fit")
     parser.add_argument("--note", action="store_true", help="write the figures into docs/promises.md")
     given = parser.parse_args(words)
+    if find_spec("pytest") is None:
+        parser.error("expected pytest, with which cases are checked: pip install -e '.[test]'")
     campaign = Campaign(given.kind, given.first)
     with _bounded(campaign) as folder, suppress(KeyboardInterrupt):
         _go_on(campaign, folder, time.monotonic() + 60.0 * given.minutes, given.count)
