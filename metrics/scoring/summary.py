@@ -6,7 +6,7 @@ print(summarize_runs(table))
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ from swarm_forage_env.runs.record import RunRecord
 from swarm_forage_env.runs.store import RunStore
 from swarm_forage_env.runs.table import Table
 from swarm_forage_env.scenarios.columns import part_column
+from swarm_forage_env.scenarios.config import PHYSICS_ENGINES
 from swarm_forage_env.scenarios.performance import Performance, performance_curve, performance_of
 from swarm_forage_env.scenarios.robots import kind_sizes
 from swarm_forage_env.wrappers.world import World, WorldLike, world_of
@@ -124,9 +125,22 @@ class RunSummary(Answer):
         scenario = self.world.scenario
         if n_worlds > 1:
             return f"{scenario.name} and others: {counted(n_worlds, 'world')}"
-        headline = f"{scenario.name}: {counted(self.world.n_robots, 'robot')}, {scenario.objects.n_objects} objects"
+        headline = f"{self._place}: {counted(self.world.n_robots, 'robot')}, {scenario.objects.n_objects} objects"
         disturbed = ", ".join(config.name for config in self.world.wrappers)
-        return f"{headline}, {scenario.horizon_s:g} s" + (f", with {disturbed}" if disturbed else "")
+        words = f"{headline}, {scenario.horizon_s:g} s{self._engine}"
+        return words + (f", with {disturbed}" if disturbed else "")
+
+    @property
+    def _place(self) -> str:
+        """Name of the scenario, or that which the world was given, such as the name of its file."""
+        is_given = self.world.name != replace(self.world, name="").name
+        return self.world.name if is_given else self.world.scenario.name
+
+    @property
+    def _engine(self) -> str:
+        """The engine of physics, where it is not the first, which is the default."""
+        physics = self.world.scenario.physics
+        return "" if physics == PHYSICS_ENGINES[0] else f", physics {physics}"
 
     def to_mapping(self) -> dict[str, Any]:
         """Return policies, runs and failures as plain values."""
@@ -189,7 +203,9 @@ class RunSummary(Answer):
             path,
             self.table.of(self.rows[0].condition)[0].t_end_s,
             curves,
-            title=f"{scenario.name}, {scenario.robots.n_robots} robots" if is_one_world else scenario.name,
+            title=f"{self._place}, {counted(self.world.n_robots, 'robot')}{self._engine}"
+            if is_one_world
+            else scenario.name,
             ylabel=f"{read_as.title} per {scenario.interval_s:g} s" if read_as.is_total else read_as.title,
             band=_about_bands(curves),
             style=style,

@@ -50,14 +50,15 @@ def run(
     from metrics.scoring.summary import run_question
     from swarm_forage_env._internal.fields import MOST_SEEDS, whole
     from swarm_forage_env.cli.printer import ask_and_show, refusing
-    from swarm_forage_env.cli.scenario_options import default_folder, described_world
+    from swarm_forage_env.cli.scenario_options import default_folder, described_world, name_of_file
 
     whole("--seeds", seeds, at_least=1, at_most=MOST_SEEDS)
     world, caches = described_world(described)
+    world = replace(world, name=name_of_file(described) or world.name)
     chosen = range(first_seed, first_seed + seeds)
     with refusing():
         question = run_question(policies.names("crw"), world, seeds=chosen, caches=caches)
-    folder = options.out or default_folder(world.scenario.name)
+    folder = options.out or default_folder(described)
     ask_and_show(question, folder, options, picture=picture or folder / "performance.png")
 
 
@@ -108,7 +109,7 @@ def score(
         disturbance=disturbance,
         forms=forms,
     )
-    folder = options.out or default_folder(question.world.scenario.name)
+    folder = options.out or default_folder(described)
     file = picture or folder / ("scores.png" if len(question.plan.policies) == 1 else "comparison.png")
     ask_and_show(question, folder, options, picture=file)
 
@@ -220,7 +221,7 @@ def predict(
             if from_scenario
             else prediction_question(names, world, fit=fitted, hold=held, seeds=seeds, caches=caches)
         )
-    folder = options.out or default_folder(world.scenario.name)
+    folder = options.out or default_folder(described)
     file = picture or folder / f"{'from_scenario' if from_scenario else 'prediction'}.png"
     ask_and_show(question, folder, options, picture=file)
 
@@ -307,7 +308,7 @@ def choose(
             seeds=seeds,
             caches=caches,
         )
-    ask_and_show(question, options.out or default_folder(world.scenario.name), options)
+    ask_and_show(question, options.out or default_folder(described), options)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

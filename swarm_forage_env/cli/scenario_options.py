@@ -88,13 +88,19 @@ def described_fields(options: PlaceOptions) -> WorldDescription:
     Raises:
         ConfigError: see `described_world`; names and values of fields are not looked at here.
     """
-    is_file = Path(options.scenario).suffix == FILE
+    is_file = bool(name_of_file(options))
     file = describe_file(options.scenario) if is_file else WorldDescription(preset=options.scenario)
     fields = {**file.fields, **_fields_of(options, file.preset)}
     wrappers = tuple(parse_wrapper(word) for word in options.wrappers)
     named = {wrapper.name for wrapper in wrappers}
     left = (wrapper for wrapper in file.wrappers if wrapper.name not in named)
     return WorldDescription(preset=file.preset, fields=fields, wrappers=(*wrappers, *left))
+
+
+def name_of_file(options: PlaceOptions) -> str:
+    """Return the name of the scenario's file without its ending; empty for a preset."""
+    path = Path(options.scenario)
+    return path.stem if path.suffix == FILE else ""
 
 
 def _fields_of(options: PlaceOptions, preset: str) -> dict[str, Any]:
@@ -182,6 +188,6 @@ def plan_runs(options: WorldOptions, policies: Sequence[str], *, n_seeds: int, f
     )
 
 
-def default_folder(scenario_name: str) -> Path:
-    """Return the default folder for results: one folder per scenario, so that repeated runs are found."""
-    return Path("results") / scenario_name
+def default_folder(options: PlaceOptions) -> Path:
+    """Return the default folder for results: one per preset or file, so that repeated runs are found."""
+    return Path("results") / (name_of_file(options) or options.scenario)

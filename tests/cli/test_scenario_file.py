@@ -41,7 +41,7 @@ def command(command):
 
 def stored_spec() -> dict:
     """The specification of the one stored run."""
-    (record,) = load(Path("results/warehouse_small"))
+    (record,) = load(Path("results/world"))
     return json.loads(record.spec)
 
 
@@ -66,6 +66,15 @@ def test_other_options_go_before_the_file(command):
         ("throttle", None),
         ("actuator_noise", 0.3),
     ]
+
+
+def test_a_file_gives_table_and_folder_their_name(command):
+    text = CONFIG.replace("horizon_s = 4.0", 'horizon_s = 4.0\nphysics = "chipmunk"')
+    code, out, err = command(text, "--scenario", "world.toml")
+    assert code == 0
+    assert out.startswith("world: 3 robots, 20 objects, 4 s, physics chipmunk, with throttle, actuator_noise\n")
+    assert "picture results/world/performance.png" in err
+    assert not Path("results/warehouse_small").exists()
 
 
 @pytest.mark.parametrize(
