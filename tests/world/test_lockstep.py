@@ -15,6 +15,7 @@ from swarm_forage_env.views.plans import ArenaPlan, plan_arena
 from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.world.lockstep import Lockstep, can_go_in_lockstep
 from swarm_forage_env.wrappers.throttle import Throttle
+from tests.support.branches import pickled
 
 pytestmark = pytest.mark.compiled
 N_ROBOTS = 12
@@ -293,3 +294,38 @@ def test_a_stack_whose_step_was_replaced_is_stepped_by_it(monkeypatch):
     now = drawn(1, 2)[0]
     np.testing.assert_array_equal(other.step(now).obs, batch.step(now).obs)
     assert len(calls) == 2
+
+
+@pytest.mark.parametrize(
+    ("wrappers", "fields"),
+    [
+        (ADVERSITY, {"walk_probability": 0.05, "caches": "dynamic", "pickup_ticks": 3, "n_objects": 300}),
+        (
+            ("message_noise:sigma=0.1,loss=0.2", "handling_cost:waveform=square,amplitude=5,offset=6,period_s=8"),
+            {"message_size": 2, "neighbours_seen": 3, "neighbour_range_m": 3.0},
+        ),
+        ((), {"n_objects": 300}),
+    ],
+    ids=["adversity", "messages", "plain"],
+)
+def test_arrays_are_found_after_copies_snapshots_and_starts_in_any_order(wrappers, fields):
+    chosen, chance = plan(*wrappers, **fields), np.random.default_rng(0)
+    batch, other = ArenaBatch(chosen, 3), OneByOne(chosen, 3)
+    for each in (batch, other):
+        each.reset([1, 2, 3], [None] * 3)
+    for tick in range(100):
+        actions = chance.uniform(-1, 1, (3 * N_ROBOTS, 3 + fields.get("message_size", 0))).astype(np.float32)
+        actions[:, 2] = 1.0 if tick % 3 == 0 else actions[:, 2]
+        step, expected = batch.step(actions), other.step(actions)
+        for name in COLUMNS:
+            np.testing.assert_array_equal(getattr(step, name), getattr(expected, name), err_msg=f"{name}, tick {tick}")
+        event, n = chance.integers(16), int(chance.integers(3))
+        if event == 0:
+            batch = pickled(batch)
+        elif event == 1:
+            batch = copy.deepcopy(batch)
+        elif event in (2, 3):
+            batch.arenas[n].restore(batch.arenas[n].snapshot())
+        elif event == 4:
+            for each in (batch, other):
+                each._start(n, np.empty((N_ROBOTS, each._n_columns), np.float32), seed=tick)
