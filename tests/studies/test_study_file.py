@@ -201,7 +201,7 @@ def test_an_unknown_axis_is_told_the_nearest_few_and_where_all_are():
 
 def test_the_studies_of_the_page_are_some(written, tmp_path):
     page = (Path(__file__).parents[2] / "docs/studies.md").read_text()
-    text, of_shares = re.findall(r"^```toml\n(name = .*?)^```", page, re.DOTALL | re.MULTILINE)
+    text, of_densities, of_shares = re.findall(r"^```toml\n(name = .*?)^```", page, re.DOTALL | re.MULTILINE)
     policy = next(Path(pretrained.__file__).parent.glob("*.npz"))
     (tmp_path / "my_policy.npz").write_bytes(policy.read_bytes())
     file = written(text)
@@ -209,6 +209,7 @@ def test_the_studies_of_the_page_are_some(written, tmp_path):
     first, full = load_study(file, "first"), load_study(file, "full")
     assert (first.n_experiments, first.n_runs, full.n_runs) == (6, 48, 384)
     assert first.reference_of(first.places[0]) == Place("described", "crw", (10, 0.1))
+    assert load_study(written(of_densities)).n_experiments > 1
     assert [place.values for place in load_study(written(of_shares)).places] == [(0.0,), (0.1,), (0.2,), (0.5,), (1.0,)]
 
 
