@@ -55,7 +55,7 @@ def missing_in(page: str, experiments: Sequence[str]) -> list[str]:
 def _rows(page: str, table: str) -> dict[str, str]:
     """Return claim -> its part of a table, or of that of the claims that wait."""
     text = "".join(re.findall(rf'<table[^>]* id="{table}(?:-waiting)?">(.*?)</table>', page, re.DOTALL))
-    return {name: part for part in text.split("<tbody>")[1:] for name in re.findall(r'class="name">(\w+)<', part)}
+    return {name: part for part in text.split("<tbody>")[1:] for name in re.findall(r'class="name"[^>]*>(\w+)<', part)}
 
 
 def main() -> int:
