@@ -173,3 +173,5 @@ class Counter(IntEnum):
     """The same of robots in a pick-up from the floor, or in a drop that no cache takes."""
     AT_CACHES = 20
     """The same of robots in a pick-up from a cache, or in a drop into one."""
+    INTERFERING_NEAR_CACHES = 21
+    """Robot-ticks in interference within `scenarios.columns.NEAR_CACHE_M` of the centre of a cache."""

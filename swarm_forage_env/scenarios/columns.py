@@ -10,6 +10,10 @@ from typing import Literal, TypeAlias
 Kind: TypeAlias = Literal["text", "whole", "number", "amount", "fraction"]
 """Kind of a column: text, whole numbers >= 0, numbers, numbers >= 0, numbers in [0, 1]."""
 
+NEAR_CACHE_M = 2.0
+"""From the centre of a cache: time lost within this distance is lost near it (our choice: robots that use a cache crowd
+at its centre, and most of them within this distance, whatever its size)."""
+
 
 @dataclass(frozen=True, slots=True)
 class Column:
@@ -77,6 +81,9 @@ INTERVAL_COLUMNS: Mapping[str, Column] = {
 CONTRIBUTED_COLUMNS: Mapping[str, Column] = {
     "avoidances": _total(
         "avoidances", "begun by active robots; the mean duration is interference_ticks / avoidances, in ticks"
+    ),
+    "interference_ticks_near_caches": _total(
+        "robot-ticks", f"those of interference_ticks within {NEAR_CACHE_M:g} m of the centre of a cache"
     ),
     "n_searching": Column(
         "amount",

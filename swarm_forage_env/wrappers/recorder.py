@@ -31,6 +31,7 @@ TOTALS: dict[str, Counter] = {
     "caches_depleted": Counter.CACHES_DEPLETED,
     "interference_ticks": Counter.INTERFERING,
     "avoidances": Counter.AVOIDANCES,
+    "interference_ticks_near_caches": Counter.INTERFERING_NEAR_CACHES,
 }
 """Columns that are totals per interval."""
 TICK_MEANS: dict[str, Counter] = {

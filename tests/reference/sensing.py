@@ -74,6 +74,12 @@ def interferes(env: ForageEnv, robot: int) -> bool:
     return abs(away) > 0.1
 
 
+def is_near_cache(env: ForageEnv, robot: int) -> bool:
+    """Whether the robot is within 2 m of the centre of a cache."""
+    centres = [(0.2 * x + 0.1, 0.2 * y + 0.1) for x, y in env.caches.cell[env.caches.alive]]
+    return any(math.dist(env.swarm.position[robot], centre) <= 2.0 for centre in centres)
+
+
 def work(swarm: SwarmState, robot: int) -> Counter:
     """What a robot at work that avoids nothing is counted as."""
     pending = swarm.pending_kind[robot]

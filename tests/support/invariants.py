@@ -114,6 +114,7 @@ def look_at_record(recorder: RunRecorder, first_counters: np.ndarray) -> None:
     assert np.all((columns["interference_fraction"] >= 0.0) & (columns["interference_fraction"] <= 1.0 + 1e-12))
     assert counters[Counter.INTERFERING] <= counters[Counter.ACTIVE]
     assert columns["avoidances"].sum() <= columns["interference_ticks"].sum()
+    assert np.all(columns["interference_ticks_near_caches"] <= columns["interference_ticks"])
     busy = ("n_searching", "n_homing", "n_handling", "n_at_caches")
     avoiding = columns["interference_ticks"] / env.scenario.interval_ticks
     at_work = avoiding + sum(columns[name] for name in busy)

@@ -12,7 +12,7 @@ from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import Quirks
 from tests.reference import sensing
 from tests.support.engines import in_each_engine
-from tests.support.stage import act, lay, load, put, stand, tidy_world
+from tests.support.stage import OPEN_CELL, act, build_cache, cell_centre, lay, load, put, stand, tidy_world
 
 WORK = (Counter.SEARCHING, Counter.HANDLING, Counter.HOMING, Counter.AT_CACHES, Counter.INTERFERING)
 """What a robot at work can do, one at a time."""
@@ -141,6 +141,22 @@ def test_an_avoidance_begins_once_and_again_after_a_break():
 
 
 @in_each_engine
+@pytest.mark.parametrize(("away_m", "near"), [(1.9, 1), (2.1, 0)], ids=["near", "farther"])
+def test_time_lost_near_a_cache_is_told_from_other_time(away_m, near):
+    """Of a pair that stand along a circle around a cache, and of a robot at a wall, the pair alone may be near it."""
+    env = tidy_world(caches="dynamic")
+    build_cache(env, (0, 1), OPEN_CELL)
+    x, y = cell_centre(OPEN_CELL)
+    put(env, 0, x + away_m, y, math.pi / 2)
+    put(env, 1, x + away_m, y + 0.25, -math.pi / 2)
+    put(env, 2, 31.6 - 0.1, 8.0)
+    put(env, 3, 6.0, 12.0)
+    act(env, {})
+    assert env.events.interfering.tolist() == [True, True, True, False]
+    assert env.events.counters[Counter.INTERFERING_NEAR_CACHES] == 2 * near
+
+
+@in_each_engine
 def test_who_comes_back_from_repair_beside_another_begins_anew():
     env = tidy_world()
     met(env, 0, 1)
@@ -186,14 +202,19 @@ def test_flags_and_sums_equal_those_of_the_slow_rule_on_slow_readings(quirks):
         expected = [sensing.interferes(env, robot) for robot in range(60)]
         assert env.events.interfering.tolist() == expected
         counted[Counter.INTERFERING] += sum(expected)
+        counted[Counter.INTERFERING_NEAR_CACHES] += sum(
+            flag and sensing.is_near_cache(env, robot) for robot, flag in enumerate(expected)
+        )
         counted[Counter.AVOIDANCES] += sum(now and not then for now, then in zip(expected, before, strict=True))
         counted.update(robots_do[robot] for robot in range(60) if active[robot] and not expected[robot])
         share += sum(expected) / 50
         before = expected
     assert counted[Counter.INTERFERING] > counted[Counter.AVOIDANCES] > 10
-    assert {counter: int(env.events.counters[counter]) for counter in (*WORK, Counter.AVOIDANCES)} == {
-        counter: counted[counter] for counter in (*WORK, Counter.AVOIDANCES)
+    known = (*WORK, Counter.AVOIDANCES, Counter.INTERFERING_NEAR_CACHES)
+    assert {counter: int(env.events.counters[counter]) for counter in known} == {
+        counter: counted[counter] for counter in known
     }
-    assert min(counted[counter] for counter in WORK) > 0, "the test knows each of them"
+    assert min(counted[counter] for counter in known) > 0, "the test knows each of them"
+    assert counted[Counter.INTERFERING_NEAR_CACHES] < counted[Counter.INTERFERING]
     assert env.events.interference_sum[0] == pytest.approx(share)
     assert [int(env.events.counters[c]) for c in (Counter.ACTIVE, Counter.PRESENT)] == [40 * 50, 40 * 55]

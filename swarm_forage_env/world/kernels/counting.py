@@ -5,13 +5,16 @@ from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.detection import sees_obstacle
 from swarm_forage_env.contract.layout import RING_SENSORS
 from swarm_forage_env.contract.types import BoolArray, CodeArray, FloatArray, ObsArray
+from swarm_forage_env.scenarios.columns import NEAR_CACHE_M
+from swarm_forage_env.scenarios.floor import CELL_M
 from swarm_forage_env.world.kernels.interact import CACHE_DROP, CACHE_PICKUP, NO_REQUEST
-from swarm_forage_env.world.state import StepEvents, SwarmState
+from swarm_forage_env.world.state import CacheState, StepEvents, SwarmState
 
 _INTERFERING, _ACTIVE, _PRESENT = int(Counter.INTERFERING), int(Counter.ACTIVE), int(Counter.PRESENT)
 _CARRYING, _AVOIDANCES = int(Counter.CARRYING), int(Counter.AVOIDANCES)
 _SEARCHING, _HOMING = int(Counter.SEARCHING), int(Counter.HOMING)
 _HANDLING, _AT_CACHES = int(Counter.HANDLING), int(Counter.AT_CACHES)
+_NEAR_CACHES = int(Counter.INTERFERING_NEAR_CACHES)
 
 
 @kernel
@@ -21,6 +24,7 @@ def mark(
     near: BoolArray,
     behind_counts: bool,
     swarm: SwarmState,
+    caches: CacheState,
     events: StepEvents,
 ) -> None:
     """Flag active robots for which the obstacle rule holds in this tick, walls and boxes included, and count the tick.
@@ -34,6 +38,7 @@ def mark(
         near: (N,) whether any beam may have hit something; others are skipped.
         behind_counts: Quirk `obstacle_behind_counts`.
         swarm: Read.
+        caches: Read.
         events: `interfering` is that of the last tick, and written, `counters` are added to, and the share of active
             robots (0/0 = 0) is added to `interference_sum`.
     """
@@ -46,6 +51,7 @@ def mark(
     n_homing = 0
     n_handling = 0
     n_at_caches = 0
+    n_near_caches = 0
     for i in range(active.shape[0]):
         ring = obs[i, proximity : proximity + RING_SENSORS]
         flag = active[i] and near[i] and sees_obstacle(ring, behind_counts)
@@ -53,6 +59,7 @@ def mark(
         n_begun += flag and not events.interfering[i]
         events.interfering[i] = flag
         n_interfering += flag
+        n_near_caches += flag and _is_near_cache(swarm.position[i], caches)
         n_active += active[i]
         n_present += swarm.present[i]
         n_carrying += carries
@@ -69,11 +76,24 @@ def mark(
     counters[_HANDLING] += n_handling
     counters[_AT_CACHES] += n_at_caches
     counters[_INTERFERING] += n_interfering
+    counters[_NEAR_CACHES] += n_near_caches
     counters[_ACTIVE] += n_active
     counters[_PRESENT] += n_present
     counters[_CARRYING] += n_carrying
     if n_active > 0:
         events.interference_sum[0] += n_interfering / n_active
+
+
+@kernel
+def _is_near_cache(place: FloatArray, caches: CacheState) -> bool:
+    """Whether a place (2,) in m lies within `NEAR_CACHE_M` of the centre of a cache."""
+    for slot in range(caches.alive.shape[0]):
+        if caches.alive[slot]:
+            dx = (caches.cell[slot, 0] + 0.5) * CELL_M - place[0]
+            dy = (caches.cell[slot, 1] + 0.5) * CELL_M - place[1]
+            if dx * dx + dy * dy <= NEAR_CACHE_M * NEAR_CACHE_M:
+                return True
+    return False
 
 
 @kernel

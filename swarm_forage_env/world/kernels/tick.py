@@ -168,7 +168,7 @@ def meet(a: ArenaArrays, actions: ActionArray, tick: int, chance: FloatArray) ->
     """
     state, s = a.state, a.sensors
     look(a)
-    mark(s.obs, s.columns.proximity, s.near, s.behind_counts, state.swarm, state.events)
+    mark(s.obs, s.columns.proximity, s.near, s.behind_counts, state.swarm, state.caches, state.events)
     serve(state, a.rules, actions, tick, chance)
     displaced, creators = state.requests.displaced, state.requests.creators
     if creators[-1] == 0:  # new caches come first
