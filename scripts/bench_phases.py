@@ -104,7 +104,8 @@ class PhasedRun:
         read = (name for name in SENSES if getattr(self.arena._arrays.sensors, f"reads_{name}"))
         self._senses |= {name: self._held_with(name) for name in read}
         state, source = self.arena._arrays.state, self.arena._arrays.source
-        self._held = [hold(part) for part in (state, self.arena._arrays.rules, state.swarm, state.events)]
+        parts = state, self.arena._arrays.rules, state.swarm, state.caches, state.events
+        self._held = [hold(part) for part in parts]
         draws = self.arena._arrays.placement_draws
         self._placing = [hold(part) for part in (state.requests, state.objects, source, draws)]
         self._drawn: list[Any] = [()]
@@ -148,8 +149,9 @@ class PhasedRun:
         """Make the part of `world.kernels.tick.meet`, and what Python adds."""
         a, watch = self.arena._arrays, self.watch
         watch.kernel("look around: proximity", look, self.arena._held)
-        sensors, (state, rules, swarm, events) = a.sensors, self._held
-        marked = sensors.obs, sensors.columns.proximity, sensors.near, sensors.behind_counts, swarm, events
+        sensors, (state, rules, swarm, caches, events) = a.sensors, self._held
+        seen = sensors.obs, sensors.columns.proximity, sensors.near, sensors.behind_counts
+        marked = *seen, swarm, caches, events
         watch.kernel("mark interference", mark, *marked)
         watch.kernel("pick up, drop", serve, state, rules, actions, tick, chance)
         requests, objects, source, draws = self._placing

@@ -1,6 +1,6 @@
 """Data beside docs/results.md: packed runs, and what was computed of them as tables that any program reads.
 
-    <set>.parquet   the runs of a set: a packed study with the columns that the page needs
+    <set>.parquet   the runs of a set: a packed study
     runs.csv        one row per set: digest of its runs, how many, what made them, hours
     measures.csv    one row per measure, rules, policy and level: mean over runs with its interval
     verdicts.csv    one row per claim, rules and form of the measures: the answer, and what it was decided on
@@ -8,7 +8,7 @@
 In the tables a set stands with the first digits of the digest of its runs, "S1a 3f2a9c1d".
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,21 +18,11 @@ import polars.selectors as cs
 
 from metrics.claims import Claim
 from metrics.scoring import StudyVerdict, study_figures
-from metrics.scoring.run_curves import NOISE, POPULATION, THROTTLE
-from metrics.scoring.study_models import FORAGING_COLUMNS
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env.runs.store import DONE
 from swarm_forage_env.studies.study_table import StudyTable, read_study
-from swarm_forage_env.wrappers.world import SIZE
 
 RUNS, MEASURES, VERDICTS = "runs.csv", "measures.csv", "verdicts.csv"
-NEEDED: Mapping[str, Sequence[str]] = {
-    SIZE: FORAGING_COLUMNS,
-    THROTTLE: ("adversity", "throttle"),
-    NOISE: (),
-    POPULATION: ("n_active",),
-}
-"""Criterion of the last axis -> columns that verdicts, figures and models of the page read, besides performance."""
 DIGITS = 8
 """Of a digest, where it names runs."""
 SIGNIFICANT = 6
@@ -41,7 +31,7 @@ SIGNIFICANT = 6
 
 def ship(tables: Iterable[StudyTable], folder: Path) -> None:
     """Write the runs of studies into the folder, and what is known of all runs there into `RUNS`."""
-    given = [table.with_columns(NEEDED[table.spec.axes[-1].name]) for table in tables]
+    given = list(tables)
     names = [table.spec.name for table in given]
     for table in given:
         rules = "" if names.count(table.spec.name) == 1 else f"_{'_'.join(table.spec.rules)}"

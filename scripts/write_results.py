@@ -5,8 +5,8 @@
     scripts/write_results --check                    say whether page and tables are those of these runs; exit 1 if not
     scripts/write_results --out FOLDER DIR|FILE ...  the same with another folder than docs
 
-What is given is packed into docs/results, with the columns that are needed, and all that is written comes of these
-files; `results_data.py` says what lies there. Folders also say how long the runs took.
+What is given is packed into docs/results, and all that is written comes of these files; `results_data.py` says what
+lies there. Folders also say how long the runs took.
 
 Needs the extra "plots". The interpreter is $PYTHON, else that of the active environment or of .venv, else python3.
 """

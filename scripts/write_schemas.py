@@ -23,13 +23,13 @@ from swarm_forage_env.runs.record import COLUMN_DTYPES, SCHEMA_VERSION
 from swarm_forage_env.runs.spec import RUN_ID_DIGITS
 from swarm_forage_env.runs.store import STATES
 from swarm_forage_env.runs.versions import VERSION_NAMES
-from swarm_forage_env.scenarios.columns import ALL_COLUMNS, CONTRIBUTED_COLUMNS, Column, part_column
+from swarm_forage_env.scenarios.columns import ALL_COLUMNS, CONTRIBUTED_COLUMNS, KEY_COLUMNS, Column, part_column
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import field_types
 from swarm_forage_env.studies.ladders import CRITERIA
 from swarm_forage_env.studies.study import OF_THE_STUDY, POLICY_KEYS, RULES_NAMES, SCENARIO_FIELDS
 from swarm_forage_env.studies.study_file import AXIS_KEYS, BUDGET_KEYS, FILE_KEYS, FORMER_RULES
-from swarm_forage_env.studies.study_table import AXIS, LOSS_COLUMNS, OF_ROWS, TABLE_VERSION
+from swarm_forage_env.studies.study_table import AXIS, LOSS_COLUMNS, TABLE_VERSION
 from swarm_forage_env.wrappers.registry import WRAPPERS, wrapper_config_class
 from swarm_forage_env.wrappers.waveform import WAVEFORM_KINDS, Waveform
 
@@ -213,7 +213,8 @@ def packed_study() -> Schema:
     del columns["properties"]["controller"]  # the label of the policy stands in its place
     columns["properties"] |= {name: listed(values) for name, values in (first | last).items()}
     columns["patternProperties"][f"^{AXIS}"] = listed(LEVEL)
-    columns["required"] = [*dict.fromkeys((*first, *OF_ROWS)), *last]
+    keys = [name for name in KEY_COLUMNS if name != "controller"]
+    columns["required"] = [*first, *keys, "interval", "t_end_s", "performance", *last]
     return keyed({"metadata": keyed(stamp), "columns": columns})
 
 

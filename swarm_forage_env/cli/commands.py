@@ -45,6 +45,7 @@ COMMANDS: dict[str, tuple[Command, ...]] = {
         Command("study run", "Run what is missing of a study, and pack it.", "study:run"),
         Command("study status", "Show which runs of a study are done.", "study:status"),
         Command("study pack", "Put all runs of a study into one file.", "study:pack"),
+        Command("study unpack", "Go on from packed studies: their runs as folders.", "study:unpack"),
         Command("study verdict", "Hold the claims of the paper against runs.", "study:verdict"),
         Command("study plot", "Draw the figures of a study.", "study:plot"),
         Command("study report", "Write one page about studies.", "study:report"),

@@ -208,6 +208,22 @@ def pack(
     typer.echo(f"packed into {_pack(folder, file)}")
 
 
+def unpack(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Packed studies.")],
+    out: Annotated[
+        Path, typer.Option("--out", help="Folder around those of the studies, which are called NAME_BUDGET.")
+    ] = Path("results/studies"),
+) -> None:
+    """Put the runs of packed studies into folders, from which study run goes on."""
+    from swarm_forage_env._internal.wording import counted
+    from swarm_forage_env.studies.study_folder import StudyFolder
+    from swarm_forage_env.studies.study_table import read_study, unpack_study
+
+    for table in [read_study(file) for file in files]:  # all of them are read before anything is written
+        folder = StudyFolder(_folder(table.spec, out, is_one=False))
+        typer.echo(f"{counted(unpack_study(table, folder), 'run')} of {table.spec.name} added to {folder.folder}")
+
+
 def _pack(folder: Path, chosen: Path | None) -> Path:
     from swarm_forage_env.studies.study_folder import StudyFolder
     from swarm_forage_env.studies.study_table import gather_study

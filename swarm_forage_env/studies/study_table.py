@@ -12,7 +12,7 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache, cached_property
 from io import BytesIO
 from pathlib import Path
@@ -42,8 +42,6 @@ LOSS_COLUMNS = ("state", "error", "traceback", "rerun")
 that makes the run again, given in the folder of the study."""
 _PREFIX = "swarm_forage_env.study."
 _FILE_KEYS = tuple(_PREFIX + name for name in ("table_version", "study", "versions", "digest"))
-OF_ROWS = ("study", "run_id", "n_robots", "seed", "interval", "t_end_s", "performance")
-"""Columns that every table has."""
 _COMPRESSION = 19
 """Of Zstandard; it takes a second for a thousand runs, and files are read as quickly."""
 _NOT_KEPT = "controller"
@@ -116,8 +114,7 @@ class StudyTable(Table):
         if run_id not in self._of_run:
             raise KeyError(f"Study {self.spec.name} has no run {run_id!r}.")
         first = self._rows_of(run_id).row(0, named=True)
-        specs = self.spec.specs_of(self.spec.places[first["cell"]])
-        return next(spec for spec in specs if spec.seed == first["seed"])
+        return self._specs(first["cell"])[first["seed"]]
 
     def place_states(self) -> tuple[PlaceState, ...]:
         """Return how many runs of each condition are done, failed and missing."""
@@ -148,19 +145,6 @@ class StudyTable(Table):
     def digest(self) -> str:
         """Hash of everything that a file of the table holds, the one by which a damaged file is noticed."""
         return _digest(self.frame, *self._texts)
-
-    def with_columns(self, names: Collection[str]) -> "StudyTable":
-        """Return the table with some columns of records only, and those that say which run and interval a row is of.
-
-        Its curves are the same; no whole record can be made of it. Runs that are missing have no `run_id`.
-        """
-        import polars as pl
-
-        axes = (AXIS + axis.name for axis in self.spec.axes)
-        kept = {"cell", "reading", "policy", *axes, *OF_ROWS, *LOSS_COLUMNS, *names}
-        frame = self.frame.select([name for name in self.frame.columns if name in kept])
-        is_there = pl.col("state") != MISSING  # what is not there takes most of the room otherwise: ids are by chance
-        return replace(self, frame=frame.with_columns(run_id=pl.when(is_there).then("run_id")))
 
     def write(self, path: str | Path) -> None:
         """Write the table to a Parquet file, whole or not at all."""
@@ -194,17 +178,23 @@ class StudyTable(Table):
             found.setdefault(run_id, (start, length))
         return found
 
+    @cached_property
+    def _specs(self) -> Callable[[int], Mapping[int, RunSpec]]:
+        """Number of a condition -> seed -> specification."""
+        return cache(lambda number: {spec.seed: spec for spec in self.spec.specs_of(self.spec.places[number])})
+
     def _rows_of(self, run_id: str) -> "pl.DataFrame":
         return self.frame.slice(*self._of_run[run_id])
 
     def _record(self, run_id: str) -> RunRecord:
-        """The record of a finished run; versions that all runs share are its provenance, other ones are not known."""
+        """The record of a finished run. Its provenance are the versions of all runs: a table does not say whose."""
         import polars as pl
 
         rows, spec = self._rows_of(run_id), self.spec_of(run_id)
         here = {"study", "cell", "reading", "policy", *LOSS_COLUMNS, *(AXIS + axis.name for axis in self.spec.axes)}
         kept = [name for name in rows.columns if name not in here and not rows[name].null_count()]
-        made = self.versions[0] if len(self.versions) == 1 else {}
+        names = dict.fromkeys(name for made in self.versions for name in made)
+        made = {name: " or ".join(dict.fromkeys(made.get(name, "") for made in self.versions)) for name in names}
         return record_of(rows.select(pl.lit(spec.policy).alias(_NOT_KEPT), *kept), spec.to_json(), made)
 
     def _failure(self, run_id: str) -> RunFailure:
@@ -290,6 +280,28 @@ def gather_study(
         versions=tuple(dict(pairs) for pairs in sorted(versions)),
         wall_time_s=None if math.isnan(wall_time_s) else wall_time_s,
     )
+
+
+def unpack_study(table: StudyTable, folder: StudyFolder) -> int:
+    """Put the finished runs of a table into the folder of its study, so that `run_study` and others go on from there.
+
+    Runs that the folder has stay as they are. Records lack what a packed file leaves out: how long each run took.
+
+    Args:
+        table: From the packed file.
+        folder: Made if it is not there.
+
+    Returns:
+        How many runs were added.
+
+    Raises:
+        RecordError: the folder holds another study.
+    """
+    folder.take(table.spec)
+    lacking = [run_id for run_id in table.records if run_id not in folder.store]
+    for run_id in lacking:
+        folder.store.write(table.records[run_id])
+    return len(lacking)
 
 
 def read_study(path: str | Path) -> StudyTable:

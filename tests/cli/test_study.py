@@ -98,6 +98,17 @@ def test_shards_are_not_packed_until_asked(written):
     assert [place["n_missing"] for place in json.loads(out)["conditions"]] == [1, 1]
 
 
+def test_a_packed_study_goes_on(written):
+    written(*RUN, "--shard", "1/2", "--rules", "described", "--out", "here")
+    written("study", "pack", "here", "--file", "half.parquet")
+    code, out, _ = written("study", "unpack", "half.parquet", "--out", "there")
+    assert (code, out) == (0, "2 runs of mine added to there/mine_tiny\n")
+    code, _, err = written(*RUN, "--rules", "described", "--out", "there/mine_tiny")
+    assert code == 0
+    assert "2 of 4 runs are stored already" in err, "the other half alone is made"
+    assert written("study", "unpack", "half.parquet", "--out", "there")[1].startswith("0 runs of mine")
+
+
 def test_several_studies_have_a_folder_around_theirs(written):
     Path("other.toml").write_text(FILE.replace('"mine"', '"other"'))
     code, out, _ = written("study", "run", "mine.toml", "other.toml", "--jobs", "1", "--out", "all")

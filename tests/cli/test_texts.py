@@ -114,6 +114,7 @@ CASES = {
     "study_status_failing.txt": "study status failing",
     "study_status_failing.json": "study status failing --json",
     "study_pack.txt": "study pack done --file packed/S1a.parquet",
+    "study_unpack.txt": "study unpack packed.parquet --out unpacked",
     "study_verdict.txt": "study verdict done",
     "study_verdict_made.txt": "study verdict made.parquet noise.parquet --file verdict_made.json",
     "study_plot.txt": "study plot done --out figures --band --variant corrected,sierra",
