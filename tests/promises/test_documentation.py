@@ -62,7 +62,9 @@ def test_marked_commands_of_the_readme_are_one_line_each(name):
 
 
 def test_relative_links_lead_to_files():
-    targets = [(page, link) for page in PAGES for link in re.findall(r"\]\((?!https?://|#)([^)#\s]+)", page.read_text())]
+    targets = [
+        (page, link) for page in PAGES for link in re.findall(r"\]\((?!https?://|#)([^)#\s]+)", page.read_text())
+    ]
     assert [(page.name, target) for page, target in targets if not (page.parent / target).exists()] == []
 
 
