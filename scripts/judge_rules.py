@@ -98,6 +98,7 @@ MARGIN = {"a": 1.12, "b": 1.0}
 IDEAL = {"ideal a": 1.0, "ideal b": 1.0}
 LADDER = {"a": 4.0, "b": 3.0, "c": 2.0, "d": 1.0}
 ONE = {"policies": ("a",)}
+EQUAL = dict.fromkeys(FOUR, 1.0)
 RULES: dict[str, Rule] = {
     "ties, at the margin": Rule(
         predicate=general.ties, parameters=PAIR, border=fixed({"a": 1.1, "b": 1.0, "c": 1.0}), wrong=("supported",),
@@ -182,6 +183,11 @@ RULES: dict[str, Rule] = {
         predicate=orders.unrelated, parameters={"policies": FOUR},
         border=fixed(LADDER, {"a": 3.0, "b": 1.0, "c": 4.0, "d": 2.0}), wrong=("contradicted",),
         holds=fixed(LADDER, {"a": 3.0, "b": 1.0, "c": 4.0, "d": 2.0}), fails=fixed(LADDER, LADDER),
+    ),
+    "unrelated orders, of equal policies": Rule(
+        predicate=orders.unrelated, parameters={"policies": FOUR}, border=fixed(LADDER, EQUAL),
+        wrong=("supported", "contradicted"), holds=fixed(LADDER, {"a": 3.0, "b": 1.0, "c": 4.0, "d": 2.0}),
+        fails=fixed(LADDER, LADDER),
     ),
     "changes within, of a straight line": Rule(
         predicate=shapes.changes_within, parameters={**ONE, "between": (3.0, 4.0)}, border=fixed({"a": LEVELS}),

@@ -3,8 +3,8 @@
 All rest on Kendall's tau between two orders: 1 if all pairs of policies stand alike in both, -1 if all stand the other
 way round. A pair has an order in a panel if one of the two is higher at more levels than the other: by intervals where
 the means are further apart than the margin, by bands where the bands do not overlap. Tau is that of the pairs which
-have an order in both panels; these must be half of all pairs or more, else the answer is undecided. For orders that
-have nothing to do with each other, pairs without an order speak, too: by intervals they count as 0.
+have an order in both panels; these must be half of all pairs or more, else the answer is undecided. For orders that have
+nothing to do with each other they must be `ORDERED`: where policies tie, an order is neither tied to another nor free.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,6 +19,10 @@ from .predicates import every_pair
 
 LOOSE = 0.5
 """Largest Kendall's tau, up or down, of orders that are not tied to each other (our choice)."""
+ORDERED = 2.0 / 3.0
+"""Share of pairs that must have an order in both panels where orders have nothing to do with each other (our choice).
+One of four policies apart from three that tie is half: in every other case chance puts it at the same end or the other.
+"""
 SAME = 5.0 / 6.0
 """Above this tau four policies without ties have the same order. Of 24 random orders one has that, four reach 2/3."""
 
@@ -73,7 +77,7 @@ def unrelated(first: Panel, second: Panel, *, policies: Sequence[str], rule: Rul
     """Whether the order in one panel has nothing to do with that in the other: tau lies within `LOOSE` of 0.
 
     Contradicted if its interval leaves out 0 on either side: the opposite order is a strong tie, too. By bands, if tau
-    itself is beyond `LOOSE`.
+    itself is beyond `LOOSE`. Undecided if fewer than `ORDERED` of the pairs have an order in both.
     """
 
     def decide(_: float, lower: float, upper: float) -> Answer:
@@ -82,7 +86,7 @@ def unrelated(first: Panel, second: Panel, *, policies: Sequence[str], rule: Rul
         return "contradicted" if lower > 0.0 or upper < 0.0 else "undecided"
 
     limit = f"within {LOOSE:g} of 0 is unrelated"
-    return _of_tau(first, second, policies, (1, 1), rule, decide, limit, of_all=rule == "intervals")
+    return _of_tau(first, second, policies, (1, 1), rule, decide, limit, needed=ORDERED)
 
 
 def _is_above(least: float, tau: float, lower: float, upper: float) -> Answer:
@@ -100,11 +104,11 @@ def _of_tau(
     decide: Callable[[float, float, float], Answer],
     limit: str,
     *,
-    of_all: bool = False,
+    needed: float = MANY,
 ) -> Outcome:
     """Decide on Kendall's tau of two panels and the bounds of its interval; by bands both are tau.
 
-    `of_all`: pairs without an order count as 0; else they are left out.
+    `needed`: share of the pairs that must have an order in both panels.
     """
     check_option("rule", rule, Rule)
     parts: list[Panel] = []
@@ -124,11 +128,11 @@ def _of_tau(
         found = [_by_means(means, part.tie_margins) for (means, _), part in zip(curves, parts, strict=True)]
         drawn = [_by_means(means, part.tie_margins) for (_, means), part in zip(curves, parts, strict=True)]
     n_ordered, n_pairs = int((found[0] * found[1] != 0.0).sum()), found[0].size
-    if n_ordered < MANY * n_pairs and not of_all:
-        why = f"{n_ordered} of {n_pairs} pairs have an order in both panels; half of them are needed"
+    if n_ordered < needed * n_pairs:
+        why = f"{n_ordered} of {n_pairs} pairs have an order in both panels; {needed:.0%} of them are needed"
         return Outcome(answer="undecided", statistic=np.nan, effect=np.nan, n_runs=n_runs, why=why)
-    tau = float(_tau(found, of_all=of_all))
-    lower, upper = (tau, tau) if drawn is None else bounds(_tau(drawn, of_all=of_all))
+    tau = float(_tau(*found))
+    lower, upper = (tau, tau) if drawn is None else bounds(_tau(*drawn))
     interval = f"{lower:.2f} to {upper:.2f}, " if drawn is not None else ""
     why = f"Kendall's tau of the two orders is {tau:.2f} ({interval}of {n_ordered} of {n_pairs} pairs); {limit}"
     return Outcome(answer=decide(tau, lower, upper), statistic=tau, effect=np.nan, n_runs=n_runs, why=why)
@@ -147,8 +151,7 @@ def _by_means(means: FloatArray, margins: FloatArray) -> FloatArray:
     return np.sign((np.sign(gaps) * (np.abs(gaps) > margins)).sum(axis=-1))
 
 
-def _tau(found: Sequence[FloatArray], *, of_all: bool) -> FloatArray:
+def _tau(first: FloatArray, second: FloatArray) -> FloatArray:
     """Kendall's tau of two orders, (..., pairs) each to (...); 0 where no pair has an order in both."""
-    agree = found[0] * found[1]
-    n_pairs = agree.shape[-1] if of_all else np.maximum(1.0, np.abs(agree).sum(axis=-1))
-    return agree.sum(axis=-1) / n_pairs
+    agree = first * second
+    return agree.sum(axis=-1) / np.maximum(1.0, np.abs(agree).sum(axis=-1))

@@ -270,6 +270,10 @@ def test_orders_in_two_panels():
     assert answers(orders.unrelated, rising, mixed, **names) == BOTH
     assert answers(orders.unrelated, rising, rising, **names) == NEITHER
     assert answers(orders.unrelated, rising, falling, **names) == NEITHER, "the opposite order is a tie, too"
+    alike = panel(dict.fromkeys("abcd", 1.0))
+    assert answers(orders.unrelated, alike, alike, **names) == OPEN, "what ties has no order that could be free"
+    apart = panel({"a": 2.0, "b": 1.0, "c": 1.0, "d": 1.0})
+    assert answers(orders.unrelated, apart, rising, **names) == OPEN, "one policy alone stands at one end or the other"
     noise = panel(dict.fromkeys("abcd", 1.0), sd=1.0)
     for statement in (orders.same_order, orders.opposite_order, orders.unrelated):
         assert answers(statement, rising, noise, **names) == OPEN
