@@ -98,6 +98,8 @@ MARGIN = {"a": 1.12, "b": 1.0}
 IDEAL = {"ideal a": 1.0, "ideal b": 1.0}
 LADDER = {"a": 4.0, "b": 3.0, "c": 2.0, "d": 1.0}
 ONE = {"policies": ("a",)}
+WILD = np.where(LEVELS == 3.0, -4.0, 1.0)
+"""A curve that is constant but for one level."""
 EQUAL = dict.fromkeys(FOUR, 1.0)
 RULES: dict[str, Rule] = {
     "ties, at the margin": Rule(
@@ -146,8 +148,12 @@ RULES: dict[str, Rule] = {
         wrong=("supported",), holds=fixed({"a": 1.15, "b": 1.0}), fails=fixed(APART),
     ),
     "is constant, at the limit": Rule(
-        predicate=general.is_constant, parameters=ONE, border=fixed({"a": np.linspace(0.875, 1.125, 7)}),
+        predicate=general.is_constant, parameters=ONE, border=fixed({"a": np.linspace(0.85, 1.15, 7)}),
         wrong=("supported", "contradicted"), holds=fixed({"a": 1.0}), fails=fixed({"a": LEVELS}),
+    ),
+    "is constant, but for a wild level": Rule(
+        predicate=general.is_constant, parameters=ONE, border=fixed({"a": WILD}), wrong=("contradicted",),
+        holds=fixed({"a": WILD}), fails=fixed({"a": WILD * LEVELS}),
     ),
     "is narrow, at the limit": Rule(
         predicate=general.is_narrow, parameters=ONE, border=fixed({"a": 1.0}), wrong=("supported", "contradicted"),

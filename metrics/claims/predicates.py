@@ -52,6 +52,8 @@ MORE = 0.1
 """Share of comparisons by which one panel has more differences than another (our choice)."""
 CLEAR = 2.0
 """Student's t at which a difference is half as clear as can be: about where it becomes significant."""
+MIN_CONSTANT = 4
+"""Levels from which on one may be wild in a curve that is constant (our choice: three others still show a curve)."""
 WIDER = 1.5
 """Ratio of the widths of two bands from which on one looks wider (our choice)."""
 
@@ -199,10 +201,10 @@ def is_not_higher(
 
 
 def is_constant(panel: Panel, *, policies: Sequence[str], rule: Rule = "intervals") -> Outcome:
-    """Whether each policy is roughly constant over the levels.
+    """Whether each policy is roughly constant over the levels, or over all but one of `MIN_CONSTANT` or more.
 
-    By intervals: its largest less its smallest mean is at most `FLAT` of the scale. By bands: one height lies within
-    the bands of all levels.
+    One wild level does not decide for all others, but a fall over several does. By intervals: its largest less its
+    smallest mean is at most `FLAT` of the scale. By bands: one height lies within the bands of these levels.
     """
     return all_of([_constancy(panel, policy, rule) for policy in policies])
 
@@ -321,21 +323,33 @@ def _constancy(panel: Panel, policy: str, rule: Rule) -> Outcome:
     def judge(part: Panel) -> Outcome:
         (values,) = part.of((policy,))
         means, drawn = resampled_means(values, part.confidence)
-        spread, n_runs = float(np.ptp(means)) / part.scale, part.n_runs((policy,))
+        kept = _but_one(means.size)
+        spreads = np.array([np.ptp(means[some]) for some in kept]) / part.scale
+        spread, n_runs = float(spreads.min()), part.n_runs((policy,))
+        words = "all levels" if len(kept) == 1 else "all levels but one"
         if rule == "bands":
             reach = 2.0 * std_over_runs(values)
-            lowest, highest = float((means + reach).min()), float((means - reach).max())
-            answer: Answer = "supported" if highest <= lowest else "contradicted"
-            why = f"the bands of {policy} have " + ("a height in common" if highest <= lowest else "no common height")
+            shared = any((means + reach)[some].min() >= (means - reach)[some].max() for some in kept)
+            answer: Answer = "supported" if shared else "contradicted"
+            why = f"the bands of {policy} at {words} have {'a height in common' if shared else 'no common height'}"
             return Outcome(answer=answer, statistic=spread, effect=spread, n_runs=n_runs, why=why)
         # The spread of noisy means is too large, so its percentiles would be, too. The spread of what the runs add by
-        # chance bounds it from both sides.
-        chance = float(np.quantile(np.ptp(drawn - means, axis=-1), CONFIDENCE)) / part.scale
-        interval = (max(0.0, spread - chance), spread + chance)
-        why = f"means of {policy} spread over {spread:.2f} of the scale ({_ends(interval)}); {FLAT:g} is still constant"
+        # chance bounds it from both sides, for each choice of levels: a wild level may scatter more than the others.
+        chances = [np.quantile(np.ptp((drawn - means)[:, some], axis=-1), CONFIDENCE) / part.scale for some in kept]
+        interval = (max(0.0, float((spreads - chances).min())), float((spreads + chances).min()))
+        why = (
+            f"means of {policy} at {words} spread over {spread:.2f} of the scale ({_ends(interval)}); {FLAT:g} is still "
+            "constant"
+        )
         return Outcome(answer=within_limit(interval, FLAT), statistic=spread, effect=spread, n_runs=n_runs, why=why)
 
     return where_scored(panel, (policy,), rule, judge)
+
+
+def _but_one(n_levels: int) -> list[BoolArray]:
+    """Return masks of the levels over which a curve has to be constant: all but each one, of few levels all."""
+    every = np.ones((1, n_levels), dtype=np.bool_)
+    return list(every if n_levels < MIN_CONSTANT else every ^ np.eye(n_levels, dtype=np.bool_))
 
 
 def _narrowness(panel: Panel, policy: str, rule: Rule) -> Outcome:

@@ -65,6 +65,23 @@ def test_the_interval_of_a_difference_by_hand():
     assert np.isnan(interval_of(some, some[:3])).all()
 
 
+def test_one_wild_level_does_not_decide_whether_a_curve_is_constant():
+    wild = np.where(SIX == 3.0, -4.0, 1.0)
+    steep = np.where(SIX > 4.0, 2.0, 1.0)
+    a = {"policies": ("a",)}
+    assert answers(general.is_constant, panel({"a": wild}), **a) == BOTH
+    assert answers(general.varies, panel({"a": wild}), **a) == NEITHER
+    assert answers(general.is_constant, panel({"a": steep}), **a) == NEITHER, "two levels are no single wild one"
+    few = panel({"a": [1.0, 1.0, 2.0]}, levels=[1.0, 2.0, 3.0])
+    assert answers(general.is_constant, few, **a) == NEITHER, "of three levels all count"
+
+
+def test_a_wild_level_that_scatters_widely_silences_no_others():
+    made = panel({"a": 1.0, "b": 1.0}, n_runs=8)
+    made.scores["a"][2] = np.linspace(-40.0, 30.0, 8)
+    assert answers(general.is_constant, made, policies=("a",)) == BOTH
+
+
 def test_resampled_means_vary_as_students_interval_says():
     (values,) = panel({"a": 1.0}, levels=[1.0], n_runs=16).of(("a",))
     _, drawn = resampled_means(values)
