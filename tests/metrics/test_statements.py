@@ -61,8 +61,17 @@ def test_the_interval_of_a_difference_by_hand():
     # Against numbers without scatter, three degrees and 3.1824.
     lower, upper = interval_of(some, np.zeros(4))
     assert (lower, upper) == pytest.approx((2.0 - 3.1824 * 1.29099, 2.0 + 3.1824 * 1.29099), abs=1e-3)
-    assert interval_of(np.ones(4), np.zeros(5)) == (1.0, 1.0)
     assert np.isnan(interval_of(some, some[:3])).all()
+
+
+@pytest.mark.parametrize(("n_runs", "found"), [(4, [math.nan, math.nan]), (5, [math.nan, 0.0]), (6, [1.0, 0.0])])
+def test_runs_without_scatter_decide_once_most_runs_surely_score_so(n_runs, found):
+    # By chance all runs of one or the other lie on one side of its median: 2 / 2^5 = 6.25 %, 2 / 2^6 = 3.1 %. Ties are
+    # tested at 10 %.
+    equal = Panel(levels=[1, 2], scores={"a": np.ones((2, n_runs)), "b": [[0.0] * n_runs, [1.0] * n_runs]})
+    np.testing.assert_equal(signs(equal, "a", "b", "intervals"), found)
+    assert interval_of(np.ones(6), np.zeros(6)) == (1.0, 1.0)
+    assert np.isnan(interval_of(np.ones(6), np.zeros(6), 0.99)).all(), "an early look asks for more"
 
 
 def test_one_wild_level_does_not_decide_whether_a_curve_is_constant():
