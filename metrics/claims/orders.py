@@ -3,8 +3,9 @@
 All rest on Kendall's tau between two orders: 1 if all pairs of policies stand alike in both, -1 if all stand the other
 way round. A pair has an order in a panel if one of the two is higher at more levels than the other: by intervals where
 the means are further apart than the margin, by bands where the bands do not overlap. Tau is that of the pairs which
-have an order in both panels; these must be half of all pairs or more, else the answer is undecided. For orders that have
-nothing to do with each other they must be `ORDERED`: where policies tie, an order is neither tied to another nor free.
+have an order in both panels; these must be half of all pairs or more, else the answer is undecided. For orders that
+have nothing to do with each other they must be `ORDERED`: where policies tie, an order is neither tied to another nor
+free.
 """
 
 from collections.abc import Callable, Sequence

@@ -286,8 +286,8 @@ def signs(panel: Panel, first: str, second: str, rule: Rule, n_tests: int = 1) -
 def interval_of(first: FloatArray, second: FloatArray, confidence: float = CONFIDENCE) -> tuple[float, float]:
     """Bounds of Welch's interval of the difference of two means; NaN for fewer than `MIN_RUNS` of one.
 
-    Where the runs of both are equal among themselves, they show no scatter that Welch's t could use. Then the bounds are
-    the difference itself if most runs of each surely score so, by the sign test, else NaN: six runs each at 95 %.
+    Where the runs of both are equal among themselves, they show no scatter that Welch's t could use. Then the bounds
+    are the difference itself if most runs of each surely score so, by the sign test, else NaN: six runs each at 95 %.
 
     Runs are not paired by seed: that two policies meet the same world correlates their scores by 0.04 to 0.15, which
     gains less than half of the degrees of freedom that pairing costs.

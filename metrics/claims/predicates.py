@@ -338,8 +338,8 @@ def _constancy(panel: Panel, policy: str, rule: Rule) -> Outcome:
         chances = [np.quantile(np.ptp((drawn - means)[:, some], axis=-1), CONFIDENCE) / part.scale for some in kept]
         interval = (max(0.0, float((spreads - chances).min())), float((spreads + chances).min()))
         why = (
-            f"means of {policy} at {words} spread over {spread:.2f} of the scale ({_ends(interval)}); {FLAT:g} is still "
-            "constant"
+            f"means of {policy} at {words} spread over {spread:.2f} of the scale ({_ends(interval)}); {FLAT:g} is "
+            "still constant"
         )
         return Outcome(answer=within_limit(interval, FLAT), statistic=spread, effect=spread, n_runs=n_runs, why=why)
 
