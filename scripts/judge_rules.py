@@ -100,7 +100,7 @@ LADDER = {"a": 4.0, "b": 3.0, "c": 2.0, "d": 1.0}
 ONE = {"policies": ("a",)}
 WILD = np.where(LEVELS == 3.0, -4.0, 1.0)
 """A curve that is constant but for one level."""
-EQUAL = dict.fromkeys(FOUR, 1.0)
+EQUAL: Curves = dict.fromkeys(FOUR, 1.0)
 RULES: dict[str, Rule] = {
     "ties, at the margin": Rule(
         predicate=general.ties, parameters=PAIR, border=fixed({"a": 1.1, "b": 1.0, "c": 1.0}), wrong=("supported",),
@@ -118,6 +118,11 @@ RULES: dict[str, Rule] = {
     "is higher": Rule(
         predicate=general.is_higher, parameters={"upper": ("a",), "lower": ("b",)}, border=fixed(ALIKE),
         wrong=("supported",), holds=fixed(APART), fails=fixed({"a": 1.0, "b": 2.0}),
+    ),
+    "is above zero": Rule(
+        predicate=lambda panel, **given: general.is_higher(shapes.with_zero(panel), **given),
+        parameters={"upper": ("a",), "lower": (shapes.ZERO,)}, border=fixed({"a": 0.0}), wrong=("supported",),
+        holds=fixed({"a": 0.5}), fails=fixed({"a": -0.5}),
     ),
     "is higher, a tie at the margin": Rule(
         predicate=general.is_higher, parameters={"upper": ("a",), "lower": ("b",)}, border=fixed(MARGIN),

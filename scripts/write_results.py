@@ -296,8 +296,8 @@ def intuitions(results: StudyVerdict) -> str:
     ]
     return (
         "## What the paper expected\n\nIts tables of intuitions, written before its experiments, in our words, with "
-        'what we take "modest" and "low" to mean. Left out: that STOCHM is congested near its caches, since records '
-        f"do not hold where time is lost.\n\n{rows(('name', 'where', 'expected', *results.rules, 'runs'), lines)}"
+        'what we take "modest" and "low" to mean.'
+        f"\n\n{rows(('name', 'where', 'expected', *results.rules, 'runs'), lines)}"
     )
 
 

@@ -2,13 +2,13 @@
 
 The paper has two tables of intuitions, one per scenario. Their words are vague: "modest", "moderate", "low". Here each
 is a comparison with the other algorithms: high is better than all three others, low is worse than CRW and STOCHX or, of
-one of these, worse than both others; modest lies between. That is our choice. One
-intuition is left out: that STOCHM is congested near its caches. Records of runs hold how much time is lost, not where;
-`swarm-forage maps` makes runs again to see it.
+one of these, worse than both others; modest lies between. That is our choice. Only congestion near caches needs no
+other algorithm: it is held against interference that is spread evenly over the floor.
 """
 
 from .checking import Claim, Place, Statement
-from .predicates import is_not_higher, stays_alike
+from .predicates import is_higher, is_not_higher, stays_alike
+from .shapes import ZERO, with_zero
 from .statements import E_T, SIMPLE, STEADY, UNSTEADY, A, C, D, N, P, R, best_of, better, spatial, states
 
 _SPATIAL = (spatial("S1a"), spatial("S1b"))
@@ -118,6 +118,15 @@ _WRITTEN: tuple[tuple[int, str, str, tuple[Statement, ...]], ...] = (
         "STOCHX",
         "Modest robustness to deaths and modest flexibility: worse than CRW, better than DPO.",
         _between((*_POPULATION_2, *_FLEXIBLE_2), "crw", "stochx", "dpo"),
+    ),
+    (
+        1,
+        "STOCHM",
+        "Congested near its caches: more interference within 2 m of them than their share of the floor explains.",
+        tuple(
+            states(is_higher, (experiment, "cache_congestion"), views=(with_zero,), upper=("stochm",), lower=(ZERO,))
+            for experiment in ("S1a", "S1b")
+        ),
     ),
 )
 

@@ -5,16 +5,17 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
+from swarm_forage_env.scenarios.columns import NEAR_CACHE_M
 from swarm_forage_env.wrappers.world import SIZE
 
 from ..catalog import METRICS
 from ..curves import FloatArray, Form, Variant
 from ..emergence import interference_gain, spatial_emergence, task_emergence, time_emergence, undisturbed_gain
-from ..interference import performance_lost
+from ..interference import cache_congestion, performance_lost
 from ..scaling import efficiency, raw_performance, scalability
 from .by_adversity import BY_ADVERSITY
-from .run_curves import RunCurves, StudyCurves, common_runs
-from .scores import Score, ScoreForms, Uncomputable, Values, check_measures, label_of, score_runs
+from .run_curves import NEAR_CACHES, RunCurves, StudyCurves, common_runs
+from .scores import NOTHING_ACHIEVED, Score, ScoreForms, Uncomputable, Values, check_measures, label_of, score_runs
 
 FALLING = (
     "performance is lower than that of the next smaller swarm, and it weights the time lost, so that a collapse counts "
@@ -43,6 +44,13 @@ def _efficiency(runs: RunCurves, *, variant: Variant) -> FloatArray:
 
 def _t_lost_fraction(runs: RunCurves) -> FloatArray:
     return runs.interference.mean(axis=-1)
+
+
+def _cache_congestion(runs: RunCurves) -> FloatArray:
+    if runs.floor_m2 is None:
+        raise Uncomputable("there is no size of the floor")
+    lost, near, n_caches = (runs.curves[name] for name in NEAR_CACHES)
+    return cache_congestion(near, lost, n_caches, floor=runs.floor_m2, reach=NEAR_CACHE_M)
 
 
 def _performance_lost(one: RunCurves, runs: RunCurves, *, variant: Variant) -> FloatArray:
@@ -93,6 +101,9 @@ def _scalability(few: RunCurves, many: RunCurves, *, variant: Variant) -> FloatA
     return scalability(few.performance, few.n_robots, many.performance, many.n_robots, variant=variant)
 
 
+_LOST = ("interference_fraction",)
+
+
 @dataclass(frozen=True, kw_only=True)
 class _SizeMeasure:
     """How a measure of swarm sizes is applied."""
@@ -108,7 +119,8 @@ class _SizeMeasure:
     one_drops_out: bool = False
     """Whether the marginal form has the run of one robot on both sides of a difference, and can do without it."""
     of_two_sizes: bool = False
-    needs_interference: bool = False
+    columns: tuple[str, ...] = ()
+    """Columns that it needs besides the performance."""
     is_gain: bool = False
     """Whether the value is an amount of performance, which is also given relative to that of the swarm."""
     is_part: bool = False
@@ -117,17 +129,25 @@ class _SizeMeasure:
     """Variants that weight the time lost with the performance achieved, which misleads where performance falls."""
     order_matters: bool = False
     """As in `score_runs`."""
+    undefined: str = NOTHING_ACHIEVED
+    """As in `score_runs`."""
 
 
 BY_SIZE: dict[str, _SizeMeasure] = {
     "raw_performance": _SizeMeasure(values=_raw_performance, unit="objects {span}"),
     "efficiency": _SizeMeasure(values=_efficiency, unit="objects per robot {span}"),
-    "t_lost_fraction": _SizeMeasure(values=_t_lost_fraction, unit="share of robot time", needs_interference=True),
+    "t_lost_fraction": _SizeMeasure(values=_t_lost_fraction, unit="share of robot time", columns=_LOST),
+    "cache_congestion": _SizeMeasure(
+        values=_cache_congestion,
+        unit="share of interference",
+        columns=NEAR_CACHES,
+        undefined="which have no interference or no cache",
+    ),
     "performance_lost": _SizeMeasure(
         values=_performance_lost,
         unit="objects {span}",
         from_one=True,
-        needs_interference=True,
+        columns=_LOST,
         is_gain=True,
         weighted_in=("corrected", "paper", "sierra"),
     ),
@@ -138,11 +158,11 @@ BY_SIZE: dict[str, _SizeMeasure] = {
         from_one=True,
         one_drops_out=True,
         of_two_sizes=True,
-        needs_interference=True,
+        columns=_LOST,
         is_gain=True,
         weighted_in=("corrected", "paper"),
     ),
-    "time_emergence": _SizeMeasure(values=_time_emergence, unit="robots", of_two_sizes=True, needs_interference=True),
+    "time_emergence": _SizeMeasure(values=_time_emergence, unit="robots", of_two_sizes=True, columns=_LOST),
     "task_emergence": _SizeMeasure(
         values=_task_emergence, unit="objects {span}", of_two_sizes=True, is_gain=True, is_part=True
     ),
@@ -150,7 +170,7 @@ BY_SIZE: dict[str, _SizeMeasure] = {
         values=partial(_gain, formula=interference_gain),
         unit="objects {span}",
         of_two_sizes=True,
-        needs_interference=True,
+        columns=_LOST,
         is_gain=True,
         is_part=True,
     ),
@@ -158,7 +178,7 @@ BY_SIZE: dict[str, _SizeMeasure] = {
         values=partial(_gain, formula=undisturbed_gain),
         unit="objects {span}",
         of_two_sizes=True,
-        needs_interference=True,
+        columns=_LOST,
         is_gain=True,
         is_part=True,
     ),
@@ -197,6 +217,7 @@ def _size_scores(name: str, study: StudyCurves, variant: Variant, form: Form) ->
             is_doubtful=falls,
             remark=FALLING if falls else UPSIDE_DOWN if name == "scalability" and variant != "corrected" else "",
             order_matters=measure.order_matters,
+            undefined=measure.undefined,
         )
         yield _per_robot(score, *experiments) if measure.is_part and variant == "corrected" else score
 
@@ -231,8 +252,12 @@ def _sizes(study: StudyCurves, measure: _SizeMeasure, variant: Variant, form: Fo
     if not sizes:
         raise Uncomputable(f"there are no runs with criterion {SIZE}")
     smallest = sizes[0].n_robots
-    if measure.needs_interference and any("interference_fraction" not in e.curves and e.seeds for e in sizes):
-        raise Uncomputable("there is no column interference_fraction for every swarm size")
+    absent = [name for name in measure.columns if any(name not in e.curves and e.seeds for e in sizes)]
+    if absent:
+        raise Uncomputable(f"there is no column {' and '.join(absent)} for every swarm size")
+    with_runs = [e for e in sizes if e.seeds]
+    if "n_caches" in measure.columns and with_runs and not any(e.curves["n_caches"].any() for e in with_runs):
+        raise Uncomputable("there is no cache in any run")
     # The authors' program takes its first experiment for the run of one robot, whatever its size.
     needs_one = (measure.from_one or form == "interactive") and not _without_one(measure, sizes[0], variant, form)
     if needs_one and smallest != 1 and variant != "sierra":

@@ -23,6 +23,7 @@ MEASURE_CRITERIA: dict[str, str] = {
     "raw_performance": SIZE,
     "efficiency": SIZE,
     "t_lost_fraction": SIZE,
+    "cache_congestion": SIZE,
     "performance_lost": SIZE,
     "spatial_emergence": SIZE,
     "time_emergence": SIZE,
@@ -38,6 +39,8 @@ MEASURE_CRITERIA: dict[str, str] = {
     "availability": POPULATION,
 }
 """Measure -> what has to be varied for it. The order is that of score tables."""
+ON_REQUEST = ("cache_congestion",)
+"""Measures that are scored where they are named only: most policies have no caches."""
 DISTURBANCES = (THROTTLE, HANDLING)
 """Kinds of disturbance over time, the paper's two, under which reactivity and adaptability can be scored."""
 _NO_AMOUNT = 1e-12
@@ -48,6 +51,7 @@ BAND = "mean ± 2 sd"
 """Heading of the column that `Score.cells` adds for the authors' bands."""
 DOUBTFUL = "?"
 """Mark of a value that misleads; its note says why."""
+NOTHING_ACHIEVED = "in which neither swarm achieved anything"
 _BOOTSTRAP_SEED = 1
 """Fixed, so that the same runs give the same table."""
 Values: TypeAlias = Callable[..., ArrayLike]
@@ -98,13 +102,13 @@ def label_of(measure: str, variant: Variant, form: Form) -> str:
 
 
 def check_measures(measures: Sequence[str] | None) -> tuple[str, ...]:
-    """Return measures in the order of tables, each once; None = all.
+    """Return measures in the order of tables, each once; None = all but those `ON_REQUEST`.
 
     Raises:
         CurveError: an unknown name, or none at all.
     """
     if measures is None:
-        return tuple(MEASURE_CRITERIA)
+        return tuple(name for name in MEASURE_CRITERIA if name not in ON_REQUEST)
     _check_words("measure", measures, tuple(MEASURE_CRITERIA))
     return tuple(name for name in MEASURE_CRITERIA if name in measures)
 
@@ -299,6 +303,7 @@ def score_runs(
     floor: float | None = None,
     order_matters: bool = False,
     remark: str = "",
+    undefined: str = NOTHING_ACHIEVED,
     **told: Any,
 ) -> Score:
     """Return the score of experiments, with one value per run that all of them have.
@@ -310,6 +315,7 @@ def score_runs(
         floor: Noise floor, for distances.
         order_matters: Whether to add the measure of the mean curves, which differs from the mean of the measures.
         remark: What to know before reading the value, whatever the runs are.
+        undefined: What runs without a value have in common.
         told: Fields of `Score` that no run tells: measure, level, unit and others.
     """
     paired = common_runs(*experiments)
@@ -339,7 +345,7 @@ def score_runs(
             name: dict(zip(seeds, found.tolist(), strict=True))
             for name, found in zip(_OF_MEANS, of_means, strict=False)
         },
-        note="; ".join(filter(None, (remark, _note(per_run, n_lost, relative)))),
+        note="; ".join(filter(None, (remark, _note(per_run, n_lost, relative, undefined)))),
         **told,
     )
 
@@ -386,13 +392,13 @@ def _pseudo(of_all: FloatArray, without: FloatArray) -> FloatArray:
         return of_all + (without.size - 1) * (without.mean() - without)
 
 
-def _note(per_run: FloatArray, n_lost: int, relative: FloatArray | None) -> str:
+def _note(per_run: FloatArray, n_lost: int, relative: FloatArray | None, undefined: str) -> str:
     notes: list[str] = []
     n_nan, n_infinite = int(np.isnan(per_run).sum()), int(np.isinf(per_run).sum())
     if n_lost:
         notes.append(f"{n_lost} of {len(per_run) + n_lost} runs failed or have no partner of the same seed")
     if n_nan:
-        notes.append(f"undefined in {n_nan} of {len(per_run)} runs, in which neither swarm achieved anything")
+        notes.append(f"undefined in {n_nan} of {len(per_run)} runs, {undefined}")
     if n_infinite:
         notes.append(f"infinite in {n_infinite} of {len(per_run)} runs, in which one swarm achieved nothing")
     if relative is not None and (n_idle := int(np.isnan(relative).sum())):

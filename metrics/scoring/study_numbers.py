@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
 FIGURE_MEASURES = (
     "raw_performance",
+    "cache_congestion",
     "spatial_emergence",
     "task_emergence",
     "scalability",
@@ -44,7 +45,8 @@ FIGURE_MEASURES = (
     "population_robustness",
     "recorded_population_robustness",
 )
-"""Measures that the paper's figures show, and population robustness with the robots that were at work."""
+"""Measures that the paper's figures show, population robustness with the robots that were at work, and congestion near
+caches, which the paper has in words."""
 FIGURE_FORMS: dict[str, tuple[Form, ...]] = {"spatial_emergence": ("interactive", "marginal")}
 """Measure -> forms that the figures show, where it is not the marginal one alone: in the warehouses a swarm is held
 beside as many robots that work alone, in search and rescue, where no robot works alone, beside the next smaller swarm.
@@ -166,7 +168,7 @@ class StudyPanel:
         panel = Panel(levels=self.levels, scores=self.scores, looks=self.looks, reached=self.reached)
         if self.measure == "scalability":
             return replace(panel, margins=np.full(n_levels, TIE), unit=1.0)
-        if (measure.lowest, measure.highest) == (0.0, 1.0):
+        if np.isfinite((measure.lowest, measure.highest)).all():
             return replace(panel, margins=np.full(n_levels, TIE_OF_FRACTIONS), unit=1.0)
         shown = self.name if name is None else name
         floors = None if shown.of_mean_curves else self.floors or None  # undisturbed runs have no second mean curve
@@ -185,7 +187,7 @@ class StudyPanels:
 
     panels: tuple[StudyPanel, ...]
     missing: Mapping[tuple[str, str], str]
-    """Measure (in a form of it) and variant -> why it could not be computed, for what the study varies."""
+    """Measure (in a form of it) and variant -> why no policy has scores, of those for what the study varies."""
 
 
 def experiment_of(study: str, others: "Sequence[Value]") -> str | None:
@@ -220,14 +222,13 @@ def study_panels(
         about = {"looks": table.spec.looks, "reached": looked if table.spec.looks else {}}
         for variant in variants:
             for measure, form in _measures_in(measures, variant, together[0].curves):
-                found: dict[str, tuple[Score, ...]] = {}
-                for line in together:
-                    scores, why = _scores(line.curves, measure, variant, form)
-                    found[line.policy] = scores
-                    if why:
-                        missing[label_of(measure, "corrected", form), variant] = why
+                scored = {line.policy: _scores(line.curves, measure, variant, form) for line in together}
+                found = {policy: scores for policy, (scores, _) in scored.items()}
                 if any(found.values()):
                     panels.append(replace(_score_panel(table, together[0], variant, form, found), **about))
+                else:
+                    reasons = dict.fromkeys(why for _, why in scored.values() if why)
+                    missing[label_of(measure, "corrected", form), variant] = "; ".join(reasons)
     if not panels and "raw_performance" in measures:
         panels = _performance_panels(table, list(lines.values()))
     return StudyPanels(panels=tuple(panels), missing=missing)

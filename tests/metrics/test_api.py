@@ -16,6 +16,7 @@ from tests.support.public_names import homes_of
 FOLDER = Path(metrics.__file__).parent
 SIGNATURES = {
     "t_lost_fraction": "n_interfering, n",
+    "cache_congestion": "lost_near, lost, n_caches, *, floor, reach",
     "performance_lost": "perf, t_lost, n, perf_one, t_lost_one, *, variant='corrected'",
     "spatial_emergence": "perf1, t_lost1, n1, perf2, t_lost2, n2, perf_one, t_lost_one, *, variant='corrected', "
     "reduce='sum'",

@@ -178,6 +178,9 @@ def varied_table(name):
         },
         "performance": pl.col("performance") * pl.Series(rng.uniform(0.5, 1.5, shape)),
         "interference_fraction": pl.col("interference_fraction") * pl.Series(rng.uniform(0.5, 1.5, shape)),
+        "interference_ticks": pl.Series(rng.uniform(50.0, 100.0, shape)),
+        "interference_ticks_near_caches": pl.Series(rng.uniform(0.0, 50.0, shape)),
+        "n_caches": pl.Series(rng.uniform(0.0, 3.0, shape)),
         "n_active": pl.col("n_active") * pl.Series(rng.uniform(0.5, 1.0, shape)),
         "adversity": pl.col("adversity") * pl.Series(rng.uniform(0.5, 1.0, shape)),
     }

@@ -20,6 +20,8 @@ import polars as pl
 TICK_S = 0.2
 REPAIRS = {50: 0.001022222, 200: 0.001005556}
 """Robots -> lowest repair rate of the study per tick; malfunctions are 0.001. A level multiplies both."""
+FLOORS_M2 = {"warehouse_small": 32.0 * 16.0, "warehouse_medium": 48.0 * 48.0}
+NEAR_M = 2.0
 CLOSE = 2e-5
 """Relative difference that the six printed digits allow."""
 
@@ -75,6 +77,17 @@ def paired(*conditions: Runs) -> list[Runs]:
 
 def raw_performance(runs: Runs) -> Values:
     return runs["performance"].sum(axis=1)
+
+
+def cache_congestion(runs: Runs, scenario: str) -> Values:
+    """Time lost near caches beyond their share of the floor, which grows with the swarm in search and rescue."""
+    floor = FLOORS_M2.get(scenario) or (16.0 * max(1, round((runs["n_robots"] / 12.8) ** 0.5))) ** 2
+    lost, n_caches = runs["interference_ticks"], runs["n_caches"]
+    even = lost * np.minimum(1.0, n_caches * math.pi * NEAR_M**2 / floor)
+    known = (lost.sum(axis=1) > 0.0) & n_caches.any(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = (runs["interference_ticks_near_caches"] - even).sum(axis=1) / lost.sum(axis=1)
+    return np.where(known, found, np.nan)
 
 
 def spatial_emergence(one: Runs, few: Runs, many: Runs) -> Values:
@@ -165,12 +178,14 @@ PAIRS: dict[str, dict[str, Callable[..., Values]]] = {
 """Criterion -> measures of a level beside its reference."""
 
 
-def over_sizes(line: dict[float, Runs]) -> Iterator[tuple[str, str, float, Values]]:
+def over_sizes(line: dict[float, Runs], study: dict) -> Iterator[tuple[str, str, float, Values]]:
     """Measures of a policy over swarm sizes: name, form, size, values of runs."""
     sizes = sorted(line)
     one = line[sizes[0]]
     for size in sizes:
         yield "raw_performance", "marginal", size, raw_performance(line[size])
+        if "interference_ticks_near_caches" in line[size]:
+            yield "cache_congestion", "marginal", size, cache_congestion(line[size], study["scenario"])
     for smaller, size in pairwise(sizes):
         few, many = paired(line[smaller], line[size])
         yield "task_emergence", "marginal", size, task_emergence(few, many)
@@ -204,7 +219,7 @@ def measured(file: Path) -> Iterator[tuple[tuple, Values]]:
     for (rules, policy, *values), whole in lines.items():
         line = looked_at(whole, study)
         where = " ".join(f"{name} {value:g}" for name, value in zip(others, values, strict=True))
-        found = over_sizes(line) if last == "population_size" else over_levels(last, line, study)
+        found = over_sizes(line, study) if last == "population_size" else over_levels(last, line, study)
         for measure, form, value, of_runs in found:
             yield (runs, measure, form, rules, where, policy, float(f"{value:.6g}")), of_runs[np.isfinite(of_runs)]
 
