@@ -254,7 +254,7 @@ def _sizes(study: StudyCurves, measure: _SizeMeasure, variant: Variant, form: Fo
     smallest = sizes[0].n_robots
     absent = [name for name in measure.columns if any(name not in e.curves and e.seeds for e in sizes)]
     if absent:
-        raise Uncomputable(f"there is no column {' and '.join(absent)} for every swarm size")
+        raise Uncomputable(f"there is no column {', '.join(absent)} for every swarm size")
     with_runs = [e for e in sizes if e.seeds]
     if "n_caches" in measure.columns and with_runs and not any(e.curves["n_caches"].any() for e in with_runs):
         raise Uncomputable("there is no cache in any run")
