@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-from swarm_forage_env.scenarios.columns import NEAR_CACHE_M
+from swarm_forage_env.scenarios.floor import NEAR_CACHE_M
 from swarm_forage_env.wrappers.world import SIZE
 
 from ..catalog import METRICS

@@ -174,4 +174,4 @@ class Counter(IntEnum):
     AT_CACHES = 20
     """The same of robots in a pick-up from a cache, or in a drop into one."""
     INTERFERING_NEAR_CACHES = 21
-    """Robot-ticks in interference within `scenarios.columns.NEAR_CACHE_M` of the centre of a cache."""
+    """Robot-ticks in interference within `scenarios.floor.NEAR_CACHE_M` of the centre of a cache."""

@@ -7,12 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
+from swarm_forage_env.scenarios.floor import NEAR_CACHE_M
+
 Kind: TypeAlias = Literal["text", "whole", "number", "amount", "fraction"]
 """Kind of a column: text, whole numbers >= 0, numbers, numbers >= 0, numbers in [0, 1]."""
-
-NEAR_CACHE_M = 2.0
-"""From the centre of a cache: time lost within this distance is lost near it (our choice: robots that use a cache crowd
-at its centre, and most of them within this distance, whatever its size)."""
 
 
 @dataclass(frozen=True, slots=True)

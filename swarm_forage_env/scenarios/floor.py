@@ -18,6 +18,9 @@ WALL_M = 0.2
 outside."""
 EAST_WALL_M = 0.4
 """How far the wall in the east reaches into the arena: all of it."""
+NEAR_CACHE_M = 2.0
+"""From the centre of a cache: time lost within this distance is lost near it (our choice: robots that use a cache crowd
+at its centre, and most of them within this distance, whatever its size)."""
 
 Box: TypeAlias = tuple[int, int, int, int]
 

@@ -5,8 +5,7 @@ from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.detection import sees_obstacle
 from swarm_forage_env.contract.layout import RING_SENSORS
 from swarm_forage_env.contract.types import BoolArray, CodeArray, FloatArray, ObsArray
-from swarm_forage_env.scenarios.columns import NEAR_CACHE_M
-from swarm_forage_env.scenarios.floor import CELL_M
+from swarm_forage_env.scenarios.floor import CELL_M, NEAR_CACHE_M
 from swarm_forage_env.world.kernels.interact import CACHE_DROP, CACHE_PICKUP, NO_REQUEST
 from swarm_forage_env.world.state import CacheState, StepEvents, SwarmState
 
