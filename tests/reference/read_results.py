@@ -11,6 +11,7 @@ import json
 import math
 import sys
 from collections.abc import Callable, Iterator
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -155,6 +156,7 @@ def rates(level: float, n: int) -> tuple[float, float]:
     return (0.001 * level, REPAIRS[n] * level) if n in REPAIRS else (level, 0.0)
 
 
+@cache
 def mean_away(leave: float, back: float, n: int, ticks: float) -> float:
     """Mean number of robots away until then, by the exponential of the chain's generator and of its integral."""
     chain = leave * np.eye(n + 1, k=1) + back * np.eye(n + 1, k=-1)
