@@ -4,6 +4,7 @@
 there.
 """
 
+import os
 import posixpath
 import re
 import tomllib
@@ -34,6 +35,7 @@ myst_heading_anchors = 4
 # A notebook that fails, or takes longer, ends the build.
 nb_execution_mode = "force"
 nb_execution_in_temp = True
+os.environ["RESULTS"] = str(Path(__file__).parent / "results")  # for the notebook that reads them
 nb_execution_show_tb = True
 nb_execution_timeout = 1200  # seconds for a cell; slow machines and cold kernels need some
 nb_merge_streams = True
