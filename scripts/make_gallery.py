@@ -65,21 +65,21 @@ EXHIBITS = (
         "warehouse_small",
         "warehouse_small",
         ("crw", "dpo", "stochm", "stochx"),
-        "The four scripted controllers in the small warehouse. CRW wanders; DPO goes back to what it remembers; STOCHM "
-        "and STOCHX divide the way at caches.",
+        "The four scripted controllers in the small warehouse. CRW walks at random. DPO goes back to objects that it "
+        "remembers. In STOCHM and STOCHX, robots hand objects over at caches, so each carries them part of the way.",
     ),
     Exhibit(
         "trained_policy",
         "warehouse_small",
         ("crw", "ppo_warehouse_small"),
-        "The trained policy beside CRW: straight to the source and straight home.",
+        "The trained policy beside CRW. Its robots drive straight to the source and straight home.",
     ),
     Exhibit(
         "generalist",
         "warehouse_small",
         ("dpo", "generalist"),
-        "One network for all scenarios, beside the scripted controller that delivers most: a whole run in the small "
-        "warehouse.",
+        "One network for all scenarios, beside DPO, the scripted controller that delivers most. This is a whole run of "
+        "10,000 s in the small warehouse.",
         frame_s=10.0,
         horizon_s=10_000.0,
     ),
@@ -87,7 +87,7 @@ EXHIBITS = (
         "generalist_medium",
         "warehouse_medium",
         ("dpo", "generalist"),
-        "The same network in the medium warehouse, a whole run: nothing jams.",
+        "The same network in the medium warehouse, for a whole run. No jams form.",
         frame_s=10.0,
         horizon_s=10_000.0,
     ),
@@ -95,8 +95,8 @@ EXHIBITS = (
         "generalist_rescue",
         "search_and_rescue",
         ("dpo", "generalist"),
-        "The same network in search and rescue, a whole run. Each robot remembers where it picked up last and what it "
-        "saw on its way home, and comes back.",
+        "The same network in search and rescue, for a whole run. Each robot remembers where it last picked up an "
+        "object and what it saw on its way home, and returns there.",
         frame_s=10.0,
         horizon_s=10_000.0,
     ),
@@ -104,45 +104,44 @@ EXHIBITS = (
         "warehouse_dual",
         "warehouse_dual",
         ("crw", "dpo", "stochm", "stochx"),
-        "Two sources, the nest between them.",
+        "Two sources, with the nest between them.",
     ),
-    Exhibit("warehouse_medium", "warehouse_medium", ("crw", "dpo"), "Objects anywhere around the nest.", frame_s=2.0),
+    Exhibit("warehouse_medium", "warehouse_medium", ("crw", "dpo"), "Objects all around the nest.", frame_s=2.0),
     Exhibit("warehouse_quad", "warehouse_quad", ("crw", "dpo"), "Four sources around the nest.", frame_s=2.0),
-    Exhibit("search_and_rescue", "search_and_rescue", ("crw", "dpo"), "Clusters of objects that wander slowly."),
+    Exhibit("search_and_rescue", "search_and_rescue", ("crw", "dpo"), "Objects lie in clusters and drift slowly."),
     Exhibit(
         "throttle",
         "warehouse_small",
         ("dpo", "dpo"),
-        "Throttle: in the second run robots lose up to 80 % of their speed, in waves of 300 s.",
+        "In the second run, robots lose up to 80 % of their speed, in waves of 300 s.",
         wrapper="throttle:waveform=sine,amplitude=0.4,offset=0.4,period_s=300",
     ),
     Exhibit(
         "handling_cost",
         "warehouse_small",
         ("dpo", "dpo"),
-        "Handling cost: in every other 100 s of the second run, each pick-up and drop takes 20 s.",
+        "In the second run, each pick-up and drop takes 20 s during every other 100 s.",
         wrapper="handling_cost:waveform=square,amplitude=50,offset=50,period_s=200",
     ),
     Exhibit(
         "sensor_noise",
         "warehouse_small",
         ("dpo", "dpo"),
-        "Sensor noise: robots of the second run see obstacles that are not there.",
+        "In the second run, noise makes robots see obstacles that do not exist.",
         wrapper="sensor_noise:sigma=0.05",
     ),
     Exhibit(
         "actuator_noise",
         "warehouse_small",
         ("dpo", "dpo"),
-        "Actuator noise: wheels of the second run turn faster or slower than they should, so that robots never drive "
-        "quite straight.",
+        "In the second run, wheels turn faster or slower than commanded, so robots never drive quite straight.",
         wrapper="actuator_noise:sigma=0.5",
     ),
     Exhibit(
         "population",
         "warehouse_small",
         ("dpo", "dpo"),
-        "Failures: robots of the second run break, are repaired, and sometimes die where they are.",
+        "In the second run, robots break down, are repaired, and sometimes die where they stand.",
         wrapper="population:malfunction_per_tick=0.02,repair_per_tick=0.025,death_per_tick=0.0015",
     ),
 )
@@ -222,9 +221,9 @@ def page() -> str:
     lines = [
         "# Gallery",
         "",
-        "Every scenario, every controller and every kind of adversity, most for a thousand seconds, as",
-        "[replays](replay.md): download a file and open it in a browser. Runs side by side have the same seed.",
-        "`scripts/make_gallery.py` makes them.",
+        "[Replays](replay.md) of every scenario, every controller and every kind of adversity, most of them 1,000 s",
+        "long. Download a file and open it in a browser. Runs side by side have the same seed.",
+        "`scripts/make_gallery.py` makes them all.",
     ]
     for exhibit in EXHIBITS:
         title = exhibit.name.replace("_", " ")
