@@ -190,7 +190,7 @@ def main() -> int:
     about = (
         f"Swarms of {min(found.sizes)} to {max(found.sizes)} {table.spec.policies[0].label.upper()} robots, "
         f"{runs.n_objects} objects, {runs.horizon_s:,.0f} s, {' or '.join(map(str, sorted(n_runs)))} runs each. The "
-        f"model knows the runs of one and of {found.small} robots. Intervals are 95 %; those of the model are from "
+        f"model uses only the runs of one and of {found.small} robots. Intervals are 95 %; those of the model are from "
         "resampled runs of these two sizes."
     )
     blocks = {

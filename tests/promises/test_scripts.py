@@ -252,7 +252,7 @@ def test_laws_are_written_beside_the_runs_of_a_study(run):
     code, out, err = run("laws_beside_data", "laws.parquet", "--out", "page")
     assert (code, out) == (0, "written page/laws.md and page/images/laws.png\n"), err
     page = Path("page/laws.md").read_text(encoding="utf-8")
-    assert "Swarms of 1 to 8 CRW robots, 512 objects, 4,000 s, 2 runs each. The model knows the runs of one and" in page
+    assert "Swarms of 1 to 8 CRW robots, 512 objects, 4,000 s, 2 runs each. The model uses only the runs of one" in page
     assert re.findall(r"^\| (\d+) \|", page, re.MULTILINE) == ["1", "2", "4", "8"]
     assert re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE) == [*ALL_LAWS, *ALL_LAWS], "what they say, and the fits"
     assert Path("page/images/laws.png").read_bytes().startswith(b"\x89PNG")
