@@ -79,18 +79,19 @@ def page_block(standings: Sequence[Standing], protocol: Protocol, picture: str =
     entries = [standing.entry for standing in ranked]
     n_runs = len(protocol.scored) * len(protocol.seeds)
     parts = [
-        f"Version {protocol.version}: {len(protocol.scored)} held-out worlds, {len(protocol.seeds)} seeds, so {n_runs} "
-        f"runs of {protocol.horizon_s:,g} s that count per policy.",
+        f"Version {protocol.version} has {len(protocol.scored)} held-out worlds and {len(protocol.seeds)} seeds, so "
+        f"{n_runs} runs of {protocol.horizon_s:,g} s count for each policy.",
         board_sheet(ranked).markdown(),
         *([f"![Scores of all entries, and their shares in each world]({picture})"] if picture else []),
         *([f"All numbers, world by world and measure by measure: [{details}]({details})."] if details else []),
         "### How each was made\n\n" + _origins(entries).markdown(),
-        "These commands make them again:\n\n" + _commands(entries),
+        "These commands repeat them:\n\n" + _commands(entries),
         "### Group by group\n\n" + _groups(ranked, protocol).markdown(),
-        "### Measure by measure\n\nIn how many rows of a measure an entry is at least as good as the best of the four "
-        "scripted controllers; amounts and distances as shares of performance.\n\n" + _matched(entries).markdown(),
-        "### One against the other\n\nHow often a run of the row's entry is better than one of the column's in the "
-        "same world.\n\n" + _duels(entries, protocol).markdown(),
+        "### Measure by measure\n\nEach cell counts the rows of a measure in which the entry is at least as good as "
+        "the best of the four scripted controllers. Amounts and distances are compared as shares of performance.\n\n"
+        + _matched(entries).markdown(),
+        "### One against the other\n\nHow often a run of the row's entry is better than a run of the column's entry in "
+        "the same world.\n\n" + _duels(entries, protocol).markdown(),
     ]
     return f"{BEGIN}\n\n" + "\n\n".join(parts) + f"\n\n{END}"
 
