@@ -9,6 +9,7 @@
 
 The commands are listed below; the store is docs/results.json. A block looks like
 `<!-- generated: run.crw by scripts/update_docs -->20.45 ± 0.91<!-- end -->`; `run.table` is all that a command printed.
+A number must not begin a line: Markdown takes a comment there for the start of an HTML block, which ends the paragraph.
 --remake needs an installation with everything: pip install -e ".[plots,train]" "torch==2.13.0"
 The interpreter is $PYTHON, else that of the active environment or of .venv, else python3.
 """
@@ -33,6 +34,9 @@ PAGES = [ROOT / "README.md", ROOT / "paper/paper.md", *sorted((ROOT / "docs").rg
 BLOCK = re.compile(
     r"(<!-- generated: (?P<source>\w+)\.(?P<field>\w+) by scripts/update_docs -->)(?P<text>.*?)(<!-- end -->)",
     re.DOTALL,
+)
+BEGINS_A_LINE = re.compile(
+    r"^[ >]*(?:(?:[-*+]|\d+[.)]) +)?<!-- generated: \w+\.(?!table )\w+ by scripts/update_docs -->", re.MULTILINE
 )
 PACKAGES = ("numpy", "scipy", "numba", "pymunk")
 FIVE = ("crw", "dpo", "stochm", "stochx", "ppo_warehouse_small")
@@ -184,6 +188,11 @@ def written(text: str, store: dict[str, dict[str, Any]]) -> str:
     return BLOCK.sub(block, text)
 
 
+def broken_lines(text: str) -> list[int]:
+    """Return the numbers of the lines of a page that a number begins, so that their paragraphs break."""
+    return [text.count("\n", 0, found.start()) + 1 for found in BEGINS_A_LINE.finditer(text)]
+
+
 def main(words: Sequence[str] | None = None) -> int:
     """Do what the options say, those of the command line where none are given; returns the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -199,6 +208,9 @@ def main(words: Sequence[str] | None = None) -> int:
             store[name] = make(name)
             store = {source: store[source] for source in SOURCES if source in store}  # in the order of the list
             STORE.write_text(json.dumps(store, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    broken = [f"{page.relative_to(ROOT)}:{line}" for page in PAGES for line in broken_lines(page.read_text("utf-8"))]
+    for place in broken:
+        print(f"{place}: expected a word before the number of a run, whose comment breaks the paragraph here")
     differing_pages = [
         page for page in PAGES if written(page.read_text(encoding="utf-8"), store) != page.read_text(encoding="utf-8")
     ]
@@ -206,7 +218,7 @@ def main(words: Sequence[str] | None = None) -> int:
         print(f"{page.relative_to(ROOT)}: {'differs from docs/results.json' if arguments.check else 'written'}")
         if not arguments.check:
             page.write_text(written(page.read_text(encoding="utf-8"), store), encoding="utf-8")
-    return 1 if arguments.check and differing_pages else 0
+    return 1 if broken or (arguments.check and differing_pages) else 0
 
 
 if __name__ == "__main__":

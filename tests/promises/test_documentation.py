@@ -115,6 +115,25 @@ def test_numbers_of_runs_are_those_of_the_store():
         assert [number for number in numbers if number in by_hand] == [], f"{page}: a number outside of a block"
 
 
+def test_numbers_of_runs_leave_paragraphs_whole():
+    for page in update_docs.PAGES:
+        assert update_docs.broken_lines(page.read_text()) == [], f"{page}: put a word before the number"
+
+
+@pytest.mark.parametrize("before", ["", "  ", "- ", "12. ", "> "])
+def test_a_number_that_begins_a_line_is_found(before, tmp_path, monkeypatch, capsys):
+    """Markdown takes a comment at the start of a line for an HTML block, which breaks the paragraph."""
+    page = tmp_path / "page.md"
+    block = "<!-- generated: run.{} by scripts/update_docs -->{}<!-- end -->"
+    page.write_text(f"CRW delivers\n{before}{block.format('crw', 'x')}; see\n\n{block.format('table', '')}\n")
+    monkeypatch.setattr(update_docs, "PAGES", [page])
+    monkeypatch.setattr(update_docs, "ROOT", tmp_path)
+    assert update_docs.main([]) == 1
+    assert "page.md:2: expected a word before the number" in capsys.readouterr().out
+    page.write_text(page.read_text().replace(f"\n{before}<!-- generated: run.crw", " <!-- generated: run.crw"))
+    assert update_docs.main(["--check"]) == 0
+
+
 def test_a_block_is_written_from_the_store():
     page = "before <!-- generated: run.crw by scripts/update_docs -->1.00 ± 0.10<!-- end --> after"
     assert update_docs.written(page, {"run": {"crw": "2.00 ± 0.20"}}) == page.replace("1.00 ± 0.10", "2.00 ± 0.20")
