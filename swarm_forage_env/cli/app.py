@@ -13,7 +13,7 @@ from swarm_forage_env.cli.commands import COMMANDS, Command
 
 _OPTIONS = {
     "--version": "Print the version and exit.",
-    "--trust-models": "Open models (.zip) and Python (.py) that files\nname: this runs code in them (SECURITY.md).",
+    "--trust-models": "Open models (.zip) and Python files (.py) that\nother files name: runs code (SECURITY.md).",
     "--help": "Show this message and exit.",
 }
 PACKAGES = ("swarm_forage_env", "baselines", "metrics")
@@ -100,7 +100,7 @@ def _help() -> str:
     return "\n\n".join(
         [
             "Usage: swarm-forage [OPTIONS] COMMAND [ARGS]...",
-            "  Swarm foraging: run, film, train and score policies, inspect scenarios.",
+            "  Swarm foraging: run, film, train and score policies.",
             _listed("Options", list(_OPTIONS.items())),
             *(_listed(heading, [(one.words, one.about) for one in group]) for heading, group in groups.items()),
         ]

@@ -14,7 +14,9 @@ from swarm_forage_env.cli.options import AsJson, DryRun, Jobs, PolicyOptions
 if TYPE_CHECKING:
     from metrics.benchmark import BenchmarkQuestion, Board, Training
 
-Entries = Annotated[list[Path], typer.Argument(metavar="ENTRY...", help="Entry files; the scripted four come along.")]
+Entries = Annotated[
+    list[Path], typer.Argument(metavar="ENTRY...", help="Entry files; the scripted four are always shown, too.")
+]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -25,7 +27,7 @@ class TrainedOptions:
         str,
         typer.Option(
             "--trained-in",
-            help="given: in the training worlds only; other: also elsewhere; nothing: not trained; unknown.",
+            help="given: only in the training worlds; other: also elsewhere; nothing: not trained; unknown.",
         ),
     ] = "unknown"
     training_command: Annotated[
@@ -37,7 +39,9 @@ class TrainedOptions:
     ] = None
     training_seeds: Annotated[
         list[int] | None,
-        typer.Option("--training-seed", min=0, help="Per policy, in their order; default what their files tell."),
+        typer.Option(
+            "--training-seed", min=0, help="Training seed of each policy, in their order; default what their files say."
+        ),
     ] = None
 
     def training(self) -> "Training":
@@ -52,21 +56,25 @@ class TrainedOptions:
 def run(
     policies: PolicyOptions,
     *,
-    name: Annotated[str | None, typer.Option("--name", help="Name of the entry; default that of the policy.")] = None,
-    file: Annotated[Path | None, typer.Option("--file", help="Entry; default results/benchmark/NAME.json.")] = None,
+    name: Annotated[str | None, typer.Option("--name", help="Name of the entry; default the policy's.")] = None,
+    file: Annotated[
+        Path | None, typer.Option("--file", help="Entry to write; default results/benchmark/NAME.json.")
+    ] = None,
     out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Folder for records of runs.")] = Path(
         "results/benchmark/records"
     ),
-    quick: Annotated[bool, typer.Option("--quick", help="Short runs and few seeds, for a look; no entry.")] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Quick look: short runs and few seeds, without an entry.")
+    ] = False,
     trained: TrainedOptions,
     jobs: Jobs = None,
     as_json: AsJson = False,
     dry_run: DryRun = False,
 ) -> None:
-    """Run policies in all worlds of the benchmark, write one entry file, and show what it is worth.
+    """Run policies in all worlds of the benchmark, write one entry file, and show its score.
 
-    Several policies are training seeds of one method. Runs that the folder of records holds are not repeated: after
-    Ctrl-C the same command does the rest.
+    Several policies count as training seeds of one method. The command does not repeat runs that the folder of records
+    holds: after Ctrl-C, the same command does the rest.
     """
     names = list(policies.names())
     if name is None and len(names) > 1:
@@ -107,7 +115,7 @@ def run(
 
 
 def worlds(as_json: AsJson = False) -> None:
-    """Show the worlds of the benchmark: those to train in, and those that are held out."""
+    """Show the worlds of the benchmark: training worlds and held-out worlds."""
     from metrics.benchmark import load_protocol
     from swarm_forage_env.cli.printer import show as print_answer
 
@@ -115,13 +123,13 @@ def worlds(as_json: AsJson = False) -> None:
 
 
 def show(entries: Entries, as_json: AsJson = False) -> None:
-    """Show what entries are worth, beside the scripted controllers."""
+    """Show the scores of entries, beside the scripted controllers."""
     _show(_board_of(entries), as_json=as_json)
 
 
 def page(
     entries: Entries,
-    file: Annotated[Path, typer.Option("--file", help="Page whose generated part is written anew.")] = Path(
+    file: Annotated[Path, typer.Option("--file", help="Page whose generated part to write again.")] = Path(
         "docs/benchmark.md"
     ),
     picture: Annotated[Path, typer.Option("--picture", help="Figure that the page shows.")] = Path(

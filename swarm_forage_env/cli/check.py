@@ -19,15 +19,17 @@ def check(
     described: WorldOptions,
     seeds: Annotated[int, typer.Option("--seeds", min=1, help="Runs per policy.")] = 1,
     first_seed: FirstSeed = 0,
-    window: Annotated[float, typer.Option("--window", help="Seconds in which every robot should get away.")] = 600.0,
-    moved: Annotated[float, typer.Option("--moved", help="How far that is, in m.")] = 0.05,
+    window: Annotated[
+        float, typer.Option("--window", help="Simulated seconds in which every robot should move away.")
+    ] = 600.0,
+    moved: Annotated[float, typer.Option("--moved", help="How far it should move, in m.")] = 0.05,
     jobs: Jobs = None,
     as_json: AsJson = False,
 ) -> None:
-    """Check that policies keep the rules, and find robots that get stuck; exits with 1 if something is wrong.
+    """Check that policies keep the rules, and find stuck robots; exit code 1 if something is wrong.
 
-    Rules are those of swarm_forage_env.checks.check_policy. A robot is stuck that is active, hardly moved for minutes,
-    and does not wait by rule.
+    swarm_forage_env.checks.check_policy lists the rules. A stuck robot is active and has hardly moved for minutes,
+    although no rule makes it wait.
     """
     from swarm_forage_env.cli.scenario_options import plan_runs
     from swarm_forage_env.inspect.stuck import find_stuck_in
@@ -54,7 +56,7 @@ def _check_rules(specs: "Sequence[RunSpec]") -> None:
 def rerun(
     file: Annotated[Path, typer.Argument(help="A record (.parquet) or a failure (.json).")], as_json: AsJson = False
 ) -> None:
-    """Run a stored run again, here; a record is compared with what comes out, a failure shows its traceback."""
+    """Repeat a stored run. Compare a record with the new results, or show the traceback of a failure."""
     import traceback
 
     from swarm_forage_env.policies.trust import UntrustedModelError

@@ -11,7 +11,9 @@ from swarm_forage_env.cli.printer import notes, progress_bar
 
 
 def list_everything(
-    what: Annotated[str | None, typer.Argument(help="scenarios, policies, wrappers or columns (of records).")] = None,
+    what: Annotated[
+        str | None, typer.Argument(help="What to list: scenarios, policies, wrappers or columns (of records).")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """List scenarios and policies, wrappers, or the columns of run records."""
@@ -25,7 +27,7 @@ def info(
     name: Annotated[str, typer.Argument(help="A scenario, an environment id, a policy or its file.")],
     as_json: AsJson = False,
 ) -> None:
-    """Show all fields and spaces of a scenario, or what a policy is."""
+    """Describe a scenario, with all its fields and spaces, or a policy."""
     from swarm_forage_env.inspect.descriptions import describe
 
     found = describe(name)
@@ -35,14 +37,16 @@ def info(
 def watch(
     policies: PolicyOptions,
     described: WorldOptions,
-    speed: Annotated[float, typer.Option(help="Simulated seconds per second at first; arrow keys change it.")] = 10.0,
+    speed: Annotated[
+        float, typer.Option(help="Simulated seconds per second at the start; arrow keys change it.")
+    ] = 10.0,
     size: Annotated[int, typer.Option(help="Longer side of the arena in pixels.")] = 900,
     theme: Annotated[str, typer.Option(help="dark or light.")] = "dark",
     seed: Seed = 0,
 ) -> None:
-    """Watch a run in a window: pause, choose robots, raise noise, kill.
+    """Watch a run in a window: pause, follow a robot, raise noise, kill robots.
 
-    The window shows the keys. Needs a display; without one, see record and replay.
+    The window shows the keys. It needs a display; without one, use record or replay.
     """
     from swarm_forage_env.cli.scenario_options import described_world
     from swarm_forage_env.inspect.watch import watch_run
@@ -79,11 +83,12 @@ def record(
     file: Annotated[
         Path | None,
         typer.Option(
-            "--file", help="File to write, .gif or .mp4, or .png with --at; default results/SCENARIO_POLICY.gif."
+            "--file", help="File to write: .gif or .mp4, or .png with --at; default results/SCENARIO_POLICY.gif."
         ),
     ] = None,
     at: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="One picture at this simulated time, in place of a film.")
+        float | None,
+        typer.Option(metavar="SECONDS", help="Draw one picture at this simulated time, in place of a film."),
     ] = None,
     seconds: Annotated[float, typer.Option(help="Simulated seconds to film.")] = 300.0,
     speedup: Annotated[float, typer.Option(help="Simulated seconds per second of film.")] = 20.0,
@@ -94,7 +99,7 @@ def record(
 ) -> None:
     """Film a run, or draw it at one time.
 
-    'swarm-forage record dpo --at 300 --file dpo.png' draws how it is after 300 s.
+    'swarm-forage record dpo --at 300 --file dpo.png' draws the run after 300 s.
     """
     from swarm_forage_env._internal.files import as_file_name
     from swarm_forage_env.cli.scenario_options import described_world
@@ -140,10 +145,10 @@ def saliency(
     seed: Seed = 0,
     as_json: AsJson = False,
 ) -> None:
-    """Show what a trained network looks at: how much it acts otherwise when one part of what it sees is exchanged.
+    """Show what a trained network looks at.
 
-    A robot gets, for example, the light readings of another robot. How often does it then decide otherwise? The policy
-    is a shipped network, or an .npz file of a training.
+    For example, give a robot the light readings of another robot: how often does it then decide otherwise? The command
+    does this for each part of what robots see. The policy is a shipped network, or the .npz file of a training.
     """
     from swarm_forage_env.cli.scenario_options import plan_runs
     from swarm_forage_env.inspect.saliency import open_network_of

@@ -27,14 +27,14 @@ def maps(
     policies: PolicyOptions,
     described: WorldOptions,
     seeds: Annotated[
-        int | None, typer.Option("--seeds", min=1, help="Runs per row; default 1, of a study at most 4.")
+        int | None, typer.Option("--seeds", min=1, help="Runs per row; default 1, or up to 4 for a study.")
     ] = None,
     conditions: Annotated[
         list[str] | None,
         typer.Option(
             "--condition",
             metavar="KEY=VALUE,...",
-            help="Of a study only conditions with these values, e.g. policy=dpo,population_size=16; may be repeated.",
+            help="Only conditions of a study with these values, e.g. policy=dpo,population_size=16; may be repeated.",
         ),
     ] = None,
     square: Annotated[float, typer.Option("--square", help="Side of the squares in m.")] = 0.4,
@@ -43,17 +43,19 @@ def maps(
     ] = False,
     own_scales: Annotated[
         bool,
-        typer.Option("--own-scales", help="A scale of its own for each map; default one per column, to compare rows."),
+        typer.Option(
+            "--own-scales", help="Give each map its own scale; default one scale per column, to compare rows."
+        ),
     ] = False,
     jobs: Jobs = None,
     picture: Picture = None,
 ) -> None:
-    """Draw where robots were, took and left objects, and got in each other's way.
+    """Draw where robots were, where they took and left objects, and where they got in each other's way.
 
-    Of policies in a scenario; or of a page that 'swarm-forage replay' has written; or of a stored run; or of a study,
-    its folder or packed file. One row per policy, run of the page or condition of the study; then, for each after the
-    first, what is more in it than in the first. The arrays go to .npz files beside the picture. Stored runs hold no
-    positions, so they are made again.
+    Takes policies in a scenario, a page of 'swarm-forage replay', a stored run, or a study (folder or packed file). The
+    picture has one row per policy, run of the page or condition of the study. Further rows show the difference of each
+    from the first. The arrays go to .npz files beside the picture. Stored runs hold no positions, so the command makes
+    them again.
     """
     from swarm_forage_env.cli.scenario_options import plan_runs
     from swarm_forage_env.rendering.figures import check_picture

@@ -26,46 +26,46 @@ Policies = Annotated[
     tuple[str, ...],
     typer.Argument(
         metavar="POLICY",
-        help="Policies, also separated by commas: names, files of trained ones, or classes in Python files "
-        "(my_module.py:MyPolicy); docs/policies.md has more.",
+        help="One or more policies: names, files of trained policies, or classes in Python files "
+        "(my_module.py:MyPolicy). Separate them by spaces or commas (docs/policies.md).",
     ),
 ]
-NamedPolicies = Annotated[tuple[str, ...], typer.Option("--policy", metavar="POLICY", help="The same, as an option.")]
+NamedPolicies = Annotated[
+    tuple[str, ...], typer.Option("--policy", metavar="POLICY", help="The same as POLICY, as an option.")
+]
 Scenario = Annotated[
     str,
     typer.Option(
         "--scenario",
         metavar="NAME|FILE.toml",
-        help="A preset, see 'swarm-forage list'; or a file with fields and wrappers (docs/adversity.md).",
+        help="A preset (see 'swarm-forage list'), or a file with fields and wrappers (docs/adversity.md).",
     ),
 ]
-Robots = Annotated[int | None, typer.Option("--robots", min=1, help="Swarm size.")]
+Robots = Annotated[int | None, typer.Option("--robots", min=1, help="Number of robots.")]
 Objects = Annotated[int | None, typer.Option("--objects", min=1, help="Number of objects.")]
-Side = Annotated[float | None, typer.Option("--side", help="Side of the arena in m (search_and_rescue only).")]
+Side = Annotated[float | None, typer.Option("--side", help="Side of the square arena in m (search_and_rescue only).")]
 Density = Annotated[
     str | None,
-    typer.Option("--density", help="Robots per m2, e.g. 5% or 0.05; the arena is as large as the swarm needs."),
+    typer.Option("--density", help="Robots per m2, e.g. 0.05 or 5%. The arena becomes as large as the swarm needs."),
 ]
 Caches = Annotated[
     str | None,
-    typer.Option("--caches", help="none, static or dynamic; default: those of the policy, else of the scenario."),
+    typer.Option("--caches", help="none, static or dynamic; default: the policy's, or else the scenario's."),
 ]
 Performance = Annotated[
     str | None,
     typer.Option(
         "--performance",
         metavar="COLUMN",
-        help="What performance is: a recorded column (see 'swarm-forage list columns'), 1/COLUMN where less is better, "
-        "task_balance or cache_load; default the scenario's. Stored runs are read again, not repeated.",
+        help="What counts as performance: a recorded column (see 'swarm-forage list columns'), 1/COLUMN if less is "
+        "better, task_balance or cache_load; default the scenario's. Stored runs are read again, not repeated.",
     ),
 ]
-Horizon = Annotated[
-    float | None, typer.Option("--horizon", help="Simulated seconds per run, whole intervals of 200 s.")
-]
+Horizon = Annotated[float | None, typer.Option("--horizon", help="Simulated seconds per run, a multiple of 200.")]
 FirstSeed = Annotated[int, typer.Option("--first-seed", min=0, help="Seed of the first run.")]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the run.")]
 Settings = Annotated[
-    tuple[str, ...], typer.Option("--set", metavar="KEY=VALUE", help="Any scenario field; may be repeated.")
+    tuple[str, ...], typer.Option("--set", metavar="KEY=VALUE", help="Set any field of the scenario; may be repeated.")
 ]
 Wrappers = Annotated[
     tuple[str, ...],
@@ -75,38 +75,45 @@ Wrappers = Annotated[
         help="Disturb the swarm, e.g. sensor_noise:sigma=0.03 or population:death_per_tick=0.0001; may be repeated.",
     ),
 ]
-Measures = Annotated[str | None, typer.Option("--measures", help="Names separated by commas; default all.")]
+Measures = Annotated[
+    str | None, typer.Option("--measures", help="Names of measures, separated by commas; default all.")
+]
 Disturbance = Annotated[
     str,
-    typer.Option("--disturbance", help="What reactivity and adaptability are scored under: throttle or handling_cost."),
+    typer.Option("--disturbance", help="Disturbance for reactivity and adaptability: throttle or handling_cost."),
 ]
 Variants = Annotated[
     str,
-    typer.Option("--variant", help="corrected, paper (as printed), sierra (authors' program); separated by commas."),
+    typer.Option(
+        "--variant",
+        help="Forms of equations: corrected, paper (as printed), sierra (the authors' program); separated by commas.",
+    ),
 ]
 Forms = Annotated[
     str,
     typer.Option(
-        "--form", help="marginal (against the next smaller swarm), interactive (against N lone robots), or both."
+        "--form", help="Compare with the next smaller swarm (marginal), with N lone robots (interactive), or both."
     ),
 ]
 Band = Annotated[
     bool, typer.Option("--band", help="Show the paper's bands, mean ± 2 standard deviations of single runs.")
 ]
-Budget = Annotated[str, typer.Option("--budget", help="quick, standard or paper: how long, how many runs and levels.")]
-ScoreSeeds = Annotated[int | None, typer.Option("--seeds", min=1, help="Runs per experiment; default the budget's.")]
+Budget = Annotated[
+    str, typer.Option("--budget", help="quick, standard or paper: sets the length and number of runs, and the levels.")
+]
+ScoreSeeds = Annotated[
+    int | None, typer.Option("--seeds", min=1, help="Runs per experiment; default the budget's number.")
+]
 Curves = Annotated[
     Path | None,
-    typer.Option(
-        "--curves", metavar="FILE", help="Read curves from CSV or Parquet, and run nothing (docs/scoring.md)."
-    ),
+    typer.Option("--curves", metavar="FILE", help="Read curves from a CSV or Parquet file; no runs (docs/scoring.md)."),
 ]
 OF_RUNS = "which are about runs; leave them out"
 """What is said of other options than those of curves."""
 Picture = Annotated[
     Path | None,
     typer.Option(
-        "--picture", metavar="FILE", help="Picture to draw, .png, .svg or .pdf; default in the folder of results."
+        "--picture", metavar="FILE", help="Picture to draw: .png, .svg or .pdf; default in the folder of results."
     ),
 ]
 
@@ -126,10 +133,10 @@ Out = Annotated[
 ]
 Jobs = Annotated[
     int | None,
-    typer.Option("--jobs", min=1, help="Processes; default one per core that it may use; 1 = in this process."),
+    typer.Option("--jobs", min=1, help="Number of processes; default one per usable core; 1 = only this process."),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the results as JSON.")]
-DryRun = Annotated[bool, typer.Option("--dry-run", help="Print the plan and an estimate, run nothing.")]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Print the plan and an estimate of its time; no runs.")]
 
 
 def no_picture(path: Path, error: OSError) -> str:

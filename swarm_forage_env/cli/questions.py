@@ -44,8 +44,8 @@ def run(
 ) -> None:
     """Run policies in a scenario and compare how they perform.
 
-    Runs in parallel, shows a table, stores one record per run and draws performance over time. Runs that the folder
-    holds already are not repeated, so an interrupted command can simply be given again.
+    Makes the runs in parallel, shows a table, stores one record per run and draws performance over time. The command
+    does not repeat runs that the folder already holds, so after an interruption, just enter it again.
     """
     from metrics.scoring.summary import run_question
     from swarm_forage_env._internal.fields import MOST_SEEDS, whole
@@ -81,11 +81,12 @@ def score(
     disturbance: Disturbance = "throttle",
     picture: Picture = None,
 ) -> None:
-    """Run policies in all experiments that the measures of swarm engineering need, score and compare them.
+    """Run the experiments that the measures of swarm engineering need, and score and compare policies.
 
-    Swarms of several sizes, throttled, noisy and failing robots; one table with intervals and noise floors. Several
-    policies are compared seed by seed, with the differences that are significant. Runs that the folder holds already
-    are not repeated. The budget says how long runs are, unless --horizon does.
+    The experiments vary swarm size, throttle, noise and failures. One table shows all scores, with intervals and
+    noise floors. For several policies, the command compares runs with the same seed and shows which differences are
+    significant. It does not repeat runs that the folder already holds. The budget sets the length of runs, unless
+    --horizon does.
     """
     from metrics.scoring.policy_scores import score_curves
     from metrics.scoring.score_tables import side_by_side
@@ -170,28 +171,30 @@ def predict(
     fit: Annotated[
         str | None,
         typer.Option(
-            help="Swarm sizes that are fitted, four or more; default 1,2,4,8,16,32 (search_and_rescue: "
-            "12,51,115,204,320), or those of the file."
+            help="Swarm sizes to fit, four or more; default 1,2,4,8,16,32 (search_and_rescue: 12,51,115,204,320), or "
+            "those of the file."
         ),
     ] = None,
     hold: Annotated[
-        str | None, typer.Option(help="Larger sizes that are run, or in the file, but not fitted: the test.")
+        str | None,
+        typer.Option(help="Larger sizes that test the prediction: run, or read from the file, but not fitted."),
     ] = None,
     seeds: Annotated[int, typer.Option(min=2, help="Runs per size.")] = 4,
     from_scenario: Annotated[
         bool,
         typer.Option(
             "--from-scenario",
-            help="Predict performance, time lost, E_S, E_T and C from arena, objects and walk alone, for the sizes of "
-            "--fit and --hold: nothing is fitted, only --hold is run. For policies that search at random, as crw.",
+            help="Predict performance, time lost, E_S, E_T and C for the sizes of --fit and --hold, from arena, "
+            "objects and walk alone. Fits nothing and runs only --hold. For policies that search at random, like crw.",
         ),
     ] = False,
     picture: Picture = None,
 ) -> None:
-    """Fit performance to small swarms; predict twice and four times the largest, with intervals, and the critical size.
+    """Predict the performance of larger swarms from smaller ones, with intervals, and the critical size.
 
-    The critical size is the swarm size of the largest performance. Sizes of --hold are run as well and held against
-    the prediction. Runs that the folder holds already are not repeated.
+    Fits a law to small swarms and predicts twice and four times the largest of them. At the critical size, performance
+    is largest. The command also runs the sizes of --hold and compares them with the prediction. It does not repeat runs
+    that the folder already holds.
     """
     from metrics.scoring.from_scenario import predict_from_scenario, scenario_question
     from metrics.scoring.prediction import Predictions, predict_curves, prediction_question
@@ -228,12 +231,17 @@ def predict(
 
 def availability(
     robots: Annotated[str, typer.Option("--robots", help="Swarm sizes, separated by commas.")] = "50,200",
-    teams: Annotated[str, typer.Option("--teams", help="Mean teams M, robots at work on average.")] = "5,10,20",
-    needed: Annotated[str, typer.Option("--needed", help="Numbers of robots needed, for the table.")] = "1,5,10,20,40",
+    teams: Annotated[
+        str, typer.Option("--teams", help="Mean teams M: numbers of robots at work on average.")
+    ] = "5,10,20",
+    needed: Annotated[str, typer.Option("--needed", help="Numbers of robots needed, in the table.")] = "1,5,10,20,40",
     picture: Picture = None,
     as_json: AsJson = False,
 ) -> None:
-    """Show how likely enough robots are at work, over how many are needed. Computed in equilibrium, without runs."""
+    """Show how likely it is that enough robots are at work, for each number needed.
+
+    The command computes this in equilibrium, without runs.
+    """
     from metrics.scoring.theory import availability as computed
     from swarm_forage_env.cli.printer import notes
     from swarm_forage_env.cli.scenario_options import split_numbers
@@ -261,35 +269,35 @@ def choose(
     options: RunOptions,
     deliver: Annotated[
         float,
-        typer.Option(help="Performance that an undisturbed run must reach, in all: objects or what is asked for."),
+        typer.Option(
+            help="Total performance that an undisturbed run must reach: objects, or what --performance counts."
+        ),
     ],
     keep: Annotated[
-        float, typer.Option(help="Share of --deliver that is still demanded under each disturbance.")
+        float, typer.Option(help="Share of --deliver that a run must still reach under each disturbance.")
     ] = 1.0,
     failures: Annotated[
         float | None,
         typer.Option(
             metavar="RATE",
-            help="Malfunctions per tick (0.2 s) of the whole swarm, 0.001 in the study. Robots stop and are repaired "
+            help="Malfunctions per tick (0.2 s) in the whole swarm; 0.001 in the study. Robots stop and are repaired "
             "one after the other, a little faster than they fail (docs/deciding.md).",
         ),
     ] = None,
     deaths: Annotated[
         float | None,
-        typer.Option(
-            metavar="COUNT", help="Robots that are expected to die in a run, at random times; they do not come back."
-        ),
+        typer.Option(metavar="COUNT", help="Expected deaths in a run, at random times; dead robots do not come back."),
     ] = None,
     noise: Annotated[
         float | None,
-        typer.Option(metavar="SIGMA", help="Standard deviation of the noise of all sensors and wheels."),
+        typer.Option(metavar="SIGMA", help="Standard deviation of noise on all sensors and wheels."),
     ] = None,
     seeds: Annotated[int, typer.Option(min=2, help="Runs per policy and condition.")] = 4,
 ) -> None:
-    """Rank policies by the constraints that they meet: deliver so much, despite failures, deaths and noise.
+    """Rank policies by the constraints that they meet: how much they deliver, also under failures, deaths and noise.
 
-    Each policy runs undisturbed and under each disturbance alone. A constraint is met if the whole 95 % interval of
-    mean performance reaches the demand. Runs that the folder holds already are not repeated.
+    Each policy runs undisturbed and under each disturbance alone. A policy meets a constraint if the whole 95 %
+    interval of its mean performance reaches the demand. The command does not repeat runs that the folder already holds.
     """
     from metrics.scoring.choosing import choice_question
     from swarm_forage_env.cli.printer import ask_and_show, refusing
@@ -338,13 +346,14 @@ def ablate(
     described: SeveralPlaces,
     options: RunOptions,
     quirks: Annotated[
-        str, typer.Option("--quirks", help="Which to switch, separated by commas; all; or none: both rules only.")
+        str,
+        typer.Option("--quirks", help="Quirks to switch, separated by commas; all; or none, for the two rules only."),
     ] = "all",
     seeds: Annotated[int, typer.Option(min=2, help="Runs per policy, size and switched quirk.")] = 3,
 ) -> None:
-    """Switch one quirk at a time, on in the rules as described and off in the authors' program, and show what it moves.
+    """Switch one quirk at a time and show what it changes: on in the described rules, off in the authors' program.
 
-    The tables are Markdown. Records go to a folder; an interrupted command can simply be given again.
+    The tables are Markdown. Records go to a folder, so after an interruption, just enter the command again.
     """
     from metrics.scoring.ablation import ablation_question
     from swarm_forage_env._internal.fields import MOST_SEEDS, whole

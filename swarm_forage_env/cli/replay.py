@@ -38,10 +38,11 @@ def replay(
     ] = None,
     seed: Seed = 0,
 ) -> None:
-    """Look into a run: write it as one HTML file, with play, zoom, every robot's state, and curves.
+    """Write a run as one HTML file, with play, zoom, every robot's state, and curves.
 
-    Several policies act beside each other, in the same world with the same seed. In place of a policy you can name a
-    stored run (file.parquet, or the id of one in results/), which is made again. The file needs no network.
+    The page shows several policies side by side, in the same world with the same seed. In place of a policy, you can
+    name a stored run (file.parquet, or the id of one in results/), which the command makes again. The file needs no
+    network.
     """
     from swarm_forage_env._internal.files import check_file
 

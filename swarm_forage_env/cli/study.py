@@ -19,15 +19,17 @@ if TYPE_CHECKING:
 
 Name = Annotated[str, typer.Argument(metavar="NAME|FILE", help="A set of the paper (S1a to S2d), or a study file.")]
 Place = Annotated[Path, typer.Argument(metavar="DIR|FILE", help="Folder of a study, or its packed file.")]
-Budget = Annotated[str | None, typer.Option("--budget", help="How much is run; default the first of the file.")]
-Seeds = Annotated[int | None, typer.Option("--seeds", min=1, help="Runs per condition; default those of the budget.")]
-Rules = Annotated[str, typer.Option("--rules", help="described, program (the authors'), both, or file: as it says.")]
+Budget = Annotated[str | None, typer.Option("--budget", help="How much to run; default the first budget of the file.")]
+Seeds = Annotated[int | None, typer.Option("--seeds", min=1, help="Runs per condition; default the budget's number.")]
+Rules = Annotated[
+    str, typer.Option("--rules", help="described, program (the authors'), both, or file: what the file says.")
+]
 
 
 def list_studies(
     budget: Annotated[str, typer.Option("--budget", help="smoke, reduced or paper.")] = "paper", as_json: AsJson = False
 ) -> None:
-    """List the experiment sets of the paper: what they take, and what a budget leaves out."""
+    """List the experiment sets of the paper: how many runs they make, and what a budget leaves out."""
     from swarm_forage_env.cli.printer import show as print_answer
     from swarm_forage_env.studies.description import paper_sets
 
@@ -57,7 +59,8 @@ def run(  # long: one parameter per option
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", help="Folder; default results/studies/NAME_BUDGET. Of several studies the folder around theirs."
+            "--out",
+            help="Folder; default results/studies/NAME_BUDGET. For several studies, the parent of their folders.",
         ),
     ] = None,
     seeds: Seeds = None,
@@ -66,26 +69,29 @@ def run(  # long: one parameter per option
         bool,
         typer.Option(
             "--until-decided",
-            help="Judge the paper's claims again and again, and run what decides most for least (docs/studies.md). "
-            "--budget is then paper by default; --seeds is the most runs per condition, default 192.",
+            help="Judge the paper's claims again and again, and make the runs that decide most in the least time "
+            "(docs/studies.md). --budget is then paper by default, and --seeds sets the most runs per condition, "
+            "default 192.",
         ),
     ] = False,
     hours: Annotated[
-        float | None, typer.Option("--hours", min=0.0, help="With --until-decided: how long, by the clock.")
+        float | None, typer.Option("--hours", min=0.0, help="With --until-decided: for how many hours of wall time.")
     ] = None,
-    shard: Annotated[str, typer.Option("--shard", metavar="I/N", help="Only the I-th of N equal parts.")] = "1/1",
+    shard: Annotated[
+        str, typer.Option("--shard", metavar="I/N", help="Make only the I-th of N equal parts of the runs.")
+    ] = "1/1",
     jobs: Jobs = None,
     cluster: Annotated[
         str | None,
         typer.Option(
             "--cluster",
-            help="Run by Dask: local, slurm, slurm-jobs (--jobs of them), or the address of a scheduler "
+            help="Run on Dask: local, slurm, slurm-jobs (--jobs sets their number), or the address of a scheduler "
             "(docs/studies.md).",
         ),
     ] = None,
     dry_run: DryRun = False,
 ) -> None:
-    """Run what is missing of studies, and pack the runs of each into one file.
+    """Make the missing runs of studies, and pack each study into one file.
 
     Finished runs are kept: after Ctrl-C, or with more seeds, the same command does the rest.
     """
@@ -204,17 +210,17 @@ def pack(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a study.")],
     file: Annotated[Path | None, typer.Option("--file", help="Packed study; default DIR/NAME.parquet.")] = None,
 ) -> None:
-    """Put all runs of a study into one file, which holds everything that is known of them."""
+    """Put all runs of a study into one file, with everything that its folder knows about them."""
     typer.echo(f"packed into {_pack(folder, file)}")
 
 
 def unpack(
     files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Packed studies.")],
     out: Annotated[
-        Path, typer.Option("--out", help="Folder around those of the studies, which are called NAME_BUDGET.")
+        Path, typer.Option("--out", help="Parent of the folders of the studies, which are called NAME_BUDGET.")
     ] = Path("results/studies"),
 ) -> None:
-    """Put the runs of packed studies into folders, from which study run goes on."""
+    """Put the runs of packed studies into folders, so that study run can continue them."""
     from swarm_forage_env._internal.wording import counted
     from swarm_forage_env.studies.study_folder import StudyFolder
     from swarm_forage_env.studies.study_table import read_study, unpack_study
@@ -251,16 +257,17 @@ Places = Annotated[list[Path], typer.Argument(metavar="DIR|FILE...", help="Folde
 
 def verdict(
     places: Places,
-    table: Annotated[bool, typer.Option("--table", help="Counts and the table of all claims only.")] = False,
+    table: Annotated[bool, typer.Option("--table", help="Show only the counts and the table of all claims.")] = False,
     file: Annotated[
-        Path | None, typer.Option("--file", help="Write it, too: .txt, .md, .csv or .json, with more numbers.")
+        Path | None,
+        typer.Option("--file", help="Also write the answer to a file: .txt, .md, .csv or .json, with more numbers."),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Hold the claims of the paper against runs of its sets: what they support, contradict or leave open.
+    """Test the claims of the paper with runs of its sets: which claims they support, contradict or leave open.
 
-    First how many have which answer, and all claims in one table; below them what is behind each answer. The same for
-    the paper's intuitions, what it expected of each algorithm before the experiments.
+    First come the counts of each answer and one table of all claims; then the evidence for each answer. The same
+    follows for the paper's intuitions, what the authors expected of each algorithm before the experiments.
     """
     from metrics import verdict as verdict_of
     from swarm_forage_env._internal.fields import ConfigError
@@ -295,17 +302,20 @@ def plot(
     formats: Annotated[str, typer.Option("--format", help="svg, png, pdf; separated by commas.")] = "svg,png",
     width: Annotated[
         float | None,
-        typer.Option("--width", min=2.0, max=100.0, help="Of a figure, in inches; default what its panels need."),
+        typer.Option("--width", min=2.0, max=100.0, help="Width of a figure in inches; default what its panels need."),
     ] = None,
-    font_size: Annotated[float, typer.Option("--font-size", min=4.0, max=40.0, help="Of words, in points.")] = 9.0,
-    title: Annotated[bool, typer.Option("--title/--no-title", help="Headlines; in a paper, captions say it.")] = True,
+    font_size: Annotated[float, typer.Option("--font-size", min=4.0, max=40.0, help="Font size in points.")] = 9.0,
+    title: Annotated[
+        bool,
+        typer.Option("--title/--no-title", help="Whether figures have headlines; in a paper, captions replace them."),
+    ] = True,
 ) -> None:
-    """Draw the figures of a study, with tables in CSV: each measure over what is varied, and models.
+    """Draw the figures of a study, with their numbers as CSV tables: each measure over what the study varies.
 
-    Models are laws and a mean field where swarm sizes vary, the queue where robots leave and come. theory_... has what
-    follows without runs: availability curves, and sketches of the measures. NAME_snapshot.png is the arena when a run
-    begins. NAME_conditions.csv has how runs of each condition spread and how many broke down, ..._pairs.csv which
-    policy is better how often.
+    Figures also show models: laws and a mean field if swarm sizes vary, the queue if robots leave and come back. Files
+    called theory_... need no runs: availability curves and sketches of the measures. NAME_snapshot.png shows the arena
+    at the start of a run. NAME_conditions.csv says how runs of each condition spread and how many broke down,
+    ..._pairs.csv how often one policy is better than another.
     """
     from metrics import plot as plot_study
     from swarm_forage_env.cli.questions import score_forms
@@ -335,11 +345,12 @@ _PAGE_FORMS = (".html", ".md", ".txt", ".csv", ".json")
 def report(
     places: Places,
     file: Annotated[
-        Path, typer.Option("--file", help="Page to write, .html; .md, .txt, .csv, .json: its tables.")
+        Path,
+        typer.Option("--file", help="File to write: the page (.html), or only its tables (.md, .txt, .csv, .json)."),
     ] = Path("report.html"),
     band: Band = False,
 ) -> None:
-    """Write one page about studies: what they say of the paper's claims, figures, numbers, settings, versions."""
+    """Write one page about studies: verdicts on the paper's claims, figures, numbers, settings and versions."""
     from metrics import report as report_of
     from swarm_forage_env._internal.fields import ConfigError
     from swarm_forage_env._internal.files import check_file
@@ -356,7 +367,7 @@ def report(
 
 def diff(
     first: Annotated[Path, typer.Argument(metavar="A", help="Folder of a study, or its packed file.")],
-    second: Annotated[Path, typer.Argument(metavar="B", help="The same of the other study.")],
+    second: Annotated[Path, typer.Argument(metavar="B", help="Folder or packed file of the other study.")],
     columns: Annotated[
         str | None,
         typer.Option(
@@ -365,9 +376,9 @@ def diff(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Say which conditions of two studies differ beyond chance.
+    """Show which conditions of two studies differ beyond chance.
 
-    Exit code 0 if no condition differs; 1 if one does or may, or if one has no finished runs in A or in B.
+    Exit code 0 if no condition differs; 1 if one does or may, or if one lacks finished runs in A or in B.
     """
     from metrics import diff as diff_of
     from metrics.scoring.study_diff import COLUMNS

@@ -47,15 +47,15 @@ class RecipeOptions:
 
     algorithm: Annotated[str | None, typer.Option("--algo", help="ppo, a2c, dqn or sac; default ppo.")] = None
     steps: Annotated[
-        int | None, typer.Option(min=1, help=f"Decisions of single robots; default {DEFAULT_STEPS:,}.")
+        int | None, typer.Option(min=1, help=f"Decisions, counted per robot; default {DEFAULT_STEPS:,}.")
     ] = None
     arenas: Annotated[
-        int | None, typer.Option(min=1, help=f"Arenas side by side; default {DEFAULT_ARENAS}, fewer of large swarms.")
+        int | None, typer.Option(min=1, help=f"Arenas side by side; default {DEFAULT_ARENAS}, fewer for large swarms.")
     ] = None
-    seed: Annotated[int | None, typer.Option(min=0, help="Seed of everything; default 0, or that of --plan.")] = None
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the training; default 0, or the plan's.")] = None
     observation: Annotated[str | None, typer.Option(help="compact or full; default compact.")] = None
     actions: Annotated[
-        str | None, typer.Option(help="discrete or continuous; default discrete, for sac continuous.")
+        str | None, typer.Option(help="discrete or continuous; default discrete, or continuous for sac.")
     ] = None
     automatic_gripper: Annotated[
         bool | None,
@@ -74,8 +74,8 @@ class RecipeOptions:
         bool | None,
         typer.Option(
             "--drawn-actions/--likeliest-actions",
-            help="Whether the trained policy draws its actions by their probabilities, or takes the likeliest; default "
-            "drawn where it has probabilities (ppo, a2c).",
+            help="Whether the trained policy draws its actions by their probabilities or takes the likeliest one; "
+            "default drawn if it has probabilities (ppo, a2c).",
         ),
     ] = None
     evaluate_every: Annotated[
@@ -83,23 +83,23 @@ class RecipeOptions:
         typer.Option(
             min=1,
             help="Decisions between evaluations and checkpoints; "
-            f"default {EVALUATE_EVERY:,}, more where evaluations take long.",
+            f"default {EVALUATE_EVERY:,}, or more if evaluations take long.",
         ),
     ] = None
     evaluation_horizon: Annotated[
-        float | None, typer.Option(help="Seconds per run of an evaluation; default those of the scenario.")
+        float | None, typer.Option(help="Simulated seconds per run of an evaluation; default the scenario's.")
     ] = None
     small_start: Annotated[
         bool | None,
         typer.Option(
             "--small-start/--no-small-start",
-            help="Spend the first third in a smaller arena with short ways; default if deliveries count.",
+            help="Whether to spend the first third in a smaller arena; default yes if deliveries count.",
         ),
     ] = None
     hidden: Annotated[str | None, typer.Option(help=f"Sizes of the hidden layers; default {_HIDDEN}.")] = None
     arguments: Annotated[
         tuple[str, ...],
-        typer.Option("--arg", metavar="KEY=NUMBER", help="Argument of the algorithm; may be repeated."),
+        typer.Option("--arg", metavar="KEY=NUMBER", help="Set an argument of the algorithm; may be repeated."),
     ] = ()
 
     def plan(self, described: WorldOptions) -> "TrainingPlan":
@@ -137,7 +137,7 @@ def train(
     plan: Annotated[
         str | None,
         typer.Option(
-            help="TOML file with a training plan, or name of a shipped policy, instead of all below; but --seed counts."
+            help="TOML file with a training plan, or name of a shipped policy; replaces all options below but --seed."
         ),
     ] = None,
     asked: RecipeOptions,
@@ -146,25 +146,26 @@ def train(
         typer.Option(
             "--callback",
             metavar="MODULE:CLASS",
-            help="Callback of stable-baselines3, code of yours that runs beside the training; or the name of an entry "
+            help="Your own callback of stable-baselines3, whose code runs during the training; or the name of an entry "
             "point. May be repeated.",
         ),
     ] = None,
-    jobs: Annotated[int, typer.Option("--jobs", min=1, help="Processes for the arenas; 1 = in this process.")] = 1,
+    jobs: Annotated[
+        int, typer.Option("--jobs", min=1, help="Number of processes for the arenas; 1 = only this process.")
+    ] = 1,
     resume: Annotated[
         bool,
         typer.Option(
-            "--resume", help="Continue from the checkpoint in --out (needs --trust-models); --steps makes it longer."
+            "--resume", help="Continue from the checkpoint in --out (needs --trust-models); --steps sets a new total."
         ),
     ] = False,
 ) -> None:
-    """Train one policy that every robot shares, beside evaluations of it and of a scripted controller.
+    """Train one policy that every robot shares, and compare it with a scripted controller meanwhile.
 
-    Episodes last --horizon, by default 1,000 s or as measured to be best. Rewards are fields of the scenario. Where
-    deliveries count, training sets nest_progress=0.05 and first_pickup=1 unless --set or the file of --scenario does,
-    and begins in a smaller arena: deliveries alone are too rare to learn from. plan.json holds
-    all that was chosen. Ctrl-C keeps a checkpoint; swarm-forage --trust-models train --out
-    FOLDER --resume goes on.
+    Episodes last --horizon, by default 1,000 s or the length that was measured to be best. Rewards are fields of the
+    scenario. If deliveries count, they alone are too rare to learn from. The training then sets nest_progress=0.05 and
+    first_pickup=1, unless --set or the file of --scenario does, and begins in a smaller arena. plan.json holds all
+    choices. Ctrl-C keeps a checkpoint; swarm-forage --trust-models train --out FOLDER --resume continues.
     """
     from swarm_forage_env.cli.training_report import run_training
     from swarm_forage_env.training.evaluations import resumed_plan
@@ -216,17 +217,15 @@ def curves(
     folders: Annotated[list[Path], typer.Argument(metavar="DIR ...", help="Folders of trainings in one scenario.")],
     policies: Annotated[
         str | None,
-        typer.Option(
-            "--policy", help="Policies to compare with, separated by commas; none for no others; default the paper's."
-        ),
+        typer.Option("--policy", help="Policies to compare with, separated by commas, or none; default the paper's."),
     ] = None,
     picture: Picture = None,
     jobs: Jobs = None,
     as_json: AsJson = False,
 ) -> None:
-    """Draw how trainings went, beside the scripted controllers on the same axes.
+    """Draw the progress of trainings, with the scripted controllers on the same axes.
 
-    The others make the runs of the trainings' evaluations: same world, same seeds, the caches that they are made for.
+    The controllers make the same runs as the evaluations: same world and seeds, with the caches that they are made for.
     """
     from swarm_forage_env.cli.scenario_options import split_names
     from swarm_forage_env.rendering.figures import check_picture
@@ -254,16 +253,16 @@ class RecordedOptions:
 
     observation: Annotated[
         str | None,
-        typer.Option(help="full or compact; default what a learned policy sees, else full."),
+        typer.Option(help="full or compact; default what a learned policy sees, or full for others."),
     ] = None
     site_memory: Annotated[
         bool | None,
         typer.Option(
             "--site-memory/--no-site-memory",
-            help="Whether to record two places that robots remember; default as a learned policy sees, else not.",
+            help="Whether to record two places that robots remember; default as a learned policy sees them, or no.",
         ),
     ] = None
-    compress: Annotated[bool, typer.Option("--compress", help="Smaller files, which take longer to write.")] = False
+    compress: Annotated[bool, typer.Option("--compress", help="Write smaller files, which takes longer.")] = False
 
 
 def dataset(
@@ -282,8 +281,8 @@ def dataset(
 ) -> None:
     """Record what robots see and do, for offline reinforcement learning and imitation.
 
-    Writes observations, actions, rewards and ends of every robot. Runs that the folder holds already are not repeated,
-    so an interrupted command can simply be given again.
+    Writes the observations, actions, rewards and episode ends of every robot. The command does not repeat runs that the
+    folder already holds, so after an interruption, just enter it again.
     """
     from swarm_forage_env._internal.files import as_file_name
     from swarm_forage_env.cli.printer import progress_bar
