@@ -55,7 +55,7 @@ LAW_WORDS: dict[LawName, LawWords] = {
     "linear": LawWords("a N", "-", "robots do not affect each other"),
     "contention": LawWords("a N / (1 + s (N - 1))", "-", "robots wait for one another (Amdahl)"),
     "universal": LawWords(
-        "a N / (1 + s (N - 1) + k N (N - 1))", "sqrt((1 - s) / k)", "and every pair of robots costs time (Gunther)"
+        "a N / (1 + s (N - 1) + k N (N - 1))", "sqrt((1 - s) / k)", "robots wait, and every pair costs time (Gunther)"
     ),
     "power": LawWords("a N^b", "-", "b < 1 sublinear, b > 1 superlinear"),
     "hamann": LawWords("a N^b exp(c N)", "-b / c", "cooperation times interference (Hamann)"),

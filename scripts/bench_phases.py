@@ -39,7 +39,7 @@ ROWS = (
     "policy",
     "drive, press",
     "bodies",
-    "bodies tell poses",
+    "poses from bodies",
     "look around: proximity",
     "mark interference",
     "pick up, drop",
@@ -135,7 +135,7 @@ class PhasedRun:
         while not watch.kernel("bodies", move_bodies, bodies.held, *moving):
             bodies.make_room()
         poses = bodies.state.poses, swarm.present, swarm.position, swarm.heading, swarm.facing
-        watch.kernel("bodies tell poses", tell_poses, *poses)
+        watch.kernel("poses from bodies", tell_poses, *poses)
         self._meet(actions, tick, picks)
         self._close(walks)
         arena.tick, arena.has_changed = tick, False

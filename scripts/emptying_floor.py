@@ -67,7 +67,15 @@ def main() -> None:
                 *(f"{one.mean:.{n}f} ± {one.upper - one.mean:.{n}f}" for one, n in zip(means, digits, strict=True)),
             )
         )
-    header = ("policy", "delivered, first", "later", "interference, first", "later", "free objects at, m: begin", "end")
+    header = (
+        "policy",
+        "delivered, first",
+        "later",
+        "interference, first",
+        "later",
+        "free objects to nest, m: begin",
+        "end",
+    )
     title = f"{world.name}, {world.robots.n_robots} robots: the first {FIRST_S:,.0f} s, and from {LATER_S:,.0f} s on"
     notes = [f"± 95 % interval of the mean of {n_seeds} runs; delivered per 1,000 s"]
     print(Sheet(title=title, header=header, rows=rows, notes=notes).text())
