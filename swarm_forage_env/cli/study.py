@@ -96,6 +96,7 @@ def run(  # long: one parameter per option
     Finished runs are kept: after Ctrl-C, or with more seeds, the same command does the rest.
     """
     from swarm_forage_env.runs.cluster import cluster_executor
+    from swarm_forage_env.runs.workers import WorkerError
     from swarm_forage_env.studies.study_file import PAPER
     from swarm_forage_env.studies.study_folder import StudyFolder, parse_shard
 
@@ -117,10 +118,13 @@ def run(  # long: one parameter per option
                 n_failed = 0
             else:
                 n_failed = sum(_run_all(spec, folder, part, jobs, executor) for spec, folder in studies)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, WorkerError) as error:
         kept = ", ".join(str(folder.folder) for _, folder in studies)
-        words = f"Interrupted. Finished runs are kept in {kept}; the same command does the rest."
-        raise typer.Exit(complain(words, EXIT_INTERRUPTED)) from None
+        why, code = (
+            ("Interrupted.", EXIT_INTERRUPTED) if isinstance(error, KeyboardInterrupt) else (error, EXIT_FAILURE)
+        )
+        words = f"{why} Finished runs are kept in {kept}; the same command does the rest."
+        raise typer.Exit(complain(words, code)) from None
     if n_failed:
         raise typer.Exit(EXIT_FAILURE)
 

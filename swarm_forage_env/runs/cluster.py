@@ -4,6 +4,7 @@ Workers need the same versions of the packages, and no shared disk: tasks and re
 worker may join or be killed at any time; what it was running is run elsewhere.
 """
 
+import logging
 import os
 import signal
 import threading
@@ -15,12 +16,14 @@ from typing import Any
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.wording import install_command
-from swarm_forage_env.runs.workers import available_cores
+from swarm_forage_env.runs.workers import WorkerError, available_cores
 
 LOCAL, SLURM, SLURM_JOBS = "local", "slurm", "slurm-jobs"
 ROLES = ("the scheduler", "the process that writes", "at least one worker")
 """What the tasks of an allocation do, in their order."""
 CONNECT_WITHIN_S = 30.0
+"""How long a scheduler may take to answer, at first and when the connection was lost."""
+TLS_NEEDS = ". An address with tls:// needs certificates: distributed.comm.tls in ~/.config/dask/distributed.yaml."
 
 
 @contextmanager
@@ -40,15 +43,21 @@ def cluster_executor(where: str, workers: int | None = None) -> Iterator[Executo
             given.
         ImportError: Dask is not installed.
         SystemExit: in all tasks of an allocation but one, when the study is over: they are its scheduler and workers.
+        WorkerError: the scheduler ended while the executor was in use.
     """
     try:
         import distributed
+        from distributed.client import ClosedClientError
     except ImportError as error:
         raise ImportError(f"Studies on a cluster need Dask: {install_command('cluster')}.") from error
     if where not in (LOCAL, SLURM_JOBS) and workers is not None:
         what = "tasks of an allocation, whose number says how many" if where == SLURM else "a running scheduler"
         raise ConfigError(f"Expected no number of workers for {what}, got {workers} for {where}.")
     with ExitStack() as stack:
+        loggers = {name: logging.getLogger(f"distributed.{name}") for name in ("client", "nanny")}
+        for logger in loggers.values():
+            stack.callback(logger.setLevel, logger.level)
+        loggers["client"].setLevel(logging.CRITICAL)  # the errors below say what it would
         target: Any = where
         if where == LOCAL:
             with _interrupts_later():
@@ -67,11 +76,20 @@ def cluster_executor(where: str, workers: int | None = None) -> Iterator[Executo
             target.scale(jobs=workers or available_cores())
         try:
             client = stack.enter_context(distributed.Client(target, timeout=CONNECT_WITHIN_S))
-        except (OSError, ValueError) as error:
+        except (OSError, RuntimeError, TypeError, ValueError) as error:  # Dask raises all of them of addresses
+            hint = TLS_NEEDS if where.startswith("tls:") else ""
             raise ConfigError(
-                f"Expected the address of a Dask scheduler, local, slurm or slurm-jobs, got {where!r}: {error}"
+                f"Expected the address of a Dask scheduler, local, slurm or slurm-jobs, got {where!r}: {error}{hint}"
             ) from error
-        yield client.get_executor(pure=False)
+        try:
+            yield client.get_executor(pure=False)
+        except (ClosedClientError, WorkerError) as error:
+            if client.status == "running":
+                raise
+            raise WorkerError(
+                f"The scheduler of Dask ({where}) does not answer any more: it ended, or its machine cannot be reached."
+            ) from error
+        loggers["nanny"].setLevel(logging.ERROR)  # it warns of workers that are slow to leave
 
 
 @contextmanager

@@ -12,7 +12,6 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
     BrokenExecutor,
-    CancelledError,
     Executor,
     Future,
     ProcessPoolExecutor,
@@ -72,7 +71,7 @@ KILLED = (
 
 
 class WorkerError(RuntimeError):
-    """Worker processes could not be started at all."""
+    """Worker processes could not be started at all, or an executor ended before its work was done."""
 
 
 def run_each(
@@ -94,7 +93,7 @@ def run_each(
 
     Raises:
         OSError: the store cannot be written to; then nothing has been run.
-        WorkerError: no worker process could be started.
+        WorkerError: no worker process could be started, or `executor` ended before all runs were done.
     """
     todo = deque((spec,) for spec in specs)
     if store is not None and todo:
@@ -196,9 +195,11 @@ def _run_on(
     """Run `todo` with at most `limit` tasks submitted at a time; if the executor breaks, stop and leave the rest.
 
     Runs that were submitted when it broke are failures, or go to `lost` if it is given. If a task of several runs
-    fails as a whole, they are tried again one by one, so that only those fail that kill their worker.
+    fails as a whole, they are tried again one by one, so that only those fail that kill their worker. Tasks that the
+    executor cancels, because it ends, are in `todo` again at the end.
     """
     running: dict[Future[Any], Task] = {}
+    cancelled: list[Task] = []
     broken = False
     try:
         while running or (todo and not broken):
@@ -211,7 +212,10 @@ def _run_on(
             finished, _ = wait(running, timeout=WAKE_UP_EVERY_S, return_when=FIRST_COMPLETED)
             for future in finished:
                 task = running.pop(future)
-                error = CancelledError("by its executor") if future.cancelled() else future.exception()
+                if future.cancelled():
+                    cancelled.append(task)
+                    continue
+                error = future.exception()
                 if isinstance(error, BrokenExecutor):
                     broken = True
                     if lost is not None:
@@ -226,6 +230,7 @@ def _run_on(
     finally:
         for future in running:
             future.cancel()
+    todo.extend(cancelled)
 
 
 def _submitted(executor: Executor, task: Task) -> Future[Any]:
@@ -260,7 +265,8 @@ def _run_elsewhere(executor: Executor, todo: deque[Task]) -> Generator[Outcome]:
     yield from _run_on(executor, todo, limit=min(QUEUED_ELSEWHERE, max(1, len(todo))))
     if todo:
         n_left = sum(len(task) for task in todo)
-        raise WorkerError(f"The executor broke; {n_left} runs were not started. Run them again on a new one.")
+        left = "1 run is" if n_left == 1 else f"{n_left} runs are"
+        raise WorkerError(f"The executor broke, or cancelled runs: {left} not done. Run them again on a new one.")
 
 
 def _failure(spec: RunSpec, error: BaseException) -> RunFailure:

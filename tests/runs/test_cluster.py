@@ -1,11 +1,14 @@
 """Studies on Dask clusters of this machine: workers that die and come late change nothing."""
 
+import json
+import logging
 import os
 import signal
 import subprocess
 import sys
 import threading
 import time
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -14,6 +17,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.runs import cluster
 from swarm_forage_env.runs.cluster import LOCAL, SLURM, cluster_executor, slurm_cluster
 from swarm_forage_env.runs.store import DONE
+from swarm_forage_env.runs.workers import WorkerError
 from swarm_forage_env.studies.study_folder import StudyFolder, run_study
 from swarm_forage_env.studies.study_table import gather_study
 from tests.support.tiny_study import tiny_study
@@ -98,6 +102,81 @@ def test_a_cluster_of_this_machine_is_one_word(tmp_path, expected):
     assert packed(StudyFolder(tmp_path)) == expected
 
 
+@pytest.fixture
+def scheduler_and_worker(tmp_path):
+    """A scheduler and a worker as processes of their own; gives the first, and its address."""
+    file = tmp_path / "scheduler.json"
+    dask = (
+        [sys.executable, "-m", "distributed.cli.dask_scheduler"],
+        [sys.executable, "-m", "distributed.cli.dask_worker"],
+    )
+    own = ["--host", "127.0.0.1", "--no-dashboard", "--scheduler-file", str(file)]
+    usual = {"cwd": tmp_path, "env": {**os.environ, "PYTHONPATH": str(ROOT)}, "stderr": subprocess.DEVNULL}
+    processes = [
+        subprocess.Popen([*dask[0], *own, "--port", "0"], **usual),
+        subprocess.Popen([*dask[1], *own, "--nthreads", "1", "--no-nanny"], **usual),
+    ]
+    try:
+        while not file.exists():
+            assert processes[0].poll() is None, "the scheduler starts"
+            time.sleep(0.1)
+        time.sleep(0.1)  # until the file is written
+        yield processes[0], json.loads(file.read_text())["address"]
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_dies_ends_the_study_and_no_run_is_a_failure(
+    monkeypatch, tmp_path, scheduler_and_worker, expected, caplog
+):
+    monkeypatch.setattr(cluster, "CONNECT_WITHIN_S", 5.0)
+    scheduler, address = scheduler_and_worker
+    folder = StudyFolder(tmp_path / "study")
+    with (
+        pytest.raises(WorkerError, match=rf"scheduler of Dask \({address}\) does not answer any more"),
+        cluster_executor(address) as executor,
+    ):
+        once_some_runs_are_stored(folder, scheduler.kill)
+        run_study(STUDY, folder, executor=executor)
+    assert 2 <= len(folder.store.run_ids()) < STUDY.n_runs
+    assert not list(folder.folder.rglob("failures/*"))
+    assert not caplog.records, "one line says it, and that is ours"
+    run_study(STUDY, folder, jobs=1)
+    assert packed(folder) == expected
+
+
+def test_nannies_do_not_warn_at_a_normal_end(monkeypatch, caplog):
+    """On a slow machine one kills its worker, which has nothing left to do, and says so."""
+
+    class Cluster(nullcontext):
+        def __init__(self, **_):
+            super().__init__()
+
+        def __exit__(self, *_):
+            nanny.warning("Worker process still alive after 4.0 seconds, killing")
+
+    class Client(nullcontext):
+        status = "running"
+
+        def __init__(self, *_, **__):
+            super().__init__(self)
+
+        def get_executor(self, **_):
+            nanny.warning("Restarting worker")
+
+    nanny = logging.getLogger("distributed.nanny")
+    monkeypatch.setattr(distributed, "LocalCluster", Cluster)
+    monkeypatch.setattr(distributed, "Client", Client)
+    with cluster_executor(LOCAL, 1):
+        pass
+    assert [record.getMessage() for record in caplog.records] == ["Restarting worker"]
+    nanny.warning("as before")
+    assert len(caplog.records) == 2
+
+
 ALLOCATION = {"SLURM_JOB_ID": "7", "SLURM_STEP_ID": "0", "SLURM_PROCID": "1", "SLURM_NTASKS": "3"}
 
 
@@ -166,6 +245,10 @@ def test_a_scheduler_that_does_not_answer_is_told(monkeypatch):
     address = "tcp://127.0.0.1:9"
     with pytest.raises(ConfigError, match=f"a Dask scheduler, local, slurm or slurm-jobs, got '{address}'"):
         with_executor(address)
+    with pytest.raises(ConfigError, match=r"got 'tls://127.0.0.1:9': .* needs certificates.*distributed.comm.tls"):
+        with_executor("tls://127.0.0.1:9")
+    with pytest.raises(ConfigError, match=r"got 'ucx://127.0.0.1:9'"):
+        with_executor("ucx://127.0.0.1:9")
     with pytest.raises(ConfigError, match="no number of workers for a running scheduler"):
         with_executor(address, 3)
     with pytest.raises(ConfigError, match="no number of workers for tasks of an allocation"):
