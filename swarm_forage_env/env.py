@@ -10,6 +10,7 @@ from pettingzoo import ParallelEnv
 
 from swarm_forage_env._internal.fields import as_whole, instance, switch
 from swarm_forage_env.contract.layout import ObservationLayout
+from swarm_forage_env.contract.own_functions import OwnFunctionError
 from swarm_forage_env.contract.policy import COMMANDS, ActionError, SwarmSpec
 from swarm_forage_env.contract.reset_and_step import as_actions, checked_gain, is_over, no_options, refuse_not_finite
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
@@ -90,6 +91,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         self._actions = np.zeros((n_robots, COMMANDS + scenario.robots.message_size), np.float32)
         self._seeds = np.random.default_rng()
         self.seed_value: int | None = None
+        self._is_half_done = False
 
     # Spaces and constants
 
@@ -155,6 +157,21 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
             raise RuntimeError(
                 "There is no world before the first reset. Call reset before step, state, render or snapshot."
             )
+
+    def require_whole(self) -> None:
+        """Refuse to go on with a tick that is half done; RuntimeError. See `break_off`."""
+        if self._is_half_done:
+            raise RuntimeError(
+                "A tick is half done: something failed in it, and going on would shift all that is counted by a tick. "
+                "Reset, or restore a snapshot, before the next step or snapshot."
+            )
+
+    def break_off(self) -> None:
+        """Refuse every step and snapshot until a reset or a restore, because something failed in the middle of a tick.
+
+        A sensor, a reward, a wrapper or a compiled policy of the user may. The state can be read as it is.
+        """
+        self._is_half_done = True
 
     @property
     def swarm(self) -> SwarmState:
@@ -234,6 +251,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         else:
             seed = as_whole("seed", seed, at_least=0, or_none=True)
             self._seeds = np.random.default_rng(seed)
+        self.break_off()  # should the reset fail
         obs = self.arena.reset(seed)
         self._rewards = RewardModel(
             self.scenario.reward, self.scenario.arena.nest_centres_m, self.arena.swarm, self.arena.events, self.arena
@@ -241,6 +259,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         self.seed_value = seed
         self._terminated[:] = False
         self.agents = list(self.possible_agents)
+        self._is_half_done = False
         if self._window is not None:
             self.render()
         return obs
@@ -250,9 +269,10 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
 
         Raises:
             ActionError: values that are not numbers, or another shape.
-            RuntimeError: before the first reset.
+            RuntimeError: before the first reset, or after a step that failed half done.
         """
         self._require_reset()
+        self.require_whole()
         return as_actions(actions, len(self._actions), self.scenario.robots.message_size)
 
     def refuse_bad_step(self, actions: ActionArray, wheel_gain: FloatArray | None) -> None:
@@ -288,11 +308,16 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         Raises:
             ActionError: values that are not numbers, a wrong shape, or an action or gain of an active robot that is not
                 finite.
-            RuntimeError: before the first reset.
+            RuntimeError: before the first reset, or after a step that failed half done.
+            OwnFunctionError: a sensor or reward of the user failed; no step goes on from here, see `break_off`.
         """
         actions, wheel_gain = self.begin_step(actions, wheel_gain)
-        self.arena.step(actions, wheel_gain=wheel_gain, tasks=tasks)
-        return self.end_step(tasks)
+        try:
+            self.arena.step(actions, wheel_gain=wheel_gain, tasks=tasks)
+            return self.end_step(tasks)
+        except OwnFunctionError:
+            self.break_off()
+            raise
 
     def begin_step(
         self, actions: ActionArray, wheel_gain: FloatArray | None = None
@@ -321,7 +346,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         Random generators of the spaces are no part of it, nor attributes that a subclass adds.
 
         Raises:
-            RuntimeError: before the first reset.
+            RuntimeError: before the first reset, or after a step that failed half done.
             SnapshotError: physics is "chipmunk" and the environment was made without `snapshots=True`.
         """
         return self.snapshot_through(())
@@ -344,6 +369,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
 
     def snapshot_through(self, wrappers: Sequence[Any]) -> Snapshot:
         """Return a snapshot of a stack: this environment and the wrappers around it, outermost first."""
+        self.require_whole()
         arena, seed = self._world, self.seed_value
         assert seed is not None, "there is a world"
         own = {name: getattr(self, name) for name in _STATE}
@@ -354,6 +380,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         """Restore a stack: this environment and the wrappers around it, outermost first."""
         own, of_arena, *of_wrappers = read(snapshot, self._origin(wrappers), self._parts(wrappers))
         vars(self).update(own)
+        self._is_half_done = False
         self.arena.__setstate__(of_arena)
         for wrapper, state in zip(wrappers, of_wrappers, strict=True):
             wrapper.__setstate__(state)

@@ -20,6 +20,7 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import as_whole
 from swarm_forage_env.contract.codes import Counter
+from swarm_forage_env.contract.own_functions import OwnFunctionError
 from swarm_forage_env.contract.policy import COMMANDS
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.env import ForageEnv
@@ -236,10 +237,16 @@ class ArenaBatch:
         flags = np.zeros((3, *shape), np.bool_)
         lockstep, books = self._chosen_ways()
         actions = actions.reshape(*shape, *actions.shape[1:])
-        if lockstep is not None:
-            ticks = self._together(lockstep, books, actions, rewards)
-        else:
-            ticks = [self._alone(number, actions[number], rewards[number]) for number in range(self.n_arenas)]
+        try:
+            if lockstep is not None:
+                ticks = self._together(lockstep, books, actions, rewards)
+            else:
+                ticks = [self._alone(number, actions[number], rewards[number]) for number in range(self.n_arenas)]
+        except OwnFunctionError:
+            self._is_reset = False
+            for arena in self.arenas:  # some have been stepped and some not
+                arena.forage_env.break_off()
+            raise
         n_terminated = self._book(books, ticks, rewards, (flags[0], flags[2]), obs)
         endings: _Endings | None = None
         for number, (dead, all_dead, at_horizon) in enumerate(ticks):
@@ -422,6 +429,8 @@ class ArenaBatch:
         if self._is_closed:
             raise closed_error()
         if not self._is_reset:
+            for arena in self.arenas:
+                arena.forage_env.require_whole()
             raise RuntimeError(f"Call reset before {what}.")
 
     def render(self) -> list[np.ndarray | None]:

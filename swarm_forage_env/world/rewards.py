@@ -16,6 +16,9 @@ from swarm_forage_env.scenarios.config import RewardConfig
 from swarm_forage_env.world.kernels.reward import Payment, Weights, rewards
 from swarm_forage_env.world.state import StepEvents, SwarmState
 
+MOST_REWARD = 1e30
+"""Largest reward of a user's function; our choice: sums over long runs are finite in float32, too."""
+
 
 class RewardModel:
     """Rewards of one run, tick by tick; made anew at reset."""
@@ -105,7 +108,7 @@ class RewardModel:
         """Return what the user's function adds, (N,), zero for robots that are not at work.
 
         Raises:
-            OwnFunctionError: it failed, or returned another shape or numbers that are not finite.
+            OwnFunctionError: it failed, or returned another shape or numbers beyond `MOST_REWARD`.
         """
         active = self._payment.swarm.active
         values = called(function, self._world, f"reward {self._own_name!r}")
@@ -114,8 +117,10 @@ class RewardModel:
                 f"Expected reward {self._own_name!r} to return shape (n_robots,) = {active.shape}, got {values.shape}."
             )
         values = np.where(active, values, 0.0)
-        if not np.isfinite(values).all():
+        fits = np.abs(values) <= MOST_REWARD
+        if not fits.all():
             raise OwnFunctionError(
-                f"Expected reward {self._own_name!r} to return finite numbers, got {values[~np.isfinite(values)][0]}."
+                f"Expected reward {self._own_name!r} to return numbers in [{-MOST_REWARD}, {MOST_REWARD}], "
+                f"got {values[~fits][0]}."
             )
         return values

@@ -235,16 +235,24 @@ class SwarmWrapper(BaseParallelWrapper):
         self._require_reset()
         if self._acts_first:
             env.refuse_bad_step(actions, wheel_gain)  # before any wrapper draws a number or lets a robot die
-        for wrapper in self.stack:
-            wrapper.before_step()
-            wheel_gain = wrapper.gain(actions, wheel_gain)
+        try:
+            for wrapper in self.stack:
+                wrapper.before_step()
+                wheel_gain = wrapper.gain(actions, wheel_gain)
+        except Exception:
+            env.break_off()
+            raise
         return actions, wheel_gain
 
     def _after(self, step: BatchStep, tasks: CodeArray | None) -> BatchStep:
         obs, reward, terminated, truncated = step
-        for wrapper in reversed(self.stack):
-            obs = wrapper._last_obs = wrapper.observe(obs)
-            wrapper.after_step(tasks, terminated, truncated)
+        try:
+            for wrapper in reversed(self.stack):
+                obs = wrapper._last_obs = wrapper.observe(obs)
+                wrapper.after_step(tasks, terminated, truncated)
+        except Exception:
+            self._unwrapped.break_off()
+            raise
         return obs, reward, terminated, truncated
 
     def snapshot(self) -> Snapshot:

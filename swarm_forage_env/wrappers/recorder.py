@@ -169,29 +169,35 @@ class RunRecorder(SwarmWrapper):
         Wrappers inside are asked for what they do `ahead`; where one has to act, their hooks are called in that tick.
 
         Raises:
-            RuntimeError: bodies that are not compiled.
+            RuntimeError: bodies that are not compiled, or a run that failed before.
+            ActionError: as `ForagingArena.run`, and so for ValueError; no step goes on from here.
         """
         env = self.unwrapped
         arena, end = env.arena, min(env.tick + n_ticks, env.max_cycles)
         kept = False
-        while env.tick < end and not self._complete:
-            n_ahead, disturbances = self._disturbances(min(end - env.tick, self._ticks_left))
-            if n_ahead == 0:
-                self._run_with_hooks(policy)
-                kept = False
-                continue
-            before = env.tick
-            n_observed = arena.run(policy, n_ahead, self._task_sums, disturbances, kept=kept)
-            kept = len(disturbances.lanes) == 0
-            n_done = env.tick - before
-            for wrapper in self._inside:
-                wrapper.count_ticks(n_done)
-            if n_observed < n_done and isinstance(self._inner, SwarmWrapper):
-                self._inner._after(self._stepped(), policy.task)
-            self._ticks_left -= n_done
-            self._complete = env.tick >= env.max_cycles
-            if self._ticks_left == 0 or self._complete:
-                self._close_interval(has_tasks=policy.task is not None)
+        env.require_whole()
+        try:
+            while env.tick < end and not self._complete:
+                n_ahead, disturbances = self._disturbances(min(end - env.tick, self._ticks_left))
+                if n_ahead == 0:
+                    self._run_with_hooks(policy)
+                    kept = False
+                    continue
+                before = env.tick
+                n_observed = arena.run(policy, n_ahead, self._task_sums, disturbances, kept=kept)
+                kept = len(disturbances.lanes) == 0
+                n_done = env.tick - before
+                for wrapper in self._inside:
+                    wrapper.count_ticks(n_done)
+                if n_observed < n_done and isinstance(self._inner, SwarmWrapper):
+                    self._inner._after(self._stepped(), policy.task)
+                self._ticks_left -= n_done
+                self._complete = env.tick >= env.max_cycles
+                if self._ticks_left == 0 or self._complete:
+                    self._close_interval(has_tasks=policy.task is not None)
+        except Exception:
+            env.break_off()  # what wrappers do ahead they have not counted; their noise is for later ticks already
+            raise
 
     def _disturbances(self, n_ticks: int) -> tuple[int, Disturbances]:
         """Return in how many ticks, at most `n_ticks`, no hook is needed, and what the wrappers do in them."""

@@ -2,6 +2,7 @@
 
 import copy
 import json
+from contextlib import nullcontext
 from typing import Any
 
 import gymnasium
@@ -27,6 +28,8 @@ from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterfac
 from swarm_forage_env.training.datasets.recording import plan_dataset
 from swarm_forage_env.training.plan import TrainingPlan
 from swarm_forage_env.views.gymnasium import SwarmVectorEnv
+from swarm_forage_env.wrappers.base import wrap_in_order
+from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.world import World
 from tests.support.branches import pickled
 
@@ -179,13 +182,86 @@ def test_readings_that_no_observation_can_hold(values, message):
 
 @pytest.mark.parametrize(
     ("values", "message"),
-    [(lambda world: np.zeros(5), r"\(6,\), got \(5,\)"), (lambda world: np.full(6, np.inf), "finite numbers, got inf")],
+    [
+        (lambda world: np.zeros(5), r"\(6,\), got \(5,\)"),
+        (lambda world: np.full(6, np.inf), r"numbers in \[-1e\+30, 1e\+30\], got inf"),
+        (lambda world: np.full(6, np.nan), "got nan"),
+        (lambda world: np.full(6, -1e300), r"got -1e\+300"),
+    ],
 )
 def test_rewards_that_no_learner_can_take(values, message):
     register_reward("odd", values)
     env = made(own_reward="odd")
     env.reset(seed=1)
     with pytest.raises(OwnFunctionError, match=message):
+        env.step_batch(ACTIONS)
+
+
+def fails_in_tick_3(world):
+    if world.tick == 3:
+        raise OSError("the network is down")
+    return np.zeros(len(world.swarm.active))
+
+
+OWN: list[dict[str, Any]] = [{"own_sensors": ("odd",)}, {"own_reward": "odd"}]
+
+
+@pytest.fixture
+def _fails():
+    register_sensor("odd", fails_in_tick_3)
+    register_reward("odd", fails_in_tick_3)
+
+
+@pytest.mark.usefixtures("_fails")
+@pytest.mark.parametrize("fields", OWN)
+@pytest.mark.parametrize("physics", ["chipmunk", "compiled"])
+def test_a_tick_that_fails_half_done_is_not_gone_on_with(fields, physics):
+    """The world has moved on, but what wraps it has not counted the tick: all that came later would be shifted."""
+    env = ForageEnv(scenario("warehouse_small", n_robots=6, physics=physics, **fields), snapshots=True)
+    stack = wrap_in_order(env, [parse_wrapper("sensor_noise:sigma=0.1")])
+    stack.reset_batch(seed=1)
+    for _ in range(2):
+        stack.step_batch(ACTIONS)
+    before = stack.snapshot()
+    expected_failure = pytest.raises(OwnFunctionError, match="'odd' failed with OSError: the network is down")
+    with expected_failure:
+        stack.step_batch(ACTIONS)
+    assert env.tick == 3, "one may look at what there is"
+    for refused in (lambda: stack.step_batch(ACTIONS), lambda: env.step_batch(ACTIONS), stack.snapshot):
+        with pytest.raises(RuntimeError, match=r"half done.*\. Reset"):
+            refused()
+    stack.restore_batch(before)
+    register_sensor("odd", lambda world: np.zeros(6))
+    with expected_failure if "own_reward" in fields else nullcontext():
+        stack.step_batch(ACTIONS)
+    stack.reset_batch(seed=1)
+    stack.step_batch(ACTIONS)
+
+
+@pytest.mark.usefixtures("_fails")
+@pytest.mark.parametrize("fields", OWN)
+@pytest.mark.parametrize("n_arenas", [1, 2])
+def test_arenas_of_which_one_fails_wait_for_a_reset(fields, n_arenas):
+    arenas = SwarmVectorEnv("warehouse_small", n_arenas=n_arenas, n_robots=6, physics="compiled", **fields)
+    actions = np.zeros((6 * n_arenas, 3), np.float32)
+    for _ in range(2):
+        arenas.reset(seed=3)
+        for _ in range(2):
+            arenas.step(actions)
+        with pytest.raises(OwnFunctionError):
+            arenas.step(actions)
+        with pytest.raises(RuntimeError, match=r"half done.*\. Reset"):
+            arenas.step(actions)
+
+
+def test_a_reset_that_fails_leaves_no_run_of_before():
+    register_sensor("odd", lambda world: np.zeros(6))
+    env = made(own_sensors=("odd",))
+    env.reset(seed=1)
+    register_sensor("odd", lambda world: 1 / 0)
+    with pytest.raises(OwnFunctionError):
+        env.reset(seed=1)
+    with pytest.raises(RuntimeError, match="half done"):
         env.step_batch(ACTIONS)
 
 

@@ -135,12 +135,14 @@ def test_a_scheduler_that_dies_ends_the_study_and_no_run_is_a_failure(
     monkeypatch.setattr(cluster, "CONNECT_WITHIN_S", 5.0)
     scheduler, address = scheduler_and_worker
     folder = StudyFolder(tmp_path / "study")
-    with (
-        pytest.raises(WorkerError, match=rf"scheduler of Dask \({address}\) does not answer any more"),
-        cluster_executor(address) as executor,
-    ):
-        once_some_runs_are_stored(folder, scheduler.kill)
-        run_study(STUDY, folder, executor=executor)
+
+    def run_on_it():
+        with cluster_executor(address) as executor:
+            once_some_runs_are_stored(folder, scheduler.kill)
+            run_study(STUDY, folder, executor=executor)
+
+    with pytest.raises(WorkerError, match=rf"scheduler of Dask \({address}\) does not answer any more"):
+        run_on_it()
     assert 2 <= len(folder.store.run_ids()) < STUDY.n_runs
     assert not list(folder.folder.rglob("failures/*"))
     assert not caplog.records, "one line says it, and that is ours"

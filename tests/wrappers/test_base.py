@@ -124,6 +124,29 @@ def test_numbers_of_robots_that_are_away_are_ignored(stack):
     assert len(stack.unwrapped.calls) == 1
 
 
+@pytest.mark.parametrize("hook", ["before_step", "gain", "observe", "after_step"])
+def test_a_hook_that_fails_leaves_a_tick_that_is_not_gone_on_with(hook):
+    """Some hooks of the tick have been called, and others not."""
+
+    def fails(*_):
+        raise OSError("no network")
+
+    env = ForageEnv(small_scenario())
+    wrapper = type("Own", (SwarmWrapper,), {"stack_position": 4, hook: fails})(env)
+    env.reset_batch(7)
+    if hook == "observe":
+        vars(wrapper)["observe"] = lambda obs: obs
+    wrapper.reset_batch(7)
+    vars(wrapper).pop("observe", None)
+    actions = np.zeros((4, 3), np.float32)
+    with pytest.raises(OSError, match="no network"):
+        wrapper.step_batch(actions)
+    with pytest.raises(RuntimeError, match="A tick is half done"):
+        wrapper.step_batch(actions)
+    env.reset_batch(7)
+    env.step_batch(actions)
+
+
 @pytest.mark.parametrize("of_the_inside", [False, True])
 def test_a_step_before_the_first_reset_is_refused(of_the_inside):
     env = wrapper_at(2)(FakeArena(small_scenario()))
