@@ -66,8 +66,7 @@ def as_actions(actions: ActionArray, n_robots: int, message_size: int = 0) -> Ac
     """
     expected = (n_robots, COMMANDS + message_size)
     try:
-        # Kernels are compiled for contiguous float32 only; another type would have all compiled anew.
-        checked = np.ascontiguousarray(actions, np.float32)
+        checked = real_numbers(actions)
     except (TypeError, ValueError) as error:
         raise ActionError(f"Expected actions with {_shape_in_words(expected)}: {error}.") from error
     if message_size and checked.shape == (n_robots, COMMANDS):
@@ -80,6 +79,21 @@ def as_actions(actions: ActionArray, n_robots: int, message_size: int = 0) -> Ac
             "pass one row per robot, inactive ones included."
         )
     return checked
+
+
+def real_numbers(values: Any) -> np.ndarray:
+    """Return real numbers as a contiguous float32 array, the same array if it is one.
+
+    Kernels are compiled for such arrays only; another type would have all compiled anew.
+
+    Raises:
+        TypeError: text, dates or complex numbers, which numpy would convert, too.
+        ValueError: no array.
+    """
+    given = np.asarray(values)
+    if given.dtype.kind not in "biufO":  # objects say themselves whether they are numbers
+        raise TypeError(f"real numbers are needed, not {given.dtype}")
+    return np.ascontiguousarray(given, np.float32)
 
 
 def _shape_in_words(expected: tuple[int, int]) -> str:

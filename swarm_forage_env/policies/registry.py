@@ -13,6 +13,7 @@ import numpy as np
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.policy import Policy, SwarmSpec
+from swarm_forage_env.contract.reset_and_step import real_numbers
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.mixture import Part, different_labels, is_mixture, mixture_of, mixture_parts
@@ -58,8 +59,14 @@ class CallablePolicy:
         self._shapes = spec.action_shapes
 
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
-        """Return the function's actions, checked for shape; raises ValueError otherwise."""
-        actions = np.asarray(self.function(obs), dtype=np.float32)
+        """Return the function's actions, checked for type and shape; raises ValueError otherwise."""
+        given = self.function(obs)
+        try:
+            actions = real_numbers(given)
+        except (TypeError, ValueError) as error:
+            raise ValueError(
+                f"Expected policy {self.name!r} to return real numbers, one row per robot: {error}."
+            ) from error
         if actions.shape not in self._shapes:
             raise ValueError(
                 f"Expected policy {self.name!r} to return actions with shape (n_robots, 3) = "

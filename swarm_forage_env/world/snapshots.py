@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass, field, is_dataclass
 from functools import cache
 from importlib import metadata
 from typing import Any
+from zlib import crc32
 
 from swarm_forage_env.scenarios.config import ScenarioConfig
 
@@ -67,6 +68,8 @@ class Snapshot:
     content: bytes = field(repr=False)
     kept: tuple[bytes, ...] = field(repr=False)
     """Parts of the content that other snapshots share."""
+    checksum: int = field(repr=False)
+    """Of `content` and `kept`, see `checksum_of`."""
 
 
 def take(origin: Origin, seed: int, tick: int, states: Sequence[Any], parts: Sequence[object]) -> Snapshot:
@@ -93,7 +96,18 @@ def take(origin: Origin, seed: int, tick: int, states: Sequence[Any], parts: Seq
             f"Expected a state that can be pickled, got {type(error).__name__}: {error}. A wrapper of your own that "
             "holds something else leaves it out by `__getstate__`."
         ) from error
-    return Snapshot(origin=origin, seed=seed, tick=tick, content=file.getvalue(), kept=tuple(writer.kept))
+    content, kept = file.getvalue(), tuple(writer.kept)
+    return Snapshot(
+        origin=origin, seed=seed, tick=tick, content=content, kept=kept, checksum=checksum_of(content, kept)
+    )
+
+
+def checksum_of(content: bytes, kept: Sequence[bytes]) -> int:
+    """Return a number that changes when a bit does: a damaged array may hold indices that compiled code follows."""
+    found = crc32(content)
+    for part in kept:
+        found = crc32(part, found)
+    return found
 
 
 def read(snapshot: Snapshot, origin: Origin, parts: Sequence[object]) -> list[Any]:
@@ -105,7 +119,7 @@ def read(snapshot: Snapshot, origin: Origin, parts: Sequence[object]) -> list[An
         parts: As in `take`, of that environment.
 
     Raises:
-        SnapshotError: not a snapshot, or one of another origin.
+        SnapshotError: not a snapshot, one of another origin, or a damaged one.
     """
     if not isinstance(snapshot, Snapshot):  # pyright: ignore[reportUnnecessaryIsInstance] - it comes from users
         raise SnapshotError(f"Expected a Snapshot, as `snapshot()` returns it, got {type(snapshot).__name__}.")
@@ -116,7 +130,19 @@ def read(snapshot: Snapshot, origin: Origin, parts: Sequence[object]) -> list[An
             "Expected a snapshot of an environment with the scenario, wrappers and version of this one, got another: "
             f"{'; '.join(found[:_SHOWN])}{more}. Restore it in an environment that is made as that one was."
         )
-    return _Reader(io.BytesIO(snapshot.content), [*parts, *snapshot.kept]).load()
+    try:
+        is_whole = checksum_of(snapshot.content, snapshot.kept) == snapshot.checksum
+    except TypeError:  # no bytes
+        is_whole = False
+    if not is_whole:
+        raise SnapshotError("Expected a snapshot as it was taken, got a damaged one; take it, or copy its file, again.")
+    try:
+        return _Reader(io.BytesIO(snapshot.content), [*parts, *snapshot.kept]).load()
+    except Exception as error:
+        raise SnapshotError(
+            f"Expected a snapshot of this Python's packages, got one that cannot be read here: "
+            f"{type(error).__name__}: {error}."
+        ) from error
 
 
 class _Writer(pickle.Pickler):

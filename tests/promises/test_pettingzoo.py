@@ -263,7 +263,19 @@ def test_batches_of_other_numbers_are_converted():
         np.testing.assert_array_equal(world.step_batch(other)[0], expected)
 
 
-@pytest.mark.parametrize("actions", [[["a", "b", "c"]] * 5, None, [[0.0, 0.0, 0.0]] * 4 + [[0.0]], {}])
+@pytest.mark.parametrize(
+    "actions",
+    [
+        [["a", "b", "c"]] * 5,
+        [["0.5", "0", "1"]] * 5,
+        None,
+        [[0.0, 0.0, 0.0]] * 4 + [[0.0]],
+        {},
+        np.full((5, 3), 0.5 + 1j),
+        np.full((5, 3), 1j).astype(object),
+        np.full((5, 3), np.timedelta64(1)),
+    ],
+)
 def test_batches_that_are_no_numbers(actions):
     world = parallel_env(**SMALL)
     world.reset_batch(0)

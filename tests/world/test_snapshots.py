@@ -4,6 +4,7 @@ import copy
 import itertools
 import pickle
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from swarm_forage_env import Snapshot, SnapshotError, parallel_env, scenario
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.config import PHYSICS_ENGINES
+from swarm_forage_env.world import snapshots
 from tests.support.branches import Branch, pickled
 from tests.support.busy import BusyPolicy
 from tests.support.crowded_runs import DENSE, side
@@ -248,6 +250,41 @@ def test_many_differences_are_counted():
 def test_what_is_no_snapshot_is_refused():
     with pytest.raises(SnapshotError, match=r"Expected a Snapshot, as `snapshot\(\)` returns it, got dict"):
         small().restore({})
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda content: {"content": content[:100]},
+        lambda content: {"content": b""},
+        lambda content: {"content": None},
+        lambda content: {"content": content[:2000] + bytes([content[2000] ^ 4]) + content[2001:]},
+        lambda content: {"kept": (bytes(5000),)},
+        lambda content: {"kept": None},
+    ],
+    ids=["cut", "empty", "none", "bit", "parts", "no parts"],
+)
+def test_a_damaged_snapshot_is_refused_and_changes_nothing(damage):
+    """A flipped bit could be an index beyond the end of an array."""
+    env = small(n_robots=30)
+    env.reset(seed=1)
+    twin = copy.deepcopy(env)
+    snapshot = env.snapshot()
+    snapshot = replace(snapshot, **damage(snapshot.content))
+    with pytest.raises(SnapshotError, match="Expected a snapshot as it was taken, got a damaged one"):
+        env.restore(snapshot)
+    np.testing.assert_array_equal(env.last_obs, twin.last_obs)
+    actions = np.full((30, 3), 0.5, np.float32)
+    np.testing.assert_array_equal(env.step_batch(actions)[0], twin.step_batch(actions)[0])
+
+
+def test_a_snapshot_that_this_python_cannot_read_is_refused():
+    env = small()
+    env.reset(seed=1)
+    content = b"cno_such_module\nThing\n."
+    foreign = replace(env.snapshot(), content=content, checksum=snapshots.checksum_of(content, ()))
+    with pytest.raises(SnapshotError, match="cannot be read here: ModuleNotFoundError: No module named 'no_such"):
+        env.restore(foreign)
 
 
 def test_the_switch_is_checked():
