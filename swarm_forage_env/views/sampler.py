@@ -27,7 +27,7 @@ from typing import Any, get_type_hints
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError, instance, known_keys, number, table
+from swarm_forage_env._internal.fields import ConfigError, as_whole, instance, known_keys, number, table
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.layout import BUILT_IN_SLICES, LayoutRow
 from swarm_forage_env.contract.policy import layout_for
@@ -204,7 +204,14 @@ class ScenarioSampler:
             ) from error
 
     def world_of(self, seed: int, share: float | None = None) -> World:
-        """Return the world of the run with this seed; see `draw`."""
+        """Return the world of the run with this seed; see `draw`.
+
+        Raises:
+            ConfigError: no whole number from 0 up as seed, a share outside of [0, 1), or see `draw`.
+        """
+        seed = as_whole("seed", seed, at_least=0)
+        if share is not None:
+            number("share", share, at_least=0.0, below=1.0)
         return self.draw(stream_rng(seed, Stream.SCENARIO), share)
 
     def shares(self, n_arenas: int) -> list[float | None]:

@@ -25,6 +25,19 @@ def test_a_seed_gives_the_same_world_and_others_give_others():
     assert len({world.n_robots for world in drawn(sampler(), 20)}) > 2
 
 
+@pytest.mark.parametrize("seed", [None, -1, 1.5, "1", True])
+def test_a_seed_is_a_whole_number(seed):
+    """Without one the operating system would draw, and another world each time."""
+    with pytest.raises(ConfigError, match="Expected seed to be a whole number >= 0"):
+        sampler().world_of(seed)
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.0, float("nan"), "all"])
+def test_a_share_is_a_place_among_the_weights(share):
+    with pytest.raises(ConfigError, match=r"Expected share to be .* got"):
+        sampler().world_of(1, share)
+
+
 def test_worlds_come_as_often_as_their_weights_say_and_wrappers_as_their_probability():
     found = drawn(sampler())
     names = Counter(world.scenario.name for world in found)
