@@ -1,4 +1,3 @@
-#!/usr/bin/env python
 """RecurrentPPO of sb3-contrib: robots that remember by a network of their own, without the site memory of the package.
 
     pip install ".[train]" "torch==2.13.0" "sb3-contrib==2.9.2"  # in a checkout

@@ -1,4 +1,3 @@
-#!/usr/bin/env python
 """MAPPO with TorchRL: robots share an actor that sees what one robot sees, and a critic that sees the whole swarm.
 
     pip install . "torchrl==0.14.1" "torch==2.13.0"  # in a checkout

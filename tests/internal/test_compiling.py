@@ -286,7 +286,7 @@ def test_without_a_place_for_compiled_functions_they_are_compiled_in_every_proce
     # Not by permissions: whoever runs the tests may be allowed to write everywhere.
     monkeypatch.setattr(CacheImpl, "_locator_classes", [])
     assert hits(inner()) == 0
-    (told,) = caplog.messages
+    (told,) = [record.getMessage() for record in caplog.records if record.levelname == "WARNING"]
     assert "Compiled functions cannot be kept" in told
     assert "Set NUMBA_CACHE_DIR" in told
 
@@ -294,7 +294,7 @@ def test_without_a_place_for_compiled_functions_they_are_compiled_in_every_proce
 @pytest.mark.compiled
 def test_a_full_disk_keeps_no_compiled_functions_and_says_so(inner, full_disk, caplog):
     assert hits(inner()) == 0
-    (told,) = caplog.messages
+    (told,) = [record.getMessage() for record in caplog.records if record.levelname == "WARNING"]
     assert "cannot be kept" in told
     assert "File too large" in told
 
