@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from importlib.metadata import version
 
 import pytest
 
@@ -26,7 +27,7 @@ main()
 
 
 def test_version_and_help(command):
-    assert command("--version") == (0, "swarm-forage 0.1.0\n", "")
+    assert command("--version") == (0, f"swarm-forage {version('swarm-forage-env')}\n", "")
     assert command() == command("--help")
     code, out, err = command("--help")
     assert (code, err) == (0, "")

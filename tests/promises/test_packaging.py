@@ -1,5 +1,6 @@
 """What an installed package promises: light imports, complete names, one version, commands that are pinned."""
 
+import json
 import os
 import re
 import subprocess
@@ -11,6 +12,7 @@ from pathlib import Path
 import gymnasium
 import pettingzoo
 import pytest
+from packaging.requirements import Requirement
 
 import swarm_forage_env
 from swarm_forage_env.contract.policy import Policy
@@ -79,6 +81,34 @@ def test_changelog_and_citation_have_this_version_and_its_date():
     dates = re.findall(r"^date-released: (.+)$", citation, re.MULTILINE)
     assert f"\nversion: {PROJECT['version']}\n" in citation
     assert f"## {PROJECT['version']} ({dates[0]})\n" in (ROOT / "CHANGELOG.md").read_text()
+
+
+def test_archives_and_papers_name_the_same_software():
+    """Version, authors and words stand in files of several formats; pyproject.toml is where they come from."""
+    known = json.loads((ROOT / "codemeta.json").read_text())
+    citation, paper = ((ROOT / name).read_text() for name in ("CITATION.cff", "paper/paper.md"))
+    (author,) = (one["name"] for one in PROJECT["authors"])
+    assert (known["identifier"], known["version"]) == (PROJECT["name"], PROJECT["version"])
+    assert (known["description"], known["keywords"]) == (PROJECT["description"], PROJECT["keywords"])
+    assert known["license"] == f"https://spdx.org/licenses/{PROJECT['license']}"
+    assert known["runtimePlatform"].replace(" ", "") == f"Python{PROJECT['requires-python']}"
+    assert [one["name"] for one in known["author"]] == [author]
+    assert f"\n  - name: {author}\n" in citation
+    assert f"\n  - name: {author}\n" in paper
+    assert f"\ndate-released: {known['datePublished']}\n" in citation
+    assert f"\ntitle: {known['name']}\n" in citation
+    assert f'\ntitle: "{known["name"]}: ' in paper
+    publication = known["referencePublication"]
+    assert f'title: "{publication["name"]}"' in citation
+    assert publication["identifier"].endswith(re.findall(r"doi: (\S+)", citation)[0])
+
+
+def test_hooks_have_versions_of_the_dev_extra():
+    hooks = (ROOT / ".pre-commit-config.yaml").read_text()
+    revisions = dict(re.findall(r"repo: https://github\.com/\S+/(\w+)\S*\n +rev: v(\S+)", hooks))
+    demanded = {one.name: one.specifier for one in map(Requirement, PROJECT["optional-dependencies"]["dev"])}
+    for name in ("ruff", "codespell", "zizmor"):
+        assert revisions[name] in demanded[name], f"{name}: .pre-commit-config.yaml beside pyproject.toml"
 
 
 @pytest.mark.parametrize("name", swarm_forage_env.SCENARIO_NAMES)
