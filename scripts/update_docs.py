@@ -7,7 +7,8 @@
     scripts/update_docs --compare FILE   compare the deliveries that a run of README's command printed with the stored;
                                          where other versions are installed, only say that they are not compared
 
-The commands are listed below; the store is docs/results.json. A block looks like
+The commands are listed below; the store is docs/results.json. Answers to claims and means of measures come of the files
+of docs/results, see `results_numbers.py`. A block looks like
 `<!-- generated: run.crw by scripts/update_docs -->20.45 ± 0.91<!-- end -->`; `run.table` is all that a command printed.
 A number must not begin a line: Markdown takes a comment there for the start of an HTML block, which ends the paragraph.
 --remake needs an installation with everything: pip install -e ".[plots,train]" "torch==2.13.0"
@@ -27,8 +28,11 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from scripts.results_numbers import results_fields
+
 ROOT = Path(__file__).resolve().parent.parent
 STORE = ROOT / "docs/results.json"
+RESULTS = ROOT / "docs/results"
 PAGES = [ROOT / "README.md", ROOT / "paper/paper.md", *sorted((ROOT / "docs").rglob("*.md")),
          *sorted((ROOT / "swarm_forage_env/policies/pretrained").glob("*.md"))]  # fmt: skip
 BLOCK = re.compile(
@@ -177,12 +181,20 @@ def compare(printed: str, stored: dict[str, Any]) -> int:
     return 1 if differing else 0
 
 
+def known(store: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Return the store with the fields of docs/results."""
+    return {**store, "results": results_fields(RESULTS)}
+
+
 def written(text: str, store: dict[str, dict[str, Any]]) -> str:
     """Return a page with its blocks as they are stored."""
 
     def block(match: re.Match[str]) -> str:
         value = store[match["source"]][match["field"]]
-        value = f"\n```\n{value}\n```\n" if match["field"] == "table" else value
+        if match["field"] == "table":
+            value = f"\n```\n{value}\n```\n"
+        elif value.startswith("|"):  # Markdown's own
+            value = f"\n\n{value}\n\n"
         return f"{match[1]}{value}{match[5]}"
 
     return BLOCK.sub(block, text)
@@ -211,11 +223,12 @@ def main(words: Sequence[str] | None = None) -> int:
     broken = [f"{page.relative_to(ROOT)}:{line}" for page in PAGES for line in broken_lines(page.read_text("utf-8"))]
     for place in broken:
         print(f"{place}: expected a word before the number of a run, whose comment breaks the paragraph here")
+    store = known(store)
     differing_pages = [
         page for page in PAGES if written(page.read_text(encoding="utf-8"), store) != page.read_text(encoding="utf-8")
     ]
     for page in differing_pages:
-        print(f"{page.relative_to(ROOT)}: {'differs from docs/results.json' if arguments.check else 'written'}")
+        print(f"{page.relative_to(ROOT)}: {'differs from what is stored' if arguments.check else 'written'}")
         if not arguments.check:
             page.write_text(written(page.read_text(encoding="utf-8"), store), encoding="utf-8")
     return 1 if broken or (arguments.check and differing_pages) else 0

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from scripts import update_docs
+from scripts.results_numbers import results_fields
 from scripts.update_docs import FIVE
 from swarm_forage_env.runs import workers
 
@@ -107,9 +108,10 @@ def test_readme_table_names_every_scenario():
 
 def test_numbers_of_runs_are_those_of_the_store():
     store = json.loads(update_docs.STORE.read_text())
+    known = update_docs.known(store)
     for page in update_docs.PAGES:
         text = page.read_text()
-        assert update_docs.written(text, store) == text, f"{page}: scripts/update_docs"
+        assert update_docs.written(text, known) == text, f"{page}: scripts/update_docs"
         by_hand = update_docs.BLOCK.sub("", text)
         numbers = {values[name] for source, values in store.items() for name in update_docs.SOURCES[source][1]}
         assert [number for number in numbers if number in by_hand] == [], f"{page}: a number outside of a block"
@@ -137,6 +139,36 @@ def test_a_number_that_begins_a_line_is_found(before, tmp_path, monkeypatch, cap
 def test_a_block_is_written_from_the_store():
     page = "before <!-- generated: run.crw by scripts/update_docs -->1.00 ± 0.10<!-- end --> after"
     assert update_docs.written(page, {"run": {"crw": "2.00 ± 0.20"}}) == page.replace("1.00 ± 0.10", "2.00 ± 0.20")
+
+
+def test_answers_and_means_are_those_beside_the_results(tmp_path):
+    (tmp_path / "runs.csv").write_text(
+        "set,runs,swarm-forage-env,code,hours\nS1a,1200,0.1.0,abc,0.26\nS1b,40,0.1.0,abc,\n"
+    )
+    (tmp_path / "measures.csv").write_text(
+        "runs,measure,form,rules,others,policy,value,mean\n"
+        "S1a 12345678,raw_performance,marginal,described,,crw,128.0,456.375\n"
+        "S2a 12345678,raw_performance,marginal,described,walk_probability 0,crw,128.0,1\n"
+        "S1a 12345678,spatial_emergence,interactive,described,,crw,4.0,1\n"
+    )
+    (tmp_path / "verdicts.csv").write_text(
+        "claim,rules,measures,sense,answer\nV1,,,,supported\nE1,described,corrected,,contradicted\n"
+        "E1,described,corrected,of mean curves,tie\nE1,program,corrected,,supported\nE1,program,paper,,tie\n"
+    )
+    found = results_fields(tmp_path)
+    assert (found["V1"], found["E1"], found["C3"]) == (
+        "supported, supported",
+        "contradicted, supported",
+        "waiting, waiting",
+    )
+    assert [name for name in found if name.startswith(("S1", "S2"))] == ["S1a_raw_performance_described_crw_128"]
+    assert found["S1a_raw_performance_described_crw_128"] == "456.4"
+    assert (found["runs"], found["sets"], found["hours"], found["code"]) == ("1,240", "2", "0.3", "abc")
+    assert found["contradicted"] == "None."
+    assert found["split"].splitlines()[2].endswith("| contradicted | supported |")
+    assert found["answers"].splitlines()[2].startswith("| described | 1 | 1 | 0 | 0 | 0 |")
+    block = "<!-- generated: results.split by scripts/update_docs -->"
+    assert f"{block}\n\n| claim |" in update_docs.written(f"{block}<!-- end -->", {"results": found})
 
 
 def test_deliveries_are_read_from_a_printed_table():

@@ -97,8 +97,9 @@ def test_archives_and_papers_name_the_same_software():
     assert f"\n  - name: {author}\n" in paper
     assert f"\ndate-released: {known['datePublished']}\n" in citation
     assert f"\ntitle: {known['name']}\n" in citation
-    assert f'\ntitle: "{known["name"]}: ' in paper
+    assert f"\nsoftware: {known['name']} {known['version']}\n" in paper
     publication = known["referencePublication"]
+    assert f'\ntitle: "[Re] {publication["name"]}"\n' in paper
     assert f'title: "{publication["name"]}"' in citation
     assert publication["identifier"].endswith(re.findall(r"doi: (\S+)", citation)[0])
 

@@ -1,0 +1,91 @@
+"""Numbers and answers of docs/results as fields of blocks in pages, which scripts/update_docs writes.
+
+    results.C3                                      the answers to a claim under the rules described and program
+    results.S1a_raw_performance_described_crw_128   a mean of measures.csv: set, measure, rules, policy, value
+    results.runs, .sets, .hours, .version, .code    what was run, and by what
+    results.answers                                 how many claims have which answer, as a table
+    results.contradicted, .supported, .split        claims with these answers under both rules, as tables
+
+Answers are ours, by intervals, with the corrected measures; `results_data.py` writes the files.
+"""
+
+import csv
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from metrics.claims import CLAIMS
+from swarm_forage_env._internal.wording import number
+
+DESCRIBED, PROGRAM = RULES = ("described", "program")
+ANSWERS = ("supported", "contradicted", "tie", "undecided", "too vague")
+"""Columns of the table, in this order; further ones follow."""
+
+
+def results_fields(folder: Path) -> dict[str, str]:
+    """Return the fields of the files in a folder such as docs/results."""
+    answers = dict(_answers(folder / "verdicts.csv"))
+    return {
+        **{name: ", ".join(given) for name, given in answers.items()},
+        **dict(_means(folder / "measures.csv")),
+        **_runs(folder / "runs.csv"),
+        "answers": _counts(list(answers.values())),
+        "contradicted": _claims(answers, ("contradicted", "contradicted")),
+        "supported": _claims(answers, ("supported", "supported")),
+        "split": _claims(answers, ("contradicted", "supported"), ("supported", "contradicted")),
+    }
+
+
+def _lines(file: Path) -> list[dict[str, str]]:
+    with file.open(encoding="utf-8", newline="") as lines:
+        return list(csv.DictReader(lines))
+
+
+def _answers(file: Path) -> Iterator[tuple[str, tuple[str, str]]]:
+    """Yield each claim of the paper and its answers; one about a formula has the same under both rules."""
+    given = {
+        (line["claim"], line["rules"]): line["answer"]
+        for line in _lines(file)
+        if line["measures"] in ("", "corrected") and not line["sense"]
+    }
+    for name in CLAIMS:
+        of_formula = given.get((name, ""), "waiting")
+        yield name, (given.get((name, DESCRIBED), of_formula), given.get((name, PROGRAM), of_formula))
+
+
+def _means(file: Path) -> Iterator[tuple[str, str]]:
+    """Yield the means that depend on nothing but the last axis of their set."""
+    for line in _lines(file):
+        if line["form"] == "marginal" and not line["others"]:
+            place = (line["measure"], line["rules"], line["policy"], f"{float(line['value']):g}")
+            yield "_".join([line["runs"].split()[0], *place]), number(float(line["mean"]))
+
+
+def _runs(file: Path) -> dict[str, str]:
+    lines = _lines(file)
+    made = {name: sorted({line[name] for line in lines}) for name in ("swarm-forage-env", "code")}
+    return {
+        "runs": f"{sum(int(line['runs']) for line in lines):,}",
+        "sets": f"{len(lines)}",
+        "hours": f"{sum(float(line['hours'] or 0.0) for line in lines):.1f}",
+        "version": ", ".join(made["swarm-forage-env"]),
+        "code": ", ".join(made["code"]),
+    }
+
+
+def _table(header: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
+    return "\n".join(f"| {' | '.join(line)} |" for line in (header, ["---"] * len(header), *lines))
+
+
+def _counts(answers: Sequence[tuple[str, str]]) -> str:
+    counts = [Counter(given[place] for given in answers) for place in range(len(RULES))]
+    known = [*ANSWERS, *sorted(set().union(*counts) - set(ANSWERS))]
+    return _table(
+        ["rules", *known],
+        [[rules, *(str(count[answer]) for answer in known)] for rules, count in zip(RULES, counts, strict=True)],
+    )
+
+
+def _claims(answers: dict[str, tuple[str, str]], *wanted: tuple[str, str]) -> str:
+    found = [(name, CLAIMS[name].text, *given) for name, given in answers.items() if given in wanted]
+    return _table(["claim", "the paper", *RULES], found) if found else "None."
