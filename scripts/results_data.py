@@ -8,7 +8,6 @@
 In the tables a set stands with the first digits of the digest of its runs, "S1a 3f2a9c1d".
 """
 
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -17,23 +16,15 @@ from typing import Any
 import polars as pl
 import polars.selectors as cs
 
-from metrics.claims import CLAIMS, Claim
+from metrics.claims import Claim
 from metrics.scoring import StudyVerdict, study_figures
-from metrics.scoring.study_verdict import ANSWERS
 from swarm_forage_env._internal.files import replacing
-from swarm_forage_env._internal.wording import number
 from swarm_forage_env.runs.store import DONE
 from swarm_forage_env.studies.study_table import StudyTable, read_study
 
 RUNS, MEASURES, VERDICTS = "runs.csv", "measures.csv", "verdicts.csv"
 DATA = "results"
 """Folder of the files, beside the page."""
-FINDINGS = "findings.md"
-"""The page of prose: its words are written by people, the answers and numbers in it by this script."""
-_ANSWERS = re.compile(rf"\b([A-Z]\d+|relative): ({'|'.join(ANSWERS)}),\s+({'|'.join(ANSWERS)})")
-"""A claim, or the one before it relative to performance, with its answers under the rules described and program."""
-_NUMBER = re.compile(rf'\[[^\]]*\]\({DATA}/{MEASURES} "(\w+) (\w+) (\w+) (\w+) ([\d.]+) ?([^"]*)"\)')
-"""A mean of `MEASURES`, by set, measure, rules, policy, value on the last axis and those on others."""
 DIGITS = 8
 """Of a digest, where it names runs."""
 SIGNIFICANT = 6
@@ -109,40 +100,6 @@ def runs_of(claim: Claim, results: StudyVerdict) -> str:
     """Return the runs that a claim is held against."""
     sets = {panel.experiment.split()[0] for panel in claim.panels}
     return ", ".join(run_words(table) for table in results.tables if table.spec.name in sets)
-
-
-def with_findings(text: str, results: StudyVerdict) -> str:
-    """Return the page of prose with the answers and numbers of these results; new answers may need new words.
-
-    Raises:
-        ValueError: a number that no run has.
-    """
-    before = ""
-
-    def answered(found: re.Match[str]) -> str:
-        nonlocal before
-        before = found[1] if found[1] in CLAIMS else before
-        place = 2 if found[1] == "relative" else 1  # of `cells`
-        given = [results.cells(CLAIMS[before], rules)[place] for rules in ("described", "program")]
-        gap = found[0][len(f"{found[1]}: {found[2]},") : -len(found[3])]
-        return f"{found[1]}: {given[0]},{gap}{given[1]}"
-
-    keys = ("measure", "rules", "policy")
-    means: dict[str, float] = {
-        " ".join([row["runs"].split()[0], *(row[key] for key in keys), f"{row['value']:g} {row['others']}"]): row[
-            "mean"
-        ]
-        for row in measures(results)
-        if row["form"] == "marginal"
-    }
-
-    def numbered(found: re.Match[str]) -> str:
-        key = " ".join(found.groups())
-        if key not in means:
-            raise ValueError(f"Expected a number of {FINDINGS} as {MEASURES} has it, got {key}.")
-        return f"[{number(means[key])}]{found[0][found[0].index('](') + 1 :]}"
-
-    return _NUMBER.sub(numbered, _ANSWERS.sub(answered, text))
 
 
 def _about(table: StudyTable) -> dict[str, Any]:

@@ -1,7 +1,9 @@
 """Numbers and answers of docs/results as fields of blocks in pages, which scripts/update_docs writes.
 
     results.C3                                      the answers to a claim under the rules described and program
-    results.S1a_raw_performance_described_crw_128   a mean of measures.csv: set, measure, rules, policy, value
+    results.R2_relative                             the same relative to performance
+    results.S1a_raw_performance_described_crw_128   a mean of measures.csv: set, measure, rules, policy, value,
+                                                    and values on other axes, such as _walk_probability_0
     results.runs, .sets, .hours, .version, .code    what was run, and by what
     results.answers                                 how many claims have which answer, as a table
     results.contradicted, .supported, .split        claims with these answers under both rules, as tables
@@ -27,6 +29,10 @@ def results_fields(folder: Path) -> dict[str, str]:
     answers = dict(_answers(folder / "verdicts.csv"))
     return {
         **{name: ", ".join(given) for name, given in answers.items()},
+        **{
+            f"{name}_relative": ", ".join(given)
+            for name, given in _answers(folder / "verdicts.csv", "relative to performance")
+        },
         **dict(_means(folder / "measures.csv")),
         **_runs(folder / "runs.csv"),
         "answers": _counts(list(answers.values())),
@@ -41,12 +47,12 @@ def _lines(file: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(lines))
 
 
-def _answers(file: Path) -> Iterator[tuple[str, tuple[str, str]]]:
+def _answers(file: Path, sense: str = "") -> Iterator[tuple[str, tuple[str, str]]]:
     """Yield each claim of the paper and its answers; one about a formula has the same under both rules."""
     given = {
         (line["claim"], line["rules"]): line["answer"]
         for line in _lines(file)
-        if line["measures"] in ("", "corrected") and not line["sense"]
+        if line["measures"] in ("", "corrected") and line["sense"] == sense
     }
     for name in CLAIMS:
         of_formula = given.get((name, ""), "waiting")
@@ -54,10 +60,11 @@ def _answers(file: Path) -> Iterator[tuple[str, tuple[str, str]]]:
 
 
 def _means(file: Path) -> Iterator[tuple[str, str]]:
-    """Yield the means that depend on nothing but the last axis of their set."""
+    """Yield all means of measures that compare neighbouring sizes, or none."""
     for line in _lines(file):
-        if line["form"] == "marginal" and not line["others"]:
-            place = (line["measure"], line["rules"], line["policy"], f"{float(line['value']):g}")
+        if line["form"] == "marginal":
+            others = line["others"].split()
+            place = (line["measure"], line["rules"], line["policy"], f"{float(line['value']):g}", *others)
             yield "_".join([line["runs"].split()[0], *place]), number(float(line["mean"]))
 
 

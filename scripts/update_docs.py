@@ -40,7 +40,7 @@ BLOCK = re.compile(
     re.DOTALL,
 )
 BEGINS_A_LINE = re.compile(
-    r"^[ >]*(?:(?:[-*+]|\d+[.)]) +)?<!-- generated: \w+\.(?!table )\w+ by scripts/update_docs -->", re.MULTILINE
+    r"^[ >]*(?:(?:[-*+]|\d+[.)]) +)?<!-- generated: \w+\.\w+ by scripts/update_docs -->(?!\n)", re.MULTILINE
 )
 PACKAGES = ("numpy", "scipy", "numba", "pymunk")
 FIVE = ("crw", "dpo", "stochm", "stochx", "ppo_warehouse_small")

@@ -2,7 +2,7 @@
 
     scripts/write_results DIR|FILE ...               from folders of studies, or from their packed files
     scripts/write_results                            from the packed runs of docs/results, those of an earlier call
-    scripts/write_results --check                    say whether pages and tables are those of these runs; exit 1 if not
+    scripts/write_results --check                    say whether page and tables are those of these runs; exit 1 if not
     scripts/write_results --out FOLDER DIR|FILE ...  the same with another folder than docs
 
 What is given is packed into docs/results, and all that is written comes of these files; `results_data.py` says what
@@ -23,7 +23,6 @@ from typing import Any
 from PIL import Image
 from results_data import (
     DATA,
-    FINDINGS,
     MEASURES,
     RUNS,
     VERDICTS,
@@ -31,7 +30,6 @@ from results_data import (
     runs_of,
     ship,
     shipped,
-    with_findings,
     write_numbers,
 )
 
@@ -450,8 +448,6 @@ def differing(results: StudyVerdict, folder: Path) -> list[str]:
         write_numbers(results, Path(there))
         tables = {f"{DATA}/{name}": Path(there, name).read_text(encoding="utf-8") for name in (MEASURES, VERDICTS)}
     expected = {PAGE: page(results, None), **tables}
-    if (folder / FINDINGS).is_file():
-        expected[FINDINGS] = with_findings((folder / FINDINGS).read_text(encoding="utf-8"), results)
     return [name for name, text in expected.items() if (folder / name).read_text(encoding="utf-8") != text]
 
 
@@ -480,8 +476,6 @@ def main(words: Sequence[str] | None = None) -> int:
         print(f"not those of the runs in {out / DATA}: {', '.join(others)}" if others else "as the runs have it")
         return int(bool(others))
     (out / PAGE).write_text(page(results, out), encoding="utf-8")
-    if (findings := out / FINDINGS).is_file():
-        findings.write_text(with_findings(findings.read_text(encoding="utf-8"), results), encoding="utf-8")
     write_numbers(results, out / DATA)
     n_pictures = len(list((out / PICTURES).glob("*.png")))
     print(f"written {out / PAGE}, {RUNS}, {MEASURES} and {VERDICTS} in {out / DATA}, {counted(n_pictures, 'picture')}")

@@ -153,7 +153,8 @@ def test_answers_and_means_are_those_beside_the_results(tmp_path):
     )
     (tmp_path / "verdicts.csv").write_text(
         "claim,rules,measures,sense,answer\nV1,,,,supported\nE1,described,corrected,,contradicted\n"
-        "E1,described,corrected,of mean curves,tie\nE1,program,corrected,,supported\nE1,program,paper,,tie\n"
+        "E1,described,corrected,of mean curves,tie\nE1,described,corrected,relative to performance,undecided\n"
+        "E1,program,corrected,,supported\nE1,program,paper,,tie\n"
     )
     found = results_fields(tmp_path)
     assert (found["V1"], found["E1"], found["C3"]) == (
@@ -161,7 +162,11 @@ def test_answers_and_means_are_those_beside_the_results(tmp_path):
         "contradicted, supported",
         "waiting, waiting",
     )
-    assert [name for name in found if name.startswith(("S1", "S2"))] == ["S1a_raw_performance_described_crw_128"]
+    assert [name for name in found if name.startswith(("S1", "S2"))] == [
+        "S1a_raw_performance_described_crw_128",
+        "S2a_raw_performance_described_crw_128_walk_probability_0",
+    ]
+    assert found["E1_relative"] == "undecided, waiting"
     assert found["S1a_raw_performance_described_crw_128"] == "456.4"
     assert (found["runs"], found["sets"], found["hours"], found["code"]) == ("1,240", "2", "0.3", "abc")
     assert found["contradicted"] == "None."
@@ -224,7 +229,9 @@ def test_remake_runs_the_command_and_writes_store_and_pages(tmp_path, monkeypatc
     store, page = tmp_path / "results.json", tmp_path / "page.md"
     store.write_text(json.dumps({"run": {}, "medium": {"crw": "as it was"}}))
     block = "<!-- generated: {} by scripts/update_docs -->{}<!-- end -->"
-    page.write_text(block.format("run.table", "") + block.format("run.crw", "") + block.format("medium.crw", ""))
+    page.write_text(
+        "Runs: " + block.format("run.table", "") + block.format("run.crw", "") + block.format("medium.crw", "")
+    )
     monkeypatch.setitem(
         update_docs.SOURCES, "run", ((f"{command} --robots 10 --horizon 200 --seeds 2 --jobs 1",), labels)
     )
@@ -238,7 +245,8 @@ def test_remake_runs_the_command_and_writes_store_and_pages(tmp_path, monkeypatc
     assert made["run"]["made_with"] == update_docs.made_with()
     assert "10 robots, 200 objects, 200 s" in made["run"]["table"]
     assert page.read_text() == (
-        block.format("run.table", f"\n```\n{made['run']['table']}\n```\n")
+        "Runs: "
+        + block.format("run.table", f"\n```\n{made['run']['table']}\n```\n")
         + block.format("run.crw", made["run"]["crw"])
         + block.format("medium.crw", "as it was")
     )
