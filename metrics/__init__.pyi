@@ -105,6 +105,11 @@ from .foraging_model import ForagingRates as ForagingRates
 from .foraging_model import MeanField as MeanField
 from .foraging_model import SteadyState as SteadyState
 
+# how near to the limit
+from .scoring import limit_of as limit_of
+from .limits import foraging_limit as foraging_limit
+from .limits import ForagingLimit as ForagingLimit
+
 # foraging from the scenario alone
 from .random_search import search_curves as search_curves
 from .random_search import heading_diffusion as heading_diffusion

@@ -32,12 +32,14 @@ from .study_report import StudyReport, report
 from .study_verdict import Judged, StudyVerdict, Waiting, judge_claims, verdict
 from .summary import RunQuestion, RunSummary, run_question, summarize_runs
 from .until_decided import Outlook, run_until_decided
+from .world_limits import limit_of
 
 __all__ = [
     "score_policy",
     "compare_policies",
     "score_curves",
     "compare_tables",
+    "limit_of",
     "ask",
     "run_question",
     "summarize_runs",

@@ -51,6 +51,8 @@ SIGNATURES = {
     "forward_error": "name, sizes, performance",
     "mean_field": "rates, n_robots, horizon_s, *, n_points=201",
     "steady_state": "rates, n_robots",
+    "foraging_limit": "gaps_m, *, n_robots, n_objects, horizon_s, speed_mps, handling_s",
+    "limit_of": "world",
     "estimate_rates": "n_robots, *, pickups, deliveries, n_carrying, interference, interval_s, n_objects, "
     "lone_interference=None, avoidance_s=1.0",
     "fit_ladder": "sizes, runs, *, level=0.95, n_resamples=200, seed=None",
