@@ -148,7 +148,7 @@ def test_without_pytest_it_says_what_to_install(monkeypatch):
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("name", policy_names())
+@pytest.mark.parametrize("name", sorted({*policy_names()} - {"oracle"}))
 def test_shipped_policies_pass(name):
     check_policy(name, scenario("warehouse_small", n_robots=20, n_objects=300))
     check_determinism(name, scenario("warehouse_small", n_robots=20, n_objects=300), seeds=[3], seconds=30.0)

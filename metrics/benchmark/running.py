@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env.policies.registry import file_of, is_policy_file, policy_label
+from swarm_forage_env.contract.policy import reads_world
+from swarm_forage_env.policies.registry import file_of, is_policy_file, policy_class, policy_label
 from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.policy_spec import policy_specs
 from swarm_forage_env.runs.record import RunRecord
@@ -98,8 +99,15 @@ def benchmark_question(
         raise BenchmarkError(
             f"Expected one training seed per policy, got {len(training_seeds)} for {len(policies)} policies."
         )
+    specs = policy_specs(policies)
+    omniscient = [spec.label for spec in specs if reads_world(policy_class(spec.policy))]
+    if omniscient:
+        raise BenchmarkError(
+            f"Expected policies that decide by what robots observe, got {omniscient[0]}, which reads the world. It is "
+            "a yardstick and no contestant: swarm-forage run puts it beside others."
+        )
     return BenchmarkQuestion(
-        plan=Plan.product(policy_specs(policies), [each.world for each in chosen.worlds], chosen.seeds),
+        plan=Plan.product(specs, [each.world for each in chosen.worlds], chosen.seeds),
         name=name,
         protocol=chosen,
         command=command or entry_command(policies, name),

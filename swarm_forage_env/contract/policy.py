@@ -1,6 +1,7 @@
 """The Policy protocol, and what a policy knows before a run.
 
-A policy, scripted or trained, sees observations and never the state of the world. `baselines` imports only this folder,
+A policy, scripted or trained, sees observations and never the state of the world. One exception is called what it is:
+`Policy` says how a yardstick such as the oracle gets at the world. `baselines` imports only this folder,
 `Quirks`, and the tools `compiling`, `rng` and `wording`, and nothing else of `swarm_forage_env`.
 """
 
@@ -233,6 +234,11 @@ class Memories(NamedTuple):
         return RememberedPlaces(self.place_m[own & ~self.is_cache], self.place_m[own & self.is_cache])
 
 
+def reads_world(policy: object) -> bool:
+    """Return whether a policy, or its class, takes the state of the world and not only observations; see `Policy`."""
+    return hasattr(policy, "read_world")
+
+
 @runtime_checkable
 class Policy(Protocol):
     """Controls every robot at once. An instance drives one run; its memory is created by `reset`.
@@ -242,6 +248,8 @@ class Policy(Protocol):
     (`inspect.replay` keeps it); `describe_memories() -> Memories`, where all robots remember things (`inspect.replay`
     keeps it, and the window shows those of one); `part_rows`, slices of rows that the record tells apart, set by
     `reset` (of mixed swarms, whose runs are counted tick by tick);
+    `read_world(env)`, called by runs after `reset` with the `ForageEnv`, which a policy may read and must not change: a
+    policy that has it is a yardstick and no contestant, so that `check_policy` and the benchmark refuse it;
     `compiled() -> CompiledPolicy | None`, for runs without Python between ticks (`KernelPolicy` has it); the class
     attributes `caches` ("none", "static", "dynamic": those that the policy is made for) and `reads` (names of the
     slices it looks at; default all; "light if carrying" = light only of robots that carry).

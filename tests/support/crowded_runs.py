@@ -25,6 +25,10 @@ DENSE = {
 }
 
 
+POLICIES = sorted({*policy_names()} - {"oracle"})
+"""Policies that see observations and not the world."""
+
+
 def made_for(policy: str) -> tuple[str, ...]:
     """The kinds of caches that a policy can live with: the one it states, else all."""
     stated = getattr(load_policy(policy), "caches", "none") if policy != "busy" else "none"
@@ -33,7 +37,7 @@ def made_for(policy: str) -> tuple[str, ...]:
 
 RUNS = [("busy", name, caches) for name in DENSE for caches in made_for("busy")]
 """The world is asked by a policy that does everything, in every kind of scenario with every kind of caches."""
-RUNS += [(policy, "warehouse_small", caches) for policy in policy_names() for caches in made_for(policy)]
+RUNS += [(policy, "warehouse_small", caches) for policy in POLICIES for caches in made_for(policy)]
 """A policy sees observations only, so one preset tells what it does."""
 EPISODES = [(name, "dpo") for name in NEAR]
 
