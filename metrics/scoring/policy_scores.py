@@ -11,7 +11,7 @@ from swarm_forage_env.runs.table import Table
 from swarm_forage_env.scenarios.performance import Performance, performance_of
 from swarm_forage_env.studies import ladders
 from swarm_forage_env.studies.ladders import Budget
-from swarm_forage_env.wrappers.world import World, WorldLike, world_of
+from swarm_forage_env.wrappers.world import SIZE, World, WorldLike, world_of
 
 from ..checks import CurveError, chosen_seeds
 from .by_adversity import forecast_population
@@ -20,7 +20,8 @@ from .measures import score_study
 from .question import Question, ask, failure_lines
 from .run_curves import THROTTLE, PerformanceLike, own_performance, policy_curves
 from .score_tables import Comparison, ScoreTable, side_by_side
-from .scores import ScoreForms, check_measures, criteria_of
+from .scores import Score, ScoreForms, check_measures, criteria_of
+from .world_limits import share_of_limit
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -68,6 +69,7 @@ class ScoreQuestion(Question[Comparison]):
     def _scores(self, table: Table, policy: str) -> ScoreTable:
         study = policy_curves(table, policy, self.performance)
         scores, missing = score_study(study, self.measures, self.forms)
+        scores = tuple(self._beside_limit(score, policy) for score in scores)
         scenario = self.plan.conditions[0].world.scenario
         return ScoreTable(
             policy=policy,
@@ -87,6 +89,15 @@ class ScoreQuestion(Question[Comparison]):
             },
             band=self.forms.band,
         )
+
+    def _beside_limit(self, score: Score, policy: str) -> Score:
+        """Return the performance of a swarm size with its share of the limit; other scores as they are."""
+        if score.measure != "raw_performance" or score.variant == "sierra" or self.performance is not None:
+            return score
+        sizes = [self.plan.specs_of(one)[0].world for one in self.plan.of_policy(policy) if one.world.criterion == SIZE]
+        world = next(each for each in sizes if each.n_robots == score.x)
+        share = share_of_limit(world, score.summary.mean)
+        return score if share is None else replace(score, beside={"of_limit": share})
 
 
 def score_policy(

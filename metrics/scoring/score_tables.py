@@ -35,8 +35,8 @@ TEST = (
 """How differences are tested, as a text for readers."""
 VALUES = (
     "Values: mean over seeds with half of Student's 95 % interval; in brackets the mean relative to the performance "
-    f"compared with; ! = runs are missing; {DOUBTFUL} = misleads, a note says why. Noise floor: what two runs of the "
-    "undisturbed swarm score by chance."
+    "compared with, of raw_performance the share of the limit that is estimated for the world; ! = runs are missing; "
+    f"{DOUBTFUL} = misleads, a note says why. Noise floor: what two runs of the undisturbed swarm score by chance."
 )
 BANDS = "In square brackets: mean minus and plus two standard deviations of single runs."
 PAIRS_PER_TABLE = 6
@@ -401,7 +401,8 @@ def _cell(score: Score | None, *, band: bool) -> str:
     """Value with its half interval, relative to performance, its band, and marks for missing runs and doubt."""
     if score is None:
         return "-"
-    relative = "" if score.relative is None else f" ({percent(score.relative.mean)})"
+    relative = score.relative_cell() if score.relative is None else percent(score.relative.mean)
+    relative = relative and f" ({relative})"
     deviations = f" [{limits(*score.band)}]" if band and score.summary.n_used > 1 else ""
     marks = (" !" if score.is_partial else "") + (f" {DOUBTFUL}" if score.is_doubtful else "")
     return spread(score.summary) + relative + deviations + marks

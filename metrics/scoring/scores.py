@@ -245,9 +245,9 @@ class Score:
         return number(self.noise_floor) + ("" if self.relative_floor is None else f" ({percent(self.relative_floor)})")
 
     def relative_cell(self) -> str:
-        """Return the relative value, and in brackets per robot; empty for measures that are relative themselves."""
+        """Return the relative value, and in brackets per robot; of a performance its share of the limit; else empty."""
         if self.relative is None:
-            return ""
+            return f"{percent(self.beside['of_limit'])} of the limit" if "of_limit" in self.beside else ""
         per_robot = self.beside.get("per_robot")
         return percent(self.relative.mean) + ("" if per_robot is None else f" ({percent(per_robot)} per robot)")
 

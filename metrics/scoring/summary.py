@@ -34,6 +34,7 @@ from ..statistics import Summary, aggregate
 from .plots import FEWEST_RUNS
 from .question import Question
 from .scores import bounds
+from .world_limits import ABOUT_LIMIT, share_of_limit, share_text
 
 LEVEL = 0.95
 """Confidence level of all intervals."""
@@ -69,6 +70,8 @@ class ConditionSummary:
     deliveries_per_robot_per_1000_s: Summary
     """Per robot that is present."""
     first_pickups_per_1000_s: Summary
+    share_of_limit: float | None
+    """Mean performance over the estimated limit of the world; None where there is no estimate, see `limit_of`."""
     interference_fraction: float
     simulated_s_per_wall_s: float
     """Simulated seconds per second and process, policy and recording included."""
@@ -105,21 +108,24 @@ class RunSummary(Answer):
         # Deliveries are always there; what else the scenario calls performance stands before them.
         other = [] if self.read_as.name == "collected" else [f"{self.read_as.title} {span(self.read_as)}"]
         header = ["policy", *(["world"] if len(worlds) > 1 else []), "caches", "runs", *other, "deliveries per 1,000 s"]
-        header += [*(["per robot"] if is_mixed else []), "interference", "simulated s per wall s"]
+        has_limit = any(row.share_of_limit is not None for row in self.rows)
+        header += [*(["per robot"] if is_mixed else []), *(["of the limit"] if has_limit else [])]
+        header += ["interference", "simulated s per wall s"]
         lines: list[list[str]] = []
         for row in self.rows:
             about = [row.condition.policy.label, *([row.condition.world.name] if len(worlds) > 1 else [])]
             numbers = [spread_text(row.performance)] if other else []
             numbers += [spread_text(row.deliveries_per_1000_s)]
             numbers += [spread_text(row.deliveries_per_robot_per_1000_s)] if is_mixed else []
+            numbers += [share_text(row.share_of_limit)] if has_limit else []
             tail = [f"{row.interference_fraction:.3f}", f"{row.simulated_s_per_wall_s:,.0f}"]
             lines.append([*about, row.caches, str(row.n_runs), *numbers, *tail])
             empty = [""] * (len(about) + 1 + len(other))
-            lines += [_part_line(part, empty) for part in row.parts]
+            lines += [_part_line(part, empty, [""] * has_limit) for part in row.parts]
         is_spread = any(row.n_runs > 1 for row in self.rows)
         interval = f"± {LEVEL:.0%} t interval over seeds" if is_spread else "one seed, so no interval"
-        note = f"{interval}; interference: share of active robot time"
-        return Sheet(title=self._title(len(worlds)), header=header, rows=lines, notes=(note,)), failures
+        notes = [f"{interval}; interference: share of active robot time", *([ABOUT_LIMIT] if has_limit else [])]
+        return Sheet(title=self._title(len(worlds)), header=header, rows=lines, notes=notes), failures
 
     def _title(self, n_worlds: int) -> str:
         scenario = self.world.scenario
@@ -274,14 +280,16 @@ def _condition_summaries(table: Table) -> Iterator[ConditionSummary]:
             continue
         wall_s = sum(record.wall_time_s for record in records)
         read_as = performance_of(condition.world.scenario.performance)
+        planned = table.plan.specs_of(condition)[0].world
         yield ConditionSummary(
             condition=condition,
-            caches=table.plan.specs_of(condition)[0].scenario.caches,
+            caches=planned.scenario.caches,
             n_runs=len(records),
             performance=_mean(records, lambda record, read_as=read_as: performance_number(record, read_as)),
             deliveries_per_1000_s=_mean(records, lambda record: record.rate_per_1000_s("collected")),
             deliveries_per_robot_per_1000_s=_mean(records, _deliveries_per_robot),
             first_pickups_per_1000_s=_mean(records, lambda record: record.rate_per_1000_s("first_picked")),
+            share_of_limit=share_of_limit(planned, float(np.mean([record.performance.sum() for record in records]))),
             interference_fraction=float(np.mean([record.interference_fraction.mean() for record in records])),
             simulated_s_per_wall_s=sum(record.horizon_s for record in records) / wall_s if wall_s else math.nan,
             parts=tuple(_part_summaries(condition, records)),
@@ -329,11 +337,11 @@ def _part_summaries(condition: Condition, records: Sequence[RunRecord]) -> Itera
         )
 
 
-def _part_line(part: PartSummary, empty: Sequence[str]) -> list[str]:
+def _part_line(part: PartSummary, empty: Sequence[str], no_share: Sequence[str]) -> list[str]:
     name = f"  of which {part.policy} ({counted(part.n_robots, 'robot')})"
     rates = [spread_text(part.deliveries_per_1000_s), spread_text(part.deliveries_per_robot_per_1000_s)]
     interference = f"{part.interference_fraction:.3f}" if part.n_robots else NO_NUMBER
-    return [name, *empty, *rates, interference, ""]
+    return [name, *empty, *rates, *no_share, interference, ""]
 
 
 def _condition_mapping(row: ConditionSummary) -> dict[str, Any]:
@@ -343,6 +351,7 @@ def _condition_mapping(row: ConditionSummary) -> dict[str, Any]:
         "n_runs": row.n_runs,
         "performance": _ends(row.performance),
         **_rates_mapping(row),
+        "share_of_limit": row.share_of_limit,
         "simulated_s_per_wall_s": plain(row.simulated_s_per_wall_s),
         "parts": [{"policy": part.policy, "n_robots": part.n_robots, **_rates_mapping(part)} for part in row.parts],
     }
