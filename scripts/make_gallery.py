@@ -101,6 +101,14 @@ EXHIBITS = (
         horizon_s=10_000.0,
     ),
     Exhibit(
+        "oracle",
+        "warehouse_medium",
+        ("generalist", "oracle"),
+        "The trained network beside a yardstick that reads the world: each robot knows the nearest object that is left. "
+        "Robots pass each other on the right.",
+        frame_s=2.0,
+    ),
+    Exhibit(
         "warehouse_dual",
         "warehouse_dual",
         ("crw", "dpo", "stochm", "stochx"),
