@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env.contract.policy import reads_world
+from swarm_forage_env.contract.policy import sees_world
 from swarm_forage_env.policies.registry import file_of, is_policy_file, policy_class, policy_label
 from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.policy_spec import policy_specs
@@ -100,7 +100,7 @@ def benchmark_question(
             f"Expected one training seed per policy, got {len(training_seeds)} for {len(policies)} policies."
         )
     specs = policy_specs(policies)
-    omniscient = [spec.label for spec in specs if reads_world(policy_class(spec.policy))]
+    omniscient = [spec.label for spec in specs if sees_world(policy_class(spec.policy))]
     if omniscient:
         raise BenchmarkError(
             f"Expected policies that decide by what robots observe, got {omniscient[0]}, which reads the world. It is "

@@ -11,7 +11,7 @@ from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.contract.layout import LIGHT_IF_CARRYING, ObservationLayout
-from swarm_forage_env.contract.policy import Policy, SwarmSpec, reads_world
+from swarm_forage_env.contract.policy import Policy, SwarmSpec, sees_world
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -47,9 +47,9 @@ def check_policy(
     subject = built(factory_of(policy))
     config = config_for(subject, scenario)
     world = ForageEnv(config)
-    if reads_world(subject):
+    if sees_world(subject):
         raise CheckError(
-            "Expected a policy that decides by what robots observe, got one that reads the world (it has read_world): "
+            "Expected a policy that decides by what robots observe, got one that reads the world (it has see_world): "
             "it is a yardstick and no contestant, and check_determinism alone says something about it."
         )
     reads = _checked_statements(subject, world.layout)

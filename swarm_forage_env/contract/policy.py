@@ -234,9 +234,9 @@ class Memories(NamedTuple):
         return RememberedPlaces(self.place_m[own & ~self.is_cache], self.place_m[own & self.is_cache])
 
 
-def reads_world(policy: object) -> bool:
+def sees_world(policy: object) -> bool:
     """Return whether a policy, or its class, takes the state of the world and not only observations; see `Policy`."""
-    return hasattr(policy, "read_world")
+    return hasattr(policy, "see_world")
 
 
 @runtime_checkable
@@ -248,7 +248,7 @@ class Policy(Protocol):
     (`inspect.replay` keeps it); `describe_memories() -> Memories`, where all robots remember things (`inspect.replay`
     keeps it, and the window shows those of one); `part_rows`, slices of rows that the record tells apart, set by
     `reset` (of mixed swarms, whose runs are counted tick by tick);
-    `read_world(env)`, called by runs after `reset` with the `ForageEnv`, which a policy may read and must not change: a
+    `see_world(env)`, called by runs after `reset` with the `ForageEnv`, which a policy may read and must not change: a
     policy that has it is a yardstick and no contestant, so that `check_policy` and the benchmark refuse it;
     `compiled() -> CompiledPolicy | None`, for runs without Python between ticks (`KernelPolicy` has it); the class
     attributes `caches` ("none", "static", "dynamic": those that the policy is made for) and `reads` (names of the

@@ -1,7 +1,7 @@
 """OraclePolicy: what robots could do that see the whole world. It shows how near to the limit a swarm can come.
 
 It is no contestant: it takes the places of robots and objects from the world, which no robot can do. A run gives the
-world to a policy that has the method `read_world`, see `contract.policy.Policy`.
+world to a policy that has the method `see_world`, see `contract.policy.Policy`.
 
 Its rules (ours, the simplest that we know): an empty robot drives straight to the nearest free object that no other
 robot has chosen, a robot with an object straight to the nearest nest; whoever has another robot in the way leaves it on
@@ -43,7 +43,7 @@ class OraclePolicy:
         self._actions: ActionArray = np.zeros((spec.n_robots, spec.action_size), np.float32)
         self._world: Any = None
 
-    def read_world(self, world: Any) -> None:
+    def see_world(self, world: Any) -> None:
         """Take the world of this run, a `ForageEnv` that is only read."""
         self._world = world
 

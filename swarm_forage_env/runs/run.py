@@ -13,7 +13,7 @@ import numpy as np
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.contract.kernel_policy import CompiledPolicy
-from swarm_forage_env.contract.policy import Policy, reads_world
+from swarm_forage_env.contract.policy import Policy, sees_world
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.record import RunRecord
@@ -52,8 +52,8 @@ class LiveRun:
         self._by_ticks = by_ticks
         policy.reset(self.forage_env.swarm_spec, stream_rng(seed, Stream.POLICY))
         self._obs = stack.reset_batch(seed)
-        if reads_world(policy):
-            policy.read_world(self.forage_env)  # type: ignore[attr-defined] - optional, see Policy
+        if sees_world(policy):
+            policy.see_world(self.forage_env)  # type: ignore[attr-defined] - optional, see Policy
         if isinstance(stack, RunRecorder):
             stack.divide(_told_apart(policy, self.forage_env.scenario))
         self._has_tasks = hasattr(policy, "task")

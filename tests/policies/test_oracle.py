@@ -33,7 +33,7 @@ def commands(robots, objects):
     )
     policy = OraclePolicy()
     policy.reset(SwarmSpec.of(scenario("warehouse_small", n_robots=len(robots))), np.random.default_rng(0))
-    policy.read_world(SimpleNamespace(swarm=swarm, objects=SimpleNamespace(cell=cells, status=status)))
+    policy.see_world(SimpleNamespace(swarm=swarm, objects=SimpleNamespace(cell=cells, status=status)))
     return policy.act(np.zeros((len(robots), 1), np.float32), everyone).copy(), policy
 
 
