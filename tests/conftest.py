@@ -20,6 +20,8 @@ MAY_BE_SKIPPED = {
     r"needs (benchmarl|epymarl|ray|sb3_contrib|supersuit|torchrl): .*": (
         "each library has an environment of its own: scripts/test_bridges"
     ),
+    r"needs a C compiler: .*": "it comes with the operating system, not from a package registry",
+    r"could not import 'onnx(runtime)?': .*": "its wheels come later than a new Python does",
     r"could not import 'optuna': .*": "only one page needs it (docs/bridges/optuna.md)",
 }
 """Reason of a skip -> why it is no failure under --no-skips."""

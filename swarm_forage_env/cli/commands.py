@@ -36,6 +36,7 @@ COMMANDS: dict[str, tuple[Command, ...]] = {
     "Train": (
         Command("train", "Train one policy that every robot shares.", "train:train"),
         Command("train curves", "Draw the progress of trainings.", "train:curves"),
+        Command("export", "Write a network as a C header, or as ONNX.", "train:export"),
         Command("dataset", "Record what robots see and do, for learners.", "train:dataset"),
     ),
     "Studies and benchmark": (

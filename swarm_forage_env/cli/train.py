@@ -312,3 +312,21 @@ def dataset(
         from swarm_forage_env.training.datasets.minari_export import export_minari
 
         typer.echo(f"wrote the Minari data set {export_minari(folder, minari).spec.dataset_id}")
+
+
+def export(
+    policies: PolicyOptions,
+    described: WorldOptions,
+    *,
+    file: Annotated[Path, typer.Option("--file", metavar="FILE", help="File to write, .h (C99) or .onnx.")],
+) -> None:
+    """Write a network as a C header, or as ONNX, for robots and other simulators.
+
+    The file says in words what goes in and what comes out; docs/export.md says what a robot must sense. The policy is a
+    shipped network, or an .npz file of a training. The world says how large the arena is.
+    """
+    from swarm_forage_env.cli.scenario_options import described_world
+    from swarm_forage_env.training.export.exporting import export_policy
+
+    world, _ = described_world(described)
+    typer.echo(f"wrote {export_policy(policies.one(), file, world.scenario)}")

@@ -135,6 +135,7 @@ CASES = {
     "benchmark_page.txt": "benchmark page mine.json --file page.md --picture page.png",
     "availability.txt": "predict availability",
     "availability.json": "predict availability --json",
+    "export.txt": "export generalist --file net.h",
     "list.txt": "list",
     "info_policy.txt": "info crw",
     "info_scenario.txt": "info search_and_rescue",

@@ -1,0 +1,173 @@
+"""Networks as C headers and as ONNX: their outputs are those of the policy, and their words fit."""
+
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from swarm_forage_env import ConfigError, export_policy, scenario
+from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.policies.kernels.network import pick
+from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkError
+from swarm_forage_env.policies.pretrained import network_file
+from swarm_forage_env.training.export.c_header import c_header
+from swarm_forage_env.training.export.manual import manual_of
+
+PROGRAM = """\
+#include <stdio.h>
+#include "NAME.h"
+
+int main(void)
+{
+    float inputs[UPPER_INPUTS], outputs[UPPER_OUTPUTS];
+    while (fread(inputs, sizeof inputs, 1, stdin) == 1) {
+        NAME_forward(inputs, outputs);
+        fwrite(outputs, sizeof outputs, 1, stdout);
+    }
+    return 0;
+}
+"""
+CHOOSING = """\
+#include <stdio.h>
+#include "NAME.h"
+
+int main(void)
+{
+    float outputs[UPPER_OUTPUTS];
+    double chance;
+    int chosen[2];
+    while (fread(outputs, sizeof outputs, 1, stdin) == 1 && fread(&chance, sizeof chance, 1, stdin) == 1) {
+        chosen[0] = NAME_likeliest(outputs);
+        chosen[1] = NAME_draw(outputs, chance);
+        fwrite(chosen, sizeof chosen, 1, stdout);
+    }
+    return 0;
+}
+"""
+LARGE = 40
+"""Rows of observations."""
+
+
+def made_network(activation, sizes, **choices):
+    """A network of random weights with these sizes of its layers."""
+    rng = np.random.default_rng(7)
+    pairs = list(pairwise(sizes))
+    return Network(
+        tuple(rng.normal(0.0, 0.5, pair).astype(np.float32) for pair in pairs),
+        tuple(rng.normal(0.0, 0.5, pair[1]).astype(np.float32) for pair in pairs),
+        NetworkAbout(interface=InterfaceConfig(**choices), activation=activation),
+    )
+
+
+NETWORKS = {
+    "generalist": Network.load(network_file("generalist")),
+    "relu and gripper": made_network(
+        "relu", (23, 20, 11), observation="compact", actions="discrete", automatic_gripper=False
+    ),
+    "commands": made_network("tanh", (111, 16, 8, 3)),
+    "one layer, drives only": made_network("tanh", (23, 2), observation="compact", automatic_gripper=True),
+}
+
+
+def rows(network):
+    return np.random.default_rng(1).uniform(-1.0, 1.0, (LARGE, len(network.weights[0]))).astype(np.float32)
+
+
+def expected(network, seen):
+    outputs = network.outputs(seen)
+    return outputs if network.about.interface.actions == "discrete" else outputs.clip(-1.0, 1.0)
+
+
+def answer(folder, name, program, content):
+    """What a C program answers that includes the header of that name in the folder."""
+    compiler = shutil.which("gcc")
+    if compiler is None:
+        pytest.skip("needs a C compiler: gcc is not installed")
+    (folder / "main.c").write_text(program.replace("NAME", name).replace("UPPER", name.upper()))
+    strict = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-O2"]
+    subprocess.run([compiler, *strict, "main.c", "-o", "main"], cwd=folder, check=True)
+    return subprocess.run([folder / "main"], input=content, capture_output=True, check=True).stdout
+
+
+@pytest.mark.parametrize("which", NETWORKS)
+def test_the_header_computes_what_the_policy_does(which, tmp_path):
+    network = NETWORKS[which]
+    network.save(tmp_path / "my net.npz")
+    export_policy(tmp_path / "my net.npz", tmp_path / "my_net.h")
+    seen = rows(network)
+    found = np.frombuffer(answer(tmp_path, "my_net", PROGRAM, seen.tobytes()), np.float32)
+    np.testing.assert_allclose(found.reshape(LARGE, -1), expected(network, seen), rtol=1e-6, atol=1e-6)
+
+
+def test_the_header_chooses_as_the_policy_does(tmp_path):
+    export_policy("generalist", tmp_path / "generalist.h")
+    rng = np.random.default_rng(2)
+    logits, chances = rng.normal(0.0, 2.0, (LARGE, 6)).astype(np.float32), rng.random(LARGE)
+    content = b"".join(row.tobytes() + chance.tobytes() for row, chance in zip(logits, chances, strict=True))
+    found = np.frombuffer(answer(tmp_path, "generalist", CHOOSING, content), np.int32).reshape(LARGE, 2)
+    room = np.zeros(6)
+    both = [[pick(row, s, chance, room) for s in (False, True)] for row, chance in zip(logits, chances, strict=True)]
+    np.testing.assert_array_equal(found, both)
+    assert (found[:, 0] != found[:, 1]).any()
+
+
+@pytest.mark.parametrize("which", NETWORKS)
+def test_onnx_computes_what_the_policy_does(which, tmp_path):
+    pytest.importorskip("onnx")
+    runtime = pytest.importorskip("onnxruntime")
+    network = NETWORKS[which]
+    network.save(tmp_path / "net.npz")
+    file = export_policy(tmp_path / "net.npz", tmp_path / "net.onnx")
+    session = runtime.InferenceSession(file, providers=["CPUExecutionProvider"])
+    seen = rows(network)
+    (found,) = session.run(None, {"inputs": seen})
+    largest = max(1.0, float(np.abs(network.outputs(seen)).max()))  # libraries add up in orders of their own
+    np.testing.assert_allclose(found, expected(network, seen), rtol=1e-6, atol=1e-6 * largest)
+    about = session.get_modelmeta().custom_metadata_map["about"]
+    assert NetworkAbout.from_json(about) == network.about
+
+
+def test_the_words_say_what_goes_in_and_out():
+    text = "\n".join(manual_of(NETWORKS["generalist"], scenario("warehouse_medium"), "generalist").lines)
+    for words in (
+        "Inputs, 31 numbers:",
+        "27..30  sighting_site",
+        "X = 48 m, Y = 48 m",
+        "1  forward: wheels +0.10, +0.10 m/s",
+        "Draw the action k",
+        "every 1 s",
+        "The gripper works by itself",
+    ):
+        assert words in text
+    text = "\n".join(manual_of(NETWORKS["relu and gripper"], scenario("warehouse_small"), "net").lines)
+    assert "6  grasp: wheels stand, gripper command +1.000" in text
+    assert "Choose the action with the largest output" in text
+    text = "\n".join(manual_of(NETWORKS["commands"], scenario("warehouse_small"), "net").lines)
+    assert "2  gripper command" in text
+
+
+def test_names_become_identifiers_and_words_do_not_end_the_comment():
+    manual = replace(manual_of(NETWORKS["commands"], scenario("warehouse_small"), "7 nets/a*/"), use=("*/ int x;",))
+    assert manual.identifier == "policy_7_nets_a__"
+    assert c_header(NETWORKS["commands"], manual).split("#ifndef")[0].count("*/") == 1
+
+
+def test_what_is_no_network_or_no_known_file_is_refused(tmp_path):
+    with pytest.raises(ConfigError, match=r"ends in \.h \(a C header\) or \.onnx \(ONNX\), got .*net\.txt"):
+        export_policy("generalist", tmp_path / "net.txt")
+    with pytest.raises(ConfigError, match="Expected a network"):
+        export_policy("crw", tmp_path / "net.h")
+    replace(NETWORKS["commands"], about=NETWORKS["generalist"].about).save(tmp_path / "net.npz")
+    with pytest.raises(NetworkError, match="as its interface says"):
+        export_policy(tmp_path / "net.npz", tmp_path / "net.h")
+    assert not (tmp_path / "net.h").exists()
+
+
+def test_without_onnx_it_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "onnx", None)
+    with pytest.raises(ImportError, match=r'An ONNX file needs onnx: pip install "\.\[export\]"'):
+        export_policy("generalist", tmp_path / "net.onnx")
