@@ -307,6 +307,27 @@ def test_minari_gets_the_same_numbers(policy, tmp_path, monkeypatch):
         assert np.flatnonzero(episode.truncations).tolist() == [len(steps) - 1]
 
 
+def test_minari_recovers_the_environment_and_knows_reference_scores(tmp_path, monkeypatch):
+    minari = pytest.importorskip("minari")
+    from swarm_forage_env.training.datasets.minari_export import export_minari
+
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "minari"))
+    noisy = (parse_wrapper("sensor_noise:sigma=0.02"),)
+    record_dataset(plan("dpo", seeds=(3, 5), wrappers=noisy, observation="compact"), tmp_path / "ours")
+    export_minari(tmp_path / "ours", "swarm_forage/test-v0", author="somebody", ref_max_score=8.0)
+    found = minari.load_dataset("swarm_forage/test-v0")
+    env = found.recover_environment()
+    first = next(found.iterate_episodes())
+    obs, _ = env.reset(seed=3)
+    for action, seen, reward in zip(first.actions, first.observations[1:], first.rewards, strict=True):
+        obs, gained, *_ = env.step(action)
+        np.testing.assert_array_equal(obs, seen)
+        assert gained == reward
+    assert found.storage.metadata["ref_max_score"] == 8.0
+    low = found.storage.metadata["ref_min_score"]
+    assert minari.get_normalized_score(found, np.array([low, 8.0])).tolist() == [0.0, 1.0]
+
+
 def test_without_minari_the_error_says_what_to_install(tmp_path, monkeypatch):
     from swarm_forage_env.training.datasets.minari_export import export_minari
 

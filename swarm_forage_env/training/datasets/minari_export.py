@@ -6,22 +6,30 @@ same actions: observations (N, d), the sum of the rewards of all robots, termina
 
 import re
 import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import gymnasium
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector.utils import batch_space
 
 from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.contract.policy import SwarmSpec
-from swarm_forage_env.policies.interface import LearnerInterface
+from swarm_forage_env.policies.interface import LearnerInterface, interface_from_mapping
+from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.training.datasets.layout import DatasetError
 from swarm_forage_env.training.datasets.reading import TrajectoryDataset
+from swarm_forage_env.views.gymnasium import JointForageEnv
 
 if TYPE_CHECKING:
     from minari import MinariDataset
 
 
+_RANDOM_RUNS = 3
+"""Runs with random actions for the lower reference score (our choice: seconds)."""
 _ID = re.compile(r"(?:[\w-]+/)*[\w-]+-v\d+")
 
 
@@ -44,13 +52,50 @@ def check_minari(dataset_id: str) -> None:
         )
 
 
+def recorded_env(spec: Mapping[str, Any], interface: Mapping[str, Any], **options: Any) -> JointForageEnv:
+    """Return the environment of a recorded run: what `recover_environment` of a Minari data set calls.
+
+    Args:
+        spec: Of a run, `RunSpec.to_mapping`; its policy plays no part.
+        interface: Fields of the interface that was recorded.
+        options: Others of `JointForageEnv`, such as `render_mode`.
+    """
+    run = RunSpec.from_mapping(spec)
+    return JointForageEnv(
+        run.scenario, wrappers=run.wrappers, interface=interface_from_mapping(dict(interface)), **options
+    )
+
+
+def _reference_scores(env_spec: EnvSpec, seeds: Sequence[int], returns: Sequence[float]) -> dict[str, float]:
+    """Return what 0 and 1 mean in Minari's normalized scores: random actions, and the recorded policy.
+
+    There is no 1 where the recorded policy is not better than random actions.
+    """
+    env = gymnasium.make(env_spec)
+    at_random = [_random_return(env, seed) for seed in seeds[:_RANDOM_RUNS]]
+    env.close()
+    low, high = float(np.mean(at_random)), float(np.mean(returns))
+    return {"ref_min_score": low, **({"ref_max_score": high} if high > low else {})}
+
+
+def _random_return(env: gymnasium.Env[Any, Any], seed: int) -> float:
+    """Return the sum of rewards of a run with actions drawn from the action space."""
+    env.reset(seed=seed)
+    env.action_space.seed(seed)
+    total, over = 0.0, False
+    while not over:
+        _, reward, terminated, truncated, _ = env.step(env.action_space.sample())
+        total, over = total + float(reward), terminated or truncated
+    return total
+
+
 def export_minari(folder: str | Path, dataset_id: str, **about: Any) -> "MinariDataset":
     """Make a Minari data set in its usual place (the environment variable `MINARI_DATASETS_PATH` chooses another).
 
     Args:
         folder: A data set of `record_dataset`; one episode for each run that is whole.
         dataset_id: Name of the new data set, such as "swarm_forage/dpo-v0".
-        about: More for `minari.create_dataset_from_buffers`, such as `author` or `description`.
+        about: More, or other values, for `minari.create_dataset_from_buffers`, such as `author` or `description`.
 
     Raises:
         ImportError: minari is not installed.
@@ -82,7 +127,14 @@ def export_minari(folder: str | Path, dataset_id: str, **about: Any) -> "MinariD
             "truncations": ended & run.truncated,
         }
         episodes.append(EpisodeBuffer(id=number, seed=run.seed, infos={"active": steps.active}, **arrays))
+    env_spec = EnvSpec(
+        f"swarm_forage/{spec.scenario.name}-v2",
+        entry_point=f"{__name__}:{recorded_env.__name__}",
+        kwargs={"spec": spec.to_mapping(), "interface": asdict(dataset.card.interface)},
+    )
     told: dict[str, Any] = {
+        "env": env_spec,
+        **_reference_scores(env_spec, [run.seed for run in dataset.runs], [np.sum(one.rewards) for one in episodes]),
         "algorithm_name": spec.policy,
         "description": f"{spec.scenario.name}, {n_robots} robots, policy {spec.policy}",
         "observation_space": batch_space(interface.observation_space, n_robots),
