@@ -242,10 +242,11 @@ class ChoiceQuestion(Question[Choice]):
     def answer(self, table: Table) -> Choice:
         """Return the policies, those first that meet most constraints, then miss fewest, then do best undisturbed."""
         candidates = [self._candidate(table, policy.label) for policy in self.plan.policies]
-        scenario = self.plan.conditions[0].world.scenario
+        world = self.plan.conditions[0].world
+        scenario = world.scenario
         return Choice(
             candidates=tuple(sorted(candidates, key=lambda candidate: candidate.order)),
-            scenario=scenario.name,
+            scenario=world.title(),
             n_robots=scenario.robots.n_robots,
             horizon_s=scenario.horizon_s,
             unit=unit_text(performance_of(scenario.performance)),

@@ -406,7 +406,7 @@ def _table_of(
 ) -> ScenarioPrediction:
     return ScenarioPrediction(
         policy=policy.label,
-        scenario=world.scenario.name,
+        scenario=world.title(),
         horizon_s=world.scenario.horizon_s,
         predicted=dict(_by_size(policy, world, sizes)),
         runs=runs,

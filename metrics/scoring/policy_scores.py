@@ -73,7 +73,7 @@ class ScoreQuestion(Question[Comparison]):
         scenario = self.plan.conditions[0].world.scenario
         return ScoreTable(
             policy=policy,
-            scenario=self.world.scenario.name,
+            scenario=self.world.title(),
             scores=scores,
             forecasts=forecast_population(study),
             missing=missing,

@@ -53,7 +53,7 @@ class PredictionTable(Answer):
 
     policy: str
     scenario: str
-    """Name of the scenario; empty if it is not known."""
+    """The world for people: the scenario, and what differs from its preset; empty if it is not known."""
     horizon_s: float | None
     """Length of a run in seconds, where known."""
     totals: Mapping[int, tuple[float, ...]]
@@ -252,7 +252,7 @@ class PredictionQuestion(Question[Predictions]):
         read_as = performance_of(scenario.performance)
         return _table(
             policy=policy,
-            scenario=scenario.name,
+            scenario=self.world.title(),
             horizon_s=scenario.horizon_s,
             totals=totals,
             fit=usable,

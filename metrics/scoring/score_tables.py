@@ -49,7 +49,7 @@ class ScoreTable(Answer):
 
     policy: str
     scenario: str
-    """Name of the scenario; empty if it is not known."""
+    """The world for people: the scenario, and what differs from its preset; empty if it is not known."""
     scores: tuple[Score, ...]
     forecasts: tuple[PopulationForecast, ...] = ()
     """What the queue model predicts for a changing population, beside what the runs showed."""

@@ -6,7 +6,7 @@ print(summarize_runs(table))
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,6 @@ from swarm_forage_env.runs.record import RunRecord
 from swarm_forage_env.runs.store import RunStore
 from swarm_forage_env.runs.table import Table
 from swarm_forage_env.scenarios.columns import part_column
-from swarm_forage_env.scenarios.config import PHYSICS_ENGINES
 from swarm_forage_env.scenarios.performance import Performance, performance_curve, performance_of
 from swarm_forage_env.scenarios.robots import kind_sizes
 from swarm_forage_env.wrappers.world import World, WorldLike, world_of
@@ -103,17 +102,17 @@ class RunSummary(Answer):
         failures = Sheet(notes=told)
         if not self.rows:
             return (failures,)
-        worlds = list(dict.fromkeys(condition.world.name for condition in self.table.plan.conditions))
+        n_worlds = len({condition.world for condition in self.table.plan.conditions})
         is_mixed = any(row.parts for row in self.rows)
         # Deliveries are always there; what else the scenario calls performance stands before them.
         other = [] if self.read_as.name == "collected" else [f"{self.read_as.title} {span(self.read_as)}"]
-        header = ["policy", *(["world"] if len(worlds) > 1 else []), "caches", "runs", *other, "deliveries per 1,000 s"]
+        header = ["policy", *(["world"] if n_worlds > 1 else []), "caches", "runs", *other, "deliveries per 1,000 s"]
         has_limit = any(row.share_of_limit is not None for row in self.rows)
         header += [*(["per robot"] if is_mixed else []), *(["of the limit"] if has_limit else [])]
         header += ["interference", "simulated s per wall s"]
         lines: list[list[str]] = []
         for row in self.rows:
-            about = [row.condition.policy.label, *([row.condition.world.name] if len(worlds) > 1 else [])]
+            about = [row.condition.policy.label, *([row.condition.world.name] if n_worlds > 1 else [])]
             numbers = [spread_text(row.performance)] if other else []
             numbers += [spread_text(row.deliveries_per_1000_s)]
             numbers += [spread_text(row.deliveries_per_robot_per_1000_s)] if is_mixed else []
@@ -125,28 +124,14 @@ class RunSummary(Answer):
         is_spread = any(row.n_runs > 1 for row in self.rows)
         interval = f"± {LEVEL:.0%} t interval over seeds" if is_spread else "one seed, so no interval"
         notes = [f"{interval}; interference: share of active robot time", *([ABOUT_LIMIT] if has_limit else [])]
-        return Sheet(title=self._title(len(worlds)), header=header, rows=lines, notes=notes), failures
+        return Sheet(title=self._title(n_worlds), header=header, rows=lines, notes=notes), failures
 
     def _title(self, n_worlds: int) -> str:
         scenario = self.world.scenario
         if n_worlds > 1:
             return f"{scenario.name} and others: {counted(n_worlds, 'world')}"
-        headline = f"{self._place}: {counted(self.world.n_robots, 'robot')}, {scenario.objects.n_objects} objects"
-        disturbed = ", ".join(config.name for config in self.world.wrappers)
-        words = f"{headline}, {scenario.horizon_s:g} s{self._engine}"
-        return words + (f", with {disturbed}" if disturbed else "")
-
-    @property
-    def _place(self) -> str:
-        """Name of the scenario, or that which the world was given, such as the name of its file."""
-        is_given = self.world.name != replace(self.world, name="").name
-        return self.world.name if is_given else self.world.scenario.name
-
-    @property
-    def _engine(self) -> str:
-        """The engine of physics, where it is not the first, which is the default."""
-        physics = self.world.scenario.physics
-        return "" if physics == PHYSICS_ENGINES[0] else f", physics {physics}"
+        sizes = counted(self.world.n_robots, "robot"), counted(scenario.objects.n_objects, "object")
+        return self.world.title(*sizes, f"{scenario.horizon_s:g} s")
 
     def to_mapping(self) -> dict[str, Any]:
         """Return policies, runs and failures as plain values."""
@@ -195,7 +180,7 @@ class RunSummary(Answer):
         if not self.has_picture:
             raise ValueError("Expected finished runs with the same intervals, got nothing to draw.")
         scenario, read_as = self.world.scenario, self.read_as
-        is_one_world = len({row.condition.world.name for row in self.rows}) == 1
+        n_worlds = len({row.condition.world for row in self.rows})
         curves: list[Curve] = []
         for row in self.rows:
             runs = np.array([record.performance for record in self.table.of(row.condition)])
@@ -203,15 +188,13 @@ class RunSummary(Answer):
             mean, low, high = np.array([(point.mean, point.lower, point.upper) for point in per_interval]).T
             if len(runs) < FEWEST_RUNS:
                 low = high = np.full_like(mean, np.nan)
-            label = row.condition.policy.label if is_one_world else row.condition.describe()
+            label = row.condition.policy.label if n_worlds == 1 else row.condition.describe()
             curves.append(Curve(label, mean, low, high))
         draw_curves(
             path,
             self.table.of(self.rows[0].condition)[0].t_end_s,
             curves,
-            title=f"{self._place}, {counted(self.world.n_robots, 'robot')}{self._engine}"
-            if is_one_world
-            else scenario.name,
+            title=self._title(n_worlds),
             ylabel=f"{read_as.title} per {scenario.interval_s:g} s" if read_as.is_total else read_as.title,
             band=_about_bands(curves),
             style=style,

@@ -113,7 +113,7 @@ def record(
     world, asked_caches = described_world(described)
     _refuse_unknown(policy)
     ending = "gif" if at is None else "png"
-    path = file or Path("results", f"{world.scenario.name}_{as_file_name(policy_label(policy))}.{ending}")
+    path = file or Path("results", f"{world.file_name}_{as_file_name(policy_label(policy))}.{ending}")
     look: dict[str, Any] = {"seed": seed, "size_px": size, "theme": theme, "caches": asked_caches}
     look["wrappers"] = world.wrappers
     try:
@@ -150,7 +150,7 @@ def saliency(
     For example, give a robot the light readings of another robot: how often does it then decide otherwise? The command
     does this for each part of what robots see. The policy is a shipped network, or the .npz file of a training.
     """
-    from swarm_forage_env.cli.scenario_options import plan_runs
+    from swarm_forage_env.cli.scenario_options import described_world, plan_runs
     from swarm_forage_env.inspect.saliency import open_network_of
     from swarm_forage_env.inspect.saliency import saliency as measured
     from swarm_forage_env.rendering.figures import check_picture
@@ -158,7 +158,8 @@ def saliency(
     policy = policies.one()
     network = open_network_of(policy)
     (spec,) = plan_runs(described, (policy,), n_seeds=1, first_seed=seed)
-    file = picture or Path("results", f"{spec.scenario.name}_{Path(policy).stem}.saliency.png")
+    world, _ = described_world(described)
+    file = picture or Path("results", f"{world.file_name}_{Path(policy).stem}.saliency.png")
     check_picture(file)
     found = measured(network, spec, seconds=seconds)
     typer.echo(found.json() if as_json else printable(found.text()))

@@ -57,7 +57,7 @@ def maps(
     from the first. The arrays go to .npz files beside the picture. Stored runs hold no positions, so the command makes
     them again.
     """
-    from swarm_forage_env.cli.scenario_options import plan_runs
+    from swarm_forage_env.cli.scenario_options import described_world, plan_runs
     from swarm_forage_env.rendering.figures import check_picture
     from swarm_forage_env.runs.record import is_record
     from swarm_forage_env.studies.study_table import read_study
@@ -81,7 +81,7 @@ def maps(
         found = _of_study(study, conditions or (), seeds, square, jobs)
     else:
         specs = plan_runs(described, words, n_seeds=seeds or 1, first_seed=0)
-        file = picture or Path("results", "maps", specs[0].scenario.name, PICTURE_FILE)
+        file = picture or Path("results", "maps", described_world(described)[0].file_name, PICTURE_FILE)
         check_picture(file)
         found = _of_runs(specs, square, jobs)
     try:

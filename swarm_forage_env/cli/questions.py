@@ -32,6 +32,7 @@ from swarm_forage_env.cli.options import (
 
 if TYPE_CHECKING:
     from metrics.scoring import ScoreForms, ScoreQuestion
+    from swarm_forage_env.wrappers.world import World
 
 
 def run(
@@ -50,16 +51,25 @@ def run(
     from metrics.scoring.summary import run_question
     from swarm_forage_env._internal.fields import MOST_SEEDS, whole
     from swarm_forage_env.cli.printer import ask_and_show, refusing
-    from swarm_forage_env.cli.scenario_options import default_folder, described_world, name_of_file
+    from swarm_forage_env.cli.scenario_options import default_folder, described_world
 
     whole("--seeds", seeds, at_least=1, at_most=MOST_SEEDS)
     world, caches = described_world(described)
-    world = replace(world, name=name_of_file(described) or world.name)
     chosen = range(first_seed, first_seed + seeds)
     with refusing():
         question = run_question(policies.names("crw"), world, seeds=chosen, caches=caches)
-    folder = options.out or default_folder(described)
-    ask_and_show(question, folder, options, picture=picture or folder / "performance.png")
+    folder = options.out or default_folder(world)
+    ask_and_show(question, folder, options, picture=picture or _picture(folder, "performance", world))
+
+
+def _picture(folder: Path, name: str, world: "World") -> Path:
+    """Return the file of a picture: a folder has the runs of one world, which may be read in several ways."""
+    from swarm_forage_env._internal.files import as_file_name
+    from swarm_forage_env.scenarios.differences import preset_of
+
+    read_as, preset = world.scenario.performance, preset_of(world.scenario)
+    is_usual = preset is None or read_as == preset.performance
+    return folder / (f"{name}.png" if is_usual else f"{name}_{as_file_name(read_as)}.png")
 
 
 _CURVES_OF_SCORE = ("curves", "measures", "performance", "variant", "form", "band", "picture", "as_json")
@@ -110,8 +120,9 @@ def score(
         disturbance=disturbance,
         forms=forms,
     )
-    folder = options.out or default_folder(described)
-    file = picture or folder / ("scores.png" if len(question.plan.policies) == 1 else "comparison.png")
+    folder = options.out or default_folder(question.world)
+    name = "scores" if len(question.plan.policies) == 1 else "comparison"
+    file = picture or _picture(folder, name, question.world)
     ask_and_show(question, folder, options, picture=file)
 
 
@@ -224,8 +235,8 @@ def predict(
             if from_scenario
             else prediction_question(names, world, fit=fitted, hold=held, seeds=seeds, caches=caches)
         )
-    folder = options.out or default_folder(described)
-    file = picture or folder / f"{'from_scenario' if from_scenario else 'prediction'}.png"
+    folder = options.out or default_folder(world)
+    file = picture or _picture(folder, "from_scenario" if from_scenario else "prediction", world)
     ask_and_show(question, folder, options, picture=file)
 
 
@@ -316,7 +327,7 @@ def choose(
             seeds=seeds,
             caches=caches,
         )
-    ask_and_show(question, options.out or default_folder(described), options)
+    ask_and_show(question, options.out or default_folder(world), options)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

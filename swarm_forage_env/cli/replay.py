@@ -56,7 +56,7 @@ def replay(
         )
     with _complaints():
         runs = _planned(words, described, seed)
-        path = file or _default_file(runs[0][0])
+        path = file or _default_file(runs[0], described)
         check_file(path)
         if path.suffix.lower() not in PAGES:
             raise typer.BadParameter(
@@ -144,8 +144,11 @@ def _refusing_policies() -> Iterator[None]:
         raise typer.BadParameter(str(error)) from error
 
 
-def _default_file(spec: "RunSpec") -> Path:
+def _default_file(run: "tuple[RunSpec, RunRecord | None]", described: WorldOptions) -> Path:
     from swarm_forage_env._internal.files import as_file_name
+    from swarm_forage_env.cli.scenario_options import described_world
     from swarm_forage_env.policies.registry import policy_label
 
-    return RESULTS / f"{spec.scenario.name}_{as_file_name(policy_label(spec.policy))}.html"
+    spec, record = run
+    world = described_world(described)[0] if record is None else spec.world
+    return RESULTS / f"{world.file_name}_{as_file_name(policy_label(spec.policy))}.html"

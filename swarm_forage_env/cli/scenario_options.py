@@ -88,19 +88,13 @@ def described_fields(options: PlaceOptions) -> WorldDescription:
     Raises:
         ConfigError: see `described_world`; names and values of fields are not looked at here.
     """
-    is_file = bool(name_of_file(options))
+    is_file = Path(options.scenario).suffix == FILE
     file = describe_file(options.scenario) if is_file else WorldDescription(preset=options.scenario)
     fields = {**file.fields, **_fields_of(options, file.preset)}
     wrappers = tuple(parse_wrapper(word) for word in options.wrappers)
     named = {wrapper.name for wrapper in wrappers}
     left = (wrapper for wrapper in file.wrappers if wrapper.name not in named)
-    return WorldDescription(preset=file.preset, fields=fields, wrappers=(*wrappers, *left))
-
-
-def name_of_file(options: PlaceOptions) -> str:
-    """Return the name of the scenario's file without its ending; empty for a preset."""
-    path = Path(options.scenario)
-    return path.stem if path.suffix == FILE else ""
+    return WorldDescription(preset=file.preset, fields=fields, wrappers=(*wrappers, *left), name=file.name)
 
 
 def _fields_of(options: PlaceOptions, preset: str) -> dict[str, Any]:
@@ -188,6 +182,6 @@ def plan_runs(options: WorldOptions, policies: Sequence[str], *, n_seeds: int, f
     )
 
 
-def default_folder(options: PlaceOptions) -> Path:
-    """Return the default folder for results: one per preset or file, so that repeated runs are found."""
-    return Path("results") / (name_of_file(options) or options.scenario)
+def default_folder(world: World) -> Path:
+    """Return the default folder for results: one per world, so that repeated runs are found and no others are there."""
+    return Path("results") / world.file_name

@@ -286,13 +286,14 @@ def dataset(
     """
     from swarm_forage_env._internal.files import as_file_name
     from swarm_forage_env.cli.printer import progress_bar
-    from swarm_forage_env.cli.scenario_options import plan_runs
+    from swarm_forage_env.cli.scenario_options import described_world, plan_runs
     from swarm_forage_env.policies.registry import policy_label
     from swarm_forage_env.training.datasets.recording import plan_dataset, record_dataset
 
     spec = plan_runs(described, (policies.one("dpo"),), n_seeds=1, first_seed=first_seed)[0]
     plan = plan_dataset(spec, range(first_seed, first_seed + seeds), **asdict(recorded))
-    folder = out or Path("results", "datasets", as_file_name(f"{spec.scenario.name}_{policy_label(spec.policy)}"))
+    world, _ = described_world(described)
+    folder = out or Path("results", "datasets", as_file_name(f"{world.file_name}_{policy_label(spec.policy)}"))
     typer.echo(plan.describe(folder).text())
     if dry_run:
         return

@@ -5,6 +5,7 @@ import inspect
 import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from swarm_forage_env.runs.spec import stated_caches
 from swarm_forage_env.scenarios import presets
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.wrappers.registry import WRAPPERS, wrapper_config_class
+from swarm_forage_env.wrappers.world import FILE, read_world
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -68,24 +70,37 @@ def overview(what: str | None = None) -> Overview:
 
 
 def _scenarios() -> Sheet:
-    configs = {presets.scenario(name): _first_line(made) for name, made in presets.PRESETS.items()}
-    rows = [
-        (
-            config.name,
-            str(config.robots.n_robots),
-            str(config.objects.n_objects),
-            f"{config.arena.width_m:g} x {config.arena.height_m:g} m",
-            words,
-        )
-        for config, words in configs.items()
-    ]
+    rows = [_row_or_fault(name, _scenario_cells, n_cells=4) for name in presets.scenario_names()]
     return Sheet(title="scenarios", header=("scenario", "robots", "objects", "arena", "what it is"), rows=rows)
 
 
+def _scenario_cells(name: str) -> tuple[str, ...]:
+    config = presets.scenario(name)
+    arena = f"{config.arena.width_m:g} x {config.arena.height_m:g} m"
+    return str(config.robots.n_robots), str(config.objects.n_objects), arena, _scenario_headline(name)
+
+
+def _scenario_headline(name: str) -> str:
+    maker = presets.scenario_maker(name)
+    return "a configuration of another package" if isinstance(maker, partial) else _first_line(maker)
+
+
 def _policies() -> Sheet:
-    classes = {name: policy_class(name) for name in policy_names()}
-    rows = [(name, _caches(policy), _first_line(policy)) for name, policy in classes.items()]
+    rows = [_row_or_fault(name, _policy_cells, n_cells=2) for name in policy_names()]
     return Sheet(title="policies", header=("policy", "caches", "what it is"), rows=rows)
+
+
+def _policy_cells(name: str) -> tuple[str, ...]:
+    policy = policy_class(name)
+    return _caches(policy), _first_line(policy)
+
+
+def _row_or_fault(name: str, cells: Callable[[str], tuple[str, ...]], *, n_cells: int) -> tuple[str, ...]:
+    """Return the row of something installed; where its package is broken, what is wrong: the others stay listed."""
+    try:
+        return name, *cells(name)
+    except Exception as error:  # noqa: BLE001 - whatever another package does when it is imported
+        return name, *["-"] * (n_cells - 1), f"broken: {type(error).__name__}: {error}"
 
 
 def _wrappers() -> Sheet:
@@ -107,7 +122,7 @@ LISTS: dict[str, Callable[[], Sheet]] = {
 
 
 def describe(name: str) -> Description:
-    """Return everything about a scenario (by name or environment id) or a policy (by name or file).
+    """Return everything about a scenario (by name, environment id or file) or a policy (by name or file).
 
     Of a mixed swarm that is everything about the policies in it.
 
@@ -119,8 +134,11 @@ def describe(name: str) -> Description:
 
 def _lines(name: str) -> Iterable[str]:
     name = re.sub(r"^swarm_forage/(\w+)-v\d+$", r"\1", name)
-    if name in presets.SCENARIO_NAMES:
-        return _scenario_lines(presets.scenario(name), _first_line(presets.PRESETS[name]))
+    if name in presets.scenario_names():
+        return _scenario_lines(presets.scenario(name), _scenario_headline(name))
+    if Path(name).suffix == FILE:
+        world = read_world(name)
+        return _scenario_lines(world.scenario, world.title())
     if name in policy_names():
         network = network_file(name)
         return [*_policy_lines(name), *([] if network is None else ["", *_file_lines(network)])]
@@ -128,7 +146,7 @@ def _lines(name: str) -> Iterable[str]:
         return _file_lines(Path(file_of(name)))
     if is_mixture(name):
         return "\n\n".join("\n".join(_lines(part.policy)) for part in mixture_parts(name)).splitlines()
-    known = (*presets.SCENARIO_NAMES, *policy_names())
+    known = (*presets.scenario_names(), *policy_names())
     raise ConfigError(f"Unknown scenario or policy {name!r}.{suggestion(name, known)} Known: {', '.join(known)}.")
 
 

@@ -20,6 +20,7 @@ from swarm_forage_env.rendering.view import RenderError, arena_view, refusing
 from swarm_forage_env.runs.run import LiveRun, build_env
 from swarm_forage_env.runs.spec import chosen_caches, pin_policy
 from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.wrappers.world import World
 
 if TYPE_CHECKING:
     from swarm_forage_env.wrappers.base import WrapperConfig
@@ -77,8 +78,9 @@ def record_run(
     path = check_film(path, fps, len(ticks))
     arena_view(scenario, size_px, theme)  # refuses a bad size or theme before the run starts
     policy, name, scenario = cast_policy(policy, scenario, caches, parameters)
-    title = _title(scenario, name)
-    stack = build_env(scenario, wrappers, reads=getattr(policy, "reads", None))
+    disturbed = tuple(wrappers)
+    title = World(scenario, disturbed).title(name, size_words(scenario))
+    stack = build_env(scenario, disturbed, reads=getattr(policy, "reads", None))
     n_samples = round(trail_s * fps / speedup) + 1
     check_file(path)
     trails = Trails(scenario.robots.n_robots, n_samples) if n_samples > 1 else None
@@ -144,7 +146,8 @@ def picture_run(
         number("trail_s", trail_s, at_least=0.0)
     arena_view(scenario, size_px, theme)  # refuses a bad size or theme before the run starts
     policy, name, scenario = cast_policy(policy, scenario, caches, parameters)
-    run = LiveRun(build_env(scenario, wrappers, reads=getattr(policy, "reads", None)), policy, seed)
+    disturbed = tuple(wrappers)
+    run = LiveRun(build_env(scenario, disturbed, reads=getattr(policy, "reads", None)), policy, seed)
     check_file(path)
     end = round(at_s / scenario.dt_s)
     samples = [tick for tick in range(end, -1, -round(1.0 / scenario.dt_s)) if (end - tick) * scenario.dt_s <= trail_s]
@@ -155,15 +158,15 @@ def picture_run(
             trails.add(run.forage_env.swarm)
     world = run.forage_env
     state = (world.swarm, world.objects, world.caches, world.events)
-    title = _title(scenario, name)
+    title = World(scenario, disturbed).title(name, size_words(scenario))
     return write_picture(
         render_frame(scenario, *state, tick=world.tick, size_px=size_px, trails=trails, title=title, theme=theme), path
     )
 
 
-def _title(scenario: ScenarioConfig, policy: str) -> str:
-    arena = scenario.arena
-    return f"{scenario.name.replace('_', ' ')}, {policy}, {arena.width_m:g} x {arena.height_m:g} m"
+def size_words(scenario: ScenarioConfig) -> str:
+    """Return the sides of the arena for a title."""
+    return f"{scenario.arena.width_m:g} x {scenario.arena.height_m:g} m"
 
 
 def cast_policy(

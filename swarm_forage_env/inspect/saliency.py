@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_forage_env._internal.fields import ConfigError, number
-from swarm_forage_env._internal.wording import plain, suggestion
+from swarm_forage_env._internal.wording import counted, plain, suggestion
 from swarm_forage_env.contract.layout import ObservationLayout
 from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, ObsArray
 from swarm_forage_env.policies.network import Network, NetworkPolicy
@@ -172,7 +172,7 @@ def saliency(
     if not len(rows):
         raise ConfigError("Expected robots at work, got a run in which no robot decided anything; choose another seed.")
     found = saliency_of_rows(network, policy.interface.layout, rows, np.random.default_rng(spec.seed))
-    about = f"{scenario.name}, {scenario.robots.n_robots} robots, seed {spec.seed}"
+    about = spec.world.title(counted(scenario.robots.n_robots, "robot"), f"seed {spec.seed}")
     return replace(found, title=f"{Path(spec.policy).stem} in {about}")
 
 

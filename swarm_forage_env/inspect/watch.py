@@ -13,7 +13,7 @@ import numpy as np
 from swarm_forage_env._internal.fields import number
 from swarm_forage_env.contract.codes import Counter, Task
 from swarm_forage_env.contract.policy import Memories, Policy, RememberedPlaces
-from swarm_forage_env.inspect.film import cast_policy
+from swarm_forage_env.inspect.film import cast_policy, size_words
 from swarm_forage_env.inspect.levels_by_hand import LEVELS, Levels, with_idle
 from swarm_forage_env.rendering.close_up import render_close_up
 from swarm_forage_env.rendering.frame import render_frame
@@ -23,6 +23,7 @@ from swarm_forage_env.runs.run import LiveRun, build_env
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M
 from swarm_forage_env.wrappers.base import WrapperConfig
+from swarm_forage_env.wrappers.world import World
 
 HELP = (
     "space: pause   .: one tick   up, down: speed   click, tab: choose a robot   esc: none   +, -: close-up   "
@@ -73,9 +74,11 @@ class Watch:
             number("speed", speed, above=0.0)
         arena_view(scenario, size_px, theme)  # refuses a bad size or theme before the run starts
         self._policy, self._name, self.scenario = cast_policy(policy, scenario, caches, parameters)
+        disturbed = tuple(wrappers)
+        self._headline = World(self.scenario, disturbed).title(self._name, size_words(self.scenario))
         reads = getattr(self._policy, "reads", None)
         stack = build_env(
-            self.scenario, with_idle(wrappers), reads=None if reads is None else tuple({*reads, *_SHOWN_SLICES})
+            self.scenario, with_idle(disturbed), reads=None if reads is None else tuple({*reads, *_SHOWN_SLICES})
         )
         self.levels = Levels(stack)
         self._size_px, self._theme, self._seed = size_px, theme, seed
@@ -181,7 +184,7 @@ class Watch:
             world.events,
             tick=world.tick,
             size_px=self._size_px,
-            title=self._headline(),
+            title=self._headline,
             theme=self._theme,
         )
         ring = close_up = None
@@ -233,13 +236,9 @@ class Watch:
 
     def title(self) -> str:
         """Return the text of the title bar; it names all that was changed by hand."""
-        title = f"{self._headline()}, seed {self._seed}"
+        title = f"{self._headline}, seed {self._seed}"
         changes = ", ".join(self.levels.changes)
         return f"{title} - changed by hand: {changes}" if changes else title
-
-    def _headline(self) -> str:
-        arena = self.scenario.arena
-        return f"{self.scenario.name.replace('_', ' ')}, {self._name}, {arena.width_m:g} x {arena.height_m:g} m"
 
     def _lines(self) -> list[str]:
         clock = "over" if self.run.over else "paused" if self.paused else f"{self.speed:g} times real time"

@@ -1,4 +1,4 @@
-"""The paper's three scenarios, and two warehouses with more sources, as configurations; each value names its source.
+"""The paper's three scenarios, two warehouses with more sources and a classroom; each value names its source.
 
 Section numbers refer to the paper, "Improved Swarm Engineering: Aligning Intuition and Analysis" (Harwell, Gini);
 "study" means the experiment configuration published with it. Every field can be overridden:
@@ -6,6 +6,8 @@ Section numbers refer to the paper, "Improved Swarm Engineering: Aligning Intuit
 """
 
 from collections.abc import Callable, Mapping
+from functools import cache, partial
+from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from swarm_forage_env._internal import fields
@@ -95,6 +97,30 @@ def warehouse_quad(**overrides: Any) -> ScenarioConfig:
         robots=RobotConfig(n_robots=200),  # our choice: as the medium warehouse, so that only the sources differ
         objects=ObjectConfig(n_objects=800, placement="quad_source"),
         performance="collected",
+    )
+    return with_overrides(base, **overrides)
+
+
+def classroom(**overrides: Any) -> ScenarioConfig:
+    """Classroom, 8 x 6 m, one nest and one source: first deliveries at once. 10 robots, 40 objects."""
+    base = ScenarioConfig(
+        name="classroom",
+        arena=ArenaConfig(
+            width_m=8.0,  # our choice: a room; in the window a robot is a disc of 10 pixels or more
+            height_m=6.0,
+            nest_centre_m=(
+                1.0,
+                3.0,
+            ),  # our choice: at the left wall but clear of it; half way up
+            nest_size_m=(1.6, 4.8),  # our choice: 0.2 X by 0.8 Y; 0.1 X has no room for two robots side by side
+        ),
+        robots=RobotConfig(
+            n_robots=10,  # our choice: few enough to follow each; they still meet at the source
+            start_margin_m=0.8,  # our choice: with the 2.8 m of the study 20 robots have no room
+        ),
+        objects=ObjectConfig(n_objects=40, placement="single_source"),  # our choice: 4 per robot, as in the warehouses
+        performance="collected",
+        horizon_s=2_000.0,  # our choice: ten intervals, a second of computing
     )
     return with_overrides(base, **overrides)
 
@@ -202,17 +228,61 @@ PRESETS: dict[str, Callable[..., ScenarioConfig]] = {
     "warehouse_dual": warehouse_dual,
     "warehouse_quad": warehouse_quad,
     "search_and_rescue": search_and_rescue,
+    "classroom": classroom,
 }
-"""Name -> what builds the scenario. A new one is registered here, and nowhere else."""
+"""Name -> what builds the scenario. A new one of this package is registered here, and nowhere else."""
 SCENARIO_NAMES = tuple(PRESETS)
-"""What `scenario` takes."""
+"""Scenarios of this package; `scenario_names` has those of other packages, too."""
+SCENARIO_ENTRY_POINTS = "swarm_forage_env.scenarios"
+"""Entry-point group under which installed packages offer scenarios by name: functions like `warehouse_small`, which
+take overrides, or a `ScenarioConfig`. Each builds a configuration of the entry point's name."""
+
+
+@cache  # every world asks, and the answer is in the files of all packages that are installed
+def _installed() -> dict[str, EntryPoint]:
+    return {point.name: point for point in entry_points(group=SCENARIO_ENTRY_POINTS) if point.name not in PRESETS}
+
+
+def scenario_names() -> tuple[str, ...]:
+    """Return what `scenario` takes: the scenarios of this package, then those of others, sorted."""
+    return (*SCENARIO_NAMES, *sorted(_installed()))
+
+
+def scenario_maker(name: str) -> Callable[..., ScenarioConfig]:
+    """Return the function that builds the scenario of that name with fields overridden.
+
+    Raises:
+        ConfigError: unknown name (with the nearest known one), or an entry point that cannot be loaded.
+    """
+    known_name("scenario", name, scenario_names())
+    if name in PRESETS:
+        return PRESETS[name]
+    point = _installed()[name]
+    try:
+        found = point.load()
+    except Exception as error:  # whatever another package does when it is imported
+        raise ConfigError(
+            f"Cannot load the scenario {name!r} from {point.value}: {type(error).__name__}: {error}. "
+            "Mend or uninstall the package that offers it."
+        ) from error
+    return partial(with_overrides, found) if isinstance(found, ScenarioConfig) else found
+
+
+def _made(name: str, overrides: Mapping[str, Any]) -> ScenarioConfig:
+    found: Any = scenario_maker(name)(**overrides)
+    if not isinstance(found, ScenarioConfig) or found.name != overrides.get("name", name):
+        came = found.name if isinstance(found, ScenarioConfig) else type(found).__name__
+        raise ConfigError(
+            f"Expected what offers the scenario {name!r} to build a ScenarioConfig of that name, got {came}."
+        )
+    return found
 
 
 def scenario(name: str, /, *, density: float | None = None, **overrides: Any) -> ScenarioConfig:
     """Return a preset by name with fields overridden.
 
     Args:
-        name: One of `SCENARIO_NAMES`.
+        name: One of `scenario_names()`.
         density: Robots per m^2, for example 0.05; the arena is as large as the swarm needs, see `at_density`. Default:
             the arena of the preset.
         overrides: Field names of ScenarioConfig or of its sections, see `with_overrides`.
@@ -223,13 +293,13 @@ def scenario(name: str, /, *, density: float | None = None, **overrides: Any) ->
     if density is not None:
         others = {key: value for key, value in overrides.items() if key not in _SIZES}
         return _with_density(scenario(name, **others), density, overrides)
-    known_name("scenario", name, PRESETS)
+    known_name("scenario", name, scenario_names())
     if "side_m" in overrides and name != "search_and_rescue":
         raise ConfigError(
             f"Expected side_m with search_and_rescue only, got it with {name}; "
             "other arenas change by width_m and height_m."
         )
-    return PRESETS[name](**overrides)
+    return _made(name, overrides)
 
 
 def chosen_scenario(given: str | ScenarioConfig, overrides: Mapping[str, Any]) -> ScenarioConfig:

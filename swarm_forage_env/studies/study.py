@@ -29,7 +29,7 @@ from swarm_forage_env.runs.plan import Condition, Plan
 from swarm_forage_env.runs.policy_spec import PolicySpec
 from swarm_forage_env.runs.spec import RunSpec, identity_of, wrappers_from_list, wrappers_to_list
 from swarm_forage_env.scenarios.overrides import field_sections, field_types, parse_tuple
-from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
+from swarm_forage_env.scenarios.presets import scenario, scenario_names
 from swarm_forage_env.scenarios.quirks import RULES
 from swarm_forage_env.scenarios.robots import words_of_kind
 from swarm_forage_env.studies.ladders import CRITERIA, swarms_of_sizes, wrappers_at
@@ -184,7 +184,7 @@ class StudySpec:
 
     def __post_init__(self) -> None:
         check_file_name("name of a study", self.name)
-        known_name("scenario", self.scenario, SCENARIO_NAMES)
+        known_name("scenario", self.scenario, scenario_names())
         for name in table("set", self.settings):
             if name in OF_THE_STUDY:
                 raise ConfigError(f"Expected no {name} in set: {OF_THE_STUDY[name]}.")

@@ -177,7 +177,7 @@ def place_of(plan: TrainingPlan) -> str:
     """Say where policies of a plan are judged."""
     if plan.evaluation.worlds:
         return counted(len(plan.evaluation.worlds), "world")
-    return f"{plan.scenario.name}, {counted(plan.scenario.robots.n_robots, 'robot')}"
+    return plan.world.name
 
 
 def counted_in(plan: TrainingPlan) -> str:

@@ -14,8 +14,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from swarm_forage_env._internal.fields import ConfigError, as_tuples, instance, number, table, text
-from swarm_forage_env._internal.files import parse_toml
+from swarm_forage_env._internal.files import as_file_name, parse_toml
+from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.differences import difference_words, differences, digest_of, is_resized
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.registry import wrappers_from_mapping
 
@@ -29,8 +31,16 @@ SIZE = "population_size"
 """Criterion of worlds that differ in the number of robots."""
 FILE = ".toml"
 """Ending of files of worlds."""
+_DIGITS = 6
+"""Hexadecimal digits in names of files; our choice: of a hundred worlds, two share theirs once in 3,000 times."""
 _PRESET = "warehouse_small"
 """What a file without a preset changes."""
+
+
+class _DefaultName(str):
+    """A name that a world has made of what it is; a changed copy makes its own."""
+
+    __slots__ = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +61,7 @@ class World:
     value: float = field(default=0.0, kw_only=True)
     """Place of this world on that axis."""
     name: str = field(default="", kw_only=True, compare=False)
-    """Name for people; default made of scenario, number of robots and what is varied."""
+    """Name for people; default made of scenario, number of robots and what is varied or differs from the preset."""
 
     def __post_init__(self) -> None:
         instance("scenario", self.scenario, ScenarioConfig)
@@ -64,8 +74,8 @@ class World:
             names = ", ".join(config.name for config in ordered)
             raise ConfigError(f"Expected each wrapper at most once, got {names}.")
         object.__setattr__(self, "wrappers", ordered)
-        if not self.name:
-            object.__setattr__(self, "name", self._default_name())
+        if not self._own_name:
+            object.__setattr__(self, "name", _DefaultName(self._default_name()))
 
     @property
     def n_robots(self) -> int:
@@ -85,13 +95,63 @@ class World:
             return self
         return replace(self, scenario=replace(self.scenario, caches=caches))
 
+    @property
+    def place(self) -> str:
+        """Name of the scenario; of a world with a name of its own, such as that of its file, that with the scenario."""
+        own = self._own_name
+        return f"{own} ({self.scenario.name})" if own and own != self.scenario.name else self.scenario.name
+
+    @property
+    def changes(self) -> tuple[str, ...]:
+        """What differs from the preset, the engine where it is another one, and disturbances with their levels."""
+        return (*difference_words(self.scenario), *(config.in_words(self.scenario.dt_s) for config in self.wrappers))
+
+    def title(self, *facts: str) -> str:
+        """Name the world for people: "warehouse_small: 50 robots, with 3 objects, throttle: robots lose 20 % ...".
+
+        Titles, tables and legends use this, so that no two worlds are called the same.
+
+        Args:
+            facts: What a title says of the runs, such as how many robots there are; changes among them appear once.
+        """
+        changes = [words for words in self.changes if words not in facts]
+        words = f"{self.place}: {', '.join(facts)}," if facts else self.place
+        return f"{words} with {', '.join(changes)}" if changes else words.removesuffix(",")
+
+    @property
+    def file_name(self) -> str:
+        """Name the world for files and folders: `warehouse_small`, `warehouse_small_20_robots`, `mine_100_s_3fd21a`.
+
+        Sizes of swarms and lengths of runs other than the preset's are readable; six digits stand for all other
+        differences and disturbances. Worlds of one name are equal, or differ only in what is read of their runs.
+        """
+        scenario = self.scenario
+        found = differences(scenario)
+        words = [as_file_name(self._own_name or scenario.name)]
+        if is_resized(scenario):
+            words.append(f"{self.n_robots}_robots")
+        if "horizon_s" in found:
+            words.append(f"{found.pop('horizon_s'):g}_s")
+        found.pop("n_robots", None)
+        wrappers = [{"wrapper": config.name, **config.to_mapping()} for config in self.wrappers]
+        if found or wrappers:
+            words.append(digest_of([found, wrappers], _DIGITS))
+        return "_".join(words)
+
+    @property
+    def _own_name(self) -> str:
+        """The name that was given; empty where it is the default."""
+        return "" if isinstance(self.name, _DefaultName) else self.name
+
     def _default_name(self) -> str:
-        """Scenario and robots, and what is varied, else what disturbs the swarm."""
-        words = [f"{self.scenario.name}, {self.n_robots} robot{'s' if self.n_robots != 1 else ''}"]
+        """Scenario and robots, and what is varied, else what differs from the preset and disturbs the swarm."""
+        words = [f"{self.scenario.name}, {counted(self.n_robots, 'robot')}"]
         if self.criterion not in (UNDISTURBED, SIZE):
             words.append(f"{self.criterion} {self.value:g}")
+        elif self.criterion == SIZE:
+            words += [config.in_words(self.scenario.dt_s) for config in self.wrappers]
         else:
-            words += [config.name for config in self.wrappers]
+            words += self.changes
         return ", ".join(words)
 
 
@@ -103,10 +163,12 @@ class WorldDescription:
     fields: dict[str, Any] = field(default_factory=dict)
     """Scenario fields by name."""
     wrappers: "tuple[WrapperConfig, ...]" = ()
+    name: str = ""
+    """Of the file without its ending; empty for a preset."""
 
     def world(self) -> World:
         """Return the world; raises ConfigError where it cannot be."""
-        return World(scenario(self.preset, **self.fields), self.wrappers)
+        return World(scenario(self.preset, **self.fields), self.wrappers, name=self.name)
 
 
 def describe_file(file: str | Path) -> WorldDescription:
@@ -129,7 +191,7 @@ def describe_file(file: str | Path) -> WorldDescription:
         raise ConfigError(f"Cannot use {path}: {error.strerror or error}.") from error
     except ValueError as error:
         raise ConfigError(f"Cannot use {path}: {error}") from error
-    return WorldDescription(preset=preset, fields=given, wrappers=wrappers)
+    return WorldDescription(preset=preset, fields=given, wrappers=wrappers, name=path.stem)
 
 
 def read_world(file: str | Path) -> World:

@@ -17,11 +17,11 @@ def test_choose_prints_ranking_evidence_and_reason(command):
     code, out, _ = command(*CHOOSE, *ADVERSE)
     assert code == 0
     lines = out.splitlines()
-    assert lines[0] == "warehouse_small, 3 robots, runs of 4 s: objects"
+    assert lines[0] == "warehouse_small with 20 objects, 3 robots, runs of 4 s: objects"
     assert lines[1].split()[:4] == ["rank", "policy", "constraint", "demand"]
     for word in ("undisturbed", "failures 0.01", "deaths 1", "noise 0.01", "not met", "comes first: it meets 0 of 4"):
         assert word in out
-    assert len(load("results/warehouse_small")) == 16
+    assert len(load("results/warehouse_small_3_robots_4_s_33b9a3")) == 16
 
 
 def test_under_a_disturbance_a_share_of_the_demand_is_enough(command):
@@ -39,7 +39,7 @@ def test_another_performance_is_read_from_the_same_runs(command, monkeypatch):
     monkeypatch.setattr(RandomPolicy, "reset", lambda *_: pytest.fail("a stored run was repeated"))
     code, out, _ = command(*CHOOSE, "--performance", "n_active")
     assert code == 0
-    assert out.splitlines()[0] == "warehouse_small, 3 robots, runs of 4 s: robots summed over intervals"
+    assert out.splitlines()[0] == "warehouse_small with 20 objects, 3 robots, runs of 4 s: robots summed over intervals"
     # Three robots at work in each of two intervals.
     assert " ".join(out.splitlines()[2].split()).startswith("1 random undisturbed 5 6 ")
 
@@ -54,7 +54,7 @@ def test_the_same_command_again_runs_nothing(command, monkeypatch):
 def test_a_dry_run_shows_conditions_and_runs_nothing(command):
     code, out, _ = command(*CHOOSE, *ADVERSE, "--dry-run")
     assert code == 0
-    assert out.splitlines()[0] == "16 runs, 16 to do, records go to results/warehouse_small"
+    assert out.splitlines()[0] == "16 runs, 16 to do, records go to results/warehouse_small_3_robots_4_s_33b9a3"
     assert [line.split()[0] for line in out.splitlines()[7:]] == ["policy", "random", "crw", "all", "about"]
     assert not Path("results").exists()
 

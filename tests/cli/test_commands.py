@@ -35,10 +35,10 @@ def test_run_shows_a_table_and_keeps_records_and_a_picture(command, painted):
     assert "warehouse_small: 3 robots, 20 objects, 4 s" in out
     for word in ("random", "none", "deliveries", "per 1,000 s", "interference", "simulated s", "± 95% t interval"):
         assert word in out
-    folder = Path("results/warehouse_small")
+    folder = Path("results/warehouse_small_3_robots_4_s_33b9a3")
     assert [record.seed for record in sorted(load(folder), key=lambda record: record.seed)] == [0, 1]
     assert (folder / "performance.png").read_bytes().startswith(b"\x89PNG")
-    assert "2 records in results/warehouse_small" in err
+    assert "2 records in results/warehouse_small_3_robots_4_s_33b9a3" in err
 
 
 def test_a_few_runs_are_drawn_without_bands(command, monkeypatch):
@@ -105,8 +105,8 @@ def test_json_has_null_where_there_is_no_interval(command):
 def test_several_controllers_and_their_worlds(command):
     code, out, _ = command("run", "--policy", "random, crw,random", *SHORT, "--caches", "static", "--dry-run")
     assert code == 0
-    rows = [line.split()[:2] for line in out.splitlines() if "static" in line]
-    assert rows == [["random", "static"], ["crw", "static"], ["all", "static"]]
+    rows = [line.split()[:2] for line in out.splitlines() if " static " in line]
+    assert rows[-3:] == [["random", "static"], ["crw", "static"], ["all", "static"]]
 
 
 @pytest.mark.parametrize("words", [("crw,dpo",), ("crw", "dpo"), ("--policy", "crw", "dpo"), ("--policy", "crw,dpo")])
@@ -160,7 +160,7 @@ def test_set_changes_any_field_with_its_type(command):
 def test_a_density_chooses_the_arena(command, density):
     words = ("run", "--policy", "random", "--robots", "20", "--density", density, "--horizon", "4", "--jobs", "1")
     assert command(*words, "--set", "interval_s=2")[0] == 0
-    (record,) = load(Path("results/warehouse_small"))
+    (record,) = load(Path("results/warehouse_small_20_robots_4_s_c12cf6"))
     arena = RunSpec.from_json(record.spec).scenario.arena
     assert (arena.width_m, arena.height_m) == (28.4, 14.2)  # 400 m^2 = 2 a^2 with a = 14.14 m
 
@@ -171,7 +171,7 @@ def test_wrappers_disturb_the_run_and_are_part_of_its_record(command):
     assert code == 0
     record = RunRecord.read(json.loads(out)["runs"][0]["file"])
     assert record.adversity.tolist() == pytest.approx([0.2, 0.2])
-    assert "4 s, with throttle, actuator_noise" in command(*RUN, *words)[1]
+    assert "4 s, with throttle: robots lose 20 % of their speed, wheel noise: sigma 0.1" in command(*RUN, *words)[1]
     assert [wrapper["wrapper"] for wrapper in json.loads(record.spec)["wrappers"]] == ["throttle", "actuator_noise"]
 
 
@@ -208,7 +208,7 @@ def test_a_failed_run_is_reported_with_the_way_to_run_it_again(command, monkeypa
 
 def test_rerun_compares_with_the_record(command):
     command(*RUN)
-    (file,) = Path("results/warehouse_small").glob("*.parquet")
+    (file,) = Path("results/warehouse_small_3_robots_4_s_33b9a3").glob("*.parquet")
     code, out, _ = command("rerun", str(file))
     assert code == 0
     assert f"bit for bit the same as {file}" in out
@@ -216,7 +216,7 @@ def test_rerun_compares_with_the_record(command):
 
 def test_rerun_notices_a_difference(command, monkeypatch):
     command(*RUN)
-    (file,) = Path("results/warehouse_small").glob("*.parquet")
+    (file,) = Path("results/warehouse_small_3_robots_4_s_33b9a3").glob("*.parquet")
     monkeypatch.setattr(RunRecord, "same_results", lambda *_: False)
     code, _, err = command("rerun", str(file))
     assert code == 1
@@ -227,7 +227,7 @@ def test_rerun_says_when_the_policy_is_not_what_it_was(command):
     shipped = Path(pretrained.__file__).with_name("ppo_warehouse_small.npz")
     copy = Path(shutil.copy(shipped, "mine.npz"))
     command("run", "--policy", "mine.npz", *SHORT)
-    (file,) = Path("results/warehouse_small").glob("*.parquet")
+    (file,) = Path("results/warehouse_small_3_robots_4_s_33b9a3").glob("*.parquet")
     assert command("rerun", str(file))[0] == 0
     for change, said in ((lambda: copy.write_bytes(b"other"), "has changed since"), (copy.unlink, "No such file")):
         change()
@@ -245,7 +245,10 @@ def test_ctrl_c_in_this_process(command, monkeypatch):
     monkeypatch.setattr(RandomPolicy, "reset", interrupt)
     code, _, err = command(*RUN, "--seeds", "3")
     assert code == 130
-    expected = "swarm-forage: Interrupted: 1 of 3 runs are finished and kept. They are in results/warehouse_small; "
+    expected = (
+        "swarm-forage: Interrupted: 1 of 3 runs are finished and kept. They are in "
+        "results/warehouse_small_3_robots_4_s_33b9a3; "
+    )
     assert err.splitlines()[-1] == expected + "the same command does the rest."
 
 
@@ -292,7 +295,7 @@ def test_without_matplotlib_it_says_how_to_get_the_picture(command, monkeypatch)
     assert code == 0
     assert "random" in out
     assert 'pip install ".[plots]"' in err
-    assert not Path("results/warehouse_small/performance.png").exists()
+    assert not Path("results/warehouse_small_3_robots_4_s_33b9a3/performance.png").exists()
 
 
 @pytest.mark.parametrize("name", ["ppo_warehouse_small", str(pretrained.network_file("ppo_warehouse_small"))])
@@ -462,7 +465,7 @@ def test_a_mistake_is_one_line_and_exit_code_2(command, words, complaint):
 
 def test_a_damaged_record_in_the_folder_is_named_put_aside_and_made_again(command):
     _, out, _ = command(*RUN, "--dry-run", "--json")
-    damaged = Path("results/warehouse_small") / f"{json.loads(out)['runs'][0]['run_id']}.parquet"
+    damaged = Path("results/warehouse_small_3_robots_4_s_33b9a3") / f"{json.loads(out)['runs'][0]['run_id']}.parquet"
     damaged.parent.mkdir(parents=True)
     damaged.write_bytes(b"damaged")
     code, _, err = command(*RUN)

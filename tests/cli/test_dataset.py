@@ -14,7 +14,7 @@ def test_a_data_set_is_told_written_and_kept(command, tmp_path):
     assert "runs          2, of which 2 to do; 200 decisions of 3 robots each" in out
     assert list(tmp_path.iterdir()) == []
     code, out, _ = command(*words, "--compress")
-    folder = tmp_path / "results/datasets/warehouse_small_ppo_warehouse_small"
+    folder = tmp_path / "results/datasets/warehouse_small_3_robots_200_s_bcf754_ppo_warehouse_small"
     assert code == 0
     assert "400 decisions" in out
     assert [len(TrajectoryDataset(folder).steps(seed)) for seed in (0, 1)] == [200, 200]

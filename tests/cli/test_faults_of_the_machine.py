@@ -80,7 +80,8 @@ def test_a_disk_that_fills_up_later_ends_the_command_with_one_line(command, monk
     monkeypatch.setattr(RunRecord, "write", full)
     code, out, err = command(*RUN)
     assert (code, out) == (1, "")
-    assert err.splitlines()[-1].startswith("swarm-forage: No space left on device: results/warehouse_small/")
+    folder = "results/warehouse_small_3_robots_4_s_20cdbe"
+    assert err.splitlines()[-1].startswith(f"swarm-forage: No space left on device: {folder}/")
     assert "Traceback" not in err
 
 
@@ -92,7 +93,8 @@ def test_results_are_shown_even_if_their_picture_cannot_be_written(command, monk
     code, out, err = command(*RUN)
     assert code == 0
     assert "random" in out
-    assert "No picture results/warehouse_small/performance.png: No space left on device." in " ".join(err.split())
+    picture = "results/warehouse_small_3_robots_4_s_20cdbe/performance.png"
+    assert f"No picture {picture}: No space left on device." in " ".join(err.split())
 
 
 @pytest.mark.parametrize("words", [("run", "random"), ("score", "random"), ("predict", "random")])
@@ -114,7 +116,7 @@ def test_sigterm_keeps_finished_runs_as_ctrl_c_does(command, monkeypatch):
     code, _, err = command(*RUN, "--seeds", "3")
     assert code == 143
     assert "Interrupted: 1 of 3 runs are finished and kept." in err.splitlines()[-1]
-    assert len(load("results/warehouse_small")) == 1
+    assert len(load("results/warehouse_small_3_robots_4_s_20cdbe")) == 1
     assert signal.getsignal(signal.SIGTERM) == before
 
 

@@ -29,8 +29,8 @@ def test_maps_of_policies_need_no_page(command):
     words = ("--robots", "3", "--horizon", "4", "--set", "interval_s=2", "--seeds", "2", "--square", "1")
     code, out, err = command("maps", "random", "crw", *words, "--per-robot")
     assert (code, err) == (0, "")
-    assert out == "wrote maps to results/maps/warehouse_small/maps.png and .npz files beside it\n"
-    folder = Path("results/maps/warehouse_small")
+    assert out == "wrote maps to results/maps/warehouse_small_3_robots_4_s_20cdbe/maps.png and .npz files beside it\n"
+    folder = Path("results/maps/warehouse_small_3_robots_4_s_20cdbe")
     assert {path.name for path in folder.glob("*.npz")} == {
         "maps.random.npz",
         "maps.crw.npz",
@@ -64,7 +64,7 @@ def test_maps_refuses_other_files(command):
 def test_maps_of_a_stored_run(command, monkeypatch):
     short = ("--set", "horizon_s=20", "--set", "interval_s=10", "--robots", "3", "--objects", "20")
     assert command("run", "random", *short, "--jobs", "1")[0] == 0
-    (record,) = Path("results/warehouse_small").glob("*.parquet")
+    (record,) = Path("results/warehouse_small_3_robots_20_s_a1884d").glob("*.parquet")
     code, out, err = command("maps", str(record))
     assert (code, err) == (0, "")
     assert out == f"wrote maps to {record.with_suffix('.maps.png')} and .npz files beside it\n"

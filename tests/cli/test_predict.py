@@ -52,14 +52,14 @@ def one_object_per_robot(monkeypatch):
 def test_predict_runs_all_sizes_prints_the_prediction_and_draws_it(command, one_object_per_robot, painted):
     code, out, err = command(*RUNS, *WORLD)
     assert code == 0
-    assert out.splitlines()[0] == "crw in warehouse_small: objects in 4 s, fitted to 1, 2, 3, 4 robots"
+    assert out.splitlines()[0] == "crw in warehouse_small with 20 objects: objects in 4 s, fitted to 1, 2, 3, 4 robots"
     assert "1 of 1 held-back mean inside the interval" in out
     for word in ("law: ", "critical size: none up to 16 robots", "held back", "predicted"):
         assert word in out
-    folder = Path("results/warehouse_small")
+    folder = Path("results/warehouse_small_4_s_33b9a3")
     assert len(load(folder)) == 10
     assert (folder / "prediction.png").is_file()
-    assert "picture results/warehouse_small/prediction.png" in err
+    assert "picture results/warehouse_small_4_s_33b9a3/prediction.png" in err
     code, out, _ = command(*RUNS, *WORLD, "--json")
     (table,) = json.loads(out)["tables"]
     assert [row["n_robots"] for row in table["predictions"]] == [6, 8, 16]
@@ -76,7 +76,7 @@ def test_the_same_command_again_runs_nothing(command, one_object_per_robot, monk
 def test_a_dry_run_shows_sizes_and_runs_nothing(command):
     code, out, _ = command(*RUNS, *WORLD, "--dry-run")
     assert code == 0
-    assert out.splitlines()[0] == "10 runs, 10 to do, records go to results/warehouse_small"
+    assert out.splitlines()[0] == "10 runs, 10 to do, records go to results/warehouse_small_4_s_33b9a3"
     assert "on 1 core as fast as this one is now" in out
     assert not Path("results").exists()
     _, out, _ = command(*RUNS, *WORLD, "--dry-run", "--json")
@@ -98,7 +98,9 @@ def test_curves_of_others_are_predicted_and_drawn_where_a_picture_is_asked_for(c
 def test_another_performance_is_predicted_from_runs_and_from_curves(command, curves):
     code, out, _ = command(*RUNS, *WORLD, "--performance", "n_active")
     assert code == 0
-    assert out.startswith("crw in warehouse_small: robots summed over intervals, fitted to 1, 2, 3, 4 robots")
+    assert out.startswith(
+        "crw in warehouse_small with 20 objects: robots summed over intervals, fitted to 1, 2, 3, 4 robots"
+    )
     assert "law: linear, P(N) = 2 N" in out  # every robot is at work in each of two intervals
     code, out, _ = command("predict", "--curves", curves(), "--performance", "1/performance")
     assert code == 0
@@ -128,7 +130,7 @@ def test_ctrl_c_says_what_is_kept(command, monkeypatch):
     monkeypatch.setattr("swarm_forage_env.runs.runner.run_specs", interrupted)
     code, out, err = command(*RUNS, *WORLD)
     assert (code, out) == (130, "")
-    assert "0 of 10 runs are finished and kept. They are in results/warehouse_small" in err
+    assert "0 of 10 runs are finished and kept. They are in results/warehouse_small_4_s_33b9a3" in err
 
 
 def test_a_size_whose_runs_fail_is_left_out_and_the_command_exits_with_1(command, one_object_per_robot, monkeypatch):

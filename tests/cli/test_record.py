@@ -20,8 +20,8 @@ def test_record_films_a_run(command):
     code, out, _ = command("record", "--file", "film.gif", *words)
     assert (code, out) == (0, "wrote film.gif\n")
     assert Path("film.gif").read_bytes().startswith(b"GIF8")
-    assert command("record", *words)[1] == "wrote results/warehouse_small_random.gif\n"
-    assert Path("results/warehouse_small_random.gif").read_bytes() == Path("film.gif").read_bytes()
+    assert command("record", *words)[1] == "wrote results/warehouse_small_3_robots_random.gif\n"
+    assert Path("results/warehouse_small_3_robots_random.gif").read_bytes() == Path("film.gif").read_bytes()
 
 
 @pytest.mark.parametrize(("asked", "filmed"), [((), "static"), (("--caches", "none"), "none")])
@@ -41,7 +41,7 @@ def test_record_films_the_caches_that_were_asked_for(command, monkeypatch, asked
 def test_record_films_a_world_whose_horizon_is_not_whole_intervals(command):
     pytest.importorskip("PIL")
     code, out, err = command("record", "--policy", "random", "--set", "horizon_s=30", *SHORT_FILM)
-    assert (code, out, err) == (0, "wrote results/warehouse_small_random.gif\n", "")
+    assert (code, out, err) == (0, "wrote results/warehouse_small_3_robots_30_s_random.gif\n", "")
 
 
 def test_record_names_a_file_without_the_way_there(command, monkeypatch):
@@ -55,7 +55,7 @@ def test_record_names_a_file_without_the_way_there(command, monkeypatch):
 
     monkeypatch.setattr(film, "render_frame", note)
     assert command("record", "--policy", "mine.npz", *SHORT_FILM)[0] == 0
-    assert titles == {"warehouse small, mine, 32 x 16 m"}
+    assert titles == {"warehouse_small: mine, 32 x 16 m"}
 
 
 def test_record_says_when_a_network_does_not_fit(command):
@@ -83,11 +83,11 @@ def test_record_draws_one_picture_of_the_run_it_films(command, monkeypatch):
     assert list(filmed) == [40]
     with image.open("new/at.png") as picture:
         assert np.array_equal(np.asarray(picture), filmed[40])
-    with image.open("results/warehouse_small_random.gif") as gif:
+    with image.open("results/warehouse_small_3_robots_random.gif") as gif:
         gif.seek(gif.n_frames - 1)
         off = np.abs(np.asarray(gif.convert("RGB"), float) - filmed[40]).mean()
     assert off < 4.0, "the last picture of the film, but for the colours of a GIF and the length of trails"
-    assert command("record", *words, "--at", "0")[1] == "wrote results/warehouse_small_random.png\n"
+    assert command("record", *words, "--at", "0")[1] == "wrote results/warehouse_small_3_robots_random.png\n"
 
 
 def test_record_says_how_pictures_and_films_are_asked_for(command):

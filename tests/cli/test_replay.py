@@ -19,7 +19,7 @@ def test_replay_writes_a_page(command):
     assert out.startswith("wrote new/run.html (0.1 MB)")
     (replay,) = read_replays("new/run.html")
     assert (replay.label, replay.n_frames, replay.scenario.robots.n_robots) == ("random", 5, 3)
-    assert command("replay", "random", *SHORT)[1].startswith("wrote results/warehouse_small_random.html")
+    assert command("replay", "random", *SHORT)[1].startswith("wrote results/warehouse_small_3_robots_random.html")
 
 
 def test_replay_shows_runs_of_one_world_and_seed_side_by_side(command):
@@ -41,12 +41,12 @@ def stored(command):
     """A stored run and the words that make it."""
     words = ("--policy", "dpo", "--robots", "3", "--horizon", "200", "--first-seed", "4", "--jobs", "1")
     assert command("run", *words)[0] == 0
-    (record,) = RunStore("results/warehouse_small").records()
+    (record,) = RunStore("results/warehouse_small_3_robots_200_s").records()
     return record
 
 
 def test_replay_makes_a_stored_run_again(command, stored):
-    for word in (stored.run_id, f"results/warehouse_small/{stored.run_id}.parquet"):
+    for word in (stored.run_id, f"results/warehouse_small_3_robots_200_s/{stored.run_id}.parquet"):
         code, _, err = command("replay", word, "crw", "--file", "run.html")
         assert (code, err) == (0, "")
         mine, beside = read_replays("run.html")

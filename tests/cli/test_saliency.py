@@ -17,7 +17,7 @@ def test_saliency_is_told_and_drawn(command, monkeypatch):
     assert code == 0
     assert "share of decisions that change when a slice comes from another observation" in out
     assert "cos, sin of the heading" in out
-    picture = Path("results/warehouse_small_ppo_warehouse_small.saliency.png")
+    picture = Path("results/warehouse_small_3_robots_ppo_warehouse_small.saliency.png")
     assert err == f"picture {picture}\n"
     assert picture.read_bytes().startswith(b"\x89PNG")
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)

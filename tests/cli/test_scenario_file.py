@@ -41,7 +41,8 @@ def command(command):
 
 def stored_spec() -> dict:
     """The specification of the one stored run."""
-    (record,) = load(Path("results/world"))
+    (folder,) = Path("results").glob("world_*")
+    (record,) = load(folder)
     return json.loads(record.spec)
 
 
@@ -72,9 +73,12 @@ def test_a_file_gives_table_and_folder_their_name(command):
     text = CONFIG.replace("horizon_s = 4.0", 'horizon_s = 4.0\nphysics = "chipmunk"')
     code, out, err = command(text, "--scenario", "world.toml")
     assert code == 0
-    assert out.startswith("world: 3 robots, 20 objects, 4 s, physics chipmunk, with throttle, actuator_noise\n")
-    assert "picture results/world/performance.png" in err
-    assert not Path("results/warehouse_small").exists()
+    assert out.startswith(
+        "world (warehouse_small): 3 robots, 20 objects, 4 s, with physics chipmunk, 5 substeps, "
+        "throttle: robots lose 20 % of their speed, wheel noise: sigma 0.1\n"
+    )
+    assert "picture results/world_3_robots_4_s_bec93b/performance.png" in err
+    assert not list(Path("results").glob("warehouse_small*"))
 
 
 @pytest.mark.parametrize(

@@ -34,20 +34,20 @@ def tiny_budget(monkeypatch):
 def test_score_shows_every_measure_keeps_records_and_draws_a_picture(command, painted):
     code, out, err = command(*SCORE)
     assert code == 0
-    assert out.splitlines()[0] == "random in warehouse_small, budget tiny, 2 seeds, 4 s"
+    assert out.splitlines()[0] == "random in warehouse_small with 20 objects, budget tiny, 2 seeds, 4 s"
     for word in ("95 % interval", "noise floor", "reactivity", "objects in 4 s", "higher"):
         assert word in out
     assert "Population: what the queueing model predicts" in out
-    folder = Path("results/warehouse_small")
+    folder = Path("results/warehouse_small_3_robots_bcf754")
     assert len(load(folder)) == 14
     assert (folder / "scores.png").read_bytes().startswith(b"\x89PNG")
-    assert "picture results/warehouse_small/scores.png" in err
+    assert "picture results/warehouse_small_3_robots_bcf754/scores.png" in err
 
 
 def test_compare_shows_values_differences_and_the_test(command):
     code, out, _ = command(*COMPARE, *FEW, "--out", "here")
     assert code == 0
-    assert out.splitlines()[0] == "random, crw in warehouse_small, budget tiny, 2 seeds, 4 s"
+    assert out.splitlines()[0] == "random, crw in warehouse_small with 20 objects, budget tiny, 2 seeds, 4 s"
     assert out.splitlines()[1].split() == ["measure", "at", "better", "random", "crw"]
     for word in ("random - crw", "paired t test", "Holm", "adaptability, relative", "throttle 0.4"):
         assert word in out
@@ -59,7 +59,7 @@ def test_flexibility_is_scored_under_a_handling_cost_if_asked(command):
     assert code == 0
     assert out.count("handling cost 800") >= 2
     assert "throttle" not in out
-    columns = [record.columns() for record in load(Path("results/warehouse_small"))]
+    columns = [record.columns() for record in load(Path("results/warehouse_small_3_robots_bcf754"))]
     # A cycle is as long as an interval here: half of it at 1,601 ticks, half at one.
     assert {float(values["adversity"].max()) for values in columns} == {1.0, 801.0}
 
@@ -70,7 +70,7 @@ def test_sizes_keep_a_density_if_asked(command):
     assert code == 0
     arenas = {
         (record.n_robots, RunSpec.from_json(record.spec).scenario.arena.width_m)
-        for record in load(Path("results/warehouse_small"))
+        for record in load(Path("results/warehouse_small_20_robots_9db01d"))
     }
     assert arenas == {(1, 28.4), (20, 28.4)}
 
@@ -117,14 +117,14 @@ def test_another_performance_reads_the_same_runs(command, monkeypatch):
     monkeypatch.setattr(RandomPolicy, "reset", lambda *_: pytest.fail("a stored run was repeated"))
     code, out, _ = command(*SCORE, *FEW, "--performance", "1/interference_fraction")
     assert code == 0
-    assert out.startswith("random in warehouse_small, performance 1/interference_fraction, budget tiny")
+    assert out.startswith("random in warehouse_small with 20 objects, performance 1/interference_fraction, budget tiny")
     assert "1/interference_fraction (DTW)" in out
 
 
 def test_a_dry_run_shows_the_experiments_and_runs_nothing(command):
     code, out, _ = command(*COMPARE, "--dry-run")
     assert code == 0
-    assert out.startswith("28 runs, 28 to do, records go to results/warehouse_small\n")
+    assert out.startswith("28 runs, 28 to do, records go to results/warehouse_small_3_robots_bcf754\n")
     assert "population_dynamics" in out
     assert not Path("results").exists()
     command(*SCORE, *FEW)
@@ -157,7 +157,7 @@ def test_a_plan_counts_in_words(command):
 
 def test_seeds_length_and_world_can_be_chosen(command):
     command(*SCORE, *FEW, "--seeds", "1", "--horizon", "2", "--set", "walk_probability=0.1", "--caches", "static")
-    records = load("results/warehouse_small")
+    records = load("results/warehouse_small_3_robots_ba6106")
     assert {(record.seed, record.horizon_s) for record in records} == {(0, 2.0)}
     assert all('"caches": "static"' in record.spec and '"walk_probability": 0.1' in record.spec for record in records)
 
@@ -255,7 +255,8 @@ def test_ctrl_c_says_what_is_kept_and_how_to_go_on(command, monkeypatch):
     monkeypatch.setattr(RandomPolicy, "reset", interrupt)
     code, out, err = command(*SCORE, *FEW)
     assert (code, out) == (130, "")
-    expected = "swarm-forage: Interrupted: 4 of 8 runs are finished and kept. They are in results/warehouse_small; "
+    folder = "results/warehouse_small_3_robots_bcf754"
+    expected = f"swarm-forage: Interrupted: 4 of 8 runs are finished and kept. They are in {folder}; "
     assert err.splitlines()[-1] == expected + "the same command does the rest."
 
 
@@ -265,7 +266,7 @@ def test_without_matplotlib_it_says_how_to_get_the_picture(command, monkeypatch)
     assert code == 0
     assert "adaptability" in out
     assert 'pip install ".[plots]"' in err
-    assert not Path("results/warehouse_small/scores.png").exists()
+    assert not Path("results/warehouse_small_3_robots_bcf754/scores.png").exists()
 
 
 @pytest.mark.slow

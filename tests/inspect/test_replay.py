@@ -316,13 +316,15 @@ def test_replays_come_back_from_their_file(replay, tmp_path):
 @pytest.mark.compiled
 def test_runs_of_one_policy_are_told_apart(replay, tmp_path):
     again = read_replays(write_replays(tmp_path / "three.html", [replay] * 3))
-    assert [one.label for one in again] == [
-        f"stochm with sensor noise, population, throttle{nth}" for nth in ("", " (2)", " (3)")
-    ]
+    assert [one.label for one in again] == [f"stochm{nth}" for nth in ("", " (2)", " (3)")]
     throttled = dataclasses.replace(replay, spec=spec_of(wrappers=DISTURBED[1:]))
     calm = dataclasses.replace(replay, spec=spec_of(wrappers=()))
     again = read_replays(write_replays(tmp_path / "two.html", [calm, throttled]))
-    assert [one.label for one in again] == ["stochm", "stochm with sensor noise, throttle"]
+    assert [one.label for one in again] == [
+        "stochm",
+        "stochm with sensor noise: sigma 0.02 (all sensors), throttle: robots lose 0 to 40 % of their speed (sine, "
+        "period 40 s)",
+    ]
 
 
 def edited(text: str, change) -> str:

@@ -1,10 +1,11 @@
 """World: its name, its wrappers in order, and what it refuses."""
 
+import copy
 from dataclasses import replace
 
 import pytest
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import ConfigError, check_file_name
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.noise import SensorNoiseConfig
 from swarm_forage_env.wrappers.population import PopulationConfig
@@ -20,10 +21,20 @@ SMALL = scenario("warehouse_small")
     [
         (World(SMALL), "warehouse_small, 50 robots"),
         (World(scenario("search_and_rescue", n_robots=1)), "search_and_rescue, 1 robot"),
-        (World(SMALL, (InnerConfig(), OuterConfig())), "warehouse_small, 50 robots, test_outer, test_inner"),
+        (
+            World(SMALL, (InnerConfig(sigma=0.1), OuterConfig())),
+            "warehouse_small, 50 robots, test outer: groups proximity, test inner: sigma 0.1",
+        ),
+        (
+            World(scenario("warehouse_small", n_objects=3, physics="chipmunk")),
+            "warehouse_small, 50 robots, physics chipmunk, 3 objects",
+        ),
         (World(SMALL, (InnerConfig(),), criterion="noise", value=0.025), "warehouse_small, 50 robots, noise 0.025"),
         (World(SMALL, criterion="noise", value=0.0), "warehouse_small, 50 robots, noise 0"),
-        (World(SMALL, (InnerConfig(),), criterion=SIZE, value=50), "warehouse_small, 50 robots, test_inner"),
+        (
+            World(SMALL, (InnerConfig(sigma=0.1),), criterion=SIZE, value=50),
+            "warehouse_small, 50 robots, test inner: sigma 0.1",
+        ),
         (World(SMALL, criterion=SIZE, value=50, name="the usual"), "the usual"),
     ],
 )
@@ -36,6 +47,68 @@ def test_a_name_is_for_people_only():
     assert named == World(SMALL)
     assert hash(named) == hash(World(SMALL))
     assert named != World(SMALL, criterion="noise")
+
+
+def test_a_changed_copy_makes_its_own_name_and_keeps_a_given_one():
+    fewer = scenario("warehouse_small", n_objects=3)
+    assert replace(World(SMALL), scenario=fewer).name == "warehouse_small, 50 robots, 3 objects"
+    assert replace(World(SMALL, name="home"), scenario=fewer).name == "home"
+    assert copy.deepcopy(World(SMALL)).file_name == "warehouse_small"
+
+
+def test_a_title_says_place_facts_and_changes_once():
+    changed = World(scenario("warehouse_small", n_objects=3), (InnerConfig(sigma=0.1),))
+    assert World(SMALL).title() == "warehouse_small"
+    assert World(SMALL).title("50 robots", "400 s") == "warehouse_small: 50 robots, 400 s"
+    assert changed.title() == "warehouse_small with 3 objects, test inner: sigma 0.1"
+    assert changed.title("3 objects") == "warehouse_small: 3 objects, with test inner: sigma 0.1"
+    assert replace(changed, name="mine").title("400 s").startswith("mine (warehouse_small): 400 s, with 3 objects")
+
+
+WORLDS = [
+    World(SMALL, name="home"),
+    *(
+        World(scenario("warehouse_small", **fields))
+        for fields in (
+            {},
+            {"n_robots": 20},
+            {"n_robots": 21},
+            {"horizon_s": 400.0},
+            {"n_robots": 20, "horizon_s": 400.0},
+            {"interval_s": 100.0},
+            {"n_objects": 3},
+            {"n_objects": 3, "obstacles": ((10.0, 4.0, 11.0, 12.0),)},
+            {"n_objects": 3, "obstacles": ((10.0, 4.0, 11.0, 12.2),)},
+            {"physics": "chipmunk"},
+            {"caches": "static"},
+            {"scattered_sites": True},
+        )
+    ),
+    World(SMALL, (InnerConfig(sigma=0.1),)),
+    World(SMALL, (InnerConfig(sigma=0.2),)),
+    World(replace(SMALL, name="ruins")),
+    World(replace(scenario("warehouse_small", n_objects=3), name="ruins")),
+]
+
+
+def test_no_two_worlds_share_a_file_name():
+    names = [world.file_name for world in WORLDS]
+    assert len(set(names)) == len(names)
+    assert names[:6] == [
+        "home",
+        "warehouse_small",
+        "warehouse_small_20_robots",
+        "warehouse_small_21_robots",
+        "warehouse_small_400_s",
+        "warehouse_small_20_robots_400_s",
+    ]
+    for world in WORLDS:
+        check_file_name("file_name", world.file_name)
+
+
+def test_what_is_read_of_runs_and_what_is_varied_leave_the_file_name_alone():
+    assert World(scenario("warehouse_small", performance="n_active")).file_name == "warehouse_small"
+    assert World(SMALL, criterion="noise", value=0.1).file_name == "warehouse_small"
 
 
 def test_wrappers_are_kept_in_stack_order_and_at_most_once():

@@ -104,9 +104,8 @@ def read_replays(path: str | Path) -> tuple[Replay, ...]:
 
 
 def _told_apart(replays: Sequence[Replay]) -> list[Replay]:
-    """Return the replays with labels that differ: those of one policy get what disturbs the run, then a number."""
-    labels = [replay.label for replay in replays]
-    labels = [_with_disturbance(replay) if labels.count(replay.label) > 1 else replay.label for replay in replays]
+    """Return the replays with labels that differ: of one policy, with what is other in the worlds, then a number."""
+    labels = [_with_changes(replay, [one for one in replays if one.label == replay.label]) for replay in replays]
     seen = [labels[: index + 1].count(label) for index, label in enumerate(labels)]
     return [
         replace(replay, label=label if nth == 1 else f"{label} ({nth})")
@@ -114,14 +113,16 @@ def _told_apart(replays: Sequence[Replay]) -> list[Replay]:
     ]
 
 
-def _with_disturbance(replay: Replay) -> str:
-    names = ", ".join(config.name.replace("_", " ") for config in replay.spec.wrappers)
-    return f"{replay.label} with {names}" if names else replay.label
+def _with_changes(replay: Replay, namesakes: Sequence[Replay]) -> str:
+    """Return the label of a replay with what not all of the same label have in their worlds."""
+    common = set[str].intersection(*(set(one.spec.world.changes) for one in namesakes))
+    words = ", ".join(change for change in replay.spec.world.changes if change not in common)
+    return f"{replay.label} with {words}" if words else replay.label
 
 
 def _headline(replays: Sequence[Replay]) -> str:
     if len(replays) == 1:
-        return f"{replays[0].label}, {replays[0].scenario.name.replace('_', ' ')}"
+        return f"{replays[0].label}, {replays[0].spec.world.title()}"
     return ", ".join(replay.label for replay in replays)
 
 

@@ -136,7 +136,7 @@ def export_minari(folder: str | Path, dataset_id: str, **about: Any) -> "MinariD
         "env": env_spec,
         **_reference_scores(env_spec, [run.seed for run in dataset.runs], [np.sum(one.rewards) for one in episodes]),
         "algorithm_name": spec.policy,
-        "description": f"{spec.scenario.name}, {n_robots} robots, policy {spec.policy}",
+        "description": f"{spec.world.name}, policy {spec.policy}",
         "observation_space": batch_space(interface.observation_space, n_robots),
         "action_space": batch_space(interface.action_space, n_robots),
     }

@@ -101,7 +101,7 @@ class DatasetPlan:
         each = counted(self.n_decisions, "decision") + f" of {counted(scenario.robots.n_robots, 'robot')}"
         return Sheet(
             rows=[
-                ("policy", f"{policy_label(self.spec.policy)} in {scenario.name}, {scenario.horizon_s:g} s"),
+                ("policy", f"{policy_label(self.spec.policy)} in {self.spec.world.title()}, {scenario.horizon_s:g} s"),
                 ("runs", f"{len(self.card.seeds)}, of which {n_todo} to do; {each} each"),
                 ("observations", f"{config.observation}, {len(self.card.columns)} columns"),
                 ("actions", f"{actions}, one per {counted(config.decision_ticks, 'tick')}"),

@@ -129,7 +129,7 @@ def test_policies_without_runs_come_last_and_are_no_reason():
 
 def test_the_table_has_a_row_for_each_policy_and_constraint():
     lines = str(chosen(a=(GOOD, BAD), b=(GOOD, GOOD))).splitlines()
-    assert lines[0] == "warehouse_small, 4 robots, runs of 4 s: objects"
+    assert lines[0] == "warehouse_small with 20 objects, 4 robots, runs of 4 s: objects"
     assert " ".join(lines[2].split()) == "1 b undisturbed 10 13 10.52 to 15.48 +3 98.2 % 3 of 3 met"
     # 2 ± 4.303 / sqrt(3) stays below 5.
     assert " ".join(lines[5].split()) == "noise 0.01 5 2 -0.4841 to 4.484 -3 1.75 % 0 of 3 not met"
@@ -138,7 +138,7 @@ def test_the_table_has_a_row_for_each_policy_and_constraint():
 def test_the_unit_is_that_of_the_performance():
     for name, unit in {"first_picked": "objects", "n_carrying": "robots summed over intervals"}.items():
         choice = chosen(replace(WORLD, performance=name), a=([12.0, 13.0], [12.0, 13.0]))
-        assert str(choice).splitlines()[0] == f"warehouse_small, 4 robots, runs of 4 s: {unit}"
+        assert str(choice).splitlines()[0] == f"warehouse_small with 20 objects, 4 robots, runs of 4 s: {unit}"
         assert choice.to_mapping()["unit"] == unit
 
 
@@ -213,7 +213,8 @@ def test_wrappers_of_the_world_are_in_all_runs(tmp_path):
     )
     options = {"deliver": 1.0, "deaths": 2.0, "seeds": 2, "out": tmp_path, "jobs": 1, "progress": False}
     choice = choose_policy(["random"], World(WORLD, (slow, deaf)), **options)
-    assert choice.scenario == "warehouse_small"
+    disturbed = "sensor noise: sigma 0.2 (all sensors), throttle: robots lose 30 % of their speed"
+    assert choice.scenario == f"warehouse_small with 20 objects, {disturbed}"
     runs = [json.loads(record.spec) for record in load(tmp_path)]
     assert len(runs) == 4
     always = {"throttle", "sensor_noise"}

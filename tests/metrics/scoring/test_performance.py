@@ -76,7 +76,7 @@ def test_scenario_and_argument_mean_the_same(folder, no_runs):
     by_scenario = scored(world=dataclasses.replace(WORLD, performance="n_active"), out=folder)
     assert str(by_scenario) == str(scored(performance="n_active", out=folder))
     assert values(by_scenario) == {(1, 0): 2.0, (1, 1): 2.0, (4, 0): 8.0, (4, 1): 8.0}
-    assert str(by_scenario).startswith("stochm in warehouse_small, performance n_active, budget custom")
+    assert str(by_scenario).startswith("stochm in warehouse_small with 20 objects, performance n_active, budget custom")
 
 
 def test_units_follow(folder, no_runs):

@@ -66,7 +66,7 @@ def table():
 
 def test_every_measure_has_rows_with_all_that_is_needed_to_read_them(table):
     assert {score.measure for score in table.scores} == set(metrics.METRICS) - {*ON_REQUEST}
-    assert (table.policy, table.scenario, table.missing, table.failures) == ("random", "warehouse_small", {}, ())
+    assert (table.policy, table.scenario, table.missing, table.failures) == ("random", "warehouse_small with 20 objects", {}, ())
     for score in table.scores:
         assert score.unit
         assert score.n_robots
@@ -255,7 +255,7 @@ def slow():
 def test_wrappers_of_the_world_are_in_all_runs(slow, tmp_path):
     options = {"budget": TINY, "measures": [*SIZES, "population_robustness"], "jobs": 1, "progress": False}
     found = score_policy("random", slow, out=tmp_path, **options)
-    assert (found.scenario, found.failures, found.missing) == ("warehouse_small", (), {})
+    assert (found.scenario, found.failures, found.missing) == (slow.title(), (), {})
     runs = load(tmp_path)
     assert {run.criterion for run in runs} == {"population_size", "none", "population_dynamics"}
     for run in runs:

@@ -211,7 +211,7 @@ def test_the_unit_is_that_of_the_performance(tmp_path):
     for name, told in units.items():
         table = predicted(runs, fit=(1, 2, 4, 8), world=replace(WORLD, performance=name))
         assert (table.unit, table.adds_up) == told
-        assert str(table).startswith(f"random in warehouse_small: {told[0]}, fitted to")
+        assert str(table).startswith(f"random in warehouse_small with 20 objects: {told[0]}, fitted to")
         assert ("note: this performance is no sum over robots" in str(table)) is not told[1]
     (table,) = predict_curves(curves_file(tmp_path / "curves.csv"), performance="1/performance")
     assert (table.unit, table.adds_up) == ("1/performance summed over intervals", False)
@@ -224,7 +224,7 @@ def test_a_policy_is_run_at_every_size_and_the_large_ones_are_held_back(tmp_path
     world = scenario("warehouse_small", n_objects=20, horizon_s=1000.0)
     options = {"fit": [1, 2, 3, 4], "hold": [6], "seeds": 2, "out": tmp_path, "jobs": 1, "progress": False}
     table = predict_policy("dpo", world, **options)
-    assert (table.policy, table.scenario, table.horizon_s) == ("dpo", "warehouse_small", 1000.0)
+    assert (table.policy, table.scenario, table.horizon_s) == ("dpo", "warehouse_small with 20 objects", 1000.0)
     assert (table.fit, table.hold, table.predicted_sizes) == ((1, 2, 3, 4), (6,), (6, 8, 16))
     runs = load(tmp_path)
     assert len(runs) == 10

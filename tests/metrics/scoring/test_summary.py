@@ -19,7 +19,7 @@ def test_conditions_in_several_worlds_have_a_row_each(tmp_path, monkeypatch):
     assert [row.condition for row in summary.rows] == list(plan.conditions)
     lines = str(summary).splitlines()
     assert lines[0] == "warehouse_small and others: 2 worlds"
-    assert "warehouse_small, 3 robots, sensor_noise" in lines[3]
+    assert "warehouse_small, 3 robots, 20 objects, sensor noise: sigma 0.03 (all sensors)" in lines[3]
     assert summary.csv().splitlines()[0].startswith("policy,world,caches,runs,")
     answer = json.loads(summary.json())
     assert [len(answer[name]) for name in ("controllers", "runs", "failures")] == [4, 8, 0]
