@@ -21,7 +21,7 @@ from swarm_forage_env.runs.plan import Condition, Plan
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import DONE, RunStore
 from swarm_forage_env.runs.workers import processes_of
-from swarm_forage_env.wrappers.world import UNDISTURBED, World
+from swarm_forage_env.wrappers.world import World
 
 WORLDS_SHOWN = 60
 """Worlds that the text names; `to_mapping` has all."""
@@ -200,7 +200,7 @@ def _is_closed(policy: str) -> bool:
 def _world_cells(world: World) -> tuple[str, ...]:
     scenario = world.scenario
     return (
-        world.title() if world.criterion == UNDISTURBED else world.place,
+        scenario.name,
         world.criterion,
         f"{world.value:g}",
         str(world.n_robots),

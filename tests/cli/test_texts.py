@@ -264,7 +264,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
         place = Place(folder)
         for name in FIRST:
             place.answer(name)
-        shutil.copy(min(Path("results/warehouse_small").glob("*.parquet")), "record.parquet")
+        shutil.copy(min(Path("results").glob("warehouse_small_6_robots_400_s_*/*.parquet")), "record.parquet")
         shutil.copy("done/S1a.parquet", "packed.parquet")
         yield place
 
