@@ -60,7 +60,10 @@ def difference_words(config: ScenarioConfig) -> tuple[str, ...]:
 
 def is_resized(config: ScenarioConfig) -> bool:
     """Return whether the swarm has another size than that of the preset, or there is no preset of that name."""
-    return config.name not in scenario_names() or config.robots.n_robots != scenario(config.name).robots.n_robots
+    try:
+        return config.robots.n_robots != scenario(config.name).robots.n_robots
+    except ConfigError:
+        return True
 
 
 def digest_of(values: Any, digits: int) -> str:
@@ -78,10 +81,12 @@ def preset_of(config: ScenarioConfig) -> ScenarioConfig | None:
 def _preset(name: str, n_robots: int) -> ScenarioConfig | None:
     if name not in scenario_names():
         return None
-    try:
-        return scenario(name, n_robots=n_robots)
-    except ConfigError:  # its arena is too small for them, so this one has another
-        return scenario(name)
+    for sizes in ({"n_robots": n_robots}, {}):
+        try:
+            return scenario(name, **sizes)
+        except ConfigError:  # its arena is too small for them, so this one has another; or its package is broken
+            continue
+    return None
 
 
 def _flat(config: ScenarioConfig) -> dict[str, Any]:

@@ -66,7 +66,12 @@ def table():
 
 def test_every_measure_has_rows_with_all_that_is_needed_to_read_them(table):
     assert {score.measure for score in table.scores} == set(metrics.METRICS) - {*ON_REQUEST}
-    assert (table.policy, table.scenario, table.missing, table.failures) == ("random", "warehouse_small with 20 objects", {}, ())
+    assert (table.policy, table.scenario, table.missing, table.failures) == (
+        "random",
+        "warehouse_small with 20 objects",
+        {},
+        (),
+    )
     for score in table.scores:
         assert score.unit
         assert score.n_robots
