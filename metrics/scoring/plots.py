@@ -24,7 +24,7 @@ from ..catalog import METRICS
 from ..claims.panel import MIN_RUNS
 from ..statistics import Summary
 from .run_curves import NOISE, POPULATION, THROTTLE
-from .scores import MEASURE_CRITERIA
+from .scores import MEASURE_CRITERIA, PICTURED, words_of
 
 if TYPE_CHECKING:
     from .prediction import PredictionTable  # a table draws itself by this
@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 FEWEST_RUNS = MIN_RUNS
 """Fewer runs are drawn without an interval: they decide nothing, and that of two runs reaches nine standard deviations
 to either side, which would leave nothing else to be seen."""
-LONG_TITLE = 48
-"""Letters that fit above a panel; longer titles are smaller, so that they do not run into their neighbours."""
 X_LABELS = {
     SIZE: "robots (the larger swarm)",
     THROTTLE: "distance from ideal conditions (amplitude)",
@@ -45,24 +43,32 @@ X_LABELS = {
 
 
 def draw_scores(
-    tables: "Sequence[ScoreTable]", path: str | Path, *, band: bool = False, style: FigureStyle = SCREEN
+    tables: "Sequence[ScoreTable]",
+    path: str | Path,
+    *,
+    band: bool = False,
+    all_panels: bool = False,
+    style: FigureStyle = SCREEN,
 ) -> None:
     """Draw score tables side by side into a picture file: one panel per measure, one line per policy.
 
-    Amounts and distances have a second panel with their values relative to performance. Error bars are the intervals of
-    the tables; below a dotted line, the noise floor, a distance says nothing; hollow marks are values that mislead.
-    Measures that are computed without runs (availability) and values that are not finite are left out.
+    Amounts and distances are drawn relative to performance, where they have such values: a swarm that does little has
+    little to lose. Error bars are the intervals of the tables; below a dotted line, the noise floor, a distance says
+    nothing; hollow marks are values that mislead. Measures that are computed without runs (availability) and values
+    that are not finite are left out.
 
     Args:
         tables: One per policy.
         path: File to write; as in `saved_figure`, whose errors this has.
         band: Shade the mean plus and minus two standard deviations of single runs, as the paper does.
+        all_panels: Draw every measure, itself and relative to performance. Default: those of `PICTURED`, or all where
+            only some measures were scored.
         style: Of the figure.
 
     Raises:
         ValueError: no table has a score that can be drawn.
     """
-    drawn = _contents(tables)
+    drawn = _contents(tables, all_panels=all_panels)
     if not drawn:
         raise ValueError("Expected a score to draw, got tables without a finite value from runs.")
     where = next((table.scenario for table in tables if table.scenario), "")
@@ -91,6 +97,11 @@ class _Content:
     label: str
     is_relative: bool
 
+    @property
+    def measure(self) -> str:
+        """Name of the measure."""
+        return self.label.partition(",")[0]
+
     def scores(self, table: "ScoreTable") -> "list[Score]":
         """Return the scores of a table that can be drawn here."""
         found = [score for score in table.scores if score.label == self.label and score.per_seed]
@@ -105,8 +116,18 @@ class _Content:
         return score.relative_floor if self.is_relative else score.noise_floor
 
 
-def _contents(tables: "Sequence[ScoreTable]") -> list[_Content]:
+def _contents(tables: "Sequence[ScoreTable]", *, all_panels: bool) -> list[_Content]:
     """Return the panels that have something to show, in the order of tables, relative ones beside their measure."""
+    found = _all_contents(tables)
+    if all_panels:
+        return found
+    relative = {content.label for content in found if content.is_relative}
+    each = [content for content in found if content.is_relative or content.label not in relative]
+    measures = {content.measure for content in found}
+    return [content for content in each if content.measure in PICTURED] if measures >= {*PICTURED} else each
+
+
+def _all_contents(tables: "Sequence[ScoreTable]") -> list[_Content]:
     scores = [score for table in tables for score in table.scores]
     order = list(MEASURE_CRITERIA)
     labels = dict.fromkeys(score.label for score in sorted(scores, key=lambda score: order.index(score.measure)))
@@ -128,9 +149,8 @@ def _draw_panel(panel: Panel, content: _Content, tables: "Sequence[ScoreTable]",
     if about.neutral is not None and not about.is_distance and first.variant == "corrected":
         panel.axhline(about.neutral, color="0.6", linewidth=0.8, zorder=0)
     arrow = "higher" if about.higher_is_better else "lower"
-    title = f"{content.label}{', relative' if content.is_relative else ''} ({arrow} is better)"
-    panel.set_title(title, fontsize="medium" if len(title) <= LONG_TITLE else "small")
-    panel.set_ylabel("share of performance" if content.is_relative else first.unit)
+    panel.set_title(f"{words_of(content.label)} ({arrow} is better)")
+    panel.set_ylabel(f"{about.symbol}, {'share of performance' if content.is_relative else first.unit}")
     panel.set_xlabel(X_LABELS[MEASURE_CRITERIA[first.measure]])
     panel.set_xticks(range(len(places)), [_place(place, shown) for place in places])
     panel.margins(x=0.15)

@@ -41,6 +41,20 @@ MEASURE_CRITERIA: dict[str, str] = {
 """Measure -> what has to be varied for it. The order is that of score tables."""
 ON_REQUEST = ("cache_congestion",)
 """Measures that are scored where they are named only: most policies have no caches."""
+PICTURED = (
+    "raw_performance",
+    "t_lost_fraction",
+    "spatial_emergence",
+    "task_emergence",
+    "scalability",
+    "reactivity",
+    "adaptability",
+    "noise_robustness",
+    "population_robustness",
+)
+"""Measures of the usual picture: the paper's, without the parts and variants of ours."""
+_WORDS = {"t_lost_fraction": "time lost"}
+"""Measures whose names are no words."""
 DISTURBANCES = (THROTTLE, HANDLING)
 """Kinds of disturbance over time, the paper's two, under which reactivity and adaptability can be scored."""
 _NO_AMOUNT = 1e-12
@@ -80,6 +94,8 @@ class ScoreForms:
     """For measures that compare two sizes."""
     band: bool = False
     """Whether tables and pictures have the authors' bands, too: mean plus and minus two standard deviations."""
+    all_panels: bool = False
+    """Whether pictures have every measure, itself and relative to performance, in place of those of `PICTURED`."""
 
     def __post_init__(self) -> None:
         _check_words("variant", self.variants, get_args(Variant))
@@ -99,6 +115,12 @@ def label_of(measure: str, variant: Variant, form: Form) -> str:
     """Return the name of a measure with what differs from the usual form: "spatial_emergence, interactive, sierra"."""
     words = (measure, "interactive" if form == "interactive" else "", "" if variant == "corrected" else variant)
     return ", ".join(word for word in words if word)
+
+
+def words_of(label: str) -> str:
+    """Return a name of `label_of` in words for people: "spatial emergence, interactive"."""
+    measure, comma, rest = label.partition(",")
+    return _WORDS.get(measure, measure).replace("_", " ") + comma + rest
 
 
 def check_measures(measures: Sequence[str] | None) -> tuple[str, ...]:

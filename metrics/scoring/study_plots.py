@@ -32,7 +32,7 @@ from ..claims import PanelName
 from ..curves import FloatArray, Variant
 from ..statistics import Summary, aggregate
 from .plots import FEWEST_RUNS, X_LABELS
-from .scores import label_of
+from .scores import label_of, words_of
 from .study_models import model_figures
 from .study_numbers import StudyPanel, StudyPanels, place_distributions, policy_pairs, study_panels
 from .theory import theory_of
@@ -79,7 +79,7 @@ class StudyFigure:
         """Headline."""
         first = self.panels[0]
         arrow = "higher" if first.higher_is_better else "lower"
-        measure = label_of(first.measure, "corrected", first.form).replace("_", " ")
+        measure = words_of(label_of(first.measure, "corrected", first.form))
         words = f"{measure} ({arrow} is better), rules {first.rules}"
         return f"{first.study}: {words}" + ("" if first.variant == "corrected" else f", measure {first.variant}")
 

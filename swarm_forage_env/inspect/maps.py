@@ -49,6 +49,8 @@ class FloorMaps:
     is_difference: bool = False
     obstacles_m: tuple[Rectangle, ...] = ()
     """Boxes on the floor; of a difference, those of the first."""
+    nests_m: tuple[Rectangle, ...] = ()
+    """Boxes that are nests; of a difference, those of the first."""
 
     def minus(self, other: "FloorMaps") -> "FloorMaps":
         """Return what is more here than in `other`, square by square.
@@ -125,6 +127,7 @@ def floor_maps(replay: Replay, *, side_m: float = 2 * CELL_M) -> FloorMaps:
         size_m=(arena.width_m, arena.height_m),
         n_robots=replay.scenario.robots.n_robots,
         obstacles_m=arena.obstacles,
+        nests_m=arena.nest_boxes_m,
         arrays={
             "density": count(position_m[active]) * of_frames,
             "interference": count(position_m[active & replay.has(Status.INTERFERING)]) * of_frames,
@@ -162,7 +165,7 @@ class ComparedMaps:
         Raises:
             ImportError: matplotlib is not installed; the arrays are written.
         """
-        from swarm_forage_env.rendering.plots import draw_maps
+        from swarm_forage_env.rendering.plots import MapRow, draw_maps
 
         rows = self.rows
         for one in rows:
@@ -170,7 +173,9 @@ class ComparedMaps:
         columns = {
             name: (what, f"{unit}, per {self.per}" if self.per else unit) for name, (what, unit) in MEANINGS.items()
         }
-        shown = [(one.label, one.arrays, one.is_difference, one.size_m, one.obstacles_m) for one in rows]
+        shown = [
+            MapRow(one.label, one.arrays, one.is_difference, one.size_m, one.obstacles_m, one.nests_m) for one in rows
+        ]
         draw_maps(picture, shown, columns, own_scales=own_scales, style=style)
 
 

@@ -74,8 +74,12 @@ class FigureStyle:
         number("font_size", self.font_size, at_least=4.0, at_most=40.0)
 
     def columns(self, n_panels: int) -> int:
-        """Return how many panels stand side by side: two can be read on a phone, many would be a tower."""
-        wanted = min(n_panels, 2 if n_panels <= 2 * PANELS_PER_ROW else PANELS_PER_ROW)
+        """Return how many panels stand side by side: two can be read on a phone, many would be a tower.
+
+        Full rows of three stand before rows of four of which the last has gaps.
+        """
+        most = PANELS_PER_ROW - (n_panels % PANELS_PER_ROW != 0 and n_panels % (PANELS_PER_ROW - 1) == 0)
+        wanted = min(n_panels, 2 if n_panels <= 2 * PANELS_PER_ROW else most)
         if self.width_in is None:
             return wanted
         return max(1, min(wanted, int(self.width_in / (_NARROWEST_PANEL * self.font_size))))
@@ -168,7 +172,7 @@ def _fit_words(figure: Figure) -> None:
             share = room / max(extent.width, extent.height, 1.0)
             if lines and share < 1.0:
                 most = max(12, int(share * max(map(len, lines))))
-                words.set_text("\n".join(textwrap.fill(line, most) for line in lines))
+                words.set_text("\n".join(textwrap.fill(line, most, break_long_words=False) for line in lines))
 
 
 @contextmanager

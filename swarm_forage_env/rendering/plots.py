@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from swarm_forage_env.rendering.figures import (
     COLOURS,
     SCREEN,
     FigureStyle,
+    Panel,
     legend_below,
     looks,
     policy_words,
@@ -21,6 +23,11 @@ from swarm_forage_env.rendering.figures import (
 
 _OBSTACLE = {"facecolor": "white", "edgecolor": "black", "hatch": "////", "linewidth": 0.5}
 """Hatched: neither a map nor a difference has that."""
+_NEST = {"facecolor": "none", "edgecolor": "black", "linestyle": "--", "linewidth": 0.8}
+_NARROWEST_MAP = 0.2
+"""Inches per point of the font: narrower maps stand below each other."""
+_MOST_OF_FLOOR = 0.5
+"""What happens in a smaller part of the floor is shown without the rest (our choice)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,9 +121,21 @@ def draw_trainings(
 
 Box: TypeAlias = tuple[float, float, float, float]
 """x low, y low, x high, y high, m."""
-MapRow: TypeAlias = tuple[str, Mapping[str, FloatArray], bool, tuple[float, float], Sequence[Box]]
-"""Label; arrays (ny, nx) by name, row = y from below; whether they are differences; extent of the floor in m; the boxes
-on it, which are hatched."""
+
+
+class MapRow(NamedTuple):
+    """A map of a floor, or a difference of two, to draw."""
+
+    label: str
+    arrays: Mapping[str, FloatArray]
+    """Name of a quantity -> (ny, nx), row = y from below."""
+    is_difference: bool
+    size_m: tuple[float, float]
+    """Extent of the floor along x and y."""
+    obstacles_m: Sequence[Box] = ()
+    """They are hatched."""
+    nests_m: Sequence[Box] = ()
+    """They are outlined."""
 
 
 def draw_maps(
@@ -129,7 +148,9 @@ def draw_maps(
 ) -> None:
     """Draw maps of floors of the same proportions: a row of panels per map or difference, a column per quantity.
 
-    Colours of a column mean the same in all rows of maps, and the same in all rows of differences, where white is 0.
+    Colours of a quantity mean the same in all maps, and the same in all differences, where white is 0. Squares in which
+    nothing happened are white, and what happened in a small part of the floor only is shown there. A narrow figure has
+    fewer quantities beside each other, and the scales below the maps.
 
     Args:
         path: File to write; as in `saved_figure`, whose errors this has.
@@ -138,25 +159,66 @@ def draw_maps(
         own_scales: Whether every panel has a scale of its own instead, which shows more of what is rare.
         style: Of the figure.
     """
-    shape = rows[0][3][1] / rows[0][3][0]
-    width = style.width_in or 3.6 * len(columns)
-    size_in = width, (0.75 * shape * width / len(columns) + 0.1 * style.font_size) * len(rows)
+    n_across = len(columns)
+    if style.width_in is not None:
+        n_across = max(1, min(n_across, int(style.width_in / (_NARROWEST_MAP * style.font_size))))
+    width = style.width_in or 3.6 * n_across
+    shape = rows[0].size_m[1] / rows[0].size_m[0]
+    blocks = [[*columns][start : start + n_across] for start in range(0, len(columns), n_across)]
+    n_lines = len(blocks) * len(rows)
+    is_narrow = n_across < len(columns)
+    bar = {"location": "bottom", "aspect": 12} if is_narrow else {"shrink": min(1.0, 1.2 * shape)}
+    size_in = width, (0.75 * shape * width / n_across + (0.18 if is_narrow else 0.1) * style.font_size) * n_lines
     with saved_figure(path, size_in, style=style) as figure:
-        panels = figure.subplots(len(rows), len(columns), squeeze=False)
-        bar = min(1.0, 1.2 * shape)  # as long as a panel is high
-        for (label, arrays, is_difference, size_m, obstacles), line in zip(rows, panels, strict=True):
-            alike = [row for row in rows if row[2] == is_difference]
-            for (name, (what, unit)), axes in zip(columns.items(), line, strict=True):
-                top = _map_top([arrays[name]] if own_scales else [row[1][name] for row in alike])
-                low, colours, ends = (-top, "RdBu_r", "both") if is_difference else (0.0, None, "max")
-                extent = (0, size_m[0], 0, size_m[1])
-                image = axes.imshow(arrays[name], origin="lower", extent=extent, vmin=low, vmax=top, cmap=colours)
-                for x_low, y_low, x_high, y_high in obstacles:
-                    axes.fill([x_low, x_high, x_high, x_low], [y_low, y_low, y_high, y_high], **_OBSTACLE)
-                axes.set(title=f"{policy_words(label)}\n{what}", xlabel="x [m]", ylabel="y [m]")
-                axes.grid(visible=False)
-                scale = figure.colorbar(image, ax=axes, shrink=bar, extend=ends)
-                scale.set_label(f"more {unit}" if is_difference else unit)
+        panels = iter(figure.subplots(n_lines, n_across, squeeze=False))
+        for names, row in product(blocks, rows):
+            line: list[Panel] = [*next(panels)]
+            alike = [row] if own_scales else [one for one in rows if one.is_difference == row.is_difference]
+            for name, axes in zip(names, line, strict=False):
+                top = _map_top([one.arrays[name] for one in alike])
+                image = _draw_map(axes, row, name, top)
+                x_low, y_low, x_high, y_high = _busy_part([one.arrays[name] for one in rows])
+                axes.set_xlim(x_low * row.size_m[0], x_high * row.size_m[0])
+                axes.set_ylim(y_low * row.size_m[1], y_high * row.size_m[1])
+                what, unit = columns[name]
+                axes.set_title(f"{policy_words(row.label)}\n{what}")
+                ends = "both" if row.is_difference else "max"
+                scale = figure.colorbar(image, ax=axes, extend=ends, **bar)
+                scale.set_label(f"more {unit}" if row.is_difference else unit)
+            for axes in line[len(names) :]:
+                axes.set_axis_off()
+
+
+def _draw_map(axes: Panel, row: MapRow, name: str, top: float) -> Any:
+    """Draw the squares of one map, and what stands on its floor; returns the image."""
+    low, colours = (-top, "RdBu_r") if row.is_difference else (0.0, "cividis_r")
+    squares = np.ma.masked_equal(row.arrays[name], 0.0)
+    extent = (0, row.size_m[0], 0, row.size_m[1])
+    image = axes.imshow(squares, origin="lower", extent=extent, vmin=low, vmax=top, cmap=colours)
+    for boxes, look in ((row.obstacles_m, _OBSTACLE), (row.nests_m, _NEST)):
+        for x_low, y_low, x_high, y_high in boxes:
+            axes.fill([x_low, x_high, x_high, x_low], [y_low, y_low, y_high, y_high], **look)
+    axes.set(xlabel="x [m]", ylabel="y [m]")
+    axes.grid(visible=False)
+    return image
+
+
+def _busy_part(arrays: Sequence[FloatArray]) -> Box:
+    """Return the part of the floor to show, in shares of it: all, or where something is if that is less than half.
+
+    It has the proportions of the floor, and one square around whatever is there.
+    """
+    ny, nx = arrays[0].shape
+    y, x = np.nonzero(np.any([array != 0.0 for array in arrays], axis=0))
+    if not len(x):
+        return 0.0, 0.0, 1.0, 1.0
+    lows = np.maximum([(x.min() - 1) / nx, (y.min() - 1) / ny], 0.0)
+    highs = np.minimum([(x.max() + 2) / nx, (y.max() + 2) / ny], 1.0)
+    side = float((highs - lows).max())
+    if side**2 >= _MOST_OF_FLOOR:
+        return 0.0, 0.0, 1.0, 1.0
+    x_low, y_low = np.clip(0.5 * (lows + highs - side), 0.0, 1.0 - side).tolist()
+    return x_low, y_low, x_low + side, y_low + side
 
 
 def _map_top(arrays: Sequence[FloatArray]) -> float:

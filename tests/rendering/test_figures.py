@@ -166,7 +166,7 @@ def test_long_words_are_wrapped_in_narrow_panels(tmp_path):
 
 
 def test_narrow_figures_have_fewer_panels_in_a_row():
-    assert [FigureStyle().columns(n) for n in (1, 2, 8, 9)] == [1, 2, 2, 4]
+    assert [FigureStyle().columns(n) for n in (1, 2, 8, 9, 10, 12)] == [1, 2, 2, 3, 4, 4]
     assert [FigureStyle(width_in=width, font_size=8).columns(12) for width in (2.5, 3.5, 7.0)] == [1, 1, 3]
 
 

@@ -1,6 +1,7 @@
 """Pictures of scores: what is drawn, what is left out."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from metrics.scoring.curves_file import study_curves
 from metrics.scoring.measures import score_study
 from metrics.scoring.plots import draw_scores
 from metrics.scoring.score_tables import ScoreTable
+from metrics.scoring.scores import MEASURE_CRITERIA, PICTURED, words_of
 from tests.support.curve_tables import rows, table
 from tests.support.pictures import PNG, keep_figures
 
@@ -41,19 +43,18 @@ def test_one_panel_per_measure_and_one_line_per_policy(tmp_path, monkeypatch):
     draw_scores(given, tmp_path / "scores.png")
     assert (tmp_path / "scores.png").read_bytes().startswith(PNG)
     figure = drawn(monkeypatch, tmp_path / "scores.png", given)
-    titles = [axes.get_title() for axes in figure.axes if axes.axison]
-    measures = dict.fromkeys(score.measure for score in given[0].scores)
-    assert list(dict.fromkeys(title.split()[0].rstrip(",") for title in titles)) == list(measures)
-    assert "raw_performance (higher is better)" in titles
+    titles = [axes.get_title().partition(" (")[0] for axes in figure.axes if axes.axison]
+    assert titles == [words_of(measure) for measure in dict.fromkeys(score.measure for score in given[0].scores)]
+    assert panel_of(figure, "time lost").get_ylabel() == "t_lost(N, t), share of robot time"
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["mine", "theirs"]
-    panel = panel_of(figure, "noise_robustness")
+    panel = panel_of(figure, "noise robustness")
     assert len(panel.containers) == 2
-    assert panel.get_ylabel() == "objects (DTW)"
-    summary = given[0]["noise_robustness"][0].summary
+    assert panel.get_ylabel() == "B_sa, share of performance"
+    summary = given[0]["noise_robustness"][0].relative
     (bar,) = panel.containers[0][2][0].get_segments()
-    assert bar[:, 1].tolist() == pytest.approx([summary.lower, summary.upper])
+    assert bar[:, 1].tolist() == pytest.approx([summary.mean] * 2)  # of two runs there is no interval
     dotted = [line for line in panel.get_lines() if line.get_linestyle() == ":"]
-    assert [line.get_ydata()[0] for line in dotted] == [given[0]["noise_robustness"][0].noise_floor] * 2
+    assert [line.get_ydata()[0] for line in dotted] == [given[0]["noise_robustness"][0].relative_floor] * 2
 
 
 def test_single_runs_have_no_error_bars_and_other_formats_work(tmp_path):
@@ -73,16 +74,28 @@ def test_nothing_to_draw_is_refused(tmp_path):
         draw_scores([ScoreTable(policy="mine", scenario="", scores=())], tmp_path / "scores.png")
 
 
-def test_amounts_and_distances_are_drawn_relative_to_performance_too(tmp_path, monkeypatch):
+def test_all_panels_are_drawn_on_request_with_amounts_and_distances_themselves(tmp_path, monkeypatch):
     (given,) = tables("mine")
-    figure = drawn(monkeypatch, tmp_path / "scores.png", [given])
-    panel = panel_of(figure, "noise_robustness, relative")
+    figure = drawn(monkeypatch, tmp_path / "scores.png", [given], all_panels=True)
+    (itself, panel) = [axes for axes in figure.axes if axes.get_title().startswith("noise robustness (")]
     (score,) = given["noise_robustness"]
+    assert itself.get_lines()[0].get_ydata()[0] == pytest.approx(score.summary.mean)
+    assert itself.get_ylabel() == "B_sa, objects (DTW)"
     line, floor = panel.get_lines()[0], panel.get_lines()[-1]
     assert line.get_ydata()[0] == pytest.approx(score.relative.mean)
     assert floor.get_ydata()[0] == pytest.approx(score.relative_floor)
-    assert panel.get_ylabel() == "share of performance"
-    assert not any(axes.get_title().startswith("scalability, relative") for axes in figure.axes)
+    assert panel.get_ylabel() == "B_sa, share of performance"
+    assert len([axes for axes in figure.axes if axes.get_title().startswith("scalability (")]) == 1
+
+
+def test_of_all_measures_the_usual_nine_are_drawn(tmp_path, monkeypatch):
+    (given,) = tables("mine")
+    some = given["scalability"][0]
+    every = [replace(some, measure=measure) for measure in MEASURE_CRITERIA]
+    figure = drawn(monkeypatch, tmp_path / "scores.png", [replace(given, scores=tuple(every))])
+    titles = [axes.get_title().partition(" (")[0] for axes in figure.axes if axes.axison]
+    assert titles == [words_of(measure) for measure in MEASURE_CRITERIA if measure in PICTURED]
+    assert len(titles) == 9
 
 
 def test_bands_are_two_standard_deviations_wide_and_drawn_on_request_only(tmp_path, monkeypatch):
@@ -106,9 +119,9 @@ def test_values_that_mislead_have_hollow_marks(tmp_path, monkeypatch):
     )
     (study,) = study_curves(frame)
     given = ScoreTable(policy="mine", scenario="", scores=score_study(study, ["spatial_emergence"])[0])
-    panel = panel_of(drawn(monkeypatch, tmp_path / "scores.png", [given]), "spatial_emergence")
+    panel = panel_of(drawn(monkeypatch, tmp_path / "scores.png", [given]), "spatial emergence")
     (hollow,) = [line for line in panel.get_lines() if line.get_markerfacecolor() == "w"]
-    assert hollow.get_ydata().tolist() == [given.scores[1].summary.mean]
+    assert hollow.get_ydata().tolist() == [given.scores[1].relative.mean]
 
 
 def test_variants_and_forms_have_panels_of_their_own(tmp_path, monkeypatch):
