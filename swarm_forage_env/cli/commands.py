@@ -20,6 +20,7 @@ class Command(NamedTuple):
 COMMANDS: dict[str, tuple[Command, ...]] = {
     "Run and look": (
         Command("run", "Run policies in a scenario and compare them.", "questions:run"),
+        Command("plot", "Draw stored runs anew.", "questions:plot"),
         Command("watch", "Watch a run in a window.", "look:watch"),
         Command("record", "Film a run, or draw it at one time.", "look:record"),
         Command("replay", "Write runs as one HTML page that plays them.", "replay:replay"),

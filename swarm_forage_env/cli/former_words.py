@@ -53,7 +53,6 @@ COMMANDS = {
     "eval": "score",
     "evaluate": "score",
     "film": "record",
-    "plot": "study plot",
     "policies": "list policies",
     "reproduce": "rerun",
     "report": "study report",

@@ -11,11 +11,14 @@ import inspect
 from collections.abc import Callable, Collection
 from dataclasses import Field, dataclass, fields, is_dataclass
 from pathlib import Path
-from typing import Annotated, Any, get_args, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
 
 import typer
 
 from swarm_forage_env._internal.wording import printable
+
+if TYPE_CHECKING:
+    from swarm_forage_env.rendering.figures import FigureStyle
 
 EXIT_FAILURE = 1
 EXIT_USAGE = 2
@@ -223,6 +226,24 @@ class RunOptions:
     jobs: Jobs = None
     as_json: AsJson = False
     dry_run: DryRun = False
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class StyleOptions:
+    """How figures look."""
+
+    width: Annotated[
+        float | None,
+        typer.Option("--width", min=2.0, max=100.0, help="Of a figure, in inches; default what its panels need."),
+    ] = None
+    font_size: Annotated[float, typer.Option("--font-size", min=4.0, max=40.0, help="Of words, in points.")] = 9.0
+    title: Annotated[bool, typer.Option("--title/--no-title", help="Headlines; in a paper, captions say it.")] = True
+
+    def style(self) -> "FigureStyle":
+        """Return the style that they describe."""
+        from swarm_forage_env.rendering.figures import FigureStyle
+
+        return FigureStyle(width_in=self.width, font_size=self.font_size, title=self.title)
 
 
 def spread(command: Callable[..., None]) -> Callable[..., None]:

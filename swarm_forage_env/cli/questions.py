@@ -21,11 +21,13 @@ from swarm_forage_env.cli.options import (
     FirstSeed,
     Forms,
     Measures,
+    Performance,
     Picture,
     PlaceOptions,
     PolicyOptions,
     RunOptions,
     ScoreSeeds,
+    StyleOptions,
     Variants,
     WorldOptions,
     refuse_others,
@@ -61,6 +63,33 @@ def run(
         question = run_question(policies.names("crw"), world, seeds=chosen, caches=caches)
     folder = options.out or default_folder(world)
     ask_and_show(question, folder, options, picture=picture or _picture(folder, "performance", world))
+
+
+def plot(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of records that 'run' has stored.")],
+    looks: StyleOptions,
+    performance: Performance = None,
+    picture: Picture = None,
+) -> None:
+    """Draw stored runs anew: performance over time, one curve per policy. Nothing is run.
+
+    'swarm-forage plot results/warehouse_small --width 3.5 --no-title --picture figure.pdf' draws it for a column of a
+    paper. 'study plot' draws studies.
+    """
+    from metrics.scoring.summary import summarize_runs
+    from swarm_forage_env.cli.printer import refusing
+    from swarm_forage_env.rendering.figures import check_picture
+    from swarm_forage_env.runs.table import read_table
+    from swarm_forage_env.studies.study_folder import StudyFolder
+
+    if folder.suffix == ".parquet" or StudyFolder(folder).study_file.exists():
+        raise ConfigError(f"Expected a folder of runs, got a study; it is 'swarm-forage study plot {folder}'.")
+    with refusing():
+        found = summarize_runs(read_table(folder, performance=performance))
+        file = picture or _picture(folder, "performance", found.world)
+        check_picture(file)
+        found.draw(file, style=looks.style())
+    typer.echo(f"picture {file}")
 
 
 def _picture(folder: Path, name: str, world: "World") -> Path:

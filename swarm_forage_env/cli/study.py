@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, Band, DryRun, Jobs, Variants, complain
+from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, Band, DryRun, Jobs, StyleOptions, Variants, complain
 from swarm_forage_env.cli.signals import EXIT_INTERRUPTED
 
 if TYPE_CHECKING:
@@ -300,19 +300,11 @@ def verdict(
 
 def plot(
     place: Annotated[Path, typer.Argument(metavar="DIR|FILE", help="Folder of a study, or its packed file.")],
+    looks: StyleOptions,
     out: Annotated[Path | None, typer.Option("--out", help="Folder; default results/figures/NAME.")] = None,
     band: Band = False,
     variants: Variants = "corrected",
     formats: Annotated[str, typer.Option("--format", help="svg, png, pdf; separated by commas.")] = "svg,png",
-    width: Annotated[
-        float | None,
-        typer.Option("--width", min=2.0, max=100.0, help="Width of a figure in inches; default what its panels need."),
-    ] = None,
-    font_size: Annotated[float, typer.Option("--font-size", min=4.0, max=40.0, help="Font size in points.")] = 9.0,
-    title: Annotated[
-        bool,
-        typer.Option("--title/--no-title", help="Whether figures have headlines; in a paper, captions replace them."),
-    ] = True,
 ) -> None:
     """Draw the figures of a study, with their numbers as CSV tables: each measure over what the study varies.
 
@@ -324,7 +316,6 @@ def plot(
     from metrics import plot as plot_study
     from swarm_forage_env.cli.questions import score_forms
     from swarm_forage_env.cli.scenario_options import split_names
-    from swarm_forage_env.rendering.figures import FigureStyle
     from swarm_forage_env.studies.study_table import read_study
 
     forms = score_forms(variants, "marginal")
@@ -335,7 +326,7 @@ def plot(
         band="sd" if band else "ci",
         variants=forms.variants,
         formats=split_names(formats),
-        style=FigureStyle(width_in=width, font_size=font_size, title=title),
+        style=looks.style(),
     )
     for file in plotted.files:
         typer.echo(file)

@@ -4,17 +4,23 @@ seeds, curves = table.curves(condition, "performance", "interference_fraction") 
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.types import FloatArray
+from swarm_forage_env.policies.registry import policy_label
 from swarm_forage_env.runs.plan import Condition, Plan
+from swarm_forage_env.runs.policy_spec import PolicySpec
 from swarm_forage_env.runs.record import RunRecord
-from swarm_forage_env.runs.store import RunFailure
+from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.runs.store import RunFailure, load
+from swarm_forage_env.scenarios.differences import preset_of
+from swarm_forage_env.wrappers.world import UNDISTURBED
 
 if TYPE_CHECKING:
     import polars as pl
@@ -82,3 +88,50 @@ class Table:
             for record in self.of(condition):
                 told = {"policy": condition.policy.label, "world": condition.world.name}
                 yield record.to_frame().select(*(pl.lit(word).alias(name) for name, word in told.items()), pl.all())
+
+
+def read_table(folder: str | Path, *, performance: str | None = None) -> Table:
+    """Return the runs that a folder holds as the table that made them; of scores and studies those of the plain world.
+
+    Caches that are not those of the scenario count as the policy's, as in runs of several policies in one world.
+
+    Args:
+        folder: Where records are.
+        performance: What of them is performance; default what each was made for.
+
+    Raises:
+        RecordError: the folder holds no records, or a damaged one.
+        ConfigError: it holds runs of several lengths, or of disturbed worlds only.
+    """
+    records = {record.run_id: record for record in load(folder)}
+    specs = [RunSpec.from_json(record.spec) for record in records.values()]
+    plain = [spec for spec in specs if spec.world.criterion == UNDISTURBED]
+    if performance is not None:
+        plain = [_read_as(spec, performance) for spec in plain]
+    if not plain:
+        raise ConfigError(f"Expected runs of a world in which nothing is varied in {folder}, got none.")
+    lengths = {(spec.scenario.horizon_s, spec.scenario.interval_s) for spec in plain}
+    if len(lengths) > 1:
+        told = ", ".join(
+            f"{horizon_s:g} s in intervals of {interval_s:g} s" for horizon_s, interval_s in sorted(lengths)
+        )
+        raise ConfigError(f"Expected runs of one length in {folder}, got {told}; make folders of their own by --out.")
+    conditions: list[Condition] = []
+    for condition in map(_condition_of, plain):
+        if condition not in conditions:  # wrappers of users may have no hash
+            conditions.append(condition)
+    plan = Plan(conditions=tuple(conditions), seeds=tuple(sorted({spec.seed for spec in plain})))
+    chosen = {spec.run_id: records[spec.run_id] for spec in plain}
+    return Table(plan=plan, records=chosen, n_stored=len(chosen), folder=Path(folder))
+
+
+def _read_as(spec: RunSpec, performance: str) -> RunSpec:
+    return replace(spec, world=replace(spec.world, scenario=replace(spec.scenario, performance=performance)))
+
+
+def _condition_of(spec: RunSpec) -> Condition:
+    """Return the condition that a run is of."""
+    preset = preset_of(spec.scenario)
+    own, caches = spec.scenario.caches, "none" if preset is None else preset.caches
+    policy = PolicySpec(label=policy_label(spec.policy), policy=spec.policy, parameters=spec.parameters, caches=own)
+    return Condition(policy, spec.world.with_caches(caches))

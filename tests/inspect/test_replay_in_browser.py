@@ -136,6 +136,33 @@ def test_a_click_chooses_a_robot_and_tells_its_state(pair, replays, desktop):
     assert (desktop.complaints, desktop.requests) == ([], [])
 
 
+def test_a_link_goes_to_a_moment_and_a_robot(pair, desktop):
+    value = "Number(document.getElementById('scrub').value)"
+    desktop.open(pair, fragment="#t=120&robot=7")
+    desktop.wait_for(f"{value} === 120")
+    assert desktop.text("#robot h2").startswith("robot 7")
+    desktop.ask("location.hash = '#t=60&robot=3'")
+    desktop.wait_for(f"{value} === 60 && document.querySelector('#robot h2').textContent.startsWith('robot 3')")
+    for nonsense in ("#t=soon&robot=99", "#robot=-1", "#t=", "#elsewhere"):
+        desktop.ask(f"location.hash = '{nonsense}'")
+        desktop.ask("new Promise((done) => setTimeout(done, 50))")
+        assert desktop.ask(value) == 60
+        assert desktop.text("#robot h2").startswith("robot 3")
+    assert (desktop.complaints, desktop.requests) == ([], [])
+
+
+def test_the_address_of_a_page_that_stands_still_is_such_a_link(page, desktop):
+    desktop.open(page)
+    desktop.ask("new Promise((done) => setTimeout(done, 500))")
+    assert desktop.ask("location.hash") == ""
+    seek(desktop, 150.0)
+    desktop.wait_for("location.hash === '#t=150'")
+    desktop.ask("location.hash = '#t=150&robot=2'")
+    desktop.press("Escape")
+    desktop.wait_for("location.hash === '#t=150'")
+    assert desktop.complaints == []
+
+
 def test_keys_play_step_and_switch_to_dark(page, desktop):
     value = "Number(document.getElementById('scrub').value)"
     desktop.open(page)

@@ -112,15 +112,18 @@ class Browser:
         elif event["method"] == "Network.requestWillBeSent" and about["request"]["url"] != self._address:
             self.requests.append(about["request"]["url"])
 
-    def open(self, file: Path, ready: str = "document.getElementById('loading')?.hidden === true") -> None:
+    def open(
+        self, file: Path, ready: str = "document.getElementById('loading')?.hidden === true", *, fragment: str = ""
+    ) -> None:
         """Open a file and wait until it is ready; by default until its replay is unpacked.
 
-        What was kept of an earlier page is gone.
+        What was kept of an earlier page is gone. A fragment such as "#t=60" ends the address.
         """
         self.complaints.clear()
         self.requests.clear()
         self._address = file.resolve().as_uri()
-        self.call("Page.navigate", url=self._address)
+        self.call("Page.navigate", url="about:blank")  # another fragment alone would not load the page anew
+        self.call("Page.navigate", url=self._address + fragment)
         self.wait_for(ready)
 
     def ask(self, expression: str) -> Any:

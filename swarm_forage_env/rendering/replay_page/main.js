@@ -18,6 +18,8 @@ class Page {
     this.restyle();
     document.addEventListener("themed", () => this.restyle());
     addEventListener("resize", () => this.resize());
+    addEventListener("hashchange", () => this.goToAddress());
+    this.goToAddress();
     this.turn(performance.now()); // at once, for pictures that are taken as soon as the page is loaded
   }
 
@@ -80,6 +82,7 @@ class Page {
     for (const chart of [this.life, ...this.charts]) if (!chart.card.hidden) chart.paint(time);
     showTime(this.player);
     this.inspector.update();
+    this.keepAddress();
   }
 
   keepInSight() {
@@ -113,6 +116,30 @@ class Page {
     focus.follows = false;
     this.camera.reset();
     this.repaint();
+  }
+
+  /** Go where the address says, "#t=1200&robot=7": a moment in s, and a robot by its number. */
+  goToAddress() {
+    const asked = new URLSearchParams(location.hash.slice(1));
+    const time = asked.get("t") ? Number(asked.get("t")) : NaN;
+    const robot = asked.get("robot") ? Number(asked.get("robot")) : NaN;
+    if (Number.isFinite(time)) {
+      this.player.pause();
+      this.player.seek(time);
+    }
+    if (Number.isInteger(robot) && robot >= 0 && robot < this.runs[0].header.n_robots) this.choose(robot, this.panels[0]);
+  }
+
+  /** Make the address of a page that stands still a link to what it shows; later, because browsers count changes. */
+  keepAddress() {
+    clearTimeout(this.waiting);
+    this.waiting = setTimeout(() => {
+      const { time, playing } = this.player;
+      const words = [...(time > 0 ? [`t=${Math.round(10 * time) / 10}`] : []),
+        ...(focus.chosen >= 0 ? [`robot=${focus.chosen}`] : [])];
+      const address = words.length > 0 ? `#${words.join("&")}` : "";
+      if (!playing && location.hash !== address) history.replaceState(null, "", address || location.href.split("#")[0]);
+    }, 300);
   }
 
   showTip(panel, event) {
