@@ -23,7 +23,7 @@ from metrics import ForagingRates, Ladder, Summary, aggregate, fit_ladder
 from metrics.laws import LAW_WORDS, SYMBOLS
 from metrics.scoring.run_curves import study_lines
 from metrics.scoring.study_models import DRAWN_LAWS, ForagingRuns, foraging_runs
-from swarm_forage_env.rendering.figures import COLOURS, Panel, legend_below, saved_figure, shade, size_axis
+from swarm_forage_env.rendering.figures import COLOURS, Panel, legend_below, log_height, saved_figure, shade, size_axis
 from swarm_forage_env.studies.study_table import read_study
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
@@ -158,7 +158,7 @@ def draw(found: Beside, path: Path) -> None:
         low, high = 100 * found.bounds[:, :, 1]
         shade(lost, at, low, high, COLOURS[0])
         _draw_runs(lost, sizes, [found.lost(size) for size in sizes], np.full(sizes.size, 100.0))
-        total.set_yscale("log")
+        log_height(total)
         total.yaxis.set_major_formatter("{x:g}")
         each.set_ylim(bottom=0.0)
         lost.set_ylim(bottom=0.0)

@@ -18,6 +18,7 @@ from swarm_forage_env.rendering.figures import (
     Look,
     Panel,
     heat_map,
+    log_height,
     looks,
     policy_words,
     saved_panels,
@@ -202,7 +203,7 @@ def _draw_panel(place: Panel, panel: StudyPanel, band: Band, *, is_log_high: boo
     if panel.criterion == SIZE:
         size_axis(place, panel.drawn_at)
     if is_log_high:
-        place.set_yscale("log", nonpositive="mask")
+        log_height(place)
         place.yaxis.set_major_formatter("{x:,g}")
     are_many = sum(scores.size for scores in panel.scores.values()) > MANY_DOTS
     for (look, x, scores), (_, aside, _) in zip(_beside(panel), _beside(panel, aside=_DOTS_ASIDE), strict=True):

@@ -46,6 +46,8 @@ _PLACES_OF_OTHERS = (6, 4, 5, 0, 1, 2, 3, 7)
 PANELS_PER_ROW = 4
 _NARROWEST_PANEL = 0.25
 """Inches per point of the font: with less, the numbers along an axis run into each other."""
+_FEW_DECADES = 100.0
+"""Over less than two decades, powers of ten alone are too few numbers along an axis."""
 _FLATTEST = 0.8
 """Height of a figure that is made narrower, as a share of its width: words need as much height as before."""
 _NARROWEST_FIGURE_IN = 5.2
@@ -226,6 +228,19 @@ def size_axis(panel: Panel, sizes: Iterable[float]) -> None:
     panel.set_xticks(marks, [f"{size:g}" for size in marks])
     panel.minorticks_off()
     panel.set_xlabel("robots")
+
+
+def log_height(panel: Panel) -> None:
+    """Make y an axis on which factors are equally far apart, with plain numbers; matplotlib's are formulas."""
+
+    def between(value: float, _: int) -> str:
+        low, high = panel.get_ylim()
+        digit = value / 10.0 ** math.floor(math.log10(value))
+        return f"{value:g}" if high / low < _FEW_DECADES and round(digit) in (2, 5) else ""
+
+    panel.set_yscale("log", nonpositive="mask")
+    panel.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    panel.yaxis.set_minor_formatter(between)
 
 
 def shade(panel: Panel, x: Any, low: Any, high: Any, colour: str, *, label: str | None = None) -> None:

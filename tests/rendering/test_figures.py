@@ -22,6 +22,7 @@ from swarm_forage_env.rendering.figures import (
     FORMATS,
     FigureStyle,
     check_picture,
+    log_height,
     looks,
     policy_words,
     saved_figure,
@@ -208,3 +209,13 @@ def test_only_whole_words_are_names_of_the_paper(label, shown):
 def test_policies_are_told_apart_by_colour_blind_readers(vision):
     found = [tuple(bytes.fromhex(look.colour[1:])) for look in looks(["crw", "dpo", "stochm", "stochx", "mine"])]
     assert min(float(np.linalg.norm(seen_lab(a, vision) - seen_lab(b, vision))) for a, b in combinations(found, 2)) > 10
+
+
+@pytest.mark.parametrize(("values", "shown"), [((30.0, 300.0), ["50", "100", "200"]), ((1.0, 5e4), ["1", "10", "100"])])
+def test_heights_on_a_log_axis_have_plain_numbers(tmp_path, values, shown):
+    with saved_panels(tmp_path / "it.svg", 1, (3.0, 2.0)) as (panel,):
+        panel.plot([0, 1], values)
+        log_height(panel)
+    words = (tmp_path / "it.svg").read_text()
+    assert "$" not in words
+    assert [number for number in shown if f">{number}<" in words] == shown
