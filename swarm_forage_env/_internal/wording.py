@@ -2,6 +2,7 @@
 
 import difflib
 import math
+import re
 import unicodedata
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -14,6 +15,8 @@ _REFUSED = ("Cc", "Cs")
 """Those that no text may have. Others that nobody sees are part of ordinary words, such as U+200C in Persian."""
 _TURNING = frozenset("\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
 """Characters that steer the direction of writing, Bidi_Control of Unicode; those of `metrics.scoring.curves_file`."""
+_NOTHING = "<!-- -->"
+"""Nothing, in Markdown."""
 _MOST_NEAR = 4
 """Names that a message lists where there are too many to list all."""
 _NEAR = 0.5
@@ -68,6 +71,16 @@ def printable(text: str) -> str:
     Ends of lines stay, so that a text of several lines remains one.
     """
     return "".join(_escaped(character) for character in text)
+
+
+def plain_markdown(text: str) -> str:
+    """Return a text for a page in Markdown, in one line; it makes no link, picture, HTML, code or end of a cell.
+
+    Emphasis stays. An empty comment in an address keeps GitHub from making a link of it.
+    """
+    words = " ".join(text.split()).replace("\\", r"\\")
+    words = re.sub(r"[\[\]|`]", r"\\\g<0>", words).replace("<", "&lt;")
+    return re.sub(r"://|(?<=www)\.|@", rf"{_NOTHING}\g<0>", words, flags=re.IGNORECASE)
 
 
 def shown(value: Any) -> str:

@@ -19,7 +19,7 @@ from typing import Any
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import replacing
-from swarm_forage_env._internal.wording import aligned
+from swarm_forage_env._internal.wording import aligned, plain_markdown
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 
 
@@ -39,12 +39,12 @@ class Sheet:
         return "\n".join([*([self.title] if self.title else []), *table, *self.notes])
 
     def markdown(self) -> str:
-        """Return the table in the form of GitHub; what would end a cell is escaped."""
-        parts = [f"**{self.title}**"] if self.title else []
+        """Return the table in the form of GitHub; names in title and cells make no links."""
+        parts = [f"**{plain_markdown(self.title)}**"] if self.title else []
         if self.rows:
             header = self.header or [""] * len(self.rows[0])
             lines = [header, ["---"] * len(header), *self.rows]
-            parts.append("\n".join(f"| {' | '.join(map(_markdown_cell, row))} |" for row in lines))
+            parts.append("\n".join(f"| {' | '.join(map(plain_markdown, row))} |" for row in lines))
         return "\n\n".join([*parts, *self.notes])
 
     def csv(self) -> str:
@@ -53,11 +53,6 @@ class Sheet:
         writer = csv.writer(out, lineterminator="\n")
         writer.writerows([self.header, *self.rows] if self.header else self.rows)
         return out.getvalue()
-
-
-def _markdown_cell(text: str) -> str:
-    """A cell of a table: names may hold what would end it, or begin HTML."""
-    return " ".join(text.split()).replace("|", r"\|").replace("<", "&lt;")
 
 
 class Answer(ABC):

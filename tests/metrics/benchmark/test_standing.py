@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from markdown_it import MarkdownIt
 
 from metrics import PAPER_POLICIES
 from metrics.benchmark import (
@@ -18,6 +19,7 @@ from metrics.benchmark import (
 )
 from metrics.benchmark.page import BEGIN, END, with_block
 from metrics.benchmark.standing import improvements, scripted_entries
+from swarm_forage_env._internal.wording import plain_markdown
 from tests.support.entries import TINY, made_up_entry
 from tests.support.pictures import words_in
 
@@ -101,6 +103,29 @@ def test_improvements_of_a_pair_add_up_to_one(protocol, scripted):
     shares = improvements(scripted, protocol)
     np.testing.assert_allclose(shares + shares.T, 1.0)
     assert shares[0, 2] == 1.0  # always better than 1 object
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["[a](https://b.de)", "![a](b.png)", r"a\](b)[c](d", "<img src=b>", "`a`", "a|b", r"a\|b", "[a][b]\n\n[b]: c"],
+)
+def test_names_on_the_page_neither_link_nor_load_pictures(name, protocol, scripted, reference):
+    mine = made_up_entry(protocol, name, lambda k: 39.0, training=Training(library=name))
+    standings = [standing_of(entry, reference, protocol) for entry in [*scripted, mine]]
+    pages = page_block(standings, protocol), details_page(standings, reference, protocol, "benchmark.md")
+    html = [MarkdownIt("commonmark").enable("table").render(page) for page in pages]
+    ours = [page_block(standings[:-1], protocol), details_page(standings[:-1], reference, protocol, "benchmark.md")]
+    for found, own in zip(html, ours, strict=True):
+        without = MarkdownIt("commonmark").enable("table").render(own)
+        for sign in ("<a ", "<img", "<code>", "<h"):
+            assert found.count(sign) == without.count(sign), (sign, found)
+    n_cells = [row.count("<td") for row in html[0].partition("</table>")[0].split("<tr>")[2:]]
+    assert len(set(n_cells)) == 1
+
+
+@pytest.mark.parametrize("name", ["https://b.de/c", "www.b.de", "WWW.b.de", "a@b.de"])
+def test_addresses_in_names_are_no_addresses_to_github(name):
+    assert "<!-- -->" in plain_markdown(name)
 
 
 def test_the_page_has_every_entry_with_its_command_cost_and_seeds(protocol, scripted, reference):
