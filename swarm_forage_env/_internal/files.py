@@ -10,13 +10,17 @@ import os
 import re
 import tomllib
 from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
 _PROBE = bytes(1 << 16)
 """What a folder must have room for, as large as a small record (our choice)."""
+_NO_LOCKS = (errno.EBADF, errno.EINVAL, errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP)
+"""How disks answer that keep no locks, or none of folders, as some network disks do."""
+_LONE = re.compile(r"\\u[dD][89a-fA-F]")
+"""Half of a pair of UTF-16 in JSON, which alone stands for no character."""
 MOST_LEVELS = 50
 """Levels of nested tables and lists that a file may have; our choice: our own files have fewer than ten."""
 
@@ -49,30 +53,57 @@ def replacing(path: Path, *, ending: str = ".tmp") -> Generator[Path]:
 
 
 @contextmanager
-def alone_in(folder: Path) -> Generator[None]:
-    """Keep a folder, which must be there, to this process, as long as others ask in the same way.
+def alone_in(folder: Path, refusal: type[ValueError] | None = None) -> Generator[None]:
+    """Keep a folder to this process, as long as others ask in the same way.
 
-    The system forgets it when the process ends, however it ends, and nothing is left in the folder. Where the system
-    has no such locks (Windows), nobody is refused.
+    It is made if it is missing, and removed if it is still empty at the end. The system forgets the lock when the
+    process ends, however it ends, and nothing of it is in the folder. Where the system or the disk has no such locks
+    (Windows, some network disks), everybody is let in.
+
+    Args:
+        folder: The folder.
+        refusal: What is raised while another process has the folder; None = wait until it has ended.
 
     Raises:
-        BlockingIOError: somebody else has the folder; the error names it.
-        OSError: it cannot be opened.
+        ValueError: `refusal`, see there.
+        OSError: the folder cannot be made or opened.
     """
+    is_new = not folder.exists()
+    opened = _locked(folder, refusal)
+    try:
+        yield
+    finally:
+        if is_new:
+            with suppress(OSError):  # it holds something
+                folder.rmdir()
+        if opened is not None:
+            os.close(opened)
+
+
+def _locked(folder: Path, refusal: type[ValueError] | None) -> int | None:
+    """Lock a folder; returns what to close, None where there are no locks."""
+    folder.mkdir(parents=True, exist_ok=True)
     try:
         from fcntl import LOCK_EX, LOCK_NB, flock
     except ImportError:
-        yield
-        return
+        return None
     opened = os.open(folder, os.O_RDONLY)
     try:
-        try:
-            flock(opened, LOCK_EX | LOCK_NB)
-        except BlockingIOError as error:
-            raise BlockingIOError(error.errno, error.strerror, str(folder)) from error
-        yield
-    finally:
+        flock(opened, LOCK_EX if refusal is None else LOCK_EX | LOCK_NB)
+        if folder.exists() and folder.stat().st_ino == os.fstat(opened).st_ino:
+            return opened
+    except BaseException as error:
         os.close(opened)
+        if isinstance(error, BlockingIOError) and refusal is not None:
+            raise refusal(
+                f"Expected to be the only one that writes to {folder}, but another command does; wait until it has "
+                "ended, or give another --out."
+            ) from error
+        if isinstance(error, OSError) and error.errno in _NO_LOCKS:
+            return None
+        raise
+    os.close(opened)  # whoever had it found it empty, and removed it
+    return _locked(folder, refusal)
 
 
 def check_folder(folder: Path) -> None:
@@ -113,9 +144,35 @@ def parse_json(text: str) -> Any:
     """Return what a JSON text holds.
 
     Raises:
-        ValueError: no JSON, or nested deeper than `MOST_LEVELS`.
+        ValueError: no JSON, nested deeper than `MOST_LEVELS`, or with a text that cannot be written as UTF-8.
     """
-    return _bounded(json.loads, text, "JSON")
+    content = _bounded(json.loads, text, "JSON")
+    if _LONE.search(text):
+        try:
+            json.dumps(content, ensure_ascii=False).encode()
+        except UnicodeEncodeError as error:
+            raise ValueError(
+                f"Expected texts that can be written as UTF-8, got one with {error.object[error.start]!r}."
+            ) from error
+    return content
+
+
+def read_json(path: Path, refusal: type[ValueError]) -> Any:
+    """Return what a JSON file holds.
+
+    Args:
+        path: The file.
+        refusal: What is raised where it cannot be used; the message names the file.
+
+    Raises:
+        ValueError: `refusal`: there is no such file, or see `parse_json`.
+    """
+    try:
+        return parse_json(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise refusal(f"Cannot read {path}: {error.strerror or error}.") from error
+    except ValueError as error:
+        raise refusal(f"Cannot use {path}: {error}") from error
 
 
 def parse_toml(text: str) -> dict[str, Any]:

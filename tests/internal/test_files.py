@@ -1,11 +1,99 @@
 """Files appear whole or not at all, drafts never meet, and a disk that takes no files is told."""
 
+import errno
+import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Thread
 
 import pytest
 
-from swarm_forage_env._internal.files import as_file_name, check_file, check_folder, replacing
+from swarm_forage_env._internal.files import (
+    alone_in,
+    as_file_name,
+    check_file,
+    check_folder,
+    parse_json,
+    read_json,
+    replacing,
+)
+
+HOLDER = """
+import sys, time
+from pathlib import Path
+from swarm_forage_env._internal.files import alone_in
+with alone_in(Path(sys.argv[1]), ValueError):
+    print("has it", flush=True)
+    time.sleep(60)
+"""
+
+
+def test_a_folder_is_kept_until_its_process_ends_however_it_ends(tmp_path):
+    pytest.importorskip("fcntl")
+    folder = tmp_path / "new" / "folder"
+    holder = subprocess.Popen([sys.executable, "-c", HOLDER, folder], stdout=subprocess.PIPE, text=True)
+    try:
+        assert holder.stdout.readline() == "has it\n"
+        with pytest.raises(LookupError, match="but another command does; wait until it has ended"):
+            enter(folder)
+    finally:
+        holder.kill()  # nothing is left to remove
+        holder.wait()
+        holder.stdout.close()
+    with alone_in(folder, RefusalError):
+        assert list(folder.iterdir()) == []
+    assert folder.exists(), "it was there"
+    enter(tmp_path / "other")
+    assert not (tmp_path / "other").exists(), "it was made for nothing"
+
+
+def enter(folder):
+    with alone_in(folder, RefusalError):
+        pass
+
+
+class RefusalError(ValueError, LookupError):
+    """An error of whoever asks."""
+
+
+def test_who_waits_comes_after_the_first(tmp_path):
+    pytest.importorskip("fcntl")
+    told = []
+
+    def second():
+        with alone_in(tmp_path):
+            told.append("second")
+
+    waiting = Thread(target=second)
+    with alone_in(tmp_path):
+        waiting.start()
+        waiting.join(0.2)
+        told.append("first")
+    waiting.join()
+    assert told == ["first", "second"]
+
+
+def test_a_disk_without_locks_refuses_nobody(tmp_path, monkeypatch):
+    fcntl = pytest.importorskip("fcntl")
+
+    def none(*_):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(fcntl, "flock", none)
+    with alone_in(tmp_path, RefusalError), alone_in(tmp_path):
+        pass
+
+
+def test_texts_that_no_file_can_hold_are_refused(tmp_path):
+    assert parse_json(r'{"a": "\ud83d\ude00"}') == {"a": "\U0001f600"}, "a pair is a character"
+    for text in (r'{"a": ["\ud800"]}', r'{"\udcff": 1}'):
+        with pytest.raises(ValueError, match=r"Expected texts that can be written as UTF-8, got one with '.udc?"):
+            parse_json(text)
+    (tmp_path / "a.json").write_text("[", encoding="utf-8")
+    for name, message in (("a.json", "Cannot use .*a.json"), ("b.json", "Cannot read .*b.json: No such file")):
+        with pytest.raises(RefusalError, match=message):
+            read_json(tmp_path / name, RefusalError)
 
 
 def test_drafts_of_one_file_have_different_names_in_every_thread(tmp_path):

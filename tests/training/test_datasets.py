@@ -158,7 +158,7 @@ def test_a_second_recording_into_one_folder_is_refused_while_the_first_is_under_
     told = []
 
     def second(*_):
-        with pytest.raises(DatasetError, match="another command is recording there; wait until it has ended"):
+        with pytest.raises(DatasetError, match="another command does; wait until it has ended"):
             record_dataset(plan(seeds=(4,)), tmp_path)
         told.append(True)
 

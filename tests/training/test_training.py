@@ -13,6 +13,7 @@ pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-b
 
 import torch
 from stable_baselines3 import DQN, PPO, SAC
+from stable_baselines3.common.callbacks import BaseCallback
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.env import ForageEnv
@@ -180,6 +181,25 @@ def test_folders_of_other_trainings_are_left_alone(tmp_path):
     other = dataclasses.replace(tiny_plan().evaluation, n_runs=2)
     with pytest.raises(ConfigError, match=r"another plan: evaluation\.n_runs: 1 before, 2 now; seed: 0 before, 5 now"):
         train(tiny_plan(stages=(Stage(steps=128),), evaluation=other, seed=5), tmp_path, resume=True)
+
+
+def test_a_second_training_in_one_folder_is_refused_while_the_first_is_under_way(tmp_path):
+    pytest.importorskip("fcntl")
+    told = []
+
+    class Second(BaseCallback):
+        """Before the first one has written anything that tells of it."""
+
+        def _on_training_start(self):
+            with pytest.raises(ConfigError, match="another command does; wait until it has ended"):
+                train(tiny_plan(seed=5), tmp_path)
+            told.append(read_plan(tmp_path / "plan.json").seed)
+
+        def _on_step(self):
+            return True
+
+    train(tiny_plan(stages=(Stage(steps=128),)), tmp_path, callbacks=[Second()])
+    assert told == [0]
 
 
 def test_a_finished_training_goes_on_by_a_longer_plan(trained, tmp_path):

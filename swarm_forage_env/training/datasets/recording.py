@@ -226,15 +226,8 @@ def record_dataset(
     folder = Path(folder)
     _card_of_folder(plan.card, folder)  # refuses another data set
     _check_room(folder, len(plan.missing(folder)) * plan.run_bytes)
-    folder.mkdir(parents=True, exist_ok=True)
-    try:
-        with alone_in(folder):
-            _record_runs(plan, folder, jobs, progress)
-    except BlockingIOError as error:
-        raise DatasetError(
-            f"Expected to be the only one that writes to {folder}, but another command is recording there; wait until "
-            "it has ended, or give another --out."
-        ) from error
+    with alone_in(folder, DatasetError):
+        _record_runs(plan, folder, jobs, progress)
     return tuple(RunSummary.read(folder, seed) for seed in plan.card.seeds)
 
 

@@ -25,7 +25,7 @@ from stable_baselines3.common.logger import HParam
 from stable_baselines3.common.utils import safe_mean
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.files import check_folder, replacing
+from swarm_forage_env._internal.files import alone_in, check_folder, replacing
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies import trust
@@ -109,7 +109,8 @@ def train(
     The same plan gives the same weights on the same machine with the same versions. Resumed training is sound, but
     not the same as one that was never interrupted: arenas start anew, and so does the replay memory of dqn and sac.
     Ctrl-C keeps a checkpoint before it goes on its way; a crash leaves the one of the latest evaluation. One that was
-    killed within an evaluation begins with it when it goes on.
+    killed within an evaluation begins with it when it goes on. Two trainings in one folder would overwrite each other,
+    so the second is refused.
 
     Args:
         plan: What to do. A training goes on by its own plan, or by one with a longer last stage or further stages.
@@ -122,16 +123,30 @@ def train(
     Raises:
         ConfigError: the algorithm knows no such option, more processes than arenas, the folder holds a training run and
             `resume` is False, `resume` is True and the folder holds no training run, or one by another plan, or broken
-            files; a stage whose scenario cannot be built; or a training that diverged.
+            files; another call that trains in the folder; a stage whose scenario cannot be built; or a training that
+            diverged.
     """
     _check_options(plan)
     if not 0 <= n_processes <= plan.n_arenas:
         raise ConfigError(f"Expected processes from 0 to n_arenas = {plan.n_arenas}, got {n_processes}.")
-    _check_folder(folder, plan, resume=resume)
-    _check_baseline(plan)
     check_folder(folder)
+    with alone_in(folder, ConfigError):
+        _check_folder(folder, plan, resume=resume)
+        _check_baseline(plan)
+        return _train(plan, folder, n_processes, resume, report or _keep_quiet, callbacks)
+
+
+def _train(
+    plan: TrainingPlan,
+    folder: Path,
+    n_processes: int,
+    resume: bool,
+    report: Report,
+    callbacks: Sequence[BaseCallback],
+) -> TrainingResult:
+    """Train in a folder that is checked, and that nobody else writes to."""
     torch.set_num_threads(1)  # networks this small gain nothing from more, and arenas want the cores
-    watch = _Watch(plan, folder, report or _keep_quiet)
+    watch = _Watch(plan, folder, report)
     together = _Together(watch, callbacks)
     if available_cores() > 1:
         compile_world(plan.scenario)
