@@ -13,9 +13,10 @@ import sys
 import types
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, TypeAlias, Union, get_args, get_origin, get_type_hints
 
-from metrics.benchmark.entry import TRAINED_IN, EntryMeasure, EntryPolicy, Training
+from metrics.benchmark.entry import TRAINED_IN, EntryFile
+from swarm_forage_env._internal.typed import Shown
 from swarm_forage_env.contract.codes import Counter, Task
 from swarm_forage_env.inspect.replay.coding import DTYPES
 from swarm_forage_env.inspect.replay.files import FORMAT, FORMAT_VERSION
@@ -89,6 +90,9 @@ def free(values: Schema, **more: Any) -> Schema:
 
 def of_type(kind: Any) -> Schema:
     """Return the schema of the values of a type: plain ones, tuples, mappings, alternatives, dataclasses."""
+    if get_origin(kind) is Annotated:
+        inner, bounds = get_args(kind)
+        return {**of_type(inner), **_limits(get_origin(inner) is tuple, bounds)}
     origin, parts = get_origin(kind), get_args(kind)
     if dataclasses.is_dataclass(kind):
         return of_class(kind)
@@ -104,9 +108,18 @@ def of_type(kind: Any) -> Schema:
     return OF_TYPE[kind]
 
 
+def _limits(is_list: bool, bounds: Any) -> Schema:
+    """Return what `typed.Within` or `typed.Shown` asks of a value."""
+    if isinstance(bounds, Shown):
+        return {"minLength": 1}
+    names = ("minItems", "maxItems") if is_list else ("minimum", "maximum")
+    limits = zip(names, (bounds.at_least, bounds.at_most), strict=True)
+    return {name: limit for name, limit in limits if limit is not None}
+
+
 def of_class(kind: Any) -> Schema:
     """Return the schema of a dataclass as its file has it: a field that has a default may be missing."""
-    hints = get_type_hints(kind)
+    hints = get_type_hints(kind, include_extras=True)
     own = dataclasses.fields(kind)
     lacking = dataclasses.MISSING
     required = [item.name for item in own if item.default is lacking and item.default_factory is lacking]
@@ -261,22 +274,12 @@ def _settings() -> dict[str, Schema]:
 
 def entry() -> Schema:
     """Return the schema of an entry of the benchmark."""
-    per_policy = listed(listed({"type": "number", "minimum": 0}))
-    training, measure = of_class(Training), of_class(EntryMeasure)
-    training["properties"]["worlds"] = one_of(TRAINED_IN)
-    fields = {
-        "benchmark": keyed({"version": WHOLE, "identity": RUN_ID, "quick": SWITCH}),
-        "name": TEXT,
-        "command": TEXT,
-        "training": training,
-        "policies": listed(of_class(EntryPolicy), minItems=1),
-        "core_hours": {"type": ["number", "null"]},
-        "versions": free(TEXT),
-        "runs": free(keyed({"performance": per_policy, "interference": per_policy}), description="by world"),
-        "measures": listed(measure),
-        "digest": RUN_ID,
-    }
-    return keyed(fields)
+    whole = of_class(EntryFile)
+    fields = whole["properties"]
+    fields["training"]["properties"]["worlds"] = one_of(TRAINED_IN)
+    fields["benchmark"]["properties"]["identity"] = fields["digest"] = RUN_ID
+    fields["runs"]["description"] = "by world"
+    return whole
 
 
 def replay() -> Schema:

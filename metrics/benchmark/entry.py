@@ -13,27 +13,21 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
+
+from swarm_forage_env._internal.fields import number
+from swarm_forage_env._internal.files import read_json, replacing
+from swarm_forage_env._internal.typed import Amount, Count, Name, Within, typed
 
 from ..curves import FloatArray
 from .protocol import BenchmarkError, Protocol
 
 TRAINED_IN = ("given", "other", "nothing", "unknown")
 """Where a policy was trained: in the training worlds only, also elsewhere, not at all, or nobody said."""
-_KEYS = (
-    "benchmark",
-    "name",
-    "command",
-    "training",
-    "policies",
-    "core_hours",
-    "versions",
-    "runs",
-    "measures",
-    "digest",
-)
+Rows: TypeAlias = tuple[tuple[float | None, ...], ...]
+"""(policies, seeds); None where a run has no such value."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,12 +38,14 @@ class Training:
     """One of `TRAINED_IN`."""
     command: str = ""
     library: str = ""
-    core_hours: float | None = None
+    core_hours: Amount | None = None
     """Of all its trainings together."""
 
     def __post_init__(self) -> None:
         if self.worlds not in TRAINED_IN:
             raise BenchmarkError(f"Expected training worlds to be one of {', '.join(TRAINED_IN)}, got {self.worlds!r}.")
+        if self.core_hours is not None:
+            number("core-hours of training", self.core_hours, at_least=0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,7 +56,7 @@ class EntryPolicy:
     """For people, see `swarm_forage_env.policies.registry.policy_label`: of a file without folder and ending."""
     digest: str = ""
     """Hash of the content of its file; of a mixed swarm those of all its files, joined by +. Empty without any file."""
-    training_seed: int | None = None
+    training_seed: Count | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,18 +67,53 @@ class EntryMeasure:
     label: str
     at: str
     """The level in words."""
-    n_robots: tuple[int, ...]
+    n_robots: tuple[Annotated[int, Within(at_least=1)], ...]
     unit: str
     higher_is_better: bool
-    values: tuple[tuple[float | None, ...], ...]
-    """(policies, seeds); None where a run has no such value."""
-    relative: tuple[tuple[float | None, ...], ...] = ()
+    values: Rows
+    relative: Rows = ()
     """The same over the performance that they are compared with; empty for measures that are relative themselves."""
 
     @property
     def key(self) -> tuple[str, str, str]:
         """What it is about, the same for all entries."""
         return self.group, self.label, self.at
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorldRuns:
+    """The runs of a world in an entry file, (policies, seeds) each."""
+
+    performance: tuple[tuple[Amount, ...], ...]
+    """Per 1,000 s."""
+    interference: tuple[tuple[Annotated[float, Within(at_least=0, at_most=1)], ...], ...]
+    """Share of robot time."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Edition:
+    """What an entry file is an entry of."""
+
+    version: int
+    identity: str
+    quick: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class EntryFile:
+    """An entry file as it stands; the schema of entries is made of this."""
+
+    benchmark: Edition
+    name: Name
+    command: str
+    training: Training
+    policies: Annotated[tuple[EntryPolicy, ...], Within(at_least=1)]
+    core_hours: Amount | None
+    versions: Mapping[str, str]
+    runs: Mapping[str, WorldRuns]
+    """By world."""
+    measures: tuple[EntryMeasure, ...]
+    digest: str
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -141,8 +172,6 @@ class Entry:
 
     def write(self, path: str | Path) -> None:
         """Write the entry to a file, whole or not at all."""
-        from swarm_forage_env._internal.files import replacing
-
         with replacing(Path(path)) as draft:
             draft.write_text(_text(self.to_mapping()), encoding="utf-8")
 
@@ -167,18 +196,25 @@ class Entry:
                 f"Expected an entry of the benchmark, {protocol.name}, got {told} in {where}; run swarm-forage "
                 "benchmark again, without --quick and with this version of the package."
             )
-        shape = (len(self.policies), len(protocol.seeds))
-        for world in protocol.worlds:
-            for name in ("performance", "interference"):
-                rows = self.runs.get(world.name, {}).get(name)
-                if rows is None:
-                    raise BenchmarkError(f"Expected {name} in the world {world.name!r} in {where}, found none.")
-                values = _numbers(rows)
-                if values.shape != shape or not np.isfinite(values).all() or (values < 0.0).any():
-                    raise BenchmarkError(
-                        f"Expected {name} in the world {world.name!r} of {where} as numbers from 0 up, one for each "
-                        f"of {shape[0]} policies and {shape[1]} seeds."
-                    )
+        worlds = [world.name for world in protocol.worlds]
+        for world in worlds:
+            if world not in self.runs:
+                raise BenchmarkError(f"Expected runs of the world {world!r} in {where}, found none.")
+        for world, of_world in self.runs.items():
+            if world not in worlds:
+                raise BenchmarkError(f"Expected runs of the worlds of the benchmark in {where}, got {world!r}, too.")
+            for name, rows in of_world.items():
+                self._check_rows(f"{name} in the world {world!r} of {where}", rows, protocol)
+        for measure in self.measures:
+            for name in ("values", "relative") if measure.relative else ("values",):
+                self._check_rows(f"{name} of {', '.join(measure.key)} in {where}", getattr(measure, name), protocol)
+
+    def _check_rows(self, where: str, rows: Sequence[Sequence[Any]], protocol: Protocol) -> None:
+        if [len(row) for row in rows] != [len(protocol.seeds)] * len(self.policies):
+            raise BenchmarkError(
+                f"Expected {where} as lists of numbers, one for each of {len(self.policies)} policies and "
+                f"{len(protocol.seeds)} seeds."
+            )
 
 
 def read_entry(path: str | Path, protocol: Protocol) -> Entry:
@@ -187,22 +223,14 @@ def read_entry(path: str | Path, protocol: Protocol) -> Entry:
     Raises:
         BenchmarkError: the file cannot be read, holds no whole entry of `protocol`, or its digest does not fit.
     """
-    from swarm_forage_env._internal.files import parse_json
-
+    content = read_json(Path(path), BenchmarkError)
     try:
-        content = parse_json(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise BenchmarkError(f"Cannot read the entry {path}: {error.strerror or error}.") from error
+        stored: EntryFile = typed(EntryFile, content, "")
     except ValueError as error:
-        raise BenchmarkError(f"Expected an entry of the benchmark as JSON in {path}: {error}.") from error
-    if not isinstance(content, dict) or sorted(content) != sorted(_KEYS):  # pyright: ignore[reportUnknownArgumentType] - JSON holds anything
-        raise BenchmarkError(f"Expected an entry of the benchmark in {path}, with the keys {', '.join(_KEYS)}.")
-    try:
-        entry = _entry(content)  # pyright: ignore[reportUnknownArgumentType] - JSON holds anything
-    except (TypeError, KeyError, ValueError) as error:
         raise BenchmarkError(f"Cannot use the entry {path}: {error}") from error
+    entry = _entry(stored)
     entry.check(protocol, str(path))
-    if entry.digest != content["digest"]:
+    if entry.digest != stored.digest:
         raise BenchmarkError(
             f"Expected the numbers of {path} as swarm-forage benchmark wrote them, got others: the digest does not "
             "fit. Make the entry again."
@@ -210,34 +238,21 @@ def read_entry(path: str | Path, protocol: Protocol) -> Entry:
     return entry
 
 
-def _entry(content: Mapping[str, Any]) -> Entry:
-    about = content["benchmark"]
+def _entry(stored: EntryFile) -> Entry:
+    about = stored.benchmark
     return Entry(
-        version=about["version"],
-        identity=about["identity"],
-        is_quick=about["quick"],
-        name=content["name"],
-        command=content["command"],
-        training=Training(**content["training"]),
-        policies=tuple(EntryPolicy(**policy) for policy in content["policies"]),
-        core_hours=content["core_hours"],
-        versions=content["versions"],
-        runs=content["runs"],
-        measures=tuple(_measure(measure) for measure in content["measures"]),
+        version=about.version,
+        identity=about.identity,
+        is_quick=about.quick,
+        name=stored.name,
+        command=stored.command,
+        training=stored.training,
+        policies=stored.policies,
+        core_hours=stored.core_hours,
+        versions=stored.versions,
+        runs={world: vars(runs) for world, runs in stored.runs.items()},
+        measures=stored.measures,
     )
-
-
-def _measure(content: Mapping[str, Any]) -> EntryMeasure:
-    lists: dict[str, Any] = {name: tuple(tuple[Any](row) for row in content[name]) for name in ("values", "relative")}
-    fields: dict[str, Any] = {**content, **lists, "n_robots": tuple[Any](content["n_robots"])}
-    return EntryMeasure(**fields)
-
-
-def _numbers(rows: Any) -> FloatArray:
-    try:
-        return np.asarray(rows, dtype=np.float64)
-    except (TypeError, ValueError):
-        return np.empty(0)
 
 
 def _lists(rows: Sequence[Sequence[float]]) -> list[list[float]]:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from swarm_forage_env._internal.fields import text
 from swarm_forage_env.contract.policy import sees_world
 from swarm_forage_env.policies.registry import file_of, is_policy_file, policy_class, policy_label
 from swarm_forage_env.runs.plan import Plan
@@ -88,6 +89,7 @@ def benchmark_question(
     training_seeds: Sequence[int] = (),
 ) -> BenchmarkQuestion:
     """Return what `run_benchmark` asks; arguments and errors as there."""
+    text("the name of an entry", name)
     chosen = protocol or load_protocol()
     is_shipped = tuple(policies) == (name,) and not chosen.is_quick  # made again
     if name in PAPER_POLICIES and not is_shipped:
@@ -146,6 +148,7 @@ def run_benchmark(
     Raises:
         BenchmarkError: runs failed, there is not one training seed per policy, or the name is that of a scripted
             controller.
+        ConfigError: a name without characters, or with some that no terminal shows.
         ValueError: an unknown policy, or a file that cannot be opened.
         swarm_forage_env.runs.runner.RunsInterrupted: Ctrl-C; finished runs are in `out`.
     """

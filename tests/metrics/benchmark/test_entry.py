@@ -5,7 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from metrics.benchmark import BenchmarkError, Training, load_protocol, read_entry
+from metrics.benchmark import BenchmarkError, Training, benchmark_question, load_protocol, read_entry
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.runs.spec import identity_of
 from tests.support.entries import TINY, made_up_entry
 
 
@@ -89,13 +91,13 @@ def add_field(content):
     [
         (set_version, "Expected an entry of version 1 of the benchmark, got one of version 2"),
         (set_identity, "got other worlds or seeds"),
-        (drop_world, "Expected performance in the world 'room, 2 robots'"),
+        (drop_world, "Expected runs of the world 'room, 2 robots'"),
         (drop_seed, "for each of 2 policies and 2 seeds"),
-        (set_negative, "as numbers from 0 up"),
-        (set_text, "as numbers from 0 up"),
+        (set_negative, r"performance\[0\]\[0\] to be a finite number >= 0"),
+        (set_text, "performance to be a list"),
         (raise_performance, "the digest does not fit"),
         (rename_measure, "the digest does not fit"),
-        (drop_key, "with the keys benchmark, name"),
+        (drop_key, "Missing key 'measures'"),
         (set_training, "Expected training worlds to be one of given, other"),
         (add_field, "colour"),
     ],
@@ -103,6 +105,58 @@ def add_field(content):
 def test_a_file_that_is_no_whole_entry_is_refused(change, message, protocol, file):
     with pytest.raises(BenchmarkError, match=message) as refused:
         read_entry(altered(file, change), protocol)
+    assert str(file) in str(refused.value)
+
+
+def put(*path_and_value):
+    *path, last, value = path_and_value
+
+    def change(content):
+        for key in path:
+            content = content[key]
+        content[last] = value
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (put("name", 5), "Expected name to be a non-empty text"),
+        (put("name", None), "Expected name to be a non-empty text"),
+        (put("name", []), "Expected name to be a non-empty text"),
+        (put("name", "\x1b[31m"), "Expected name to be a non-empty text without control characters"),
+        (put("name", "\ud800"), "Expected texts that can be written as UTF-8"),
+        (put("command", 5), "Expected command to be a text"),
+        (put("core_hours", "x"), "Expected core_hours to be a finite number >= 0"),
+        (put("core_hours", -1), "Expected core_hours to be a finite number >= 0"),
+        (put("runs", "x"), "Expected runs to be a table"),
+        (put("runs", "room, 2 robots", 5), "Expected runs.room, 2 robots to be a table"),
+        (put("runs", "room, 2 robots", "performance", 0, 0, "x"), r"performance\[0\]\[0\] to be a finite number >= 0"),
+        (put("runs", "room, 2 robots", "beauty", [[1.0, 1.0]] * 2), "Unknown key .*beauty"),
+        (put("runs", "mars", {"performance": [[1.0, 1.0]] * 2, "interference": [[0.1, 0.1]] * 2}), "got 'mars', too"),
+        (put("runs", "room, 2 robots", "interference", 0, 0, 1.5), r"interference.* to be a number in \[0, 1\]"),
+        (put("measures", 0, "values", [["x", 1.0], [1.0, 1.0]]), r"values\[0\]\[0\] to be a finite number"),
+        (put("measures", 0, "values", [[1.0], [1.0, 1.0]]), "one for each of 2 policies and 2 seeds"),
+        (put("measures", 0, "relative", [[1.0]]), "one for each of 2 policies and 2 seeds"),
+        (put("measures", 0, "n_robots", ["x"]), r"n_robots\[0\] to be a whole number >= 1"),
+        (put("measures", 0, "higher_is_better", 1), "higher_is_better to be True or False"),
+        (put("policies", []), "Expected policies to have at least 1"),
+        (put("policies", 0, "training_seed", -1), "training_seed to be a whole number >= 0"),
+        (put("versions", {"numpy": 2}), "versions.numpy to be a text"),
+        (put("benchmark", []), "Expected benchmark to be a table"),
+        (put("benchmark", "quick", "no"), "benchmark.quick to be True or False"),
+        (put("benchmark", "version", None), "benchmark.version to be a whole number"),
+        (put("training", "core_hours", "x"), "training.core_hours to be a finite number >= 0"),
+    ],
+)  # fmt: skip
+def test_an_entry_from_a_stranger_is_refused_by_the_name_of_the_field(change, message, protocol, file):
+    content = json.loads(file.read_text())
+    change(content)
+    del content["digest"]
+    file.write_text(json.dumps(content | {"digest": identity_of(content)}))
+    with pytest.raises(BenchmarkError, match=message) as refused:
+        read_entry(file, protocol)
     assert str(file) in str(refused.value)
 
 
@@ -121,10 +175,14 @@ def test_a_file_that_is_no_json_object_of_ours_is_refused(text, protocol, tmp_pa
 
 
 def test_a_missing_file_is_named(protocol, tmp_path):
-    with pytest.raises(BenchmarkError, match="Cannot read the entry"):
+    with pytest.raises(BenchmarkError, match=r"Cannot read .*none\.json: No such file"):
         read_entry(tmp_path / "none.json", protocol)
 
 
-def test_training_worlds_are_known_words():
+def test_what_no_file_may_say_is_refused_before_any_run():
     with pytest.raises(BenchmarkError, match="got 'mars'"):
         Training(worlds="mars")
+    with pytest.raises(ConfigError, match="Expected core-hours of training"):
+        Training(core_hours=float("nan"))
+    with pytest.raises(ConfigError, match="Expected the name of an entry to be a non-empty text"):
+        benchmark_question(["crw"], name="\x1b[31m")
