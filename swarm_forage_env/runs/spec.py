@@ -138,7 +138,7 @@ class RunSpec:
         Raises:
             ConfigError: unknown or missing keys, or values that describe no run.
         """
-        known_keys(mapping, _KEYS, "key of a run specification")
+        known_keys(table("a run specification", mapping), _KEYS, "key of a run specification")
         missing = [key for key in ("scenario", "policy") if key not in mapping]
         if missing:
             raise ConfigError(f"Missing key {missing[0]!r} in a run specification.")

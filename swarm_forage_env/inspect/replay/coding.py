@@ -8,7 +8,6 @@ that is not a surprise. An array of floats goes to zlib as it is.
 
 import math
 import zlib
-from typing import Any
 
 import numpy as np
 
@@ -16,9 +15,6 @@ from swarm_forage_env.inspect.replay.frames import ReplayError
 
 DTYPES = ("u1", "u2", "i4", "f4")
 """Types of arrays in a replay, little-endian; the page knows the same."""
-MOST_BYTES = 2**31
-"""Bytes of one array that are unpacked at most, for files may be anybody's. Our choice: three times the positions of
-16,384 robots in 10,000 frames."""
 _LEVEL = 9
 
 
@@ -27,11 +23,14 @@ def pack(array: np.ndarray) -> bytes:
     if array.dtype.kind == "f":
         return zlib.compress(np.ascontiguousarray(array, "<f4").tobytes(), _LEVEL)
     size = array.dtype.itemsize
-    rows = np.moveaxis(array, 0, -1).astype(np.int64)
-    half = 1 << (8 * size - 1)
-    changes = (np.diff(rows, prepend=0) + half) % (2 * half) - half
-    zigzag = np.where(changes < 0, -2 * changes - 1, 2 * changes).astype(f"<u{size}")
-    planes = np.ascontiguousarray(zigzag).reshape(-1).view(np.uint8).reshape(-1, size).T
+    rows = np.moveaxis(array, 0, -1).astype(f"<u{size}", order="C")
+    changes = np.diff(rows, prepend=rows.dtype.type(0)).view(f"<i{size}")  # unsigned, so modulo the range
+    del rows
+    signs = changes >> (8 * size - 1)
+    changes <<= 1
+    changes ^= signs
+    del signs
+    planes = changes.reshape(-1).view(np.uint8).reshape(-1, size).T
     return zlib.compress(planes.tobytes(), _LEVEL)
 
 
@@ -44,17 +43,12 @@ def unpack(packed: bytes, dtype: str, shape: tuple[int, ...]) -> np.ndarray:
         shape: Shape of the array.
 
     Raises:
-        ReplayError: bytes that are damaged, or of an array of another size, or of more than `MOST_BYTES`.
+        ReplayError: bytes that are damaged, or of an array of another size.
     """
     if dtype not in DTYPES:
         raise ReplayError(f"Expected arrays of the types {', '.join(DTYPES)}, got {dtype!r}.")
     size = int(dtype[1])
     expected = size * math.prod(shape)
-    if expected > MOST_BYTES:
-        raise ReplayError(
-            f"Expected arrays of at most {MOST_BYTES:,} bytes, got one of shape {shape}; write the replay with fewer "
-            "frames (--frame, --seconds)."
-        )
     unpacking = zlib.decompressobj()
     try:
         raw = unpacking.decompress(packed, expected + 1)  # no more, however much is packed
@@ -67,9 +61,14 @@ def unpack(packed: bytes, dtype: str, shape: tuple[int, ...]) -> np.ndarray:
         raise ReplayError(f"Expected {expected} bytes for an array of shape {shape}, got {came}.")
     if dtype == "f4":
         return np.frombuffer(raw, "<f4").reshape(shape)
-    planes = np.frombuffer(raw, np.uint8).reshape(size, -1).T
-    zigzag = np.ascontiguousarray(planes).reshape(-1).view(f"<u{size}").astype(np.int64)
-    changes = np.where(zigzag % 2 == 1, -(zigzag + 1) // 2, zigzag // 2)
-    rows = np.cumsum(changes.reshape(*shape[1:], shape[0]), axis=-1)
-    wrapped: Any = rows.astype(f"<{dtype}")  # modulo the range of the type
-    return np.ascontiguousarray(np.moveaxis(wrapped, -1, 0))
+    # In the type itself, step by step in place: an array may be as large as memory allows.
+    rows = np.frombuffer(raw, np.uint8).reshape(size, -1).T.copy().reshape(-1).view(f"<u{size}")
+    del raw
+    odd = rows & rows.dtype.type(1)
+    rows >>= 1
+    np.negative(odd, out=odd)
+    rows ^= odd
+    del odd
+    rows = rows.reshape(*shape[1:], shape[0])
+    np.cumsum(rows, axis=-1, dtype=rows.dtype, out=rows)  # modulo the range of the type
+    return np.ascontiguousarray(np.moveaxis(rows.view(f"<{dtype}"), -1, 0))

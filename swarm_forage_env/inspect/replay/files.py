@@ -6,16 +6,20 @@ and which array lies where in the run's block of bytes (`coding` says how). `doc
 
 import hashlib
 import json
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import ConfigError, known_keys, one_of
 from swarm_forage_env._internal.files import replacing
+from swarm_forage_env._internal.typed import Count, Name, Within, typed
+from swarm_forage_env._internal.wording import shown
 from swarm_forage_env.contract.codes import Counter, Task
+from swarm_forage_env.inspect.replay.checking import MOST_BYTES, check_numbers, check_shape, n_frames, shapes
 from swarm_forage_env.inspect.replay.coding import pack, unpack
 from swarm_forage_env.inspect.replay.frames import Replay, ReplayError
 from swarm_forage_env.rendering.pages import PageError, build_replay_page, take_replay_page_apart
@@ -44,6 +48,10 @@ _ARRAYS = {
     "memory_events": "i4",
 }
 """Arrays of a `Replay` and their types in a file; those that are None are left out."""
+_ALWAYS = tuple(name for name in _ARRAYS if name not in ("activity", "remembered", "memory_events"))
+"""Arrays that every replay has."""
+_SIGNAL = "signal_"
+"""What the name of an array begins with that is a waveform, by the name of its wrapper."""
 _SIGNALS = {"throttle": ("throttle", ""), "handling_cost": ("handling cost", " ticks")}
 """Wrapper -> what its waveform is called in the page, and its unit."""
 _TASKS = {Task.NONE: "no task", Task.CACHE_COLLECTOR: "cache collector"}
@@ -91,16 +99,16 @@ def read_replays(path: str | Path) -> tuple[Replay, ...]:
     """
     try:
         header, blocks = take_replay_page_apart(Path(path).read_text(encoding="utf-8"))
-        return tuple(_replay_of(about, block) for about, block in zip(_runs_of(header), blocks, strict=True))
+        _check_version(header)
+        return _replays_of(header, blocks)
     except OSError as error:
         raise ReplayError(f"Cannot read {path}: {error.strerror or error}.") from error
     except UnicodeDecodeError as error:
         raise ReplayError(f"Cannot read {path}: it is no text, so no replay page.") from error
     except PageError as error:
         raise ReplayError(f"Cannot read {path}: {error}.") from error
-    except (ConfigError, ReplayError, KeyError, TypeError, ValueError) as error:
-        reason = f"no {error}" if isinstance(error, KeyError) else str(error).rstrip(".")
-        raise ReplayError(f"Cannot read {path}: its content is damaged ({reason}).") from error
+    except (ConfigError, ReplayError) as error:
+        raise ReplayError(f"Cannot read {path}: its content is damaged ({str(error).rstrip('.')}).") from error
 
 
 def _told_apart(replays: Sequence[Replay]) -> list[Replay]:
@@ -126,22 +134,21 @@ def _headline(replays: Sequence[Replay]) -> str:
     return ", ".join(replay.label for replay in replays)
 
 
-def _runs_of(header: dict[str, Any]) -> list[dict[str, Any]]:
+def _check_version(header: dict[str, Any]) -> None:
     if header.get("format") != FORMAT:
         raise PageError("it is no replay page of swarm_forage_env")
     if header.get("version") not in READ_VERSIONS:
         raise PageError(
-            f"it has version {header.get('version')} of the format, this version of swarm_forage_env reads "
+            f"it has version {shown(header.get('version'))} of the format, this version of swarm_forage_env reads "
             f"{' to '.join(map(str, (READ_VERSIONS[0], READ_VERSIONS[-1])))}; read it with the version that wrote it"
         )
-    return header["runs"]
 
 
 def _packed(replay: Replay) -> tuple[dict[str, Any], bytes]:
     """Return the header of a run, and its block of bytes."""
     arrays: dict[str, np.ndarray] = {
         name: array for name in _ARRAYS if (array := getattr(replay, name)) is not None
-    } | {f"signal_{name}": values for name, values in replay.signals.items()}
+    } | {f"{_SIGNAL}{name}": values for name, values in replay.signals.items()}
     places: list[dict[str, Any]] = []
     block = b""
     for name, array in arrays.items():
@@ -229,30 +236,100 @@ def _world(scenario: ScenarioConfig) -> dict[str, Any]:
     }
 
 
-def _replay_of(about: dict[str, Any], block: bytes) -> Replay:
-    digest = about.pop("digest")
-    if _digest(about, block) != digest:
-        raise ReplayError("it does not match its digest")
-    arrays = {
-        place["name"]: unpack(
-            block[place["offset"] : place["offset"] + place["size"]], place["dtype"], tuple(place["shape"])
+@dataclass(frozen=True, kw_only=True)
+class _Place:
+    """Where an array lies in a block, and what it is."""
+
+    name: str
+    dtype: str
+    shape: tuple[Count, ...]
+    offset: Count
+    size: Count
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of the array, unpacked."""
+        return math.prod(self.shape) * int(self.dtype[1:])
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Run:
+    """What of the header of a run becomes a `Replay`; all else is for the page."""
+
+    spec: Mapping[str, Any]
+    label: Name
+    frame_ticks: Annotated[int, Within(at_least=1)]
+    end_tick: Annotated[int, Within(at_least=1)]
+    activities: tuple[str, ...]
+    remembered_frames: Annotated[int, Within(at_least=1)]
+    has_tasks: bool
+    versions: Mapping[str, str]
+    arrays: tuple[_Place, ...]
+    digest: str
+
+
+def _replays_of(header: dict[str, Any], blocks: list[bytes]) -> tuple[Replay, ...]:
+    given: tuple[Mapping[str, Any], ...] = typed(tuple[Mapping[str, Any], ...], header.get("runs"), "runs")
+    if len(given) != len(blocks):
+        raise ReplayError(f"Expected one block of numbers for each of {len(given)} runs, got {len(blocks)}.")
+    own = _Run.__dataclass_fields__
+    runs: list[_Run] = [
+        typed(_Run, {name: value for name, value in about.items() if name in own}, f"runs[{k}]")
+        for k, about in enumerate(given)
+    ]
+    for run, about, block in zip(runs, given, blocks, strict=True):
+        if _digest({name: value for name, value in about.items() if name != "digest"}, block) != run.digest:
+            raise ReplayError("it does not match its digest")
+    specs = [RunSpec.from_mapping(run.spec) for run in runs]
+    for run, spec in zip(runs, specs, strict=True):  # before anything is unpacked
+        _check_places(run, spec.scenario)
+    in_all = sum(place.n_bytes for run in runs for place in run.arrays)
+    if in_all > MOST_BYTES:
+        raise ReplayError(
+            f"Expected arrays of at most {MOST_BYTES:,} bytes in all, got {in_all:,}; write the replay with fewer "
+            "frames (--frame, --seconds)."
         )
-        for place in about["arrays"]
+    return tuple(_replay_of(run, spec, block) for run, spec, block in zip(runs, specs, blocks, strict=True))
+
+
+def _check_places(run: _Run, scenario: ScenarioConfig) -> None:
+    """Refuse arrays that a replay of this run does not have."""
+    if run.end_tick > scenario.horizon_ticks:
+        raise ReplayError(f"Expected end_tick of at most {scenario.horizon_ticks:,}, got {run.end_tick:,}.")
+    frames = n_frames(run.frame_ticks, run.end_tick)
+    wanted = shapes(scenario, frames, run.remembered_frames)
+    of_signals = {f"{_SIGNAL}{name}": (frames,) for name in _SIGNALS}
+    names = [place.name for place in run.arrays]
+    for name in (*_ALWAYS, *names):
+        if names.count(name) != 1:
+            raise ReplayError(f"Expected one array {name}, got {names.count(name)}.")
+    known_keys(dict.fromkeys(names), (*wanted, *of_signals), "array")
+    for place in run.arrays:
+        one_of(f"the type of {place.name}", place.dtype, (_ARRAYS.get(place.name, "f4"),))
+        check_shape(place.name, place.shape, (wanted | of_signals)[place.name])
+
+
+def _replay_of(run: _Run, spec: RunSpec, block: bytes) -> Replay:
+    arrays = {
+        place.name: unpack(block[place.offset : place.offset + place.size], place.dtype, place.shape)
+        for place in run.arrays
     }
     own: dict[str, Any] = {name: arrays.get(name) for name in _ARRAYS}
-    signals = {name.removeprefix("signal_"): array for name, array in arrays.items() if name not in _ARRAYS}
-    return Replay(
-        spec=RunSpec.from_mapping(about["spec"]),
-        label=about["label"],
-        frame_ticks=about["frame_ticks"],
-        end_tick=about["end_tick"],
-        activities=tuple(about["activities"]),
-        remembered_frames=about["remembered_frames"],
-        versions=about["versions"],
-        has_tasks=about["has_tasks"],
+    signals = {name.removeprefix(_SIGNAL): array for name, array in arrays.items() if name not in _ARRAYS}
+    replay = Replay(
+        spec=spec,
+        label=run.label,
+        frame_ticks=run.frame_ticks,
+        end_tick=run.end_tick,
+        activities=run.activities,
+        remembered_frames=run.remembered_frames,
+        versions=run.versions,
+        has_tasks=run.has_tasks,
         signals=signals,
         **own,
     )
+    check_numbers(replay)
+    return replay
 
 
 def _digest(about: dict[str, Any], block: bytes) -> str:
