@@ -50,8 +50,8 @@ def typed(kind: Any, value: Any, where: str) -> Any:
     """Return a plain value as a type.
 
     Args:
-        kind: bool, int, float, str or Any; one of them or None; a tuple or a mapping from texts of what is in this
-            list; a dataclass with such fields. `Annotated` adds `Within` or `Shown`.
+        kind: bool, int, float, str or Any; one of them or None, or one of several; a tuple or a mapping from texts of
+            what is in this list; a dataclass with such fields. `Annotated` adds `Within` or `Shown`.
         value: What a parser returned.
         where: Name of the value, for the message.
 
@@ -65,8 +65,9 @@ def typed(kind: Any, value: Any, where: str) -> Any:
     if kind is Any:
         return value
     if origin in (Union, UnionType):
-        (other,) = (part for part in parts if part is not NoneType)  # one type, or None
-        return None if value is None else typed(other, value, where)
+        if value is None and NoneType in parts:
+            return None
+        return typed(_alternative(parts, value, where), value, where)
     if dataclasses.is_dataclass(kind):
         return _record(cast("type", kind), value, where)
     if origin is tuple:
@@ -75,6 +76,21 @@ def typed(kind: Any, value: Any, where: str) -> Any:
         return {key: typed(parts[-1], item, f"{where}.{key}") for key, item in table(where, value).items()}
     _scalar(kind, value, where, bounds)
     return value
+
+
+def _alternative(kinds: tuple[Any, ...], value: Any, where: str) -> Any:
+    """Return which of several types a value is meant to have."""
+    others = [kind for kind in kinds if kind is not NoneType]
+    if len(others) == 1:
+        return others[0]
+    fitting = [kind for kind in (bool, float, str) if isinstance(value, kind | int if kind is float else kind)]
+    if not fitting or fitting[0] not in others:
+        raise ConfigError(f"Expected {where} to be one of {', '.join(map(_word, others))}, got {shown(value)}.")
+    return fitting[0]
+
+
+def _word(kind: type) -> str:
+    return {bool: "True or False", float: "a number", str: "a text"}[kind]
 
 
 def _scalar(kind: type, value: Any, where: str, bounds: Any) -> None:

@@ -9,9 +9,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import ConfigError, one_of, table, text
 from swarm_forage_env.policies.registry import from_callable, policy_label
 from swarm_forage_env.runs.spec import pin_policy, stated_caches
+from swarm_forage_env.scenarios.config import CACHE_KINDS
 
 PolicyLike: TypeAlias = Any
 """A registered name; the path of a trained policy (*.zip of stable-baselines3, *.npz); a policy object or class; a
@@ -34,6 +35,13 @@ class PolicySpec:
     """Builds the policy in this process; None if worker processes can load it by its name."""
     is_named: bool = field(default=True, compare=False)
     """Whether its runs may be stored: a name tells which policy a stored run belongs to."""
+
+    def __post_init__(self) -> None:
+        text("the label of a policy", self.label)
+        text("a policy", self.policy)
+        table(f"parameters of {self.label!r}", self.parameters)
+        if self.caches is not None:
+            one_of(f"caches of {self.label!r}", self.caches, CACHE_KINDS)
 
 
 def policy_spec(

@@ -24,6 +24,7 @@ from swarm_forage_env._internal.fields import (
     table,
     whole,
 )
+from swarm_forage_env._internal.typed import typed
 from swarm_forage_env.policies.mixture import SHARE, has_open_share
 from swarm_forage_env.runs.plan import Condition, Plan
 from swarm_forage_env.runs.policy_spec import PolicySpec
@@ -43,8 +44,6 @@ if TYPE_CHECKING:
 Value: TypeAlias = float | str | bool
 """Where something is on an axis."""
 
-POLICY_KEYS = ("label", "policy", "parameters", "caches")
-"""What a study file says of a policy: fields of `PolicySpec`."""
 RULES_NAMES = {"described": "DESCRIBED", "program": "AUTHORS_PROGRAM"}
 """Word of studies -> name of the rules in `scenarios.quirks.RULES`."""
 SCENARIO_FIELDS = (*field_sections(), "density", "side_m")
@@ -151,6 +150,20 @@ class Place(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
+class StoredPolicy:
+    """What a file says of a policy, see `PolicySpec`."""
+
+    label: str
+    policy: str
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    caches: str | None = None
+
+
+POLICY_KEYS = tuple(StoredPolicy.__dataclass_fields__)
+"""The same, as keys."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class StudySpec:
     """A study as frozen data; all values are written out, nothing is left to a budget.
 
@@ -184,6 +197,8 @@ class StudySpec:
 
     def __post_init__(self) -> None:
         check_file_name("name of a study", self.name)
+        for what in ("title", "budget", "file"):
+            typed(str, getattr(self, what), what)
         known_name("scenario", self.scenario, scenario_names())
         for name in table("set", self.settings):
             if name in OF_THE_STUDY:
@@ -331,18 +346,15 @@ class StudySpec:
         if missing:
             raise ConfigError(f"Missing key {missing[0]!r} of a study.")
         values: dict[str, Any] = dict(mapping)
-        for name, kind, keys in (("policies", PolicySpec, POLICY_KEYS), ("axes", Axis, ("name", "values"))):
-            entries = [{**table(name, entry)} for entry in values[name]]
-            for entry in entries:
-                known_keys(entry, keys, f"key of {name}")
-                if "values" in entry:
-                    entry["values"] = tuple(entry["values"])
-            values[name] = tuple(kind(**entry) for entry in entries)
+        values["policies"] = tuple(
+            PolicySpec(**vars(policy)) for policy in typed(tuple[StoredPolicy, ...], values["policies"], "policies")
+        )
+        values["axes"] = typed(tuple[Axis, ...], values["axes"], "axes")
         values["wrappers"] = wrappers_from_list(values["wrappers"])
-        values["settings"] = plain_settings(values["settings"])
-        values["seeds"] = tuple(values["seeds"])
-        values["looks"] = tuple(values.get("looks", ()))
-        values["rules"] = tuple(values.pop(_STORED["rules"]))
+        values["settings"] = plain_settings(table("settings", values["settings"]))
+        values["seeds"] = typed(tuple[int, ...], values["seeds"], "seeds")
+        values["looks"] = typed(tuple[int, ...], values.get("looks", ()), "looks")
+        values["rules"] = typed(tuple[str, ...], values.pop(_STORED["rules"]), _STORED["rules"])
         return cls(**values)
 
     def to_json(self) -> str:

@@ -230,6 +230,7 @@ def _policy(entry: Any, folder: Path) -> PolicySpec:
     word = keys.pop("policy", None)
     if not isinstance(word, str):
         raise ConfigError(f"Missing key 'policy', a name or a file, in {entry!r}.")
+    table(f"parameters of {word!r}", keys.get("parameters", {}))
     return policy_spec(_beside(word, folder), **keys)
 
 
@@ -251,7 +252,10 @@ def _axes(
     for number, entry in enumerate(entries, 1):
         known_keys(entry, AXIS_KEYS, "key of an axis")
         name = _axis_name(entry)
-        given = _listed(f"values of axis {name}", entry.get("values") or _of_paper(content, settings, name))
+        given = _listed(
+            f"values of axis {name}", entry["values"] if "values" in entry else _of_paper(content, settings, name)
+        )
+        several(f"the values of axis {name}", tuple(given), "values")
         values = [_place(value) for value in given]
         is_last = number == len(entries)
         if "reference" in entry and not is_last:

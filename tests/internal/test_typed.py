@@ -64,6 +64,16 @@ def test_what_is_of_another_type_or_out_of_bounds_is_named(change, message):
         typed(Whole, {"parts": []} | change, "")
 
 
+def test_one_of_several_types():
+    for value in (True, 1, 0.5, "a"):
+        assert typed(float | str | bool, value, "a") is value
+    for value in (None, [1], {}):
+        with pytest.raises(ConfigError, match="Expected a to be one of a number, a text, True or False"):
+            typed(float | str | bool, value, "a")
+    with pytest.raises(ConfigError, match="Expected a to be one of a number, a text, got True"):
+        typed(float | str, True, "a")
+
+
 def test_what_is_no_table_is_named_by_its_type():
     with pytest.raises(ConfigError, match="Expected a Whole to be a table"):
         typed(Whole, [], "")

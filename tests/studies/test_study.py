@@ -58,6 +58,29 @@ def test_the_reference_of_a_place_differs_on_the_last_axis_only():
     assert replace(spec, reference=None).reference_of(place) is None
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("seeds", 5, "Expected seeds to be a list"),
+        ("seeds", [0.5], r"Expected seeds\[0\] to be a whole number"),
+        ("looks", "x", "Expected looks to be a list"),
+        ("readings", None, "Expected readings to be a list"),
+        ("policies", [1], r"Expected policies\[0\] to be a table"),
+        ("policies", [{"label": 3, "policy": "crw", "parameters": {}, "caches": None}], r"policies\[0\].label to be a text"),
+        ("policies", [{"label": "a", "policy": "crw", "parameters": [1], "caches": None}], "parameters to be a table"),
+        ("axes", {}, "Expected axes to be a list"),
+        ("axes", [{"name": "noise", "values": 3}], r"Expected axes\[0\].values to be a list"),
+        ("axes", [{"name": "noise", "values": [[1]]}], r"Expected axes\[0\].values\[0\] to be one of a number, a text"),
+        ("settings", [], "Expected settings to be a table"),
+        ("title", None, "Expected title to be a text"),
+        ("horizon_s", [], "horizon_s"),
+    ],
+)  # fmt: skip
+def test_a_stored_study_from_a_stranger_is_refused_by_the_name_of_the_field(key, value, message):
+    with pytest.raises(ConfigError, match=message):
+        StudySpec.from_mapping(study(Axis(name="noise", values=(0.0,))).to_mapping() | {key: value})
+
+
 def test_fields_that_hold_lists_can_vary():
     spec = study(Axis(name="nest_size_m", values=("3.2,12.8", "3.2,6.4")))
     sizes = [spec.world(place).scenario.arena.nest_size_m for place in spec.places]

@@ -174,6 +174,17 @@ def test_a_policy_file_lies_beside_the_study(written, tmp_path):
         ('policy = "stochm", ', "", "Missing key 'policy'"),
         ("[set]", "[set", "mine.toml"),
         ('"described"', '"descibed"', "Did you mean 'described'"),
+        ("values = [0.01, 0.02, 0.03, 0.04]", "values = []", "values of axis noise to be one or more values"),
+        ("values = [0.0, 0.01]", "values = []", "values of axis walk_probability to be one or more values"),
+        ('policy = "stochm"', 'parameters = [1], policy = "stochm"', "Expected parameters of 'stochm' to be a table"),
+        ('caches = "none"', "caches = 1", "Expected caches of .* to be one of none, static"),
+        ('policy = "stochm", ', 'policy = 3, ', "Missing key 'policy', a name or a file"),
+        ('name = "mine"', 'name = "mine"\ntitle = 3', "Expected title to be a text, got 3"),
+        ("seeds = 2", "seeds = [0, 0.5]", "Expected a seed to be a whole number"),
+        ('label = "without caches"', "label = 3", "Expected the label of a policy to be a non-empty text"),
+        ("horizon_s = 400.0", "horizon_s = 'x'", "horizon_s to be a"),
+        ("seeds = 2", "interval_s = []", "interval_s to be a"),
+        ('scenario = "', 'scenario = 5 # "', "Unknown scenario 5"),
     ],
 )  # fmt: skip
 def test_what_a_file_may_not_say(written, old, new, message):
