@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
+from swarm_forage_env._internal.archives import BROKEN_ARCHIVE
 from swarm_forage_env._internal.fields import ConfigError, table
 from swarm_forage_env._internal.files import parse_json
 from swarm_forage_env._internal.wording import install_command
@@ -30,7 +31,7 @@ from swarm_forage_env.policies.interface import (
     interface_from_mapping,
 )
 from swarm_forage_env.policies.learned import LearnedPolicy, Remember
-from swarm_forage_env.policies.network import BROKEN_ARCHIVE, Network, NetworkPolicy
+from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.scenarios.config import CACHE_KINDS
 
 MODEL_NOTE = "swarm_forage_note"

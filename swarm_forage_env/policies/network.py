@@ -5,13 +5,8 @@ of `NetworkAbout`. Nothing in it is executed, so it is safe to open a file from 
 """
 
 import dataclasses
-import io
 import itertools
 import json
-import math
-import tokenize
-import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,6 +15,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
+from swarm_forage_env._internal.archives import ArchiveError, open_arrays, read_array
 from swarm_forage_env._internal.fields import ConfigError, known_keys, one_of, switch, table
 from swarm_forage_env._internal.files import parse_json, replacing
 from swarm_forage_env.contract.kernel_policy import KernelPolicy
@@ -32,12 +28,6 @@ from swarm_forage_env.policies.learned import InterfacePolicy
 from swarm_forage_env.scenarios.config import CACHE_KINDS
 
 ACTIVATIONS = ("tanh", "relu")
-_ARCHIVE = b"PK\x03\x04"
-"""First bytes of a zip file, which an `.npz` is."""
-BROKEN_ARCHIVE = (LookupError, TypeError, EOFError, OSError, RuntimeError, zipfile.BadZipFile, zlib.error)
-"""Errors that zipfile raises for a file that is damaged or not an archive, besides ValueError."""
-_BROKEN = (*BROKEN_ARCHIVE, ValueError, tokenize.TokenError, SyntaxError, OverflowError)
-"""The same, and those of numpy over the header of an array."""
 _MOST_BYTES = 2**28
 """Bytes that a network may have, in the file and unpacked; our choice: a network of ours has a thousandth of it."""
 _LAYER_PARTS = ("weight", "bias")
@@ -191,55 +181,13 @@ class Network:
             NetworkError: it does not hold a network.
         """
         try:
-            stored = _parts(_content(Path(path)))
+            stored = open_arrays(Path(path), _MOST_BYTES)
             n_layers = sum(name.startswith("weight_") for name in stored.namelist())
-            weights = tuple(_part(stored, f"weight_{k}") for k in range(n_layers))
-            biases = tuple(_part(stored, f"bias_{k}") for k in range(n_layers))
-            return cls(weights, biases, NetworkAbout.from_json(str(_part(stored, "about"))))
-        except NetworkError as error:
+            weights = tuple(read_array(stored, f"weight_{k}") for k in range(n_layers))
+            biases = tuple(read_array(stored, f"bias_{k}") for k in range(n_layers))
+            return cls(weights, biases, NetworkAbout.from_json(str(read_array(stored, "about"))))
+        except (ArchiveError, NetworkError) as error:
             raise NetworkError(f"Expected {path} to hold a network: {error}") from error
-
-
-def _content(path: Path) -> bytes:
-    size = path.stat().st_size
-    if size > _MOST_BYTES:
-        raise NetworkError(f"The file has {size:,} bytes; a network may have {_MOST_BYTES:,}.")
-    return path.read_bytes()
-
-
-def _parts(content: bytes) -> zipfile.ZipFile:
-    """Return the archive, its parts not read yet; `_part` reads one. Both raise NetworkError only."""
-    if not content:
-        raise NetworkError("The file is empty.")
-    if not content.startswith(_ARCHIVE):
-        raise NetworkError("The file is not an .npz archive.")
-    try:
-        archive = zipfile.ZipFile(io.BytesIO(content))
-    except _BROKEN as error:
-        raise NetworkError("The file is a damaged .npz archive; its table of contents cannot be read.") from error
-    size = sum(part.file_size for part in archive.infolist())
-    if size > _MOST_BYTES:
-        raise NetworkError(f"The archive has {size:,} bytes unpacked; a network may have {_MOST_BYTES:,}.")
-    return archive
-
-
-def _part(stored: zipfile.ZipFile, name: str) -> np.ndarray:
-    """Return an array; its header must agree with its bytes before memory is taken for it."""
-    try:
-        about = stored.getinfo(f"{name}.npy")
-    except KeyError as error:
-        raise NetworkError(f"The archive has no part {name!r}; it is damaged, or holds something else.") from error
-    try:
-        with stored.open(about) as file:
-            version = np.lib.format.read_magic(file)
-            readers = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
-            shape, _, dtype = readers[version](file)
-            content = file.read(about.file_size)
-        if dtype.hasobject or math.prod(shape) * dtype.itemsize != len(content):
-            raise ValueError("the header tells of another array than the bytes that follow")
-        return np.load(io.BytesIO(stored.read(about)), allow_pickle=False)
-    except _BROKEN as error:
-        raise NetworkError(f"Its part {name!r} is damaged, or not a plain array of numbers or text.") from error
 
 
 def _array(tensor: Any) -> np.ndarray:

@@ -66,7 +66,7 @@ def test_the_reference_of_a_place_differs_on_the_last_axis_only():
         ("looks", "x", "Expected looks to be a list"),
         ("readings", None, "Expected readings to be a list"),
         ("policies", [1], r"Expected policies\[0\] to be a table"),
-        ("policies", [{"label": 3, "policy": "crw", "parameters": {}, "caches": None}], r"policies\[0\].label to be a text"),
+        ("policies", [{"label": 3, "policy": "crw", "parameters": {}}], r"policies\[0\].label to be a text"),
         ("policies", [{"label": "a", "policy": "crw", "parameters": [1], "caches": None}], "parameters to be a table"),
         ("axes", {}, "Expected axes to be a list"),
         ("axes", [{"name": "noise", "values": 3}], r"Expected axes\[0\].values to be a list"),

@@ -1,8 +1,10 @@
 """Trajectories as files: they hold what the environment gave, and are there whole or not at all."""
 
 import json
+import shutil
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -228,14 +230,122 @@ def test_a_disk_without_room_is_told_before_anything_is_run(tmp_path, monkeypatc
     assert not (tmp_path / "new").exists()
 
 
-def test_arrays_of_other_lengths_are_named(tmp_path):
-    record_dataset(plan(), tmp_path)
-    chunk = chunk_file(tmp_path, 3, 0)
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """Two runs of a scripted policy, of several chunks each."""
+    folder = tmp_path_factory.mktemp("recorded")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(recording, "CHUNK_BYTES", 60_000)
+        record_dataset(plan(seeds=(3, 4)), folder)
+    return folder
+
+
+@pytest.fixture
+def copied(recorded, tmp_path):
+    return Path(shutil.copytree(recorded, tmp_path / "copied"))
+
+
+def changed_chunk(folder, change):
+    chunk = chunk_file(folder, 3, 0)
     with np.load(chunk) as arrays:
         values = dict(arrays)
-    np.savez(chunk, **values | {"active": values["active"][:-1]})
-    with pytest.raises(DatasetError, match=r"Expected active of \(decisions, robots\)"):
+    change(values)
+    np.savez(chunk, **values)
+
+
+def set_array(name, change):
+    return lambda arrays: arrays.update({name: change(arrays[name])})
+
+
+def with_nan(array):
+    array[2, 1] = np.nan
+    return array
+
+
+@pytest.mark.parametrize("has_digests", [True, False])
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (set_array("active", lambda a: a[:-1]), r"Expected active to be an array \(\d+, 4\) of bool"),
+        (set_array("observations", lambda a: a[:, :3]), "Expected observations to be an array"),
+        (set_array("observations", lambda a: a[..., 1:]), "Expected observations to be an array"),
+        (set_array("observations", with_nan), "Expected observations to hold finite numbers"),
+        (set_array("observations", lambda a: a.astype(np.float64)), "of float32, got .* of float64"),
+        (set_array("observations", lambda a: a.astype(">f4")), "Expected observations to be an array"),
+        (set_array("rewards", lambda a: a.astype(str)), "Expected rewards to be an array"),
+        (set_array("rewards", lambda a: a.astype(complex)), "Expected rewards to be an array"),
+        (set_array("actions", with_nan), "Expected actions to hold finite numbers"),
+        (set_array("actions", lambda a: a[..., :2]), "Expected actions to be an array"),
+        (set_array("terminated", lambda a: a.astype(np.int8)), "Expected terminated to be an array"),
+        (lambda arrays: arrays.pop("active"), "has no part 'active'"),
+        (lambda arrays: arrays.update(more=np.zeros(10**7)), "bytes, but at most"),
+    ],
+)
+def test_a_chunk_of_other_arrays_is_refused(copied, change, message, has_digests):
+    changed_chunk(copied, change)
+    if not has_digests:
+        of_version_1(copied)
+    with pytest.raises(DatasetError, match=message) as refused:
+        TrajectoryDataset(copied).steps(3)
+    assert chunk_file(copied, 3, 0).name in str(refused.value)
+
+
+def of_version_1(folder):
+    card = json.loads((folder / "dataset.json").read_text())
+    (folder / "dataset.json").write_text(json.dumps(card | {"schema_version": 1}))
+    for seed in (3, 4):
+        summary = json.loads(summary_file(folder, seed).read_text())
+        del summary["digests"]
+        summary_file(folder, seed).write_text(json.dumps(summary))
+
+
+def test_a_chunk_of_another_run_is_refused(copied):
+    shutil.copyfile(chunk_file(copied, 4, 0), chunk_file(copied, 3, 0))
+    with pytest.raises(DatasetError, match=r"Expected .*seed_000003_0000.npz as it was recorded, got other numbers"):
+        TrajectoryDataset(copied).steps(3)
+    of_version_1(copied)
+    assert len(TrajectoryDataset(copied).steps(3)), "a data set of an earlier day is read without digests"
+
+
+def test_actions_that_nobody_could_choose_are_refused(tmp_path):
+    record_dataset(plan("ppo_warehouse_small"), tmp_path)
+    changed_chunk(tmp_path, set_array("actions", lambda a: a + 4))
+    with pytest.raises(DatasetError, match="Expected actions from 0 to 5 in"):
         TrajectoryDataset(tmp_path).steps(3)
+
+
+@pytest.mark.parametrize(
+    ("file", "change", "message"),
+    [
+        ("dataset.json", {"seeds": 3}, "Expected seeds to be a list"),
+        ("dataset.json", {"seeds": [3, 3]}, "Expected different seeds"),
+        ("dataset.json", {"seeds": ["x"]}, r"Expected seeds\[0\] to be a whole number"),
+        ("dataset.json", {"columns": None}, "Expected columns to be a list"),
+        ("dataset.json", {"n_actions": "x"}, "Expected n_actions to be a whole number >= 1"),
+        ("dataset.json", {"parts": [1]}, "Expected parts to be a table"),
+        ("dataset.json", {"versions": {"a": 1}}, "Expected versions.a to be a text"),
+        ("dataset.json", {"interface": 5}, "Expected interface to be a table"),
+        ("dataset.json", {"interface": {"decision_ticks": 0}}, "decision_ticks"),
+        ("dataset.json", {"run": {}}, "Missing key 'scenario'"),
+        ("dataset.json", {"run": 5}, "Expected run to be a table"),
+        ("dataset.json", {"schema_version": None}, "Expected schema_version to be a whole number"),
+        ("seed_000003.json", {"seed": 4}, "to be of seed 3, got seed 4"),
+        ("seed_000003.json", {"chunks": []}, "Expected chunks to have at least 1"),
+        ("seed_000003.json", {"chunks": [0]}, r"Expected chunks\[0\] to be a whole number >= 1"),
+        ("seed_000003.json", {"chunks": [10**9]}, "Expected at most 100 decisions in the chunks"),
+        ("seed_000003.json", {"chunks": "x"}, "Expected chunks to be a list"),
+        ("seed_000003.json", {"digests": []}, "Expected a digest for each chunk"),
+        ("seed_000003.json", {"truncated": 1}, "Expected truncated to be True or False"),
+        ("seed_000003.json", {"collected": -1}, "Expected collected to be a whole number >= 0"),
+        ("seed_000003.json", {"colour": 1}, "Unknown key 'colour'"),
+    ],
+)
+def test_cards_and_summaries_from_strangers_are_refused_by_the_name_of_the_field(copied, file, change, message):
+    content = json.loads((copied / file).read_text())
+    (copied / file).write_text(json.dumps(content | change))
+    with pytest.raises(DatasetError, match=message) as refused:
+        TrajectoryDataset(copied)
+    assert file in str(refused.value)
 
 
 def test_damaged_files_are_named(tmp_path):

@@ -43,14 +43,6 @@ def shapes(scenario: ScenarioConfig, frames: int, remembered_frames: int) -> dic
     }
 
 
-def check_shape(name: str, given: tuple[int, ...], wanted: Shape) -> None:
-    """Refuse an array that is of another shape than the specification of its run says; raises ConfigError."""
-    fits = len(given) == len(wanted) and all(k is None or k == n for k, n in zip(wanted, given, strict=True))
-    if not fits:
-        lengths = ", ".join("any" if length is None else str(length) for length in wanted)
-        raise ConfigError(f"Expected {name} of shape ({lengths}), as its run has it, got {given}.")
-
-
 def check_numbers(replay: Replay) -> None:
     """Refuse numbers that point to frames, robots, objects or words that the run does not have.
 

@@ -16,11 +16,11 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, known_keys, one_of
 from swarm_forage_env._internal.files import replacing
-from swarm_forage_env._internal.typed import Count, Name, Within, typed
+from swarm_forage_env._internal.typed import Count, Name, Within, check_kind, typed
 from swarm_forage_env._internal.wording import shown
 from swarm_forage_env.contract.codes import Counter, Task
-from swarm_forage_env.inspect.replay.checking import MOST_BYTES, check_numbers, check_shape, n_frames, shapes
-from swarm_forage_env.inspect.replay.coding import pack, unpack
+from swarm_forage_env.inspect.replay.checking import MOST_BYTES, check_numbers, n_frames, shapes
+from swarm_forage_env.inspect.replay.coding import DTYPES, pack, unpack
 from swarm_forage_env.inspect.replay.frames import Replay, ReplayError
 from swarm_forage_env.rendering.pages import PageError, build_replay_page, take_replay_page_apart
 from swarm_forage_env.runs.spec import RunSpec
@@ -305,8 +305,9 @@ def _check_places(run: _Run, scenario: ScenarioConfig) -> None:
             raise ReplayError(f"Expected one array {name}, got {names.count(name)}.")
     known_keys(dict.fromkeys(names), (*wanted, *of_signals), "array")
     for place in run.arrays:
-        one_of(f"the type of {place.name}", place.dtype, (_ARRAYS.get(place.name, "f4"),))
-        check_shape(place.name, place.shape, (wanted | of_signals)[place.name])
+        one_of(f"the type of {place.name}", place.dtype, DTYPES)
+        dtype = _ARRAYS.get(place.name, "f4")
+        check_kind(place.name, place.dtype, place.shape, dtype, (wanted | of_signals)[place.name])
 
 
 def _replay_of(run: _Run, spec: RunSpec, block: bytes) -> Replay:

@@ -14,21 +14,32 @@ row, and the first row of the next chunk.
     terminated    (n, N) bool, robots that died in this decision
     truncated     (n, N) bool, robots that could have gone on when the run ended
     active        (n + 1, N) bool, robots at work when the observation was made; others do not act
+
+Types are exact, and numbers are finite. The summary has a digest of each chunk, by which one of another run is noticed.
 """
 
+import hashlib
 import json
+import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from swarm_forage_env._internal.fields import ConfigError, known_keys, table
-from swarm_forage_env._internal.files import parse_json, replacing
-from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping
+import numpy as np
+
+from swarm_forage_env._internal.fields import ConfigError, table
+from swarm_forage_env._internal.files import read_json, replacing
+from swarm_forage_env._internal.typed import Count, Within, typed
+from swarm_forage_env._internal.wording import shown
+from swarm_forage_env.contract.policy import COMMANDS
+from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.runs.spec import RunSpec
 
-SCHEMA_VERSION = 1
-"""Version of the folder; raised whenever an array or a field changes its name, type or meaning."""
+SCHEMA_VERSION = 2
+"""Version of the folder; raised whenever an array or a field is new, or changes its name, type or meaning."""
+READ_VERSIONS = (1, 2)
+"""Versions that are read; 1 is without digests of chunks."""
 CARD_FILE = "dataset.json"
 ARRAYS = ("observations", "actions", "rewards", "terminated", "truncated", "active")
 
@@ -46,13 +57,13 @@ class Card:
     interface: InterfaceConfig
     """What is seen, and which actions were taken how often. Without a learned policy, actions are the commands
     (left wheel, right wheel, gripper) of every tick."""
-    seeds: tuple[int, ...]
+    seeds: Annotated[tuple[Count, ...], Within(at_least=1)]
     """Seeds that were asked for."""
-    columns: tuple[str, ...]
+    columns: Annotated[tuple[str, ...], Within(at_least=1)]
     """Name of the slice that each column of an observation belongs to, d entries."""
-    n_actions: int | None
+    n_actions: Annotated[int, Within(at_least=1)] | None
     """Number of discrete actions, None for continuous ones."""
-    parts: Mapping[str, int]
+    parts: Mapping[str, Count]
     """Of a mixed swarm, its parts and how many robots each has, in the order of the rows."""
     versions: Mapping[str, str]
     """Software that made it."""
@@ -62,6 +73,24 @@ class Card:
     def spec(self) -> RunSpec:
         """Specification of the first run."""
         return RunSpec.from_mapping(self.run)
+
+    def __post_init__(self) -> None:
+        if len(set(self.seeds)) < len(self.seeds):
+            raise ConfigError("Expected different seeds, got one twice.")
+
+    @property
+    def action_shape(self) -> tuple[int, ...]:
+        """Shape of one action of all robots, (N,) or (N, k)."""
+        n_robots, config = self.spec.scenario.robots.n_robots, self.interface
+        if self.n_actions is not None:
+            return (n_robots,)
+        driven = COMMANDS - 1 if config.automatic_gripper else COMMANDS
+        return (n_robots, driven + (config.message_size or 0))
+
+    @property
+    def n_decisions(self) -> int:
+        """Decisions of a run that nothing ends early."""
+        return math.ceil(self.spec.scenario.horizon_ticks / self.interface.decision_ticks)
 
     def write(self, folder: Path) -> None:
         """Write the card, whole or not at all."""
@@ -74,52 +103,64 @@ class Card:
         Raises:
             DatasetError: there is none, or it is damaged or of another version.
         """
-        values = _read_json(folder / CARD_FILE)
-        if values.get("schema_version") != SCHEMA_VERSION:
+        file = folder / CARD_FILE
+        values = read_json(file, DatasetError)
+        version = values.get("schema_version") if isinstance(values, dict) else None
+        if version is not None and version not in READ_VERSIONS:
             raise DatasetError(
-                f"Expected a data set of schema version {SCHEMA_VERSION} in {folder}, got "
-                f"{values.get('schema_version')!r}; read it with the version that wrote it."
+                f"Expected a data set of schema version {' or '.join(map(str, READ_VERSIONS))} in {folder}, got "
+                f"{shown(version)}; read it with the version that wrote it."
             )
         try:
-            known_keys(values, [item.name for item in fields(cls)], "key of a card")
-            values["interface"] = interface_from_mapping(table("interface", values["interface"]))
-            values["seeds"], values["columns"] = tuple(values["seeds"]), tuple(values["columns"])
-            return cls(**values)
-        except (ConfigError, LookupError, TypeError) as error:
-            raise DatasetError(f"Cannot use {folder / CARD_FILE}: {error}") from error
+            card: Card = typed(cls, {**table("a card", values), "schema_version": version}, "")
+            _ = card.spec  # refuses what describes no run
+        except ConfigError as error:
+            raise DatasetError(f"Cannot use {file}: {error}") from error
+        return card
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class RunSummary:
     """A run of a data set, of which all chunks are there."""
 
-    seed: int
-    chunks: tuple[int, ...]
+    seed: Count
+    chunks: Annotated[tuple[Annotated[int, Within(at_least=1)], ...], Within(at_least=1)]
     """Decisions in each chunk."""
     truncated: bool
     """Whether the horizon was reached; if not, all robots died before."""
-    collected: int
+    collected: Count
     """Objects delivered."""
-    first_picked: int
+    first_picked: Count
     """Objects picked up for the first time."""
+    digests: tuple[str, ...] = ()
+    """Of each chunk, see `chunk_digest`; none in data sets of version 1."""
 
     def write(self, folder: Path) -> None:
         """Write the summary, whole or not at all."""
         _write_json(summary_file(folder, self.seed), asdict(self))
 
     @classmethod
-    def read(cls, folder: Path, seed: int) -> "RunSummary":
+    def read(cls, folder: Path, seed: int, card: Card) -> "RunSummary":
         """Read the summary of a run.
 
         Raises:
-            DatasetError: there is none, or it is damaged.
+            DatasetError: there is none, or it is damaged, or of another run than the card tells of.
         """
         file = summary_file(folder, seed)
-        values = _read_json(file)
+        content = read_json(file, DatasetError)
         try:
-            return cls(**{**values, "chunks": tuple(values["chunks"])})
-        except (LookupError, TypeError) as error:
+            summary: RunSummary = typed(cls, content, "")
+        except ConfigError as error:
             raise DatasetError(f"Cannot use {file}: {error}") from error
+        if summary.seed != seed:
+            raise DatasetError(f"Expected {file} to be of seed {seed}, got seed {summary.seed}.")
+        if sum(summary.chunks) > card.n_decisions:
+            raise DatasetError(
+                f"Expected at most {card.n_decisions:,} decisions in the chunks of {file}, got {sum(summary.chunks):,}."
+            )
+        if len(summary.digests) != (0 if card.schema_version == 1 else len(summary.chunks)):
+            raise DatasetError(f"Expected a digest for each chunk in {file}, got {len(summary.digests)}.")
+        return summary
 
 
 def summary_file(folder: Path, seed: int) -> Path:
@@ -137,13 +178,11 @@ def _write_json(file: Path, values: Mapping[str, Any]) -> None:
         draft.write_text(json.dumps(values, indent=1, sort_keys=True), encoding="utf-8")
 
 
-def _read_json(file: Path) -> dict[str, Any]:
-    try:
-        values = parse_json(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise DatasetError(f"Cannot read {file}: {error.strerror or error}.") from error
-    except ValueError as error:
-        raise DatasetError(f"Cannot use {file}: {error}") from error
-    if not isinstance(values, dict):
-        raise DatasetError(f"Expected {file} to hold a JSON object, got {type(values).__name__}.")
-    return values
+def chunk_digest(arrays: Mapping[str, np.ndarray]) -> str:
+    """Return a hash of all that a chunk holds: names, types, shapes and numbers of `ARRAYS`."""
+    state = hashlib.blake2b(digest_size=16)
+    for name in ARRAYS:
+        array = arrays[name]
+        state.update(f"{name} {array.dtype.str} {array.shape} ".encode())
+        state.update(np.ascontiguousarray(array).data)
+    return state.hexdigest()

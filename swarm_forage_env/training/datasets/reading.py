@@ -1,18 +1,27 @@
 """Reading a data set back: runs as the environment gave them, episodes of single robots, and transitions."""
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from swarm_forage_env._internal.archives import ArchiveError, Kind, open_arrays, read_array
 from swarm_forage_env.contract.types import BoolArray, ObsArray
-from swarm_forage_env.policies.network import BROKEN_ARCHIVE
-from swarm_forage_env.training.datasets.layout import ARRAYS, Card, DatasetError, RunSummary, chunk_file, summary_file
+from swarm_forage_env.training.datasets.layout import (
+    ARRAYS,
+    Card,
+    DatasetError,
+    RunSummary,
+    chunk_digest,
+    chunk_file,
+    summary_file,
+)
 
-_BROKEN = (*BROKEN_ARCHIVE, ValueError)
-"""Errors of numpy and zipfile over a file that is missing, damaged or something else."""
+_HEADERS_BYTES = 1 << 16
+"""What names, headers and the table of contents of a chunk take at most."""
 _LONGER_BY_ONE = ("observations", "active")
 """Arrays that also have what follows the last decision."""
 
@@ -85,7 +94,7 @@ class TrajectoryDataset:
         self.folder = Path(folder)
         self.card = Card.read(self.folder)
         whole = [seed for seed in self.card.seeds if summary_file(self.folder, seed).exists()]
-        self.runs = tuple(RunSummary.read(self.folder, seed) for seed in whole)
+        self.runs = tuple(RunSummary.read(self.folder, seed, self.card) for seed in whole)
 
     @property
     def is_complete(self) -> bool:
@@ -98,16 +107,18 @@ class TrajectoryDataset:
             yield from self._chunks_of(run)
 
     def _chunks_of(self, run: RunSummary) -> Iterator[Steps]:
-        n_robots = self.card.spec.scenario.robots.n_robots
         for number, n_decisions in enumerate(run.chunks):
             file = chunk_file(self.folder, run.seed, number)
-            steps = _read(file, run.seed)
-            for name in ARRAYS:
-                expected = n_decisions + (name in _LONGER_BY_ONE), n_robots
-                shape = getattr(steps, name).shape
-                if shape[:2] != expected:
-                    raise DatasetError(f"Expected {name} of (decisions, robots) = {expected} in {file}, got {shape}.")
-            yield steps
+            arrays = _read(file, _kinds(self.card, n_decisions))
+            if self.card.n_actions is not None and not _are_below(arrays["actions"], self.card.n_actions):
+                raise DatasetError(f"Expected actions from 0 to {self.card.n_actions - 1} in {file}, got others.")
+            if run.digests and chunk_digest(arrays) != run.digests[number]:
+                raise DatasetError(
+                    f"Expected {file} as it was recorded, got other numbers: its digest does not fit. Remove "
+                    f"{summary_file(self.folder, run.seed).name}, and the command records the run again."
+                )
+            fields: dict[str, Any] = arrays
+            yield Steps(seed=run.seed, **fields)
 
     def steps(self, seed: int) -> Steps:
         """Return a whole run.
@@ -150,9 +161,30 @@ class TrajectoryDataset:
         return Transitions(**{name: np.concatenate(parts) for name, parts in found.items()})
 
 
-def _read(file: Path, seed: int) -> Steps:
+def _kinds(card: Card, n_decisions: int) -> dict[str, Kind]:
+    """Return type and shape of each array of a chunk."""
+    n_robots = card.spec.scenario.robots.n_robots
+    each, longer = (n_decisions, n_robots), (n_decisions + 1, n_robots)
+    return {
+        "observations": (np.float32, (*longer, len(card.columns))),
+        "actions": (np.float32 if card.n_actions is None else np.int64, (n_decisions, *card.action_shape)),
+        "rewards": (np.float64, each),
+        "terminated": (np.bool_, each),
+        "truncated": (np.bool_, each),
+        "active": (np.bool_, longer),
+    }
+
+
+def _are_below(actions: np.ndarray, n_actions: int) -> bool:
+    return bool((actions >= 0).all() and (actions < n_actions).all())
+
+
+def _read(file: Path, kinds: Mapping[str, Kind]) -> dict[str, np.ndarray]:
+    most = sum(math.prod(length or 0 for length in shape) * np.dtype(dtype).itemsize for dtype, shape in kinds.values())
     try:
-        with np.load(file, allow_pickle=False) as arrays:
-            return Steps(seed=seed, **{name: arrays[name] for name in ARRAYS})
-    except _BROKEN as error:
-        raise DatasetError(f"Cannot read {file}: it is missing or damaged ({' '.join(str(error).split())}).") from error
+        stored = open_arrays(file, most + most // 100 + _HEADERS_BYTES)  # what cannot be compressed becomes longer
+        return {name: read_array(stored, name, kind) for name, kind in kinds.items()}
+    except OSError as error:
+        raise DatasetError(f"Cannot read {file}: {error.strerror or error}.") from error
+    except ArchiveError as error:
+        raise DatasetError(f"Cannot read {file}: {error}") from error

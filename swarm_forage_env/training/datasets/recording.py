@@ -17,7 +17,7 @@ from swarm_forage_env._internal.files import alone_in, check_folder, replacing
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.contract.codes import Counter
-from swarm_forage_env.contract.policy import COMMANDS, Policy, SwarmSpec
+from swarm_forage_env.contract.policy import Policy, SwarmSpec
 from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.policies.learned import InterfacePolicy
@@ -34,6 +34,7 @@ from swarm_forage_env.training.datasets.layout import (
     Card,
     DatasetError,
     RunSummary,
+    chunk_digest,
     chunk_file,
     summary_file,
 )
@@ -55,37 +56,23 @@ class DatasetPlan:
     """Whether chunks are compressed: slower, several times smaller."""
 
     @property
-    def n_decisions(self) -> int:
-        """Decisions of a run that nothing ends early."""
-        return math.ceil(self.spec.scenario.horizon_ticks / self.card.interface.decision_ticks)
-
-    @property
     def chunk_decisions(self) -> int:
         """Decisions in a chunk, the last one of a run aside."""
-        return max(1, min(self.n_decisions, CHUNK_BYTES // self._decision_bytes))
+        return max(1, min(self.card.n_decisions, CHUNK_BYTES // self._decision_bytes))
 
     @property
     def _decision_bytes(self) -> int:
         """Bytes of one decision of all robots: observation, action, reward and three truth values."""
-        action = 8 if self.card.n_actions is not None else 4 * self.action_shape[-1]
+        action = 8 if self.card.n_actions is not None else 4 * self.card.action_shape[-1]
         return self.spec.scenario.robots.n_robots * (4 * len(self.card.columns) + action + 8 + 3)
-
-    @property
-    def action_shape(self) -> tuple[int, ...]:
-        """Shape of one action of all robots, (N,) or (N, k)."""
-        n_robots, config = self.spec.scenario.robots.n_robots, self.card.interface
-        if self.card.n_actions is not None:
-            return (n_robots,)
-        driven = COMMANDS - 1 if config.automatic_gripper else COMMANDS
-        return (n_robots, driven + (config.message_size or 0))
 
     @property
     def run_bytes(self) -> int:
         """Bytes of one run; if it is compressed or ends early, fewer."""
-        n_chunks = math.ceil(self.n_decisions / self.chunk_decisions)
+        n_chunks = math.ceil(self.card.n_decisions / self.chunk_decisions)
         n_robots = self.spec.scenario.robots.n_robots
         last_rows = n_chunks * n_robots * (4 * len(self.card.columns) + 1)
-        return self.n_decisions * self._decision_bytes + last_rows + n_chunks * _HEADERS_BYTES
+        return self.card.n_decisions * self._decision_bytes + last_rows + n_chunks * _HEADERS_BYTES
 
     def missing(self, folder: Path) -> tuple[int, ...]:
         """Return the seeds whose runs are not yet whole in a folder."""
@@ -95,10 +82,10 @@ class DatasetPlan:
         """Return what is to be recorded, and how much room it takes in a folder."""
         scenario, config, n_todo = self.spec.scenario, self.card.interface, len(self.missing(folder))
         actions = f"{self.card.n_actions} discrete actions"
-        if len(self.action_shape) == 2:
-            actions = f"commands of {'two' if self.action_shape[-1] == 2 else 'three'} numbers"
+        if len(self.card.action_shape) == 2:
+            actions = f"commands of {'two' if self.card.action_shape[-1] == 2 else 'three'} numbers"
         room = f"{'at most' if self.compress else 'about'} {n_todo * self.run_bytes / 1e6:,.1f} MB"
-        each = counted(self.n_decisions, "decision") + f" of {counted(scenario.robots.n_robots, 'robot')}"
+        each = counted(self.card.n_decisions, "decision") + f" of {counted(scenario.robots.n_robots, 'robot')}"
         return Sheet(
             rows=[
                 ("policy", f"{policy_label(self.spec.policy)} in {self.spec.world.title()}, {scenario.horizon_s:g} s"),
@@ -224,11 +211,11 @@ def record_dataset(
         OSError: the folder cannot be written to, or has no room; then nothing has been run.
     """
     folder = Path(folder)
-    _card_of_folder(plan.card, folder)  # refuses another data set
+    card = _card_of_folder(plan.card, folder)  # refuses another data set
     _check_room(folder, len(plan.missing(folder)) * plan.run_bytes)
     with alone_in(folder, DatasetError):
         _record_runs(plan, folder, jobs, progress)
-    return tuple(RunSummary.read(folder, seed) for seed in plan.card.seeds)
+    return tuple(RunSummary.read(folder, seed, card) for seed in plan.card.seeds)
 
 
 def _record_runs(
@@ -238,7 +225,7 @@ def _record_runs(
     for draft in folder.glob(".*.tmp"):  # of a process that was killed
         draft.unlink(missing_ok=True)
     todo = [replace(plan.spec, seed=seed) for seed in plan.missing(folder)]
-    in_all, robot_ticks = len(todo) * plan.n_decisions, sum(spec.robot_ticks for spec in todo)
+    in_all, robot_ticks = len(todo) * plan.card.n_decisions, sum(spec.robot_ticks for spec in todo)
 
     def tell(done: float) -> None:
         if progress is not None:
@@ -249,7 +236,7 @@ def _record_runs(
 
 
 def _keep_run(plan: DatasetPlan, folder: Path, spec: RunSpec, tell: Tell | None) -> None:
-    _record_run(plan, spec.seed, folder, lambda done: tell and tell(done, plan.n_decisions)).write(folder)
+    _record_run(plan, spec.seed, folder, lambda done: tell and tell(done, plan.card.n_decisions)).write(folder)
 
 
 def _card_of_folder(card: Card, folder: Path) -> Card:
@@ -294,7 +281,7 @@ class _Chunk:
         n_robots, size = plan.spec.scenario.robots.n_robots, plan.chunk_decisions
         is_discrete = plan.card.n_actions is not None
         self.observations = np.empty((size + 1, n_robots, len(plan.card.columns)), np.float32)
-        self.actions = np.empty((size, *plan.action_shape), np.int64 if is_discrete else np.float32)
+        self.actions = np.empty((size, *plan.card.action_shape), np.int64 if is_discrete else np.float32)
         self.rewards = np.zeros((size, n_robots))
         self.terminated = np.zeros((size, n_robots), np.bool_)
         self.truncated = np.zeros((size, n_robots), np.bool_)
@@ -305,8 +292,8 @@ class _Chunk:
     def is_full(self) -> bool:
         return self.length == len(self.rewards)
 
-    def write(self, file: Path, *, compress: bool) -> None:
-        """Write what is there and go on with the last observation as the first."""
+    def write(self, file: Path, *, compress: bool) -> str:
+        """Write what is there and go on with the last observation as the first; returns the digest."""
         n = self.length
         arrays: dict[str, Any] = {
             name: getattr(self, name)[:n] for name in ("actions", "rewards", "terminated", "truncated")
@@ -314,10 +301,12 @@ class _Chunk:
         arrays |= {name: getattr(self, name)[: n + 1] for name in ("observations", "active")}
         with replacing(file, ending=".tmp") as draft, draft.open("wb") as opened:
             (np.savez_compressed if compress else np.savez)(opened, **arrays)
+        digest = chunk_digest(arrays)
         self.observations[0], self.active[0] = self.observations[n], self.active[n]
         self.rewards[:] = 0.0
         self.terminated[:] = self.truncated[:] = False
         self.length = 0
+        return digest
 
 
 def _record_run(plan: DatasetPlan, seed: int, folder: Path, tell: Callable[[int], object]) -> RunSummary:
@@ -330,7 +319,7 @@ def _record_run(plan: DatasetPlan, seed: int, folder: Path, tell: Callable[[int]
     interface, chunk = LearnerInterface(config, world.swarm_spec), _Chunk(plan)
     interface.observe(obs, chunk.observations[0])
     chunk.active[0] = world.active
-    lengths: list[int] = []
+    lengths, digests = list[int](), list[str]()
     gone, over = np.zeros(len(world.active), np.bool_), False
     while not over:
         row, truncated, dead = chunk.length, False, gone
@@ -354,7 +343,7 @@ def _record_run(plan: DatasetPlan, seed: int, folder: Path, tell: Callable[[int]
         chunk.length += 1
         if chunk.is_full or over:
             lengths.append(chunk.length)
-            chunk.write(chunk_file(folder, seed, len(lengths) - 1), compress=plan.compress)
+            digests.append(chunk.write(chunk_file(folder, seed, len(lengths) - 1), compress=plan.compress))
             tell(sum(lengths))
     env.close()
     counters = world.events.counters
@@ -364,6 +353,7 @@ def _record_run(plan: DatasetPlan, seed: int, folder: Path, tell: Callable[[int]
         chunks=tuple(lengths),
         collected=int(counters[Counter.COLLECTED]),
         first_picked=int(counters[Counter.FIRST_PICKED]),
+        digests=tuple(digests),
     )
 
 
