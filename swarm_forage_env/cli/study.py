@@ -236,13 +236,9 @@ def unpack(
 
 def _pack(folder: Path, chosen: Path | None) -> Path:
     from swarm_forage_env.studies.study_folder import StudyFolder
-    from swarm_forage_env.studies.study_table import gather_study
+    from swarm_forage_env.studies.study_table import pack_study
 
-    table = gather_study(StudyFolder(folder))
-    file = chosen or folder / f"{table.spec.name}.parquet"
-    file.parent.mkdir(parents=True, exist_ok=True)
-    table.write(file)
-    return file
+    return pack_study(StudyFolder(folder), chosen)
 
 
 def _chosen(name: str, budget: str | None, seeds: int | None, rules: str) -> "StudySpec":

@@ -3,13 +3,15 @@
     <folder>/<run_id>.parquet         a RunRecord
     <folder>/failures/<run_id>.json   a RunFailure; gone once the run succeeds
 
-Every file appears whole or not at all, and only the driver of a study writes, so a folder can be read at any time.
+Every file appears whole or not at all, so a folder can be read at any time. Several commands may write to one folder:
+runs of one specification have equal results, so it does not matter whose file stays.
 """
 
 import errno
 import json
 import os
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -141,7 +143,8 @@ class RunStore:
     def put_aside(self, run_id: str) -> None:
         """Rename a damaged file, so that nothing is lost by making its run again."""
         path = self.path(run_id)
-        path.replace(path.with_suffix(f"{path.suffix}{DAMAGED}"))
+        with suppress(FileNotFoundError):  # another command has done it
+            path.replace(path.with_suffix(f"{path.suffix}{DAMAGED}"))
 
     def write_failure(self, failure: RunFailure) -> None:
         """Store why a run failed, with the command that runs it again."""

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from swarm_forage_env._internal.fields import ConfigError, whole
-from swarm_forage_env._internal.files import parse_json, replacing
+from swarm_forage_env._internal.files import alone_in, parse_json, replacing
 from swarm_forage_env.runs.record import RecordError
 from swarm_forage_env.runs.runner import Outcomes, longest_first, run_specs
 from swarm_forage_env.runs.spec import RunSpec
@@ -77,26 +77,28 @@ class StudyFolder:
         Raises:
             RecordError: the folder holds another study.
         """
-        kept = spec
-        if self.study_file.exists():
-            there = self.study()
-            kept = replace(
-                spec,
-                seeds=tuple(sorted({*there.seeds, *spec.seeds})),
-                rules=tuple(name for name in RULES_NAMES if name in {*there.rules, *spec.rules}),
-                looks=spec.looks or there.looks,
+        with alone_in(self.folder):  # shards on several machines add their seeds, one after the other
+            kept = self._joined(spec) if self.study_file.exists() else spec
+            with replacing(self.study_file) as draft:
+                draft.write_text(json.dumps(kept.to_mapping(), indent=1), encoding="utf-8")
+        return kept
+
+    def _joined(self, spec: StudySpec) -> StudySpec:
+        there = self.study()
+        kept = replace(
+            spec,
+            seeds=tuple(sorted({*there.seeds, *spec.seeds})),
+            rules=tuple(name for name in RULES_NAMES if name in {*there.rules, *spec.rules}),
+            looks=spec.looks or there.looks,
+        )
+        mine, other = kept.to_mapping(), there.to_mapping()
+        told = ("seeds", "readings", "title", "budget", "file", *(() if there.looks else ("looks",)))
+        differing = [key for key in mine if key not in told and mine[key] != other[key]]
+        if differing:
+            raise RecordError(
+                f"Expected study {there.name} as {self.study_file} has it, got one of other {differing[0]}. Give "
+                f"another folder, or remove {self.study_file.name}: runs that both studies have are kept."
             )
-            mine, other = kept.to_mapping(), there.to_mapping()
-            told = ("seeds", "readings", "title", "budget", "file", *(() if there.looks else ("looks",)))
-            differing = [key for key in mine if key not in told and mine[key] != other[key]]
-            if differing:
-                raise RecordError(
-                    f"Expected study {there.name} as {self.study_file} has it, got one of other {differing[0]}. Give "
-                    f"another folder, or remove {self.study_file.name}: runs that both studies have are kept."
-                )
-        self.folder.mkdir(parents=True, exist_ok=True)
-        with replacing(self.study_file) as draft:
-            draft.write_text(json.dumps(kept.to_mapping(), indent=1), encoding="utf-8")
         return kept
 
     def place_states(self) -> tuple[PlaceState, ...]:

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from swarm_forage_env._internal.files import parse_json, replacing
+from swarm_forage_env._internal.files import alone_in, parse_json, replacing
 from swarm_forage_env.runs.plan import Condition, Plan
 from swarm_forage_env.runs.record import COLUMN_DTYPES, RecordError, RunRecord, record_of
 from swarm_forage_env.runs.spec import RunSpec
@@ -280,6 +280,28 @@ def gather_study(
         versions=tuple(dict(pairs) for pairs in sorted(versions)),
         wall_time_s=None if math.isnan(wall_time_s) else wall_time_s,
     )
+
+
+def pack_study(folder: StudyFolder, chosen: Path | None = None) -> Path:
+    """Put all runs of a study into one file; of several calls at once, the last one to write has read the last runs.
+
+    Args:
+        folder: Of the study.
+        chosen: The file; default NAME.parquet in the folder.
+
+    Returns:
+        The file.
+
+    Raises:
+        RecordError: see `gather_study`.
+        OSError: the file cannot be written.
+    """
+    folder.study()  # a folder without one is refused before anything is made in it
+    with alone_in(folder.store.folder):  # not the folder itself, which shards need in order to begin
+        table = gather_study(folder)
+        file = chosen or folder.folder / f"{table.spec.name}.parquet"
+        table.write(file)
+    return file
 
 
 def unpack_study(table: StudyTable, folder: StudyFolder) -> int:
