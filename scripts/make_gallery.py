@@ -104,7 +104,7 @@ EXHIBITS = (
         "oracle",
         "warehouse_medium",
         ("generalist", "oracle"),
-        "The trained network beside a yardstick that reads the world: each robot knows the nearest object that is left. "
+        "The trained network beside a yardstick that reads the world: each robot knows the nearest object left. "
         "Robots pass each other on the right.",
         frame_s=2.0,
     ),

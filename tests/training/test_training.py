@@ -1,4 +1,5 @@
 """Training by stable-baselines3: reproducible, resumable, compared with a baseline, exported without loss."""
+# long file: trainings are slow to make, and these tests share them
 
 import contextlib
 import csv
