@@ -74,12 +74,12 @@ def printable(text: str) -> str:
 
 
 def plain_markdown(text: str) -> str:
-    """Return a text for a page in Markdown, in one line; it makes no link, picture, HTML, code or end of a cell.
+    """Return a text for a page in Markdown, in one line; it makes no link, picture, HTML or end of a cell.
 
-    Emphasis stays. An empty comment in an address keeps GitHub from making a link of it.
+    Emphasis and code stay. An empty comment in an address keeps GitHub from making a link of it.
     """
     words = " ".join(text.split()).replace("\\", r"\\")
-    words = re.sub(r"[\[\]|`]", r"\\\g<0>", words).replace("<", "&lt;")
+    words = re.sub(r"[\[\]|]", r"\\\g<0>", words).replace("<", "&lt;")
     return re.sub(r"://|(?<=www)\.|@", rf"{_NOTHING}\g<0>", words, flags=re.IGNORECASE)
 
 
