@@ -214,12 +214,12 @@ def _told_by_file(policy: str) -> dict[str, Any]:
     return {"digest": file_digest(file), "seed": seed if isinstance(seed, int) else None}
 
 
-def _runs(protocol: Protocol, table: Table) -> dict[str, dict[str, list[list[float]]]]:
+def _runs(protocol: Protocol, table: Table) -> dict[str, dict[str, tuple[tuple[float, ...], ...]]]:
     """World -> performance and interference of all policies and seeds."""
 
-    def of_all(world: str, value: Callable[[RunRecord], float]) -> list[list[float]]:
+    def of_all(world: str, value: Callable[[RunRecord], float]) -> tuple[tuple[float, ...], ...]:
         conditions = [condition for condition in table.plan.conditions if condition.world.name == world]
-        return [[six_digits(value(record)) for record in table.of(condition)] for condition in conditions]
+        return tuple(tuple(six_digits(value(record)) for record in table.of(one)) for one in conditions)
 
     def performance(record: RunRecord) -> float:
         return record.rate_per_1000_s("performance")

@@ -163,7 +163,7 @@ def test_an_altered_entry_is_refused_in_one_line(command, mine):
         (("--policy", "none.npz"), "none.npz"),
         (("--policy", "crw", "--trained-in", "mars"), "got 'mars'"),
         (("--policy", "crw", "--training-seed", "1", "--training-seed", "2"), "got 2 for 1 policies"),
-        (("show", "none.json"), "Cannot read the entry none.json"),
+        (("show", "none.json"), "Cannot read none.json"),
         (("show", "mine.json", "mine.json"), "'mine' twice"),
         (("show", "dpo.json"), "another policy with the name 'dpo'"),
         (("page", "mine.json", "--file", "none.md"), "none.md"),

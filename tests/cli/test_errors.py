@@ -120,5 +120,5 @@ def test_the_guard_is_around_every_command(command, monkeypatch, tmp_path):
 def test_a_missing_word_is_explained_and_our_own_words_have_no_prefix(command):
     code, _, err = command("choose", "crw")
     assert code == 2
-    assert err.startswith("swarm-forage: Missing option '--deliver'. It is: Performance")
+    assert err.startswith("swarm-forage: Missing option '--deliver'. It is: Total performance")
     assert command("saliency")[2].startswith("swarm-forage: Expected a policy")

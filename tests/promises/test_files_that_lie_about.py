@@ -178,7 +178,7 @@ def test_no_file_is_read_because_of_its_name(console, here, marker, words, neede
     assert (ended.returncode, marker.exists()) == (0, False), ended.stderr
     assert ended.stderr.count(".numba_config.yaml") <= 1
     if words[0] == "run":
-        assert (here / "results/warehouse_small/performance.png").exists()
+        assert list(here.glob("results/warehouse_small*/performance.png"))
 
 
 def test_both_guards_are_the_same():

@@ -162,12 +162,12 @@ def test_a_wrong_entry_is_found(tmp_path):
     (tmp_path / "tests").mkdir()
     (tmp_path / "tests/test_other.py").write_text("from tests.reference.motion import free_motion\nfree_motion()\n")
     kernel = "swarm_forage_env.world.kernels.walk.walk"
-    wrong = Twin("sensing.observe", "test_other.py", "baselines.crw.CRWPolicy.act")
+    wrong = Twin("sensing.observe", "test_other.py", "metrics.scaling.scalability")
     assert faults(kernel, wrong, tmp_path) == [
-        f"baselines.crw.CRWPolicy.act does not lead to {kernel}",
+        f"metrics.scaling.scalability does not lead to {kernel}",
         "test_other.py does not import tests.reference.sensing",
         "test_other.py does not call observe",
-        "test_other.py does not call act",
+        "test_other.py does not call scalability",
     ]
     gone = Twin("sensing.gone", "test_gone.py", kernel)
     assert faults(kernel, gone, tmp_path) == ["tests.reference has no sensing.gone", "there is no test_gone.py"]
