@@ -56,9 +56,9 @@ def replacing(path: Path, *, ending: str = ".tmp") -> Generator[Path]:
 def alone_in(folder: Path, refusal: type[ValueError] | None = None) -> Generator[None]:
     """Keep a folder to this process, as long as others ask in the same way.
 
-    It is made if it is missing, and removed if it is still empty at the end. The system forgets the lock when the
-    process ends, however it ends, and nothing of it is in the folder. Where the system or the disk has no such locks
-    (Windows, some network disks), everybody is let in.
+    It is made if it is missing, with the folders around it; what was made is removed if it is still empty at the end.
+    The system forgets the lock when the process ends, however it ends, and nothing of it is in the folder. Where the
+    system or the disk has no such locks (Windows, some network disks), everybody is let in.
 
     Args:
         folder: The folder.
@@ -68,14 +68,14 @@ def alone_in(folder: Path, refusal: type[ValueError] | None = None) -> Generator
         ValueError: `refusal`, see there.
         OSError: the folder cannot be made or opened.
     """
-    is_new = not folder.exists()
+    made = [place for place in (folder, *folder.parents) if not place.exists()]
     opened = _locked(folder, refusal)
     try:
         yield
     finally:
-        if is_new:
-            with suppress(OSError):  # it holds something
-                folder.rmdir()
+        with suppress(OSError):  # one of them holds something
+            for place in made:
+                place.rmdir()
         if opened is not None:
             os.close(opened)
 
