@@ -65,7 +65,7 @@ def test_cleanrl_trains(tmp_path):
 
 def test_the_example_of_stable_baselines3_trains_and_exports(tmp_path):
     require("stable_baselines3", "sb3")
-    page = (ROOT / "docs" / "learning.md").read_text()
+    page = (ROOT / "docs" / "training.md").read_text()
     on_policy, off_policy = [block for block in EXAMPLE.findall(page) if "stable_baselines3" in block]
     (tmp_path / "example.py").write_text(f"{on_policy}\n{off_policy}")
     run(["example.py"], tmp_path)
