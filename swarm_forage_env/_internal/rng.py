@@ -27,6 +27,7 @@ class Stream(IntEnum):
     POPULATION = 8
     MESSAGE_NOISE = 9
     SCENARIO = 12
+    TURN = 13
 
 
 def stream_rng(seed: int, stream: Stream, level: Iterable[float] = ()) -> np.random.Generator:

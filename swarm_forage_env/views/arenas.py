@@ -276,7 +276,7 @@ class ArenaBatch:
         ticks: list[tuple[BoolArray, bool, bool]] = [(_NOBODY, False, False)] * self.n_arenas
         going = list(range(self.n_arenas))
         for _ in range(self.interface.config.decision_ticks):
-            if payer is not None and self.interface.passes_on and actions.shape == self._commands.shape:
+            if payer is not None and self.arenas[0].passes_on and actions.shape == self._commands.shape:
                 np.copyto(self._commands, actions, casting="same_kind")
                 payer.remember(going)
                 gains: dict[int, FloatArray | None] = dict.fromkeys(going)

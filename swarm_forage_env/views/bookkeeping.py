@@ -57,7 +57,7 @@ class Bookkeeping:
         payments = [payment for model in self._models if (payment := model.payment) is not None]
         self.pays = plain and len(payments) == len(environments)
         self._payments = payments[:1], addresses(payments)
-        self.copies = plain and all(arena.interface.shows_all for arena in self._arenas)
+        self.copies = plain and all(arena.shows_all for arena in self._arenas)
         self._held = [hold(Robots(env.swarm, env.terminated, env.last_obs)) for env in environments]
         self._robots = self._held[0], addresses(self._held)
         self._no_obs = np.empty((0, *environments[0].last_obs.shape), np.float32)

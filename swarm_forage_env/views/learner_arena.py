@@ -22,6 +22,7 @@ from swarm_forage_env.policies.kernels.learner import SiteMemory
 from swarm_forage_env.scenarios.config import SECTIONS
 from swarm_forage_env.scenarios.overrides import field_sections
 from swarm_forage_env.views.plans import ArenaPlan
+from swarm_forage_env.views.turns import AS_IT_IS, Turn, turn_of
 from swarm_forage_env.world.snapshots import Snapshot, SnapshotError
 from swarm_forage_env.wrappers.base import SwarmWrapper
 from swarm_forage_env.wrappers.world import World
@@ -47,6 +48,8 @@ class LearnerSnapshot:
     """Agents of a parallel environment that are left."""
     memory: SiteMemory | None = None
     """What robots remember, where the interface lets them."""
+    turn: Turn = AS_IT_IS
+    """How the learner sees the run."""
 
 
 class LearnerArena:
@@ -60,6 +63,7 @@ class LearnerArena:
         env: Environment and wrappers as one stack.
         forage_env: The ForageEnv at its bottom.
         interface: Translates for the learner; its spaces stay the same, but a reset may make a new object.
+        turn: How the learner sees this run, drawn by its seed where the plan says so.
     """
 
     def __init__(self, plan: ArenaPlan, share: float | None = None) -> None:
@@ -77,6 +81,7 @@ class LearnerArena:
         self.n_rows = plan.world.n_robots
         self._overrides: dict[str, Any] = {}
         self._world: World | None = None
+        self.turn = AS_IT_IS
         self._seeds = np.random.default_rng()
         self._adopt(*self._built({}, None))
 
@@ -84,6 +89,16 @@ class LearnerArena:
     def n_robots(self) -> int:
         """Robots of this run, at most as many as there are rows."""
         return self.forage_env.scenario.robots.n_robots
+
+    @property
+    def shows_all(self) -> bool:
+        """Whether the learner sees the rows of the environment as they are."""
+        return self.interface.shows_all and not self._plan.turned
+
+    @property
+    def passes_on(self) -> bool:
+        """Whether actions are commands of the environment as they are."""
+        return self.interface.passes_on and not self._plan.turned
 
     def _built(
         self, overrides: Mapping[str, Any], world: World | None
@@ -118,6 +133,7 @@ class LearnerArena:
         sampler = self._plan.sampler
         self._change(overrides, None if sampler is None else sampler.world_of(seed, self._share))
         self._seeds = seeds  # not before the world is known to be possible
+        self.turn = turn_of(seed) if self._plan.turned else AS_IT_IS
         self.env.reset_batch(seed)
         self.interface.forget()
 
@@ -152,7 +168,8 @@ class LearnerArena:
 
     def command(self, actions: np.ndarray) -> ActionArray:
         """Return the actions of the next tick, (N, A) in a reused buffer; see `LearnerInterface.command`."""
-        return self.interface.command(actions, self.env.last_obs)
+        checked = self.interface.checked(actions)
+        return self.interface.carry_out(self.turn.actions(checked), self.env.last_obs)
 
     def take(self, tick: BatchStep, rewards: np.ndarray) -> tuple[BoolArray, bool, bool]:
         """Take over what a tick of `env` has brought; arguments and result as those of `step`."""
@@ -177,6 +194,7 @@ class LearnerArena:
             seeds=self._seeds.bit_generator.state,
             agents=tuple(agents),
             memory=self.interface.memory(),
+            turn=self.turn,
         )
 
     def restore(self, snapshot: LearnerSnapshot) -> None:
@@ -217,6 +235,7 @@ class LearnerArena:
             before.close()
         self._seeds.bit_generator.state = snapshot.seeds
         self.interface.recall(snapshot.memory)
+        self.turn = snapshot.turn
 
     @property
     def active(self) -> BoolArray:
@@ -227,7 +246,7 @@ class LearnerArena:
         """Return what the learner sees now, (rows, d): a new array, or `out`."""
         if out is None:
             out = np.empty((self.n_rows, self.interface.layout.size), np.float32)
-        self.interface.observe(self.env.last_obs, out[: self.n_robots])
+        self.turn.rows(self.interface.observe(self.env.last_obs, out[: self.n_robots]), self.interface.layout)
         out[self.n_robots :] = 0.0
         return out
 
@@ -236,7 +255,7 @@ class LearnerArena:
 
         Spare rows can stand, because algorithms with masks draw an action for each row.
         """
-        mask = self._with_spare_rows(self.interface.mask(self.env.last_obs))
+        mask = self._with_spare_rows(self.turn.mask(self.interface.mask(self.env.last_obs)))
         mask[self.n_robots :, MOTIONS.index("stand")] = True
         return mask
 

@@ -6,13 +6,14 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
-from swarm_forage_env._internal.fields import ConfigError, instance
+from swarm_forage_env._internal.fields import ConfigError, instance, switch
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import GivenInterface, InterfaceConfig, chosen_interface
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import scenario_of_same_size
 from swarm_forage_env.scenarios.presets import chosen_scenario
 from swarm_forage_env.views.sampler import ScenarioSampler
+from swarm_forage_env.views.turns import check_turned
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig, wrap_in_order
 from swarm_forage_env.wrappers.registry import wrapper_configs
 from swarm_forage_env.wrappers.world import World
@@ -36,6 +37,8 @@ class ArenaPlan:
     render_mode: str | None = None
     snapshots: bool = False
     """Keep what copies and snapshots need; see `ForageEnv`."""
+    turned: bool = False
+    """Whether learners see each run turned or mirrored, see `views.turns`."""
 
     def build(self, overrides: Mapping[str, Any], world: World | None = None) -> ForageEnv | SwarmWrapper:
         """Build the environment with its wrappers.
@@ -91,6 +94,7 @@ def plan_arena(
     max_cycles: int | None = None,
     render_mode: str | None = None,
     snapshots: bool = False,
+    turned: bool = False,
     **overrides: Any,
 ) -> ArenaPlan:
     """Plan an arena.
@@ -105,6 +109,8 @@ def plan_arena(
         max_cycles: Ticks until truncation; default the scenario's horizon.
         render_mode: None, "rgb_array" or "human"; see `ForageEnv`.
         snapshots: Keep what copies and snapshots need; see `ForageEnv`.
+        turned: Show each run turned by quarter turns or mirrored, one of eight ways that its seed draws, so that a
+            learner cannot learn the compass by heart (`views.turns`). `ForageEnv` itself shows the world as it is.
         overrides: Scenario fields by name (`n_robots=20`, `n_objects=100`, `caches="static"`).
 
     Raises:
@@ -127,13 +133,18 @@ def plan_arena(
                 "into the sampler, where all worlds can share it. By id, make swarm_forage/sampled-v2."
             )
         config = sampler.largest
+    chosen = chosen_interface(interface).for_scenario(config)
+    switch("turned", turned)
+    if turned:
+        check_turned(chosen)
     return ArenaPlan(
         world=World(config, disturbing),
         sampler=sampler,
-        interface=chosen_interface(interface).for_scenario(config),
+        interface=chosen,
         max_cycles=max_cycles,
         render_mode=render_mode,
         snapshots=snapshots,
+        turned=turned,
     )
 
 

@@ -239,6 +239,7 @@ def open_arenas(
     max_cycles: int | None = None,
     render_mode: str | None = None,
     snapshots: bool = False,
+    turned: bool = False,
     **overrides: Any,
 ) -> ArenaBatch | ArenaProcesses:
     """Build arenas in this process or in others.
@@ -257,6 +258,7 @@ def open_arenas(
         max_cycles: Ticks until truncation; default the scenario's horizon.
         render_mode: None or "rgb_array".
         snapshots: Keep what copies and snapshots need; see `ForageEnv`.
+        turned: Show each run turned or mirrored, see `plan_arena`.
         overrides: Scenario fields by name (`n_robots=20`, `nest_progress=0.1`).
 
     Raises:
@@ -271,6 +273,7 @@ def open_arenas(
         max_cycles=max_cycles,
         render_mode=render_mode,
         snapshots=snapshots,
+        turned=turned,
         **overrides,
     )
     if render_mode == "human":

@@ -22,6 +22,7 @@ def test_stream_numbers_are_stored_history():
         "POPULATION": 8,
         "MESSAGE_NOISE": 9,
         "SCENARIO": 12,
+        "TURN": 13,
     }
 
 

@@ -1,0 +1,168 @@
+"""Turns: what a learner would see and do if its world were turned by quarter turns, or mirrored.
+
+A policy that always sees the nest in the west learns the compass by heart. A world that is turned has the same physics,
+so nothing in it needs to change: it is enough to turn what robots see of it. That moves columns and changes signs, and
+is exact. An arena that is turned by a quarter shows itself as one whose width and height are exchanged.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.contract.layout import (
+    CACHE_FIELDS,
+    GROUND_SENSORS,
+    NEIGHBOUR_FIELDS,
+    NEIGHBOURS,
+    RING_SENSORS,
+    WINDOW_CELLS,
+    ObservationLayout,
+    ObservationSlice,
+)
+from swarm_forage_env.contract.policy import state_size
+from swarm_forage_env.contract.types import BoolArray, IntArray, ObsArray
+from swarm_forage_env.policies.interface import GRIPS, MOTIONS, InterfaceConfig
+
+_ROBOT_FIELDS, _OBJECT_FIELDS = state_size(1, 0), state_size(0, 1)
+_ABSOLUTE = {"position": (0,), "heading": (0,), "los_cell": (0,), "event_cache": (1,)}
+"""Slices with directions or places of the arena: the columns of x, each before its y."""
+_AHEAD_LEFT = ("object", "cache", "pickup_site", "sighting_site")
+"""Slices of the learner whose second column is to the left of the robot."""
+
+
+class _Columns(NamedTuple):
+    """How columns of a turned row come from those of the row as it is: `row[:, source] * sign`."""
+
+    source: IntArray
+    sign: ObsArray
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """The world mirrored, if it is, from left to right (x becomes -x), and then turned counter-clockwise."""
+
+    quarters: int = 0
+    """Quarter turns, 0 to 3."""
+    is_mirrored: bool = False
+
+    def rows(self, rows: ObsArray, layout: ObservationLayout) -> None:
+        """Turn what robots see, (N, d) with columns as in `layout`, in place."""
+        if self != AS_IT_IS:
+            source, sign = _columns(self, layout)
+            rows[:] = rows[:, source] * sign
+
+    def actions(self, actions: np.ndarray) -> np.ndarray:
+        """Return actions for the world as it is, from those for the turned one; and the other way round.
+
+        Args:
+            actions: (N,) numbers or (N, k) values, as `LearnerInterface.checked` returns them.
+        """
+        if not self.is_mirrored:
+            return actions
+        if actions.ndim == 1:
+            return _MIRRORED_NUMBERS[actions]
+        return np.concatenate((actions[:, 1::-1], actions[:, 2:]), axis=1)
+
+    def mask(self, mask: BoolArray) -> BoolArray:
+        """Return which actions make sense in the turned world, from those as it is; (N, number of actions)."""
+        return mask[:, _MIRRORED_NUMBERS[: mask.shape[1]]] if self.is_mirrored else mask
+
+    def state(self, state: ObsArray, n_robots: int) -> ObsArray:
+        """Return the global view of the turned world, from that of the world as it is; see `world.sensors`."""
+        turned = state.copy()
+        robots, things = np.split(turned, [state_size(n_robots, 0)])
+        robots, things = robots.reshape(-1, _ROBOT_FIELDS), things.reshape(-1, _OBJECT_FIELDS)
+        for pairs in (robots[:, :2], robots[:, 2:4], things[:, :2]):
+            pairs[:] = pairs @ self.matrix.T
+        return turned
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """(2, 2) float32: what becomes of a vector (x, y)."""
+        cos, sin = ((1, 0), (0, 1), (-1, 0), (0, -1))[self.quarters]
+        mirror = -1 if self.is_mirrored else 1
+        return np.array([[cos * mirror, -sin], [sin * mirror, cos]], np.float32)
+
+
+AS_IT_IS = Turn()
+TURNS = tuple(Turn(quarters, is_mirrored) for is_mirrored in (False, True) for quarters in range(4))
+"""All ways to lay a rectangle along the axes."""
+
+
+def turn_of(seed: int) -> Turn:
+    """Return the turn of the run with this seed; all are equally likely."""
+    return TURNS[stream_rng(seed, Stream.TURN).integers(len(TURNS))]
+
+
+def check_turned(interface: InterfaceConfig) -> None:
+    """Refuse own sensors, of which only their author knows what a turn does to them; raises ConfigError."""
+    if interface.own_sensors:
+        raise ConfigError(
+            f"Expected worlds as they are where learners see own sensors, got turned ones with "
+            f"{', '.join(interface.own_sensors)}: a turn would have to turn these, too. Say turned=False (--as-drawn)."
+        )
+
+
+def _mirrored_numbers() -> IntArray:
+    names = (*MOTIONS, *GRIPS)
+    other = {"left": "right", "right": "left"}
+    mirrored = (" ".join(other.get(word, word) for word in name.split()) for name in names)
+    return np.array([names.index(name) for name in mirrored], np.int32)
+
+
+_MIRRORED_NUMBERS = _mirrored_numbers()
+"""(number of actions,) the action that does the same in a mirrored world."""
+
+
+@lru_cache(maxsize=64)
+def _columns(turn: Turn, layout: ObservationLayout) -> _Columns:
+    source, sign = np.arange(layout.size, dtype=np.int32), np.ones(layout.size, np.float32)
+    for part in layout:
+        own_source, own_sign = source[part.start : part.stop], sign[part.start : part.stop]
+        for x in _places_of_x(part):
+            matrix = turn.matrix
+            own_source[x : x + 2] = part.start + x + np.abs(matrix).argmax(axis=1)
+            own_sign[x : x + 2] = matrix.sum(axis=1)
+        if part.name == "los_object":
+            own_source[:] = part.start + _window(turn)
+        elif turn.is_mirrored:
+            own_source[:] = own_source[_mirrored_order(part)]
+            own_sign[_places_of_left(part)] = -1.0
+    return _Columns(source, sign)
+
+
+def _places_of_x(part: ObservationSlice) -> list[int]:
+    """Columns of a slice with the x of a place or direction in the arena; y stands behind each."""
+    if part.name == "los_cache":
+        return list(range(1, part.size, CACHE_FIELDS))
+    return list(_ABSOLUTE.get(part.name, ()))
+
+
+def _places_of_left(part: ObservationSlice) -> list[int]:
+    """Columns of a slice that count how far something is to the left of the robot."""
+    if part.name == NEIGHBOURS:
+        return list(range(1, part.size, NEIGHBOUR_FIELDS))
+    is_sum = part.name in ("proximity", "light") and part.size < RING_SENSORS
+    return [1] if is_sum or part.name in _AHEAD_LEFT else []
+
+
+def _mirrored_order(part: ObservationSlice) -> np.ndarray:
+    """Where the columns of a slice come from in a mirrored world: what is left and right of the robot changes place."""
+    order = np.arange(part.size)
+    if part.size == RING_SENSORS and part.name in ("proximity", "light"):
+        return order[::-1]
+    if part.name == "wheel_speed" or (part.name == "ground" and part.size == GROUND_SENSORS):
+        return order ^ 1
+    return order
+
+
+def _window(turn: Turn) -> np.ndarray:
+    """Where the cells of the line-of-sight window come from, row by row from the lower left."""
+    half = WINDOW_CELLS // 2
+    dy, dx = np.divmod(np.arange(WINDOW_CELLS**2), WINDOW_CELLS) - np.array(half)
+    x, y = turn.matrix.T.astype(int) @ np.array([dx, dy])
+    return (y + half) * WINDOW_CELLS + x + half
