@@ -40,6 +40,9 @@ def _former(error: type[Exception], name: str, **_: Any) -> NoReturn:
 
 def _register_with_pettingzoo() -> None:
     import pettingzoo
+
+    if not hasattr(pettingzoo, "register"):  # before 1.27 there are no ids
+        return
     from pettingzoo.env_registry.exceptions import VersionNotFound
 
     for name, kwargs in _ids():

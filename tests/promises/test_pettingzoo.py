@@ -7,6 +7,7 @@ from gymnasium import spaces
 from pettingzoo.test import api_test, max_cycles_test, parallel_api_test, parallel_seed_test, seed_test, state_test
 from pettingzoo.utils.env import AECEnv
 
+import swarm_forage_env
 from swarm_forage_env import SCENARIO_NAMES
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.policy import ActionError
@@ -53,6 +54,10 @@ def test_max_cycles():
     max_cycles_test(views)
 
 
+with_ids = pytest.mark.skipif(not hasattr(pettingzoo, "make"), reason="needs PettingZoo 1.27, which has ids")
+
+
+@with_ids
 @pytest.mark.parametrize("name", SCENARIO_NAMES)
 def test_environments_are_made_by_id(name):
     parallel = pettingzoo.make("parallel", f"swarm_forage/{name}-v2", caches="dynamic", **SMALL)
@@ -379,5 +384,15 @@ def test_one_factory_makes_all_forms():
     assert isinstance(parallel_env("warehouse_small", wrappers=[throttle], **SMALL), Throttle)
     learner = parallel_env("warehouse_small", wrappers=[throttle], interface={"actions": "discrete"}, **SMALL)
     assert isinstance(learner, ParallelLearnerEnv)
+
+
+@with_ids
+def test_an_id_makes_what_the_factory_makes():
+    throttle = "throttle:waveform=constant,amplitude=0.1"
     by_id = pettingzoo.make("parallel", "swarm_forage/warehouse_small-v2", wrappers=[throttle], **SMALL)
     assert isinstance(by_id, Throttle)
+
+
+def test_an_older_pettingzoo_has_no_ids(monkeypatch):
+    monkeypatch.delattr(pettingzoo, "register", raising=False)
+    swarm_forage_env._register_with_pettingzoo()
