@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from swarm_forage_env.training.plan import TrainingPlan
 
 _HIDDEN = ",".join(map(str, DEFAULT_HIDDEN))
-_OF_PLAN = ("plan", "out", "seed", "callbacks", "jobs", "resume")
+_OF_PLAN = ("plan", "out", "seed", "turned", "callbacks", "jobs", "resume")
 """Options that go with --plan."""
 _OF_RESUMING = ("steps", "out", "callbacks", "jobs", "resume")
 """Options that say nothing of the plan that is resumed."""
@@ -96,6 +96,14 @@ class RecipeOptions:
             help="Whether to spend the first third in a smaller arena; default yes if deliveries count.",
         ),
     ] = None
+    turned: Annotated[
+        bool | None,
+        typer.Option(
+            "--turned/--as-drawn",
+            help="Whether to show each episode turned or mirrored, so that the policy cannot learn the compass by "
+            "heart; default turned if samplers draw the worlds.",
+        ),
+    ] = None
     hidden: Annotated[str | None, typer.Option(help=f"Sizes of the hidden layers; default {_HIDDEN}.")] = None
     arguments: Annotated[
         tuple[str, ...],
@@ -120,7 +128,7 @@ class RecipeOptions:
             wrappers=world.wrappers,
             options=dict(map(_argument, self.arguments)),
             evaluation=_given({"every_steps": self.evaluate_every, "horizon_s": self.evaluation_horizon}),
-            **self._chosen("algorithm", "steps", "small_start", "seed", "samples"),
+            **self._chosen("algorithm", "steps", "small_start", "seed", "samples", "turned"),
             **_given({"n_arenas": self.arenas, "hidden": None if self.hidden is None else _layers(self.hidden)}),
             **world.fields,
         )
@@ -137,7 +145,8 @@ def train(
     plan: Annotated[
         str | None,
         typer.Option(
-            help="TOML file with a training plan, or name of a shipped policy; replaces all options below but --seed."
+            help="TOML file with a training plan, or name of a shipped policy; replaces all options below but --seed "
+            "and --turned."
         ),
     ] = None,
     asked: RecipeOptions,
@@ -173,7 +182,7 @@ def train(
 
     if plan is not None:
         refuse_others(context, "--plan", _OF_PLAN, "which it decides; write them into its file")
-        chosen = named_plan(plan, asked.seed)
+        chosen = named_plan(plan, asked.seed, asked.turned)
         name = Path(plan).stem if asked.seed is None else f"{Path(plan).stem}_seed_{asked.seed}"
     else:
         chosen = asked.plan(described)

@@ -30,6 +30,7 @@ from swarm_forage_env.scenarios.overrides import scenario_of_same_size, with_ove
 from swarm_forage_env.training.defaults import DEFAULT_ARENAS, DEFAULT_HIDDEN, DEFAULT_STEPS, EVALUATE_EVERY
 from swarm_forage_env.training.evaluation_worlds import CHOSEN_BY, COUNTED, EvaluationWorld, scenario_of, tuples
 from swarm_forage_env.views.sampler import ScenarioSampler, columns_of
+from swarm_forage_env.views.turns import check_turned
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import wrappers_from_mapping
 from swarm_forage_env.wrappers.world import World
@@ -202,6 +203,9 @@ class TrainingPlan:
     (PPO, A2C). Robots that always take the likeliest one may block each other for ever."""
     sampler: ScenarioSampler | None = None
     """Draws the world of each episode; None = it is always `world`. Then `evaluation` has worlds."""
+    turned: bool | None = None
+    """Whether the learner sees each episode turned or mirrored (`views.turns`), so that it cannot learn the compass by
+    heart; None = where samplers draw the worlds. Evaluations show their worlds as they are."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "interface", self.interface.for_scenario(self.scenario))
@@ -228,6 +232,11 @@ class TrainingPlan:
         whole("seed", self.seed, at_least=0)
         _check_options("options", self.options)
         self._check_worlds()
+        if self.turned is None:
+            object.__setattr__(self, "turned", self.is_sampled)
+        switch("turned", self.turned)
+        if self.turned:
+            check_turned(self.interface)
         self.judging(LEARNING)  # refuses horizons that cannot be
 
     def _check_worlds(self) -> None:
@@ -237,7 +246,7 @@ class TrainingPlan:
                 "Expected a plan with a sampler without scenario and wrappers, which it draws; in Python, give "
                 "world=World(sampler.largest)."
             )
-        is_sampled = any(stage.sampler or self.sampler for stage in self.stages)
+        is_sampled = self.is_sampled
         if is_sampled and not self.evaluation.worlds:
             raise ConfigError(
                 "Expected evaluation.worlds beside a sampler: fixed worlds, in which policies can be compared."
@@ -279,6 +288,11 @@ class TrainingPlan:
                 f"Expected the evaluation world {world.name} with the caches of the training, "
                 f"{self.scenario.caches!r}, got {world.scenario.caches!r}; give both the same."
             )
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether samplers draw worlds, in all stages or in some."""
+        return any(stage.sampler or self.sampler for stage in self.stages)
 
     @property
     def scenario(self) -> ScenarioConfig:
@@ -404,22 +418,26 @@ def read_plan(path: Path) -> TrainingPlan:
     """
     try:
         text = path.read_text(encoding="utf-8")
-        return TrainingPlan.from_mapping(parse_json(text) if path.suffix == ".json" else parse_toml(text))
+        if path.suffix != ".json":
+            return TrainingPlan.from_mapping(parse_toml(text))
+        written = table("the plan", parse_json(text))
+        return TrainingPlan.from_mapping({"turned": False, **written})  # trainings once saw all worlds as they are
     except OSError as error:
         raise ConfigError(f"Cannot read the plan {path}: {error.strerror or error}.") from error
     except (ValueError, TypeError) as error:  # ConfigError, and what the two parsers raise
         raise ConfigError(f"Cannot use the plan {path}: {error}") from error
 
 
-def named_plan(name: str, seed: int | None = None) -> TrainingPlan:
-    """Return the plan of a file, or of a shipped policy by its name, with another seed if one is given.
+def named_plan(name: str, seed: int | None = None, turned: bool | None = None) -> TrainingPlan:
+    """Return the plan of a file, or of a shipped policy by its name, with another seed or turned worlds if given.
 
     Raises:
         ConfigError: there is none, or it cannot be used.
     """
     shipped = plan_file(name)
     plan = read_plan(Path(name) if shipped is None else shipped)
-    return plan if seed is None else dataclasses.replace(plan, seed=seed)
+    given = {name: value for name, value in (("seed", seed), ("turned", turned)) if value is not None}
+    return dataclasses.replace(plan, **given)
 
 
 def _common(config: ScenarioConfig) -> tuple[Any, ...]:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,10 +20,11 @@ from swarm_forage_env.scenarios.presets import warehouse_small
 from swarm_forage_env.training import evaluations
 from swarm_forage_env.training.evaluation_worlds import EvaluationWorld
 from swarm_forage_env.training.evaluations import Evaluation, baseline_runs, best_baselines, ratio_to, read_evaluations
-from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan, read_plan
+from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan, named_plan, read_plan
 from swarm_forage_env.training.recipe import recipe
-from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv
+from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv, training
 from swarm_forage_env.training.sb3.training import train
+from swarm_forage_env.views.turns import AS_IT_IS
 from swarm_forage_env.wrappers.registry import wrapper_configs
 from swarm_forage_env.wrappers.world import World
 from tests.support.sampled import TWO_WORLDS, sampler
@@ -230,3 +232,38 @@ def test_the_heading_tells_one_horizon_only_where_all_runs_have_it():
     for worlds, words in ((JUDGED, "in 1 run of 200 s in each of 2 worlds"), ((*JUDGED, longer), "in 1 whole run in")):
         plan = dataclasses.replace(FIXED, evaluation=EvaluationPlan(worlds=worlds))
         assert words in heading(plan)
+
+
+def test_drawn_worlds_are_turned_unless_the_plan_says_no(tmp_path):
+    assert recipe(sampler=WORLDS).turned is True
+    assert recipe("warehouse_small").turned is False
+    assert recipe("warehouse_small", turned=True).turned is True
+    plan = tmp_path / "plan.toml"
+    text = (Path(__file__).parents[1] / "support/tiny_plan.toml").read_text()
+    plan.write_text(text)
+    assert read_plan(plan).turned is True
+    assert named_plan(str(plan), turned=False).turned is False
+    plan.write_text(f"turned = false\n{text}")
+    assert read_plan(plan).turned is False
+
+
+@pytest.mark.parametrize("turned", [True, False])
+def test_a_plan_beside_a_training_says_how_it_was(turned, tmp_path):
+    """One that says nothing was written before there were turns."""
+    plan = tiny_plan(turned=turned)
+    plan.write(tmp_path / "plan.json")
+    assert read_plan(tmp_path / "plan.json") == plan
+    mapping = plan.to_mapping()
+    del mapping["turned"]
+    (tmp_path / "plan.json").write_text(json.dumps(mapping))
+    assert read_plan(tmp_path / "plan.json").turned is False
+
+
+@pytest.mark.parametrize("turned", [True, False])
+def test_a_training_turns_its_arenas(turned):
+    plan = tiny_plan(turned=turned)
+    env = training._arenas(plan, plan.stages[0], 0)
+    env.seed(0)
+    env.reset()
+    turns = {arena.turn for arena in env._arenas.arenas}
+    assert (turns != {AS_IT_IS}) is turned

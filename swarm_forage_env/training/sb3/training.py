@@ -192,6 +192,7 @@ def _arenas(plan: TrainingPlan, stage: Stage, n_processes: int) -> SwarmVecEnv:
         n_processes=n_processes,
         interface=plan.interface,
         wrappers=plan.wrappers if sampler is None else (),
+        turned=bool(plan.turned),
     )
 
 
