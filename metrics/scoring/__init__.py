@@ -11,6 +11,7 @@ from .from_scenario import (
     predict_from_scenario,
     scenario_question,
 )
+from .outlook import Outlook, what_would_decide
 from .plots import draw_predictions, draw_scores
 from .policy_scores import ScoreQuestion, compare_policies, score_curves, score_policy, score_question
 from .prediction import (
@@ -31,7 +32,7 @@ from .study_plots import PlottedStudy, StudyFigure, draw_figure, draw_map, plot,
 from .study_report import StudyReport, report
 from .study_verdict import Judged, StudyVerdict, Waiting, judge_claims, verdict
 from .summary import RunQuestion, RunSummary, run_question, summarize_runs
-from .until_decided import Outlook, run_until_decided
+from .until_decided import run_until_decided
 from .world_limits import limit_of
 
 __all__ = [
@@ -60,6 +61,7 @@ __all__ = [
     "diff",
     "plot",
     "report",
+    "what_would_decide",
     "run_until_decided",
     "draw_scores",
     "predict_policy",
