@@ -4,12 +4,14 @@
     runs.csv        one row per set: digest of its runs, how many, what made them, hours
     measures.csv    one row per measure, rules, policy and level: mean over runs with its interval
     verdicts.csv    one row per claim, rules and form of the measures: the answer, and what it was decided on
+    undecided.csv   one row per undecided claim and rules: the runs of each condition, and what more would decide it
 
 In the tables a set stands with the first digits of the digest of its runs, "S1a 3f2a9c1d".
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +19,14 @@ import polars as pl
 import polars.selectors as cs
 
 from metrics.claims import Claim
-from metrics.scoring import StudyVerdict, study_figures
+from metrics.claims.checking import RELATIVE
+from metrics.scoring import StudyVerdict, study_figures, what_would_decide
+from metrics.scoring.outlook import words_of
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env.runs.store import DONE
 from swarm_forage_env.studies.study_table import StudyTable, read_study
 
-RUNS, MEASURES, VERDICTS = "runs.csv", "measures.csv", "verdicts.csv"
+RUNS, MEASURES, VERDICTS, UNDECIDED = "runs.csv", "measures.csv", "verdicts.csv", "undecided.csv"
 DATA = "results"
 """Folder of the files, beside the page."""
 DIGITS = 8
@@ -50,9 +54,10 @@ def shipped(folder: Path) -> list[StudyTable]:
 
 
 def write_numbers(results: StudyVerdict, folder: Path) -> None:
-    """Write `MEASURES` and `VERDICTS` of the studies."""
+    """Write `MEASURES`, `VERDICTS` and `UNDECIDED` of the studies."""
     _write(folder / MEASURES, measures(results))
     _write(folder / VERDICTS, verdicts(results))
+    _write(folder / UNDECIDED, undecided(results))
 
 
 def run_words(table: StudyTable) -> str:
@@ -94,6 +99,35 @@ def verdicts(results: StudyVerdict) -> Iterator[dict[str, Any]]:
                 "why": found.why,
                 "runs": runs_of(one.claim, results),
             }
+
+
+@cache  # the page and its table need it
+def undecided(results: StudyVerdict) -> tuple[dict[str, Any], ...]:
+    """Return one row per claim that is not decided, also relative to performance, and rules.
+
+    `core_hours` is what runs lack up to `decided_after`, or up to `last_look` where no look is foreseen to decide.
+    """
+    outlook = what_would_decide(results)
+    return tuple(
+        {
+            "claim": one.open.claim.name,
+            "sense": RELATIVE if one.open.is_relative else "",
+            "rules": one.rules,
+            "runs": min(outlook.reached[line] for line in one.lines),
+            "decided_after": one.open.n_runs,
+            "last_look": outlook.looks[-1],
+            "core_hours": None if one.seconds is None else one.seconds / 3600.0,
+            "needs_runs_of": words_of(one.lines),
+        }
+        for one in outlook.wanted
+        if one.open is not None
+    )
+
+
+def rows(header: Sequence[str], lines: Sequence[Sequence[Any]], right: Sequence[int] = ()) -> str:
+    """Return a table of Markdown; `right` are the columns that are aligned to the right."""
+    under = ["--:" if place in right else "---" for place in range(len(header))]
+    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in (header, under, *lines))
 
 
 def runs_of(claim: Claim, results: StudyVerdict) -> str:

@@ -25,13 +25,16 @@ from results_data import (
     DATA,
     MEASURES,
     RUNS,
+    UNDECIDED,
     VERDICTS,
+    rows,
     run_words,
     runs_of,
     ship,
     shipped,
     write_numbers,
 )
+from results_undecided import undecided_claims
 
 from metrics import verdict
 from metrics.claims import CLAIMS, INTUITIONS, Verdict
@@ -86,21 +89,16 @@ A claim that is contradicted is a result like any other. Some rules were wrong a
 [metrics.md](metrics.md#the-papers-claims), how studies are run in [studies.md](studies.md).
 
 The runs lie beside this page, packed, so that everybody can check it without running anything: [runs]({DATA}/runs.csv),
-[every measure with its interval]({DATA}/measures.csv), and
-[every verdict with what it was decided on]({DATA}/verdicts.csv). Behind the name of a set stand the first digits of the
-digest of its runs. `swarm-forage study verdict docs/{DATA}/*.parquet` gives the answers, `scripts/write_results` this
-page with its tables and pictures; nothing in it is typed by hand."""
+[every measure with its interval]({DATA}/measures.csv),
+[every verdict with what it was decided on]({DATA}/verdicts.csv), and
+[every undecided claim with what would decide it]({DATA}/undecided.csv). Behind the name of a set stand the first digits
+of the digest of its runs. `swarm-forage study verdict docs/{DATA}/*.parquet` gives the answers, `scripts/write_results`
+this page with its tables and pictures; nothing in it is typed by hand."""
 
 
 def judged(folder: Path) -> StudyVerdict:
     """Score and judge the studies whose runs lie in a folder."""
     return verdict(*shipped(folder), tell=lambda words: print(words, file=sys.stderr))
-
-
-def rows(header: Sequence[str], lines: Sequence[Sequence[Any]], right: Sequence[int] = ()) -> str:
-    """Return a table of Markdown; `right` are the columns that are aligned to the right."""
-    under = ["--:" if place in right else "---" for place in range(len(header))]
-    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in (header, under, *lines))
 
 
 def what_is_there(results: StudyVerdict) -> str:
@@ -433,6 +431,7 @@ def page(results: StudyVerdict, folder: Path | None) -> str:
         what_is_there(results),
         INTRODUCTION,
         answers(results),
+        undecided_claims(results),
         intuitions(results),
         figures(results, folder),
         breakdowns(results),
@@ -446,9 +445,13 @@ def differing(results: StudyVerdict, folder: Path) -> list[str]:
     """Return which files in a folder are not those of the results; pictures are not looked at."""
     with tempfile.TemporaryDirectory() as there:
         write_numbers(results, Path(there))
-        tables = {f"{DATA}/{name}": Path(there, name).read_text(encoding="utf-8") for name in (MEASURES, VERDICTS)}
+        tables = {
+            f"{DATA}/{name}": Path(there, name).read_text(encoding="utf-8") for name in (MEASURES, VERDICTS, UNDECIDED)
+        }
     expected = {PAGE: page(results, None), **tables}
-    return [name for name, text in expected.items() if (folder / name).read_text(encoding="utf-8") != text]
+    files = {name: folder / name for name in expected}
+    there = {name: file.read_text(encoding="utf-8") for name, file in files.items() if file.is_file()}
+    return [name for name, text in expected.items() if there.get(name) != text]
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -478,7 +481,8 @@ def main(words: Sequence[str] | None = None) -> int:
     (out / PAGE).write_text(page(results, out), encoding="utf-8")
     write_numbers(results, out / DATA)
     n_pictures = len(list((out / PICTURES).glob("*.png")))
-    print(f"written {out / PAGE}, {RUNS}, {MEASURES} and {VERDICTS} in {out / DATA}, {counted(n_pictures, 'picture')}")
+    tables = f"{RUNS}, {MEASURES}, {VERDICTS} and {UNDECIDED} in {out / DATA}"
+    print(f"written {out / PAGE}, {tables}, {counted(n_pictures, 'picture')}")
     return 0
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.cost import MeasuredCost
 from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.runs.store import DONE
 
 from ..claims import CLAIMS, Claim, Panel, PanelName
 from ..claims.checking import Statement
@@ -177,13 +178,12 @@ class _Packed(StudyLines):
 
     def learn(self, cost: MeasuredCost) -> None:
         """Find out which runs are done, and what they took."""
-        there = set(self._table.records)
         done: list[RunSpec] = []
         for place in self.spec.places:
-            runs = [run for run in self.spec.specs_of(place) if run.run_id in there]
-            self.done[place] = {run.seed for run in runs}
-            done += runs
-        if self._table.wall_time_s is not None:
+            rows = self._table.rows(place)
+            self.done[place] = set(rows.filter(rows["state"] == DONE)["seed"])
+            done += [run for run in self.spec.specs_of(place) if run.seed in self.done[place]]
+        if done and self._table.wall_time_s is not None:
             per_robot_tick_s = self._table.wall_time_s / sum(run.robot_ticks for run in done)
             for run in done:
                 cost.add(run, per_robot_tick_s * run.robot_ticks)

@@ -142,8 +142,36 @@ def test_the_results_page_comes_of_the_runs_beside_it(run):
     assert Path("page/results.md").read_text(encoding="utf-8") == text
     assert [path.name for path in Path("page").rglob("*.png")] == pictures
     Path("page/results.md").write_text(text.replace("supported", "contradicted", 1), encoding="utf-8")
+    Path("page/results/undecided.csv").unlink()
     code, out, _ = run("write_results", "--out", "page", "--check")
-    assert (code, out) == (1, "not those of the runs in page/results: results.md\n")
+    assert (code, out) == (1, "not those of the runs in page/results: results.md, results/undecided.csv\n")
+
+
+def test_the_results_page_says_what_would_decide_the_rest(tmp_path, monkeypatch):
+    """Two policies whose runs scatter, and one that has fewer runs than the others."""
+    axis = Axis(name="noise", values=(0.0, 0.02, 0.04))
+    spec = made_study("S1e", axis, reference=0.0, seeds=tuple(range(8)), looks=(4, 8, 16, 64))
+    table = made_table(spec, lambda place: 50.0, lost={(spec.places[0], 7)})
+    scatter = np.random.default_rng(3).uniform(0.5, 1.5, len(table.frame))
+    table = replace(table, frame=table.frame.with_columns(performance=pl.col("performance") * pl.Series(scatter)))
+    results = verdict(replace(table, wall_time_s=7200.0))
+    found = results_data.undecided(results)
+    open_ones = {(one.claim.name, one.rules) for one in results.judged if one.verdict.answer == "undecided"}
+    assert {(one["claim"], one["rules"]) for one in found if not one["sense"]} == open_ones != set()
+    assert {one["runs"] for one in found} <= {4, 8}
+    assert {one["last_look"] for one in found} == {64}
+    assert all(one["core_hours"] > 0.0 and "S1e " in one["needs_runs_of"] for one in found)
+    monkeypatch.syspath_prepend(ROOT / "scripts")
+    undecided_claims = importlib.import_module("results_undecided").undecided_claims
+    text = undecided_claims(results)
+    for one in found:
+        look = f"{one['decided_after']} runs" if one["decided_after"] else "never by 64 runs like these"
+        (line,) = [line for line in text.splitlines() if line.startswith(f"| {look} |")]
+        assert one["claim"] in line
+    results_data.write_numbers(results, tmp_path)
+    assert len(pl.read_csv(tmp_path / "undecided.csv")) == len(found)
+    unlooked = verdict(made_table(replace(spec, looks=()), lambda place: 50.0))
+    assert "No forecast" in undecided_claims(unlooked)
 
 
 SETS = {
