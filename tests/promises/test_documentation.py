@@ -98,7 +98,8 @@ def test_index_lists_every_page():
 def test_table_of_worlds_names_every_scenario():
     from swarm_forage_env import SCENARIO_NAMES, scenario
 
-    rows = re.findall(r"^\| `\w+` \| [\d.]+ x .+? \|.+?\|.+?\|", (ROOT / "docs" / "worlds.md").read_text(), re.MULTILINE)
+    page = (ROOT / "docs" / "worlds.md").read_text()
+    rows = re.findall(r"^\| `\w+` \| [\d.]+ x .+? \|.+?\|.+?\|", page, re.MULTILINE)
     configs = [scenario(name) for name in SCENARIO_NAMES]
     assert rows == [
         f"| `{c.name}` | {c.arena.width_m:g} x {c.arena.height_m:g} m | {c.robots.n_robots} | {c.objects.n_objects} |"
