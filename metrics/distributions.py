@@ -1,7 +1,7 @@
-"""Statistics that look at all runs: the interquartile mean, and how probably one policy beats another.
+"""Statistics that look at all runs: interquartile mean, probability of improvement, optimality gap, profile.
 
 A mean of few runs hangs on the best or the worst of them. Near the critical size of a swarm, where some runs break down
-and others do not, it describes neither kind. Source of both measures and of their intervals: Agarwal et al. 2021.
+and others do not, it describes neither kind. Source of the measures and of their intervals: Agarwal et al. 2021.
 """
 
 import math
@@ -109,6 +109,44 @@ def probability_of_improvement(
     lower, upper = percentile_bounds(resampled, level) if enough else (math.nan, math.nan)
     n_runs = min(sum(values.size for values in policy) for policy in (ours, theirs))
     return Estimate(value=float(np.mean(shares)), lower=lower, upper=upper, n_runs=n_runs)
+
+
+def optimality_gap(values: ArrayLike, *, target: float = 1.0) -> float:
+    """By how much runs fall short of a target, mean over all runs; 0 = every run reaches it.
+
+        optimality_gap([0.5, 1.5])  # 0.25: what lies above the target makes up for nothing
+
+    Args:
+        values: One value per run, any shape. NaN values are left out.
+        target: What a run should reach, in the unit of the values.
+
+    Raises:
+        CurveError: No values.
+    """
+    runs = np.asarray(values, dtype=np.float64)
+    known = runs[~np.isnan(runs)]
+    if known.size == 0:
+        raise CurveError(f"Expected at least one run, got values of shape {runs.shape} without a number.")
+    return float(np.maximum(target - known, 0.0).mean())
+
+
+def performance_profile(values: ArrayLike, thresholds: ArrayLike) -> FloatArray:
+    """Share of the runs above each threshold, (T,): 1 minus their distribution function.
+
+        performance_profile([0.5, 1.5, 2.0], [0.0, 1.0])  # 1 and 2/3
+
+    Args:
+        values: One value per run, any shape. NaN values are left out.
+        thresholds: (T,), in the unit of the values.
+
+    Raises:
+        CurveError: No values.
+    """
+    runs = np.asarray(values, dtype=np.float64)
+    known = np.sort(runs[~np.isnan(runs)])
+    if known.size == 0:
+        raise CurveError(f"Expected at least one run, got values of shape {runs.shape} without a number.")
+    return 1.0 - np.searchsorted(known, np.asarray(thresholds, dtype=np.float64), side="right") / known.size
 
 
 def _strata(name: str, values: ArrayLike | Sequence[ArrayLike]) -> list[FloatArray]:

@@ -16,10 +16,20 @@ import numpy as np
 
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.wording import plain
-from swarm_forage_env.rendering.figures import COLOURS, SCREEN, FigureStyle, Panel, heat_map, policy_words, saved_figure
+from swarm_forage_env.rendering.figures import (
+    COLOURS,
+    SCREEN,
+    FigureStyle,
+    Panel,
+    heat_map,
+    looks,
+    policy_words,
+    saved_figure,
+)
 from swarm_forage_env.runs.answer import Answer, Sheet
 
 from ..controllers import PAPER_POLICIES
+from ..distributions import performance_profile
 from ..statistics import Estimate
 from .entry import Entry
 from .page import board_sheet, details_page, page_block, share, sorted_standings, with_block
@@ -28,6 +38,8 @@ from .standing import Reference, Standing, reference_of, scripted_entries, share
 
 _MOST_SHADE = 2.0
 """Share of the best scripted controller from which a cell is as blue as it gets: as far from 1 as nothing is."""
+_LINES = ("-", "--", ":")
+"""Of entries that share a colour."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -119,6 +131,7 @@ def _mapping(standing: Standing) -> dict[str, Any]:
         "name": standing.entry.name,
         "score": _bounds(standing.score),
         "improvement": _bounds(standing.improvement),
+        "optimality_gap": plain(standing.gap),
         "worlds_won": standing.n_won,
         "worlds": standing.n_worlds,
         "calm": plain(standing.calm),
@@ -142,10 +155,11 @@ def draw_benchmark(
     *,
     style: FigureStyle = SCREEN,
 ) -> None:
-    """Draw all entries into a picture file: their scores, and their shares in each world.
+    """Draw all entries into a picture file: their scores, their performance profiles, and their shares in each world.
 
-    Above, the score of each entry with its interval; the line at 1 is the best scripted controller of each world.
-    Below, a row per held-out world and a column per entry: blue is better than that controller, orange is worse.
+    Above on the left, the score of each entry with its interval; the line at 1 is the best scripted controller of each
+    world. On the right, how many of the runs in held-out worlds reach each share of that controller. Below, a row per
+    held-out world and a column per entry: blue is better than that controller, orange is worse.
 
     Args:
         standings: All entries.
@@ -158,9 +172,12 @@ def draw_benchmark(
     n_worlds = len(protocol.scored)
     heights = (0.5 * len(ranked) + 0.9, 0.27 * n_worlds + 1.2)
     with saved_figure(path, (max(7.0, 3.6 + 1.0 * len(ranked)), sum(heights)), style=style) as figure:
-        above, below = figure.subplots(2, 1, height_ratios=heights)
-        _draw_scores(above, ranked)
-        _draw_worlds(below, ranked, reference, protocol)
+        panels: dict[str, Panel] = figure.subplot_mosaic(
+            [["scores", "profiles"], ["worlds"] * 2], height_ratios=heights
+        )
+        _draw_scores(panels["scores"], ranked)
+        _draw_profiles(panels["profiles"], ranked, reference, protocol)
+        _draw_worlds(panels["worlds"], ranked, reference, protocol)
 
 
 def _draw_scores(panel: Panel, ranked: Sequence[Standing]) -> None:
@@ -174,9 +191,26 @@ def _draw_scores(panel: Panel, ranked: Sequence[Standing]) -> None:
     panel.set_yticks(places, [policy_words(standing.entry.name) for standing in ranked])
     panel.set_ylim(len(ranked) - 0.5, -0.5)
     panel.set_xlim(left=0.0)
-    seeds = "; orange: each training seed" if any(standing.by_policy for standing in ranked) else ""
-    panel.set_title(f"score: share of the best scripted controller, interquartile mean and 95 % interval{seeds}")
+    trainings = "; orange: each training" if any(standing.by_policy for standing in ranked) else ""
+    panel.set_title(f"score with 95 % interval{trainings}")
+    panel.set_xlabel("share of the best scripted controller")
     panel.grid(visible=False, axis="y")
+
+
+def _draw_profiles(panel: Panel, ranked: Sequence[Standing], reference: Reference, protocol: Protocol) -> None:
+    thresholds = np.linspace(0.0, _MOST_SHADE, 201)
+    drawn: Counter[str] = Counter()  # there are more entries than colours
+    for look, standing in zip(looks(standing.entry.name for standing in ranked), ranked, strict=True):
+        shares = [shares_of(standing.entry, world, reference).ravel() for world in protocol.scored]
+        profile = performance_profile(np.concatenate(shares), thresholds)
+        style = _LINES[drawn[look.colour] % len(_LINES)]
+        drawn[look.colour] += 1
+        panel.plot(thresholds, profile, style, color=look.colour, label=look.name)
+    panel.axvline(1.0, color="0.5", linewidth=0.8, zorder=0)
+    panel.set_title("share of the runs that achieve more")
+    panel.set_xlabel("share of the best scripted controller")
+    panel.set_ylim(0.0, 1.02)
+    panel.legend(fontsize="x-small")
 
 
 def _draw_worlds(panel: Panel, ranked: Sequence[Standing], reference: Reference, protocol: Protocol) -> None:

@@ -149,6 +149,11 @@ class Entry:
         return [(policy.name, policy.digest) for policy in self.policies] == [(self.name, "")]
 
     @property
+    def is_trained(self) -> bool:
+        """Whether trainings made its policies, as far as its author says: then trainings of one plan may differ."""
+        return self.training.worlds != "nothing"
+
+    @property
     def digest(self) -> str:
         """Hash of everything that the entry holds."""
         return self.to_mapping()["digest"]

@@ -45,6 +45,7 @@ def board_sheet(standings: Sequence[Standing]) -> Sheet:
         "score",
         "better than the best scripted",
         "worlds won",
+        "gap",
         "calm",
         "disturbed",
         "training worlds",
@@ -56,6 +57,7 @@ def board_sheet(standings: Sequence[Standing]) -> Sheet:
             bounded(standing.score),
             percent_of(standing.improvement.value),
             f"{standing.n_won} of {standing.n_worlds}",
+            share(standing.gap),
             share(standing.calm),
             share(standing.disturbed),
             share(standing.training),
@@ -173,7 +175,7 @@ def _commands(entries: Sequence[Entry]) -> str:
 def _groups(ranked: Sequence[Standing], protocol: Protocol) -> Sheet:
     names = [group.name for group in protocol.groups]
     several = any(standing.by_policy for standing in ranked)
-    header = ("entry", *names, *(("score of each training seed",) if several else ()))
+    header = ("entry", *names, *(("score of each training",) if several else ()))
     rows = [
         (
             standing.entry.name,

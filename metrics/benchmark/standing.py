@@ -3,18 +3,21 @@
 The performance of each run is divided by the mean of that scripted controller which is best in the world. So 1 is as
 good as the best of the four there, and worlds of few and of many deliveries count alike. The score is the
 interquartile mean of all held-out runs: a world in which a policy is lucky, or breaks down, does not decide it.
+
+An interval counts what varied. Trainings of one plan differ far more than runs of one network, so the interval of a
+trained entry is over its trainings; that of a scripted one is over its runs.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from ..controllers import PAPER_POLICIES
 from ..curves import FloatArray
-from ..distributions import interquartile_mean, probability_of_improvement
-from ..statistics import Estimate
+from ..distributions import interquartile_mean, optimality_gap, probability_of_improvement
+from ..statistics import Estimate, aggregate
 from .entry import Entry, EntryMeasure, read_entry
 from .protocol import BenchmarkError, Protocol, ProtocolWorld
 
@@ -44,7 +47,9 @@ class Standing:
     score: Estimate
     """Interquartile mean over the runs of all held-out worlds; 1 = as good as the best scripted controller."""
     improvement: Estimate
-    """How probably one of its runs is better than one of the best scripted controller in the same world."""
+    """How probably one of its runs is better than one of the best scripted controller in the same world, in [0, 1]."""
+    gap: float
+    """Optimality gap: how far runs in held-out worlds fall short of the best scripted controller, mean over runs."""
     n_won: int
     """Held-out worlds in which its mean is above that of every scripted controller."""
     n_worlds: int
@@ -58,7 +63,7 @@ class Standing:
     interference: float
     """Share of robot time lost in held-out worlds, mean over runs."""
     by_policy: tuple[float, ...]
-    """Score of each policy, where there are several: the spread over training seeds."""
+    """Score of each policy, where there are several: the spread over trainings."""
 
 
 def scripted_folder() -> Path:
@@ -108,28 +113,54 @@ def standing_of(entry: Entry, reference: Reference, protocol: Protocol) -> Stand
         return interquartile_mean(picked, seed=_SEED).value if picked else float("nan")
 
     counting = protocol.scored
-    n_policies = len(entry.policies)
-    ours = [entry.performance(world.name).ravel() for world in counting]
+    performances = [entry.performance(world.name) for world in counting]
     theirs = [reference.runs[world.name] for world in counting]
+    scores = [interquartile_mean([shares[world.name][k] for world in counting], seed=_SEED) for k in _policies(entry)]
+    chances = [
+        probability_of_improvement([runs[k] for runs in performances], theirs, seed=_SEED) for k in _policies(entry)
+    ]
+    score = interquartile_mean([shares[world.name].ravel() for world in counting], seed=_SEED)
+    improvement = probability_of_improvement([runs.ravel() for runs in performances], theirs, seed=_SEED)
     return Standing(
         entry=entry,
-        score=interquartile_mean([shares[world.name].ravel() for world in counting], seed=_SEED),
-        improvement=probability_of_improvement(ours, theirs, seed=_SEED),
+        score=over_trainings(score, scores) if entry.is_trained else score,
+        improvement=_within_0_and_1(over_trainings(improvement, chances)) if entry.is_trained else improvement,
+        gap=optimality_gap(np.concatenate([shares[world.name].ravel() for world in counting])),
         # Of performances, not of shares: a share of itself may be rounded to a little more than 1.
-        n_won=sum(bool(our.mean() > their.mean()) for our, their in zip(ours, theirs, strict=True)),
+        n_won=sum(bool(our.mean() > their.mean()) for our, their in zip(performances, theirs, strict=True)),
         n_worlds=len(counting),
         calm=middle(lambda world: world.counts and not world.is_disturbed),
         disturbed=middle(lambda world: world.counts and world.is_disturbed),
         training=middle(lambda world: not world.is_held_out),
         groups={group.name: middle(lambda world, of=group.name: world.group == of) for group in protocol.groups},
         interference=float(np.mean([entry.interference(world.name).mean() for world in counting])),
-        by_policy=tuple(
-            interquartile_mean([shares[world.name][k] for world in counting], seed=_SEED).value
-            for k in range(n_policies)
-        )
-        if n_policies > 1
-        else (),
+        by_policy=tuple(each.value for each in scores) if len(scores) > 1 else (),
     )
+
+
+def over_trainings(pooled: Estimate, by_training: Sequence[Estimate]) -> Estimate:
+    """Return a number of all runs with Student's interval over trainings; without an interval for one training.
+
+    Our choice: resampling trainings, then runs, gives intervals that are too short. By simulation, 71 to 76 % of such
+    95 % intervals hold the truth with three trainings, 85 to 88 % with five, but 94 to 97 % of Student's.
+
+    Args:
+        pooled: The number from all runs of all trainings.
+        by_training: The same number from the runs of each training alone.
+    """
+    over = aggregate([estimate.value for estimate in by_training])
+    lower, upper = (pooled.value + bound - over.mean for bound in (over.lower, over.upper))
+    return replace(pooled, lower=lower, upper=upper)
+
+
+def _within_0_and_1(estimate: Estimate) -> Estimate:
+    """Cut bounds that a share cannot have; NaN stays NaN."""
+    lower, upper = np.clip([estimate.lower, estimate.upper], 0.0, 1.0)
+    return replace(estimate, lower=float(lower), upper=float(upper))
+
+
+def _policies(entry: Entry) -> range:
+    return range(len(entry.policies))
 
 
 def shares_of(entry: Entry, world: ProtocolWorld, reference: Reference) -> FloatArray:

@@ -7,6 +7,7 @@ import pytest
 from scipy import stats
 
 from metrics import CurveError, interquartile_mean, probability_of_improvement
+from metrics.distributions import optimality_gap, performance_profile
 
 FIRST = [[1.0, 5, 9, 2, 7, 11, 3, 30], [0, 2, 4, 6, 8, 10, 12, 1]]
 SECOND = [[2.0, 4, 6, 2, 1, 12, 0, 3], [3, 2, 5, 5, 9, 10, 15, 0]]
@@ -88,3 +89,20 @@ def test_nonsense_is_refused():
         interquartile_mean([1.0], level=1.0)
     with pytest.raises(ValueError, match="n_resamples"):
         probability_of_improvement([1.0], [2.0], n_resamples=0)
+
+
+def test_the_optimality_gap_is_that_of_rliable():
+    # rliable 1.2.0: aggregate_optimality_gap(scores, gamma) = gamma - mean of min(scores, gamma)
+    scores = np.array([[0.2, 0.9, 1.4], [0.5, 2.0, 1.0]])
+    for target in (1.0, 1.5):
+        assert optimality_gap(scores, target=target) == pytest.approx(target - np.minimum(scores, target).mean())
+    assert optimality_gap([0.5, math.nan, 1.5]) == 0.25
+    with pytest.raises(CurveError, match="at least one run"):
+        optimality_gap([math.nan])
+
+
+def test_the_profile_is_the_share_of_runs_above_each_threshold():
+    runs = np.array([0.5, 1.0, math.nan, 2.0, 2.0])
+    np.testing.assert_array_equal(performance_profile(runs, [0.0, 0.5, 1.0, 1.5, 2.0]), [1.0, 0.75, 0.5, 0.5, 0.0])
+    with pytest.raises(CurveError, match="at least one run"):
+        performance_profile([], [0.0])

@@ -1,5 +1,6 @@
 """What entries are worth, checked on numbers made up: shares of the best scripted controller, and the page."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -17,8 +18,9 @@ from metrics.benchmark import (
     reference_of,
     standing_of,
 )
-from metrics.benchmark.page import BEGIN, END, with_block
-from metrics.benchmark.standing import improvements, scripted_entries
+from metrics.benchmark.page import BEGIN, END, bounded, with_block
+from metrics.benchmark.standing import improvements, over_trainings, scripted_entries
+from metrics.distributions import interquartile_mean
 from swarm_forage_env._internal.wording import plain_markdown
 from tests.support.entries import TINY, made_up_entry
 from tests.support.pictures import words_in
@@ -88,6 +90,49 @@ def test_one_world_in_which_a_policy_is_lucky_does_not_decide(protocol, referenc
 def test_each_training_seed_has_a_score_of_its_own(protocol, reference):
     standing = standing_of(made_up_entry(protocol, "two", lambda k: 18.5, n_policies=2), reference, protocol)
     assert standing.by_policy == (pytest.approx(19.5 / 20), pytest.approx(20.5 / 20))
+
+
+def test_the_interval_of_a_trained_entry_counts_its_trainings(protocol, reference):
+    """Students' t with one degree of freedom, 12.7, times the deviation of the two scores over the root of two."""
+    given = Training(worlds="given")
+    two = standing_of(made_up_entry(protocol, "two", lambda k: 18.5, n_policies=2, training=given), reference, protocol)
+    low, high = two.by_policy
+    half = 12.7062047 * (high - low) / 2.0
+    assert (two.score.lower, two.score.upper) == pytest.approx((two.score.value - half, two.score.value + half))
+    one = standing_of(made_up_entry(protocol, "one", lambda k: 18.5, training=given), reference, protocol)
+    assert math.isnan(one.score.lower)
+    assert math.isnan(one.improvement.upper)
+    assert bounded(one.score) == "0.97"
+    script = standing_of(made_up_entry(protocol, "script", lambda k: 18.5), reference, protocol)
+    assert script.score.lower < script.score.value < script.score.upper
+
+
+@pytest.mark.parametrize("n_trainings", [2, 3, 5])
+@pytest.mark.parametrize("spread", [0.0, 0.05, 0.3])
+def test_intervals_over_trainings_hold_the_truth(n_trainings, spread):
+    """Trainings scatter by `spread`, runs by 0.1: about 95 of 100 intervals hold the score of all trainings."""
+    rng = np.random.default_rng(1)
+    worlds = rng.uniform(0.6, 1.6, 26)
+
+    def shares(n):
+        trainings = 1.0 + spread * rng.standard_normal((n, 1, 1))
+        return worlds[:, None] * trainings * (1.0 + 0.1 * rng.standard_normal((n, 26, 3)))
+
+    def middle(values):
+        return interquartile_mean(values.reshape(-1), n_resamples=1)
+
+    truth = middle(shares(20_000)).value
+    held = 0
+    for _ in range(400):
+        of_entry = shares(n_trainings)
+        held += over_trainings(middle(of_entry), [middle(of_one) for of_one in of_entry]).holds(truth)
+    assert 0.92 * 400 <= held <= 0.985 * 400
+
+
+def test_the_gap_counts_only_what_is_missing(protocol, reference):
+    """The best of the four achieves 20: runs of 9 and 11 lack half of it, runs of 39 and 41 nothing."""
+    assert standing_of(made_up_entry(protocol, "half", lambda k: 9.0), reference, protocol).gap == pytest.approx(0.5)
+    assert standing_of(made_up_entry(protocol, "twice", lambda k: 39.0), reference, protocol).gap == 0.0
 
 
 def test_references_of_measures_do_not_count(protocol, reference):
