@@ -6,10 +6,15 @@ from .page import details_page, page_block
 from .protocol import BenchmarkError, Protocol, ProtocolWorld, load_protocol
 from .running import BenchmarkQuestion, benchmark_question, run_benchmark
 from .standing import Standing, reference_of, scripted_entries, standing_of
+from .verification import Verification, VerificationQuestion, verification_question, verify_entry
 
 __all__ = [
     "run_benchmark",
     "benchmark_question",
+    "verify_entry",
+    "verification_question",
+    "VerificationQuestion",
+    "Verification",
     "BenchmarkQuestion",
     "load_protocol",
     "read_entry",

@@ -49,14 +49,9 @@ class BenchmarkQuestion(Question[Entry]):
         Raises:
             BenchmarkError: runs failed.
         """
-        if table.failures:
-            first = next(iter(table.failures.values()))
-            raise BenchmarkError(
-                f"Expected all {len(self.plan.specs)} runs to finish, {len(table.failures)} failed; the first, "
-                f"{first.spec.describe()}: {first.error}"
-            )
+        check_finished(table)
         policies = self.plan.policies
-        told = [_told_by_file(policy.policy) for policy in policies]
+        told = [policy_origin(policy.policy) for policy in policies]
         return Entry(
             version=self.protocol.version,
             identity=self.protocol.identity,
@@ -76,6 +71,20 @@ class BenchmarkQuestion(Question[Entry]):
             training=self.training,
             core_hours=_core_hours(table.records.values()),
             versions={package: version for package, version in software_versions().items() if version},
+        )
+
+
+def check_finished(table: Table) -> None:
+    """Refuse a table in which runs are missing.
+
+    Raises:
+        BenchmarkError: runs failed.
+    """
+    if table.failures:
+        first = next(iter(table.failures.values()))
+        raise BenchmarkError(
+            f"Expected all {len(table.plan.specs)} runs to finish, {len(table.failures)} failed; the first, "
+            f"{first.spec.describe()}: {first.error}"
         )
 
 
@@ -195,15 +204,15 @@ def _core_hours(records: Iterable[RunRecord]) -> float | None:
     return float(f"{sum(known) / 3600.0:.3g}") if known else None
 
 
-def _told_by_file(policy: str) -> dict[str, Any]:
-    """What the files of a policy tell: the hashes of their contents, and the seed of its training."""
+def policy_origin(policy: str) -> dict[str, Any]:
+    """Return what the files of a policy tell: `digest` of their contents, and the `seed` of its training."""
     from swarm_forage_env.policies.mixture import is_mixture, mixture_parts
     from swarm_forage_env.policies.model_files import file_digest
     from swarm_forage_env.policies.network import Network
     from swarm_forage_env.policies.pretrained import network_file
 
     if is_mixture(policy):
-        digests = [_told_by_file(part.policy)["digest"] for part in mixture_parts(policy)]
+        digests = [policy_origin(part.policy)["digest"] for part in mixture_parts(policy)]
         return {"digest": "+".join(filter(None, digests)), "seed": None}
     file = Path(file_of(policy)) if is_policy_file(policy) else network_file(policy)
     if file is None:

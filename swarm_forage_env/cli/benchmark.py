@@ -9,7 +9,7 @@ import typer
 
 from metrics.controllers import PAPER_POLICIES
 from swarm_forage_env._internal.wording import printable
-from swarm_forage_env.cli.options import AsJson, DryRun, Jobs, PolicyOptions
+from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, DryRun, Jobs, PolicyOptions
 
 if TYPE_CHECKING:
     from metrics.benchmark import BenchmarkQuestion, Board, Training
@@ -125,6 +125,50 @@ def worlds(as_json: AsJson = False) -> None:
 def show(entries: Entries, as_json: AsJson = False) -> None:
     """Show the scores of entries, beside the scripted controllers."""
     _show(_board_of(entries), as_json=as_json)
+
+
+def verify(
+    entry: Annotated[Path, typer.Argument(metavar="ENTRY", help="Entry file.")],
+    policy: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--policy",
+            metavar="NAME|FILE",
+            help="Policies of the entry in their order; default those installed under their names.",
+        ),
+    ] = None,
+    n_worlds: Annotated[
+        int, typer.Option("--worlds", min=1, help="How many worlds to draw, counted for each policy.")
+    ] = 8,
+    every: Annotated[bool, typer.Option("--all", help="Take all worlds.")] = False,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Draws the worlds.")] = 0,
+    out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Folder for records of runs.")] = Path(
+        "results/benchmark/verified"
+    ),
+    jobs: Jobs = None,
+    as_json: AsJson = False,
+    dry_run: DryRun = False,
+) -> None:
+    """Make runs of an entry again and say whether its numbers come out.
+
+    Scripted controllers and network files must give the same numbers, other policies numbers within chance.
+    """
+    from metrics.benchmark import verification_question
+    from metrics.scoring.question import ask
+    from swarm_forage_env.cli.errors import resumable
+    from swarm_forage_env.cli.printer import notes
+    from swarm_forage_env.cli.printer import show as print_answer
+    from swarm_forage_env.runs.plan_summary import summarize_plan
+
+    question = verification_question(entry, policy or (), n_worlds=None if every else n_worlds, seed=seed)
+    if dry_run:
+        typer.echo(summarize_plan(question.plan, out=out, jobs=jobs, tell=notes().print))
+        return
+    with resumable(out):
+        answer = ask(question, out=out, jobs=jobs)
+    print_answer(answer, as_json=as_json)
+    if answer.verdict == "differs":
+        raise typer.Exit(EXIT_FAILURE)
 
 
 def page(

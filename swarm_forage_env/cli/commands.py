@@ -56,6 +56,7 @@ COMMANDS: dict[str, tuple[Command, ...]] = {
         Command("benchmark", "Score policies in a fixed set of worlds.", "benchmark:run"),
         Command("benchmark worlds", "List the worlds of the benchmark.", "benchmark:worlds"),
         Command("benchmark show", "Show the scores of entries.", "benchmark:show"),
+        Command("benchmark verify", "Make runs of an entry again and compare.", "benchmark:verify"),
         Command("benchmark page", "Write the page that compares entries.", "benchmark:page"),
     ),
     "Look up": (
