@@ -199,7 +199,7 @@ def verification_question(
             )
     conditions = [Condition(spec, each.world) for spec in specs for each in chosen.worlds]
     if n_worlds is not None and n_worlds < len(conditions):
-        drawn = np.random.default_rng(seed).choice(len(conditions), n_worlds, replace=False)
+        drawn: list[int] = np.random.default_rng(seed).choice(len(conditions), n_worlds, replace=False).tolist()
         conditions = [conditions[k] for k in sorted(drawn)]
     return VerificationQuestion(
         plan=Plan(conditions=tuple(conditions), seeds=chosen.seeds), entry=entry, protocol=chosen, policies=specs

@@ -55,12 +55,12 @@ def test_a_seed_draws_the_worlds(entry, protocol, tmp_path):
 
 def test_policies_must_be_those_of_the_entry(entry, protocol, tmp_path):
     entry.write(tmp_path / "two.json")
-    with pytest.raises(BenchmarkError, match="Expected the 2 policies of .* got 1"):
+    with pytest.raises(BenchmarkError, match=r"Expected the 2 policies of .* got 1"):
         verify_entry(tmp_path / "two.json", ["crw"], protocol=protocol)
     with pytest.raises(BenchmarkError, match="got another one in ppo_warehouse_small"):
         verify_entry(tmp_path / "two.json", ["crw", "ppo_warehouse_small"], protocol=protocol)
     made_up_entry(protocol, "mine", lambda k: 1.0).write(tmp_path / "mine.json")
-    with pytest.raises(BenchmarkError, match="Expected --policy FILE .* mine_0.npz is not installed"):
+    with pytest.raises(BenchmarkError, match=r"Expected --policy FILE .* mine_0.npz is not installed"):
         verify_entry(tmp_path / "mine.json", protocol=protocol)
 
 
