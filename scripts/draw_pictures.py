@@ -1,4 +1,4 @@
-"""Draw the pictures of robots at work, of the window, and of theory, that README and docs show.
+"""Draw the pictures of robots at work, README's film, the window, and theory.
 
     python scripts/draw_pictures.py [FILE ...] [--out FOLDER]    default all of them, docs/images
 
@@ -17,6 +17,7 @@ from PIL import Image
 
 from metrics.scoring.theory import theory_figures
 from swarm_forage_env import load_policy, plan_run, scenario
+from swarm_forage_env.inspect.film import record_run
 from swarm_forage_env.inspect.watch import Watch
 from swarm_forage_env.rendering.figures import SCREEN
 from swarm_forage_env.rendering.frame import Trails, render_frame
@@ -36,6 +37,8 @@ FIELDS: dict[str, dict[str, Any]] = {
     "obstacles_crw.png": {"obstacles": ((14.0, 0.2, 14.4, 6.0), (14.0, 10.0, 14.4, 15.8), (20.0, 7.0, 21.0, 9.0))}
 }
 """File -> scenario fields that are not those of the preset."""
+FILM = "small.gif"
+"""The trained policy in the small warehouse: a hundred pictures of 300 s, half a megabyte."""
 WINDOWS = {"window.png": "dark", "window_light.png": "light"}
 """File -> theme of the window."""
 THEORY = ("self_organisation.png", "flexibility.png", "task_graph.png")
@@ -73,6 +76,14 @@ def draw(file: Path, scenario_name: str, policy_name: str, time_s: float, size_p
     print(file)
 
 
+def film(file: Path) -> None:
+    """Film the policy that was trained in the small warehouse, until the first robots have delivered."""
+    record_run(
+        scenario("warehouse_small"), "ppo_warehouse_small", file, seconds=300.0, speedup=30.0, fps=10.0, size_px=560
+    )
+    print(file)
+
+
 def draw_window(file: Path, theme: str) -> None:
     """Watch DPO with seed 0 until a robot near objects meets another one; raise the throttle and choose the robot."""
     import pygame
@@ -99,7 +110,7 @@ def draw_window(file: Path, theme: str) -> None:
 def main() -> None:
     """Draw what was asked for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    known = (*PICTURES, *WINDOWS, *THEORY)
+    known = (*PICTURES, FILM, *WINDOWS, *THEORY)
     parser.add_argument("files", nargs="*", metavar="FILE", help=f"default all: {', '.join(known)}")
     parser.add_argument("--out", type=Path, default=IMAGES, metavar="FOLDER", help="where they go")
     arguments = parser.parse_args()
@@ -109,6 +120,8 @@ def main() -> None:
     for name in arguments.files or known:
         if name in PICTURES:
             draw(arguments.out / name, *PICTURES[name])
+        elif name == FILM:
+            film(arguments.out / name)
         elif name in WINDOWS:
             draw_window(arguments.out / name, WINDOWS[name])
     for figure in theory_figures():

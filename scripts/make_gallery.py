@@ -2,12 +2,11 @@
 
     python scripts/make_gallery.py [NAME ... | --pages]
 
-The films are those of README.md, whose table is written, too. Without names, everything is made. A NAME is that of a
-replay or of a film. `--pages` makes no run: it puts the present style sheet and scripts around the runs of the stored
-replays, which is enough after a change of the page. Needs the render extra.
+Without names, everything is made. A NAME is that of a replay or of a film. `--pages` makes no run: it puts the present
+style sheet and scripts around the runs of the stored replays, which is enough after a change of the page. Needs the
+render extra.
 """
 
-import re
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +22,6 @@ from swarm_forage_env.runs.run import LiveRun, build_env
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 FOLDER = DOCS / "gallery"
-README = DOCS.parent / "README.md"
 HORIZON_S = 1000.0
 FRAME_S = 1.0
 SEED = 1
@@ -191,8 +189,7 @@ FILM_FPS = 6.0
 FILM_PX = 300
 FILM_TRAIL_S = 10.0
 MOST_FILM_BYTES = 400_000
-"""README shows all films at once."""
-_TABLE = re.compile(r"(<!-- films by scripts/make_gallery.py -->\n).*?(<!-- end of films -->)", re.DOTALL)
+"""The page shows all films at once."""
 
 
 def draw(exhibit: Exhibit) -> None:
@@ -231,7 +228,9 @@ def page() -> str:
         "",
         "[Replays](replay.md) of every scenario, every controller and every kind of adversity, most of them 1,000 s",
         "long. Download a file and open it in a browser. Runs side by side have the same seed.",
-        "`scripts/make_gallery.py` makes them all.",
+        "`scripts/make_gallery.py` makes them all. A click on a film leads to its replay.",
+        "",
+        *table_of_films(),
     ]
     for exhibit in EXHIBITS:
         title = exhibit.name.replace("_", " ")
@@ -263,18 +262,15 @@ def shoot(film: Film) -> None:
         sys.exit(f"Expected films of at most {MOST_FILM_BYTES / 1e3:.0f} kB; make it shorter or smaller.")
 
 
-def table_of_films() -> str:
-    """The films as a table in Markdown: each shows its caption and leads to its replay."""
+def table_of_films() -> list[str]:
+    """The films as lines of a table in Markdown: each shows its caption and leads to its replay."""
     lines: list[list[str]] = []
     for first in range(0, len(FILMS), FILM_COLUMNS):
         row = FILMS[first : first + FILM_COLUMNS]
-        pictures = [
-            f"[![{film.caption}](docs/gallery/{film.name}.gif)](docs/gallery.md#{film.exhibit.replace('_', '-')})"
-            for film in row
-        ]
+        pictures = [f"[![{film.caption}](gallery/{film.name}.gif)](#{film.exhibit.replace('_', '-')})" for film in row]
         captions = [film.caption for film in row]
         lines += [captions, pictures] if lines else [captions, ["---"] * len(row), pictures]
-    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines) + "\n"
+    return [f"| {' | '.join(cells)} |" for cells in lines]
 
 
 def make(names: list[str]) -> None:
@@ -293,15 +289,13 @@ def make(names: list[str]) -> None:
 
 
 def main(words: list[str]) -> None:
-    """Make what is asked for, or renew its pages; then write the page of the gallery, and the table in README.md."""
+    """Make what is asked for, or renew its pages; then write the page of the gallery."""
     if words == ["--pages"]:
         for exhibit in EXHIBITS:
             renew(exhibit)
     else:
         make(words)
     (DOCS / "gallery.md").write_text(page(), encoding="utf-8")
-    text = README.read_text(encoding="utf-8")
-    README.write_text(_TABLE.sub(lambda found: found[1] + table_of_films() + found[2], text), encoding="utf-8")
 
 
 if __name__ == "__main__":
