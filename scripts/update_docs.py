@@ -105,6 +105,13 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "stochx_program": ((f"python {ROOT}/scripts/stochx_beside_program.py",), ()),
     "from_scenario": ((f"python {ROOT}/scripts/from_scenario.py",), ()),
     "emptying": ((f"python {ROOT}/scripts/emptying_floor.py",), ("crw", "dpo")),
+    **{
+        f"lesson_{size}": (
+            (f"swarm-forage run crw,dpo --scenario classroom --robots {size} --seeds 4",),
+            ("crw", "dpo"),
+        )
+        for size in (1, 5, 10, 20, 40)
+    },
 }
 """Name -> commands, of which the last prints the table, and what its rows are called in blocks."""
 
