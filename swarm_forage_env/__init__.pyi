@@ -18,6 +18,8 @@ from .policies.registry import load_policy as load_policy
 from .policies.registry import policy_names as policy_names
 from .policies.registry import from_callable as from_callable
 from .contract.policy import Policy as Policy
+from .contract.robot_policy import RobotPolicy as RobotPolicy
+from .contract.robot_policy import StepError as StepError
 from .policies.registry import RandomPolicy as RandomPolicy
 from .runs.policy_spec import PolicySpec as PolicySpec
 from .runs.policy_spec import policy_spec as policy_spec

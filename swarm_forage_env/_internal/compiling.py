@@ -95,6 +95,11 @@ def kernel(function: F) -> F:
     return cast(F, compiled)
 
 
+def kernel_of_process(function: F) -> F:
+    """Compile a function that this process has made, a closure: as `kernel` does, but nothing is kept of it."""
+    return cast(F, njit(**_NOT_FROM_C, **_OPTIONS)(function))
+
+
 class HeldType(types.Type):
     """What numba knows of a tuple that is held, see `held`. As a value it is an address."""
 
@@ -117,8 +122,9 @@ def _widened(kind: Any) -> Any:
 @functools.cache
 def _for_callbacks(function: Callable[..., Any]) -> Any:
     """Return the version of a kernel that compiled code calls by its address."""
-    compiled = njit(**_NOT_FROM_PYTHON, **_OPTIONS)(function)
-    _keep_on_disk(compiled, "-callback")
+    compiled = njit(**_NOT_FROM_PYTHON, **_OPTIONS)(cast(Any, function).py_func)
+    if isinstance(cast(Any, function)._cache, _Cache):
+        _keep_on_disk(compiled, "-callback")
     return compiled
 
 
@@ -326,7 +332,7 @@ class Callback:
 
     @cached_property
     def _address(self) -> int:
-        version = _for_callbacks(cast(Any, self.function).py_func)
+        version = _for_callbacks(self.function)
         with _collector_off():
             version.compile(self._arguments)
         compiled = version.overloads[self._arguments]

@@ -69,8 +69,9 @@ class CompiledPolicy:
         return tick, self._chance.rows(tick)
 
     def count_ticks(self, n_ticks: int) -> None:
-        """Note that the kernel has done so many ticks."""
+        """Note that the kernel has done so many ticks, and see `KernelPolicy.check_ticks`."""
         self._policy.n_ticks += n_ticks
+        self._policy.check_ticks()
 
 
 def example_of(state: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -129,7 +130,11 @@ class KernelPolicy:
         self.n_ticks += 1
         self._draws = self._chance.row(self.n_ticks)
         self._step(obs, active, self._draws, self._state, self.n_ticks)
+        self.check_ticks()
         return self._actions
+
+    def check_ticks(self) -> None:
+        """Raise what has gone wrong inside the kernel since the last call; here nothing does."""
 
     def compiled(self) -> CompiledPolicy | None:
         """The policy for runs without Python between ticks.

@@ -1,0 +1,344 @@
+"""RobotPolicy: one function for one robot; runs by it, what robots remember, and what is told of faults."""
+
+import copy
+import math
+import pickle
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+from swarm_forage_env import (
+    CheckError,
+    ConfigError,
+    Event,
+    Grip,
+    RobotPolicy,
+    RunSpec,
+    StepError,
+    World,
+    check_policy,
+    load_policy,
+    run_policy,
+    scenario,
+)
+from swarm_forage_env._internal.compiling import is_compiled
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.contract.detection import sees_nest
+from swarm_forage_env.contract.policy import SwarmSpec
+from swarm_forage_env.runs.run import LiveRun, build_stack
+from tests.support.drivers import tick_by_tick
+from tests.support.foraging import mild_wrappers, quick_world
+
+EXAMPLE = f"{Path(__file__).resolve().parents[2] / 'docs/examples/fast_policy.py'}:SearchNearby"
+FEW = scenario("warehouse_small", n_robots=3, n_objects=40, horizon_s=20.0, interval_s=20.0)
+
+
+def acts(policy: RobotPolicy, ticks: int = 1, active: Any = (True, True, True), **columns: float) -> np.ndarray:
+    """Reset a policy for three robots, and let it act; columns of the observation hold what is given."""
+    spec = SwarmSpec.of(FEW)
+    policy.reset(spec, stream_rng(5, Stream.POLICY))
+    obs = np.zeros((3, spec.layout.size), np.float32)
+    for name, value in columns.items():
+        obs[:, spec.layout[name]] = value
+    for _ in range(ticks):
+        actions = policy.act(obs, np.array(active))
+    return actions
+
+
+class Counts(RobotPolicy):
+    reads = ("carrying", "ground", "event")
+    memory: ClassVar = {"ticks": 0, "total": 0.0, "has_seen": False, "last": (0.0, 0.0)}
+    parameters: ClassVar = {"speed": 0.25, "grips": (Grip.GRASP, Grip.SITE)}
+    draws = 2
+
+    @staticmethod
+    def step(see, robot, chance, known):
+        robot.ticks += 1
+        robot.total += chance[0]
+        robot.last[0], robot.last[1] = chance[0], chance[1]
+        robot.has_seen = robot.has_seen or sees_nest(see.ground)
+        if int(see.event * 16.0 + 0.5) == Event.PICKED_UP:
+            return 1, True, Grip.RELEASE
+        return known.speed, known.arena_size_m[1] / 32.0, known.grips[1 if see.carrying > 0.5 else 0]
+
+
+# Runs
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("wrappers", [(), mild_wrappers()], ids=["plain", "adverse"])
+@pytest.mark.parametrize("name", ["warehouse_small", "search_and_rescue"])
+def test_a_run_without_python_is_the_run_with_it(name, wrappers):
+    world = quick_world(name, interval_s=60.0)
+    one, other = load_policy(EXAMPLE), load_policy(EXAMPLE)
+    runs = [
+        LiveRun(build_stack(world, wrappers, reads=each.reads), each, seed=4) for each in (one, tick_by_tick(other))
+    ]
+    assert [run.compiled_policy is None for run in runs] == [False, True]
+    for run in runs:
+        run.advance()
+    results = [run._stack.columns() | run._stack.contributed() for run in runs]
+    assert results[0].keys() == results[1].keys()
+    for column, values in results[0].items():
+        np.testing.assert_array_equal(values, results[1][column], err_msg=column)
+    for state in ("position", "heading", "carried_object"):
+        np.testing.assert_array_equal(*(getattr(run.forage_env.swarm, state) for run in runs))
+    np.testing.assert_array_equal(one.robots, other.robots)
+    assert results[0]["first_picked"].sum() > 0
+    assert one.robots["place_m"].any()
+
+
+def test_it_keeps_the_rules_of_policies():
+    check_policy(Counts, FEW, ticks=40)
+
+
+@pytest.mark.compiled
+def test_the_example_keeps_them_too():
+    check_policy(EXAMPLE, quick_world("warehouse_small"))
+
+
+class WritesIntoWhatItSees(RobotPolicy):
+    @staticmethod
+    def step(see, robot, chance, known):
+        see.carrying = 0.25
+        return 0.0, 0.0, 0.0
+
+
+def test_one_that_writes_into_observations_breaks_them():
+    with pytest.raises(CheckError, match="leave obs and active as they are"):
+        check_policy(WritesIntoWhatItSees, FEW, ticks=10)
+
+
+# What a robot is given, and what it remembers
+
+
+def test_it_sees_remembers_and_draws_what_was_said():
+    policy = Counts()
+    np.testing.assert_array_equal(acts(policy, ticks=2, ground=0.7), [[0.25, 0.5, Grip.GRASP]] * 3)
+    drawn = stream_rng(5, Stream.POLICY).random((2, 3, 2))
+    robots = policy.robots
+    np.testing.assert_array_equal(robots["ticks"], 2)
+    np.testing.assert_array_equal(robots["total"], drawn[0, :, 0] + drawn[1, :, 0])
+    np.testing.assert_array_equal(robots["last"], drawn[1])
+    np.testing.assert_array_equal(robots["has_seen"], True)
+    np.testing.assert_array_equal(acts(policy, carrying=1.0)[:, 2], np.float32(Grip.SITE))
+    np.testing.assert_array_equal(policy.robots["has_seen"], False)  # reset begins anew
+    np.testing.assert_array_equal(acts(policy, event=1 / 16)[0], [1.0, 1.0, Grip.RELEASE])
+
+
+def test_a_robot_that_is_away_stands_keeps_its_cargo_and_remembers():
+    policy = Counts()
+    for carrying, grip in ((0.0, Grip.RELEASE), (1.0, Grip.GRASP)):
+        actions = acts(policy, ticks=3, active=(True, False, True), carrying=carrying)
+        np.testing.assert_array_equal(actions[1], np.float32([0.0, 0.0, grip]))
+        np.testing.assert_array_equal(policy.robots["ticks"], [3, 0, 3])
+
+
+def test_arguments_change_parameters_and_others_are_refused():
+    assert acts(Counts(speed=0.75))[0, 0] == 0.75
+    assert acts(Counts())[0, 0] == 0.25
+    with pytest.raises(ConfigError, match=r"Unknown parameter of Counts 'sped'. Did you mean 'speed'"):
+        Counts(sped=1.0)
+    with pytest.raises(StepError, match=r"Expected speed in the parameters of Counts to be numbers, .* got 'fast'"):
+        acts(Counts(speed="fast"))
+
+
+class Plain(RobotPolicy):
+    """Nothing is read, remembered or drawn; `step` calls others by name, one of which calls itself."""
+
+    reads = ()
+    draws = 0
+
+    @staticmethod
+    def step(see, robot, chance, known):
+        return half(1.0), factorial(3) / 12.0, Grip.DELIVER
+
+
+def half(x):
+    return x / 2.0
+
+
+def factorial(n):
+    return 1 if n == 0 else n * factorial(n - 1)
+
+
+def test_functions_that_it_calls_are_compiled_with_it():
+    np.testing.assert_array_equal(acts(Plain()), np.float32([[0.5, 0.5, Grip.DELIVER]] * 3))
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda policy: pickle.loads(pickle.dumps(policy))])  # noqa: S301 - made here
+def test_copies_go_on_by_themselves(copied):
+    policy = Counts()
+    acts(policy)
+    other = copied(policy)
+    obs = np.zeros((3, SwarmSpec.of(FEW).layout.size), np.float32)
+    for _ in range(2):
+        other.act(obs, np.ones(3, np.bool_))
+    assert (policy.robots["ticks"].tolist(), other.robots["ticks"].tolist()) == ([1] * 3, [3] * 3)
+
+
+# Faults in a run
+
+
+class Fails(RobotPolicy):
+    """Each way of failing comes in tick 7, to the third robot alone, after it has changed what it remembers."""
+
+    reads = ("proximity",)
+    memory: ClassVar = {"ticks": 0}
+    parameters: ClassVar = {"way": 0, "third": 0.0}
+
+    @staticmethod
+    def step(see, robot, chance, known):
+        robot.ticks += 1
+        late = robot.ticks == 7 and chance[0] == known.third
+        if late and known.way == 0:
+            raise ValueError("lost")
+        if late and known.way == 1:
+            see.proximity[robot.ticks + 17]
+        if late and known.way == 2:
+            return 1.0 / float(7 - robot.ticks), 0.0, 0.0
+        if late and known.way == 3:
+            return math.nan, 0.0, 0.0
+        return 0.5, 0.5, Grip.GRASP
+
+
+WAYS = {
+    0: r"ValueError: lost \(line \d+\)",
+    1: r"IndexError: index .*out of bounds.* \(line \d+\)",
+    2: r"ZeroDivisionError: .*division by zero \(line \d+\)",
+    3: r"\(nan, 0.0, 0.0\)",
+}
+
+
+def fails(way: int) -> Fails:
+    draws = stream_rng(5, Stream.POLICY).random((7, 3, 1))
+    return Fails(way=way, third=float(draws[6, 2, 0]))
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("changed", [lambda policy: policy, tick_by_tick], ids=["compiled", "by ticks"])
+def test_a_fault_ends_the_run_and_says_whose_where_and_when(way, changed, capfd):
+    spec = RunSpec(world=World(FEW), policy="fails", seed=5)
+    expected = rf"^Expected Fails.step to return \(left wheel, .* got {WAYS[way]}, for robot_2 in tick 7\.$"
+    with pytest.raises(StepError, match=expected) as raised:
+        run_policy(changed(fails(way)), spec)
+    assert "\n" not in str(raised.value)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_policy_that_failed_can_be_reset():
+    policy = fails(0)
+    with pytest.raises(StepError, match="tick 7"):
+        acts(policy, ticks=9)
+    acts(policy, ticks=6)
+
+
+class Early(RobotPolicy):
+    memory: ClassVar = {"patience": 0}
+
+    @staticmethod
+    def step(see, robot, chance, known):
+        if robot.patience < 1:
+            raise ValueError("no")
+        return 0.0, 0.0, 0.0
+
+
+def test_a_fault_is_told_by_check_policy():
+    with pytest.raises(CheckError, match=r"got StepError at tick 0.*: Expected Early.step .* ValueError: no"):
+        check_policy(Early, FEW)
+
+
+# Faults in the code
+
+
+def unread(see, robot, chance, known):
+    return see.light[0], 0.0, 0.0
+
+
+def unremembered(see, robot, chance, known):
+    robot.tick += 1
+    return 0.0, 0.0, 0.0
+
+
+def pair(see, robot, chance, known):
+    return 0.0, 0.0
+
+
+def nothing_now_and_then(see, robot, chance, known):
+    if robot.ticks < 0:
+        return 0.0, 0.0, 0.0
+    return None
+
+
+def words(see, robot, chance, known):
+    return 0.0, 0.0, "grasp"
+
+
+def undefined(see, robot, chance, known):
+    return 0.0, 0.0, grip  # noqa: F821 - on purpose
+
+
+def opens(see, robot, chance, known):
+    with Path("file") as file:
+        return 0.0, 0.0, file
+
+
+def two_kinds(see, robot, chance, known):
+    return (0.0, 0.0, 0.0) if robot.ticks else 0.0
+
+
+def clips(see, robot, chance, known):
+    return 0.0, 0.0, np.clip(chance[0], 0, 1)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    ("step", "told"),
+    [
+        (unread, r"'light' \(line \d+\), but see has proximity\."),
+        (unremembered, r"'tick' \(line \d+\), but robot has ticks\."),
+        (pair, r"a function that returns \(float64, float64\) in the place of \(left wheel"),
+        (nothing_now_and_then, r"a function that returns nothing \(None\) or \(float64, float64, float64\) in"),
+        (words, r"a function that returns \(float64, float64, unicode_type\) in"),
+        (undefined, "NameError: name 'grip' is not defined"),
+        (opens, "construct is not supported"),
+        (two_kinds, r"annot unify .*float64.* \(line \d+\)"),
+        (clips, r"clip\(float64, .*\), which it does not have \(line \d+\)"),
+    ],
+    ids=lambda value: getattr(value, "__name__", ""),
+)
+def test_code_that_is_not_compiled_is_told_in_one_line(step, told):
+    policy = type("Wrong", (RobotPolicy,), {"step": step, "reads": ("proximity",), "memory": {"ticks": 0}})()
+    with pytest.raises(
+        StepError, match=f"^Expected Wrong.step to be Python that numba compiles, got .*{told}"
+    ) as raised:
+        acts(policy)
+    assert "\n" not in str(raised.value)
+    assert str(raised.value).endswith("docs/policies.md, A fast one.")
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ({"step": lambda obs: obs}, "Expected Wrong.step to take see, robot, chance, known and .* got .* obs"),
+        ({"step": lambda self, see, robot, chance, known: 0}, "got a function of self, see, .*so it has no self"),
+        ({"step": lambda: 0}, "got a function of nothing"),
+        ({"draws": -1}, "Expected draws of Wrong to be a whole number >= 0, got -1"),
+        ({"memory": {"name": "x"}}, "Expected name in the memory of Wrong to be numbers, or True or False, got 'x'"),
+        ({"memory": {"2nd": 0}}, "Expected another name in the memory of Wrong, got '2nd'"),
+        ({"memory": {"size": 0}}, "Expected another name in the memory of Wrong, got 'size'"),
+        ({"parameters": {"dt_s": 0.1}}, "Expected another name in the parameters of Wrong, got 'dt_s'"),
+    ],
+)  # fmt: skip
+def test_what_makes_no_sense_is_refused_when_the_class_is_made(words, told):
+    with pytest.raises(ConfigError, match=told):
+        type("Wrong", (RobotPolicy,), words)
+
+
+def test_without_the_compiler_it_runs_as_python():
+    """The coverage run switches the compiler off; elsewhere this says that it is on."""
+    policy = Plain()
+    acts(policy)
+    assert is_compiled(policy._kernel) == is_compiled(sees_nest)
