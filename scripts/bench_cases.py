@@ -14,6 +14,7 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,7 @@ FIRST_EFFORT = 0.1
 SHORT_TICKS = 20
 """Of a run that tells what making a world costs."""
 SMALL, MEDIUM = "warehouse_small", "warehouse_medium"
+EXAMPLE = f"{Path(__file__).resolve().parents[1] / 'docs/examples/fast_policy.py'}:SearchNearby"
 
 
 @dataclass(frozen=True)
@@ -267,6 +269,7 @@ CASES = {
     "network-50": Case("a trained network, small", runs("generalist", SMALL, 10_000), target="400"),
     "network-200": Case("a trained network, medium", runs("generalist", MEDIUM, 5_000), target="250"),
     "numpy-200": Case("a policy of numpy", numpy_policy),
+    "function-200": Case("a function for one robot, compiled", runs(EXAMPLE, MEDIUM, 10_000), beside="dpo-200"),
     "noise-200": Case("DPO, noise on sensors and wheels", runs("dpo", MEDIUM, 5_000, wrappers=NOISE), TICK, "360"),
     "throttle-200": Case("DPO, throttle", runs("dpo", MEDIUM, 5_000, wrappers=THROTTLE), TICK, "240"),
     "failures-200": Case("DPO, failures and repairs", runs("dpo", MEDIUM, 5_000, wrappers=FAILURES), TICK, "240"),

@@ -82,16 +82,19 @@ def type_of_result(function: Any, arguments: Mapping[str, Any]) -> Any:
 
 def are_numbers(kind: Any, count: int) -> bool:
     """Return whether numba's type is that of a tuple of so many real numbers."""
-    parts = tuple(kind) if isinstance(kind, types.BaseTuple) else ()
+    parts: Any = kind if isinstance(kind, types.BaseTuple) else ()
     return len(parts) == count and all(isinstance(part, types.Integer | types.Float | types.Boolean) for part in parts)
 
 
 def told_of(kind: Any) -> str:
     """Return words for the type of a result."""
-    if isinstance(kind, types.Optional | types.NoneType):
-        return "nothing (None)" if kind is types.none else f"nothing (None) or {told_of(kind.type)}"
+    if kind is types.none:
+        return "nothing (None)"
+    if isinstance(kind, types.Optional):
+        return f"nothing (None) or {told_of(kind.type)}"
     if isinstance(kind, types.BaseTuple):
-        return f"({', '.join(map(told_of, kind))})"
+        parts: Any = kind
+        return f"({', '.join(map(told_of, parts))})"
     return str(types.unliteral(kind))
 
 

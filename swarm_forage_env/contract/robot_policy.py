@@ -201,7 +201,9 @@ def _kernel_of(
     function = own_kernel(step, _INSTEAD)
     if is_compiled(function):
         records = (np.zeros(1, kind)[0] for kind in kinds)
-        example = dict(zip(ARGUMENTS, (next(records), next(records), np.zeros(0), next(records)), strict=True))
+        example: dict[str, Any] = dict(
+            zip(ARGUMENTS, (next(records), next(records), np.zeros(0), next(records)), strict=True)
+        )
         returned = type_of_result(function, example)
         if not are_numbers(returned, COMMANDS):
             raise OwnCodeError(f"a function that returns {told_of(returned)} in the place of {ACTION}")
@@ -245,7 +247,7 @@ def _see_type(layout: ObservationLayout, reads: tuple[str, ...] | None) -> np.dt
         for part in layout
         if reads is None or part.name in reads or (part.name == "light" and LIGHT_IF_CARRYING in reads)
     ]
-    described = {
+    described: Any = {
         "names": [part.name for part in parts],
         "formats": [(np.float32, (part.size,) if part.size > 1 else ()) for part in parts],
         "offsets": [part.start * 4 for part in parts],

@@ -54,6 +54,12 @@ def test_python_examples_run_with_their_extras(page, tmp_path, monkeypatch):
     run_all([block for _, block in examples(page)], page)
 
 
+@pytest.mark.parametrize("file", sorted((ROOT / "docs/examples").glob("*.py")), ids=lambda file: file.name)
+def test_files_of_examples_stand_in_a_page(file):
+    shown = f"```python\n{file.read_text()}```\n"
+    assert [page.name for page in PAGES if shown in page.read_text()] != [], f"{file}: no page shows it as it is"
+
+
 @pytest.mark.parametrize("name", ["run", "tests"])
 def test_marked_commands_of_the_readme_are_one_line_each(name):
     text = (ROOT / "README.md").read_text()
