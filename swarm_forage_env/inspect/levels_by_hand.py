@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import ConfigError, number
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 from swarm_forage_env.wrappers.handling import IDEAL_COST, HandlingCost, HandlingCostConfig
@@ -35,6 +35,8 @@ class LevelKind:
     """Of the wrapper's configuration: a number or a `Waveform`, whose amplitude is the level."""
     step: float
     lowest: float
+    per_1000_s: bool = False
+    """Whether people give it per 1,000 s, where the field has it per tick."""
 
 
 LEVELS = {
@@ -44,6 +46,13 @@ LEVELS = {
     "h": LevelKind("handling ticks", HandlingCost, "waveform", 10.0, IDEAL_COST),
 }
 """Key -> level. The steps are our choice, of the size of those between the paper's levels."""
+RATES = {
+    "failures": LevelKind("failures per 1,000 s", PopulationDynamics, "malfunction_per_tick", 0.5, 0.0, True),
+    "repairs": LevelKind("repairs per 1,000 s", PopulationDynamics, "repair_per_tick", 0.5, 0.0, True),
+    "deaths": LevelKind("deaths per 1,000 s", PopulationDynamics, "death_per_tick", 0.5, 0.0, True),
+}
+"""Name -> rate of the whole swarm. The window has no keys for them."""
+_KINDS = {**LEVELS, **RATES}
 
 
 def with_idle(wrappers: Iterable[WrapperConfig]) -> tuple[WrapperConfig, ...]:
@@ -66,31 +75,53 @@ class Levels:
             self._wrappers[type(stack)] = stack
             stack = stack.env  # type: ignore[assignment] - PettingZoo types it as any parallel environment
         self.changes: list[str] = []
+        self._dt_s = stack.unwrapped.scenario.dt_s
+        self._per_1000_s = 1000.0 / self._dt_s
+
+    @property
+    def configs(self) -> tuple[WrapperConfig, ...]:
+        """What disturbs the swarm now, as a run could have it from its start; without what changes nothing."""
+        return tuple(one.made_from for one in self._wrappers.values() if one.made_from not in _IDLE)
 
     def level(self, key: str) -> float | None:
         """Return the level now; None for a table of values, which has no amplitude."""
-        kind = LEVELS[key]
+        kind = _KINDS[key]
         value = getattr(self._wrappers[kind.wrapper].made_from, kind.field)
-        if not isinstance(value, Waveform):
-            return value
-        return None if value.kind == "table" else value.amplitude
+        if isinstance(value, Waveform):
+            return None if value.kind == "table" else value.amplitude
+        return round(value * self._per_1000_s, 9) if kind.per_1000_s else value
 
     def change(self, key: str, *, up: bool) -> str:
         """Change a level by one step; returns one line about what has become of it."""
-        kind, now = LEVELS[key], self.level(key)
+        kind, now = _KINDS[key], self.level(key)
         if now is None:
             return f"{kind.name} follows a table, which has no amplitude to change"
         # Rounding keeps 0.05 + 0.05 + 0.05 at 0.15.
         wanted = max(kind.lowest, round(now + (kind.step if up else -kind.step), 9))
         if wanted == now:
             return f"{kind.name} is {now:g}, the lowest level"
-        wrapper = self._wrappers[kind.wrapper]
-        value = getattr(wrapper.made_from, kind.field)
         try:
-            changed = replace(value, amplitude=wanted) if isinstance(value, Waveform) else wanted
-            wrapper.reconfigure(replace(wrapper.made_from, **{kind.field: changed}))
+            return self.set(key, wanted)
         except ConfigError:
             return f"{kind.name} is {now:g}, the highest level"
+
+    def set(self, key: str, wanted: float) -> str:
+        """Change a level to a value; returns one line about it.
+
+        Raises:
+            ConfigError: the level cannot be that, or it follows a table; it stays what it was.
+        """
+        kind, wrapper = _KINDS[key], self._wrappers[_KINDS[key].wrapper]
+        number(kind.name, wanted, at_least=kind.lowest)
+        if self.level(key) is None:
+            raise ConfigError(f"Expected {kind.name} with an amplitude, got a table of values; it stays as it is.")
+        if wanted == self.level(key):
+            return f"{kind.name} is {wanted:g}"
+        value = getattr(wrapper.made_from, kind.field)
+        changed = wanted / self._per_1000_s if kind.per_1000_s else wanted
+        if isinstance(value, Waveform):
+            changed = replace(value, amplitude=wanted)
+        wrapper.reconfigure(replace(wrapper.made_from, **{kind.field: changed}))
         self._note(kind.name, f"{kind.name} {wanted:g}")
         return f"{kind.name} is {wanted:g}"
 
@@ -100,6 +131,25 @@ class Levels:
             return f"robot {robot} is not alive"
         self._note("", f"robot {robot} killed")
         return f"robot {robot} was killed"
+
+    def break_down(self, robot: int) -> str:
+        """Send a robot to repair; returns one line about it."""
+        if not self._wrappers[PopulationDynamics].break_down(robot):
+            return f"robot {robot} is not at work"
+        self._note("", f"robot {robot} broken")
+        return f"robot {robot} broke down and waits for repair"
+
+    def repair(self, robot: int) -> str:
+        """Let a robot come back from repair; returns one line about it."""
+        if not self._wrappers[PopulationDynamics].repair(robot):
+            return f"robot {robot} is not in repair"
+        self._note("", f"robot {robot} repaired")
+        return f"robot {robot} is at work again"
+
+    def signals(self, tick: int) -> dict[str, float]:
+        """Return what the waveforms of time are at a tick, by name of the wrapper; see `Replay.signals`."""
+        waves = [self._wrappers[kind].made_from for kind in (Throttle, HandlingCost)]
+        return {one.name: one.waveform.signal(self._dt_s)(tick) for one in waves}
 
     def _note(self, same: str, change: str) -> None:
         """Keep a change; a later one of the same level replaces the earlier."""

@@ -1,25 +1,20 @@
-"""Watching a run in a window: `watch_run` drives a policy and lets a person look, choose, and disturb.
-
-Looking changes nothing: until a level is changed or a robot killed by hand, the run is the one that `run_one` makes.
-"""
+"""Watching a run in a window: `watch_run` drives a policy and lets a person look, choose, and disturb."""
 
 import math
-import time
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
 from swarm_forage_env._internal.fields import number
-from swarm_forage_env.contract.codes import Counter, Task
-from swarm_forage_env.contract.policy import Memories, Policy, RememberedPlaces
-from swarm_forage_env.inspect.film import cast_policy, size_words
-from swarm_forage_env.inspect.levels_by_hand import LEVELS, Levels, with_idle
+from swarm_forage_env.contract.policy import Policy, RememberedPlaces
+from swarm_forage_env.inspect.film import size_words
+from swarm_forage_env.inspect.levels_by_hand import LEVELS
+from swarm_forage_env.inspect.run_by_hand import SPEEDS, RunByHand
 from swarm_forage_env.rendering.close_up import render_close_up
 from swarm_forage_env.rendering.frame import render_frame
 from swarm_forage_env.rendering.view import arena_view, refusing
 from swarm_forage_env.rendering.window import CLOSE_UP_PX, Clicked, Closed, Pressed, Scene, Window, WindowEvent
-from swarm_forage_env.runs.run import LiveRun, build_env
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M
 from swarm_forage_env.wrappers.base import WrapperConfig
@@ -30,27 +25,18 @@ HELP = (
     "t, s, w, h: raise throttle, sensor noise, wheel noise, handling   with shift: lower   shift and click: kill   "
     "q: quit"
 )
-SPEEDS = (0.2, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)
-"""Simulated seconds per second; our choice."""
 FRAMES_PER_S = 30.0
-LONGEST_S = 0.1
-"""Ticks of one frame take at most this long, so that the window answers even if the run is slower than its speed."""
 _NEAREST_PX = 30.0
 """A click farther from every robot chooses none."""
 _MARK_GAP_PX = 4.0
 """How much larger than the thing a mark of memory is."""
 _SIDES_M = (0.8, 1.2, 1.6, 2.4, 4.0, 8.0)
-_SHOWN_SLICES = ("proximity", "los_cell", "los_object", "los_cache")
 
 
-class Watch:
+class Watch(RunByHand):
     """A run, and how somebody looks at it.
 
     Attributes:
-        run: The run; it goes on by `advance` only.
-        levels: What can be changed by hand.
-        paused: Whether the clock stands still.
-        speed: Simulated seconds per second, one of `SPEEDS` after a key.
         robot: Row of the chosen robot, None for none.
         note: What the last key or click has done.
         is_closed: Whether the user wants to see no more.
@@ -73,41 +59,16 @@ class Watch:
         with refusing():
             number("speed", speed, above=0.0)
         arena_view(scenario, size_px, theme)  # refuses a bad size or theme before the run starts
-        self._policy, self._name, self.scenario = cast_policy(policy, scenario, caches, parameters)
-        disturbed = tuple(wrappers)
-        self._headline = World(self.scenario, disturbed).title(self._name, size_words(self.scenario))
-        reads = getattr(self._policy, "reads", None)
-        stack = build_env(
-            self.scenario, with_idle(disturbed), reads=None if reads is None else tuple({*reads, *_SHOWN_SLICES})
+        super().__init__(
+            scenario, policy, seed=seed, speed=speed, caches=caches, parameters=parameters, wrappers=wrappers
         )
-        self.levels = Levels(stack)
-        self._size_px, self._theme, self._seed = size_px, theme, seed
+        self._headline = World(self.scenario, self.given).title(self.name, size_words(self.scenario))
+        self._size_px, self._theme = size_px, theme
         self._view = arena_view(self.scenario, size_px, theme)
-        self.run = LiveRun(stack, self._policy, seed)
-        self.world = self.run.forage_env
-        self.paused, self.speed, self.note = False, speed, ""
         self.robot: int | None = None
+        self.note = ""
         self._side = _SIDES_M.index(1.6)
         self.is_closed = False
-        self._owed_ticks = 0.0
-
-    # Time
-
-    def advance(self, seconds: float) -> None:
-        """Let the run go on for what is due after `seconds` of the viewer's time; less if it takes too long."""
-        if self.paused:
-            return
-        self._owed_ticks += seconds * self.speed / self.scenario.dt_s
-        until = time.perf_counter() + LONGEST_S
-        while self._owed_ticks >= 1.0 and not self.run.over:
-            self._owed_ticks -= 1.0
-            self.step()
-            if time.perf_counter() > until:
-                self._owed_ticks %= 1.0
-
-    def step(self) -> None:
-        """Let the run go on for one tick, if it is not over."""
-        self.run.advance(to_tick=self.world.tick + 1)
 
     # Keys and clicks
 
@@ -192,7 +153,7 @@ class Watch:
         if self.robot is not None and world.swarm.present[self.robot]:
             column, row = self._view.pixels(world.swarm.position[self.robot]).tolist()
             ring = (column, row, 2.5 * self._view.robot_px + 4.0)
-            remembered = self._remembered_places(self.robot)
+            remembered = self.remembered_places(self.robot)
             marks = self._marks(remembered)
             close_up = render_close_up(
                 self.scenario,
@@ -216,10 +177,6 @@ class Watch:
             palette=self._view.palette,
         )
 
-    def _remembered_places(self, robot: int) -> RememberedPlaces | None:
-        tell: Callable[[], Memories] | None = getattr(self._policy, "describe_memories", None)
-        return None if tell is None else tell().of_robot(robot)
-
     def _marks(self, remembered: RememberedPlaces | None) -> tuple[tuple[float, float, float], ...]:
         """Return squares of the frame, around the places of objects and of caches."""
         if remembered is None:
@@ -236,9 +193,7 @@ class Watch:
 
     def title(self) -> str:
         """Return the text of the title bar; it names all that was changed by hand."""
-        title = f"{self._headline}, seed {self._seed}"
-        changes = ", ".join(self.levels.changes)
-        return f"{title} - changed by hand: {changes}" if changes else title
+        return f"{self._headline}, seed {self.seed}{self.changes_in_words(' - changed by hand: ')}"
 
     def _lines(self) -> list[str]:
         clock = "over" if self.run.over else "paused" if self.paused else f"{self.speed:g} times real time"
@@ -246,7 +201,7 @@ class Watch:
         levels = [f"{kind.name} {_told(self.levels.level(key))}" for key, kind in LEVELS.items()]
         lines = [f"{tick}, {clock}", "; ".join(levels)]
         if self.levels.changes:
-            lines.append(f"changed by hand: {', '.join(self.levels.changes)}")
+            lines.append(self.changes_in_words("changed by hand: "))
         if self.note:
             lines.append(self.note)
         return [*lines, "", *self._robot_lines()]
@@ -276,26 +231,15 @@ class Watch:
 
     def _policy_lines(self, robot: int) -> list[str]:
         """Return what the policy tells of a robot: task, activity, memory."""
-        policy, lines = self._policy, []
-        if hasattr(policy, "task"):
-            lines.append(f"task: {Task(int(policy.task[robot])).name.lower().replace('_', ' ')}")  # type: ignore[attr-defined] - optional, see Policy
-        if hasattr(policy, "describe_robot"):
-            lines.append(f"does: {policy.describe_robot(robot)}")  # type: ignore[attr-defined] - optional, see Policy
+        policy, lines = self.policy, [f"{name}: {text}" for name, text in self.told_of(robot)]
         if hasattr(policy, "describe_robots"):
             known = policy.describe_robots().n_remembered  # type: ignore[attr-defined] - optional, see Policy
             if known is not None:
                 shown = ", in thin frames" if hasattr(policy, "describe_memories") else ""
                 lines.append(f"remembers: {known[robot]}{shown}")
-        elif (places := self._remembered_places(robot)) is not None:
+        elif (places := self.remembered_places(robot)) is not None:
             lines.append(f"remembers: {len(places.objects_m) + len(places.caches_m)}, in thin frames")
-        return lines or [f"{self._name} does not tell what its robots are doing"]
-
-    def summary(self) -> str:
-        """Return one line about the run so far, for when the window is closed."""
-        delivered = self.world.events.counters[Counter.COLLECTED]
-        changes = ", ".join(self.levels.changes)
-        told = f"{self.world.tick * self.scenario.dt_s:,.0f} s, {delivered:,} delivered"
-        return f"{told}; changed by hand: {changes}" if changes else told
+        return lines or [f"{self.name} does not tell what its robots are doing"]
 
 
 _KEYS: dict[str, Callable[[Watch, Pressed], None]] = {

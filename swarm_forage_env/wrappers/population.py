@@ -1,11 +1,13 @@
 """PopulationDynamics: robots that die, are born, break down and are repaired during a run."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, number, one_of, whole
+from swarm_forage_env.contract.types import BoolArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.obstacles import distances_m
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
@@ -15,6 +17,8 @@ from swarm_forage_env.wrappers.population_process import (
     EventTally,
     PopulationState,
     advance_population,
+    break_down,
+    come_back,
     die,
 )
 
@@ -23,6 +27,7 @@ BIRTH_MARGIN_M = 2.0
 BIRTH_TRIALS = 1000
 """Positions that are tried in one tick (study configuration)."""
 DEATHS = ("terminate", "absorbing")
+_RATES = ("death_per_tick", "birth_per_tick", "malfunction_per_tick", "repair_per_tick")
 
 _STUDY_REPAIR_PER_TICK = {50: 0.001022222, 200: 0.001005556}
 """Swarm size -> lowest repair rate of the study."""
@@ -62,6 +67,7 @@ class PopulationDynamics(SwarmWrapper):
                 f"can be born, got {config.initial_robots}."
             )
         self._config = config
+        self._seed = 0
         margin = min(BIRTH_MARGIN_M, scenario.robots.start_margin_m)
         self._birth_low = np.array([margin, margin])
         self._birth_high = np.array([scenario.arena.width_m, scenario.arena.height_m]) - margin
@@ -70,6 +76,7 @@ class PopulationDynamics(SwarmWrapper):
     def on_reset(self, seed: int) -> None:
         """Start the clocks; robots that are not yet born leave the arena before the first observation."""
         config = self._config
+        self._seed = seed
         n_robots = self.unwrapped.scenario.robots.n_robots
         self._state = PopulationState.start(
             n_robots, initial_robots=config.initial_robots, max_robots=config.max_robots
@@ -99,11 +106,38 @@ class PopulationDynamics(SwarmWrapper):
         """Count ticks of robots in repair."""
         self._repair_ticks += n_ticks * len(self._state.repair_queue)
 
+    def reconfigure(self, config: "PopulationConfig") -> None:
+        """Go on under other rates from the next tick on.
+
+        The next event of each process is drawn anew, which changes nothing of its distribution: how long one has waited
+        says nothing about an exponential. Robots that are there, dead or not yet born stay so.
+
+        Raises:
+            ConfigError: another field than the rates is to change.
+        """
+        others = replace(config, **{field: getattr(self._config, field) for field in _RATES})
+        if others != self._config:
+            raise ConfigError(f"Expected other rates only, {', '.join(_RATES)}, got {config}; start another run.")
+        self.made_from = self._config = config
+        self._clocks = EventClocks(config.rates, self._seed, tick=self.unwrapped.tick)
+        self._next_tick = self._clocks.next_tick
+
     def kill(self, row: int) -> bool:
         """Let one robot die now, between two ticks; returns whether it was alive."""
-        if not self._state.present[row]:
+        return self._change_by_hand(die, row, self._state.present)
+
+    def break_down(self, row: int) -> bool:
+        """Let one robot wait for repair from now on, between two ticks; returns whether it was at work."""
+        return self._change_by_hand(break_down, row, self._state.active)
+
+    def repair(self, row: int) -> bool:
+        """Let one robot come back from repair now, between two ticks; returns whether it was there."""
+        return self._change_by_hand(come_back, row, self._state.present & ~self._state.active)
+
+    def _change_by_hand(self, event: Callable[[PopulationState, int, int], None], row: int, able: BoolArray) -> bool:
+        if not able[row]:
             return False
-        die(self._state, row, self.unwrapped.tick + 1)
+        event(self._state, row, self.unwrapped.tick + 1)
         self._apply()
         return True
 

@@ -51,15 +51,15 @@ class EventClock:
     Each process has two generators, one for times and one for choices.
     """
 
-    def __init__(self, rate: float, times: np.random.Generator, choices: np.random.Generator) -> None:
-        """Start at tick 0; `rate` in events per tick."""
+    def __init__(self, rate: float, times: np.random.Generator, choices: np.random.Generator, *, tick: int = 0) -> None:
+        """Start at a tick; `rate` in events per tick."""
         self._rate = rate
         self._times = times
         self.choices = choices
         self.next_tick = np.inf
         """First tick at which the next event may happen."""
         if rate > 0.0:
-            self.restart(0)
+            self.restart(tick)
 
     def restart(self, tick: int) -> None:
         """Draw when the next event is due, after one at `tick`."""
@@ -82,13 +82,13 @@ class EventClocks:
     make every level of a sweep look worse than its rates are.
     """
 
-    def __init__(self, rates: EventRates, seed: int) -> None:
-        """Start all clocks of the run with `seed`."""
+    def __init__(self, rates: EventRates, seed: int, *, tick: int = 0) -> None:
+        """Start all clocks of the run with `seed` at a tick."""
         sources = stream_rng(seed, Stream.POPULATION, astuple(rates)).spawn(8)
-        self.death = EventClock(rates.death, sources[0], sources[1])
-        self.birth = EventClock(rates.birth, sources[2], sources[3])
-        self.malfunction = EventClock(rates.malfunction, sources[4], sources[5])
-        self.repair = EventClock(rates.repair, sources[6], sources[7])
+        self.death = EventClock(rates.death, sources[0], sources[1], tick=tick)
+        self.birth = EventClock(rates.birth, sources[2], sources[3], tick=tick)
+        self.malfunction = EventClock(rates.malfunction, sources[4], sources[5], tick=tick)
+        self.repair = EventClock(rates.repair, sources[6], sources[7], tick=tick)
 
     @property
     def next_tick(self) -> float:
@@ -191,12 +191,12 @@ def advance_population(
         clocks.birth.restart(tick)
         changed = True
     if tick >= clocks.malfunction.next_tick and state.active.any():
-        _break_down(state, clocks.malfunction.choose(state.active), tick)
+        break_down(state, clocks.malfunction.choose(state.active), tick)
         clocks.malfunction.restart(tick)
         changed = True
     if tick >= clocks.repair.next_tick:
         if state.repair_queue:
-            _return(state, tick)
+            come_back(state, state.repair_queue[0], tick)
             changed = True
         clocks.repair.restart(tick)
     return changed
@@ -225,7 +225,8 @@ def _enter(state: PopulationState, tick: int) -> None:
     state.tally.births += 1
 
 
-def _break_down(state: PopulationState, row: int, tick: int) -> None:
+def break_down(state: PopulationState, row: int, tick: int) -> None:
+    """Let a robot at work join the end of the repair queue; `tick` as in `die`."""
     _end_stay(state, row, tick)
     state.since[row] = tick
     state.repair_queue.append(row)
@@ -238,8 +239,9 @@ def _end_stay(state: PopulationState, row: int, tick: int) -> None:
     state.tally.stay_ticks += tick - int(state.since[row])
 
 
-def _return(state: PopulationState, tick: int) -> None:
-    row = state.repair_queue.pop(0)
+def come_back(state: PopulationState, row: int, tick: int) -> None:
+    """Let a robot in repair, wherever in the queue, be active again; `tick` as in `die`."""
+    state.repair_queue.remove(row)
     state.active[row] = True
     state.tally.repairs += 1
     state.tally.absence_ticks += tick - int(state.since[row])

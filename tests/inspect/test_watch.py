@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from swarm_forage_env.inspect import watch as watching
+from swarm_forage_env.inspect import run_by_hand
 from swarm_forage_env.inspect.levels_by_hand import LEVELS, Levels, with_idle
 from swarm_forage_env.inspect.watch import HELP, SPEEDS, Watch, watch_run
 from swarm_forage_env.policies.registry import load_policy
@@ -69,7 +69,7 @@ def test_looking_changes_nothing(policy, wrappers):
 def test_marks_are_where_the_chosen_robot_remembers_things():
     watch = Watch(SMALL, "stochm", seed=3, size_px=400)
     watch.run.advance(to_tick=1500)
-    policy, view = watch._policy, watch._view
+    policy, view = watch.policy, watch._view
     for robot in range(8):
         watch.robot = robot
         objects = [(x, y) for x, y, _ in policy.remembered(robot).values()]
@@ -89,7 +89,7 @@ def test_a_policy_that_does_not_tell_has_no_marks():
 
 
 def test_pause_one_tick_and_speed(watch, monkeypatch):
-    monkeypatch.setattr(watching, "LONGEST_S", 1000.0)  # ticks take long while they are compiled
+    monkeypatch.setattr(run_by_hand, "LONGEST_S", 1000.0)  # ticks take long while they are compiled
     watch.advance(0.2)
     assert watch.world.tick == 10
     press(watch, "space")
@@ -108,7 +108,7 @@ def test_pause_one_tick_and_speed(watch, monkeypatch):
 
 
 def test_a_slow_run_does_not_keep_the_window_waiting(watch, monkeypatch):
-    monkeypatch.setattr(watching, "LONGEST_S", -1.0)
+    monkeypatch.setattr(run_by_hand, "LONGEST_S", -1.0)
     watch.advance(0.2)
     assert watch.world.tick == 1
     watch.advance(0.02)
@@ -150,7 +150,7 @@ def test_the_scene_tells_of_the_chosen_robot(watch):
     text = "\n".join(scene.lines)
     assert scene.close_up.shape == (300, 300, 3)
     assert "robot 4 at" in text
-    assert watch._policy.describe_robot(4) in text
+    assert watch.policy.describe_robot(4) in text
     assert "remembers: 0, in thin frames" in text
     assert scene.help == HELP
 

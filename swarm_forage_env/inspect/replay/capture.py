@@ -67,31 +67,18 @@ def record_replay(
     started = Started.now()
     scenario = spec.scenario
     end = _last_tick(scenario, seconds)
-    step = _ticks_between_frames(scenario, end, frame_s)
+    step = ticks_between_frames(scenario, end, frame_s)
     policy = load_policy(spec.policy, spec.parameters) if policy is None else policy
     recorder = build_stack(scenario, spec.wrappers, reads=getattr(policy, "reads", None))
     run = LiveRun(recorder, policy, spec.seed, by_ticks=True)
-    env = run.forage_env
-    album = _Album(env, policy, 1 + math.ceil(end / step))
-    album.look()
-    while env.tick < end and not run.over:
-        frame_end = min(env.tick + step, end)
-        while env.tick < frame_end and not run.over:
-            run.advance(to_tick=env.tick + 1)
-            album.note_deliveries()
-        album.look()
+    capture = Capture(run, policy, end_tick=end, frame_ticks=step)
+    while capture.tick < end and not run.over:
+        for _ in range(min(step, end - capture.tick)):
+            capture.advance()
         if progress is not None:
-            progress(env.tick, end)
+            progress(capture.tick, end)
     recorder.close()
-    replay = Replay(
-        spec=spec,
-        label=policy_label(spec.policy),
-        frame_ticks=step,
-        end_tick=env.tick,
-        signals=_signals(spec, album.ticks),
-        versions=software_versions(),
-        **album.arrays(),
-    )
+    replay = capture.replay(spec, signals=_signals(spec, capture.ticks))
     return replay, finished_record(recorder, spec, started) if recorder.complete else None
 
 
@@ -108,7 +95,8 @@ def _last_tick(scenario: ScenarioConfig, seconds: float | None) -> int:
     return max(1, round(seconds / scenario.dt_s))
 
 
-def _ticks_between_frames(scenario: ScenarioConfig, end: int, frame_s: float | None) -> int:
+def ticks_between_frames(scenario: ScenarioConfig, end: int, frame_s: float | None = None) -> int:
+    """Return the ticks between two frames of a replay of `end` ticks; `frame_s` and errors as in `record_replay`."""
     if frame_s is not None:
         with refusing():
             number("frame_s", frame_s, at_least=scenario.dt_s)
@@ -138,10 +126,26 @@ def _signals(spec: RunSpec, ticks: list[int]) -> dict[str, np.ndarray]:
     }
 
 
-class _Album:
-    """Collects frames of a run."""
+class Capture:
+    """Collects frames of a run while it goes on.
 
-    def __init__(self, env: ForageEnv, policy: Policy, most_frames: int) -> None:
+    Attributes:
+        ticks: Ticks of the frames so far.
+    """
+
+    def __init__(self, run: LiveRun, policy: Policy, *, end_tick: int, frame_ticks: int) -> None:
+        """Look at the start of a run.
+
+        Args:
+            run: The run, which has not gone on yet.
+            policy: The policy that drives it.
+            end_tick: Tick in which the run ends, or in which the last frame is wanted.
+            frame_ticks: Ticks between frames.
+        """
+        env = run.forage_env
+        most_frames = 1 + math.ceil(end_tick / frame_ticks)
+        self._run = run
+        self._end_tick, self._frame_ticks = end_tick, frame_ticks
         self._env = env
         self._policy = policy
         self._tell = cast("Callable[[], RobotStates] | None", getattr(policy, "describe_robots", None))
@@ -163,21 +167,74 @@ class _Album:
         self._memories = _MemoryChanges()
         self.ticks: list[int] = []
 
-    def look(self) -> None:
+        self._look()
+
+    @property
+    def tick(self) -> int:
+        """Ticks that the run has done."""
+        return self._env.tick
+
+    def advance(self) -> None:
+        """Let the run go on for one tick, if it is not over; at the end of it there may be a frame."""
+        if self._run.over:
+            return
+        self._run.advance(to_tick=self._env.tick + 1)
+        self._note_deliveries()
+        if self._env.tick % self._frame_ticks == 0 or self._env.tick == self._end_tick or self._run.over:
+            self._look()
+
+    def counted(self, counter: Counter) -> np.ndarray:
+        """Return what a counter has counted since the start, (F,) at the frames so far."""
+        return self._counters[: len(self.ticks), counter]
+
+    def latest_deliveries(self, after_tick: int) -> np.ndarray:
+        """Return the rows of `Replay.deliveries` of later ticks."""
+        recent: list[np.ndarray] = []
+        for rows in reversed(self._deliveries):
+            if rows[0, 0] <= after_tick:
+                break
+            recent.append(rows)
+        return np.concatenate((np.zeros((0, 4), np.int32), *reversed(recent)))
+
+    def replay(self, spec: RunSpec, *, signals: dict[str, np.ndarray], label: str = "") -> Replay:
+        """Return what was kept up to the last frame.
+
+        Args:
+            spec: The run.
+            signals: As in `Replay`.
+            label: As in `Replay`; default the policy's.
+
+        Raises:
+            ReplayError: nothing but the start has been seen.
+        """
+        if len(self.ticks) < 2:
+            raise ReplayError(
+                f"Expected a run of {self._frame_ticks * self._env.scenario.dt_s:g} s or more to make a replay of, "
+                "got its start; let it go on."
+            )
+        return Replay(
+            spec=spec,
+            label=label or policy_label(spec.policy),
+            frame_ticks=self._frame_ticks,
+            end_tick=self.ticks[-1],
+            signals=signals,
+            versions=software_versions(),
+            **self._arrays(),
+        )
+
+    def _look(self) -> None:
         """Keep the state as it is now."""
         env, frame = self._env, len(self.ticks)
         self.ticks.append(env.tick)
         self._keep_poses(frame)
         self._keep_states(frame)
         self._counters[frame] = env.events.counters - self._first_counters
-        self._objects.look(frame, _objects_now(env))
-        caches = env.caches
-        self._caches.look(frame, np.column_stack((caches.count, np.where(caches.alive[:, None], caches.cell, -1))))
-
+        self._objects.look(frame, objects_now(env))
+        self._caches.look(frame, caches_now(env))
         if self._remember is not None:
             self._memories.look(frame, self._remember(), self._step_m)
 
-    def note_deliveries(self) -> None:
+    def _note_deliveries(self) -> None:
         """Keep the deliveries of the tick that has just passed; what happened is told for one tick only."""
         env = self._env
         n_delivered = int(env.events.counters[Counter.COLLECTED])
@@ -204,19 +261,7 @@ class _Album:
         self._position[frame], self._heading[frame] = steps, turns
 
     def _keep_states(self, frame: int) -> None:
-        swarm, interfering = self._env.swarm, self._env.events.interfering
-        flags = (
-            (Status.CARRYING, swarm.carried_object >= 0),
-            (Status.INTERFERING, interfering & swarm.active),
-            (Status.REPAIR, swarm.present & ~swarm.active),
-            (Status.ABSENT, ~swarm.present),
-            (Status.HANDLING, swarm.pending_kind != 0),
-        )
-        for flag, rows in flags:
-            self._status[frame] |= np.where(rows, np.uint8(flag), np.uint8(0))
-        tasks = getattr(self._policy, "task", None)
-        if tasks is not None:
-            self._status[frame] |= np.asarray(tasks, np.uint8) << TASK_SHIFT
+        self._status[frame] = status_now(self._env, self._policy)
         if self._tell is None or self._activity is None:
             return
         states = self._tell()
@@ -225,9 +270,10 @@ class _Album:
         if states.n_remembered is not None and frame % REMEMBERED_FRAMES == 0:
             self._remembered.append(np.minimum(states.n_remembered, np.iinfo(np.uint16).max).astype(np.uint16))
 
-    def arrays(self) -> dict[str, Any]:
+    def _arrays(self) -> dict[str, Any]:
         """Return what was kept, as fields of `Replay`."""
         end = len(self.ticks)
+        deliveries = np.concatenate((np.zeros((0, 4), np.int32), *self._deliveries))
         return {
             "position": self._position[:end],
             "heading": self._heading[:end],
@@ -239,19 +285,42 @@ class _Album:
             "counters": self._counters[:end],
             "object_events": self._objects.events(),
             "memory_events": None if self._remember is None else self._memories.events(),
-            "deliveries": np.concatenate((np.zeros((0, 4), np.int32), *self._deliveries)),
+            "deliveries": deliveries[deliveries[:, 0] <= self.ticks[-1]],
             "cache_events": self._caches.events(),
             "has_tasks": getattr(self._policy, "task", None) is not None,
         }
 
 
-def _objects_now(env: ForageEnv) -> np.ndarray:
+def status_now(env: ForageEnv, policy: Policy) -> np.ndarray:
+    """Return (N,) bits of `Status` and the codes of tasks, as in `Replay.status`."""
+    swarm = env.swarm
+    status = np.zeros(len(swarm.active), np.uint8)
+    flags = (
+        (Status.CARRYING, swarm.carried_object >= 0),
+        (Status.INTERFERING, env.events.interfering & swarm.active),
+        (Status.REPAIR, swarm.present & ~swarm.active),
+        (Status.ABSENT, ~swarm.present),
+        (Status.HANDLING, swarm.pending_kind != 0),
+    )
+    for flag, rows in flags:
+        status |= np.where(rows, np.uint8(flag), np.uint8(0))
+    tasks = getattr(policy, "task", None)
+    return status if tasks is None else status | np.asarray(tasks, np.uint8) << TASK_SHIFT
+
+
+def objects_now(env: ForageEnv) -> np.ndarray:
     """Return (M, 3): status, and the cell; of a carried object the robot that carries it and -1."""
     objects, carried = env.objects, env.swarm.carried_object
     now = np.column_stack((objects.status, objects.cell)).astype(np.int32)
     robots = np.flatnonzero(carried >= 0)
     now[carried[robots], 1] = robots
     return now
+
+
+def caches_now(env: ForageEnv) -> np.ndarray:
+    """Return (K, 3): number of objects (0 = no cache), and the centre cell, -1 where there is no cache."""
+    caches = env.caches
+    return np.column_stack((caches.count, np.where(caches.alive[:, None], caches.cell, -1)))
 
 
 class _Changes:

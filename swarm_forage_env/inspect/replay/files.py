@@ -176,7 +176,7 @@ def _about(replay: Replay) -> dict[str, Any]:
         "policy": spec.policy,
         "seed": spec.seed,
         "n_robots": scenario.robots.n_robots,
-        "kinds": [[kind.name, size] for kind, size in _kinds(scenario)],
+        "kinds": [[kind.name, size] for kind, size in kind_counts(scenario)],
         "n_objects": scenario.objects.n_objects,
         "n_cache_slots": int(replay.cache_events[:, 1].max(initial=-1)) + 1,
         "n_frames": replay.n_frames,
@@ -186,35 +186,40 @@ def _about(replay: Replay) -> dict[str, Any]:
         "position_step_m": replay.position_step_m,
         "remembered_frames": replay.remembered_frames,
         "has_tasks": replay.has_tasks,
-        "tasks": [_TASKS.get(task, task.name.lower()) for task in Task],
+        "tasks": task_names(),
         "activities": list(replay.activities),
         "counters": [counter.name.lower() for counter in Counter],
-        "performance": _performance(scenario),
+        "performance": counted_performance(scenario),
         "signals": [
             {"name": name, "title": title, "unit": unit}
             for name, (title, unit) in _SIGNALS.items()
             if name in replay.signals
         ],
         "disturbances": [config.in_words(scenario.dt_s) for config in spec.wrappers],
-        "world": _world(scenario),
+        "world": geometry(scenario),
         "versions": dict(replay.versions),
         "spec": spec.to_mapping(),
     }
 
 
-def _kinds(scenario: ScenarioConfig) -> Iterable[tuple[RobotKind, int]]:
+def task_names() -> list[str]:
+    """Return what tasks are called in the page, by code."""
+    return [_TASKS.get(task, task.name.lower()) for task in Task]
+
+
+def kind_counts(scenario: ScenarioConfig) -> Iterable[tuple[RobotKind, int]]:
     """Return the kinds of robots and how many there are of each, in the order of their rows."""
     robots = scenario.robots
     return zip(robots.robot_kinds, kind_sizes(robots.robot_kinds, robots.n_robots), strict=True)
 
 
-def _performance(scenario: ScenarioConfig) -> dict[str, str]:
+def counted_performance(scenario: ScenarioConfig) -> dict[str, str]:
     """Return what the page counts: performance if it is something that the world counts, else deliveries."""
     column = scenario.performance if scenario.performance in TOTALS else "collected"
     return {"counter": TOTALS[column].name.lower(), "words": performance_of(column).title}
 
 
-def _world(scenario: ScenarioConfig) -> dict[str, Any]:
+def geometry(scenario: ScenarioConfig) -> dict[str, Any]:
     """Return the geometry that the page draws, in m."""
     arena = scenario.arena
     sources: Iterable[tuple[int, ...]] = ()

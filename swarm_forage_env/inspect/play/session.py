@@ -1,0 +1,445 @@
+"""The session behind the page to play with: commands in, frames out, plain values both. It knows no HTTP.
+
+Walls, robots, policy, scenario and seed are a run's from its first tick, so a change of them starts the run again, with
+the same seed. Noise, throttle and rates change while the run goes on, and a run that is started again has them from
+its first tick. So a run that nobody has touched since its start is the one that `run_one` makes.
+"""
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from threading import Lock
+from typing import Any
+
+import numpy as np
+
+from swarm_forage_env._internal.fields import ConfigError, known_name, number, table
+from swarm_forage_env._internal.files import as_file_name
+from swarm_forage_env._internal.typed import Count, typed
+from swarm_forage_env.contract.codes import Counter
+from swarm_forage_env.inspect.levels_by_hand import LEVELS, RATES
+from swarm_forage_env.inspect.play.captured import CapturedRun
+from swarm_forage_env.inspect.replay.capture import caches_now, objects_now, status_now
+from swarm_forage_env.inspect.replay.files import counted_performance, geometry, kind_counts, page_of, task_names
+from swarm_forage_env.inspect.run_by_hand import SPEEDS
+from swarm_forage_env.policies.registry import policy_label, policy_names
+from swarm_forage_env.runs.spec import plan_run
+from swarm_forage_env.scenarios.obstacles import MIN_SIDE_M, Rectangle
+from swarm_forage_env.scenarios.overrides import with_overrides
+from swarm_forage_env.scenarios.presets import PRESETS, scenario
+from swarm_forage_env.wrappers.world import World
+
+LONGEST_WAIT_S = 0.1
+"""A page that asks for its next frame later than this finds the run as if it had asked then: one that sleeps pauses."""
+FLASH_S = 0.7
+"""Seconds of the reader for which the page shows a delivery, as in `draw.js`."""
+MOST_FLASHES = 200
+MOST_BINS, FEWEST_BINS, SHORTEST_BIN_S = 50, 10, 40.0
+"""Of curves over time, as in `curves.js`."""
+WALL_M = 0.4
+"""What a wall that was drawn thinner than `MIN_SIDE_M` becomes; our choice: it is seen, and a robot goes round it."""
+MOST_ROBOTS = 4
+"""The slider ends at so many times the robots of the scenario; our choice: crowded, but there is room."""
+
+
+@dataclass(frozen=True, slots=True)
+class Slider:
+    """A level that the page has a slider for."""
+
+    level: str
+    """Key of `LEVELS` or `RATES`."""
+    most: float
+    step: float
+
+
+SLIDERS = {
+    "sensor_noise": Slider("s", 0.1, 0.005),
+    "wheel_noise": Slider("w", 0.5, 0.01),
+    "throttle": Slider("t", 0.9, 0.05),
+    "failures": Slider("failures", 20.0, 0.5),
+    "repairs": Slider("repairs", 20.0, 0.5),
+    "deaths": Slider("deaths", 20.0, 0.5),
+}
+"""Name in commands -> slider. Where they end is our choice: by then, every policy of ours has lost most of its
+deliveries."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Setting:
+    """What a run is made of."""
+
+    world: World
+    policy: str
+    seed: int = 0
+    caches: str | None = None
+    """Which caches were asked for; None = the policy's, or else the scenario's."""
+
+
+class PlaySession:
+    """One run at a time, and who looks at it. Several threads may ask; they take turns.
+
+    Attributes:
+        setting: What the run is made of.
+        run: The run.
+        note: What the last command has done, for people.
+    """
+
+    def __init__(self, setting: Setting, *, clock: Callable[[], float] = time.monotonic) -> None:
+        """Start a run.
+
+        Args:
+            setting: What it is made of.
+            clock: The reader's time, s.
+
+        Raises:
+            ValueError: see `plan_run`; or a policy that does not fit the scenario.
+        """
+        self._lock, self._clock = Lock(), clock
+        self._policies = tuple(dict.fromkeys((*policy_names(), setting.policy)))
+        self._serial = 0
+        self.note = ""
+        self._begin(setting)
+
+    def _begin(self, setting: Setting) -> None:
+        """Start a run; if it cannot be, all stays as it is."""
+        spec = plan_run(setting.world, setting.policy, caches=setting.caches, seed=setting.seed)
+        run = CapturedRun(spec)
+        if self._serial:
+            run.speed, run.paused = self.run.speed, self.run.paused
+        self.setting, self.run = setting, run
+        self._serial += 1
+        self._seen_s = self._clock()
+
+    # Frames
+
+    def frame(self, asked: Any = None) -> dict[str, Any]:
+        """Let the run go on for what is due, and return what is to be seen.
+
+        Args:
+            asked: A table, or None; "robot" is the row of the chosen robot, "run" the number of the run that the page
+                shows. If that is another one, the answer has "about", too.
+
+        Raises:
+            ConfigError: no such table, or no such robot.
+        """
+        words: _Asked = typed(_Asked, {} if asked is None else asked, "frame")
+        with self._lock:
+            now = self._clock()
+            passed, self._seen_s = now - self._seen_s, now
+            self.run.advance(min(max(passed, 0.0), LONGEST_WAIT_S))
+            frame = self._swarm() | self._floor() | self._numbers()
+            if words.robot is not None and words.run == self._serial:
+                frame["robot"] = self._robot(words.robot)
+            if words.run != self._serial:
+                frame["about"] = self._about()
+            return frame
+
+    def _swarm(self) -> dict[str, Any]:
+        world, policy = self.run.world, self.run.policy
+        swarm = world.swarm
+        told: dict[str, Any] = {}
+        if hasattr(policy, "describe_robots"):
+            states = policy.describe_robots()  # type: ignore[attr-defined] - optional, see Policy
+            told["activity"], told["words"] = states.activity.tolist(), list(states.words)
+            if states.n_remembered is not None:
+                told["remembered"] = states.n_remembered.tolist()
+        return told | {
+            "x": np.round(swarm.position[:, 0], 3).tolist(),
+            "y": np.round(swarm.position[:, 1], 3).tolist(),
+            "turn": np.round(swarm.heading, 2).tolist(),
+            "status": status_now(world, policy).tolist(),
+            "dead": np.flatnonzero(swarm.dead).tolist(),
+        }
+
+    def _floor(self) -> dict[str, Any]:
+        world, capture = self.run.world, self.run.capture
+        lasts_s = max(2.0, FLASH_S * self.run.speed)
+        fresh = capture.latest_deliveries(world.tick - math.ceil(lasts_s / world.scenario.dt_s))[-MOST_FLASHES:]
+        return {
+            "objects": objects_now(world).ravel().tolist(),
+            "caches": caches_now(world).ravel().tolist(),
+            "deliveries": fresh[:, [0, 2, 3]].tolist(),
+        }
+
+    def _numbers(self) -> dict[str, Any]:
+        run, counters = self.run, self.run.world.events.counters
+        time_s = run.world.tick * run.scenario.dt_s
+        active = int(counters[Counter.ACTIVE])
+        levels = {name: run.levels.level(slider.level) for name, slider in SLIDERS.items()}
+        return {
+            "run": self._serial,
+            "time_s": round(time_s, 3),
+            "paused": run.paused,
+            "over": run.run.over,
+            "speed": run.speed,
+            "counters": counters.tolist(),
+            "per_1000_s": 1000.0 * int(counters[Counter.COLLECTED]) / time_s if time_s else 0.0,
+            "interference": int(counters[Counter.INTERFERING]) / active if active else 0.0,
+            "curve": self._curve(),
+            "levels": levels,
+            "changes": list(run.levels.changes),
+            "note": self.note,
+        }
+
+    def _curve(self) -> dict[str, list[float]]:
+        """Return deliveries per 1,000 s and the share of time in interference, over equal parts of the run so far."""
+        capture, dt_s = self.run.capture, self.run.scenario.dt_s
+        last = len(capture.ticks) - 1
+        wanted = min(MOST_BINS, max(FEWEST_BINS, round(capture.ticks[-1] * dt_s / SHORTEST_BIN_S)))
+        edges = np.round(np.linspace(0, last, min(wanted, last) + 1)).astype(int)
+        seconds = np.array(capture.ticks)[edges] * dt_s
+        delivered, interfering, active = (
+            np.diff(capture.counted(counter)[edges])
+            for counter in (Counter.COLLECTED, Counter.INTERFERING, Counter.ACTIVE)
+        )
+        return {
+            "time_s": ((seconds[1:] + seconds[:-1]) / 2).tolist(),
+            "per_1000_s": (1000.0 * delivered / np.diff(seconds)).tolist(),
+            "interference": (interfering / np.maximum(active, 1)).tolist(),
+        }
+
+    def _robot(self, robot: int) -> dict[str, Any]:
+        self._check_robot(robot)
+        run = self.run
+        left, right = (100.0 * run.world.swarm.wheel_speed[robot]).tolist()
+        places = run.remembered_places(robot)
+        remembered = () if places is None else ((1, places.objects_m), (2, places.caches_m))
+        return {
+            "row": robot,
+            "told": [*run.told_of(robot), ("wheels", f"{left:.1f}, {right:.1f} cm/s")],
+            "places": [[kind, *place] for kind, places_m in remembered for place in places_m.tolist()],
+        }
+
+    def _about(self) -> dict[str, Any]:
+        """Return what stays the same during a run."""
+        run, here = self.run, self.run.scenario
+        preset = PRESETS[here.name]().robots.n_robots if here.name in PRESETS else here.robots.n_robots
+        return {
+            "title": World(here, run.given).title(run.name, f"seed {self.setting.seed}"),
+            "scenarios": list(dict.fromkeys((*PRESETS, here.name))),
+            "policies": list(self._policies),
+            "policy": self.setting.policy,
+            "most_robots": max(here.robots.n_robots, MOST_ROBOTS * preset),
+            "speeds": list(SPEEDS),
+            "sliders": [
+                {"name": name, "title": (LEVELS | RATES)[one.level].name, "most": one.most, "step": one.step}
+                for name, one in SLIDERS.items()
+            ],
+            "header": {
+                "label": policy_label(self.setting.policy),
+                "scenario": here.name,
+                "seed": self.setting.seed,
+                "n_robots": here.robots.n_robots,
+                "kinds": [[kind.name, size] for kind, size in kind_counts(here)],
+                "n_objects": here.objects.n_objects,
+                "n_cache_slots": len(run.world.caches.alive),
+                "dt_s": here.dt_s,
+                "position_step_m": run.step_m,
+                "has_tasks": hasattr(run.policy, "task"),
+                "tasks": task_names(),
+                "counters": [counter.name.lower() for counter in Counter],
+                "performance": counted_performance(here),
+                "signals": [],
+                "world": geometry(here),
+            },
+        }
+
+    # Commands
+
+    def carry_out(self, command: Any) -> str:
+        """Do what a command asks for; returns one line about it. A command that is refused changes nothing.
+
+        Args:
+            command: A table; "do" names it, the rest are its arguments.
+
+        Raises:
+            ConfigError: no such table, command or arguments.
+            ValueError: a run that cannot be.
+        """
+        words = dict(table("a command", command))
+        name = words.pop("do", None)
+        known_name("command", name, _COMMANDS)
+        kind, act = _COMMANDS[name]
+        arguments = typed(kind, words, name)
+        with self._lock:
+            self.note = act(self, arguments)
+            return self.note
+
+    def replay_page(self) -> tuple[str, str]:
+        """Return the name of a file and the replay page of the run so far.
+
+        Raises:
+            ReplayError: the run has not gone on for one frame.
+        """
+        with self._lock:
+            replay = self.run.replay()
+        return f"{replay.spec.world.file_name}_{as_file_name(policy_label(self.setting.policy))}.html", page_of(
+            [replay]
+        )
+
+    def summary(self) -> str:
+        """Return one line about the run so far."""
+        with self._lock:
+            return f"{self.run.name}: {self.run.summary()}"
+
+    def _check_robot(self, robot: int) -> None:
+        n_robots = self.run.scenario.robots.n_robots
+        if robot >= n_robots:
+            raise ConfigError(f"Expected a robot from 0 to {n_robots - 1}, got {robot}.")
+
+    def _play(self, _: "_Nothing") -> str:
+        self.run.paused = False
+        self._seen_s = self._clock()
+        return ""
+
+    def _pause(self, _: "_Nothing") -> str:
+        self.run.paused = True
+        return ""
+
+    def _step(self, _: "_Nothing") -> str:
+        self.run.paused = True
+        self.run.step()
+        return "one tick"
+
+    def _set_speed(self, asked: "_Value") -> str:
+        number("speed", asked.value, above=0.0, at_most=SPEEDS[-1])
+        self.run.speed = float(asked.value)
+        return ""
+
+    def _set_level(self, asked: "_Level") -> str:
+        known_name("level", asked.name, SLIDERS)
+        return self.run.levels.set(SLIDERS[asked.name].level, asked.value)
+
+    def _kill(self, asked: "_Robot") -> str:
+        self._check_robot(asked.robot)
+        return self.run.levels.kill(asked.robot)
+
+    def _break_down(self, asked: "_Robot") -> str:
+        self._check_robot(asked.robot)
+        return self.run.levels.break_down(asked.robot)
+
+    def _repair(self, asked: "_Robot") -> str:
+        self._check_robot(asked.robot)
+        return self.run.levels.repair(asked.robot)
+
+    def _start_again(self, asked: "_Run") -> str:
+        """Start a run, the same or another one, with the levels of now; a chosen scenario begins as its preset."""
+        if asked.policy is not None:
+            known_name("policy", asked.policy, self._policies)
+        world = World(self.setting.world.scenario, self.run.levels.configs)
+        if asked.scenario is not None:
+            world = replace(world, scenario=scenario(asked.scenario))
+        if asked.robots is not None:
+            world = replace(world, scenario=with_overrides(world.scenario, n_robots=asked.robots))
+        self._begin(
+            replace(
+                self.setting,
+                world=world,
+                policy=self.setting.policy if asked.policy is None else asked.policy,
+                seed=self.setting.seed if asked.seed is None else asked.seed,
+            )
+        )
+        return f"started again with seed {self.setting.seed}"
+
+    def _with_walls(self, walls: tuple[Rectangle, ...]) -> str:
+        here = with_overrides(self.setting.world.scenario, obstacles=walls)
+        self._begin(replace(self.setting, world=World(here, self.run.levels.configs)))
+        return f"started again with {len(walls)} wall{'' if len(walls) == 1 else 's'}"
+
+    def _add_wall(self, asked: "_Wall") -> str:
+        arena = self.setting.world.scenario.arena
+        return self._with_walls((*arena.obstacles, wall_of(asked.box, arena.width_m, arena.height_m)))
+
+    def _remove_wall(self, asked: "_Index") -> str:
+        walls = self.setting.world.scenario.arena.obstacles
+        if asked.index >= len(walls):
+            raise ConfigError(f"Expected one of {len(walls)} walls, from 0 on, got {asked.index}.")
+        return self._with_walls((*walls[: asked.index], *walls[asked.index + 1 :]))
+
+    def _remove_walls(self, _: "_Nothing") -> str:
+        return self._with_walls(())
+
+
+def wall_of(box: tuple[float, float, float, float], width_m: float, height_m: float) -> Rectangle:
+    """Return the wall that somebody drew from one corner to the other: inside the arena, and thick enough.
+
+    Args:
+        box: x, y of the two corners, m.
+        width_m: Extent of the arena along x, m.
+        height_m: Along y, m.
+    """
+    x = _side(box[0], box[2], width_m)
+    y = _side(box[1], box[3], height_m)
+    return x[0], y[0], x[1], y[1]
+
+
+def _side(one: float, other: float, extent_m: float) -> tuple[float, float]:
+    """Return the ends of a side in cm, in order."""
+    low, high = (round(min(max(edge, 0.0), extent_m), 2) for edge in sorted((one, other)))
+    if high - low >= MIN_SIDE_M:
+        return low, high
+    start = round(min(max((low + high - WALL_M) / 2, 0.0), extent_m - WALL_M), 2)
+    return start, round(start + WALL_M, 2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Asked:
+    robot: Count | None = None
+    run: Count = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Nothing:
+    pass
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Value:
+    value: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Level:
+    name: str
+    value: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Robot:
+    robot: Count
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Index:
+    index: Count
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Wall:
+    box: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Run:
+    scenario: str | None = None
+    policy: str | None = None
+    robots: int | None = None
+    seed: int | None = None
+
+
+_COMMANDS: Mapping[str, tuple[type, Callable[[PlaySession, Any], str]]] = {
+    "play": (_Nothing, PlaySession._play),
+    "pause": (_Nothing, PlaySession._pause),
+    "step": (_Nothing, PlaySession._step),
+    "speed": (_Value, PlaySession._set_speed),
+    "level": (_Level, PlaySession._set_level),
+    "kill": (_Robot, PlaySession._kill),
+    "break": (_Robot, PlaySession._break_down),
+    "repair": (_Robot, PlaySession._repair),
+    "start": (_Run, PlaySession._start_again),
+    "wall": (_Wall, PlaySession._add_wall),
+    "remove_wall": (_Index, PlaySession._remove_wall),
+    "remove_walls": (_Nothing, PlaySession._remove_walls),
+}
+"""Name -> arguments, and what is done."""

@@ -1,0 +1,300 @@
+"""The session behind the page to play with: untouched, a run is that of `run_one`; commands do what they say."""
+
+import json
+
+import numpy as np
+import pytest
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.contract.codes import Counter
+from swarm_forage_env.inspect.play import session as playing
+from swarm_forage_env.inspect.play.session import SLIDERS, PlaySession, Setting, wall_of
+from swarm_forage_env.inspect.replay.capture import record_replay
+from swarm_forage_env.inspect.replay.files import read_replays
+from swarm_forage_env.inspect.replay.frames import ReplayError, Status
+from swarm_forage_env.inspect.run_by_hand import SPEEDS
+from swarm_forage_env.runs.run import run_one
+from swarm_forage_env.runs.spec import plan_run
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.wrappers.noise import SensorNoiseConfig
+from swarm_forage_env.wrappers.throttle import ThrottleConfig
+from swarm_forage_env.wrappers.waveform import Waveform
+from swarm_forage_env.wrappers.world import World
+
+ROOM = {"width_m": 8.0, "height_m": 8.0, "nest_centre_m": (1.0, 4.0), "nest_size_m": (1.6, 4.0), "n_objects": 40}
+SMALL = scenario("warehouse_small", n_robots=8, horizon_s=400.0, interval_s=100.0, **ROOM)
+NOISY = (SensorNoiseConfig(sigma=0.01), ThrottleConfig(waveform=Waveform(kind="constant", amplitude=0.1)))
+WALL = [4.0, 2.0, 4.4, 5.0]
+
+
+class Clock:
+    """The reader's time, which a test sets forward."""
+
+    def __init__(self):
+        self.now_s = 0.0
+
+    def __call__(self):
+        return self.now_s
+
+
+@pytest.fixture(autouse=True)
+def patient(monkeypatch):
+    """Ticks take long while they are compiled."""
+    monkeypatch.setattr("swarm_forage_env.inspect.run_by_hand.LONGEST_S", 1000.0)
+
+
+def session_of(policy="crw", wrappers=(), *, seed=3, world=SMALL):
+    clock = Clock()
+    return PlaySession(Setting(world=World(world, wrappers), policy=policy, seed=seed), clock=clock), clock
+
+
+def look_after(session, clock, seconds, **asked):
+    """The frame after so many of the reader's seconds, in looks that follow each other quickly."""
+    frame = session.frame(asked or None)
+    for _ in range(round(seconds / 0.1)):
+        clock.now_s += 0.1
+        frame = session.frame(asked or None)
+    return frame
+
+
+def counted(frame, counter=Counter.COLLECTED):
+    return frame["counters"][counter]
+
+
+@pytest.mark.parametrize(
+    ("policy", "wrappers"), [("crw", ()), ("stochm", NOISY), ("ppo_warehouse_small", ())], ids=lambda one: str(one)[:9]
+)
+def test_a_run_that_nobody_touches_is_that_of_run_one(policy, wrappers):
+    session, clock = session_of(policy, wrappers)
+    session.carry_out({"do": "speed", "value": 100})
+    frame = look_after(session, clock, 4.1)
+    assert (frame["time_s"], frame["over"]) == (400.0, True)
+    record = run_one(plan_run(World(SMALL, wrappers), policy, seed=3))
+    assert counted(frame) == int(record.collected.sum()) > 0
+    assert frame["changes"] == []
+
+
+def test_a_frame_is_plain_values_and_tells_what_is_where():
+    session, clock = session_of()
+    about = session.frame()["about"]
+    frame = look_after(session, clock, 1.0, run=1)
+    assert "about" not in frame, "only for a page that does not have it"
+    assert json.loads(json.dumps(frame)) == frame
+    swarm = session.run.world.swarm
+    np.testing.assert_allclose(np.column_stack((frame["x"], frame["y"])), swarm.position, atol=6e-4)
+    assert len(frame["status"]) == about["header"]["n_robots"] == 8
+    assert len(frame["objects"]) == 3 * 40
+    assert about["header"]["world"]["width_m"] == 8.0
+    assert frame["time_s"] == pytest.approx(10.0, abs=0.3)
+
+
+def test_pause_step_and_speed():
+    session, clock = session_of()
+    session.carry_out({"do": "pause"})
+    assert look_after(session, clock, 1.0)["time_s"] == 0.0
+    assert session.carry_out({"do": "step"}) == "one tick"
+    assert look_after(session, clock, 1.0)["time_s"] == pytest.approx(0.2)
+    session.carry_out({"do": "speed", "value": SPEEDS[-1]})
+    clock.now_s += 60.0
+    session.carry_out({"do": "play"})
+    assert session.frame()["time_s"] == pytest.approx(0.2), "what was slept through is not caught up with"
+    clock.now_s += 60.0
+    assert session.frame()["time_s"] == pytest.approx(0.2 + SPEEDS[-1] * playing.LONGEST_WAIT_S)
+
+
+def test_levels_change_while_the_run_goes_on():
+    session, clock = session_of()
+    look_after(session, clock, 1.0)
+    assert session.carry_out({"do": "level", "name": "throttle", "value": 0.5}) == "throttle is 0.5"
+    session.carry_out({"do": "level", "name": "failures", "value": 400.0})
+    frame = look_after(session, clock, 4.0)
+    assert (frame["levels"]["throttle"], frame["levels"]["failures"]) == (0.5, 400.0)
+    assert frame["changes"] == ["throttle 0.5", "failures per 1,000 s 400"]
+    assert any(status & Status.REPAIR for status in frame["status"])
+    assert frame["run"] == 1, "nothing was started again"
+
+
+def test_a_level_of_now_is_there_from_the_start_of_the_next_run():
+    session, clock = session_of()
+    session.carry_out({"do": "level", "name": "sensor_noise", "value": 0.02})
+    session.carry_out({"do": "start"})
+    session.carry_out({"do": "speed", "value": 100})
+    frame = look_after(session, clock, 4.1)
+    record = run_one(plan_run(World(SMALL, (SensorNoiseConfig(sigma=0.02),)), "crw", seed=3))
+    assert (counted(frame), frame["changes"]) == (int(record.collected.sum()), [])
+
+
+def test_a_robot_is_killed_broken_and_repaired():
+    session, clock = session_of()
+    look_after(session, clock, 0.5)
+    assert session.carry_out({"do": "kill", "robot": 2}) == "robot 2 was killed"
+    assert session.carry_out({"do": "kill", "robot": 2}) == "robot 2 is not alive"
+    assert session.carry_out({"do": "repair", "robot": 5}) == "robot 5 is not in repair"
+    assert session.carry_out({"do": "break", "robot": 5}) == "robot 5 broke down and waits for repair"
+    assert session.carry_out({"do": "break", "robot": 5}) == "robot 5 is not at work"
+    frame = look_after(session, clock, 1.0)
+    assert frame["dead"] == [2]
+    assert frame["status"][2] & Status.ABSENT
+    assert frame["status"][5] & Status.REPAIR
+    where = frame["x"][5], frame["y"][5]
+    assert session.carry_out({"do": "repair", "robot": 5}) == "robot 5 is at work again"
+    frame = look_after(session, clock, 1.0)
+    assert not frame["status"][5] & Status.REPAIR
+    assert (frame["x"][5], frame["y"][5]) != where
+    assert frame["changes"] == ["robot 2 killed", "robot 5 broken", "robot 5 repaired"]
+
+
+def test_a_wall_starts_the_run_again_with_the_same_seed():
+    session, clock = session_of()
+    look_after(session, clock, 1.0)
+    session.carry_out({"do": "level", "name": "throttle", "value": 0.2})
+    assert session.carry_out({"do": "wall", "box": WALL}) == "started again with 1 wall"
+    frame = session.frame({"run": 1})
+    assert (frame["time_s"], frame["run"], frame["levels"]["throttle"]) == (0.0, 2, 0.2)
+    assert frame["about"]["header"]["world"]["obstacles_m"] == [WALL]
+    assert frame["about"]["header"]["seed"] == 3
+    assert session.carry_out({"do": "wall", "box": [6.0, 6.0, 6.5, 6.5]}) == "started again with 2 walls"
+    assert session.carry_out({"do": "remove_wall", "index": 0}) == "started again with 1 wall"
+    assert session.setting.world.scenario.arena.obstacles == ((6.0, 6.0, 6.5, 6.5),)
+    session.carry_out({"do": "remove_walls"})
+    assert session.setting.world.scenario.arena.obstacles == ()
+
+
+@pytest.mark.parametrize(
+    ("drawn", "wall"),
+    [
+        ((4.4, 5.0, 4.0, 2.0), (4.0, 2.0, 4.4, 5.0)),
+        ((4.0, 2.0, 4.05, 5.0), (3.83, 2.0, 4.23, 5.0)),
+        ((7.9, 7.0, 9.0, 7.5), (7.6, 7.0, 8.0, 7.5)),
+        ((-3.0, 7.95, -1.0, 8.0), (0.0, 7.6, 0.4, 8.0)),
+    ],
+)
+def test_walls_are_inside_and_thick_enough(drawn, wall):
+    assert wall_of(drawn, 8.0, 8.0) == pytest.approx(wall)
+
+
+def test_robots_policy_scenario_and_seed_start_another_run():
+    session, _ = session_of()
+    session.carry_out({"do": "wall", "box": WALL})
+    assert session.carry_out({"do": "start", "robots": 5, "policy": "dpo", "seed": 9}) == "started again with seed 9"
+    about = session.frame()["about"]
+    assert (about["header"]["n_robots"], about["policy"], about["header"]["seed"]) == (5, "dpo", 9)
+    assert about["header"]["world"]["obstacles_m"] == [WALL], "walls stay"
+    session.carry_out({"do": "start", "scenario": "warehouse_small"})
+    about = session.frame()["about"]
+    assert about["header"]["world"]["obstacles_m"] == []
+    assert about["header"]["n_robots"] == scenario("warehouse_small").robots.n_robots
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        None,
+        [],
+        {},
+        {"do": "fly"},
+        {"do": ["play"]},
+        {"do": "play", "now": True},
+        {"do": "speed"},
+        {"do": "speed", "value": 0},
+        {"do": "speed", "value": "fast"},
+        {"do": "speed", "value": float("nan")},
+        {"do": "level", "name": "gravity", "value": 1.0},
+        {"do": "level", "name": "throttle", "value": 2.0},
+        {"do": "level", "name": "deaths", "value": -1.0},
+        {"do": "kill", "robot": 8},
+        {"do": "kill", "robot": -1},
+        {"do": "kill", "robot": 1.5},
+        {"do": "wall", "box": [1.0, 4.0, 1.5, 4.5]},
+        {"do": "wall", "box": [1.0, 2.0, 3.0]},
+        {"do": "remove_wall", "index": 0},
+        {"do": "start", "robots": 0},
+        {"do": "start", "robots": 5000},
+        {"do": "start", "seed": -1},
+        {"do": "start", "policy": "/tmp/other.py:Mine"},
+        {"do": "start", "scenario": "moon"},
+        {"do": "start", "scenario": "/etc/passwd.toml"},
+    ],
+)
+def test_a_wrong_command_is_refused_and_changes_nothing(command):
+    session, _ = session_of("random")
+    before, run = session.setting, session.run
+    with pytest.raises(ConfigError):
+        session.carry_out(command)
+    assert (session.setting, session.run, run.levels.changes) == (before, run, [])
+
+
+@pytest.mark.parametrize("asked", [[], {"robot": 8, "run": 1}, {"robot": "all"}, {"since": 3}])
+def test_a_wrong_question_is_refused(asked):
+    session, _ = session_of("random")
+    with pytest.raises(ConfigError):
+        session.frame(asked)
+
+
+def test_a_chosen_robot_is_told_of():
+    session, clock = session_of("stochm")
+    session.carry_out({"do": "speed", "value": 100})
+    frame = look_after(session, clock, 2.0, run=1, robot=3)
+    told = dict(frame["robot"]["told"])
+    assert {"task", "does", "wheels"} <= told.keys()
+    objects, caches = session.run.remembered_places(3)
+    assert len(frame["robot"]["places"]) == len(objects) + len(caches)
+    assert frame["words"][frame["activity"][3]]
+    plain, clock = session_of("ppo_warehouse_small")
+    assert [name for name, _ in look_after(plain, clock, 0.2, run=1, robot=0)["robot"]["told"]] == ["wheels"]
+
+
+def test_the_curve_adds_up_to_what_was_counted():
+    session, clock = session_of()
+    session.carry_out({"do": "speed", "value": 100})
+    frame = look_after(session, clock, 3.0)
+    curve = frame["curve"]
+    width_s = 300.0 / len(curve["time_s"])  # but for a second, in which frames are
+    assert sum(curve["per_1000_s"]) * width_s / 1000.0 == pytest.approx(counted(frame), rel=0.05)
+    assert frame["per_1000_s"] == pytest.approx(counted(frame) / 0.3)
+    active, interfering = counted(frame, Counter.ACTIVE), counted(frame, Counter.INTERFERING)
+    assert frame["interference"] == pytest.approx(interfering / active)
+    assert len(frame["deliveries"]) <= counted(frame)
+
+
+def test_a_run_is_saved_as_a_replay_and_goes_on(tmp_path):
+    session, clock = session_of()
+    with pytest.raises(ReplayError, match="let it go on"):
+        session.replay_page()
+    session.carry_out({"do": "speed", "value": 100})
+    look_after(session, clock, 1.0)
+    session.carry_out({"do": "kill", "robot": 1})
+    session.carry_out({"do": "level", "name": "throttle", "value": 0.3})
+    look_after(session, clock, 1.0)
+    session.carry_out({"do": "step"})  # the replay ends with the last whole frame
+    name, page = session.replay_page()
+    assert name.startswith("warehouse_small")
+    assert name.endswith("_crw.html")
+    (tmp_path / name).write_text(page)
+    (replay,) = read_replays(tmp_path / name)
+    assert (replay.end_tick, replay.n_frames) == (1000, 201)
+    assert replay.label == "crw, changed by hand: robot 1 killed, throttle 0.3"
+    assert replay.has(Status.ABSENT)[-1].tolist() == [False, True] + 6 * [False]
+    assert replay.signals["throttle"][[0, -1]].tolist() == pytest.approx([0.0, 0.3])
+    assert len(replay.deliveries) == replay.counters[-1, Counter.COLLECTED]
+    session.carry_out({"do": "play"})
+    assert look_after(session, clock, 2.0)["over"]
+
+
+def test_the_replay_of_a_run_that_nobody_touched_is_that_of_its_specification():
+    session, clock = session_of("stochm", NOISY)
+    session.carry_out({"do": "speed", "value": 100})
+    look_after(session, clock, 4.1)
+    made, _ = record_replay(plan_run(World(SMALL, NOISY), "stochm", seed=3))
+    kept = session.run.replay()
+    for name in ("position", "heading", "status", "activity", "remembered", "counters", "object_events", "deliveries"):
+        np.testing.assert_array_equal(getattr(kept, name), getattr(made, name), err_msg=name)
+    assert kept.label == made.label
+    np.testing.assert_array_equal(kept.signals["throttle"], made.signals["throttle"])
+
+
+def test_every_slider_reaches_its_end():
+    session, _ = session_of("random")
+    for name, slider in SLIDERS.items():
+        session.carry_out({"do": "level", "name": name, "value": slider.most})
+    assert session.frame()["levels"] == {name: slider.most for name, slider in SLIDERS.items()}
