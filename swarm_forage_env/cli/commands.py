@@ -22,6 +22,7 @@ COMMANDS: dict[str, tuple[Command, ...]] = {
         Command("run", "Run policies in a scenario and compare them.", "questions:run"),
         Command("plot", "Draw stored runs anew.", "questions:plot"),
         Command("watch", "Watch a run in a window.", "look:watch"),
+        Command("play", "Steer and disturb a run in the browser.", "play:play"),
         Command("record", "Film a run, or draw it at one time.", "look:record"),
         Command("replay", "Write runs as one HTML page that plays them.", "replay:replay"),
         Command("maps", "Draw maps of where things happened.", "maps:maps"),

@@ -1,9 +1,10 @@
-"""The replay page and the report page, each one HTML file in which nothing is loaded from elsewhere: it forbids that.
+"""The replay page, the report page and the page to play with, each one HTML file that loads nothing from elsewhere.
 
 The replay page is made of a style sheet, scripts and data, and gives the data back. Its parts lie in `replay_page`.
 Data are a header in JSON and one block of bytes per run, in base64. The report page on studies is made of a template,
 a style sheet, a script and plain values. Its parts lie in `report_page`. It needs Jinja2 (the optional extra "plots"),
-which is imported when a page is built.
+which is imported when a page is built. The page to play with draws with the scripts and the style sheet of the replay
+page; what it has beside them lies in `play_page`.
 """
 
 import base64
@@ -35,6 +36,20 @@ SCRIPTS = (
     "main.js",
 )
 """Parts of the script in the order in which they are put together; later ones use earlier ones."""
+SHARED_SCRIPTS = (
+    "theme.js",
+    "events.js",
+    "run.js",
+    "view.js",
+    "draw.js",
+    "panels.js",
+    "curves.js",
+    "inspect.js",
+    "legend.js",
+)
+"""Those that the page to play with has, too."""
+PLAY_SCRIPTS = ("link.js", "swarm.js", "walls.js", "cards.js", "buttons.js", "play.js")
+"""Its own, which come after them."""
 _HEADER = re.compile(r'<script type="application/json" id="header">(.*?)</script>', re.DOTALL)
 _DATA = re.compile(r'<script type="text/plain" class="run">(.*?)</script>', re.DOTALL)
 
@@ -82,6 +97,15 @@ def take_replay_page_apart(text: str) -> tuple[dict[str, Any], list[bytes]]:
     if not isinstance(header, dict):
         raise PageError("its header is no JSON object")
     return header, blocks
+
+
+def build_play_page() -> str:
+    """Return the page to play with as text; it gets all else from the server that sends it."""
+    shared = [_part("replay_page", name) for name in SHARED_SCRIPTS]
+    own = [_part("play_page", name) for name in PLAY_SCRIPTS]
+    return Template(_part("play_page", "index.html")).substitute(
+        style=_part("replay_page", "replay.css") + _part("play_page", "play.css"), script="\n".join([*shared, *own])
+    )
 
 
 def build_report(values: Mapping[str, Any]) -> str:

@@ -1,0 +1,162 @@
+"""The page to play with and its session over HTTP, for one reader on this machine.
+
+It listens on the loopback address only. An address without its random token is refused, and so is a request that names
+another host (as a page does whose own name was made to lead here) or comes from another page. So of all that a browser
+shows, only this page can look at the run or steer it.
+
+    GET  /TOKEN/         the page
+    POST /TOKEN/frame    what is asked for as JSON; a frame as JSON
+    POST /TOKEN/command  a command as JSON; what it has done as JSON
+    POST /TOKEN/replay   nothing; the replay page of the run so far
+
+What is refused is answered with a table of "error", one line for people.
+"""
+
+import json
+import secrets
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+
+from swarm_forage_env._internal.files import parse_json
+from swarm_forage_env.inspect.play.session import PlaySession
+from swarm_forage_env.rendering.pages import build_play_page
+
+HOST = "127.0.0.1"
+MOST_BYTES = 10_000
+"""Longest body of a request; our choice: a hundred times the longest command."""
+SILENCE_S = 60.0
+"""A connection on which nothing comes for so long is closed."""
+_HEADERS = {
+    "Cache-Control": "no-store",
+    "Content-Security-Policy": "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
+    "img-src data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+}
+_HTML, _JSON = "text/html; charset=utf-8", "application/json"
+
+
+class PlayServer(ThreadingHTTPServer):
+    """Serves one session until `shutdown`.
+
+    Attributes:
+        session: What is looked at and steered.
+        token: What every address begins with.
+        address: Where the page is.
+    """
+
+    daemon_threads = True
+
+    def __init__(self, session: PlaySession, port: int = 0) -> None:
+        """Listen.
+
+        Args:
+            session: The session.
+            port: The port, 0 for any that is free.
+
+        Raises:
+            OSError: the port is taken, or not ours to take.
+        """
+        super().__init__((HOST, port), _Handler)
+        self.session = session
+        self.token = secrets.token_urlsafe(16)
+        self.hosts = tuple(f"{name}:{self.server_port}" for name in (HOST, "localhost"))
+        self.address = f"http://{self.hosts[0]}/{self.token}/"
+
+
+class _Refused(Exception):  # noqa: N818 - it is an answer, no error of ours
+    """A request that is refused: status and one line for people."""
+
+    def __init__(self, status: int, words: str) -> None:
+        super().__init__(words)
+        self.status = status
+
+
+class _Handler(BaseHTTPRequestHandler):
+    """Answers one connection after the other, each in a thread of its own."""
+
+    server: PlayServer  # pyright: ignore[reportIncompatibleVariableOverride] - nobody else makes it
+    protocol_version = "HTTP/1.1"
+    timeout = SILENCE_S
+    server_version = "swarm-forage"
+    sys_version = ""
+
+    def do_GET(self) -> None:
+        """Send the page."""
+        self._answer(self._page)
+
+    def do_POST(self) -> None:
+        """Send a frame or a replay, or carry out a command."""
+        self._answer(self._post)
+
+    def _answer(self, make: Any) -> None:
+        try:
+            self._check_sender()
+            self._send(200, *make())
+        except _Refused as refused:
+            self.close_connection = True  # its body may be still to come
+            self._send(refused.status, *_as_json({"error": str(refused)}))
+        except ValueError as error:  # what was asked for cannot be
+            self._send(400, *_as_json({"error": str(error)}))
+        except (BrokenPipeError, ConnectionResetError):  # the reader has gone
+            self.close_connection = True
+        except Exception as error:  # noqa: BLE001 - a user's policy may raise anything, and the page tells of it
+            self._send(500, *_as_json({"error": f"{type(error).__name__}: {error}"}))
+
+    def _check_sender(self) -> None:
+        """Refuse whoever is not our page."""
+        token = self.path.lstrip("/").partition("/")[0]
+        origins = [f"http://{host}" for host in self.server.hosts]
+        if self.headers.get("Host") not in self.server.hosts:
+            raise _Refused(403, f"Expected the host {self.server.hosts[0]}; open the address that the command shows.")
+        if self.headers.get("Origin", origins[0]) not in origins:
+            raise _Refused(403, "Expected a request of the page itself, got one of another page.")
+        if not secrets.compare_digest(token.encode(), self.server.token.encode()):
+            raise _Refused(403, "Expected the address with its token, as the command shows it.")
+
+    @property
+    def _place(self) -> str:
+        return self.path.removeprefix(f"/{self.server.token}/")
+
+    def _page(self) -> tuple[str, bytes]:
+        if self._place != "":
+            raise _Refused(404, "There is no such page.")
+        return _HTML, build_play_page().encode()
+
+    def _post(self) -> tuple[str, bytes]:
+        body, session = self._body(), self.server.session
+        if self._place == "frame":
+            return _as_json(session.frame(parse_json(body)))
+        if self._place == "command":
+            return _as_json({"done": session.carry_out(parse_json(body))})
+        if self._place == "replay":
+            name, page = session.replay_page()
+            return _as_json({"name": name, "page": page})
+        raise _Refused(404, "There is no such place.")
+
+    def _body(self) -> str:
+        length = self.headers.get("Content-Length", "")
+        if not (length.isascii() and length.isdecimal()):
+            raise _Refused(411, "Expected the length of the body as a whole number.")
+        if len(length) > len(str(MOST_BYTES)) or int(length) > MOST_BYTES:
+            raise _Refused(413, f"Expected a body of at most {MOST_BYTES:,} bytes, got {length[:20]}.")
+        try:
+            return self.rfile.read(int(length)).decode("utf-8")
+        except TimeoutError as error:
+            raise _Refused(408, "Expected the whole body, got a part of it.") from error
+
+    def _send(self, status: int, kind: str, body: bytes) -> None:
+        self.send_response(status)
+        for name, value in {**_HEADERS, "Content-Type": kind, "Content-Length": str(len(body))}.items():
+            self.send_header(name, value)
+        if self.close_connection:
+            self.send_header("Connection", "close")
+        self.end_headers()
+        self.wfile.write(body)
+
+    def log_message(self, format: str, *args: Any) -> None:  # noqa: A002 - the name that http.server has
+        """Keep quiet: what is asked for is nobody else's business."""
+
+
+def _as_json(values: Any) -> tuple[str, bytes]:
+    return _JSON, json.dumps(values, allow_nan=False).encode()
