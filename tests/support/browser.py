@@ -117,11 +117,17 @@ class Browser:
     ) -> None:
         """Open a file and wait until it is ready; by default until its replay is unpacked.
 
-        What was kept of an earlier page is gone. A fragment such as "#t=60" ends the address.
+        A fragment such as "#t=60" ends the address.
         """
+        self.open_address(file.resolve().as_uri(), ready, fragment=fragment)
+
+    def open_address(
+        self, address: str, ready: str = "document.getElementById('loading')?.hidden === true", *, fragment: str = ""
+    ) -> None:
+        """Open an address and wait until it is ready; what was kept of an earlier page is gone."""
         self.complaints.clear()
         self.requests.clear()
-        self._address = file.resolve().as_uri()
+        self._address = address
         self.call("Page.navigate", url="about:blank")  # another fragment alone would not load the page anew
         self.call("Page.navigate", url=self._address + fragment)
         self.wait_for(ready)
@@ -169,6 +175,11 @@ class Browser:
     def move_to(self, x: float, y: float) -> None:
         """Move the mouse, with no button down."""
         self.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
+
+    def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        """Press the mouse at one place, move it to another, and release it there."""
+        for kind, (x, y) in (("mousePressed", start), ("mouseMoved", end), ("mouseReleased", end)):
+            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
 
     def press(self, key: str, *, code: str = "") -> None:
         """Press and release a key."""

@@ -116,7 +116,7 @@ class PlayPage {
     if (!this.swarm?.now) return;
     const arenas = document.getElementById("arenas");
     const { width_m, height_m } = this.swarm.header.world;
-    const height = innerWidth <= 860 ? innerHeight * 0.5 : Math.max(300, innerHeight * 0.6);
+    const height = innerWidth <= 860 ? innerHeight * 0.5 : Math.max(300, innerHeight * 0.62);
     const caption = this.panel.box.querySelector("figcaption").offsetHeight + 2;
     const grid = bestGrid(1, width_m / height_m, arenas.clientWidth, height, 12, caption);
     arenas.style.gridTemplateColumns = `${grid.width + 2}px`;

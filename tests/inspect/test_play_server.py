@@ -1,0 +1,132 @@
+"""The server of the page to play with: who is refused, and what a browser gets."""
+
+import http.client
+import json
+
+import pytest
+
+from swarm_forage_env.inspect.play.server import HOST, MOST_BYTES, PlayServer
+from swarm_forage_env.inspect.play.session import PlaySession, Setting
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.wrappers.world import World
+from tests.support.play_page import served
+
+
+@pytest.fixture(scope="module")
+def server():
+    world = World(scenario("warehouse_small", n_robots=3, n_objects=20))
+    with served(PlaySession(Setting(world=world, policy="random"))) as server:
+        yield server
+
+
+def ask(server, method="POST", place="command", *, body="", path=None, **headers):
+    """The status and the text that come back; a header of None is left out."""
+    connection = http.client.HTTPConnection(HOST, server.server_port, timeout=60)
+    content = body.encode() if isinstance(body, str) else body
+    given = {"Host": server.hosts[0], "Content-Length": str(len(content))} | {
+        name.replace("_", "-"): value for name, value in headers.items()
+    }
+    connection.putrequest(method, f"/{server.token}/{place}" if path is None else path, skip_host=True)
+    for name, value in given.items():
+        if value is not None:
+            connection.putheader(name, value)
+    connection.endheaders(content)
+    answer = connection.getresponse()
+    text = answer.read().decode()
+    connection.close()
+    return answer, text
+
+
+def refusal(server, *words, **more):
+    answer, text = ask(server, *words, **more)
+    return answer.status, json.loads(text)["error"]
+
+
+def test_it_listens_on_this_machine_only(server):
+    assert server.server_address[0] == "127.0.0.1"
+    assert len(server.token) >= 20
+    with served(server.session) as other:
+        assert other.token != server.token
+
+
+def test_the_page_comes_with_its_token_and_may_load_nothing_else(server):
+    answer, text = ask(server, "GET", "")
+    assert answer.status == 200
+    assert text.startswith("<!doctype html>")
+    assert "default-src 'none'" in answer.headers["Content-Security-Policy"]
+    assert "frame-ancestors 'none'" in answer.headers["Content-Security-Policy"]
+    assert (answer.headers["Referrer-Policy"], answer.headers["Cache-Control"]) == ("no-referrer", "no-store")
+    assert ask(server, "GET", "", Host=f"localhost:{server.server_port}")[0].status == 200
+
+
+@pytest.mark.parametrize("path", ["/", "/x/command", "/%2e/command", "//command", "command", "/%C3%B6/"])
+@pytest.mark.parametrize("method", ["GET", "POST"])
+def test_without_the_token_all_is_refused(server, method, path):
+    status, words = refusal(server, method, path=path, body='{"do": "pause"}')
+    assert (status, words) == (403, "Expected the address with its token, as the command shows it.")
+
+
+@pytest.mark.parametrize("host", ["evil.example", "evil.example:80", "127.0.0.1", "127.0.0.1:1", "", None])
+def test_another_host_is_refused(server, host):
+    for method in ("GET", "POST"):
+        status, words = refusal(server, method, body='{"do": "pause"}', Host=host)
+        assert (status, words.startswith("Expected the host 127.0.0.1:")) == (403, True)
+    assert not server.session.run.paused
+
+
+def test_another_page_is_refused(server):
+    for origin in ("http://evil.example", "null", f"http://127.0.0.1:{server.server_port}0"):
+        assert refusal(server, body='{"do": "pause"}', Origin=origin)[0] == 403
+    assert not server.session.run.paused
+    answer, text = ask(server, body='{"do": "pause"}', Origin=f"http://127.0.0.1:{server.server_port}")
+    assert (answer.status, json.loads(text)) == (200, {"done": ""})
+    ask(server, body='{"do": "play"}')
+
+
+@pytest.mark.parametrize(
+    "body", ["", "{", "nonsense", b"\xff\xfe", "[1]", "7", '{"do": "fly"}', '{"do": "kill", "robot": 99}', "[" * 9000]
+)
+def test_garbage_and_unknown_commands_are_refused(server, body):
+    before = server.session.run
+    status, words = refusal(server, body=body)
+    assert status == 400
+    assert words
+    assert server.session.run is before
+
+
+def test_long_bodies_are_refused_before_they_are_read(server):
+    assert refusal(server, body="", Content_Length=str(MOST_BYTES + 1))[0] == 413
+    assert refusal(server, body="", Content_Length="9" * 5000)[0] == 413
+    for length in (None, "-1", "many", "٣"):
+        given = length if length is None else length.encode().decode("latin-1")
+        assert refusal(server, body="", Content_Length=given)[0] == 411
+
+
+@pytest.mark.parametrize(("method", "place"), [("GET", "frame"), ("GET", "../etc/passwd"), ("POST", "x"), ("POST", "")])
+def test_there_is_nothing_else(server, method, place):
+    assert refusal(server, method, place, body="null")[0] == 404
+
+
+def test_a_frame_a_command_and_a_replay_come_as_json(server):
+    answer, text = ask(server, place="frame", body='{"run": 0}')
+    assert answer.status == 200
+    assert json.loads(text)["about"]["header"]["n_robots"] == 3
+    assert json.loads(ask(server, body='{"do": "kill", "robot": 1}')[1]) == {"done": "robot 1 was killed"}
+    server.session.run.paused = True
+    assert json.loads(ask(server, place="frame", body="null")[1])["dead"] == [1]
+    while server.session.run.world.tick < 5:
+        ask(server, body='{"do": "step"}')
+    told = json.loads(ask(server, place="replay", body="null")[1])
+    assert told["name"].endswith("_random.html")
+    assert told["page"].rstrip().endswith("</html>")
+    ask(server, body='{"do": "play"}')
+
+
+def test_a_policy_that_fails_is_told_of(server, monkeypatch):
+    monkeypatch.setattr(server.session, "frame", lambda _: 1 / 0)
+    assert refusal(server, place="frame", body="null") == (500, "ZeroDivisionError: division by zero")
+
+
+def test_a_port_that_is_taken_is_no_port(server):
+    with pytest.raises(OSError, match=r"[Aa]ddress already in use"):
+        PlayServer(server.session, server.server_port)
