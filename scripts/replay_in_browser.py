@@ -1,10 +1,12 @@
-"""Replay pages in a real browser: the pictures of docs/replay.md, and how large and how fast pages are.
+"""Pages in a real browser: the pictures of docs/replay.md and docs/play.md, and how large and fast replays are.
 
     python -m scripts.replay_in_browser pictures
+    python -m scripts.replay_in_browser play
     python -m scripts.replay_in_browser speed [--robots 819] [--seconds 200]
 
-`pictures` writes docs/images/replay_desktop.png and replay_phone.png. `speed` makes the start of a run of search and
-rescue, prints the size of its page, and the processor time that the page takes when a reader jumps to another time.
+`pictures` writes docs/images/replay_desktop.png and replay_phone.png, and `play` play_desktop.png. `speed` makes the
+start of a run of search and rescue, prints the size of its page, and the processor time that the page takes when a
+reader jumps to another time.
 Needs chromium and the test extra.
 """
 
@@ -18,9 +20,11 @@ from typing import Any
 import numpy as np
 
 from scripts.arguments import whole
-from swarm_forage_env import plan_run, record_replay, scenario, write_replays
+from swarm_forage_env import World, plan_run, record_replay, scenario, write_replays
+from swarm_forage_env.inspect.play.session import PlaySession, Setting
 from swarm_forage_env.inspect.replay.frames import Replay
 from tests.support.browser import NAMES, Browser, find_chromium
+from tests.support.play_page import choose_robot, served
 from tests.support.replay_page import choose, seek
 
 IMAGES = Path(__file__).resolve().parent.parent / "docs" / "images"
@@ -31,6 +35,10 @@ PICTURE_S = 1500.0
 SEED = 1
 DESKTOP: dict[str, Any] = {"width": 1280, "height": 1080}
 PHONE: dict[str, Any] = {"width": 390, "height": 844, "touch": True}
+PLAY_DESKTOP: dict[str, Any] = {"width": 1280, "height": 800}
+PLAY_WALL = (18.0, 4.0, 18.6, 12.0)
+PLAY_S = 1200.0
+"""When the picture of the page to play with is taken; half of it, its run is as planned."""
 JUMPS = 30
 JUMP = """new Promise((done) => {{
   const scrub = document.getElementById("scrub");
@@ -63,6 +71,27 @@ def draw_pictures(folder: Path) -> None:
         print(browser.picture(IMAGES / "replay_phone.png"))
 
 
+def draw_play(folder: Path) -> None:
+    """Take the picture of the page to play with: a wall, some noise, one robot dead and another one chosen."""
+    world = scenario("warehouse_small", n_robots=40, obstacles=(PLAY_WALL,), physics="compiled")
+    session = PlaySession(Setting(world=World(world), policy="dpo", seed=SEED))
+    session.carry_out({"do": "pause"})
+    for _ in range(round(PLAY_S / 2 / world.dt_s)):
+        session.run.step()
+    session.carry_out({"do": "level", "name": "throttle", "value": 0.2})
+    session.carry_out({"do": "kill", "robot": 7})
+    with served(session) as server, Browser(folder / "play", **PLAY_DESKTOP) as browser:
+        browser.open_address(server.address)
+        for _ in range(round(PLAY_S / 2 / world.dt_s)):
+            session.run.step()
+        browser.wait_for(f"document.getElementById('clock').textContent === '{PLAY_S:,.0f} s'")
+        carrying = session.run.world.swarm.carried_object >= 0
+        choose_robot(browser, session, int(np.flatnonzero(carrying)[0]))
+        browser.wait_for("document.querySelector('#robot table').textContent.includes('wheels')")
+        browser.ask("scrollTo(0, 0)")
+        print(browser.picture(IMAGES / "play_desktop.png"))
+
+
 def measure(folder: Path, n_robots: int, seconds: int) -> None:
     """Print size and speed of a page of many robots."""
     world = scenario("search_and_rescue", n_robots=n_robots, physics="compiled")
@@ -93,7 +122,7 @@ def processor_ms(browser: Browser) -> float:
 def main() -> None:
     """Do what the command line asks for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("pictures", "speed"))
+    parser.add_argument("what", choices=("pictures", "play", "speed"))
     parser.add_argument("--robots", type=whole(at_least=1), default=819)
     parser.add_argument("--seconds", type=whole(at_least=1), default=200)
     words = parser.parse_args()
@@ -102,6 +131,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         if words.what == "pictures":
             draw_pictures(Path(folder))
+        elif words.what == "play":
+            draw_play(Path(folder))
         else:
             measure(Path(folder), words.robots, words.seconds)
 

@@ -49,5 +49,5 @@ def move_slider(browser: Browser, name: str, value: float) -> None:
 
 
 def run_shown(browser: Browser, text: str) -> None:
-    """Wait until the line below the headline has some text."""
-    browser.wait_for(f"document.getElementById('subtitle').textContent.includes('{text}')")
+    """Wait until the headline, or the line below it, has some text."""
+    browser.wait_for(f"document.querySelector('.names').textContent.includes('{text}')")

@@ -216,7 +216,7 @@ class PlaySession:
         run, here = self.run, self.run.scenario
         preset = PRESETS[here.name]().robots.n_robots if here.name in PRESETS else here.robots.n_robots
         return {
-            "title": World(here, run.given).title(run.name, f"seed {self.setting.seed}"),
+            "disturbances": [config.in_words(here.dt_s) for config in run.given],
             "scenarios": list(dict.fromkeys((*PRESETS, here.name))),
             "policies": list(self._policies),
             "policy": self.setting.policy,

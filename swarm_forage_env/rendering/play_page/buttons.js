@@ -41,8 +41,12 @@ function pressPlayKey(event, page) {
 /** Let choices and sliders show what the run is made of. */
 function showSetting(page, about) {
   const { header } = about;
+  const { width_m, height_m, obstacles_m } = header.world;
+  const facts = [`${header.n_robots} robots`, `${header.n_objects} objects`, `${width_m} × ${height_m} m`,
+    `seed ${header.seed}`];
+  if (obstacles_m.length > 0) facts.push(obstacles_m.length === 1 ? "1 wall" : `${obstacles_m.length} walls`);
   document.getElementById("title").textContent = `${header.label} in ${header.scenario.replaceAll("_", " ")}`;
-  document.getElementById("subtitle").textContent = about.title;
+  document.getElementById("subtitle").textContent = [...facts, ...about.disturbances].join("  ·  ");
   document.getElementById("seed").value = String(header.seed);
   fill("scenario", about.scenarios.map((name) => [name, name.replaceAll("_", " ")]), header.scenario);
   fill("policy", about.policies.map((name) => [name, name.split("/").at(-1)]), about.policy);
@@ -51,7 +55,7 @@ function showSetting(page, about) {
   robots.max = String(about.most_robots);
   robots.value = String(header.n_robots);
   document.getElementById("robots-now").textContent = String(header.n_robots);
-  document.getElementById("no-walls").disabled = header.world.obstacles_m.length === 0;
+  document.getElementById("no-walls").disabled = obstacles_m.length === 0;
   if (page.sliders) return;
   const card = document.getElementById("levels");
   page.sliders = Object.fromEntries(
