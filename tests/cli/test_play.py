@@ -25,6 +25,7 @@ def test_it_serves_the_page_until_it_is_interrupted(tmp_path, sent, code):
             connection = http.client.HTTPConnection(place.hostname, place.port, timeout=60)
             connection.request("GET", place.path)
             assert connection.getresponse().read().startswith(b"<!doctype html>")
+            connection.close()
             started.send_signal(sent)
             out, err = started.communicate(timeout=60)
         finally:

@@ -362,7 +362,7 @@ def _beginnings_only(*, trains: bool) -> Iterator[None]:
             raise Started(0)
         build(env, config, *given, **named)
 
-    def begin_and_stop(live: run.LiveRun, stack: Any, policy: Any, seed: int) -> None:
+    def begin_and_stop(live: run.LiveRun, stack: Any, policy: Any, seed: int, **_: Any) -> None:
         if isinstance(policy, InterfacePolicy):
             begin(live, stack, policy, seed)
         else:  # a scripted controller refuses nothing then, and compiles for a minute

@@ -452,3 +452,14 @@ def test_populations_that_do_not_fit_the_scenario_are_refused():
         PopulationConfig(initial_robots=5).wrap(env)
     with pytest.raises(ConfigError, match=r"initial_robots below 4.*a robot can be born, got None"):
         PopulationConfig(birth_per_tick=0.1).wrap(env)
+
+
+def test_rates_change_while_a_run_goes_on_and_nothing_else():
+    env = PopulationConfig().wrap(ForageEnv(scenario("warehouse_small", n_robots=4, n_objects=9)))
+    env.reset_batch(3)
+    env.reconfigure(PopulationConfig(malfunction_per_tick=50.0))
+    env.step_batch(np.zeros((4, 3), np.float32))
+    assert np.count_nonzero(env.unwrapped.active) == 3
+    assert env.made_from.malfunction_per_tick == 50.0
+    with pytest.raises(ConfigError, match="Expected other rates only"):
+        env.reconfigure(PopulationConfig(initial_robots=2))

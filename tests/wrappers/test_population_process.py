@@ -15,6 +15,8 @@ from swarm_forage_env.wrappers.population_process import (
     EventRates,
     PopulationState,
     advance_population,
+    break_down,
+    come_back,
     simulate_population,
 )
 from tests.reference.adversity import SlowPopulation
@@ -349,3 +351,21 @@ def test_deaths_per_run_of_search_and_rescue():
         # Poisson but for the floor, which lengthens no wait by more than a tick in a thousand.
         assert np.mean(deaths) == pytest.approx(mean, abs=3.5 * np.sqrt(mean / n_runs))
         assert np.var(deaths, ddof=1) == pytest.approx(mean, rel=0.6)
+
+
+def test_a_clock_that_starts_later_waits_as_long():
+    rates = EventRates(death=0.01, malfunction=0.02)
+    early, late = EventClocks(rates, 5), EventClocks(rates, 5, tick=300)
+    assert late.death.next_tick - early.death.next_tick == 300
+    assert late.malfunction.next_tick - early.malfunction.next_tick == 300
+    assert late.birth.next_tick == np.inf
+
+
+def test_whoever_is_repaired_by_hand_leaves_the_queue_wherever_it_is():
+    state = PopulationState.start(4)
+    for row in (2, 0, 3):
+        break_down(state, row, 5)
+    come_back(state, 0, 9)
+    assert state.repair_queue == [2, 3]
+    assert state.active.tolist() == [True, True, False, False]
+    assert (state.tally.repairs, state.tally.absence_ticks) == (1, 4)
