@@ -30,6 +30,8 @@ from swarm_forage_env.scenarios.config import CACHE_KINDS
 ACTIVATIONS = ("tanh", "relu")
 _MOST_BYTES = 2**28
 """Bytes that a network may have, in the file and unpacked; our choice: a network of ours has a thousandth of it."""
+_MOST_NUMBERS = 2**26
+"""Numbers of all layers where each is as wide as the widest, as kernels take them; our choice: 256 MiB."""
 _LAYER_PARTS = ("weight", "bias")
 
 
@@ -103,8 +105,13 @@ class Network:
         )
         if not fits or any(left[1] != right[0] for left, right in itertools.pairwise(sizes)):
             raise NetworkError(f"Expected layers that follow on each other, got weights {sizes}.")
-        if not all(layer.dtype.kind == "f" and np.isfinite(layer).all() for layer in (*self.weights, *self.biases)):
+        if not all(layer.dtype.kind == "f" and _is_finite(layer) for layer in (*self.weights, *self.biases)):
             raise NetworkError("Expected weights and biases that are finite numbers; did the training diverge?")
+        width = max(*(len(bias) for bias in self.biases), len(self.weights[0]))
+        if width * sum(len(weight) + 1 for weight in self.weights) > _MOST_NUMBERS:
+            raise NetworkError(
+                f"Expected layers that take at most {_MOST_NUMBERS:,} numbers side by side, got {sizes}."
+            )
 
     def outputs(self, rows: ObsArray) -> np.ndarray:
         """Return the last layer's values for observations (N, d), (N, m) float32, before any choice of actions.
@@ -188,6 +195,12 @@ class Network:
             return cls(weights, biases, NetworkAbout.from_json(str(read_array(stored, "about"))))
         except (ArchiveError, NetworkError) as error:
             raise NetworkError(f"Expected {path} to hold a network: {error}") from error
+
+
+def _is_finite(layer: np.ndarray) -> bool:
+    """Whether a layer is finite as kernels take it, float32."""
+    with np.errstate(over="ignore"):
+        return bool(np.isfinite(layer.astype(np.float32)).all())
 
 
 def _array(tensor: Any) -> np.ndarray:

@@ -290,3 +290,16 @@ def test_a_copy_continues_as_the_original_does(copied):
     of_policy = [policy.act(obs, env.active).copy() for _ in range(12)]
     np.testing.assert_array_equal(of_twin, of_policy)
     assert not np.array_equal(of_policy[0], of_policy[3])
+
+
+def test_numbers_that_are_finite_only_as_64_bits_are_refused(tmp_path):
+    network = small_network()
+    wide = tuple(weight.astype(np.float64) * 1e300 for weight in network.weights)
+    with pytest.raises(NetworkError, match="finite numbers"):
+        Network(wide, network.biases, network.about)
+
+
+def test_layers_that_would_fill_the_memory_are_refused():
+    weights = (np.zeros((1, 20_000), np.float32), np.zeros((20_000, 1), np.float32))
+    with pytest.raises(NetworkError, match="numbers side by side"):
+        Network(weights, (np.zeros(20_000, np.float32), np.zeros(1, np.float32)), small_network().about)
