@@ -249,4 +249,6 @@ def _first_line(documented: Any) -> str:
 
 
 def _plain(value: Any) -> str:
-    return " x ".join(f"{part:g}" for part in value) if isinstance(value, tuple) else str(value)
+    if isinstance(value, tuple) and all(isinstance(part, int | float) for part in value):
+        return " x ".join(f"{part:g}" for part in value)
+    return ", ".join(map(_plain, value)) if isinstance(value, tuple) else str(value)
