@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 
 from swarm_forage_env._internal.fields import known_name
+from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.wording import number
 from swarm_forage_env.inspect.study_maps import snapshot
 from swarm_forage_env.rendering.figures import (
@@ -406,8 +407,9 @@ class _Drawing:
         return [*pictures, *(self.table(file, frame) for file, frame in tables.items())]
 
     def table(self, name: str, frame: "pl.DataFrame") -> Path:
-        """Write a table; returns its file."""
-        frame.write_csv(self.folder / name)
+        """Write a table, whole or not at all; returns its file."""
+        with replacing(self.folder / name) as draft:
+            draft.write_text(frame.write_csv(), encoding="utf-8", newline="")
         return self.folder / name
 
     def measure(self, figure: StudyFigure, band: Band) -> Iterator[Path]:
@@ -436,5 +438,6 @@ def snapshot_written(spec: StudySpec, file: Path) -> Path:
     picture = snapshot(spec)
     from PIL import Image  # after the frame, which says what to install without it
 
-    Image.fromarray(picture).save(file, optimize=True)
+    with replacing(file, ending=file.suffix) as draft:
+        Image.fromarray(picture).save(draft, optimize=True)
     return file
