@@ -17,9 +17,11 @@ from typing import TYPE_CHECKING, Any, TypeAlias, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
+from swarm_forage_env._internal.fields import number, table, text, whole
 from swarm_forage_env._internal.files import parse_json, replacing
 from swarm_forage_env.contract.types import FloatArray, IntArray
 from swarm_forage_env.runs.answer import Sheet
+from swarm_forage_env.runs.parquet import ParquetError, check_columns, check_texts, open_parquet
 from swarm_forage_env.runs.versions import identity
 from swarm_forage_env.scenarios.columns import ALL_COLUMNS, INTERVAL_COLUMNS, KEY_COLUMNS
 from swarm_forage_env.scenarios.performance import performance_curve
@@ -32,6 +34,8 @@ SCHEMA_VERSION = 2
 
 CountArray: TypeAlias = NDArray[np.int64]
 
+MOST_BYTES = 2**28
+"""What a record may have, in the file, unpacked and in memory: 600,000 intervals; our choice."""
 _PREFIX = "swarm_forage_env."
 _FILE_KEYS = tuple(_PREFIX + name for name in ("schema_version", "spec", "provenance", "digest"))
 
@@ -212,18 +216,21 @@ class RunRecord:
 
         name = str(path)
         try:
-            with Path(path).open("rb"):  # a missing or unreadable file gets another message than a damaged one
-                pass
-            stamp = pl.read_parquet_metadata(name)
-            _check_stamp(name, stamp)
-            frame = pl.read_parquet(name, glob=False)
+            opened = open_parquet(Path(path), MOST_BYTES)
+            _check_stamp(name, opened.stamp)
+            frame = opened.frame()
         except OSError as error:
             raise RecordError(f"Cannot read {name}: {error.strerror or error}.") from error
-        except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
-            raise RecordError(f"Cannot read {name}: it is no Parquet file or a damaged one ({error}).") from error
-        version, spec, provenance, digest = (stamp[key] for key in _FILE_KEYS)
+        except ParquetError as error:
+            raise RecordError(f"Cannot read {name}: {error}.") from error
+        version, spec, provenance, digest = (opened.stamp[key] for key in _FILE_KEYS)
         try:
-            record = record_of(frame, spec, parse_json(provenance))
+            check_columns(frame, _column_types(), (pl.Float64,), needed=cls.column_names())
+            check_texts(frame, MOST_BYTES)
+            if sum(frame.null_count().row(0)):
+                raise RecordError("it has empty places")
+            record = record_of(frame, spec, _checked_provenance(provenance))
+            _check_content(record)
         except (pl.exceptions.PolarsError, LookupError, OverflowError, RecursionError, TypeError, ValueError) as error:
             raise RecordError(f"Cannot read {name}: its content does not match schema {version} ({error}).") from error
         if _digest(record, provenance) != digest:
@@ -233,11 +240,9 @@ class RunRecord:
 
 def is_record(path: str | os.PathLike[str]) -> bool:
     """Return whether a Parquet file says that it holds a run."""
-    import polars as pl
-
     try:
-        return set(_FILE_KEYS) <= pl.read_parquet_metadata(str(path)).keys()
-    except (OSError, pl.exceptions.PolarsError, pl.exceptions.PanicException):
+        return set(_FILE_KEYS) <= open_parquet(Path(path), MOST_BYTES).stamp.keys()
+    except (OSError, ParquetError):
         return False
 
 
@@ -291,6 +296,42 @@ def _polars_type(dtype: type) -> Any:
     import polars as pl
 
     return {str: pl.String, int: pl.Int64, float: pl.Float64}[dtype]
+
+
+def _column_types() -> dict[str, tuple[Any, ...]]:
+    """Column of a record -> types that it may have in a file."""
+    import polars as pl
+
+    whole = (pl.Int64, pl.Int32)
+    types = {str: (pl.String,), int: whole, float: (pl.Float64,), np.int32: whole, np.int64: whole}
+    types[np.float64] = types[float]
+    return {name: types[dtype] for name, dtype in (_KEY_DTYPES | COLUMN_DTYPES).items()}
+
+
+def _checked_provenance(told: str) -> Mapping[str, str]:
+    """Return versions and times as a file has them, if they are texts by name, and times numbers."""
+    found = table("provenance", parse_json(told))
+    for name, value in found.items():
+        if not isinstance(value, str):
+            raise RecordError(f"expected provenance.{name} to be a text")
+        if name in ("wall_time_s", "cpu_time_s") and value:
+            number(name, float(value), at_least=0.0)
+    return found
+
+
+def _check_content(record: RunRecord) -> None:
+    """Refuse what no run has: a clock that stands, no robots, a specification without what it is read by."""
+    for name in ("run_id", "scenario", "controller", "criterion"):
+        text(name, getattr(record, name))
+    number("criterion_value", record.criterion_value)
+    whole("n_robots", record.n_robots, at_least=1)
+    whole("seed", record.seed, at_least=0)
+    if not np.array_equal(record.interval, np.arange(record.n_intervals)):
+        raise RecordError("expected the intervals 0, 1, 2, ... once each")
+    if not (np.diff(record.t_end_s, prepend=0.0) > 0.0).all():
+        raise RecordError("expected a rising t_end_s")
+    scenario = table("scenario", table("the specification", parse_json(record.spec)).get("scenario"))
+    text("performance", scenario.get("performance"))
 
 
 def _check_stamp(name: str, stamp: Mapping[str, str]) -> None:

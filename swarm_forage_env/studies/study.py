@@ -6,6 +6,7 @@ reference on it (`StudySpec.reference`).
 """
 
 import json
+import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -56,6 +57,8 @@ OF_THE_STUDY = {
 """Scenario fields that something else in a study decides, and what."""
 _STORED = {"rules": "readings"}
 """Field -> its key in files, where that is another word."""
+MOST_CONDITIONS = 100_000
+"""Rules times policies times values of all axes; our choice: 400 times those of the largest set."""
 NOTHING = "none"
 """On an axis of lists, the list without entries."""
 
@@ -197,6 +200,8 @@ class StudySpec:
 
     def __post_init__(self) -> None:
         check_file_name("name of a study", self.name)
+        if self.budget:  # the folder of the study is named by both
+            check_file_name("budget", self.budget)
         for what in ("title", "budget", "file"):
             typed(str, getattr(self, what), what)
         known_name("scenario", self.scenario, scenario_names())
@@ -233,6 +238,12 @@ class StudySpec:
                         f"Expected only mixed swarms with a part that the axis {SHARE} sets, such as "
                         f"mixed:dpo={SHARE},crw=rest, got {policy.label}. At the share 0 or 1 they have one part."
                     )
+        n_conditions = len(self.rules) * len(self.policies) * math.prod(len(axis.values) for axis in self.axes)
+        if n_conditions > MOST_CONDITIONS:
+            raise ConfigError(
+                f"Expected at most {MOST_CONDITIONS:,} conditions of study {self.name}, got {n_conditions:,}; leave "
+                "out values of its axes, or policies."
+            )
         _ = self.plan  # refuses what scenarios, wrappers and runs refuse
 
     @cached_property

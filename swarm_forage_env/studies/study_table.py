@@ -16,17 +16,21 @@ from dataclasses import dataclass, field
 from functools import cache, cached_property
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 import numpy as np
 
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import alone_in, parse_json, replacing
+from swarm_forage_env._internal.typed import typed
+from swarm_forage_env.runs.parquet import ParquetError, open_parquet
 from swarm_forage_env.runs.plan import Condition, Plan
 from swarm_forage_env.runs.record import COLUMN_DTYPES, RecordError, RunRecord, record_of
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import DONE, FAILED, FAILURES, MISSING, RunFailure, RunStore, read_failure
 from swarm_forage_env.runs.table import Curves, Table
 from swarm_forage_env.runs.versions import VERSION_NAMES
+from swarm_forage_env.studies.packed_rows import AXIS, LOSS_COLUMNS, MOST_BYTES, check_rows, check_types
 from swarm_forage_env.studies.study import Place, StudySpec
 from swarm_forage_env.studies.study_folder import PlaceState, StudyFolder, place_state
 
@@ -35,11 +39,8 @@ if TYPE_CHECKING:
 
 TABLE_VERSION = 1
 """Version of the layout; raised whenever a column changes its name, type or meaning."""
-AXIS = "axis_"
-"""Prefix of the columns of axes, which may be called like columns of records: throttle, handling_cost."""
-LOSS_COLUMNS = ("state", "error", "traceback", "rerun")
-"""Last columns: one of `study_folder.STATES`; for failed runs the exception in one line, its traceback, and the command
-that makes the run again, given in the folder of the study."""
+Versions: TypeAlias = tuple[Mapping[str, str], ...]
+"""Versions and commits that made the runs of a study, each once."""
 _PREFIX = "swarm_forage_env.study."
 _FILE_KEYS = tuple(_PREFIX + name for name in ("table_version", "study", "versions", "digest"))
 _COMPRESSION = 19
@@ -56,8 +57,7 @@ class StudyTable(Table):
     frame: "pl.DataFrame" = field()  # pyright: ignore[reportIncompatibleVariableOverride] - here it is given
     """Columns: `study`, `cell` (index in `spec.places`), `reading` (the rules), `policy`, one `AXIS` column per axis;
     those of `RunRecord`, null where a run has no such column; `LOSS_COLUMNS`."""
-    versions: tuple[Mapping[str, str], ...]
-    """Versions and commits that made the runs, each once."""
+    versions: Versions
     wall_time_s: float | None = None
     """How long all finished runs took together, by the clock. None where it is not known: a file leaves it out, so that
     the same runs make the same bytes."""
@@ -332,31 +332,42 @@ def read_study(path: str | Path) -> StudyTable:
     Raises:
         RecordError: the file is missing, no study, damaged, or of another layout; the message names it.
     """
-    import polars as pl
-
     if Path(path).is_dir():
         return gather_study(StudyFolder(path))
     name = str(path)
     try:
-        with Path(path).open("rb"):  # a missing or unreadable file gets another message than a damaged one
-            pass
-        stamp = pl.read_parquet_metadata(name)
-        frame = pl.read_parquet(name, glob=False)
+        return _read_file(Path(path))
     except OSError as error:
         raise RecordError(f"Cannot read {name}: {error.strerror or error}.") from error
-    except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
-        raise RecordError(f"Cannot read {name}: it is no Parquet file or a damaged one ({error}).") from error
-    if not set(_FILE_KEYS) <= stamp.keys():
-        raise RecordError(f"Cannot read {name}: it is a Parquet file, but no study of swarm_forage_env.")
-    version, study, versions, digest = (stamp[key] for key in _FILE_KEYS)
+    except (ParquetError, ConfigError) as error:
+        raise RecordError(f"Cannot read {name}: {str(error).removesuffix('.')}.") from error
+
+
+def _read_file(path: Path) -> StudyTable:
+    """Read a packed study; errors do not name the file."""
+    opened = open_parquet(path, MOST_BYTES)
+    if not set(_FILE_KEYS) <= opened.stamp.keys():
+        raise ParquetError("it is a Parquet file, but no study of swarm_forage_env")
+    version, study, versions, digest = (opened.stamp[key] for key in _FILE_KEYS)
     if version != str(TABLE_VERSION):
-        raise RecordError(
-            f"Cannot read {name}: it has layout {version}, this version of swarm_forage_env reads {TABLE_VERSION}; "
-            "read it with the version that wrote it."
+        raise ParquetError(
+            f"it has layout {version}, this version of swarm_forage_env reads {TABLE_VERSION}; "
+            "read it with the version that wrote it"
         )
+    frame = opened.frame()
+    check_types(frame)
     if _digest(frame, study, versions) != digest:
-        raise RecordError(f"Cannot read {name}: its content does not match its digest, so the file is damaged.")
-    return StudyTable(spec=StudySpec.from_mapping(parse_json(study)), frame=frame, versions=tuple(parse_json(versions)))
+        raise ParquetError("its content does not match its digest, so the file is damaged")
+    spec = StudySpec.from_mapping(_parsed(study))
+    check_rows(frame, spec)
+    return StudyTable(spec=spec, frame=frame, versions=typed(Versions, _parsed(versions), "versions"))
+
+
+def _parsed(told: str) -> Any:
+    try:
+        return parse_json(told)
+    except ValueError as error:
+        raise ParquetError(f"its metadata are damaged: {error}") from error
 
 
 def _record(store: RunStore, run: RunSpec) -> RunRecord | None:

@@ -67,8 +67,8 @@ def test_a_file_gives_back_the_record_bit_for_bit(record, file):
         (lambda table: table.select(a=1), "it has no column run_id"),
         (lambda table: table.head(0), "does not match schema"),
         (lambda table: table.with_columns(collected=pl.lit("many")), "does not match schema"),
-        (lambda table: table.with_columns(collected=pl.lit([1, 2])), "does not match schema"),
-        (lambda table: table.with_columns(seed=pl.lit(2**70, dtype=pl.Int128)), "damaged"),
+        (lambda table: table.with_columns(collected=pl.lit([1, 2])), "columns of lists"),
+        (lambda table: table.with_columns(seed=pl.lit(2**70, dtype=pl.Int128)), "is of Int128, not of Int64"),
     ],
 )
 def test_a_table_with_our_stamp_that_is_no_record_is_told_as_damaged(file, damage, told):

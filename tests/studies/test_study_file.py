@@ -282,3 +282,20 @@ def test_what_a_budget_leaves_out_of_the_paper_is_told():
     assert left_out_words(reduced) == "walk_probability 0.026; population_size 460, 627, 819"
     assert left_out(load_study("S2a", "paper")) == {}
     assert left_out(replace(reduced, name="mine")) == {}, "nobody knows what a study of one's own might have"
+
+
+def test_more_conditions_than_anybody_runs_are_refused_before_any_is_made(tmp_path):
+    text = 'name = "much"\nscenario = "warehouse_small"\npolicies = ["crw"]\nrules = ["described"]\n'
+    for name, first in (("n_objects", 10), ("pickup_ticks", 1), ("n_robots", 1)):
+        text += f'[[axis]]\nfield = "{name}"\nvalues = {list(range(first, first + 50))}\n'
+    (tmp_path / "much.toml").write_text(text)
+    with pytest.raises(ConfigError, match=r"at most 100,000 conditions of study much, got 125,000; leave out"):
+        load_study(tmp_path / "much.toml")
+
+
+def test_a_budget_is_a_part_of_a_file_name(tmp_path):
+    (tmp_path / "a.toml").write_text(
+        'name = "a"\nscenario = "warehouse_small"\npolicies = ["crw"]\n[budget."../b"]\nseeds = 1\n'
+    )
+    with pytest.raises(ConfigError, match="budget to be at most 60 characters that can be a part of a file name"):
+        load_study(tmp_path / "a.toml")

@@ -1,0 +1,117 @@
+"""Parquet files of strangers: sizes are known before anything is unpacked."""
+
+import json
+import tracemalloc
+from pathlib import Path
+
+import polars as pl
+import pytest
+
+from swarm_forage_env.runs import parquet
+from swarm_forage_env.runs.parquet import ParquetError, check_texts, open_parquet
+from swarm_forage_env.runs.record import RecordError, RunRecord, is_record
+from tests.support.forged import forge_record
+
+SOURCE = Path(__file__).parents[1] / "files" / "record.parquet"
+
+
+def test_what_polars_writes_is_read(tmp_path):
+    frame = pl.DataFrame({"a": range(300_000), "b": ["x", None, "yy"] * 100_000, "c": [True, False, None] * 100_000})
+    frame.write_parquet(tmp_path / "a.parquet", metadata={"key": "täxt"}, row_group_size=100_000)
+    opened = open_parquet(tmp_path / "a.parquet", 2**26)
+    assert (opened.n_rows, opened.stamp["key"]) == (300_000, "täxt")
+    assert opened.stamp == pl.read_parquet_metadata(tmp_path / "a.parquet")
+    assert opened.frame().equals(frame)
+
+
+def test_a_small_file_that_unpacks_to_much_is_refused_before_it_is(tmp_path):
+    file = tmp_path / "bomb.parquet"
+    pl.DataFrame({"a": ["\0" * 2**27]}).write_parquet(file, compression_level=19)
+    assert file.stat().st_size < 2**17
+    tracemalloc.start()
+    with pytest.raises(ParquetError, match="bytes unpacked"):
+        open_parquet(file, 2**26)
+    assert tracemalloc.get_traced_memory()[1] < 2**21
+    tracemalloc.stop()
+
+
+def test_a_small_file_of_many_rows_is_refused(tmp_path):
+    file = tmp_path / "rows.parquet"
+    pl.DataFrame({"a": pl.zeros(10_000_000, pl.Int64, eager=True)}).write_parquet(file, compression_level=19)
+    assert file.stat().st_size < 2**20
+    with pytest.raises(ParquetError, match=r"10,000,000 rows of 1 columns"):
+        open_parquet(file, 2**26)
+
+
+def test_a_text_in_many_rows_is_refused_before_it_is_written_out(tmp_path):
+    frame = pl.DataFrame({"a": ["x" * 1000, "y" * 1000] * 1000})
+    check_texts(frame, 2_000_000)
+    with pytest.raises(ParquetError, match="texts"):
+        check_texts(frame, 1_999_999)
+    check_texts(pl.DataFrame({"a": [1]}), 0)
+
+
+def test_lists_and_other_encodings_are_refused(tmp_path):
+    pl.DataFrame({"a": [[1, 2]]}).write_parquet(tmp_path / "lists.parquet")
+    with pytest.raises(ParquetError, match="columns of lists"):
+        open_parquet(tmp_path / "lists.parquet", 2**20)
+    with pytest.raises(ParquetError, match="encoded in a way"):
+        parquet._values_in({1: 0, 5: {1: 3, 2: 7}})
+    with pytest.raises(ParquetError, match="kind 9"):
+        parquet._values_in({1: 9})
+
+
+@pytest.mark.parametrize("content", [b"", b"PAR1", b"PAR1" * 3, b"PAR1" + b"\xff" * 40 + b"PAR1", b"nothing" * 9])
+def test_what_is_no_parquet_is_told_in_one_line(tmp_path, content):
+    file = tmp_path / "a.parquet"
+    file.write_bytes(content)
+    with pytest.raises(ParquetError, match="no Parquet file or a damaged one"):
+        open_parquet(file, 2**20)
+    assert not is_record(file)
+    with pytest.raises(ParquetError, match="at most 1 are expected"):
+        open_parquet(SOURCE, 1)
+
+
+def test_no_changed_byte_leads_to_another_error_or_to_more_on_stderr(tmp_path, capfd):
+    content, file, told = SOURCE.read_bytes(), tmp_path / "a.parquet", list[str]()
+    for at in range(0, len(content), 7):
+        file.write_bytes(content[:at] + bytes((content[at] ^ 0x55,)) + content[at + 1 :])
+        try:
+            RunRecord.read(file)
+        except RecordError as error:
+            told.append(str(error))
+    assert [text for text in told if len(text.splitlines()) > 1] == []
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"spec": "null"}, "table of values"),
+        ({"spec": "{}"}, "scenario to be a table"),
+        ({"spec": '{"scenario": {}}'}, "performance to be a non-empty text"),
+        ({"provenance": "[]"}, "provenance to be a table"),
+        ({"provenance": '{"numpy": 2}'}, "provenance.numpy to be a text"),
+        ({"provenance": '{"wall_time_s": "long"}'}, "could not convert"),
+        ({"provenance": '{"cpu_time_s": "nan"}'}, "cpu_time_s to be a finite number"),
+        ({"frame": lambda frame: frame.with_columns(t_end_s=pl.lit(0.0))}, "rising t_end_s"),
+        ({"frame": lambda frame: frame.reverse()}, "intervals 0, 1, 2"),
+        ({"frame": lambda frame: frame.with_columns(n_robots=pl.lit(0, pl.Int64))}, "n_robots"),
+        ({"frame": lambda frame: frame.with_columns(seed=pl.lit(-1, pl.Int64))}, "seed"),
+        ({"frame": lambda frame: frame.with_columns(controller=pl.lit("\x1b[31m"))}, "controller"),
+        ({"frame": lambda frame: frame.with_columns(n_active=pl.lit(float("nan")))}, "not finite"),
+    ],
+)
+def test_a_record_of_what_no_run_has_is_refused_though_its_digest_fits(tmp_path, changes, told):
+    forge_record(SOURCE, tmp_path / "same.parquet")
+    assert RunRecord.read(tmp_path / "same.parquet").same_results(RunRecord.read(SOURCE))
+    forge_record(SOURCE, tmp_path / "a.parquet", **changes)
+    with pytest.raises(RecordError, match=told):
+        RunRecord.read(tmp_path / "a.parquet")
+
+
+def test_nested_texts_are_bounded(tmp_path):
+    forge_record(SOURCE, tmp_path / "a.parquet", spec=json.dumps({"scenario": {"performance": "x"}})[:-1] + ',"a":'
+                 + "[" * 60 + "]" * 60 + "}")  # fmt: skip
+    with pytest.raises(RecordError, match="nested levels"):
+        RunRecord.read(tmp_path / "a.parquet")
