@@ -66,12 +66,21 @@ def test_figures_come_into_the_page_and_those_of_other_kinds_stay(page, monkeypa
 def test_a_page_without_the_marks_is_told(page):
     page.write_text("nothing")
     with pytest.raises(ValueError, match="marks of a table by scripts/fuzz"):
-        fuzz.note(fuzz.Campaign("worlds", 0))
+        fuzz.note(fuzz.Campaign("worlds", 0, fuzz.one_world))
 
 
 def test_every_kind_of_case_runs(capsys):
     assert fuzz.main(["commands", "--count", "1"]) == 0
+    assert fuzz.main(["files", "--count", "3", "--format", "entry"]) == 0
     assert fuzz.main(["worlds", "--count", "1"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("1 commands, 0 faults; 1 ended with exit code ")
-    assert "ticks" in lines[1]
+    assert lines[1].startswith("3 files, 0 faults; ")
+    assert "ticks" in lines[2]
+
+
+@pytest.mark.parametrize("words", [["files", "--format", "pictures"], ["worlds", "--format", "entry"]])
+def test_a_format_is_one_of_files(words, capsys):
+    with pytest.raises(SystemExit):
+        fuzz.main(words)
+    assert "expected --format with files alone" in capsys.readouterr().err

@@ -362,9 +362,9 @@ def _beginnings_only(*, trains: bool) -> Iterator[None]:
             raise Started(0)
         build(env, config, *given, **named)
 
-    def begin_and_stop(live: run.LiveRun, stack: Any, policy: Any, seed: int, **_: Any) -> None:
+    def begin_and_stop(live: run.LiveRun, stack: Any, policy: Any, seed: int, **named: Any) -> None:
         if isinstance(policy, InterfacePolicy):
-            begin(live, stack, policy, seed)
+            begin(live, stack, policy, seed, **named)
         else:  # a scripted controller refuses nothing then, and compiles for a minute
             stack.reset_batch(seed)
         raise Started(0)
