@@ -1,0 +1,174 @@
+"""Two commands at once on one folder or file, and commands that are interrupted, in processes of their own.
+
+`pair` gives a command twice, a random moment apart: both end well, or one is refused in one line, and what is left is
+what one alone leaves. `interrupted` sends Ctrl-C or SIGTERM at a random moment, also while Python still starts: the
+command ends with its exit code and in one line, and leaves no half file.
+"""
+
+import shutil
+import signal
+import subprocess
+import time
+from collections import Counter
+from contextlib import suppress
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from random import Random
+from typing import Any
+
+from tests.support import kills
+from tests.support.kills import Killed
+
+FILES = Path(__file__).parents[1] / "files"
+PACKED = Path(__file__).parent / "blessed_noise.parquet"
+TINY = ("random", *kills.SMALL, "--horizon", "40", "--set", "interval_s=20")
+WRITERS: dict[str, tuple[str, ...]] = {
+    "run": kills.COMMANDS["run"].words,
+    "score": kills.COMMANDS["score"].words,
+    "study run": kills.COMMANDS["study"].words,
+    "study pack": ("study", "pack", "there", "--file", "out/packed.parquet"),
+    "study unpack": ("study", "unpack", str(PACKED), "--out", "out"),
+    "study report": ("study", "report", str(PACKED), "--file", "out/report.html"),
+    "replay": ("replay", *TINY, "--file", "out/page.html"),
+    "maps": ("maps", *TINY, "--picture", "out/maps.png"),
+    "record": ("record", *TINY[:-4], "--seconds", "10", "--size", "100", "--file", "out/film.gif"),
+    "dataset": ("dataset", *TINY, "--seeds", "2", "--out", "out"),
+    "export": ("export", str(FILES / "network.npz"), "--file", "out/network.h"),
+    "train": kills.COMMANDS["train"].words,
+}
+"""Command that writes into the folder "out" -> its words."""
+READERS: dict[str, tuple[str, ...]] = {
+    "list": ("list",),
+    "info": ("info", "crw"),
+    "study show": ("study", "show", "S1a"),
+    "study status": ("study", "status", str(PACKED)),
+    "benchmark show": ("benchmark", "show", str(FILES / "entry.json")),
+    "predict availability": ("predict", "availability"),
+}
+"""Commands that write nothing."""
+COMPARED = (".parquet", ".csv", ".json", ".npz", ".h")
+"""Endings of files that are equal whenever they are made."""
+REFUSED = "Expected to be the only one that writes to"
+LATEST_S = 3.0
+"""Until when the second command begins, or a signal comes."""
+
+
+def can_be_given() -> tuple[str, ...]:
+    """Names of the writers whose extras are installed."""
+    lacking = {"train"} if not all(find_spec(name) for name in ("stable_baselines3", "torch")) else set()
+    lacking |= {"record"} if find_spec("PIL") is None else set()
+    return tuple(name for name in WRITERS if name not in lacking)
+
+
+def pair(random: Random, folder: Path, names: tuple[str, ...]) -> Killed:
+    """Give one of these commands twice at once; `folder` holds what each leaves alone."""
+    name, after_s = random.choice(names), random.choice((0.0, random.uniform(0.0, LATEST_S)))
+    alone = _alone(name, folder)
+    place = folder / "pair"
+    shutil.rmtree(place, ignore_errors=True)
+    _furnish(place)
+    seen = Killed(Counter({f"pairs of {name}": 1}))
+    first = kills._start(WRITERS[name], place)
+    time.sleep(after_s)
+    second = kills._start(WRITERS[name], place)
+    codes = []
+    try:
+        for process in (first, second):
+            _, err = process.communicate(timeout=kills.LIMIT_S)
+            codes.append(process.returncode)
+            refusals = [line for line in err.splitlines() if REFUSED in line]
+            assert process.returncode == 0 or (process.returncode, len(refusals)) == (2, 1), err[-2000:]
+        assert 0 in codes, f"both ended with {codes}"
+        seen.figures["refused"] += codes != [0, 0]
+        left = _left(place)
+        assert left == alone, f"left {_difference(left, alone)}"
+    except (AssertionError, subprocess.TimeoutExpired) as error:
+        seen.fault = f"two of {name}, {after_s:.2f} s apart: {error}"
+    finally:
+        for process in (first, second):
+            kills._end_group(process)
+    return seen
+
+
+def interrupted(random: Random, folder: Path, names: tuple[str, ...]) -> Killed:
+    """Interrupt one of these commands."""
+    name, sent = random.choice(names), random.choice((signal.SIGINT, signal.SIGTERM))
+    after_s = random.choice((random.uniform(0.0, 0.3), random.uniform(0.0, LATEST_S)))
+    place = folder / "interrupted"
+    shutil.rmtree(place, ignore_errors=True)
+    _furnish(place)
+    seen = Killed(Counter({sent.name: 1}))
+    with kills._start((WRITERS | READERS)[name], place) as started:
+        try:
+            with suppress(subprocess.TimeoutExpired):
+                started.wait(after_s)
+            started.send_signal(sent)
+            _, err = started.communicate(timeout=kills.ENDS_WITHIN_S)
+            seen.fault = _wrong(started.returncode, sent, err) or _half_files(place)
+        except subprocess.TimeoutExpired:
+            seen.fault = f"still running {kills.ENDS_WITHIN_S:g} s after the signal"
+        finally:
+            kills._end_group(started)
+    if seen.fault:
+        seen.fault = f"{name}, {sent.name} after {after_s:.2f} s: {seen.fault}"
+    return seen
+
+
+def _wrong(code: int, sent: int, err: str) -> str:
+    """Say what is wrong with how an interrupted command ended; nothing where it was faster, or Python still started."""
+    if code in (0, -sent) or (code == 1 and ("init_import_site" in err or "KeyboardInterrupt" in err)):
+        return ""
+    if code not in kills.ENDS[sent]:
+        return f"exit code {code}: {err[-2000:]}"
+    if "Traceback" in err:
+        return f"a traceback: {err[-2000:]}"
+    told = [line for line in err.splitlines() if "nterrupted" in line]
+    return "" if len(told) == 1 else f"{len(told)} lines: {err[-2000:]}"
+
+
+def _half_files(place: Path) -> str:
+    """Name drafts, and files that their readers refuse."""
+    for file in (place / "out").rglob("*"):
+        if file.name.startswith(".") and file.suffix == ".tmp":
+            return f"left the draft {file.name}"
+        if file.is_file() and file.suffix in COMPARED[:-1]:
+            try:
+                kills._content(file)
+            except Exception as error:  # noqa: BLE001 - whatever it is, the file is no whole one
+                return f"left half of {file.name}: {error}"
+    return ""
+
+
+def _furnish(place: Path) -> None:
+    from swarm_forage_env.studies.study_folder import StudyFolder
+    from swarm_forage_env.studies.study_table import read_study, unpack_study
+
+    kills._furnish(place)
+    unpack_study(read_study(PACKED), StudyFolder(place / "there"))
+
+
+@cache
+def _alone(name: str, folder: Path) -> dict[str, Any]:
+    """What a command leaves by itself."""
+    place = folder / f"alone_{name.replace(' ', '_')}"
+    _furnish(place)
+    done = kills._call(WRITERS[name], place)
+    if done.returncode:
+        raise RuntimeError(f"Expected {name} to end well when it is alone, got: {done.stderr[-2000:]}")
+    return _left(place)
+
+
+def _left(place: Path) -> dict[str, Any]:
+    """Files in "out" by name, drafts included, with the contents of those that can be compared."""
+    found = {file.relative_to(place).as_posix(): file for file in (place / "out").rglob("*") if file.is_file()}
+    return {
+        name: kills._content(file) if file.suffix in COMPARED and not kills.NOT_COMPARED.search(name) else ""
+        for name, file in found.items()
+        if "tensorboard/" not in name
+    }
+
+
+def _difference(left: dict[str, Any], alone: dict[str, Any]) -> str:
+    others = sorted(set(left) ^ set(alone))
+    return ", ".join(others) or ", ".join(name for name in left if left[name] != alone[name])
