@@ -22,11 +22,12 @@ def forge_study(
 ) -> None:
     """Write a packed study as `source`, with another table, other keys of its study, or a whole other text for it."""
     stamp = pl.read_parquet_metadata(source)
-    _, told, made, _ = (stamp[key] for key in study_table._FILE_KEYS)
+    _, told, made, digest = (stamp[key] for key in study_table._FILE_KEYS)
     told = json.dumps({**json.loads(told), **study}) if isinstance(study, Mapping) else study or told
     made = made if versions is None else versions
     changed = frame(pl.read_parquet(source))
-    digest = study_table._digest(changed, told, made)
+    with suppress(pl.exceptions.PolarsError):
+        digest = study_table._digest(changed, told, made)  # else nobody looks at it
     values = (str(study_table.TABLE_VERSION), told, made, digest)
     changed.write_parquet(file, metadata=dict(zip(study_table._FILE_KEYS, values, strict=True)))
 
