@@ -17,6 +17,7 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
+from swarm_forage_env.policies.pretrained import network_file
 from tests.support import kills
 from tests.support.kills import Killed
 
@@ -34,7 +35,7 @@ WRITERS: dict[str, tuple[str, ...]] = {
     "maps": ("maps", *TINY, "--picture", "out/maps.png"),
     "record": ("record", *TINY[:-4], "--seconds", "10", "--size", "100", "--file", "out/film.gif"),
     "dataset": ("dataset", *TINY, "--seeds", "2", "--out", "out"),
-    "export": ("export", str(FILES / "network.npz"), "--file", "out/network.h"),
+    "export": ("export", str(network_file("ppo_warehouse_small")), "--file", "out/network.h"),
     "train": kills.COMMANDS["train"].words,
 }
 """Command that writes into the folder "out" -> its words."""
