@@ -26,6 +26,10 @@ _OBSTACLE = {"facecolor": "white", "edgecolor": "black", "hatch": "////", "linew
 _NEST = {"facecolor": "none", "edgecolor": "black", "linestyle": "--", "linewidth": 0.8}
 _NARROWEST_MAP = 0.2
 """Inches per point of the font: narrower maps stand below each other."""
+_SMOOTHED = 5
+"""Intervals of a running mean: deliveries come in bursts, which hide who delivers more (our choice)."""
+_MANY_INTERVALS = 20
+"""With fewer, single ones are drawn alone."""
 _MOST_OF_FLOOR = 0.5
 """What happens in a smaller part of the floor is shown without the rest (our choice)."""
 
@@ -53,7 +57,7 @@ def draw_curves(
     band: str,
     style: FigureStyle = SCREEN,
 ) -> None:
-    """Draw curves over simulated time into a picture file.
+    """Draw curves over simulated time into a picture file; bold lines are running means where intervals are many.
 
     Args:
         path: File to write; as in `saved_figure`, whose errors this has.
@@ -67,11 +71,24 @@ def draw_curves(
     with saved_figure(path, (8.0, 4.5), title=title, style=style) as figure:
         axes = figure.subplots()
         marker = "o" if len(t_end_s) == 1 else ""
+        has_means = len(t_end_s) >= _MANY_INTERVALS
+        if has_means:
+            band += f"; bold: running mean of {_SMOOTHED} intervals"
         for curve, look in zip(curves, looks(curve.label for curve in curves), strict=True):
-            axes.plot(t_end_s, curve.mean, color=look.colour, label=look.name, marker=marker, clip_on=False)
             shade(axes, t_end_s, curve.low, curve.high, look.colour)
+            bold = curve.mean
+            if has_means:
+                axes.plot(t_end_s, curve.mean, color=look.colour, linewidth=0.6, alpha=0.6)
+                bold = _running_mean(curve.mean)
+            axes.plot(t_end_s, bold, color=look.colour, label=look.name, marker=marker, clip_on=False, zorder=3)
         axes.set(xlabel=f"time [s] ({band})", ylabel=ylabel, xlim=(0, None), ylim=(0, None))
         legend_below(figure)
+
+
+def _running_mean(values: FloatArray) -> FloatArray:
+    """Return the mean of the intervals around each one, (T,); fewer at the ends."""
+    window = np.ones(_SMOOTHED)
+    return np.convolve(values, window, "same") / np.convolve(np.ones_like(values), window, "same")
 
 
 def draw_trainings(
