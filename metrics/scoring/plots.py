@@ -35,10 +35,10 @@ FEWEST_RUNS = MIN_RUNS
 """Fewer runs are drawn without an interval: they decide nothing, and that of two runs reaches nine standard deviations
 to either side, which would leave nothing else to be seen."""
 X_LABELS = {
-    SIZE: "robots (the larger swarm)",
-    THROTTLE: "distance from ideal conditions (amplitude)",
-    NOISE: "standard deviation of noise",
-    POPULATION: "level of population dynamics",
+    SIZE: "robots N (the larger swarm)",
+    THROTTLE: "distance from ideal conditions, DTW(I_ec, V) (amplitude)",
+    NOISE: "noise \N{GREEK SMALL LETTER SIGMA}, in the unit of each sensor",
+    POPULATION: "level of population dynamics (rates λ, μ)",
 }
 
 

@@ -118,9 +118,9 @@ def label_of(measure: str, variant: Variant, form: Form) -> str:
 
 
 def words_of(label: str) -> str:
-    """Return a name of `label_of` in words for people: "spatial emergence, interactive"."""
+    """Return a name of `label_of` in words for people: "spatial emergence, against lone robots"."""
     measure, comma, rest = label.partition(",")
-    return _WORDS.get(measure, measure).replace("_", " ") + comma + rest
+    return _WORDS.get(measure, measure).replace("_", " ") + comma + rest.replace("interactive", "against lone robots")
 
 
 def check_measures(measures: Sequence[str] | None) -> tuple[str, ...]:

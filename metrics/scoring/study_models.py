@@ -49,6 +49,8 @@ MIN_SIZES, MIN_RUNS = 4, 2
 """What a ladder of laws takes at least."""
 _SEED = 1
 """Fixed, so that the same runs give the same intervals."""
+_DASH = 3.0
+"""Length of dashes and gaps, in widths of the line."""
 RUNS_COLOUR = "black"
 """What was seen; the colours are for models."""
 
@@ -145,8 +147,10 @@ class ModelFigure:
 
 
 def _draw_panel(place: Panel, panel: ModelPanel, figure: ModelFigure) -> None:
-    for curve, colour in zip(panel.expected, COLOURS, strict=False):
-        place.plot(curve.x, curve.y, "--", color=colour, label=curve.name, zorder=3)
+    for index, (curve, colour) in enumerate(zip(panel.expected, COLOURS, strict=False)):
+        # Laws that agree show in turn: each has its dashes where the next one has gaps.
+        dashes = (_DASH * index, (_DASH, _DASH))
+        place.plot(curve.x, curve.y, color=colour, linestyle=dashes, label=curve.name, zorder=3)
     for curve in panel.seen:
         marker = "o" if figure.is_log else ""
         place.plot(curve.x, curve.y, color=RUNS_COLOUR, linewidth=1.1, label=curve.name, zorder=4, marker=marker)
@@ -180,9 +184,9 @@ def model_figures(table: "StudyTable") -> tuple[ModelFigure, ...]:
         panels = _population_panels([line for line in lines if line.rules == rules])
         if panels:
             found["population", rules] = panels
-    amount = f"{lines[0].curves.read_as.amount} per robot in {table.spec.horizon_s:,.0f} s"
+    amount = f"P(N) / N, {lines[0].curves.read_as.amount} per robot in {table.spec.horizon_s:,.0f} s"
     words = {
-        "laws": ("performance per robot beside laws", "robots", amount, True),
+        "laws": ("performance per robot beside laws", "robots N", amount, True),
         "population": ("robots at work beside the queue model", "time, s", "robots at work", False),
     }
     return tuple(

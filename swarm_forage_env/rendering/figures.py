@@ -145,6 +145,7 @@ def saved_figure(
         yield figure
         if style.width_in is not None:
             _fit_words(figure)
+        _spread_numbers(figure)
         for file, ending in zip(files, endings, strict=True):
             with replacing(file, ending=ending) as draft:
                 figure.savefig(draft, metadata=_UNDATED[ending])
@@ -175,6 +176,31 @@ def _fit_words(figure: Figure) -> None:
             if lines and share < 1.0:
                 most = max(12, int(share * max(map(len, lines))))
                 words.set_text("\n".join(textwrap.fill(line, most, break_long_words=False) for line in lines))
+
+
+def _spread_numbers(figure: Figure) -> None:
+    """Put words of levels along x that would run into each other on two lines; what still has no room is left out.
+
+    The last one is the most important one: it is where swarms are largest.
+    """
+    from matplotlib.ticker import FixedLocator
+
+    panels = [panel for panel in figure.axes if isinstance(panel.xaxis.get_major_locator(), FixedLocator)]
+    if panels:
+        figure.draw_without_rendering()
+    for panel in panels:
+        labels = panel.get_xticklabels()
+        if any(label.get_rotation() for label in labels):
+            continue
+        words: list[str] = []
+        ends = [math.inf, math.inf]
+        for label in reversed(labels):
+            extent, gap = label.get_window_extent(), 0.3 * label.get_fontsize() * figure.dpi / 72.0
+            line = next((line for line, end in enumerate(ends) if extent.x1 + gap <= end), None)
+            if line is not None:
+                ends[line] = extent.x0
+            words.insert(0, "" if line is None else "\n" * line + label.get_text())
+        panel.set_xticks(panel.get_xticks(), words)
 
 
 @contextmanager
@@ -227,7 +253,7 @@ def size_axis(panel: Panel, sizes: Iterable[float]) -> None:
     panel.set_xscale("log", base=2)
     panel.set_xticks(marks, [f"{size:g}" for size in marks])
     panel.minorticks_off()
-    panel.set_xlabel("robots")
+    panel.set_xlabel("robots N")
 
 
 def log_height(panel: Panel) -> None:
@@ -241,6 +267,12 @@ def log_height(panel: Panel) -> None:
     panel.set_yscale("log", nonpositive="mask")
     panel.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     panel.yaxis.set_minor_formatter(between)
+
+
+def signed_log_height(panel: Panel) -> None:
+    """Make y an axis on which factors are equally far apart beyond 1 and -1, and numbers between them."""
+    panel.set_yscale("symlog", linthresh=1.0)
+    panel.yaxis.set_major_formatter("{x:,g}")
 
 
 def shade(panel: Panel, x: Any, low: Any, high: Any, colour: str, *, label: str | None = None) -> None:

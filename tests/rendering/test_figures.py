@@ -27,6 +27,7 @@ from swarm_forage_env.rendering.figures import (
     policy_words,
     saved_figure,
     saved_panels,
+    size_axis,
 )
 from swarm_forage_env.rendering.plots import Curve, draw_curves
 from tests.support.colours import VISION, seen_lab
@@ -142,6 +143,17 @@ def test_a_figure_that_fails_leaves_the_old_file(tmp_path, monkeypatch):
     with pytest.raises(OSError, match=r"No space left on device: .*it\.png"):
         draw(path)
     assert [file.read_bytes() for file in tmp_path.iterdir()] == [b"old"]
+
+
+def test_sizes_that_would_run_into_each_other_are_on_two_lines_and_the_largest_is_kept(tmp_path):
+    def shown(*sizes):
+        with saved_figure(tmp_path / "it.svg", (2.0, 2.0)) as figure:
+            size_axis(figure.subplots(), sizes)
+        return [label.get_text() for label in figure.axes[0].get_xticklabels()]
+
+    assert shown(1, 8, 64) == ["1", "8", "64"]
+    assert shown(12, 627, 819) == ["12", "\n627", "819"]
+    assert shown(12, 600, 627, 819)[1:] == ["", "\n627", "819"]
 
 
 @pytest.mark.parametrize("wrong", [{"width_in": 0.5}, {"width_in": float("nan")}, {"font_size": 1.0}])

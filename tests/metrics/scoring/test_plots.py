@@ -130,7 +130,8 @@ def test_variants_and_forms_have_panels_of_their_own(tmp_path, monkeypatch):
     forms = ScoreForms(variants=("corrected", "paper"), forms=("marginal", "interactive"))
     given = ScoreTable(policy="mine", scenario="", scores=score_study(study, ["scalability"], forms)[0])
     figure = drawn(monkeypatch, tmp_path / "scores.png", [given])
-    names = ["scalability", "scalability, interactive", "scalability, paper", "scalability, interactive, paper"]
+    lone = "scalability, against lone robots"
+    names = ["scalability", lone, "scalability, paper", f"{lone}, paper"]
     assert [axes.get_title() for axes in figure.axes] == [f"{name} (higher is better)" for name in names]
 
 
@@ -147,4 +148,4 @@ def test_the_x_axis_of_flexibility_is_the_distance_of_the_conditions(tmp_path, m
     figure = drawn(monkeypatch, tmp_path / "scores.png", [given])
     panel = panel_of(figure, "reactivity")
     assert [text.get_text() for text in panel.get_xticklabels()] == ["7.4 (0.15)", "19.4 (0.4)"]
-    assert panel.get_xlabel() == "distance from ideal conditions (amplitude)"
+    assert panel.get_xlabel() == "distance from ideal conditions, DTW(I_ec, V) (amplitude)"

@@ -27,7 +27,7 @@ def test_laws_and_the_mean_field_stand_beside_the_sizes(laws):
     assert runs.x.tolist() == list(SIZES)
     assert model.y == pytest.approx(runs.y, rel=0.05), "runs that follow the model are found again from two robots"
     assert laws.name == "mine_laws_described"
-    assert laws.y_label == "objects per robot in 4,000 s"
+    assert laws.y_label == "P(N) / N, objects per robot in 4,000 s"
 
 
 def test_facts_of_laws_have_intervals(laws):
@@ -43,7 +43,7 @@ def test_facts_of_laws_have_intervals(laws):
 def test_models_are_drawn(laws, tmp_path):
     files = [tmp_path / "laws.svg", tmp_path / "laws.png"]
     laws.draw(files)
-    words = {"hamann", "mean field", "robots", "no interval: fewer than 4 runs tell too little; dashed: models"}
+    words = {"hamann", "mean field", "robots N", "no interval: fewer than 4 runs tell too little; dashed: models"}
     assert words <= {*words_in(files[0])}
 
 

@@ -160,6 +160,20 @@ def test_performance_over_sizes_has_two_logarithmic_axes(tmp_path):
     draw_figure(with_scores(figure, 0.0 * grown), [tmp_path / "nothing.svg"])
 
 
+def test_losses_over_decades_have_an_axis_with_signs_and_factors(tmp_path):
+    """On a linear one, small swarms lie on a line that says nothing."""
+    figure = next(one for one in figures() if one.panels[0].form == "interactive")
+    assert figure.height == "linear"
+    steep = with_scores(figure, [[-0.1] * 6, [-1000.0] * 6])
+    assert steep.height == "signed log"
+    assert caption(steep, "ci").endswith("height: logarithmic beyond ±1")
+    draw_figure(steep, [tmp_path / "steep.svg"])
+    minus = "\N{MINUS SIGN}"
+    words = {*words_in(tmp_path / "steep.svg")}
+    assert {"E_S(1, N), objects in 40 s", "0", f"{minus}1", f"{minus}10", f"{minus}100", f"{minus}1,000"} <= words
+    assert f"{minus}100,000" not in words
+
+
 def test_distances_have_their_noise_floor_and_those_of_mean_curves_beside_them(tmp_path):
     spec = made_study("S1e", Axis(name="noise", values=(0.0, 0.01, 0.02)), reference=0.0)
     (figure,) = study_figures(study_panels(made_table(spec, lambda place: 10.0 + place.values[0])))
@@ -180,7 +194,7 @@ def test_rates_of_a_population_are_shown_as_events(tmp_path):
     assert figure.panels[0].levels.tolist() == [1.0, 2.0], "of which claims speak"
     assert figure.panels[0].drawn_at.tolist() == pytest.approx([5.0, 10.0])
     draw_figure(figure, [tmp_path / "rates.svg"])
-    assert "departures per 1,000 s" in words_in(tmp_path / "rates.svg")
+    assert "departures λ, robots per 1,000 s" in words_in(tmp_path / "rates.svg")
 
 
 def test_two_axes_give_a_panel_per_value_and_a_map(tmp_path):
@@ -191,7 +205,7 @@ def test_two_axes_give_a_panel_per_value_and_a_map(tmp_path):
     assert figure.has_map
     draw_map(figure, [tmp_path / "map.svg"])
     mean = np.mean(figure.panels[1].scores["stochx"][2])
-    assert {"CRW", "STOCHX", "walk probability", f"{mean:.4g}"} <= {*words_in(tmp_path / "map.svg")}
+    assert {"CRW", "STOCHX", "walk probability", f"{mean:.3g}"} <= {*words_in(tmp_path / "map.svg")}
 
 
 def test_words_on_the_first_axis_have_no_map():
