@@ -13,9 +13,11 @@ from typing import Any
 
 from docutils import nodes
 from docutils.utils.math import latex2mathml
+from numpy.typing import ArrayLike
 from sphinx import addnodes
 from sphinx.application import Sphinx
 from sphinx.util.osutil import relative_uri
+from sphinx.util.typing import stringify_annotation
 
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -78,6 +80,10 @@ COLON = "\ufdd0"
 """A code point that is no character, so that no docstring has it."""
 
 
+ARRAY_LIKE = stringify_annotation(ArrayLike, "smart")
+"""The union that this name stands for, as signatures show it: six lines of names that nobody types."""
+
+
 def contents() -> str:
     """Return the table of contents as toctrees: the lists of docs/index.md under their headings, in that order."""
     trees = "\n```{toctree}\n:hidden:\n\nAll pages <docs/index.md>\n```\n"
@@ -120,6 +126,14 @@ def colons_back(_app: Sphinx, _what: str, _name: str, _object: Any, _options: An
     lines[:] = [line.replace(COLON, ":") for line in lines]
 
 
+def name_arrays(
+    _app: Sphinx, _what: str, _name: str, _object: Any, _options: Any, signature: str | None, returned: str | None
+) -> tuple[str | None, str | None]:
+    """Let signatures say ArrayLike, as the code does."""
+    arguments, result = (text and text.replace(ARRAY_LIKE, "~numpy.typing.ArrayLike") for text in (signature, returned))
+    return arguments, result
+
+
 def open_replays(app: Sphinx, doctree: nodes.document, docname: str) -> None:
     """Let links to replays open them, where Sphinx would have the browser save the file."""
     here = app.builder.get_target_uri(docname)
@@ -142,5 +156,6 @@ def setup(app: Sphinx) -> None:
     app.connect("source-read", add_contents)
     app.connect("autodoc-process-docstring", markdown_to_rst, priority=400)  # before napoleon's 500
     app.connect("autodoc-process-docstring", colons_back, priority=600)
+    app.connect("autodoc-process-signature", name_arrays)
     app.connect("doctree-resolved", open_replays)
     app.add_html_math_renderer("mathml", (write_formula, None), (write_formula, None))
