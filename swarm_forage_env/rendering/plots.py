@@ -26,6 +26,8 @@ _OBSTACLE = {"facecolor": "white", "edgecolor": "black", "hatch": "////", "linew
 _NEST = {"facecolor": "none", "edgecolor": "black", "linestyle": "--", "linewidth": 0.8}
 _NARROWEST_MAP = 0.2
 """Inches per point of the font: narrower maps stand below each other."""
+_NARROW_MAP = 0.3
+"""The same: beside narrower maps, scales and titles would run into each other, so scales stand below."""
 _SMOOTHED = 5
 """Intervals of a running mean: deliveries come in bursts, which hide who delivers more (our choice)."""
 _MANY_INTERVALS = 20
@@ -183,7 +185,7 @@ def draw_maps(
     shape = rows[0].size_m[1] / rows[0].size_m[0]
     blocks = [[*columns][start : start + n_across] for start in range(0, len(columns), n_across)]
     n_lines = len(blocks) * len(rows)
-    is_narrow = n_across < len(columns)
+    is_narrow = n_across < len(columns) or width / n_across < _NARROW_MAP * style.font_size
     bar = {"location": "bottom", "aspect": 12} if is_narrow else {"shrink": min(1.0, 1.2 * shape)}
     size_in = width, (0.75 * shape * width / n_across + (0.18 if is_narrow else 0.1) * style.font_size) * n_lines
     with saved_figure(path, size_in, style=style) as figure:

@@ -162,9 +162,10 @@ def test_performance_over_sizes_has_two_logarithmic_axes(tmp_path):
 
 def test_losses_over_decades_have_an_axis_with_signs_and_factors(tmp_path):
     """On a linear one, small swarms lie on a line that says nothing."""
-    figure = next(one for one in figures() if one.panels[0].form == "interactive")
+    sizes = Axis(name="population_size", values=(1, 2, 4, 8))
+    figure = next(one for one in figures(sizes) if one.panels[0].form == "interactive")
     assert figure.height == "linear"
-    steep = with_scores(figure, [[-0.1] * 6, [-1000.0] * 6])
+    steep = with_scores(figure, [[-0.1] * 6, [-1.0] * 6, [-1000.0] * 6])
     assert steep.height == "signed log"
     assert caption(steep, "ci").endswith("height: logarithmic beyond ±1")
     draw_figure(steep, [tmp_path / "steep.svg"])
