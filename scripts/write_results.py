@@ -144,7 +144,8 @@ def _of_budget(results: StudyVerdict, budget: str) -> str:
             )
     of = f" of the paper's sets at budget `{budget}`" if budget else ""
     n_planned = sum(plan.n_runs for plan in plans.values())
-    text = f"**This page is of {n_there:,} of {counted(n_planned, 'run')}{of}.**"
+    some = f"all {n_planned:,}" if n_there == n_planned else f"{n_there:,} of {n_planned:,}"
+    text = f"**This page is based on {some} runs{of}.**"
     for words, names in sets.items():
         text += f" {words}: {', '.join(names) or 'none'}." if names or names is not decided else ""
     return text + (" Sets of which runs are still to be made:\n" + "".join(in_part) if in_part else "")
@@ -183,9 +184,21 @@ def what_ran(results: StudyVerdict) -> str:
     )
 
 
+def values_without_runs(table: StudyTable) -> str:
+    """Return the values of axes that no run has, by plan: those that run until claims are decided make none of them."""
+    if not table.spec.looks:
+        return ""
+    ran = [state.place.values for state in table.place_states() if state.n_runs[DONE]]
+    lacks = {
+        axis.name: [value for value in axis.values if all(values[index] != value for values in ran)]
+        for index, axis in enumerate(table.spec.axes)
+    }
+    return "; ".join(f"{name} {', '.join(map(_value, values))}" for name, values in lacks.items() if values)
+
+
 def per_condition(table: StudyTable) -> str:
-    """Return how many runs conditions have, "4" or "4 to 192"."""
-    done = n_done(table)
+    """Return how many runs conditions have, "4" or "4 to 192"; without those that have none by plan."""
+    done = [n for n in n_done(table) if n or not table.spec.looks] or [0]
     return f"{min(done)} to {max(done)}" if min(done) < max(done) else str(min(done))
 
 
@@ -411,10 +424,11 @@ def fewer_values(results: StudyVerdict) -> str:
     for table in results.tables:
         spec = table.spec
         n_paper = len(load_study(spec.name, PAPER).seeds) if is_set_of_paper(spec) else len(spec.seeds)
-        words = left_out_words(spec)
-        if words or len(spec.seeds) < n_paper or spec.looks:
+        words, unasked = left_out_words(spec), values_without_runs(table)
+        if words or unasked or len(spec.seeds) < n_paper or spec.looks:
+            none = "; ".join(filter(None, (words, f"{unasked} (no claim is about it)" if unasked else "")))
             runs = f"{per_condition(table)} of {n_paper}"
-            lines.append((f"`{spec.name}`", words or "-", runs, ", ".join(claims_of(spec.name)) if words else "-"))
+            lines.append((f"`{spec.name}`", none or "none", runs, ", ".join(claims_of(spec.name)) if words else "-"))
     header = (
         "set",
         "values of the paper that are left out",

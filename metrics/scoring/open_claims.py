@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from ..claims import Claim, Panel, PanelName
 from ..claims.checking import RELATIVE, Statement, joined, read_otherwise
 from ..claims.looks import as_if
-from ..claims.outcomes import DECIDED, Outcome
+from ..claims.outcomes import DECIDED, Answer, Outcome
 
 OPEN = "undecided"
 
@@ -48,8 +48,8 @@ def policies_of(statement: Statement, panels: Mapping[PanelName, Panel]) -> tupl
     return statement.policies or tuple(dict.fromkeys(name for at in statement.panels for name in panels[at].scores))
 
 
-def open_claim(claim: Claim, is_relative: bool, panels: Mapping[PanelName, Panel]) -> OpenClaim | None:
-    """Return a claim with its forecast; None if it is decided, or has no scores to be decided on.
+def open_claim(claim: Claim, is_relative: bool, panels: Mapping[PanelName, Panel]) -> OpenClaim | Answer:
+    """Return a claim with its forecast, or its answer if it has one; "no scores" if there is nothing to judge.
 
     Args:
         claim: Of the paper, or as `read_otherwise` returns it.
@@ -57,10 +57,10 @@ def open_claim(claim: Claim, is_relative: bool, panels: Mapping[PanelName, Panel
         panels: Of studies that are looked at several times, under the same rules.
     """
     if not claim.panels or any(name not in panels for name in claim.panels):
-        return None
+        return "no scores"
     now = [statement.outcome(panels, "intervals") for statement in claim.statements]
-    if joined(claim, now).answer != OPEN:
-        return None
+    if (answer := joined(claim, now).answer) != OPEN:
+        return answer
     is_open = [outcome.answer == OPEN for outcome in now]
     statements = [statement for statement, still in zip(claim.statements, is_open, strict=True) if still]
     for look in _later_looks(statements, panels):

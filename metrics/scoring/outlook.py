@@ -5,9 +5,10 @@ judged. Each that stays open has a forecast of the runs that decide it. Looks an
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.cost import MeasuredCost
 from swarm_forage_env.runs.spec import RunSpec
@@ -16,6 +17,8 @@ from swarm_forage_env.runs.store import DONE
 from ..claims import CLAIMS, Claim, Panel, PanelName
 from ..claims.checking import Statement
 from ..claims.looks import LOOKS
+from ..claims.outcomes import DECIDED
+from ..claims.outcomes import Answer as ClaimAnswer
 from ..claims.panel import Looks
 from .open_claims import OpenClaim, both_forms, open_claim, policies_of
 from .run_curves import runs_looked_at
@@ -84,12 +87,21 @@ class Outlook(Answer):
     looks: Looks
     failed: tuple[Line, ...] = ()
     """Lines with runs that failed; they get no more."""
+    n_decided: int = 0
+    """Answers that are there: of each claim under each of the rules, as it is and relative to performance."""
+    n_unscored: int = 0
+    """Answers that have no scores to be decided on."""
+    waiting: Mapping[tuple[str, ...], tuple[str, ...]] = field(default_factory=dict[tuple[str, ...], tuple[str, ...]])
+    """Sets that are not there -> claims that wait for them."""
+    cost_note: str = ""
+    """Where core-hours come from, or why there are none."""
 
     def sheets(self) -> Sequence[Sheet]:
         """Return what has had no look yet, the claims that are open, and what each would take."""
         failed = [f"Runs of {line.describe()} failed; it gets no more." for line in self.failed]
+        last = Sheet(title=self._settled(), notes=[*self._waits(), *failed])
         if not self.wanted:
-            return (Sheet(title="Every claim that these studies are about is decided.", notes=failed),)
+            return (last,)
         sheets: list[Sheet] = []
         if first := [(one.rules, _hours(one), words_of(one.lines)) for one in self.wanted if one.open is None]:
             title = f"before claims are judged, {self.looks[0]} runs of each condition are made"
@@ -99,7 +111,24 @@ class Outlook(Answer):
             notes = [never] if any(one.open and one.open.n_runs is None for one in self.wanted) else []
             header = ("claim", "rules", "runs", "decided after", "core-hours", "needs runs of")
             sheets.append(Sheet(title=f"not decided yet: {len(rows)}", header=header, rows=rows, notes=notes))
-        return (*sheets, *([Sheet(notes=failed)] if failed else []))
+        return (*sheets, *([Sheet(notes=[self.cost_note])] if self.cost_note else []), last)
+
+    def _settled(self) -> str:
+        """How many answers there are, in one line."""
+        n_open = sum(one.open is not None for one in self.wanted)
+        if self.n_decided or self.n_unscored or n_open or not self.wanted:
+            words = f"decided: {self.n_decided} of {self.n_decided + self.n_unscored + n_open} answers to claims"
+            words += " about these sets alone, under each of the rules, as they are and relative to performance"
+            return f"{words}; {self.n_unscored} without scores" if self.n_unscored else words
+        return "No claim is judged before all of its conditions have these runs."
+
+    def _waits(self) -> list[str]:
+        """Which claims wait for which other sets, a line for each combination of these."""
+        return [
+            f"{counted(len(names), 'claim')} {'waits' if len(names) == 1 else 'wait'} for {', '.join(sets)}: "
+            f"{', '.join(names)}"
+            for sets, names in self.waiting.items()
+        ]
 
     def _row(self, one: Wanted, claim: OpenClaim) -> tuple[str, ...]:
         n_runs = str(min(self.reached[line] for line in one.lines))
@@ -112,6 +141,8 @@ class Outlook(Answer):
             "open": [one.to_mapping() for one in self.wanted],
             "runs": {line.describe(): n_runs for line, n_runs in self.reached.items()},
             "failed": [line.describe() for line in self.failed],
+            "n_decided": self.n_decided,
+            "waiting": [{"for": list(sets), "claims": list(names)} for sets, names in self.waiting.items()],
         }
 
 
@@ -142,7 +173,7 @@ def what_would_decide(results: StudyVerdict) -> Outlook:
     standing = Standing([_Packed(table) for table, _ in packed], looks)
     standing.know(panel for _, scored in packed for panel in scored.panels if panel.variant == "corrected")
     wanted = standing.first_looks() + standing.open_claims()
-    return Outlook(wanted=tuple(wanted), reached=standing.reached, looks=looks)
+    return standing.outlook(wanted)
 
 
 class StudyLines:
@@ -192,6 +223,9 @@ class _Packed(StudyLines):
 class Standing:
     """How far studies are, what is open, and what that takes."""
 
+    is_measured: bool = False
+    """Whether what runs take is known from a moment of each policy, not from runs."""
+
     def __init__(self, studies: Sequence[StudyLines], looks: Looks) -> None:
         self._looks, self._cost = looks, MeasuredCost()
         spoken_of = {name.experiment for claim in CLAIMS.values() for name in (*claim.panels, *claim.other_panels)}
@@ -208,7 +242,7 @@ class Standing:
         self._groups = {(line.group.rules, line.group.experiment): line.group for line in self.reached}
         self._changed: set[Group] = set(self._groups.values())
         self._panels: dict[str, dict[PanelName, Panel]] = {}
-        self._forecasts: dict[tuple[str, str], tuple[list[int], OpenClaim | None]] = {}
+        self._forecasts: dict[tuple[str, str], tuple[list[int], OpenClaim | ClaimAnswer]] = {}
 
     def know(self, panels: Iterable[StudyPanel]) -> None:
         """Take the scores of all groups that have changed."""
@@ -236,15 +270,17 @@ class Standing:
         wanted: list[Wanted] = []
         for rules, panels in self._panels.items():
             for claim, is_relative in both_forms(CLAIMS.values()):
+                if self._lacking(rules, claim) != ():
+                    continue
                 found = self._forecast(rules, claim, is_relative, panels)
-                if found is not None:
+                if isinstance(found, OpenClaim):
                     wanted.append(self._cheapest_way(rules, found))
         return sorted(wanted, key=lambda one: (one.open is not None and one.open.n_runs is None, one.seconds or 0.0))
 
     def _forecast(
         self, rules: str, claim: Claim, is_relative: bool, panels: Mapping[PanelName, Panel]
-    ) -> OpenClaim | None:
-        """The forecast of a claim, made again where one of its lines has more runs."""
+    ) -> OpenClaim | ClaimAnswer:
+        """The forecast of a claim, or its answer, made again where one of its lines has more runs."""
         experiments = {name.experiment for name in claim.panels}
         state = [
             n_runs
@@ -255,6 +291,43 @@ class Standing:
         if key not in self._forecasts or self._forecasts[key][0] != state:
             self._forecasts[key] = state, open_claim(claim, is_relative, panels)
         return self._forecasts[key][1]
+
+    def outlook(self, wanted: Sequence[Wanted]) -> Outlook:
+        """Return how far all is, and what is wanted."""
+        answers = [found for _, found in self._forecasts.values() if not isinstance(found, OpenClaim)]
+        n_unscored = sum(answer not in DECIDED for answer in answers)
+        waiting = self._waiting()
+        return Outlook(
+            wanted=tuple(wanted),
+            reached=self.reached,
+            looks=self._looks,
+            failed=tuple(self.failed),
+            n_decided=len(answers) - n_unscored,
+            n_unscored=n_unscored,
+            waiting=waiting,
+            cost_note=self._cost_note() if wanted else "",
+        )
+
+    def _lacking(self, rules: str, claim: Claim) -> tuple[str, ...] | None:
+        """Sets that a claim needs and that are not there under these rules; None if it is about none that is there."""
+        there = {line.group.study for line in self.reached if line.group.rules == rules}
+        needed = list(dict.fromkeys(name.experiment.split()[0] for name in claim.panels))
+        return tuple(name for name in needed if name not in there) if not there.isdisjoint(needed) else None
+
+    def _waiting(self) -> dict[tuple[str, ...], tuple[str, ...]]:
+        waiting: dict[tuple[str, ...], dict[str, None]] = {}
+        for rules in dict.fromkeys(line.group.rules for line in self.reached):
+            for name, claim in CLAIMS.items():
+                if lacks := self._lacking(rules, claim):
+                    waiting.setdefault(lacks, {})[name] = None
+        return {sets: tuple(names) for sets, names in waiting.items()}
+
+    def _cost_note(self) -> str:
+        if self._cost.seconds(()) is None:
+            return "Core-hours are not known: no run that is here says how long it took."
+        if self.is_measured:
+            return "Core-hours are an estimate: each policy was stepped for a moment, in its largest swarm."
+        return ""
 
     def _cheapest_way(self, rules: str, found: OpenClaim) -> Wanted:
         ways = [

@@ -211,6 +211,9 @@ class StudyVerdict(Answer):
     is_short: bool = False
     """Whether `sheets` are the counts and the table that says it all, without what is behind the answers."""
 
+    is_folded: bool = False
+    """Whether `sheets` only count the claims that wait under all rules."""
+
     @property
     def rules(self) -> tuple[str, ...]:
         """Those that some study has."""
@@ -267,7 +270,17 @@ class StudyVerdict(Answer):
                 (name, claim.text, *(cell for rules in self.rules for cell in self.cells(claim, rules)))
                 for name, claim in claims.items()
             ]
-            yield Sheet(title=title, header=("claim", "the paper", *columns), rows=rows)
+            folded = [row[0] for row in rows if self.is_folded and not {*row[2:]} - {WAITS, ""}]
+            shown = [row for row in rows if row[0] not in folded]
+            notes = [self._folded_words(folded, len(rows))] if folded else []
+            yield Sheet(title=title, header=("claim", "the paper", *columns), rows=shown, notes=notes)
+
+    def _folded_words(self, names: Sequence[str], n_all: int) -> str:
+        lacks = {
+            name.experiment.split()[0] for one in self.later.values() for name in one.lacks if one.claim.name in names
+        }
+        words = f"{len(names)} of {n_all} wait" + ("s" if len(names) == 1 else "")
+        return f"{words} for runs of {', '.join(sorted(lacks))}; --all shows them."
 
     def cells(self, claim: Claim, rules: str) -> tuple[str, str, str]:
         """Return the answers to a claim by the paper's bands, by ours, and by ours relative to performance."""

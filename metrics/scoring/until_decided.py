@@ -14,8 +14,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from swarm_forage_env._internal.wording import counted
-from swarm_forage_env.runs.cost import MeasuredCost, duration
-from swarm_forage_env.runs.record import RunRecord
+from swarm_forage_env.runs.cost import MeasuredCost, duration, kind_of
+from swarm_forage_env.runs.plan_summary import measured_costs
+from swarm_forage_env.runs.record import RecordError, RunRecord
 from swarm_forage_env.runs.runner import run_specs
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import DONE
@@ -43,7 +44,7 @@ def run_until_decided(
     studies: "Sequence[tuple[StudySpec, StudyFolder]]",
     *,
     hours: float,
-    looks: Looks = LOOKS,
+    looks: Looks | None = None,
     jobs: int | None = None,
     executor: Executor | None = None,
     progress: bool = False,
@@ -54,7 +55,7 @@ def run_until_decided(
     Args:
         studies: Sets of the paper, each with its folder. Seeds follow from the looks, and runs in the folders count.
         hours: By the clock. Runs that would take longer than what is left are not begun; 0 runs nothing.
-        looks: Numbers of runs of a condition after which claims are judged.
+        looks: Numbers of runs of a condition after which claims are judged. None: those of the folders, or `LOOKS`.
         jobs: As in `run_specs`, and so are all further arguments.
         executor: Runs the work instead of local processes.
         progress: Show progress and an estimate on stderr.
@@ -75,24 +76,51 @@ def run_until_decided(
         if why := why_no_claims(spec):
             raise CurveError(f"{why} Others have no claims that runs could decide.")
     until = time.monotonic() + 3600.0 * hours
+    looks = _looks_of(studies, looks)
     course = _Course([_Study(spec, folder, looks, is_dry=hours <= 0.0) for spec, folder in studies], looks)
     course.executor, course.jobs, course.progress = executor, jobs, progress
+    for why in (why for study in course.studies for why in study.damaged):
+        if tell is not None:
+            tell(f"Counts as missing: {why}")
+    if executor is None:  # how fast the workers of others are is not known before they have made a run
+        course.measure(tell)
     while True:
-        left_s = until - time.monotonic()
         wanted = course.first_looks()
-        if not (chosen := course.affordable(wanted, left_s)):
+        if not (chosen := course.affordable(wanted, until - time.monotonic())):
             course.score(tell)
             wanted += course.open_claims()
-            chosen = course.affordable(wanted, left_s)
+            chosen = course.affordable(wanted, until - time.monotonic())
         if not chosen:
-            return Outlook(wanted=tuple(wanted), reached=course.reached, looks=looks, failed=tuple(course.failed))
+            if tell is not None and hours > 0.0:
+                tell(course.ended(wanted, until - time.monotonic()))
+            return course.outlook(wanted)
         if tell is not None:
-            tell(f"{duration(left_s)} left; {course.describe(wanted, chosen)}")
+            tell(f"{duration(until - time.monotonic())} left; {course.describe(wanted, chosen)}")
         course.run(chosen)
+
+
+def _looks_of(studies: "Sequence[tuple[StudySpec, StudyFolder]]", asked: Looks | None) -> Looks:
+    """Return the looks that are asked for, or else those of the folders that have some."""
+    stored = {folder.study_file: folder.study().looks for _, folder in studies if folder.study_file.exists()}
+    wanted = asked or next(filter(None, stored.values()), LOOKS)
+    for file, looks in stored.items():
+        if looks and looks != wanted:
+            raise RecordError(
+                f"Expected looks after {_told(looks)} runs, as {file} has them, got {_told(wanted)}. Looks cannot be "
+                f"changed later: give --seeds {looks[-1]} or none for this study, or another folder."
+            )
+    return wanted
+
+
+def _told(looks: Looks) -> str:
+    return ", ".join(map(str, looks))
 
 
 class _Study(StudyLines):
     """A study in its folder, which grows."""
+
+    damaged: tuple[str, ...] = ()
+    """Why files of runs cannot be used."""
 
     def __init__(self, spec: "StudySpec", folder: StudyFolder, looks: Looks, *, is_dry: bool) -> None:
         self.folder = folder
@@ -100,7 +128,7 @@ class _Study(StudyLines):
         if not is_dry:
             self.grow(looks[0])
         elif folder.study_file.exists():
-            self.spec = replace(self.spec, seeds=tuple(sorted({*self.spec.seeds, *folder.study().seeds})))
+            self.spec = replace(folder.joined(self.spec), rules=spec.rules)
         super().__init__(self.spec)
 
     def grow(self, n_runs: int) -> None:
@@ -112,6 +140,7 @@ class _Study(StudyLines):
         """Find out which runs are done, and what they took."""
         runs = {place: self.spec.specs_of(place) for place in self.spec.places}
         stored = self.folder.store.look_up(run for of in runs.values() for run in of)
+        self.damaged = tuple(stored.damaged.values())
         for place, of in runs.items():
             self.done[place] = {run.seed for run in of if stored.states[run.run_id] == DONE}
         for run in (run for of in runs.values() for run in of):
@@ -133,8 +162,25 @@ class _Course(Standing):
 
     def __init__(self, studies: Sequence[_Study], looks: Looks) -> None:
         super().__init__(studies, looks)
-        self._studies = studies
+        self.studies = studies
         self._bought_s = self._took_s = 0.0
+        self._n_made = 0
+
+    def measure(self, tell: Callable[[str], None] | None) -> None:
+        """Where no run says what runs take, step each policy in each world for a moment, in its largest swarm."""
+        if self._cost.seconds(()) is not None:
+            return
+        largest: dict[tuple[str, str], RunSpec] = {}
+        for line, study in self._study_of.items():
+            for run in (self._first_of(study, place) for place in study.lines[line]):
+                key = run.scenario.name, run.policy
+                if key not in largest or run.robot_ticks > largest[key].robot_ticks:
+                    largest[key] = run
+        costs = measured_costs(largest.values(), tell)
+        for run in largest.values():
+            if kind_of(run) in costs:
+                self._cost.add(run, costs[kind_of(run)].seconds(run))
+        self.is_measured = bool(costs)
 
     def affordable(self, wanted: Sequence[Wanted], left_s: float) -> dict[Line, int]:
         """Return which lines get runs up to which look next: as much as a round takes, and as fits into the time."""
@@ -164,9 +210,18 @@ class _Course(Standing):
         looks = ", ".join(map(str, sorted(set(chosen.values()))))
         return f"{words}{more}: {words_of(chosen)} to {looks} runs{about}"
 
+    def ended(self, wanted: Sequence[Wanted], left_s: float) -> str:
+        """Return what was done, and why it ends here, in one line."""
+        made = f"{counted(self._n_made, 'run')} made"
+        steps = [seconds for one in wanted if (seconds := self._seconds(self._step(one.lines)))]
+        if not steps:
+            return f"{made}; no further run is of use"
+        least = f"the least that is of use takes about {duration(min(steps) / self._speed)}"
+        return f"{made}; nothing more is begun: {duration(max(0.0, left_s))} left, and {least}"
+
     def run(self, chosen: Mapping[Line, int]) -> None:
         """Make the runs that lines lack up to a look."""
-        for study in self._studies:
+        for study in self.studies:
             if mine := {line: chosen[line] for line in study.lines if line in chosen}:
                 study.grow(max(mine.values()))
                 self._run(study, mine)
@@ -185,6 +240,7 @@ class _Course(Standing):
         found = run_specs(
             todo.values(), store=study.folder.store, executor=self.executor, jobs=self.jobs, progress=self.progress
         )
+        self._n_made += len(found.records) - found.n_stored
         for run_id, record in found.records.items():
             _add_cost(self._cost, todo[run_id], record)
             self._bought_s += 0.0 if math.isnan(record.wall_time_s) else record.wall_time_s
@@ -201,7 +257,7 @@ class _Course(Standing):
         """Score what has changed."""
         changed = {line.group for line, n_runs in self.reached.items() if n_runs and line.group in self._changed}
         panels: list[StudyPanel] = []
-        for study in self._studies:
+        for study in self.studies:
             groups = {line.group for line in study.lines} & changed
             if not groups:
                 continue

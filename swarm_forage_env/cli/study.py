@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from swarm_forage_env.runs.plan_summary import PlanSummary
     from swarm_forage_env.studies.study import StudySpec
     from swarm_forage_env.studies.study_folder import StudyFolder
+    from swarm_forage_env.studies.study_table import StudyTable
 
 Name = Annotated[str, typer.Argument(metavar="NAME|FILE", help="A set of the paper (S1a to S2d), or a study file.")]
 Place = Annotated[Path, typer.Argument(metavar="DIR|FILE", help="Folder of a study, or its packed file.")]
@@ -70,8 +71,8 @@ def run(  # long: one parameter per option
         typer.Option(
             "--until-decided",
             help="Judge the paper's claims again and again, and make the runs that decide most in the least time "
-            "(docs/studies.md). --budget is then paper by default, and --seeds sets the most runs per condition, "
-            "default 192.",
+            "(docs/studies.md). --budget is then paper by default, and --seeds sets the most runs per condition; "
+            "default as the folders have it, else 192.",
         ),
     ] = False,
     hours: Annotated[
@@ -168,14 +169,14 @@ def _run_until_decided(
     jobs: int | None,
     executor: "Executor | None",
 ) -> None:
-    from metrics.claims.looks import LOOKS, looks_up_to
+    from metrics.claims.looks import looks_up_to
     from metrics.scoring import run_until_decided
     from swarm_forage_env.cli.printer import notes
 
     outlook = run_until_decided(
         studies,
         hours=hours,
-        looks=looks_up_to(seeds or LOOKS[-1]),
+        looks=looks_up_to(seeds) if seeds else None,
         jobs=jobs,
         executor=executor,
         progress=True,
@@ -202,9 +203,8 @@ def status(place: Place, as_json: AsJson = False) -> None:
     """Show which runs of each condition are done, missing or failed; exit code 1 unless all are done."""
     from swarm_forage_env.cli.printer import show as print_answer
     from swarm_forage_env.studies.description import status as status_of
-    from swarm_forage_env.studies.study_table import read_study
 
-    found = status_of(read_study(place))
+    found = status_of(_read(place))
     print_answer(found, as_json=as_json)
     if not found.is_complete:
         raise typer.Exit(EXIT_FAILURE)
@@ -235,10 +235,22 @@ def unpack(
 
 
 def _pack(folder: Path, chosen: Path | None) -> Path:
+    from swarm_forage_env.cli.printer import notes
     from swarm_forage_env.studies.study_folder import StudyFolder
     from swarm_forage_env.studies.study_table import pack_study
 
-    return pack_study(StudyFolder(folder), chosen)
+    return pack_study(StudyFolder(folder), chosen, tell=notes().print)
+
+
+def _read(place: Path) -> "StudyTable":
+    """Read a study, and tell of damaged files in its folder."""
+    from swarm_forage_env.cli.printer import notes
+    from swarm_forage_env.studies.study_table import read_study
+
+    table = read_study(place)
+    for line in table.damaged_lines:
+        notes().print(line)
+    return table
 
 
 def _chosen(name: str, budget: str | None, seeds: int | None, rules: str) -> "StudySpec":
@@ -262,6 +274,9 @@ def verdict(
         Path | None,
         typer.Option("--file", help="Also write the answer to a file: .txt, .md, .csv or .json, with more numbers."),
     ] = None,
+    whole: Annotated[
+        bool, typer.Option("--all", help="Also show the claims that wait for runs, which are else only counted.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Test the claims of the paper with runs of its sets: which claims they support, contradict or leave open.
@@ -274,12 +289,11 @@ def verdict(
     from swarm_forage_env._internal.files import check_file
     from swarm_forage_env.cli.printer import notes, show_boxed
     from swarm_forage_env.runs.answer import FORMS
-    from swarm_forage_env.studies.study_table import read_study
 
     if file is not None and file.suffix not in FORMS:
         raise ConfigError(f"Expected --file as a file ending in {', '.join(FORMS)}, got {str(file)!r}.")
     aside = notes()
-    tables = [read_study(place) for place in places]
+    tables = [_read(place) for place in places]
     if file is not None:
         check_file(file)
     found = replace(verdict_of(*tables, tell=aside.print), is_short=table)
@@ -288,7 +302,7 @@ def verdict(
     if as_json:
         typer.echo(found.json())
     else:
-        show_boxed(found)
+        show_boxed(replace(found, is_folded=not whole))
     if file is not None:
         found.write(file)
         aside.print(f"written {file}")
@@ -312,10 +326,9 @@ def plot(
     from metrics import plot as plot_study
     from swarm_forage_env.cli.questions import score_forms
     from swarm_forage_env.cli.scenario_options import split_names
-    from swarm_forage_env.studies.study_table import read_study
 
     forms = score_forms(variants, "marginal")
-    table = read_study(place)
+    table = _read(place)
     plotted = plot_study(
         table,
         out or Path("results", "figures", table.spec.name),
@@ -346,11 +359,10 @@ def report(
     from swarm_forage_env._internal.fields import ConfigError
     from swarm_forage_env._internal.files import check_file
     from swarm_forage_env.cli.printer import notes
-    from swarm_forage_env.studies.study_table import read_study
 
     if file.suffix not in _PAGE_FORMS:
         raise ConfigError(f"Expected --file as a file ending in {', '.join(_PAGE_FORMS)}, got {str(file)!r}.")
-    tables = [read_study(place) for place in places]
+    tables = [_read(place) for place in places]
     check_file(file)
     report_of(*tables, band="sd" if band else "ci", tell=notes().print).write(file)
     notes().print(f"written {file}")
@@ -374,10 +386,9 @@ def diff(
     from metrics import diff as diff_of
     from metrics.scoring.study_diff import COLUMNS
     from swarm_forage_env.cli.printer import show as print_answer
-    from swarm_forage_env.studies.study_table import read_study
 
     names = COLUMNS if columns is None else tuple(name.strip() for name in columns.split(","))
-    found = diff_of(read_study(first), read_study(second), names)
+    found = diff_of(_read(first), _read(second), names)
     print_answer(found, as_json=as_json)
     if found.differs:
         raise typer.Exit(EXIT_FAILURE)

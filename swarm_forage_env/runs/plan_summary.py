@@ -26,6 +26,7 @@ from swarm_forage_env.wrappers.world import World
 WORLDS_SHOWN = 60
 """Worlds that the text names; `to_mapping` has all."""
 _WORLDS_HEADER = ("scenario", "varied", "value", "robots", "objects", "seconds", "runs", "to do")
+_DENSITIES = ("robots/m2", "objects/m2")
 _POLICIES_HEADER = ("policy", "caches", "runs", "to do", "robot-ticks", "core-hours")
 _NOT_MEASURED = (
     "What has no core-hours is not in the estimate: models, which are not opened to plan, and policies that fail."
@@ -91,15 +92,39 @@ class PlanSummary(Answer):
         worlds = self._world_rows()
         more = [f"and {len(worlds) - WORLDS_SHOWN} more worlds"] if len(worlds) > WORLDS_SHOWN else []
         return (
-            Sheet(title=title, header=_WORLDS_HEADER, rows=worlds[:WORLDS_SHOWN], notes=more),
+            Sheet(title=title, header=self._worlds_header, rows=worlds[:WORLDS_SHOWN], notes=more),
             Sheet(header=_POLICIES_HEADER, rows=self._policy_rows(), notes=notes),
         )
+
+    @cached_property
+    def _has_densities(self) -> bool:
+        """Whether swarms of one size have several arenas, so that sizes do not tell how dense they are."""
+        arenas: dict[tuple[str, int], set[tuple[float, float]]] = {}
+        for condition, _ in self.runs:
+            world = condition.world.scenario
+            size = world.arena.width_m, world.arena.height_m
+            arenas.setdefault((world.name, condition.world.n_robots), set()).add(size)
+        return any(len(sizes) > 1 for sizes in arenas.values())
+
+    @property
+    def _worlds_header(self) -> tuple[str, ...]:
+        at = _WORLDS_HEADER.index("seconds")
+        more = _DENSITIES if self._has_densities else ()
+        return (*_WORLDS_HEADER[:at], *more, *_WORLDS_HEADER[at:])
+
+    def _world_cells(self, world: World) -> tuple[str, ...]:
+        scenario = world.scenario
+        counts = world.n_robots, scenario.objects.n_objects
+        area_m2 = scenario.arena.width_m * scenario.arena.height_m
+        densities = (f"{count / area_m2:.3g}" for count in counts) if self._has_densities else ()
+        where = scenario.name, world.criterion, f"{world.value:g}"
+        return (*where, *map(str, counts), *densities, f"{scenario.horizon_s:g}")
 
     def _world_rows(self) -> list[tuple[str, ...]]:
         n_runs: Counter[tuple[str, ...]] = Counter()
         n_todo: Counter[tuple[str, ...]] = Counter()
         for condition, specs in self.runs:
-            row = _world_cells(condition.world)
+            row = self._world_cells(condition.world)
             n_runs[row] += len(specs)
             n_todo[row] += len(specs.keys() - self.stored)
         return [(*row, f"{n_runs[row]:,}", f"{n_todo[row]:,}") for row in n_runs]
@@ -168,7 +193,7 @@ def summarize_plan(
         for policy in plan.policies:
             if policy.factory is not None:
                 here.enter_context(local_policy(policy.label, policy.factory))
-        costs = _measured(todo, tell)
+        costs = measured_costs(todo, tell)
     return PlanSummary(
         name=name,
         runs=tuple(runs),
@@ -179,8 +204,8 @@ def summarize_plan(
     )
 
 
-def _measured(specs: Iterable[RunSpec], tell: Callable[[str], None] | None) -> dict[Kind, Cost]:
-    """What runs take, but for those that cannot be tried: their runs will say why."""
+def measured_costs(specs: Iterable[RunSpec], tell: Callable[[str], None] | None) -> dict[Kind, Cost]:
+    """Return what runs take, but for those that cannot be tried: their runs will say why."""
     by_kind: dict[Kind, list[RunSpec]] = {}
     for spec in specs:
         if not _is_closed(spec.policy):
@@ -195,18 +220,6 @@ def _measured(specs: Iterable[RunSpec], tell: Callable[[str], None] | None) -> d
 def _is_closed(policy: str) -> bool:
     """Whether a policy has a file that is not to be opened, see `policies.trust.only_looks_at`."""
     return any(map(only_looks_at, policy_files(policy)))
-
-
-def _world_cells(world: World) -> tuple[str, ...]:
-    scenario = world.scenario
-    return (
-        scenario.name,
-        world.criterion,
-        f"{world.value:g}",
-        str(world.n_robots),
-        str(scenario.objects.n_objects),
-        f"{scenario.horizon_s:g}",
-    )
 
 
 def _hours_text(hours: float) -> str:

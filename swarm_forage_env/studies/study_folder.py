@@ -78,12 +78,17 @@ class StudyFolder:
             RecordError: the folder holds another study.
         """
         with alone_in(self.folder):  # shards on several machines add their seeds, one after the other
-            kept = self._joined(spec) if self.study_file.exists() else spec
+            kept = self.joined(spec) if self.study_file.exists() else spec
             with replacing(self.study_file) as draft:
                 draft.write_text(json.dumps(kept.to_mapping(), indent=1), encoding="utf-8")
         return kept
 
-    def _joined(self, spec: StudySpec) -> StudySpec:
+    def joined(self, spec: StudySpec) -> StudySpec:
+        """Return the study that the folder would hold, if `take` added one; writes nothing.
+
+        Raises:
+            RecordError: the folder holds another study, or none.
+        """
         there = self.study()
         kept = replace(
             spec,

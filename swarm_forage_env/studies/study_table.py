@@ -61,6 +61,8 @@ class StudyTable(Table):
     wall_time_s: float | None = None
     """How long all finished runs took together, by the clock. None where it is not known: a file leaves it out, so that
     the same runs make the same bytes."""
+    damaged: tuple[str, ...] = ()
+    """Of a folder: why files of runs cannot be used; these runs count as missing."""
     plan: Plan = field(init=False)
     records: Mapping[str, RunRecord] = field(init=False)
     failures: Mapping[str, RunFailure] = field(init=False)
@@ -72,6 +74,14 @@ class StudyTable(Table):
             ("failures", _InState(self, FAILED, self._failure)),
         ):
             object.__setattr__(self, name, value)
+
+    @property
+    def damaged_lines(self) -> tuple[str, ...]:
+        """What to say of damaged files: the first, and how many more there are."""
+        if not self.damaged:
+            return ()
+        more = f" {len(self.damaged) - 1} more files are like it." if len(self.damaged) > 1 else ""
+        return (f"Counts as missing, until 'study run' makes it again: {self.damaged[0]}{more}",)
 
     def rows(self, place: Place) -> "pl.DataFrame":
         """Return the rows of a condition, those of failed and missing runs included.
@@ -255,6 +265,7 @@ def gather_study(
     spec = spec or folder.study()
     versions: set[tuple[tuple[str, str], ...]] = set()
     frames: list[pl.DataFrame] = []
+    damaged: list[str] = []
     wall_time_s = 0.0
     for number, place in enumerate(spec.places):
         if places is not None and place not in places:
@@ -262,7 +273,7 @@ def gather_study(
         records: list[RunRecord] = []
         lost: list[dict[str, Any]] = []
         for run in spec.specs_of(place):
-            record = _record(folder.store, run)
+            record = _record(folder.store, run, damaged)
             if record is None:
                 lost.append(_loss(folder.store, run))
             else:
@@ -279,15 +290,17 @@ def gather_study(
         frame=frame.select(_in_order(frame.columns, spec)),
         versions=tuple(dict(pairs) for pairs in sorted(versions)),
         wall_time_s=None if math.isnan(wall_time_s) else wall_time_s,
+        damaged=tuple(damaged),
     )
 
 
-def pack_study(folder: StudyFolder, chosen: Path | None = None) -> Path:
+def pack_study(folder: StudyFolder, chosen: Path | None = None, *, tell: Callable[[str], None] | None = None) -> Path:
     """Put all runs of a study into one file; of several calls at once, the last one to write has read the last runs.
 
     Args:
         folder: Of the study.
         chosen: The file; default NAME.parquet in the folder.
+        tell: Called with words about damaged files.
 
     Returns:
         The file.
@@ -299,6 +312,8 @@ def pack_study(folder: StudyFolder, chosen: Path | None = None) -> Path:
     folder.study()  # a folder without one is refused before anything is made in it
     with alone_in(folder.store.folder):  # not the folder itself, which shards need in order to begin
         table = gather_study(folder)
+        for line in table.damaged_lines if tell is not None else ():
+            tell(line)
         file = chosen or folder.folder / f"{table.spec.name}.parquet"
         table.write(file)
     return file
@@ -370,13 +385,14 @@ def _parsed(told: str) -> Any:
         raise ParquetError(f"its metadata are damaged: {error}") from error
 
 
-def _record(store: RunStore, run: RunSpec) -> RunRecord | None:
+def _record(store: RunStore, run: RunSpec, damaged: list[str]) -> RunRecord | None:
     """The record of a run, read with the performance that the study asks for; None if it is missing or damaged."""
     if run.run_id not in store:
         return None
     try:
         return store.read(run.run_id).read_as(run.scenario.performance)
-    except RecordError:
+    except RecordError as error:
+        damaged.append(str(error))
         return None
 
 

@@ -9,6 +9,7 @@ n_robots = 30
 sigma = 0.03
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -18,6 +19,7 @@ from swarm_forage_env._internal.files import as_file_name, parse_toml
 from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.differences import difference_words, differences, digest_of, is_resized
+from swarm_forage_env.scenarios.overrides import field_sections
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.registry import wrappers_from_mapping
 
@@ -171,6 +173,19 @@ class WorldDescription:
         return World(scenario(self.preset, **self.fields), self.wrappers, name=self.name)
 
 
+def _check_places(tables: Mapping[str, Any]) -> None:
+    """Refuse scenario fields outside of their table, with the place where they belong."""
+    if isinstance(preset := tables.get("preset"), str):
+        raise ConfigError(f'Expected the scenario that the file starts from as scenario = "{preset}", got preset.')
+    outside = [
+        name
+        for name in tables
+        if name in (*field_sections(), "density", "side_m") and not isinstance(tables[name], Mapping)
+    ]
+    if outside:
+        raise ConfigError(f"Expected {', '.join(outside)} under [set], where scenario fields go, got it above.")
+
+
 def describe_file(file: str | Path) -> WorldDescription:
     """Read a file of a world, and look at no names and values of scenario fields.
 
@@ -182,6 +197,7 @@ def describe_file(file: str | Path) -> WorldDescription:
     path = Path(file)
     try:
         tables = parse_toml(path.read_text(encoding="utf-8"))
+        _check_places(tables)
         preset, fields = tables.pop("scenario", _PRESET), tables.pop("set", {})
         if not isinstance(preset, str):
             preset, fields = _PRESET, {**table("scenario", preset), **table("set", fields)}

@@ -125,8 +125,8 @@ def test_what_is_not_decided_is_told_before_any_run(command):
     assert code == 0
     assert out.startswith("before claims are judged, 4 runs of each condition are made\n")
     assert "S1b crw, dpo, stochm, stochx" in out
-    assert "claim " not in out
-    assert "never" not in out
+    assert "not decided yet" not in out
+    assert '"never"' not in out
     assert not Path("results").exists()
 
 

@@ -92,7 +92,7 @@ def test_results_say_which_sets_and_conditions_they_are_of(run):
     n_planned = sum(load_study(name, "smoke").n_runs for name in set_names())
     n_places = len(spec.places)
     assert page.splitlines()[2:5] == [
-        f"**This page is of {spec.n_runs - 3 + whole.n_runs} of {n_planned} runs of the paper's sets at budget "
+        f"**This page is based on {spec.n_runs - 3 + whole.n_runs} of {n_planned} runs of the paper's sets at budget "
         "`smoke`.** Sets with all runs: S1c. Sets not run: S1b, S1d, S1e, S1f, S1g, S1h, S2a, S2b, S2c, S2d. Sets of "
         "which runs are still to be made:",
         "",
@@ -136,6 +136,7 @@ def test_the_results_page_comes_of_the_runs_beside_it(run):
     assert f"| {spec.n_runs - 1} of {spec.n_runs} | 1 to 2 |" in text
     command = "study run S1c --budget smoke --seeds 2 --rules both --out results/studies --until-decided --hours 1\n"
     assert command in text
+    assert "based on all" not in text
     assert run("write_results", "--out", "page", "--check")[:2] == (0, "as the runs have it\n")
     pictures = [path.name for path in Path("page").rglob("*.png")]
     assert run("write_results", "--out", "page")[0] == 0, "once more, from what is there"

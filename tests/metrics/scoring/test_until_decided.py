@@ -53,9 +53,9 @@ def test_a_claim_has_a_forecast_of_the_runs_that_decide_it():
     assert found.words == "N1"
     assert 8 < found.n_runs <= 192
     assert [statement.policies for (statement,) in found.ways] == [("crw", "stochx")]
-    assert open_claim(CLAIMS["N1"], False, panels_of(equal, reached=16, sd=0.01)) is None  # a tie
+    assert open_claim(CLAIMS["N1"], False, panels_of(equal, reached=16, sd=0.01)) == "supported"  # a tie
     assert open_claim(CLAIMS["N1"], False, panels_of(equal, sd=9.0, n_levels=2)).n_runs is None
-    assert open_claim(CLAIMS["N1"], False, {}) is None  # nothing to judge
+    assert open_claim(CLAIMS["N1"], False, {}) == "no scores"  # nothing to judge
     assert [is_relative for _, is_relative in both_forms([CLAIMS["N1"], CLAIMS["C1"]])] == [False, True, False]
 
 
@@ -75,7 +75,7 @@ def test_a_study_runs_until_the_last_look(tmp_path, monkeypatch):
     assert max(found.reached.values()) in FEW
     assert {line.policy for line in found.reached} == set(FOUR)
     assert json.loads(found.json())["looks"] == list(FEW)
-    assert "first look: S1e crw, dpo, stochm, stochx to 4 runs" in told[0]
+    assert "first look: S1e crw, dpo, stochm, stochx to 4 runs" in told[len(FOUR)]
     assert "scoring S1e described" in told
     table = read_study(folder.folder)
     table.write(tmp_path / "packed.parquet")
@@ -160,14 +160,61 @@ def test_what_would_take_longer_than_the_time_is_not_begun(tmp_path, monkeypatch
 
 
 def test_nothing_is_left_to_decide():
-    found = Outlook(wanted=(), reached={}, looks=FEW)
-    assert str(found) == "Every claim that these studies are about is decided."
+    waiting = {("S1f",): ("N5",), ("S1c", "S1d"): ("X1", "X5")}
+    found = Outlook(wanted=(), reached={}, looks=FEW, n_decided=7, n_unscored=1, waiting=waiting)
+    assert str(found).splitlines() == [
+        "decided: 7 of 8 answers to claims about these sets alone, under each of the rules, as they are and relative "
+        "to performance; 1 without scores",
+        "1 claim waits for S1f: N5",
+        "2 claims wait for S1c, S1d: X1, X5",
+    ]
+    assert found.to_mapping()["waiting"][0] == {"for": ["S1f"], "claims": ["N5"]}
+
+
+def test_claims_that_wait_for_other_sets_are_not_decided(tmp_path):
+    found = run_until_decided([(tiny(), StudyFolder(tmp_path / "S1e"))], hours=1.0, looks=(4,), jobs=1)
+    assert found.waiting[("S1f",)] == ("N5",)
+    assert "1 claim waits for S1f: N5" in str(found)
+    forms = [(claim, relative) for claim, relative in both_forms(CLAIMS.values()) if claim.panels]
+    alone = [claim for claim, _ in forms if {name.experiment for name in claim.panels} == {"S1e"}]
+    n_open = sum(one.open is not None for one in found.wanted)
+    assert found.n_decided + found.n_unscored + n_open == len(alone) == 8
+    assert f"decided: {found.n_decided} of 8 answers to claims about these sets alone" in str(found)
 
 
 def test_a_dry_look_leaves_the_folder_alone(tmp_path):
-    found = run_until_decided([(tiny(), StudyFolder(tmp_path / "none"))], hours=0.0)
+    told = []
+    found = run_until_decided([(tiny(), StudyFolder(tmp_path / "none"))], hours=0.0, tell=told.append)
     assert not (tmp_path / "none").exists()
-    assert found.to_mapping()["open"][0]["core_hours"] is None
+    assert found.to_mapping()["open"][0]["core_hours"] > 0.0, "no run says what it takes, so policies are stepped"
+    assert "each policy was stepped for a moment" in str(found)
+    assert told == [f"measuring {name}, N = 3" for name in FOUR]
+    folder = StudyFolder(tmp_path / "some")
+    run_study(replace(tiny(), seeds=(0,)), folder, jobs=1)
+    told.clear()
+    assert "stepped" not in str(run_until_decided([(tiny(), folder)], hours=0.0, tell=told.append))
+    assert told == []
+
+
+def test_a_moment_is_too_short_for_any_run(tmp_path):
+    """What runs take is known before the first one, so that none is begun that cannot end in time."""
+    told = []
+    spec = tiny(horizon_s=4000.0, interval_s=1000.0)
+    found = run_until_decided([(spec, StudyFolder(tmp_path / "S1e"))], hours=1e-7, looks=FEW, jobs=1, tell=told.append)
+    assert set(found.reached.values()) == {0}
+    assert StudyFolder(tmp_path / "S1e").store.run_ids() == ()
+    assert told[-1].startswith("0 runs made; nothing more is begun: 1 s left, and the least that is of use takes about")
+
+
+def test_a_study_goes_on_with_the_looks_that_it_has(tmp_path):
+    spec, folder = tiny(), StudyFolder(tmp_path / "S1e")
+    folder.take(replace(spec, seeds=(0, 1, 2, 3), looks=FEW))
+    for hours in (0.0, 1e-7):
+        assert run_until_decided([(spec, folder)], hours=hours).looks == FEW
+        with pytest.raises(RecordError, match=r"after 4, 8 runs, as .*study.json has them, got 4, 16\. .*--seeds 8 or"):
+            run_until_decided([(spec, folder)], hours=hours, looks=(4, 16))
+    with pytest.raises(RecordError, match="other horizon_s"):
+        run_until_decided([(replace(spec, horizon_s=8.0), folder)], hours=0.0)
 
 
 def test_what_cannot_be(tmp_path):
@@ -177,8 +224,6 @@ def test_what_cannot_be(tmp_path):
     with pytest.raises(CurveError, match="paper's sets"):
         run_until_decided([(tiny("mine"), folder)], hours=0.0)
     folder.take(replace(spec, looks=FEW))
-    with pytest.raises(RecordError, match="other looks"):
-        run_until_decided([(spec, folder)], hours=1.0, looks=(4, 16))
     assert folder.take(spec).looks == FEW  # whoever runs more of it later does not forget that it was looked at
 
 
