@@ -429,12 +429,7 @@ def fewer_values(results: StudyVerdict) -> str:
             none = "; ".join(filter(None, (words, f"{unasked} (no claim is about it)" if unasked else "")))
             runs = f"{per_condition(table)} of {n_paper}"
             lines.append((f"`{spec.name}`", none or "none", runs, ", ".join(claims_of(spec.name)) if words else "-"))
-    header = (
-        "set",
-        "values of the paper that are left out",
-        "runs each",
-        "claims judged without these values",
-    )
+    header = ("set", "values of the paper that are left out", "runs each", "claims judged without these values")
     return f"Fewer runs and values than in the paper:\n\n{rows(header, lines)}\n\n" if lines else ""
 
 

@@ -85,6 +85,8 @@ def test_a_file_gives_table_and_folder_their_name(command):
     ("text", "complaint"),
     [
         ("n_robots =", "Cannot use world.toml: Invalid value"),
+        ("n_robots = 3", "Expected n_robots under [set], where scenario fields go, got it above."),
+        ('preset = "classroom"', 'starts from as scenario = "classroom", got preset.'),
         ("scenario = 3", "Cannot use world.toml: Expected scenario to be a table of values by name, got 3"),
         ('scenario = "warehouse_smal"', "Unknown scenario 'warehouse_smal'. Did you mean 'warehouse_small'?"),
         ("[set]\nn_robot = 3", "Unknown scenario field 'n_robot'. Did you mean 'n_robots'?"),

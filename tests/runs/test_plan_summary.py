@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from swarm_forage_env import Plan, World, policy_specs, rerun, run_plan, scenario, summarize_plan
+from swarm_forage_env.runs.plan_summary import PlanSummary
 from swarm_forage_env.runs.store import RunStore
 
 WORLDS = [World(scenario("warehouse_small", n_robots=n, horizon_s=20.0, interval_s=10.0)) for n in (2, 3)]
@@ -32,6 +33,16 @@ def test_stored_runs_are_counted_and_not_measured(tmp_path):
     answer = json.loads(summary.json())
     assert [run["stored"] for run in answer["runs"]].count(True) == 2
     assert answer["core_hours"] == pytest.approx(summary.core_hours)
+
+
+def test_arenas_of_several_densities_are_told():
+    worlds = [World(scenario("warehouse_small", n_robots=20, density=density)) for density in (0.02, 0.05)]
+    plan = Plan.product(policy_specs(["random"]), worlds, seeds=(0,))
+    sheet, _ = PlanSummary(
+        name="", runs=tuple((one, {}) for one in plan.conditions), stored=frozenset(), costs={}, processes=1
+    ).sheets()
+    place = sheet.header.index("robots/m2")
+    assert [float(row[place]) for row in sheet.rows] == pytest.approx([0.02, 0.05], rel=0.1)
 
 
 def test_nothing_to_do_needs_no_estimate(tmp_path):

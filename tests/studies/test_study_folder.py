@@ -151,6 +151,9 @@ def test_a_damaged_file_is_found_told_and_run_again(tmp_path, capsys, damage):
     assert changed[damage] != content
     one.write_bytes(changed[damage])
     assert sum(place.n_runs[MISSING] for place in folder.place_states()) == 1
+    (line,) = gather_study(folder).damaged_lines
+    assert line.startswith("Counts as missing, until 'study run' makes it again: ")
+    assert str(one) in line
     assert run_study(STUDY, folder, jobs=1, progress=True).count(DONE) == 16
     told = capsys.readouterr().err
     assert "15 of 16 runs are stored already." in told

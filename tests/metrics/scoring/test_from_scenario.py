@@ -89,6 +89,9 @@ def test_held_sizes_are_run_and_told_beside(tmp_path):
     assert list(crw.predicted) == [1, 2, 6]
     assert list(crw.runs) == list(dpo.runs) == [1, 6]
     assert crw.runs[6].performance.shape == (2, 2)
+    assert crw.sheets()[0].title.startswith("crw in ")
+    assert dpo.sheets()[0].title.startswith("model of a random searcher, for dpo, in ")
+    assert "not a model of dpo" in dpo.sheets()[0].notes[0]
     rows = crw.sheets()[0].rows
     assert [row[0] for row in rows] == ["1", "2", "6"]
     assert rows[1][2] == ""
