@@ -80,8 +80,9 @@ class StudyTable(Table):
         """What to say of damaged files: the first, and how many more there are."""
         if not self.damaged:
             return ()
-        more = f" {len(self.damaged) - 1} more files are like it." if len(self.damaged) > 1 else ""
-        return (f"Counts as missing, until 'study run' makes it again: {self.damaged[0]}{more}",)
+        first, *others = self.damaged
+        more = f" {len(others)} more files are like it." if others else ""
+        return (f"Counts as missing, until 'study run' makes it again: {first}{more}",)
 
     def rows(self, place: Place) -> "pl.DataFrame":
         """Return the rows of a condition, those of failed and missing runs included.
@@ -312,8 +313,9 @@ def pack_study(folder: StudyFolder, chosen: Path | None = None, *, tell: Callabl
     folder.study()  # a folder without one is refused before anything is made in it
     with alone_in(folder.store.folder):  # not the folder itself, which shards need in order to begin
         table = gather_study(folder)
-        for line in table.damaged_lines if tell is not None else ():
-            tell(line)
+        if tell is not None:
+            for line in table.damaged_lines:
+                tell(line)
         file = chosen or folder.folder / f"{table.spec.name}.parquet"
         table.write(file)
     return file
