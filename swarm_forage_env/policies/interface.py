@@ -9,13 +9,15 @@ import copy
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, TypeAlias
 
 import numpy as np
 from gymnasium import spaces
 
+from swarm_forage_env._internal.compiling import Callback
 from swarm_forage_env._internal.fields import ConfigError, known_keys, number, one_of, switch, unique_names, whole
+from swarm_forage_env.contract.kernel_policy import example_of
 from swarm_forage_env.contract.layout import (
     BUILT_IN_SLICES,
     KIND,
@@ -47,6 +49,7 @@ from swarm_forage_env.policies.kernels.learner import (
     remember_sites,
     show_sites,
 )
+from swarm_forage_env.policies.kernels.network import keep_on
 from swarm_forage_env.scenarios.config import ScenarioConfig
 
 OBSERVATIONS = ("full", "compact")
@@ -313,6 +316,26 @@ class LearnerInterface:
         if t.grips_itself:
             automatic_grip(obs, t.grip_starts, commands)
         return commands
+
+    def keeping_on(self, actions: np.ndarray) -> tuple[Callback, tuple[Any, ...]]:
+        """Return a kernel and its state that do what `carry_out` does, without Python; see `ForagingArena.decide`.
+
+        Args:
+            actions: As in `carry_out`.
+        """
+        _, number, values, _ = self._kept
+        np.copyto(number if self.translation.is_discrete else values, actions, casting="same_kind")
+        return self._keep_on, self._kept
+
+    @cached_property
+    def _kept(self) -> tuple[Any, ...]:
+        n_robots = len(self._commands)
+        number, values = np.zeros(n_robots, np.int32), np.zeros((n_robots, *self._actions_shape[1:]), np.float32)
+        return self.translation, number, values.reshape(n_robots, -1), self._commands
+
+    @cached_property
+    def _keep_on(self) -> Callback:
+        return Callback(keep_on, *example_of(self._kept))
 
     def _check_numbers(self, actions: np.ndarray) -> None:
         most = self._n_choices - 1

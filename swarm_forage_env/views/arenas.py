@@ -364,7 +364,8 @@ class ArenaBatch:
         worlds = [arena.forage_env.arena for arena in self.arenas]
         if self._ways is None or worlds != self._ways[0]:  # by identity
             in_parts = not self._is_sampled and all(map(_steps_in_parts, self.arenas))
-            lockstep = Lockstep(worlds) if in_parts and can_go_in_lockstep(worlds) else None
+            alone = not self.interface.passes_on and all(arena.decides_at_once for arena in self.arenas)
+            lockstep = Lockstep(worlds) if in_parts and not alone and can_go_in_lockstep(worlds) else None
             self._ways = worlds, lockstep, Bookkeeping(self.arenas) if in_parts and can_book_together() else None
         elif self._ways[2] is not None:
             self._ways[2].follow()

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from swarm_forage_env._internal.compiling import is_compiled
 from swarm_forage_env._internal.fields import ConfigError, table
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.reset_and_step import OPTION_OF_TESTS
@@ -19,6 +20,7 @@ from swarm_forage_env.policies.interface import (
     LearnerInterface,
 )
 from swarm_forage_env.policies.kernels.learner import SiteMemory
+from swarm_forage_env.policies.kernels.network import keep_on
 from swarm_forage_env.scenarios.config import SECTIONS
 from swarm_forage_env.scenarios.overrides import field_sections
 from swarm_forage_env.views.plans import ArenaPlan
@@ -159,12 +161,38 @@ class LearnerArena:
             RuntimeError: before the first reset.
             ActionError: actions that the interface or the drive refuses.
         """
+        if self.decides_at_once:
+            self._decide(actions, rewards)
+            return self.ending
         tick = np.zeros(0, np.bool_), False, False
         for _ in range(self._plan.interface.decision_ticks):
             tick = self.take(self.env.step_batch(self.command(actions)), rewards)
             if any(tick[1:]):
                 break
         return tick
+
+    @property
+    def decides_at_once(self) -> bool:
+        """Whether all ticks of a decision are one compiled call: nobody but the world has a say in them."""
+        env = self.forage_env
+        return (
+            self.env is env
+            and type(env) is ForageEnv
+            and "step_batch" not in vars(env)
+            and env.scenario.physics == "compiled"
+            and is_compiled(keep_on)
+            and env.render_mode != "human"
+            and not env.arena.needs_python
+            and env.reward_model.payment is not None
+        )
+
+    def _decide(self, actions: np.ndarray, rewards: np.ndarray) -> None:
+        """Do what `step` does, in one call."""
+        env, interface = self.forage_env, self.interface
+        env.require_whole()
+        chosen = self.turn.actions(interface.checked(actions))
+        n_ticks = min(self._plan.interface.decision_ticks, env.max_cycles - env.tick)
+        env.arena.decide(*interface.keeping_on(chosen), n_ticks, env.reward_model, rewards)
 
     def command(self, actions: np.ndarray) -> ActionArray:
         """Return the actions of the next tick, (N, A) in a reused buffer; see `LearnerInterface.command`."""

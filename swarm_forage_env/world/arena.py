@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from swarm_forage_env._internal.compiling import Callback
 from swarm_forage_env._internal.fields import ConfigError, whole
 from swarm_forage_env._internal.held import hold
 from swarm_forage_env._internal.rng import Stream, TickDraws, stream_rng
@@ -20,11 +21,7 @@ from swarm_forage_env.scenarios.config import MAX_HANDLING_TICKS, ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELLS_PER_M
 from swarm_forage_env.world.allocation import new_arrays, new_state
 from swarm_forage_env.world.bodies import Bodies
-from swarm_forage_env.world.caches import (
-    create_dynamic_caches,
-    create_static_caches,
-    restore_static_caches,
-)
+from swarm_forage_env.world.caches import create_dynamic_caches, create_static_caches, restore_static_caches
 from swarm_forage_env.world.compiled import CompiledTick, tasks_of
 from swarm_forage_env.world.kernels.bodies import BodyState
 from swarm_forage_env.world.kernels.disturbances import Disturbances
@@ -43,6 +40,7 @@ from swarm_forage_env.world.placement import (
     place_objects,
     static_cache_centres,
 )
+from swarm_forage_env.world.rewards import RewardModel
 from swarm_forage_env.world.sensors import light_of_carriers_only, new_sensors, read_slices
 from swarm_forage_env.world.state import ArenaArrays, Source, listed
 
@@ -347,6 +345,44 @@ class ForagingArena:
         if not tasks_counted:
             raise refused_tasks(tasks, len(self.swarm.active))
         return n_begun - (outcome != DONE)
+
+    def decide(self, act: Callback, state: tuple[Any, ...], n_ticks: int, rewards: RewardModel, paid: ObsArray) -> None:
+        """Carry out a decision of a learner; what happens is what `n_ticks` calls of `step` do.
+
+        Bodies must be compiled, and `needs_python` false.
+
+        Args:
+            act: A kernel that writes actions, called as that of a `CompiledPolicy`; it draws nothing.
+            state: What it reads and edits; the last are the actions, (N, A) float32.
+            n_ticks: For how many ticks the decision holds.
+            rewards: What makes the rewards; it must have a `payment`.
+            paid: (N,) float32, the rewards are added.
+
+        Raises:
+            ActionError: as in `step`; nothing has happened.
+        """
+        end = self.tick + n_ticks
+        while self.tick < end:
+            first = self.tick + 1
+            picks, walks = self.draws(first)
+            n_drawn = min((len(rows) for rows in (picks, walks) if rows is not self._nothing), default=n_ticks)
+            n_begun, outcome = self._compiled.decide(
+                *self.parts,
+                rewards.payment,
+                self._unit_gain,
+                first,
+                min(end - self.tick, n_drawn),
+                self.has_changed,
+                act,
+                state,
+                picks,
+                walks,
+                paid,
+            )
+            self.tick, self.has_changed = first + n_begun - 2, self.has_changed and n_begun == 1
+            self.conclude(outcome, state[-1], self._unit_gain)
+            if outcome != DONE:  # Python has ended the tick
+                paid += rewards.reward()
 
     @contextmanager
     def _observation_kept(self, kept: bool) -> Iterator[None]:

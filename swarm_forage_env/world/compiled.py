@@ -112,6 +112,7 @@ class CompiledTick:
         """
         self._calls = ExampleCalls.from_python(arrays, bodies)
         self._driver: CompiledPolicy | None = None
+        self._decide: Callable[..., tuple[int, int]] | None = None
 
     @cached_property
     def observe(self) -> Callable[[ArenaArrays], None]:
@@ -145,6 +146,12 @@ class CompiledTick:
         if policy is not self._driver:
             self._driver, self._run = policy, direct(tick.run, *arguments)
         return self._run(*arguments)
+
+    def decide(self, *arguments: Any) -> tuple[int, int]:
+        """See `kernels.tick.decide`; for compiled bodies only. The types are the same in all calls."""
+        if self._decide is None:
+            self._decide = direct(tick.decide, *arguments)
+        return self._decide(*arguments)
 
 
 def _empty_parts(config: ScenarioConfig) -> tuple[ArenaArrays, BodyState | None]:

@@ -173,8 +173,11 @@ WITHOUT = {
     "stepped alone in tests/world/test_lockstep.py",
     "swarm_forage_env.world.kernels.placement.place_displaced": "`scatter`, and what follows from it; compared with "
     "`place_objects` in tests/world/test_placement.py",
+    "swarm_forage_env.world.kernels.reward.remember": "a copy; rewards for progress are compared with arenas that are "
+    "taken one by one in tests/world/test_lockstep.py",
     "swarm_forage_env.world.kernels.reward.rewards": "a weighted sum; term by term in tests/world/test_rewards.py",
     "swarm_forage_env.world.kernels.tick.close": IN_ORDER,
+    "swarm_forage_env.world.kernels.tick.decide": "the loop of `LearnerArena.step`; " + ONE_BY_ONE,
     "swarm_forage_env.world.kernels.tick.meet_and_close": IN_ORDER,
     "swarm_forage_env.world.kernels.tick.observe": IN_ORDER,
     "swarm_forage_env.world.kernels.tick.run": "the loop of `LiveRun`; both are compared in "

@@ -3,6 +3,7 @@
 import copy
 import pickle
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from swarm_forage_env import scenario
 from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.views.arenas import ArenaBatch, ArenaStep
+from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.plans import ArenaPlan, plan_arena
 from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.world.lockstep import Lockstep, can_go_in_lockstep
@@ -34,8 +36,17 @@ def plan(*wrappers: str, interface: InterfaceConfig | None = None, **fields) -> 
     return plan_arena(world, wrappers=wrappers, interface=interface, max_cycles=60)
 
 
+class TickByTick(LearnerArena):
+    decides_at_once = False
+
+
 class OneByOne(ArenaBatch):
-    """Arenas that are never taken together: what they do is what the others have to do."""
+    """Arenas that are stepped one by one and tick by tick: what they do is what the others have to do."""
+
+    def __init__(self, *args: Any) -> None:
+        super().__init__(*args)
+        for arena in self.arenas:
+            arena.__class__ = TickByTick
 
     def _chosen_ways(self) -> tuple[None, None]:
         return None, None
@@ -72,10 +83,21 @@ def joined(steps: list[ArenaStep]) -> dict[str, np.ndarray]:
         ((), {"walk_probability": 0.02, "caches": "static"}, (True, True, True, True)),
         ((), {"nest_progress": 0.1, "interference": -0.1, "tick": -0.01}, (True, True, True, True)),
         ((), {"nest_progress": 0.1, "team": True}, (True, True, False, True)),
-        ((), {"interface": DRIVEN, "first_pickup": 1.0}, (True, True, True, False)),
+        ((), {"interface": DRIVEN, "first_pickup": 1.0}, (False, True, True, False)),
+        (("throttle:waveform=constant",), {"interface": DRIVEN}, (True, True, False, False)),
         ((), {"physics": "chipmunk"}, (False, True, True, True)),
     ],
-    ids=["bare", "wrapped", "dynamic caches", "walking objects", "rewards", "a team", "an interface", "Chipmunk"],
+    ids=[
+        "bare",
+        "wrapped",
+        "dynamic caches",
+        "walking objects",
+        "rewards",
+        "a team",
+        "an interface",
+        "a wrapped interface",
+        "Chipmunk",
+    ],
 )
 def test_arenas_together_are_those_alone(wrappers, fields, chosen_ways):
     chosen = plan(*wrappers, **fields)
@@ -146,7 +168,7 @@ def test_the_arrays_of_a_snapshot_are_found(interface, way):
             again = batch.step(now)
             np.testing.assert_array_equal(again.obs[N_ROBOTS:], first.obs[N_ROBOTS:])
             np.testing.assert_array_equal(again.rewards[N_ROBOTS:], first.rewards[N_ROBOTS:])
-    assert ways(batches[0])[:3] == (True,) * 3
+    assert ways(batches[0])[:3] == (batches[0].interface.passes_on, True, True)
 
 
 def arenas(n: int) -> list[ForagingArena]:

@@ -209,6 +209,35 @@ def decide(obs: ObsArray, draws: FloatArray, t: Translation, layers: Layers, cho
 
 
 @kernel
+def carry_out(obs: ObsArray, t: Translation, number: IntArray, values: ObsArray, actions: ActionArray) -> None:
+    """Write the commands (N, A) of actions by number (N,), or by value (N, m) where they are continuous."""
+    if t.is_discrete:
+        numbered_actions(number, t.wheels, t.grips, obs, t.cargo_starts[0], actions)
+    else:
+        n_driven, n_said = t.n_driven, values.shape[1] - t.n_driven
+        for i in range(actions.shape[0]):
+            for c in range(n_driven):
+                actions[i, c] = values[i, c]
+            for c in range(n_said):  # the message, if there is one, comes last in both
+                actions[i, actions.shape[1] - n_said + c] = values[i, n_driven + c]
+    if t.grips_itself:
+        automatic_grip(obs, t.grip_starts, actions)
+
+
+@kernel
+def keep_on(
+    obs: ObsArray,
+    _active: BoolArray,
+    _draws: FloatArray,
+    state: tuple[Translation, IntArray, ObsArray, ActionArray],
+    _now: int,
+) -> None:
+    """One tick of a decision that somebody else made: `carry_out` of what is in `state`."""
+    t, number, values, actions = state
+    carry_out(obs, t, number, values, actions)
+
+
+@kernel
 def step_network(
     obs: ObsArray,
     _active: BoolArray,
@@ -223,14 +252,4 @@ def step_network(
     t, layers, choice, actions = state
     if (now - 1) % t.decision_ticks == 0:
         decide(obs, draws, t, layers, choice)
-    if t.is_discrete:
-        numbered_actions(choice.number, t.wheels, t.grips, obs, t.cargo_starts[0], actions)
-    else:
-        n_driven, n_said = t.n_driven, choice.outputs.shape[1] - t.n_driven
-        for i in range(actions.shape[0]):
-            for c in range(n_driven):
-                actions[i, c] = choice.outputs[i, c]
-            for c in range(n_said):  # the message, if there is one, comes last in both
-                actions[i, actions.shape[1] - n_said + c] = choice.outputs[i, n_driven + c]
-    if t.grips_itself:
-        automatic_grip(obs, t.grip_starts, actions)
+    carry_out(obs, t, choice.number, choice.outputs, actions)

@@ -95,6 +95,15 @@ def rewards(p: Payment) -> None:
 
 
 @kernel
+def remember(p: Payment) -> None:
+    """Keep the positions before a tick, if a term needs them."""
+    if p.weights.nest_progress != 0.0:
+        for i in range(p.total.shape[0]):
+            p.previous_position[i, 0] = p.swarm.position[i, 0]
+            p.previous_position[i, 1] = p.swarm.position[i, 1]
+
+
+@kernel
 def pay(p: Payment, paid: ObsArray) -> None:
     """Work out the rewards of a tick, where no function of Python adds to them, and add them to `paid` (N,) float32."""
     if p.events.happened[0] or p.is_dense:

@@ -21,7 +21,7 @@ from typing import Any
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env._internal.prefetching import LARGE
 from swarm_forage_env.contract.codes import Counter
-from swarm_forage_env.contract.types import ActionArray, CodeArray, FloatArray
+from swarm_forage_env.contract.types import ActionArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.world.kernels import beams, floor, kinds, proprioception
 from swarm_forage_env.world.kernels.bodies import BodyState, move_bodies, tell_poses
 from swarm_forage_env.world.kernels.contact import press
@@ -31,6 +31,7 @@ from swarm_forage_env.world.kernels.drive import drive
 from swarm_forage_env.world.kernels.interact import serve
 from swarm_forage_env.world.kernels.neighbourhood import bin_robots, mark_cells
 from swarm_forage_env.world.kernels.placement import place_displaced
+from swarm_forage_env.world.kernels.reward import Payment, pay, remember
 from swarm_forage_env.world.kernels.walk import walk
 from swarm_forage_env.world.state import CHANGES, ArenaArrays, CacheState
 
@@ -318,3 +319,51 @@ def run(
         if outcome != DONE or not counted:
             return k + 1, outcome, counted
     return n_ticks, DONE, True
+
+
+@kernel
+def decide(
+    a: ArenaArrays,
+    b: BodyState,
+    payment: Payment,
+    wheel_gain: FloatArray,
+    first: int,
+    n_ticks: int,
+    look_first: bool,
+    act: Callable[..., None],
+    state: tuple[Any, ...],
+    chances: FloatArray,
+    walk_chances: FloatArray,
+    paid: ObsArray,
+) -> tuple[int, int]:
+    """Carry out a decision of a learner for up to `n_ticks` ticks; it ends early with a tick that is not `DONE`.
+
+    Args:
+        a: The arena.
+        b: Its bodies.
+        payment: What rewards are made of.
+        wheel_gain: (N, 2), see `set_out`.
+        first: Number of the first tick.
+        n_ticks: How many, at most as many as there are draws. Light is left out but in the last one.
+        look_first: See `set_out`.
+        act: As the policy of `run`, but it does not look at its draws.
+        state: Its state.
+        chances: See `run`.
+        walk_chances: See `run`.
+        paid: (N,) float32, the rewards of ticks that are `DONE` are added.
+
+    Returns:
+        How many ticks have begun, and the outcome of the last of them.
+    """
+    sensors = a.sensors
+    for k in range(n_ticks):
+        remember(payment)
+        act(sensors.obs, a.state.swarm.active, wheel_gain, state, first + k)
+        sensors.light_is_due[0] = k == n_ticks - 1
+        chance, walk_chance = chances[k % chances.shape[0]], walk_chances[k % walk_chances.shape[0]]
+        outcome = whole(a, b, state[-1], wheel_gain, first + k, look_first and k == 0, chance, walk_chance)
+        sensors.light_is_due[0] = True  # for what Python may have to finish
+        if outcome != DONE:
+            return k + 1, outcome
+        pay(payment, paid)
+    return n_ticks, DONE
