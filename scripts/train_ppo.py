@@ -12,11 +12,10 @@ import argparse
 from pathlib import Path
 
 import torch
-from stable_baselines3 import PPO
 
 from swarm_forage_env.training.defaults import DEFAULT_STEPS
 from swarm_forage_env.training.recipe import recipe
-from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, SwarmVecEnv
+from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, SwarmPPO, SwarmVecEnv
 from swarm_forage_env.training.sb3.export import export_network, note_interface
 from swarm_forage_env.training.sb3.training import training_seed
 
@@ -31,7 +30,7 @@ def main() -> None:
     plan = recipe("warehouse_small", steps=arguments.steps)  # plain numbers: print it, or put your own in their place
     env = SwarmVecEnv(plan.scenario, n_arenas=plan.n_arenas, interface=plan.interface)
     checkpoint = arguments.out.with_suffix(".zip")
-    model = PPO(
+    model = SwarmPPO(  # PPO that asks its network about robots at work only
         "MlpPolicy",
         env,
         **plan.options,  # n_steps, batch_size, learning_rate, ...
@@ -48,7 +47,7 @@ def main() -> None:
         env.set_options({"scenario": stage.scenario})
         if end:  # a new seed, and arenas that start anew
             seed = training_seed(plan.seed, model.num_timesteps)
-            model = PPO.load(checkpoint, env=env, device="cpu", seed=seed, **stage.options)
+            model = SwarmPPO.load(checkpoint, env=env, device="cpu", seed=seed, **stage.options)
         end += stage.steps
         model.learn(end - model.num_timesteps, reset_num_timesteps=False)
         model.save(checkpoint)

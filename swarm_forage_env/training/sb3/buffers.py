@@ -72,6 +72,10 @@ class ActiveRolloutBuffer(RolloutBuffer):
         self._active_column = width - frame + active_column
         super().__init__(buffer_size, observation_space, action_space, device, gae_lambda, gamma, n_envs)
 
+    def at_work(self, observations: np.ndarray) -> np.ndarray:
+        """Return which rows of observations (.., columns) are of robots at work, (..) bool."""
+        return observations[..., self._active_column] == 1.0
+
     def compute_returns_and_advantage(self, last_values: torch.Tensor, dones: np.ndarray) -> None:
         """Compute GAE(lambda) advantages and lambda returns, bridging steps of robots that are not at work.
 
@@ -85,7 +89,7 @@ class ActiveRolloutBuffer(RolloutBuffer):
             ValueError: the active column holds something else than 0 and 1.
         """
         column = self.observations[..., self._active_column]
-        is_active = column == 1.0
+        is_active = self.at_work(self.observations)
         if not np.all(is_active | (column == 0.0)):
             raise ValueError(
                 f"Expected column {self._active_column} of observations to be 0 or 1 (active), got "

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import stable_baselines3
 import torch
-from stable_baselines3 import A2C, DQN, PPO, SAC
+from stable_baselines3 import A2C, DQN, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 from stable_baselines3.common.logger import HParam
@@ -56,9 +56,10 @@ from swarm_forage_env.training.evaluations import (
 from swarm_forage_env.training.plan import LEARNING, Stage, TrainingPlan
 from swarm_forage_env.training.sb3.buffers import ActiveRolloutBuffer, EmptyRolloutError, PresentReplayBuffer
 from swarm_forage_env.training.sb3.export import export_network, note_interface
+from swarm_forage_env.training.sb3.ppo import SwarmPPO
 from swarm_forage_env.views.stable_baselines3 import SwarmVecEnv
 
-ALGORITHM_CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "a2c": A2C, "dqn": DQN, "sac": SAC}
+ALGORITHM_CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": SwarmPPO, "a2c": A2C, "dqn": DQN, "sac": SAC}
 ON_POLICY = ("ppo", "a2c")
 EXPORTABLE = ("ppo", "a2c", "dqn")
 POLICY_FILE = "policy.npz"
@@ -291,7 +292,8 @@ def _changes(stage: Stage) -> str:
 
 def _learn(model: BaseAlgorithm, steps: int, callbacks: "_Together", where: str) -> None:
     try:
-        model.learn(steps, callback=callbacks, reset_num_timesteps=False, tb_log_name=model.__class__.__name__.lower())
+        name = next(name for name, kind in ALGORITHM_CLASSES.items() if isinstance(model, kind))
+        model.learn(steps, callback=callbacks, reset_num_timesteps=False, tb_log_name=name)
     except KeyboardInterrupt:
         if not _has_diverged(model):
             callbacks.watch.keep(model)
@@ -375,9 +377,9 @@ class _Watch(BaseCallback):
         self.logger.record("settings", HParam(plain, measures), exclude=_NO_LINE)
 
     def _on_step(self) -> bool:
-        for info in self.locals["infos"]:
-            if "run" in info:
-                run = info["run"]
+        for row in np.flatnonzero(self.locals["dones"]):
+            run = self.locals["infos"][row].get("run")
+            if run is not None:
                 name = run["scenario"]
                 counted = run[self._counted.get(name, self._plan.scenario.performance)]
                 of_world = f"/{name}" if self._counted else ""
