@@ -14,7 +14,8 @@ PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 PAGES.remove(ROOT / "CHANGELOG.md")  # it tells of names that are no more
 OBJECTS = {
     *("action_space", "algorithm", "b", "claim", "client", "env", "forage_env", "interface", "layout", "model"),
-    *("objects", "plan", "policy", "rng", "robots", "self", "sensor_noise", "settings", "sigmas", "spec", "state"),
+    *("known", "objects", "plan", "policy", "rng", "robot", "robots", "see", "self", "sensor_noise", "settings"),
+    *("sigmas", "spec", "state"),
     *("swarm", "table", "training", "verdict", "world", "wrapper"),
 }
 """What pages and docstrings call objects, whether a module has the name or not: of these, only classes count."""
@@ -36,7 +37,7 @@ FOREIGN = {
 """Other packages."""
 SPELLINGS = (r"reset\((?:self, )?task\b", r"\btask\.(?:layout|n_robots)\b", r"\benv\.task\b", r"\bSwarmTask\b")
 """Old names that are no module's."""
-SUFFIXES = {"csv", "json", "md", "mplstyle", "npz", "png", "py", "pyi", "toml", "zip"}
+SUFFIXES = {"csv", "js", "json", "md", "mplstyle", "npz", "png", "py", "pyi", "toml", "zip"}
 DOTTED = re.compile(r"`([a-z_][a-z_0-9]*(?:\.[A-Za-z_0-9]+)+)")
 PATHS = re.compile(r"`?((?:swarm_forage_env|baselines|metrics|tests|scripts|docs)/[\w/.-]+\.(?:py|md|toml|npz|json))")
 

@@ -173,6 +173,9 @@ WITHOUT = {
     "stepped alone in tests/world/test_lockstep.py",
     "swarm_forage_env.world.kernels.placement.place_displaced": "`scatter`, and what follows from it; compared with "
     "`place_objects` in tests/world/test_placement.py",
+    "swarm_forage_env.policies.kernels.network.keep_on": "hands `state` to `carry_out`, which has a twin; "
+    + ONE_BY_ONE,
+    "swarm_forage_env.world.kernels.reward.pay": "`rewards`, and a sum; " + ONE_BY_ONE,
     "swarm_forage_env.world.kernels.reward.remember": "a copy; rewards for progress are compared with arenas that are "
     "taken one by one in tests/world/test_lockstep.py",
     "swarm_forage_env.world.kernels.reward.rewards": "a weighted sum; term by term in tests/world/test_rewards.py",

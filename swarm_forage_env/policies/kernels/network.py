@@ -232,7 +232,7 @@ def keep_on(
     state: tuple[Translation, IntArray, ObsArray, ActionArray],
     _now: int,
 ) -> None:
-    """One tick of a decision that somebody else made: `carry_out` of what is in `state`."""
+    """One tick of a decision that a learner has made: `carry_out` of what is in `state`."""
     t, number, values, actions = state
     carry_out(obs, t, number, values, actions)
 
