@@ -149,7 +149,15 @@ def percent_of(value: float, decimals: int = 0) -> str:
 
 
 def _origins(entries: Sequence[Entry]) -> Sheet:
-    header = ("entry", "trained in", "library", "training seeds", "core-hours of training", "core-hours of its runs")
+    header = (
+        "entry",
+        "trained in",
+        "library",
+        "training seeds",
+        "core-hours of training",
+        "core-hours of its runs",
+        "runs made by version",
+    )
     rows = [
         (
             entry.name,
@@ -158,6 +166,7 @@ def _origins(entries: Sequence[Entry]) -> Sheet:
             ", ".join("-" if p.training_seed is None else str(p.training_seed) for p in entry.policies),
             "-" if entry.training.core_hours is None else number(entry.training.core_hours),
             "-" if entry.core_hours is None else number(entry.core_hours),
+            entry.versions.get("swarm-forage-env", "-"),
         )
         for entry in entries
     ]
