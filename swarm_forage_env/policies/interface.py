@@ -327,6 +327,10 @@ class LearnerInterface:
         np.copyto(number if self.translation.is_discrete else values, actions, casting="same_kind")
         return self._keep_on, self._kept
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what copies and pickles have; addresses of compiled code are no others' than this one's."""
+        return {name: value for name, value in vars(self).items() if name not in ("_kept", "_keep_on")}
+
     @cached_property
     def _kept(self) -> tuple[Any, ...]:
         n_robots = len(self._commands)

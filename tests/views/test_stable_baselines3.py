@@ -1,5 +1,6 @@
 """The vector environment of stable-baselines3 gives the episode of `lives`, and keeps that library's contract."""
 
+import copy
 import warnings
 
 import numpy as np
@@ -17,6 +18,7 @@ from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.training.sb3 import SwarmVecEnv
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.support import lives
+from tests.support.branches import pickled
 
 IDLE = np.zeros((lives.N_ROBOTS, 3), np.float32)
 
@@ -222,3 +224,16 @@ def test_closed_environments_take_no_step():
     env.close()
     with pytest.raises(RuntimeError, match="were closed"):
         env.step(IDLE)
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, pickled])
+def test_it_can_be_copied_after_a_decision(copied):
+    """A decision is one call of compiled code, which no copy holds."""
+    numbered = InterfaceConfig(observation="compact", actions="discrete", decision_ticks=3)
+    env = SwarmVecEnv("warehouse_small", n_robots=4, n_objects=20, interface=numbered)
+    env.reset()
+    env.step(np.array([3, 4, 5, 6]))
+    twin = copied(env)
+    for _ in range(5):
+        expected, found = (each.step(np.array([7, 1, 2, 3])) for each in (env, twin))
+        assert [array.tobytes() for array in found[:3]] == [array.tobytes() for array in expected[:3]]
