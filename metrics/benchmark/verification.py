@@ -7,6 +7,7 @@ the same. Any other policy may round otherwise on another machine, and its runs 
 its numbers must agree within chance.
 """
 
+import math
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -14,9 +15,11 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
+from scipy.special import stdtr  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
 
 from swarm_forage_env._internal.wording import counted, number, plain
-from swarm_forage_env.policies.registry import policy_files, policy_names
+from swarm_forage_env.policies.mixture import is_mixture, mixture_parts
+from swarm_forage_env.policies.registry import file_of, is_policy_file, policy_class, policy_names
 from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.plan import Condition, Plan
 from swarm_forage_env.runs.policy_spec import PolicySpec, policy_specs
@@ -33,6 +36,13 @@ from .running import check_finished, policy_origin
 Verdict: TypeAlias = Literal["same", "within chance", "differs"]
 N_WORLDS = 8
 """Sampled by default: a few minutes on two cores (our choice)."""
+
+
+_FEWEST = 3
+"""Worlds that a verdict on policies without promised bits needs (our choice)."""
+_ERROR = 0.05
+_OURS = ("swarm_forage_env", "baselines")
+"""Packages whose policies have the same bits everywhere."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,6 +68,18 @@ class VerifiedWorld:
         """Mean change relative to the stored mean; to 1 per 1,000 s where that is smaller."""
         return float((self.again.mean() - self.stored.mean()) / max(abs(self.stored.mean()), 1.0))
 
+    @property
+    def chance(self) -> float:
+        """Probability of a difference of means as large as this one between runs of one policy: Welch's t-test."""
+        if self.is_same:
+            return 1.0
+        variances = [float(runs.var(ddof=1)) / runs.size for runs in (self.stored, self.again)]
+        scatter = sum(variances)
+        if scatter <= 0.0:
+            return 0.0
+        freedom = scatter**2 / sum(each**2 / (self.stored.size - 1) for each in variances)
+        return 2.0 * float(stdtr(freedom, -abs(self.again.mean() - self.stored.mean()) / math.sqrt(scatter)))
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Verification(Answer):
@@ -69,13 +91,22 @@ class Verification(Answer):
     """Of the entry: policies times worlds."""
     other_versions: tuple[str, ...]
     """Packages of which another version made the entry, each in words."""
+    n_stored: int = 0
+    """Runs that were in the folder of records before."""
 
     @property
     def verdict(self) -> Verdict:
-        """What all runs say together."""
+        """What all runs say together.
+
+        Where no bits are promised, neither the mean shift over worlds nor a single world may differ by more than chance
+        allows: at 5 % for all worlds together (Bonferroni).
+        """
         if all(world.is_same for world in self.worlds):
             return "same"
-        if any(world.is_exact and not world.is_same for world in self.worlds):
+        others = [world for world in self.worlds if not world.is_exact]
+        if len(others) < _FEWEST or any(world.is_exact and not world.is_same for world in self.worlds):
+            return "differs"
+        if min(world.chance for world in others) < _ERROR / len(others):
             return "differs"
         return "within chance" if self.shift.lower <= 0.0 <= self.shift.upper else "differs"
 
@@ -104,6 +135,7 @@ class Verification(Answer):
     def _notes(self) -> list[str]:
         n_runs = sum(world.stored.size for world in self.worlds)
         made = f"{counted(n_runs, 'run')} in {len(self.worlds)} of {self.n_worlds} worlds"
+        made += f" ({self.n_stored} of them stored earlier)" if self.n_stored else ""
         said = {
             "same": f"The entry {self.entry.name} is verified: {made} give the stored numbers.",
             "within chance": f"The entry {self.entry.name} is verified within chance: {made} shift the performance by "
@@ -157,6 +189,7 @@ class VerificationQuestion(Question[Verification]):
                 self._verified(condition, place[condition.policy.label], table) for condition in self.plan.conditions
             ),
             n_worlds=len(self.protocol.worlds) * len(self.entry.policies),
+            n_stored=table.n_stored,
             other_versions=tuple(
                 f"{package} {version}, here {made.get(package, 'none')}"
                 for package, version in self.entry.versions.items()
@@ -197,6 +230,10 @@ def verification_question(
             raise BenchmarkError(
                 f"Expected the policy {policy.name} of {file}, got another one in {spec.policy}: its content differs."
             )
+    if n_worlds is not None and n_worlds < _FEWEST and not all(_has_same_bits(spec.policy) for spec in specs):
+        raise BenchmarkError(
+            f"Expected at least {_FEWEST} worlds for policies whose bits may differ between machines, got {n_worlds}."
+        )
     conditions = [Condition(spec, each.world) for spec in specs for each in chosen.worlds]
     if n_worlds is not None and n_worlds < len(conditions):
         drawn: list[int] = np.random.default_rng(seed).choice(len(conditions), n_worlds, replace=False).tolist()
@@ -241,9 +278,12 @@ def verify_entry(
 
 
 def _has_same_bits(policy: str) -> bool:
-    """Whether runs of a policy are promised to be the same everywhere: docs/promises.md."""
-    files = policy_files(policy)
-    return all(file.endswith(".npz") for file in files)
+    """Whether runs of a policy, or of all parts of a mixed swarm, are promised to be the same: docs/promises.md."""
+    parts = [part.policy for part in mixture_parts(policy)] if is_mixture(policy) else [policy]
+    return all(
+        file_of(part).endswith(".npz") if is_policy_file(part) else policy_class(part).__module__.split(".")[0] in _OURS
+        for part in parts
+    )
 
 
 def _installed_policies(entry: Entry) -> tuple[str, ...]:

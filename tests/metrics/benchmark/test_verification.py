@@ -79,3 +79,41 @@ def test_chance_is_told_from_another_policy(effect, share, protocol):
         )
         verdicts.append(Verification(entry=entry, worlds=worlds, n_worlds=8, other_versions=()).verdict)
     assert share[0] <= verdicts.count("within chance") / len(verdicts) <= share[1]
+
+
+def verified(pairs, **fields):
+    """Return one world for each pair of stored and new runs."""
+    worlds = (
+        VerifiedWorld(
+            policy=EntryPolicy(name="model"), world=str(k), stored=np.array(a), again=np.array(b), is_exact=False
+        )
+        for k, (a, b) in enumerate(pairs)
+    )
+    entry = made_up_entry(load_protocol(TINY), "model", lambda k: 1.0)
+    return Verification(entry=entry, worlds=tuple(worlds), n_worlds=8, other_versions=(), **fields)
+
+
+def test_one_forged_world_is_found_among_others_that_scatter():
+    honest = [([10.0, 11.0, 9.0], [10.2, 9.9, 10.5]), ([21.0, 20.0, 22.0], [20.5, 21.0, 20.0])]
+    assert verified([*honest, ([5.0, 6.0, 7.0], [6.5, 6.0, 5.5])]).verdict == "within chance"
+    assert verified([*honest, ([900.0, 901.0, 899.0], [1.0, 1.2, 0.8])]).verdict == "differs"
+    assert verified([*honest, ([900.0] * 3, [1.0] * 3)]).verdict == "differs"
+    assert verified(honest).verdict == "differs"  # too few to tell
+
+
+def test_too_few_worlds_decide_nothing_for_chance(protocol, tmp_path):
+    policy = tmp_path / "own.py"
+    policy.write_text("from baselines.crw import CRWPolicy\n\n\nclass Own(CRWPolicy):\n    pass\n")
+    entry = run_benchmark([f"{policy}:Own"], name="own", protocol=protocol, jobs=1, progress=False)
+    entry.write(tmp_path / "own.json")
+    with pytest.raises(BenchmarkError, match="at least 3 worlds"):
+        verify_entry(tmp_path / "own.json", [f"{policy}:Own"], n_worlds=2, protocol=protocol)
+
+
+def test_stored_runs_are_named(entry, protocol, tmp_path):
+    entry.write(tmp_path / "two.json")
+    for n_stored in (0, 4):
+        found = verify_entry(
+            tmp_path / "two.json", n_worlds=2, protocol=protocol, out=tmp_path / "runs", jobs=1, progress=False
+        )
+        assert found.n_stored == n_stored
