@@ -9,7 +9,7 @@ import traceback
 from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import fields
-from functools import cache
+from functools import lru_cache
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -35,6 +35,9 @@ _OF_EACH_ROBOT = ("object_reach_cells", "cache_reach_cells")
 _WIDTHS = {"b": np.bool_, "i": np.int64, "f": np.float64}
 """Kind of a number, as numpy names it -> its type in a record."""
 
+_KINDS = {"b": "True or False", "i": "whole numbers", "f": "numbers"}
+"""Kind of a number -> words for it."""
+
 
 class StepError(ConfigError):
     """A `RobotPolicy` whose `step` cannot be compiled, or failed, or whose memory or parameters make no sense."""
@@ -56,13 +59,15 @@ class RobotPolicy(KernelPolicy):
     Attributes:
         memory: Name -> what a robot remembers at the start of a run: a bool, a whole number, a float, or some of one
             kind. The types stay.
-        parameters: Name -> number or numbers that all robots know; keyword arguments of the class change them.
+        parameters: Name -> number or numbers that all robots know; keyword arguments of the class change them. Kinds
+            and shapes stay.
         draws: How many random numbers a robot gets in every tick.
         reads: See `Policy`; `see` has these slices and no others.
 
     Raises:
-        StepError: an argument that is no parameter; when the class is made, a `step` with other arguments, or memory or
-            parameters that are no numbers; in `reset`, a `step` that cannot be compiled; in `act`, one that raises.
+        StepError: an argument of another kind or shape than its default; when the class is made, a `step` with other
+            arguments, or memory or parameters that are no numbers; in `reset`, a `step` that cannot be compiled; in
+            `act`, one that raises.
     """
 
     memory: ClassVar[Mapping[str, Any]] = {}
@@ -86,7 +91,11 @@ class RobotPolicy(KernelPolicy):
 
     def __init__(self, **parameters: Any) -> None:
         known_keys(parameters, self.parameters, f"parameter of {type(self).__name__}")
-        self.parameters = {**self.parameters, **parameters}
+        name = f"the parameters of {type(self).__name__}"
+        cast = {
+            each: _as_default(f"{each} in {name}", value, self.parameters[each]) for each, value in parameters.items()
+        }
+        self.parameters = {**self.parameters, **cast}
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -183,7 +192,7 @@ class RobotPolicy(KernelPolicy):
         return lines[-1] if lines else None
 
 
-@cache
+@lru_cache(64)  # notebooks define classes again and again
 def _kernel_of(
     step: Callable[..., Any], kinds: _Types, carrying: int
 ) -> tuple[Callable[..., Any], Callable[..., None]]:
@@ -283,6 +292,27 @@ def _record(values: Mapping[str, Any], what: str) -> np.ndarray:
     for name, array in arrays.items():
         record[name] = array
     return record
+
+
+def _as_default(where: str, value: Any, default: Any) -> Any:
+    """Return a value in the kind and shape of a default: another kind would make `step` compute something else.
+
+    Raises:
+        StepError: another kind, but a whole number where the default is a float is one; or another shape.
+    """
+    shape, kind = np.shape(default), np.dtype(_WIDTHS[np.asarray(default).dtype.kind])
+    try:
+        array = np.asarray(value)
+    except ValueError:  # rows of unequal length
+        array = np.asarray(None)
+    is_kind = array.dtype.kind in "biuf" and (array.dtype.kind == "b") == (kind.kind == "b")
+    if array.shape != shape or not is_kind or not np.can_cast(array.dtype, kind):
+        shaped = f" in the shape {shape}" if shape else ", a single one"
+        raise StepError(
+            f"Expected {where} to be {_KINDS[kind.kind]}{shaped}, as its default {shown(default)}, got {shown(value)}. "
+            "Give a value of that kind, or change the default in the class."
+        )
+    return array.astype(kind)[()]
 
 
 def _bytes(record: np.ndarray) -> np.ndarray:

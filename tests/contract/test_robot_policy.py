@@ -3,6 +3,7 @@
 import copy
 import math
 import pickle
+import re
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -141,8 +142,46 @@ def test_arguments_change_parameters_and_others_are_refused():
     assert acts(Counts())[0, 0] == 0.25
     with pytest.raises(ConfigError, match=r"Unknown parameter of Counts 'sped'. Did you mean 'speed'"):
         Counts(sped=1.0)
-    with pytest.raises(StepError, match=r"Expected speed in the parameters of Counts to be numbers, .* got 'fast'"):
-        acts(Counts(speed="fast"))
+
+
+class Known(RobotPolicy):
+    parameters: ClassVar = {"power": 2.0, "count": 2, "is_shy": False, "gains": (1.0, 2.0)}
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "kept"),
+    [
+        ("power", 3, np.float64),
+        ("power", np.int8(3), np.float64),
+        ("count", np.uint8(3), np.int64),
+        ("is_shy", True, np.bool_),
+        ("gains", [3, 4], np.float64),
+    ],
+)
+def test_arguments_keep_the_kind_and_shape_of_the_default(name, value, kept):
+    changed = Known(**{name: value}).parameters[name]
+    assert changed.dtype == kept
+    np.testing.assert_array_equal(changed, value)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "expected"),
+    [
+        ("power", (1.0, 2.0), "numbers, a single one, as its default 2.0"),
+        ("power", "x", "numbers, a single one, as its default 2.0"),
+        ("power", None, "numbers, a single one, as its default 2.0"),
+        ("power", True, "numbers, a single one, as its default 2.0"),
+        ("count", 2.0, "whole numbers, a single one, as its default 2"),
+        ("count", 2**63, "whole numbers, a single one, as its default 2"),
+        ("is_shy", 1, "True or False, a single one, as its default False"),
+        ("gains", 1.0, "numbers in the shape (2,), as its default (1.0, 2.0)"),
+        ("gains", [[1.0], 2.0], "numbers in the shape (2,), as its default (1.0, 2.0)"),
+    ],
+)
+def test_arguments_of_another_kind_or_shape_are_refused_at_once(name, value, expected):
+    told = f"Expected {name} in the parameters of Known to be {expected}, got {value!r}. Give a value of that kind, or"
+    with pytest.raises(StepError, match=re.escape(told)):
+        Known(**{name: value})
 
 
 class Plain(RobotPolicy):
