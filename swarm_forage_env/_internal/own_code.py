@@ -5,10 +5,13 @@ and that may lie anywhere.
 """
 
 import dis
+import random
 import re
-from collections.abc import Callable, Mapping
-from types import FunctionType
+from collections.abc import Callable, Iterator, Mapping
+from types import CellType, CodeType, FunctionType, ModuleType
 from typing import Any
+
+import numpy as np
 
 from swarm_forage_env._internal import numba_settings  # noqa: F401  (before numba)
 
@@ -24,6 +27,8 @@ _ABOUT_THE_COMPILER = re.compile(r"Failed in |During: |Enable logging |\s*$")
 _NO_FUNCTION = re.compile(r"No implementation of function .*? found for signature: (>>> )?(?P<call>.*?\))(?= |$).*")
 _ONLY_FOR_EXPERTS = re.compile(r"( Return of: |: %).*|\. Raised from None$")
 _PLACE = re.compile(r'^File ".*", line (?P<line>\d+):$', re.MULTILINE)
+
+_GENERATORS = (random.Random, np.random.Generator, np.random.RandomState)
 
 
 class OwnCodeError(ValueError):
@@ -55,6 +60,45 @@ def _compiled(function: Any, instead: Mapping[type, Any], done: dict[Any, Any]) 
             elif isinstance(value, type) and value in instead:
                 names[name] = instead[value]
     return done[function]
+
+
+def own_randomness(function: Any) -> str | None:
+    """Return what a function, or one that it calls by name, draws from that no seed of a run reaches; None if nothing.
+
+    These are Python's `random`, `numpy.random`, and generators under global names.
+    """
+    waiting, done = [function], set[Any]()
+    while waiting:
+        asked = waiting.pop()
+        asked = getattr(asked, "py_func", asked)  # compiled by the user
+        if not isinstance(asked, FunctionType) or asked in done:
+            continue
+        done.add(asked)
+        for name, value, line in _named(asked):
+            if value is random or value is np.random or isinstance(getattr(value, "__self__", value), _GENERATORS):
+                return name + ("" if line is None else f" (line {line})")
+            waiting.append(value)
+    return None
+
+
+def _named(function: FunctionType) -> Iterator[tuple[str, Any, int | None]]:
+    """Yield what a function names from outside of it, also by way of modules: name, value and line."""
+    cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
+    names = function.__globals__ | {name: cell.cell_contents for name, cell in cells if cell != CellType()}
+    codes = [function.__code__]
+    while codes:
+        code = codes.pop()
+        codes += [constant for constant in code.co_consts if isinstance(constant, CodeType)]
+        said, value = "", None
+        for step in dis.get_instructions(code):
+            if step.opname in ("LOAD_GLOBAL", "LOAD_DEREF"):
+                said, value = step.argval, names.get(step.argval)
+            elif step.opname in ("LOAD_ATTR", "LOAD_METHOD") and isinstance(value, ModuleType):
+                said, value = f"{said}.{step.argval}", getattr(value, step.argval, None)
+            else:
+                value = None
+                continue
+            yield said, value, step.positions.lineno if step.positions is not None else None
 
 
 def type_of_result(function: Any, arguments: Mapping[str, Any]) -> Any:

@@ -16,7 +16,14 @@ import numpy as np
 
 from swarm_forage_env._internal.compiling import is_compiled, kernel_of_process
 from swarm_forage_env._internal.fields import ConfigError, known_keys, whole
-from swarm_forage_env._internal.own_code import OwnCodeError, are_numbers, own_kernel, told_of, type_of_result
+from swarm_forage_env._internal.own_code import (
+    OwnCodeError,
+    are_numbers,
+    own_kernel,
+    own_randomness,
+    told_of,
+    type_of_result,
+)
 from swarm_forage_env._internal.wording import shown
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.contract.kernel_policy import KernelPolicy
@@ -66,8 +73,8 @@ class RobotPolicy(KernelPolicy):
 
     Raises:
         StepError: an argument of another kind or shape than its default; when the class is made, a `step` with other
-            arguments, or memory or parameters that are no numbers; in `reset`, a `step` that cannot be compiled; in
-            `act`, one that raises.
+            arguments, or memory or parameters that are no numbers; in `reset`, a `step` that cannot be compiled, or
+            draws from other than `chance`; in `act`, one that raises.
     """
 
     memory: ClassVar[Mapping[str, Any]] = {}
@@ -118,6 +125,12 @@ class RobotPolicy(KernelPolicy):
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run: every robot remembers what `memory` says."""
         name = type(self).__name__
+        drawn_from = own_randomness(self._step_of_class)
+        if drawn_from is not None:
+            raise StepError(
+                f"Expected {name}.step to draw from chance alone, got {drawn_from}, which the seed of a run does not "
+                "reach. Take numbers of chance; draws says how many a robot gets in every tick."
+            )
         robot = _record(self.memory, f"memory of {name}")
         known = _record(_numbers_of(spec) | dict(self.parameters), f"parameters of {name}")
         self._types = _Types(_see_type(spec.layout, getattr(self, "reads", None)), robot.dtype, known.dtype)

@@ -3,8 +3,10 @@
 import copy
 import math
 import pickle
+import random
 import re
 from pathlib import Path
+from random import uniform
 from typing import Any, ClassVar
 
 import numpy as np
@@ -356,6 +358,38 @@ def test_code_that_is_not_compiled_is_told_in_one_line(step, told):
         acts(policy)
     assert "\n" not in str(raised.value)
     assert str(raised.value).endswith("docs/policies.md, A fast one.")
+
+
+def draws_by_numpy(see, robot, chance, known):
+    return np.random.random(), 0.0, 0.0  # noqa: NPY002 - on purpose
+
+
+def draws_by_python(see, robot, chance, known):
+    return random.random(), 0.0, 0.0
+
+
+def draws_by_a_name(see, robot, chance, known):
+    return uniform(0.0, 1.0), 0.0, 0.0
+
+
+def draws_by_another(see, robot, chance, known):
+    return half(draws_by_numpy(see, robot, chance, known)[0]), 0.0, 0.0
+
+
+@pytest.mark.parametrize(
+    ("step", "told"),
+    [
+        (draws_by_numpy, r"np\.random"),
+        (draws_by_python, "random"),
+        (draws_by_a_name, "uniform"),
+        (draws_by_another, r"np\.random"),
+    ],
+)
+def test_numbers_that_no_seed_reaches_are_refused(step, told):
+    policy = type("Wrong", (RobotPolicy,), {"step": step})()
+    expected = rf"^Expected Wrong.step to draw from chance alone, got {told} \(line \d+\), .*draws says how many"
+    with pytest.raises(StepError, match=expected):
+        acts(policy)
 
 
 @pytest.mark.parametrize(
