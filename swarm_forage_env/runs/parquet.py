@@ -5,7 +5,6 @@ encoding of Thrift. A file of a few kilobytes may unpack to gigabytes: one page 
 So the head of every page is read first. Format: https://parquet.apache.org/docs/file-format/.
 """
 
-import math
 import os
 import struct
 from collections.abc import Iterable, Iterator, Mapping
@@ -172,7 +171,9 @@ def _unpacked(content: bytes, group: Mapping[int, Any], n_columns: int) -> int:
     total = 0
     for chunk in group[1]:
         about = chunk[3]
-        start = min(place for place in (about.get(11, math.inf), about[9]) if place > 0)
+        start = about.get(11, about[9])  # polars begins at the dictionary, wherever it lies
+        if not 0 < start <= about[9]:
+            raise _damaged("a dictionary does not lie before the values of its column")
         end = start + about[7]
         if not 4 <= start <= end <= len(content):
             raise _damaged("a column lies outside of the file")
@@ -185,6 +186,8 @@ def _unpacked(content: bytes, group: Mapping[int, Any], n_columns: int) -> int:
                 raise _damaged("a page has less than no bytes")
             total += page[2]
             n_values += _values_in(page)
+        if start != end:
+            raise _damaged("the pages of a column end elsewhere than it says")
         if n_values != about[5] or n_values != group[3]:
             raise _damaged("the pages of a column have other rows than its table")
     return total

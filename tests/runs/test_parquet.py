@@ -61,6 +61,22 @@ def test_lists_and_other_encodings_are_refused(tmp_path):
         parquet._values_in({1: 9})
 
 
+def test_a_dictionary_behind_the_values_is_refused(tmp_path):
+    """Polars begins to read at the dictionary, so pages elsewhere must not be the ones that are added up."""
+    file = tmp_path / "a.parquet"
+    pl.DataFrame({"a": ["x", "y"] * 100}).write_parquet(file)
+    content = file.read_bytes()
+    about = parquet._footer(content)[4][0][1][0][3]
+    assert (about[9], about[11]) == (36, 4)
+    assert open_parquet(file, 2**20).n_rows == 200
+    content = content.replace(bytes((0x26, 72, 0x26, 8)), bytes((0x26, 8, 0x26, 72)))  # fields 9 and 11, of zigzag kind
+    about = parquet._footer(content)[4][0][1][0][3]
+    assert (about[9], about[11]) == (4, 36)
+    file.write_bytes(content)
+    with pytest.raises(ParquetError, match="a dictionary does not lie before the values"):
+        open_parquet(file, 2**20)
+
+
 @pytest.mark.parametrize("content", [b"", b"PAR1", b"PAR1" * 3, b"PAR1" + b"\xff" * 40 + b"PAR1", b"nothing" * 9])
 def test_what_is_no_parquet_is_told_in_one_line(tmp_path, content):
     file = tmp_path / "a.parquet"
