@@ -8,12 +8,12 @@ So the head of every page is read first. Format: https://parquet.apache.org/docs
 import os
 import struct
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from swarm_forage_env._internal.wording import shown
 
@@ -24,16 +24,63 @@ _MARK = b"PAR1"
 """First and last bytes of a file."""
 _BYTES_PER_VALUE = 16
 """Memory of a value of any type that we read, texts left aside."""
-_MOST_LEVELS = 12
-"""Nested structures of a footer; those of Parquet are half as deep."""
+_MOST_FOOTER = 2**22
+"""Bytes of a footer; our choice: three hundred times the largest of ours, of which half is the text of its study."""
+_MOST_ENTRIES = 2**17
+"""Values of a footer, structures and lists among them; our choice: seventy times the most of ours, 28 per column."""
 _ENCODINGS = frozenset((0, 2, 3, 8))
 """PLAIN, PLAIN_DICTIONARY, RLE and RLE_DICTIONARY, the ones that polars writes. Others, such as prefixes of the text
 before, unpack to more than a page's head says."""
 _DATA_PAGE, _DICTIONARY_PAGE, _DATA_PAGE_V2 = 0, 2, 3
 _ALONE = Lock()
 """Held while stderr is another."""
-_BROKEN = (IndexError, KeyError, TypeError, AttributeError, struct.error, UnicodeDecodeError)
-"""Errors over bytes that are no Thrift, or that tell of another structure."""
+_BROKEN = (IndexError, KeyError, UnicodeDecodeError)
+"""Errors over bytes that are no Thrift, or that lack a field."""
+_Structure: TypeAlias = "Mapping[int, _Layout]"
+_Layout: TypeAlias = "tuple[int, ...] | _Structure | list[_Layout]"
+"""What a field holds: a value, with the kinds that Thrift gives it; a structure by its fields; a list of one thing."""
+_TRUTH, _BYTE, _WHOLE, _TEXT = (1, 2), (3,), (4, 5, 6), (8,)
+_UNIT: _Layout = {1: _TRUTH, 2: {1: {}, 2: {}, 3: {}}}
+_TYPE: _Layout = {
+    **{number: {} for number in (1, 2, 3, 4, 6, 11, 12, 13, 14, 15)},
+    5: {1: _WHOLE, 2: _WHOLE},
+    7: _UNIT,
+    8: _UNIT,
+    10: {1: _BYTE, 2: _TRUTH},
+}
+_STATISTICS: _Layout = {**dict.fromkeys((1, 2, 5, 6), _TEXT), 3: _WHOLE, 4: _WHOLE, 7: _TRUTH, 8: _TRUTH}
+_PAGE: _Structure = {
+    **dict.fromkeys((1, 2, 3, 4), _WHOLE),
+    5: {**dict.fromkeys((1, 2, 3, 4), _WHOLE), 5: _STATISTICS},
+    7: {1: _WHOLE, 2: _WHOLE, 3: _TRUTH},
+    8: {**dict.fromkeys((1, 2, 3, 4, 5, 6), _WHOLE), 7: _TRUTH, 8: _STATISTICS},
+}
+"""The head of a page. Polars takes a field that it knows for what it should be, whatever kind the file gives it, so
+that any other kind would make it go on at another byte than we do. Hence these are all fields that may be there."""
+_PAIR: _Layout = {1: _TEXT, 2: _TEXT}
+_COLUMN: _Layout = {
+    **dict.fromkeys((1, 4, 5, 6, 7, 9, 10, 11, 14, 15), _WHOLE),
+    2: [_WHOLE],
+    3: [_TEXT],
+    8: [_PAIR],
+    12: _STATISTICS,
+    13: [dict.fromkeys((1, 2, 3), _WHOLE)],
+    16: {1: _WHOLE, 2: [_WHOLE], 3: [_WHOLE]},
+}
+_GROUP: _Layout = {
+    1: [{**dict.fromkeys((2, 4, 5, 6, 7), _WHOLE), 3: _COLUMN}],
+    4: [{1: _WHOLE, 2: _TRUTH, 3: _TRUTH}],
+    **dict.fromkeys((2, 3, 5, 6, 7), _WHOLE),
+}
+_FOOTER: _Structure = {
+    2: [{**dict.fromkeys((1, 2, 3, 5, 6, 7, 8, 9), _WHOLE), 4: _TEXT, 10: _TYPE}],
+    1: _WHOLE,
+    3: _WHOLE,
+    4: [_GROUP],
+    5: [_PAIR],
+    6: _TEXT,
+    7: [{1: {}}],
+}
 
 
 class ParquetError(ValueError):
@@ -137,20 +184,23 @@ def check_texts(frame: "pl.DataFrame", most_bytes: int) -> None:
 
 @contextmanager
 def _panics_untold() -> Iterator[None]:
-    """Keep what polars says of a panic from stderr, where it would stand for dozens of lines; it raises it as well."""
-    with _ALONE:
+    """Keep what polars says of a panic from stderr, where it would stand for dozens of lines; it raises it as well.
+
+    Polars writes past `sys.stderr`, so stderr is another for the whole process: what other threads write there
+    meanwhile is lost, and a process that one of them forks meanwhile stays mute.
+    """
+    with _ALONE, ExitStack() as opened:
         try:
-            kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            opened.callback(os.close, nowhere)
+            kept = os.dup(2)
         except OSError:  # there is no stderr
             yield
             return
-        try:
-            os.dup2(nowhere, 2)
-            yield
-        finally:
-            os.dup2(kept, 2)
-            os.close(kept)
-            os.close(nowhere)
+        opened.callback(os.close, kept)
+        opened.callback(os.dup2, kept, 2)
+        os.dup2(nowhere, 2)
+        yield
 
 
 def _damaged(why: object) -> ParquetError:
@@ -161,7 +211,9 @@ def _footer(content: bytes) -> dict[int, Any]:
     (length,) = struct.unpack("<I", content[-8:-4])
     if length > len(content) - 12:
         raise _damaged("its footer is longer than the file")
-    return _Thrift(content, len(content) - 8 - length).structure()
+    if length > _MOST_FOOTER:
+        raise ParquetError(f"its footer has {length:,} bytes, but at most {_MOST_FOOTER:,} are expected")
+    return _Thrift(content, len(content) - 8 - length).structure(_FOOTER)
 
 
 def _unpacked(content: bytes, group: Mapping[int, Any], n_columns: int) -> int:
@@ -180,7 +232,7 @@ def _unpacked(content: bytes, group: Mapping[int, Any], n_columns: int) -> int:
         n_values = 0
         while start < end:
             reader = _Thrift(content, start)
-            page = reader.structure()
+            page = reader.structure(_PAGE)
             start = reader.at + page[3]
             if page[2] < 0 or page[3] < 0:
                 raise _damaged("a page has less than no bytes")
@@ -208,15 +260,17 @@ def _values_in(page: Mapping[int, Any]) -> int:
 
 
 class _Thrift:
-    """Structures in Thrift's compact encoding, as mappings from the numbers of fields."""
+    """Structures in Thrift's compact encoding, as mappings from the numbers of fields; a layout says which these are.
+
+    A structure of another layout, and one of too many values, is refused where it begins to be.
+    """
 
     def __init__(self, content: bytes, at: int) -> None:
         self._content, self.at = content, at
+        self._n_entries = 0
 
-    def structure(self, level: int = 0) -> dict[int, Any]:
+    def structure(self, layout: _Structure) -> dict[int, Any]:
         """Read one."""
-        if level > _MOST_LEVELS:
-            raise _damaged("its footer is nested too deeply")
         found: dict[int, Any] = {}
         number = 0
         while True:
@@ -224,7 +278,9 @@ class _Thrift:
             if not head:
                 return found
             number = number + (head >> 4) if head >> 4 else self._signed()
-            found[number] = self._value(head & 15, level)
+            if number not in layout:
+                raise _damaged(f"its footer or the head of a page has a field {number}")
+            found[number] = self._value(head & 15, layout[number])
 
     def _byte(self) -> int:
         value = self._content[self.at]
@@ -246,22 +302,20 @@ class _Thrift:
         value = self._unsigned()
         return value >> 1 ^ -(value & 1)
 
-    def _value(self, kind: int, level: int) -> Any:
-        if kind in (1, 2):
+    def _value(self, kind: int, layout: _Layout) -> Any:
+        self._n_entries += 1
+        if self._n_entries > _MOST_ENTRIES:
+            raise ParquetError(f"its footer has more than the {_MOST_ENTRIES:,} values that are expected")
+        kinds = layout if isinstance(layout, tuple) else (9,) if isinstance(layout, list) else (12,)
+        if kind not in kinds:
+            raise _damaged("its footer or the head of a page has a field of another kind")
+        if isinstance(layout, list):
+            return self._list(layout[0])
+        if not isinstance(layout, tuple):
+            return self.structure(layout)
+        if layout == _TRUTH:
             return kind == 1
-        if kind == 3:
-            return self._byte()
-        if kind in (4, 5, 6):
-            return self._signed()
-        if kind == 7:
-            return self._bytes(8)
-        if kind == 8:
-            return self._bytes(self._unsigned())
-        if kind == 9:
-            return self._list(level)
-        if kind == 12:
-            return self.structure(level + 1)
-        raise _damaged("its footer has a field of no kind")
+        return self._signed() if layout == _WHOLE else self._bytes(1 if layout == _BYTE else self._unsigned())
 
     def _bytes(self, count: int) -> bytes:
         self.at += count
@@ -269,12 +323,7 @@ class _Thrift:
             raise _damaged("its footer ends early")
         return self._content[self.at - count : self.at]
 
-    def _list(self, level: int) -> list[Any]:
+    def _list(self, layout: _Layout) -> list[Any]:
         head = self._byte()
         count = head >> 4 if head >> 4 < 15 else self._unsigned()
-        if level > _MOST_LEVELS or count > len(self._content):
-            raise _damaged("its footer has a list that is too long")
-        kind = head & 15
-        if kind in (1, 2):  # in lists, truth values are bytes
-            return [self._byte() == 1 for _ in range(count)]
-        return [self._value(kind, level + 1) for _ in range(count)]
+        return [self._value(head & 15, layout) for _ in range(count)]

@@ -1,6 +1,7 @@
 """Parquet files of strangers: sizes are known before anything is unpacked."""
 
 import json
+import struct
 import tracemalloc
 from pathlib import Path
 
@@ -75,6 +76,69 @@ def test_a_dictionary_behind_the_values_is_refused(tmp_path):
     file.write_bytes(content)
     with pytest.raises(ParquetError, match="a dictionary does not lie before the values"):
         open_parquet(file, 2**20)
+
+
+@pytest.mark.parametrize("place", [4, 6, 8])
+@pytest.mark.parametrize("kind", [1, 2, 3, 7, 8, 9, 12])
+def test_numbers_of_other_kinds_are_refused(tmp_path, place, kind):
+    """Polars reads them as the numbers that they should be."""
+    file = tmp_path / "a.parquet"
+    pl.DataFrame({"a": ["x", "y"] * 100}).write_parquet(file)
+    content = file.read_bytes()
+    assert content[4:9:2] == b"\x15" * 3  # fields 1, 2 and 3 of the first page's head, each of kind 5 and one byte
+    file.write_bytes(content[:place] + bytes((0x10 + kind,)) + content[place + 1 :])
+    with pytest.raises(ParquetError, match="a field of another kind"):
+        open_parquet(file, 2**20)
+
+
+@pytest.mark.parametrize("name", ["_FOOTER", "_PAGE"])
+def test_no_other_kind_of_any_field_is_taken(name):
+    def wrong_kinds(layout):
+        """Yield structures in which the last field that is read has another kind."""
+        for number, of in layout.items():
+            allowed = of if isinstance(of, tuple) else (9,) if isinstance(of, list) else (12,)
+            yield from (bytes((number << 4 | kind,)) for kind in range(16) if kind not in allowed and number < 16)
+            inner = of[0] if isinstance(of, list) else of
+            if isinstance(inner, dict) and number < 16:
+                head = bytes((number << 4 | 9, 0x1C)) if isinstance(of, list) else bytes((number << 4 | 12,))
+                yield from (head + told for told in wrong_kinds(inner))
+
+    told = list(wrong_kinds(getattr(parquet, name)))
+    assert len(told) > 300
+    for content in told:
+        with pytest.raises(ParquetError, match="a field of another kind"):
+            parquet._Thrift(content + b"\0" * 20, 0).structure(getattr(parquet, name))
+
+
+def with_footer(file, footer):
+    """Write the pages of a record with another footer."""
+    pages = SOURCE.read_bytes()[:5000]
+    file.write_bytes(pages + footer + struct.pack("<I", len(footer)) + b"PAR1")
+    return file
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [b"\x00", b"\x18\x00\x00", b"\x18\x01a\x18\x01b\x00"],
+    ids=["empty", "short", "whole"],
+)
+def test_a_footer_of_many_values_is_refused_before_it_fills_the_memory(tmp_path, entry):
+    count = parquet._MOST_FOOTER // len(entry) - 10
+    size = bytes((count & 127 | 128, count >> 7 & 127 | 128, count >> 14 & 127 | 128, count >> 21))
+    file = with_footer(tmp_path / "a.parquet", b"\x59\xfc" + size + entry * count + b"\x00")
+    tracemalloc.start()
+    with pytest.raises(ParquetError, match="more than the 131,072 values"):
+        open_parquet(file, 2**28)
+    assert tracemalloc.get_traced_memory()[1] < 2**25 + file.stat().st_size
+    tracemalloc.stop()
+
+
+def test_long_and_broken_footers_are_refused(tmp_path):
+    with pytest.raises(ParquetError, match=r"4,194,305 bytes, but at most 4,194,304"):
+        open_parquet(with_footer(tmp_path / "a.parquet", bytes(parquet._MOST_FOOTER + 1)), 2**28)
+    for footer in (b"", b"\x00", b"\x10", b"\x15\x02" * 40):
+        with pytest.raises(ParquetError, match="no Parquet file or a damaged one"):
+            open_parquet(with_footer(tmp_path / "a.parquet", footer), 2**28)
 
 
 @pytest.mark.parametrize("content", [b"", b"PAR1", b"PAR1" * 3, b"PAR1" + b"\xff" * 40 + b"PAR1", b"nothing" * 9])
