@@ -125,7 +125,17 @@ def open_parquet(path: Path, most_bytes: int) -> ParquetFile:
     size = path.stat().st_size
     if size > most_bytes:
         raise ParquetError(f"it has {size:,} bytes, but at most {most_bytes:,} are expected")
-    content = path.read_bytes()
+    return parse_parquet(path.read_bytes(), most_bytes)
+
+
+def parse_parquet(content: bytes, most_bytes: int) -> ParquetFile:
+    """Read the footer of a file's content, and the heads of its pages; see `open_parquet`.
+
+    Raises:
+        ParquetError: it is no Parquet file of so many bytes.
+    """
+    if len(content) > most_bytes:
+        raise ParquetError(f"it has {len(content):,} bytes, but at most {most_bytes:,} are expected")
     if len(content) < 12 or content[:4] != _MARK or content[-4:] != _MARK:
         raise _damaged("it does not begin and end as one")
     try:

@@ -23,7 +23,7 @@ import numpy as np
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import alone_in, parse_json, replacing
 from swarm_forage_env._internal.typed import typed
-from swarm_forage_env.runs.parquet import ParquetError, open_parquet
+from swarm_forage_env.runs.parquet import ParquetError, check_texts, open_parquet, parse_parquet
 from swarm_forage_env.runs.plan import Condition, Plan
 from swarm_forage_env.runs.record import COLUMN_DTYPES, RecordError, RunRecord, record_of
 from swarm_forage_env.runs.spec import RunSpec
@@ -158,13 +158,26 @@ class StudyTable(Table):
         return _digest(self.frame, *self._texts)
 
     def write(self, path: str | Path) -> None:
-        """Write the table to a Parquet file, whole or not at all."""
+        """Write the table to a Parquet file, whole or not at all.
+
+        Raises:
+            RecordError: it is larger than what `read_study` reads.
+            OSError: the file cannot be written.
+        """
         values = (str(TABLE_VERSION), *self._texts, self.digest)
         with replacing(Path(path)) as draft:
-            content = BytesIO()  # polars tells a full disk as an error of its own, among many others
+            buffer = BytesIO()  # polars tells a full disk as an error of its own, among many others
             stamp = dict(zip(_FILE_KEYS, values, strict=True))
-            self.frame.write_parquet(content, metadata=stamp, compression_level=_COMPRESSION)
-            draft.write_bytes(content.getvalue())
+            self.frame.write_parquet(buffer, metadata=stamp, compression_level=_COMPRESSION)
+            content = buffer.getvalue()
+            try:
+                check_texts(self.frame, MOST_BYTES)
+                parse_parquet(content, MOST_BYTES)
+            except ParquetError as error:
+                raise RecordError(
+                    f"Cannot pack study {self.spec.name}: {error}; split it into smaller ones."
+                ) from error
+            draft.write_bytes(content)
 
     @cached_property
     def _texts(self) -> tuple[str, str]:
@@ -307,7 +320,7 @@ def pack_study(folder: StudyFolder, chosen: Path | None = None, *, tell: Callabl
         The file.
 
     Raises:
-        RecordError: see `gather_study`.
+        RecordError: see `gather_study` and `StudyTable.write`.
         OSError: the file cannot be written.
     """
     folder.study()  # a folder without one is refused before anything is made in it

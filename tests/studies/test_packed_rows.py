@@ -6,6 +6,7 @@ import polars as pl
 import pytest
 
 from swarm_forage_env.runs.record import RecordError
+from swarm_forage_env.studies import study_table
 from swarm_forage_env.studies.study_table import read_study
 from tests.support.console import answer
 from tests.support.forged import forge_study
@@ -24,6 +25,19 @@ def with_value(column, value, *, row=5):
 def test_a_forged_study_that_is_whole_is_read(tmp_path):
     forge_study(SOURCE, tmp_path / "a.parquet")
     assert read_study(tmp_path / "a.parquet").frame.equals(read_study(SOURCE).frame)
+
+
+@pytest.mark.parametrize(("most", "told"), [(100, "its texts have more"), (200_000, "rows of 43 columns")])
+def test_what_would_not_be_read_again_is_not_written(tmp_path, monkeypatch, most, told):
+    table, file = read_study(SOURCE), tmp_path / "a.parquet"
+    table.write(file)
+    before = file.read_bytes()
+    monkeypatch.setattr(study_table, "MOST_BYTES", most)
+    with pytest.raises(RecordError, match=rf"Cannot pack study blessed: .*{told}.*; split it"):
+        table.write(file)
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == {file: before}
+    with pytest.raises(RecordError):
+        read_study(file)
 
 
 @pytest.mark.parametrize(
