@@ -1,6 +1,7 @@
 """Parquet files of strangers: sizes are known before anything is unpacked."""
 
 import json
+import os
 import struct
 import tracemalloc
 from pathlib import Path
@@ -162,6 +163,25 @@ def test_no_changed_byte_leads_to_another_error_or_to_more_on_stderr(tmp_path, c
             told.append(str(error))
     assert [text for text in told if len(text.splitlines()) > 1] == []
     assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("name", ["open", "dup", "nothing"])
+def test_reading_leaves_no_file_open_though_there_is_no_stderr(monkeypatch, name):
+    def next_number():
+        place = os.pipe()
+        for end in place:
+            os.close(end)
+        return place
+
+    def refuse(*_):
+        raise OSError
+
+    before = next_number()
+    with monkeypatch.context() as patch:
+        patch.setattr(parquet.os, name, refuse, raising=False)
+        with parquet._panics_untold():
+            pass
+    assert next_number() == before
 
 
 @pytest.mark.parametrize(
