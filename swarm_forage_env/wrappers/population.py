@@ -61,11 +61,7 @@ class PopulationDynamics(SwarmWrapper):
             raise ConfigError(
                 f"Expected population.initial_robots <= {n_robots}, the robots of the scenario, got {initial}."
             )
-        if config.birth_per_tick > 0.0 and initial == n_robots:
-            raise ConfigError(
-                f"Expected population.initial_robots below {n_robots}, the robots of the scenario, so that a robot "
-                f"can be born, got {config.initial_robots}."
-            )
+        _check_births(config, n_robots)
         self._config = config
         self._seed = 0
         margin = min(BIRTH_MARGIN_M, scenario.robots.start_margin_m)
@@ -109,17 +105,18 @@ class PopulationDynamics(SwarmWrapper):
     def reconfigure(self, config: "PopulationConfig") -> None:
         """Go on under other rates from the next tick on.
 
-        The next event of each process is drawn anew, which changes nothing of its distribution: how long one has waited
-        says nothing about an exponential. Robots that are there, dead or not yet born stay so.
+        Processes whose rate stays the same are not touched; see `EventClocks.change`. Robots that are there, dead or
+        not yet born stay so.
 
         Raises:
-            ConfigError: another field than the rates is to change.
+            ConfigError: another field than the rates is to change, or births although all robots were there.
         """
         others = replace(config, **{field: getattr(self._config, field) for field in _RATES})
         if others != self._config:
             raise ConfigError(f"Expected other rates only, {', '.join(_RATES)}, got {config}; start another run.")
+        _check_births(config, self.unwrapped.scenario.robots.n_robots)
         self.made_from = self._config = config
-        self._clocks = EventClocks(config.rates, self._seed, tick=self.unwrapped.tick)
+        self._clocks.change(config.rates, self._seed, self.unwrapped.tick + 1)
         self._next_tick = self._clocks.next_tick
 
     def kill(self, row: int) -> bool:
@@ -238,6 +235,15 @@ class PopulationConfig(WrapperConfig):
         if self.max_robots is not None:
             words.append(f"at most {self.max_robots}")
         return f"population: {', '.join(words) or 'no changes'}"
+
+
+def _check_births(config: PopulationConfig, n_robots: int) -> None:
+    """Refuse births where all robots are there from the start."""
+    if config.birth_per_tick > 0.0 and config.initial_robots in (None, n_robots):
+        raise ConfigError(
+            f"Expected population.initial_robots below {n_robots}, the robots of the scenario, so that a robot "
+            f"can be born, got {config.initial_robots}."
+        )
 
 
 def malfunction_levels(n_robots: int) -> tuple[PopulationConfig, ...]:

@@ -53,7 +53,7 @@ class EventClock:
 
     def __init__(self, rate: float, times: np.random.Generator, choices: np.random.Generator, *, tick: int = 0) -> None:
         """Start at a tick; `rate` in events per tick."""
-        self._rate = rate
+        self.rate = rate
         self._times = times
         self.choices = choices
         self.next_tick = np.inf
@@ -63,7 +63,7 @@ class EventClock:
 
     def restart(self, tick: int) -> None:
         """Draw when the next event is due, after one at `tick`."""
-        self.next_tick = tick + float(np.floor(self._times.standard_exponential() / self._rate))
+        self.next_tick = tick + float(np.floor(self._times.standard_exponential() / self.rate))
 
     def choose(self, candidates: BoolArray) -> int:
         """Draw one row of `candidates` (N,), of which there is at least one.
@@ -83,12 +83,33 @@ class EventClocks:
     """
 
     def __init__(self, rates: EventRates, seed: int, *, tick: int = 0) -> None:
-        """Start all clocks of the run with `seed` at a tick."""
-        sources = stream_rng(seed, Stream.POPULATION, astuple(rates)).spawn(8)
+        """Start all clocks of the run with `seed` at a tick; those of each tick have chance of their own."""
+        level = (*astuple(rates), tick) if tick else astuple(rates)
+        sources = stream_rng(seed, Stream.POPULATION, level).spawn(8)
         self.death = EventClock(rates.death, sources[0], sources[1], tick=tick)
         self.birth = EventClock(rates.birth, sources[2], sources[3], tick=tick)
         self.malfunction = EventClock(rates.malfunction, sources[4], sources[5], tick=tick)
         self.repair = EventClock(rates.repair, sources[6], sources[7], tick=tick)
+
+    def change(self, rates: EventRates, seed: int, tick: int) -> None:
+        """Go on under other rates; processes that keep their rate keep their clock.
+
+        The next event of the others is drawn anew, which changes nothing of its distribution: how long one has waited
+        says nothing about an exponential. What is due already and waits stays due, unless its rate is 0 now.
+
+        Args:
+            rates: Events per tick.
+            seed: Seed of the run.
+            tick: The tick that is about to be executed.
+        """
+        anew = EventClocks(rates, seed, tick=tick)
+        for process in ("death", "birth", "malfunction", "repair"):
+            old, new = getattr(self, process), getattr(anew, process)
+            if new.rate == old.rate:
+                continue
+            if new.rate > 0.0 and old.next_tick < tick:
+                new.next_tick = old.next_tick
+            setattr(self, process, new)
 
     @property
     def next_tick(self) -> float:

@@ -463,3 +463,28 @@ def test_rates_change_while_a_run_goes_on_and_nothing_else():
     assert env.made_from.malfunction_per_tick == 50.0
     with pytest.raises(ConfigError, match="Expected other rates only"):
         env.reconfigure(PopulationConfig(initial_robots=2))
+    with pytest.raises(ConfigError, match=r"initial_robots below 4.*a robot can be born, got None"):
+        env.reconfigure(PopulationConfig(birth_per_tick=0.1))
+    assert env.made_from.malfunction_per_tick == 50.0
+
+
+def test_a_snapshot_after_a_change_of_rates_goes_on_as_the_run_did():
+    stack = PopulationConfig(malfunction_per_tick=0.5).wrap(
+        ForageEnv(scenario("warehouse_small", n_robots=8, n_objects=9))
+    )
+    stack.reset_batch(3)
+
+    def active_later() -> list[list[bool]]:
+        looks = []
+        for _ in range(40):
+            stack.step_batch(hold(stack.unwrapped))
+            looks.append(stack.unwrapped.active.tolist())
+        return looks
+
+    active_later()
+    stack.reconfigure(PopulationConfig(malfunction_per_tick=0.5, repair_per_tick=0.6))
+    kept = stack.snapshot()
+    seen = active_later()
+    stack.restore_batch(kept)
+    assert active_later() == seen
+    assert len({tuple(look) for look in seen}) > 5

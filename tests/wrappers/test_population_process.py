@@ -353,12 +353,51 @@ def test_deaths_per_run_of_search_and_rescue():
         assert np.var(deaths, ddof=1) == pytest.approx(mean, rel=0.6)
 
 
-def test_a_clock_that_starts_later_waits_as_long():
-    rates = EventRates(death=0.01, malfunction=0.02)
-    early, late = EventClocks(rates, 5), EventClocks(rates, 5, tick=300)
-    assert late.death.next_tick - early.death.next_tick == 300
-    assert late.malfunction.next_tick - early.malfunction.next_tick == 300
-    assert late.birth.next_tick == np.inf
+# Other rates during a run
+
+PROCESSES = ("death", "birth", "malfunction", "repair")
+
+
+def test_clocks_that_start_at_another_tick_have_other_waits_and_lots_of_the_same_mean():
+    rate, ticks = 0.01, np.arange(2_000)
+    started = [EventClocks(EventRates(death=rate, malfunction=rate), 5, tick=int(tick)) for tick in ticks]
+    waits = np.array([[one.death.next_tick, one.malfunction.next_tick] for one in started]) - ticks[:, None]
+    # An exponential has a deviation like its mean; the floor takes half a tick.
+    assert waits.mean(axis=0) == pytest.approx(1.0 / rate - 0.5, abs=3.3 / rate / np.sqrt(len(ticks)))
+    for column in (*waits.T, np.array([one.death.choices.random() for one in started])):
+        assert abs(np.corrcoef(column[1:], column[:-1])[0, 1]) < 3.3 / np.sqrt(len(ticks))
+    assert all(one.birth.next_tick == np.inf for one in started)
+
+
+@pytest.mark.parametrize("changed", PROCESSES)
+def test_a_process_that_keeps_its_rate_keeps_its_clock(changed):
+    rates = dict.fromkeys(PROCESSES, 0.01)
+    clocks = EventClocks(EventRates(**rates), 5)
+    before = {process: getattr(clocks, process) for process in PROCESSES}
+    clocks.change(EventRates(**rates | {changed: 0.02}), 5, 3)
+    assert [process for process in PROCESSES if getattr(clocks, process) is not before[process]] == [changed]
+    clocks.change(EventRates(**rates | {changed: 0.0}), 5, 4)
+    assert getattr(clocks, changed).next_tick == np.inf
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_rate_that_changes_in_every_tick_has_as_many_events_as_one_that_stays(seed):
+    """Who moves a slider meets no wait a second time."""
+    rate, ticks = 0.2, 1_000
+    state, clocks = PopulationState.start(1_000), EventClocks(EventRates(death=rate), seed)
+    for tick in range(1, ticks + 1):
+        clocks.change(EventRates(death=rate * (1.0 + tick % 2 / 1e6)), seed, tick)
+        advance_population(state, clocks, tick)
+    gap = 1.0 / np.expm1(rate) - np.expm1(-rate)  # mean floor, and a tick where it is 0
+    assert state.tally.deaths == pytest.approx(ticks / gap, abs=3.3 * np.sqrt(ticks / gap))
+
+
+def test_an_event_that_waits_stays_due_under_another_rate_until_there_is_none():
+    clocks = due({"birth": 7})
+    clocks.change(EventRates(birth=0.001), 0, 20)
+    assert clocks.birth.next_tick == 7
+    clocks.change(EventRates(), 0, 21)
+    assert clocks.birth.next_tick == np.inf
 
 
 def test_whoever_is_repaired_by_hand_leaves_the_queue_wherever_it_is():
