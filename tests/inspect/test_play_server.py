@@ -2,10 +2,11 @@
 
 import http.client
 import json
+import socket
 
 import pytest
 
-from swarm_forage_env.inspect.play.server import HOST, MOST_BYTES, PlayServer
+from swarm_forage_env.inspect.play.server import HOST, MOST_BYTES, PlayServer, hosts_of
 from swarm_forage_env.inspect.play.session import PlaySession, Setting
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.world import World
@@ -125,6 +126,36 @@ def test_a_frame_a_command_and_a_replay_come_as_json(server):
 def test_a_policy_that_fails_is_told_of(server, monkeypatch):
     monkeypatch.setattr(server.session, "frame", lambda _: 1 / 0)
     assert refusal(server, place="frame", body="null") == (500, "ZeroDivisionError: division by zero")
+
+
+def test_the_page_is_asked_for_without_the_port_of_http():
+    assert hosts_of(80) == ("127.0.0.1:80", "localhost:80", "127.0.0.1", "localhost")
+    assert hosts_of(8080) == ("127.0.0.1:8080", "localhost:8080")
+
+
+@pytest.mark.parametrize("error", [TimeoutError, ConnectionAbortedError, BrokenPipeError])
+def test_an_answer_that_breaks_off_is_followed_by_no_other(server, monkeypatch, error):
+    def break_off(handler, *_):
+        handler.wfile.write(b"half")
+        raise error
+
+    monkeypatch.setattr(server.RequestHandlerClass, "_send", break_off)
+    with socket.create_connection((HOST, server.server_port), timeout=60) as connection:
+        connection.sendall(f"GET /{server.token}/ HTTP/1.1\r\nHost: {server.hosts[0]}\r\n\r\n".encode())
+        with connection.makefile("rb") as answer:
+            assert answer.read() == b"half", "and the connection is closed"
+
+
+@pytest.mark.parametrize("told", ["Content-Length: 40", "Transfer-Encoding: chunked"])
+def test_what_comes_with_a_get_is_no_further_request(server, told):
+    smuggled = f"POST /{server.token}/command HTTP/1.1\r\n"
+    with socket.create_connection((HOST, server.server_port), timeout=60) as connection:
+        head = f"GET /{server.token}/ HTTP/1.1\r\nHost: {server.hosts[0]}\r\n{told}\r\n\r\n"
+        connection.sendall((head + smuggled).encode())
+        with connection.makefile("rb") as answer:
+            head = answer.readline(), *iter(answer.readline, b"\r\n")
+            assert head[0].startswith(b"HTTP/1.1 200")
+            assert b"Connection: close\r\n" in head
 
 
 def test_a_port_that_is_taken_is_no_port(server):

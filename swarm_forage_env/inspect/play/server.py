@@ -24,6 +24,7 @@ from swarm_forage_env.rendering.pages import build_play_page
 HOST = "127.0.0.1"
 MOST_BYTES = 10_000
 """Longest body of a request; our choice: a hundred times the longest command."""
+HTTP_PORT = 80
 SILENCE_S = 60.0
 """A connection on which nothing comes for so long is closed."""
 _HEADERS = {
@@ -60,8 +61,15 @@ class PlayServer(ThreadingHTTPServer):
         super().__init__((HOST, port), _Handler)
         self.session = session
         self.token = secrets.token_urlsafe(16)
-        self.hosts = tuple(f"{name}:{self.server_port}" for name in (HOST, "localhost"))
+        self.hosts = hosts_of(self.server_port)
         self.address = f"http://{self.hosts[0]}/{self.token}/"
+
+
+def hosts_of(port: int) -> tuple[str, ...]:
+    """Return what a browser names as the host of the page; it leaves the port out where it is that of HTTP."""
+    names = (HOST, "localhost")
+    with_port = tuple(f"{name}:{port}" for name in names)
+    return (*with_port, *names) if port == HTTP_PORT else with_port
 
 
 class _Refused(Exception):  # noqa: N818 - it is an answer, no error of ours
@@ -83,6 +91,8 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """Send the page."""
+        if self.headers.get("Content-Length", "0") != "0" or "Transfer-Encoding" in self.headers:
+            self.close_connection = True  # nobody reads the body, which would be taken for the next request
         self._answer(self._page)
 
     def do_POST(self) -> None:
@@ -91,17 +101,21 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _answer(self, make: Any) -> None:
         try:
+            self._send(*self._outcome(make))
+        except (ConnectionError, TimeoutError):  # the reader has gone, maybe in the middle of the answer
+            self.close_connection = True
+
+    def _outcome(self, make: Any) -> tuple[int, str, bytes]:
+        try:
             self._check_sender()
-            self._send(200, *make())
+            return (200, *make())
         except _Refused as refused:
             self.close_connection = True  # its body may be still to come
-            self._send(refused.status, *_as_json({"error": str(refused)}))
+            return (refused.status, *_as_json({"error": str(refused)}))
         except ValueError as error:  # what was asked for cannot be
-            self._send(400, *_as_json({"error": str(error)}))
-        except (BrokenPipeError, ConnectionResetError):  # the reader has gone
-            self.close_connection = True
+            return (400, *_as_json({"error": str(error)}))
         except Exception as error:  # noqa: BLE001 - a user's policy may raise anything, and the page tells of it
-            self._send(500, *_as_json({"error": f"{type(error).__name__}: {error}"}))
+            return (500, *_as_json({"error": f"{type(error).__name__}: {error}"}))
 
     def _check_sender(self) -> None:
         """Refuse whoever is not our page."""
