@@ -52,6 +52,8 @@ RATES = {
     "deaths": LevelKind("deaths per 1,000 s", PopulationDynamics, "death_per_tick", 0.5, 0.0, True),
 }
 """Name -> rate of the whole swarm. The window has no keys for them."""
+MOST_CHANGES = 20
+"""Changes that are told in one line; our choice: more than anybody reads."""
 _KINDS = {**LEVELS, **RATES}
 
 
@@ -77,6 +79,17 @@ class Levels:
         self.changes: list[str] = []
         self._dt_s = stack.unwrapped.scenario.dt_s
         self._per_1000_s = 1000.0 / self._dt_s
+
+    @property
+    def latest_changes(self) -> list[str]:
+        """The last changes, as many as are told."""
+        return self.changes[-MOST_CHANGES:]
+
+    @property
+    def changes_in_words(self) -> str:
+        """The last changes, and how many there were before them; empty where nothing was changed."""
+        n_before = len(self.changes) - len(self.latest_changes)
+        return ", ".join([*([f"{n_before} more before"] if n_before else []), *self.latest_changes])
 
     @property
     def configs(self) -> tuple[WrapperConfig, ...]:

@@ -114,4 +114,4 @@ class RunByHand:
 
     def changes_in_words(self, before: str) -> str:
         """Return what was changed by hand behind some words, or nothing where nothing was."""
-        return f"{before}{', '.join(self.levels.changes)}" if self.levels.changes else ""
+        return f"{before}{self.levels.changes_in_words}" if self.levels.changes else ""

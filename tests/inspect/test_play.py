@@ -144,6 +144,27 @@ def test_a_robot_is_killed_broken_and_repaired():
     assert frame["changes"] == ["robot 2 killed", "robot 5 broken", "robot 5 repaired"]
 
 
+def test_the_last_changes_are_told_and_how_many_there_were():
+    session, _ = session_of("random")
+    for _ in range(15):
+        session.carry_out({"do": "break", "robot": 5})
+        session.carry_out({"do": "repair", "robot": 5})
+    frame = session.frame()
+    assert (len(frame["changes"]), frame["n_changes"]) == (20, 30)
+    told = session.summary()
+    assert "10 more before, robot 5 broken, robot 5 repaired" in told
+    assert told.count("robot 5") == 20
+
+
+def test_the_last_words_wait_for_no_run_that_is_being_started(monkeypatch):
+    monkeypatch.setattr(playing, "LONGEST_SUMMARY_S", 0.01)
+    session, _ = session_of("random")
+    with session._lock:
+        assert session.summary() == "random: 0 s, 0 delivered"
+        assert session._lock.locked()
+    assert session.summary() == "random: 0 s, 0 delivered"
+
+
 def test_a_wall_starts_the_run_again_with_the_same_seed():
     session, clock = session_of()
     look_after(session, clock, 1.0)
@@ -209,7 +230,7 @@ def test_robots_policy_scenario_and_seed_start_another_run():
         {"do": "wall", "box": [1.0, 2.0, 3.0]},
         {"do": "remove_wall", "index": 0},
         {"do": "start", "robots": 0},
-        {"do": "start", "robots": 5000},
+        {"do": "start", "robots": 201},
         {"do": "start", "seed": -1},
         {"do": "start", "policy": "/tmp/other.py:Mine"},
         {"do": "start", "scenario": "moon"},
@@ -222,6 +243,13 @@ def test_a_wrong_command_is_refused_and_changes_nothing(command):
     with pytest.raises(ConfigError):
         session.carry_out(command)
     assert (session.setting, session.run, run.levels.changes) == (before, run, [])
+
+
+def test_no_more_robots_than_the_page_offers():
+    session, _ = session_of("random")
+    most = session.frame()["about"]["most_robots"]
+    with pytest.raises(ConfigError, match=f"robots to be a whole number from 1 to {most}, got {most + 1}"):
+        session.carry_out({"do": "start", "robots": most + 1})
 
 
 @pytest.mark.parametrize("asked", [[], {"robot": 8, "run": 1}, {"robot": "all"}, {"since": 3}])

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError, known_name, number, table
+from swarm_forage_env._internal.fields import ConfigError, known_name, number, table, whole
 from swarm_forage_env._internal.files import as_file_name
 from swarm_forage_env._internal.typed import Count, typed
 from swarm_forage_env.contract.codes import Counter
@@ -25,6 +25,7 @@ from swarm_forage_env.inspect.replay.files import counted_performance, geometry,
 from swarm_forage_env.inspect.run_by_hand import SPEEDS
 from swarm_forage_env.policies.registry import policy_label, policy_names
 from swarm_forage_env.runs.spec import plan_run
+from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.obstacles import MIN_SIDE_M, Rectangle
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import PRESETS, scenario
@@ -32,6 +33,8 @@ from swarm_forage_env.wrappers.world import World
 
 LONGEST_WAIT_S = 0.1
 """A page that asks for its next frame later than this finds the run as if it had asked then: one that sleeps pauses."""
+LONGEST_SUMMARY_S = 1.0
+"""Somebody who ends the command waits no longer for a run that is being started; our choice."""
 FLASH_S = 0.7
 """Seconds of the reader for which the page shows a delivery, as in `draw.js`."""
 MOST_FLASHES = 200
@@ -178,7 +181,8 @@ class PlaySession:
             "interference": int(counters[Counter.INTERFERING]) / active if active else 0.0,
             "curve": self._curve(),
             "levels": levels,
-            "changes": list(run.levels.changes),
+            "changes": run.levels.latest_changes,
+            "n_changes": len(run.levels.changes),
             "note": self.note,
         }
 
@@ -214,13 +218,12 @@ class PlaySession:
     def _about(self) -> dict[str, Any]:
         """Return what stays the same during a run."""
         run, here = self.run, self.run.scenario
-        preset = PRESETS[here.name]().robots.n_robots if here.name in PRESETS else here.robots.n_robots
         return {
             "disturbances": [config.in_words(here.dt_s) for config in run.given],
             "scenarios": list(dict.fromkeys((*PRESETS, here.name))),
             "policies": list(self._policies),
             "policy": self.setting.policy,
-            "most_robots": max(here.robots.n_robots, MOST_ROBOTS * preset),
+            "most_robots": most_robots(here),
             "speeds": list(SPEEDS),
             "sliders": [
                 {"name": name, "title": (LEVELS | RATES)[one.level].name, "most": one.most, "step": one.step}
@@ -279,9 +282,14 @@ class PlaySession:
         )
 
     def summary(self) -> str:
-        """Return one line about the run so far."""
-        with self._lock:
+        """Return one line about the run so far; it waits for `LONGEST_SUMMARY_S` at most."""
+        # Who compiles a new run keeps the lock for long; to read the old one without it breaks nothing.
+        is_ours = self._lock.acquire(timeout=LONGEST_SUMMARY_S)
+        try:
             return f"{self.run.name}: {self.run.summary()}"
+        finally:
+            if is_ours:
+                self._lock.release()
 
     def _check_robot(self, robot: int) -> None:
         n_robots = self.run.scenario.robots.n_robots
@@ -331,6 +339,7 @@ class PlaySession:
         if asked.scenario is not None:
             world = replace(world, scenario=scenario(asked.scenario))
         if asked.robots is not None:
+            whole("robots", asked.robots, at_least=1, at_most=most_robots(world.scenario))
             world = replace(world, scenario=with_overrides(world.scenario, n_robots=asked.robots))
         self._begin(
             replace(
@@ -359,6 +368,12 @@ class PlaySession:
 
     def _remove_walls(self, _: "_Nothing") -> str:
         return self._with_walls(())
+
+
+def most_robots(here: ScenarioConfig) -> int:
+    """Return with how many robots a scenario can be started again; no fewer than it has."""
+    preset = PRESETS[here.name]().robots.n_robots if here.name in PRESETS else here.robots.n_robots
+    return max(here.robots.n_robots, MOST_ROBOTS * preset)
 
 
 def wall_of(box: tuple[float, float, float, float], width_m: float, height_m: float) -> Rectangle:

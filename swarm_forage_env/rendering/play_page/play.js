@@ -2,6 +2,7 @@
 
 const FRAME_MS = 33; // our choice: thirty frames a second look smooth, and leave the processor to the run
 const STILL_MS = 250; // while nothing moves
+const REFUSED_MS = 1000; // after a frame that was refused
 
 class PlayPage {
   constructor() {
@@ -17,19 +18,23 @@ class PlayPage {
     this.go();
   }
 
+  /** Look again and again. What is refused is told, and the reader can still start another run. */
   async go() {
-    try {
-      for (;;) {
-        const began = performance.now();
+    for (let isLost = false; !isLost; ) {
+      const began = performance.now();
+      let pause = FRAME_MS;
+      try {
         await this.look();
-        const still = this.swarm.now.paused || this.swarm.now.over;
-        await this.sleep(Math.max(0, (still ? STILL_MS : FRAME_MS) - (performance.now() - began)));
+        if (this.swarm.now.paused || this.swarm.now.over) pause = STILL_MS;
+      } catch (error) {
+        const loading = document.getElementById("loading");
+        loading.hidden = false;
+        loading.textContent = error.message;
+        pause = REFUSED_MS;
+        isLost = error instanceof LostError;
+        if (!isLost) console.error(error); // it may be a fault of this page
       }
-    } catch (error) {
-      const loading = document.getElementById("loading");
-      loading.hidden = false;
-      loading.textContent = error.message;
-      if (!(error instanceof LostError)) throw error;
+      await this.sleep(Math.max(0, pause - (performance.now() - began)));
     }
   }
 
@@ -83,7 +88,9 @@ class PlayPage {
     showControls(now);
     document.getElementById("score").replaceChildren(heading("now"), tableOf([this.swarm], numbersOf(this.swarm)));
     for (const { name } of this.about.sliders) this.sliders[name].show(now.levels[name]);
-    document.getElementById("changes").textContent = now.changes.length ? `changed by hand: ${now.changes.join(", ")}` : "";
+    const before = now.n_changes - now.changes.length;
+    const changes = [...(before > 0 ? [`${before} more before`] : []), ...now.changes];
+    document.getElementById("changes").textContent = changes.length ? `changed by hand: ${changes.join(", ")}` : "";
     this.robotCard.show(this.swarm, focus.chosen);
     this.showCurves(now);
   }
