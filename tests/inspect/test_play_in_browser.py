@@ -147,6 +147,17 @@ def test_the_run_so_far_is_saved_as_a_replay(desktop, session, tmp_path):
     settled(desktop)
 
 
+def test_after_a_frame_that_is_refused_the_page_goes_on(desktop, session, monkeypatch):
+    opened(desktop, session)
+    loading = "document.getElementById('loading')"
+    with monkeypatch.context() as broken:
+        broken.setattr(session, "frame", lambda _: 1 / 0)
+        desktop.wait_for(f"!{loading}.hidden && {loading}.textContent === 'ZeroDivisionError: division by zero'")
+    desktop.wait_for(f"{loading}.hidden")
+    move_slider(desktop, "robots", 20)
+    run_shown(desktop, "20 robots")
+
+
 def test_a_command_that_has_ended_is_told_of(desktop):
     session = PlaySession(Setting(world=World(scenario("warehouse_small", n_robots=12)), policy="random"))
     with served(session) as server:
