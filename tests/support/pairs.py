@@ -33,7 +33,7 @@ WRITERS: dict[str, tuple[str, ...]] = {
     "study report": ("study", "report", str(PACKED), "--file", "out/report.html"),
     "replay": ("replay", *TINY, "--file", "out/page.html"),
     "maps": ("maps", *TINY, "--picture", "out/maps.png"),
-    "record": ("record", *TINY[:-4], "--seconds", "10", "--size", "100", "--file", "out/film.gif"),
+    "record": ("record", *TINY[:-4], "--seconds", "10", "--size", "240", "--file", "out/film.gif"),
     "dataset": ("dataset", *TINY, "--seeds", "2", "--out", "out"),
     "export": ("export", str(network_file("ppo_warehouse_small")), "--file", "out/network.h"),
     "train": kills.COMMANDS["train"].words,
