@@ -276,7 +276,8 @@ def _checked(name: str, values: Any, dtype: type, n_intervals: int) -> np.ndarra
     given = np.asarray(values)
     if given.shape != (n_intervals,):
         raise RecordError(f"Expected column {name} with shape (intervals,) = ({n_intervals},), got {given.shape}.")
-    column = np.array(given, dtype=dtype)
+    with np.errstate(invalid="ignore"):  # what no whole number can be is refused below, in words
+        column = np.array(given, dtype=dtype)
     if not (np.isfinite(column).all() and np.array_equal(column, given)):
         raise RecordError(f"Expected column {name} to hold finite {np.dtype(dtype).name} values, got {given.tolist()}.")
     column.flags.writeable = False
