@@ -143,7 +143,9 @@ def _other_table(random: Random, frame: pl.DataFrame) -> pl.DataFrame:
         if how == 0:
             frame = frame.drop(name)
         elif how == 1:
-            frame = frame.rename({name: random.choice(("new", f"{name}_", "é"))})
+            new = random.choice(("new", f"{name}_", "é"))
+            if new not in frame.columns:
+                frame = frame.rename({name: new})
         elif how == 2:
             frame = frame.with_columns(further=pl.lit(random.choice((1, 0.5, "x", True, None, math.nan, b"x"))))
         elif how == 3:
