@@ -36,17 +36,8 @@ SCRIPTS = (
     "main.js",
 )
 """Parts of the script in the order in which they are put together; later ones use earlier ones."""
-SHARED_SCRIPTS = (
-    "theme.js",
-    "events.js",
-    "run.js",
-    "view.js",
-    "draw.js",
-    "panels.js",
-    "curves.js",
-    "inspect.js",
-    "legend.js",
-)
+_OF_REPLAYS = ("fflate.js", "decode.js", "player.js", "controls.js", "main.js")
+SHARED_SCRIPTS = tuple(script for script in SCRIPTS if script not in _OF_REPLAYS)
 """Those that the page to play with has, too."""
 PLAY_SCRIPTS = ("link.js", "swarm.js", "walls.js", "cards.js", "buttons.js", "play.js")
 """Its own, which come after them."""

@@ -8,7 +8,7 @@ import copy
 import json
 import math
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from io import BytesIO
 from pathlib import Path
@@ -167,32 +167,23 @@ def _other_table(random: Random, frame: pl.DataFrame) -> pl.DataFrame:
 
 
 def _record(random: Random, folder: Path) -> Path:
-    source, file = FILES / "record.parquet", folder / "record.parquet"
-    stamp = pl.read_parquet_metadata(source)
-    changes: dict[str, Any] = {}
-    which = random.randrange(3)
-    if which == 0:
-        changes["frame"] = lambda frame: _other_table(random, frame)
-    elif which == 1:
-        changes["spec"] = _dumped(_change(random, json.loads(stamp["swarm_forage_env.spec"])))
-    else:
-        changes["provenance"] = _dumped(_change(random, json.loads(stamp["swarm_forage_env.provenance"])))
-    forge_record(source, file, **changes)
-    return file
+    parts = {name: f"swarm_forage_env.{name}" for name in ("spec", "provenance")}
+    return _forged(random, forge_record, FILES / "record.parquet", folder / "record.parquet", parts)
 
 
 def _packed(random: Random, folder: Path) -> Path:
-    source, file = SUPPORT / "blessed_noise.parquet", folder / "packed.parquet"
+    parts = {name: f"swarm_forage_env.study.{name}" for name in ("study", "versions")}
+    return _forged(random, forge_study, SUPPORT / "blessed_noise.parquet", folder / "packed.parquet", parts)
+
+
+def _forged(random: Random, forge: Callable[..., Any], source: Path, file: Path, parts: Mapping[str, str]) -> Path:
+    """Change the table or one part of the stamp, and seal the file anew; `parts` has the key of each part."""
     stamp = pl.read_parquet_metadata(source)
-    changes: dict[str, Any] = {}
-    which = random.randrange(3)
-    if which == 0:
-        changes["frame"] = lambda frame: _other_table(random, frame)
-    elif which == 1:
-        changes["study"] = _dumped(_change(random, json.loads(stamp["swarm_forage_env.study.study"])))
+    part = (None, *parts)[random.randrange(1 + len(parts))]
+    if part is None:
+        forge(source, file, frame=lambda frame: _other_table(random, frame))
     else:
-        changes["versions"] = _dumped(_change(random, json.loads(stamp["swarm_forage_env.study.versions"])))
-    forge_study(source, file, **changes)
+        forge(source, file, **{part: _dumped(_change(random, json.loads(stamp[parts[part]])))})
     return file
 
 
