@@ -71,3 +71,26 @@ def test_its_file_is_one_of_ppo(tmp_path):
     opened = PPO.load(tmp_path / "model.zip", env=model.get_env())
     np.testing.assert_array_equal(weights(opened), weights(model))
     opened.learn(256)
+
+
+@pytest.mark.parametrize("interface", [NUMBERED, DRIVEN], ids=["numbers", "values"])
+@pytest.mark.parametrize("n_at_work", [8, 3, 0])
+def test_choices_are_those_of_the_network_for_robots_at_work_and_zeros_for_others(interface, n_at_work):
+    model = made(SwarmPPO, interface)
+    assert isinstance(model, SwarmPPO)
+    shape = model.action_space.shape
+    assert model.observation_space.shape is not None
+    assert shape is not None
+    obs = np.random.default_rng(1).normal(size=(8, *model.observation_space.shape)).astype(np.float32)
+    at_work = np.isin(np.arange(8), [6, 1, 4, 0, 2, 3, 5, 7][:n_at_work])
+    actions, values, log_probs = model._chosen(obs, at_work)
+    assert (actions.shape, values.shape, log_probs.shape) == ((8, *shape), (8, 1), (8,))
+    for array in (actions, values.numpy(), log_probs.numpy()):
+        assert not array[~at_work].any()
+    if n_at_work:
+        with torch.no_grad():
+            rows, chosen = torch.as_tensor(obs[at_work]), torch.as_tensor(actions[at_work])
+            expected_values, expected_log_probs, _ = model.policy.evaluate_actions(rows, chosen)
+        np.testing.assert_allclose(values.numpy()[at_work], expected_values.numpy(), rtol=1e-5, atol=1e-6)
+        np.testing.assert_allclose(log_probs.numpy()[at_work], expected_log_probs.numpy(), rtol=1e-5, atol=1e-6)
+        assert np.abs(expected_log_probs.numpy()).min() > 0.0
