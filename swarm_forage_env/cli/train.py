@@ -25,6 +25,7 @@ from swarm_forage_env.cli.options import (
 from swarm_forage_env.cli.signals import EXIT_INTERRUPTED
 from swarm_forage_env.training.defaults import (
     DECISION_TICKS,
+    DEFAULT_ACTIVATION,
     DEFAULT_ARENAS,
     DEFAULT_HIDDEN,
     DEFAULT_STEPS,
@@ -105,6 +106,10 @@ class RecipeOptions:
         ),
     ] = None
     hidden: Annotated[str | None, typer.Option(help=f"Sizes of the hidden layers; default {_HIDDEN}.")] = None
+    activation: Annotated[
+        str | None,
+        typer.Option(help=f"What hidden layers do to their sums, tanh or relu; default {DEFAULT_ACTIVATION}."),
+    ] = None
     arguments: Annotated[
         tuple[str, ...],
         typer.Option("--arg", metavar="KEY=NUMBER", help="Set an argument of the algorithm; may be repeated."),
@@ -128,7 +133,7 @@ class RecipeOptions:
             wrappers=world.wrappers,
             options=dict(map(_argument, self.arguments)),
             evaluation=_given({"every_steps": self.evaluate_every, "horizon_s": self.evaluation_horizon}),
-            **self._chosen("algorithm", "steps", "small_start", "seed", "samples", "turned"),
+            **self._chosen("algorithm", "steps", "small_start", "seed", "samples", "turned", "activation"),
             **_given({"n_arenas": self.arenas, "hidden": None if self.hidden is None else _layers(self.hidden)}),
             **world.fields,
         )

@@ -7,6 +7,8 @@ DEFAULT_STEPS = 5_000_000
 """Decisions of single robots in all stages."""
 DEFAULT_HIDDEN = (64, 64)
 """Sizes of the hidden layers."""
+DEFAULT_ACTIVATION = "tanh"
+"""What hidden layers do to their sums."""
 DEFAULT_ARENAS = 8
 """Arenas side by side, at most."""
 DEFAULT_ROBOTS = 400

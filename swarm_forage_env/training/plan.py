@@ -21,13 +21,20 @@ from swarm_forage_env._internal.fields import (
 from swarm_forage_env._internal.files import parse_json, parse_toml, replacing
 from swarm_forage_env.contract.policy import layout_for
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping, learner_layout
+from swarm_forage_env.policies.network import ACTIVATIONS
 from swarm_forage_env.policies.pretrained import plan_file
 from swarm_forage_env.policies.registry import policy_class
 from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.policy_spec import PolicySpec
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import scenario_of_same_size, with_overrides
-from swarm_forage_env.training.defaults import DEFAULT_ARENAS, DEFAULT_HIDDEN, DEFAULT_STEPS, EVALUATE_EVERY
+from swarm_forage_env.training.defaults import (
+    DEFAULT_ACTIVATION,
+    DEFAULT_ARENAS,
+    DEFAULT_HIDDEN,
+    DEFAULT_STEPS,
+    EVALUATE_EVERY,
+)
 from swarm_forage_env.training.evaluation_worlds import CHOSEN_BY, COUNTED, EvaluationWorld, scenario_of, tuples
 from swarm_forage_env.views.sampler import ScenarioSampler, columns_of
 from swarm_forage_env.views.turns import check_turned
@@ -193,6 +200,8 @@ class TrainingPlan:
     n_arenas: int = DEFAULT_ARENAS
     hidden: tuple[int, ...] = DEFAULT_HIDDEN
     """Sizes of the hidden layers of actor and critic."""
+    activation: str = DEFAULT_ACTIVATION
+    """What hidden layers do to their sums: "tanh", or "relu", which takes less time."""
     options: Mapping[str, Any] = field(default_factory=dict, hash=False)
     """Arguments of the algorithm's class; what is not here keeps the library's default."""
     stages: tuple[Stage, ...] = (Stage(steps=DEFAULT_STEPS),)
@@ -227,6 +236,7 @@ class TrainingPlan:
             raise ConfigError(f"Expected at most {MOST_LAYERS} hidden layers, got {len(self.hidden)}.")
         for size in self.hidden:
             whole("hidden", size, at_least=1, at_most=MOST_UNITS)
+        one_of("activation", self.activation, ACTIVATIONS)
         if not self.stages:
             raise ConfigError("Expected at least one stage, got none.")
         whole("seed", self.seed, at_least=0)

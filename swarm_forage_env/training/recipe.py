@@ -22,6 +22,7 @@ from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import chosen_scenario
 from swarm_forage_env.training.defaults import (
     DECISION_TICKS,
+    DEFAULT_ACTIVATION,
     DEFAULT_ARENAS,
     DEFAULT_HIDDEN,
     DEFAULT_REWARDS,
@@ -70,6 +71,7 @@ def recipe(
     interface: GivenInterface = None,
     wrappers: Iterable[WrapperConfig | str] = (),
     hidden: tuple[int, ...] = DEFAULT_HIDDEN,
+    activation: str = DEFAULT_ACTIVATION,
     options: Mapping[str, Any] | None = None,
     small_start: bool | None = None,
     evaluation: EvaluationPlan | Mapping[str, Any] | None = None,
@@ -97,6 +99,7 @@ def recipe(
         wrappers: What disturbs the swarm, in training and in evaluations: configurations, or words as on the command
             line ("population:death_per_tick=0.01").
         hidden: Sizes of the hidden layers.
+        activation: What hidden layers do to their sums, see `TrainingPlan.activation`.
         options: Arguments of the algorithm that differ from `DEFAULT_OPTIONS` and, to the end, from `LATE_OPTIONS`.
         small_start: Spend the first third of the steps in a smaller arena; default where deliveries count, unless
             `recipes.toml` says otherwise.
@@ -140,6 +143,7 @@ def recipe(
         interface=chosen,
         n_arenas=n_arenas,
         hidden=hidden,
+        activation=activation,
         options=_algorithm_options(
             algorithm, n_arenas * config.robots.n_robots, {**measured.options.get(algorithm, {}), **(options or {})}
         ),

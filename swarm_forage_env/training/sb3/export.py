@@ -16,7 +16,9 @@ from swarm_forage_env.policies.model_files import MODEL_NOTE, describe_spaces
 from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkError
 from swarm_forage_env.scenarios.presets import scenario
 
-_ACTIVATIONS: dict[type[nn.Module], str] = {nn.Tanh: "tanh", nn.ReLU: "relu"}
+ACTIVATION_CLASSES: dict[str, type[nn.Module]] = {"tanh": nn.Tanh, "relu": nn.ReLU}
+"""Layers of torch, by the names that plans and network files have for them."""
+_NAMES = {layer: name for name, layer in ACTIVATION_CLASSES.items()}
 
 
 def export_network(
@@ -45,7 +47,7 @@ def export_network(
     linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
     between = {type(layer) for layer in layers if not isinstance(layer, nn.Linear)}
     alternates = all(isinstance(layer, nn.Linear) == (k % 2 == 0) for k, layer in enumerate(layers))
-    if not alternates or len(between) > 1 or not between <= _ACTIVATIONS.keys():
+    if not alternates or len(between) > 1 or not between <= _NAMES.keys():
         raise NetworkError(
             "Expected linear layers with one of the activations tanh and ReLU between them, got "
             f"{[type(layer).__name__ for layer in layers]}."
@@ -54,7 +56,7 @@ def export_network(
     biases = tuple(_array(layer.bias) for layer in linear)
     about = NetworkAbout(
         interface=interface,
-        activation=_ACTIVATIONS[between.pop()] if between else "tanh",
+        activation=_NAMES[between.pop()] if between else "tanh",
         samples=samples,
         caches=caches,
         card=card or {},

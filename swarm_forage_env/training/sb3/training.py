@@ -55,7 +55,7 @@ from swarm_forage_env.training.evaluations import (
 )
 from swarm_forage_env.training.plan import LEARNING, Stage, TrainingPlan
 from swarm_forage_env.training.sb3.buffers import ActiveRolloutBuffer, EmptyRolloutError, PresentReplayBuffer
-from swarm_forage_env.training.sb3.export import export_network, note_interface
+from swarm_forage_env.training.sb3.export import ACTIVATION_CLASSES, export_network, note_interface
 from swarm_forage_env.training.sb3.ppo import SwarmPPO
 from swarm_forage_env.views.stable_baselines3 import SwarmVecEnv
 
@@ -64,7 +64,7 @@ ON_POLICY = ("ppo", "a2c")
 EXPORTABLE = ("ppo", "a2c", "dqn")
 POLICY_FILE = "policy.npz"
 _REPORT_EVERY_S = 1.0
-_TOLD = ("algorithm", "seed", "n_arenas", "hidden", "interface", "options", "stages", "scenario.reward",
+_TOLD = ("algorithm", "seed", "n_arenas", "hidden", "activation", "interface", "options", "stages", "scenario.reward",
          "scenario.name", "scenario.robots.n_robots", "sampler")  # fmt: skip
 """Settings of a plan that TensorBoard shows beside the evaluations, by name or by what their names begin with."""
 _NO_LINE = ("stdout", "log", "json", "csv")
@@ -76,7 +76,14 @@ _OURS = frozenset(
     | {f"{kind}_buffer_{what}" for kind in ("rollout", "replay") for what in ("class", "kwargs")}
 )
 """Arguments of the algorithms' classes that training gives them."""
-_ELSEWHERE = {"seed": "seed", "policy_kwargs": "hidden", "net_arch": "hidden", "hidden": "hidden"}
+_ELSEWHERE = {
+    "seed": "seed",
+    "policy_kwargs": "hidden",
+    "net_arch": "hidden",
+    "hidden": "hidden",
+    "activation_fn": "activation",
+    "activation": "activation",
+}
 """What people look for among the options -> the field of a plan that says it."""
 
 
@@ -264,7 +271,7 @@ def _prepared(plan: TrainingPlan, stage: Stage, folder: Path, env: SwarmVecEnv, 
             "rollout_buffer_class": ActiveRolloutBuffer,
             "rollout_buffer_kwargs": env.rollout_buffer_kwargs,
         }
-    network = {"net_arch": list(plan.hidden)}
+    network = {"net_arch": list(plan.hidden), "activation_fn": ACTIVATION_CLASSES[plan.activation]}
     try:
         if (folder / MODEL_FILE).exists():
             model = algorithm.load(folder / MODEL_FILE, env=env, device="cpu", **options)
