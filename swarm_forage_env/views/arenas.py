@@ -25,7 +25,7 @@ from swarm_forage_env.contract.policy import COMMANDS
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.views.bookkeeping import Bookkeeping, can_book_together
-from swarm_forage_env.views.learner_arena import LearnerArena
+from swarm_forage_env.views.learner_arena import LearnerArena, steps_as_made
 from swarm_forage_env.views.plans import ArenaPlan
 from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.world.kernels.reward import book_rows
@@ -467,10 +467,7 @@ def _steps_in_parts(arena: LearnerArena) -> bool:
 
     The outermost layer and the environment are asked; `step_batch` of what is between them is never called.
     """
-    ours = SwarmWrapper.step_batch, ForageEnv.step_batch
-    return all(
-        type(layer).step_batch in ours and "step_batch" not in vars(layer) for layer in (arena.env, arena.forage_env)
-    )
+    return steps_as_made(arena.env) and steps_as_made(arena.forage_env)
 
 
 _NOBODY: BoolArray = np.zeros(0, np.bool_)

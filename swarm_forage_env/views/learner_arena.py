@@ -173,26 +173,51 @@ class LearnerArena:
 
     @property
     def decides_at_once(self) -> bool:
-        """Whether all ticks of a decision are one compiled call: nobody but the world has a say in them."""
+        """Whether the ticks of a decision are one compiled call, but for those in which a wrapper has to act."""
         env = self.forage_env
+        layers = self.env.stack if isinstance(self.env, SwarmWrapper) else ()
         return (
-            self.env is env
-            and type(env) is ForageEnv
-            and "step_batch" not in vars(env)
+            type(env) is ForageEnv
             and env.scenario.physics == "compiled"
             and is_compiled(keep_on)
             and env.render_mode != "human"
             and not env.arena.needs_python
             and env.reward_model.payment is not None
+            and all(layer.tells_ahead for layer in layers)
+            and steps_as_made(self.env)
+            and steps_as_made(env)
         )
 
     def _decide(self, actions: np.ndarray, rewards: np.ndarray) -> None:
-        """Do what `step` does, in one call."""
+        """Do what `step` does, in as few calls as wrappers allow."""
         env, interface = self.forage_env, self.interface
         env.require_whole()
         chosen = self.turn.actions(interface.checked(actions))
-        n_ticks = min(self._plan.interface.decision_ticks, env.max_cycles - env.tick)
-        env.arena.decide(*interface.keeping_on(chosen), n_ticks, env.reward_model, rewards)
+        end = min(env.tick + self._plan.interface.decision_ticks, env.max_cycles)
+        if isinstance(self.env, SwarmWrapper):
+            self._decide_disturbed(self.env, chosen, end, rewards)
+            return
+        act = interface.keeping_on(chosen)
+        while env.tick < end:
+            env.arena.decide(*act, end - env.tick, env.reward_model, rewards)
+
+    def _decide_disturbed(self, wrapped: SwarmWrapper, chosen: np.ndarray, end: int, rewards: np.ndarray) -> None:
+        """Do what `_decide` does until tick `end` or the death of all; a wrapper that has to act gets its tick."""
+        env, interface = self.forage_env, self.interface
+        env.refuse_bad_step(env.checked_actions(interface.carry_out(chosen, wrapped.last_obs)), None)
+        act = interface.keeping_on(chosen)
+        try:
+            while env.tick < end and not env.terminated.all():
+                before = env.tick
+                n_ahead, disturbances = wrapped.told_ahead(end - before)
+                if n_ahead == 0:
+                    rewards += wrapped.step_batch(interface.carry_out(chosen, wrapped.last_obs))[1]
+                    continue
+                n_observed = env.arena.decide(*act, n_ahead, env.reward_model, rewards, disturbances)
+                wrapped.pass_ticks(env.tick - before, n_observed)
+        except Exception:
+            env.break_off()  # wrappers have drawn numbers for ticks that have not happened
+            raise
 
     def command(self, actions: np.ndarray) -> ActionArray:
         """Return the actions of the next tick, (N, A) in a reused buffer; see `LearnerInterface.command`."""
@@ -291,6 +316,12 @@ class LearnerArena:
         padded = np.zeros((self.n_rows, *rows.shape[1:]), rows.dtype)
         padded[: len(rows)] = rows
         return padded
+
+
+def steps_as_made(layer: ForageEnv | SwarmWrapper) -> bool:
+    """Whether nobody has replaced how a layer steps."""
+    ours = SwarmWrapper.step_batch, ForageEnv.step_batch
+    return type(layer).step_batch in ours and "step_batch" not in vars(layer)
 
 
 _FIXED = ("interface", "wrappers")

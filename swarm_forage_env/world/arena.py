@@ -346,43 +346,47 @@ class ForagingArena:
             raise refused_tasks(tasks, len(self.swarm.active))
         return n_begun - (outcome != DONE)
 
-    def decide(self, act: Callback, state: tuple[Any, ...], n_ticks: int, rewards: RewardModel, paid: ObsArray) -> None:
-        """Carry out a decision of a learner; what happens is what `n_ticks` calls of `step` do.
-
-        Bodies must be compiled, and `needs_python` false.
+    def decide(
+        self,
+        act: Callback,
+        state: tuple[Any, ...],
+        n_ticks: int,
+        rewards: RewardModel,
+        paid: ObsArray,
+        disturbances: Disturbances = UNDISTURBED,
+    ) -> int:
+        """Carry out a decision of a learner; what is not said here is as in `run`. `needs_python` must be false.
 
         Args:
             act: A kernel that writes actions, called as that of a `CompiledPolicy`; it draws nothing.
             state: What it reads and edits; the last are the actions, (N, A) float32.
-            n_ticks: For how many ticks the decision holds.
+            n_ticks: At most so many ticks, and at least one; it ends earlier where Python has to act.
             rewards: What makes the rewards; it must have a `payment`.
             paid: (N,) float32, the rewards are added.
-
-        Raises:
-            ActionError: as in `step`; nothing has happened.
+            disturbances: What wrappers do in so many ticks.
         """
-        end = self.tick + n_ticks
-        while self.tick < end:
-            first = self.tick + 1
-            picks, walks = self.draws(first)
-            n_drawn = min((len(rows) for rows in (picks, walks) if rows is not self._nothing), default=n_ticks)
-            n_begun, outcome = self._compiled.decide(
-                *self.parts,
-                rewards.payment,
-                self._unit_gain,
-                first,
-                min(end - self.tick, n_drawn),
-                self.has_changed,
-                act,
-                state,
-                picks,
-                walks,
-                paid,
-            )
-            self.tick, self.has_changed = first + n_begun - 2, self.has_changed and n_begun == 1
-            self.conclude(outcome, state[-1], self._unit_gain)
-            if outcome != DONE:  # Python has ended the tick
-                paid += rewards.reward()
+        first = self.tick + 1
+        picks, walks = self.draws(first)
+        n_drawn = min((len(rows) for rows in (picks, walks) if rows is not self._nothing), default=n_ticks)
+        n_begun, outcome = self._compiled.decide(
+            *self.parts,
+            disturbances,
+            rewards.payment,
+            self._unit_gain,
+            first,
+            min(n_ticks, n_drawn),
+            self.has_changed,
+            act,
+            state,
+            picks,
+            walks,
+            paid,
+        )
+        self.tick, self.has_changed = first + n_begun - 2, self.has_changed and n_begun == 1
+        self.conclude(outcome, state[-1], disturbances.gain if len(disturbances.gain) else self._unit_gain)
+        if outcome != DONE:  # Python has ended the tick
+            paid += rewards.reward()
+        return n_begun - (outcome != DONE)
 
     @contextmanager
     def _observation_kept(self, kept: bool) -> Iterator[None]:

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
 from pettingzoo.utils import BaseParallelWrapper
 
 from swarm_forage_env._internal.fields import ConfigError
@@ -15,6 +16,8 @@ from swarm_forage_env.contract.reset_and_step import no_options
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.env import BatchStep, ForageEnv
 from swarm_forage_env.scenarios import config as configs
+from swarm_forage_env.world.arena import UNDISTURBED
+from swarm_forage_env.world.kernels.disturbances import Disturbances
 from swarm_forage_env.world.snapshots import Snapshot
 from swarm_forage_env.wrappers.waveform import gather_waveform
 
@@ -33,6 +36,30 @@ _STEPS = ("step", "step_batch", "begin_step", "end_step")
 """Methods of a wrapper that are called on the outermost one only."""
 _HOOKS = ("before_step", "gain", "observe", "after_step")
 """Methods that are called on every wrapper in each step."""
+
+_NO_REWARDS: ObsArray = np.zeros(0, np.float32)
+
+
+def _refuse_unreadable(told: Disturbances, n_ticks: int) -> None:
+    """Refuse what compiled code would read wrongly, or beyond its end; ValueError."""
+    per_tick = {"throttles"} if len(told.throttles) else set[str]()
+    per_tick |= {"wheel_factors"} if len(told.wheel_lanes) else set[str]()
+    for name, expected in UNDISTURBED._asdict().items():
+        value = getattr(told, name)
+        if not isinstance(expected, np.ndarray):
+            continue
+        n_rows = n_ticks if name in per_tick else 0
+        if (
+            not isinstance(value, np.ndarray)
+            or (value.dtype, value.ndim) != (expected.dtype, expected.ndim)
+            or not value.flags.c_contiguous
+            or len(value) < n_rows
+        ):
+            raise ValueError(
+                f"Expected `ahead` to tell {name} as a contiguous array of {expected.dtype} with {expected.ndim} "
+                f"dimensions and at least {n_rows} rows, got {np.shape(value)} of "
+                f"{getattr(value, 'dtype', type(value))}."
+            )
 
 
 class SwarmWrapper(BaseParallelWrapper):
@@ -183,6 +210,42 @@ class SwarmWrapper(BaseParallelWrapper):
         return not any(
             name in vars(self) or getattr(type(self), name) is not getattr(teller, name) for name in (*_HOOKS, "ahead")
         )
+
+    def told_ahead(self, n_ticks: int) -> tuple[int, Disturbances]:
+        """Return in how many ticks, at most `n_ticks`, no hook is needed from here inwards, and what happens in them.
+
+        Raises:
+            ValueError: a wrapper tells what compiled code cannot read.
+        """
+        fields: dict[str, Any] = {}
+        for wrapper in self.stack:
+            n_ticks, told = wrapper.ahead(n_ticks)
+            if fields.keys() & told.keys() - {"gain"}:  # two of a kind: the compiled loop has place for one
+                n_ticks = 0
+            fields |= told
+        # The last death may have come between two ticks; then the coming one ends the run.
+        n_ticks = 0 if self._unwrapped.terminated.all() else max(0, n_ticks)
+        disturbances = Disturbances(**fields)
+        _refuse_unreadable(disturbances, n_ticks)
+        return n_ticks, disturbances
+
+    def pass_ticks(self, n_ticks: int, n_observed: int, tasks: CodeArray | None = None) -> None:
+        """Note, from here inwards, that ticks have passed as `told_ahead` said.
+
+        Args:
+            n_ticks: How many.
+            n_observed: After how many of them robots saw what wrappers let them see; Python has ended a further one.
+            tasks: (N,) as in `step_batch`.
+        """
+        for wrapper in self.stack:
+            wrapper.count_ticks(n_ticks)
+        if n_observed < n_ticks:
+            self._after(self.stepped(), tasks)
+
+    def stepped(self) -> BatchStep:
+        """Return the result of the environment's last step, without rewards."""
+        env = self._unwrapped
+        return env.arena.obs, _NO_REWARDS, env.terminated, env.tick >= env.max_cycles
 
     def interval_columns(self) -> dict[str, float]:
         """Return this wrapper's own columns of the run record for the recording interval that ends now.

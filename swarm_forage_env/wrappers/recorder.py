@@ -1,7 +1,7 @@
 """RunRecorder: turns the arena's cumulative counters into columns over recording intervals."""
 
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -9,13 +9,12 @@ from swarm_forage_env.contract.codes import Counter, Event, Task
 from swarm_forage_env.contract.kernel_policy import CompiledPolicy
 from swarm_forage_env.contract.policy import refused_tasks
 from swarm_forage_env.contract.types import BoolArray, CodeArray
-from swarm_forage_env.env import BatchStep, ForageEnv
+from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.columns import INTERVAL_COLUMNS, part_column
 from swarm_forage_env.scenarios.config import whole_intervals
 from swarm_forage_env.scenarios.performance import performance_curve
 from swarm_forage_env.world.arena import UNDISTURBED
 from swarm_forage_env.world.kernels.counting import add_task_shares
-from swarm_forage_env.world.kernels.disturbances import Disturbances
 from swarm_forage_env.wrappers.base import SwarmWrapper
 
 TOTALS: dict[str, Counter] = {
@@ -46,8 +45,6 @@ TICK_MEANS: dict[str, Counter] = {
     "n_at_caches": Counter.AT_CACHES,
 }
 """Columns that are means over the ticks of an interval."""
-
-_NO_REWARDS = np.zeros(0, np.float32)
 
 
 class _PartTally:
@@ -83,28 +80,6 @@ class _PartTally:
         }
         self._start()
         return columns
-
-
-def _refuse_unreadable(told: Disturbances, n_ticks: int) -> None:
-    """Refuse what compiled code would read wrongly, or beyond its end; ValueError."""
-    per_tick = {"throttles"} if len(told.throttles) else set[str]()
-    per_tick |= {"wheel_factors"} if len(told.wheel_lanes) else set[str]()
-    for name, expected in UNDISTURBED._asdict().items():
-        value = getattr(told, name)
-        if not isinstance(expected, np.ndarray):
-            continue
-        n_rows = n_ticks if name in per_tick else 0
-        if (
-            not isinstance(value, np.ndarray)
-            or (value.dtype, value.ndim) != (expected.dtype, expected.ndim)
-            or not value.flags.c_contiguous
-            or len(value) < n_rows
-        ):
-            raise ValueError(
-                f"Expected `ahead` to tell {name} as a contiguous array of {expected.dtype} with {expected.ndim} "
-                f"dimensions and at least {n_rows} rows, got {np.shape(value)} of "
-                f"{getattr(value, 'dtype', type(value))}."
-            )
 
 
 class RunRecorder(SwarmWrapper):
@@ -174,11 +149,13 @@ class RunRecorder(SwarmWrapper):
         """
         env = self.unwrapped
         arena, end = env.arena, min(env.tick + n_ticks, env.max_cycles)
-        kept = False
+        inner, kept = self._inner, False
         env.require_whole()
         try:
             while env.tick < end and not self._complete:
-                n_ahead, disturbances = self._disturbances(min(end - env.tick, self._ticks_left))
+                n_ahead, disturbances = min(end - env.tick, self._ticks_left), UNDISTURBED
+                if isinstance(inner, SwarmWrapper):
+                    n_ahead, disturbances = inner.told_ahead(n_ahead)
                 if n_ahead == 0:
                     self._run_with_hooks(policy)
                     kept = False
@@ -187,10 +164,8 @@ class RunRecorder(SwarmWrapper):
                 n_observed = arena.run(policy, n_ahead, self._task_sums, disturbances, kept=kept)
                 kept = len(disturbances.lanes) == 0
                 n_done = env.tick - before
-                for wrapper in self._inside:
-                    wrapper.count_ticks(n_done)
-                if n_observed < n_done and isinstance(self._inner, SwarmWrapper):
-                    self._inner._after(self._stepped(), policy.task)
+                if isinstance(inner, SwarmWrapper):
+                    inner.pass_ticks(n_done, n_observed, policy.task)
                 self._ticks_left -= n_done
                 self._complete = env.tick >= env.max_cycles
                 if self._ticks_left == 0 or self._complete:
@@ -199,34 +174,13 @@ class RunRecorder(SwarmWrapper):
             env.break_off()  # what wrappers do ahead they have not counted; their noise is for later ticks already
             raise
 
-    def _disturbances(self, n_ticks: int) -> tuple[int, Disturbances]:
-        """Return in how many ticks, at most `n_ticks`, no hook is needed, and what the wrappers do in them."""
-        if not self._inside:
-            return n_ticks, UNDISTURBED
-        fields: dict[str, Any] = {}
-        for wrapper in self._inside:
-            n_ticks, told = wrapper.ahead(n_ticks)
-            if fields.keys() & told.keys() - {"gain"}:  # two of a kind: the compiled loop has place for one
-                n_ticks = 0
-            fields |= told
-        # The last death may have come between two ticks; then the coming one ends the run.
-        n_ticks = 0 if self.unwrapped.terminated.all() else max(0, n_ticks)
-        disturbances = Disturbances(**fields)
-        _refuse_unreadable(disturbances, n_ticks)
-        return n_ticks, disturbances
-
     def _run_with_hooks(self, policy: CompiledPolicy) -> None:
         """Run one tick as a step of the stack does: what robots want to do stands before any wrapper acts."""
         arena = self.unwrapped.arena
         arena.run(policy, 0, None)
         _, wheel_gain = self.begin_step(policy.state[-1])
         arena.run(policy, 1, None, wheel_gain=wheel_gain, acts=False)
-        self._after(self._stepped(), policy.task)
-
-    def _stepped(self) -> BatchStep:
-        """Return the result of the last step, without rewards."""
-        env = self.unwrapped
-        return env.arena.obs, _NO_REWARDS, env.terminated, env.tick >= env.max_cycles
+        self._after(self.stepped(), policy.task)
 
     def columns(self) -> dict[str, np.ndarray]:
         """Return the columns of the finished run that every record has by name, (T,) each.

@@ -237,6 +237,28 @@ def whole(
 
 
 @kernel
+def disturb_senses(d: Disturbances, k: int, a: ArenaArrays) -> None:
+    """Write noise into the observation after tick `k` of `d`, if there is any."""
+    if d.lanes.shape[0] == 0:
+        return
+    s, swarm = a.sensors, a.state.swarm
+    draw_bits(d.lanes, d.draws)
+    d.believing[0] += disturb(
+        s.obs,
+        swarm.present,
+        swarm.active,
+        swarm.carried_object,
+        d.draws,
+        d.factors[k % d.factors.shape[0]],
+        d.noise,
+        s.blanks,
+        s.columns.proximity,
+        s.behind_counts,
+    )
+    d.believing[1] += 1.0
+
+
+@kernel
 def run(
     a: ArenaArrays,
     b: BodyState,
@@ -298,21 +320,8 @@ def run(
         light_is_due[0] = is_due
         outcome = whole(a, b, actions, gain, first + k, look_first and k == 0, chance, walk_chance)
         light_is_due[0] = True  # for what Python may have to finish
-        if outcome == DONE and d.lanes.shape[0] > 0:
-            draw_bits(d.lanes, d.draws)
-            d.believing[0] += disturb(
-                obs,
-                swarm.present,
-                swarm.active,
-                swarm.carried_object,
-                d.draws,
-                d.factors[k % d.factors.shape[0]],
-                d.noise,
-                s.blanks,
-                s.columns.proximity,
-                s.behind_counts,
-            )
-            d.believing[1] += 1.0
+        if outcome == DONE:
+            disturb_senses(d, k, a)
         if outcome == DONE:
             s.kept[0] = d.draws.shape[0] == 0 and (is_due or s.kept[0])
         counted = outcome >= 0 or tasks.shape[0] == 0 or add_task_shares(tasks, swarm.active, task_shares)
@@ -325,6 +334,7 @@ def run(
 def decide(
     a: ArenaArrays,
     b: BodyState,
+    d: Disturbances,
     payment: Payment,
     wheel_gain: FloatArray,
     first: int,
@@ -341,6 +351,7 @@ def decide(
     Args:
         a: The arena.
         b: Its bodies.
+        d: See `run`.
         payment: What rewards are made of.
         wheel_gain: (N, 2), see `set_out`.
         first: Number of the first tick.
@@ -355,15 +366,18 @@ def decide(
     Returns:
         How many ticks have begun, and the outcome of the last of them.
     """
-    sensors = a.sensors
+    sensors, swarm = a.sensors, a.state.swarm
+    gain = d.gain if d.gain.shape[0] > 0 else wheel_gain
     for k in range(n_ticks):
         remember(payment)
-        act(sensors.obs, a.state.swarm.active, wheel_gain, state, first + k)
+        act(sensors.obs, swarm.active, wheel_gain, state, first + k)
+        disturb_wheels(d, k, state[-1], swarm.carried_object, a.motion.drive_limits, wheel_gain)
         sensors.light_is_due[0] = k == n_ticks - 1
         chance, walk_chance = chances[k % chances.shape[0]], walk_chances[k % walk_chances.shape[0]]
-        outcome = whole(a, b, state[-1], wheel_gain, first + k, look_first and k == 0, chance, walk_chance)
+        outcome = whole(a, b, state[-1], gain, first + k, look_first and k == 0, chance, walk_chance)
         sensors.light_is_due[0] = True  # for what Python may have to finish
         if outcome != DONE:
             return k + 1, outcome
+        disturb_senses(d, k, a)
         pay(payment, paid)
     return n_ticks, DONE
