@@ -233,6 +233,7 @@ def test_words_are_arguments_of_the_recipe(tmp_path):
         "evaluation_horizon": 200.0,
         "small_start": False,
         "hidden": "128,32",
+        "activation": "relu",
         "arguments": ("batch_size=8", "gamma=0.9"),
     }
     assert RecipeOptions(**options).plan(words) == recipe(
@@ -247,6 +248,7 @@ def test_words_are_arguments_of_the_recipe(tmp_path):
         evaluation=EvaluationPlan(every_steps=50, horizon_s=200.0),
         small_start=False,
         hidden=(128, 32),
+        activation="relu",
         options={"batch_size": 8, "gamma": 0.9},
         n_objects=60,
         n_robots=7,

@@ -93,6 +93,8 @@ def test_a_plan_is_read_back_from_what_it_writes(plan, tmp_path):
         ("horizon_s = 400.0", "horizon_s = 300.0", "interval"),
         ("hidden = [16]", "hidden = [0]", "hidden to be a whole number"),
         ("hidden = [16]", "hidden = 64", r"hidden to be sizes of layers, for example \[64, 64\], got 64"),
+        ("hidden = [16]", 'activation = "Relu"', "Did you mean 'relu'"),
+        ("hidden = [16]", 'activation = "elu"', "activation to be one of tanh, relu, got 'elu'"),
         ('algorithm = "dqn"', 'algorithm = "DQN"', "Did you mean 'dqn'"),
         ("gamma = 0.9", "gamma = 5", r"options.gamma to be a number in \(0, 1\], got 5"),
         ("gamma = 0.9", "gamma = nan", "options.gamma"),

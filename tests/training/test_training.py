@@ -412,6 +412,7 @@ def test_damaged_models_are_refused_as_policies(trained, tmp_path):
         ({"hidden": 128}, "the plan says it in 'hidden'"),
         ({"net_arch": 128}, "the plan says it in 'hidden'"),
         ({"policy_kwargs": {}}, "the plan says it in 'hidden'"),
+        ({"activation_fn": "relu"}, "the plan says it in 'activation'"),
         ({"device": "cpu"}, "without 'device', which training sets itself"),
         ({"n_steps": 1, "batch_size": 1}, "Cannot prepare ppo with its options: `batch_size`"),
     ],
@@ -502,6 +503,16 @@ def test_the_interface_of_an_export_is_that_of_the_model(wrong, reason):
     note_interface(model, DRIVEN)
     with pytest.raises(NetworkError, match=r"Expected the interface that the model was trained with, .*decision_ticks"):
         export_network(model, dataclasses.replace(DRIVEN, decision_ticks=4))
+
+
+@pytest.mark.parametrize(("activation", "layer"), [("tanh", torch.nn.Tanh), ("relu", torch.nn.ReLU)])
+def test_a_plan_chooses_what_hidden_layers_do(tmp_path, activation, layer):
+    result = train(dataclasses.replace(SHORT, activation=activation), tmp_path)
+    policy = result.model.policy
+    for part in (policy.mlp_extractor.policy_net, policy.mlp_extractor.value_net):
+        assert [type(each) for each in part] == [torch.nn.Linear, layer]
+    assert result.policy_file is not None
+    assert Network.load(result.policy_file).about.activation == activation
 
 
 def test_models_that_a_network_file_cannot_hold_are_refused():

@@ -84,7 +84,9 @@ def joined(steps: list[ArenaStep]) -> dict[str, np.ndarray]:
         ((), {"nest_progress": 0.1, "interference": -0.1, "tick": -0.01}, (True, True, True, True)),
         ((), {"nest_progress": 0.1, "team": True}, (True, True, False, True)),
         ((), {"interface": DRIVEN, "first_pickup": 1.0}, (False, True, True, False)),
-        (("throttle:waveform=constant",), {"interface": DRIVEN}, (True, True, False, False)),
+        (("throttle:waveform=constant",), {"interface": DRIVEN}, (False, True, False, False)),
+        ((*ADVERSITY, "actuator_noise:sigma=0.1"), {"interface": DRIVEN}, (False, True, False, False)),
+        (("handling_cost:waveform=constant",), {"interface": DRIVEN}, (True, True, False, False)),
         ((), {"physics": "chipmunk"}, (False, True, True, True)),
     ],
     ids=[
@@ -95,7 +97,9 @@ def joined(steps: list[ArenaStep]) -> dict[str, np.ndarray]:
         "rewards",
         "a team",
         "an interface",
-        "a wrapped interface",
+        "a throttled interface",
+        "an interface under all kinds of adversity",
+        "an interface with a wrapper that acts in every tick",
         "Chipmunk",
     ],
 )
@@ -115,6 +119,22 @@ def test_arenas_together_are_those_alone(wrappers, fields, chosen_ways):
         n_ended += len(step.outcomes)
     assert ways(together) == chosen_ways
     assert n_ended >= 6
+
+
+def test_a_refused_decision_leaves_the_noise_as_it_was():
+    chosen = plan("sensor_noise:sigma=0.03", "actuator_noise:sigma=0.1", interface=DRIVEN)
+    asked, other = LearnerArena(chosen), LearnerArena(chosen)
+    for arena in (asked, other):
+        arena.reset(2)
+    assert asked.decides_at_once
+    good = np.full((N_ROBOTS, 2), 0.5, np.float32)
+    bad = good.copy()
+    bad[3] = np.nan
+    with pytest.raises(ActionError, match="nan"):
+        asked.step(bad, np.zeros(N_ROBOTS, np.float32))
+    for arena in (asked, other):
+        arena.step(good, np.zeros(N_ROBOTS, np.float32))
+    np.testing.assert_array_equal(asked.observe(), other.observe())
 
 
 def test_arenas_with_other_weights_are_not_stepped_together():
