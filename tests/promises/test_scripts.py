@@ -278,6 +278,36 @@ def test_the_floor_near_the_nest_empties(run):
         assert begin_m < end_m
 
 
+@pytest.mark.compiled
+def test_unseen_worlds_are_drawn_once_and_shares_are_of_the_best(run):
+    from scripts import unseen_worlds
+
+    for kind in unseen_worlds.KINDS:
+        more = unseen_worlds.worlds(kind, 5, 200.0)
+        assert unseen_worlds.worlds(kind, 2, 200.0) == more[:2]
+        assert len({world.scenario for world in more}) > 1
+    words = ("--policy", "dpo,oracle", "--draws", "1", "--horizon", "400")
+    title, header, *kinds, keeping_up, better, median = run("unseen_worlds", *words)[1].splitlines()
+    assert title == "Performance as a share of the best scripted controller, 400 s, one run of each"
+    assert header.split() == ["worlds", "dpo", "oracle"]
+    assert len(kinds) == 10
+    assert better.split()[4:] == ["0", "of", "10", "10", "of", "10"], "DPO is one of the four"
+    assert re.search(r"(\d+) of 10  +10 of 10$", keeping_up)
+    dpo, oracle = (float(word) for word in median.split()[1:])
+    assert dpo <= 1.0 < oracle
+
+
+@pytest.mark.compiled
+def test_networks_are_run_in_turned_worlds(run):
+    words = ("--policy", "ppo_warehouse_small", "--seeds", "1", "--horizon", "600")
+    title, header, *rows = run("turned_worlds", *words)[1].splitlines()
+    assert title == "Performance per 1,000 s, means of 1 run of 600 s"
+    assert header.split() == ["network", "and", "world", "as", "drawn", "quarter", "half", "mirrored"]
+    assert [row.split(",")[1].strip() for row in rows] == ["warehouse_small", "warehouse_medium", "search_and_rescue"]
+    as_drawn, _, half, _ = map(float, rows[0].split()[-4:])
+    assert as_drawn > 20.0 > half, "a specialist that knows the compass by heart"
+
+
 def test_laws_are_written_beside_the_runs_of_a_study(run):
     pytest.importorskip("matplotlib", reason="needs the plots extra: matplotlib")
     foraging_table().write("laws.parquet")

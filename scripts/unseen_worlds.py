@@ -1,0 +1,182 @@
+"""Fifty worlds unlike those of any training, drawn once: how do policies do there beside the best scripted controller?
+
+    python scripts/unseen_worlds.py                              generalist, the table of docs/generalist.md
+    python scripts/unseen_worlds.py --policy a.npz,b.npz         other policies
+    python scripts/unseen_worlds.py --draws 1 --horizon 400      a first look
+
+Ten kinds of worlds, five drawn of each by the seed below: directions, shapes, numbers and disturbances that no shipped
+training plan has. Nobody may choose a plan by them; run them once for a plan that is fixed.
+"""
+
+import argparse
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from arguments import whole
+
+from metrics.controllers import PAPER_POLICIES
+from swarm_forage_env.contract.types import FloatArray
+from swarm_forage_env.runs.answer import Sheet
+from swarm_forage_env.runs.plan import Plan
+from swarm_forage_env.runs.policy_spec import PolicySpec, policy_specs
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.training.evaluations import finished_runs
+from swarm_forage_env.wrappers.registry import wrappers_from_mapping
+from swarm_forage_env.wrappers.world import World
+
+DRAWN_BY = 20_261_126
+"""Seed of the worlds; the day on which they were drawn."""
+RUN_SEED = 50_000
+AHEAD = 0.95
+"""Share of the best scripted controller that counts as keeping up with it."""
+Drawn = tuple[str, dict[str, Any], dict[str, Any]]
+"""Preset, fields and wrappers."""
+_SMALL_CACHES = {"side_share": 0.06}
+"""Where caches of the usual size have no room; STOCHM and STOCHX have some."""
+
+
+def places(x_low: float, x_high: float, y_low: float, y_high: float) -> tuple[tuple[float, float], ...]:
+    """Return the middles of all cells in a box."""
+    return tuple((float(x), float(y)) for x in np.arange(x_low, x_high, 0.2) for y in np.arange(y_low, y_high, 0.2))
+
+
+def source_in_the_west(rng: np.random.Generator) -> Drawn:
+    """The small warehouse turned by half."""
+    source = {"placement": "positions", "object_positions_m": places(4.9, 7.8, 2.5, 13.5)}
+    return "warehouse_small", {**source, "nest_centre_m": (28.8, 8.0), "n_robots": int(rng.integers(8, 97))}, {}
+
+
+def source_in_the_south(rng: np.random.Generator) -> Drawn:
+    """The small warehouse turned by a quarter."""
+    source = {"placement": "positions", "object_positions_m": places(2.5, 13.5, 4.9, 7.8)}
+    shape = {"width_m": 16.0, "height_m": 32.0, "nest_centre_m": (8.0, 28.8), "nest_size_m": (12.8, 3.2)}
+    return "warehouse_small", {**source, **shape, "n_robots": int(rng.integers(8, 97))}, {}
+
+
+def corridor(rng: np.random.Generator) -> Drawn:
+    """Longer and narrower than in any training."""
+    height = float(0.2 * rng.integers(30, 38))  # 6 to 7.4 m
+    shape = {"width_m": 52.0, "height_m": height, "nest_centre_m": (5.2, height / 2), "nest_size_m": (5.2, 3.2)}
+    return "warehouse_small", {**shape, **_SMALL_CACHES, "n_objects": 80, "n_robots": int(rng.integers(8, 33))}, {}
+
+
+def few_objects(rng: np.random.Generator) -> Drawn:
+    """A larger hall with fewer objects."""
+    shape = {"width_m": 64.0, "height_m": 64.0, "nest_centre_m": (32.0, 32.0), "nest_size_m": (9.6, 9.6)}
+    numbers = {"n_objects": int(rng.integers(30, 80)), "n_robots": int(rng.integers(16, 65))}
+    return "warehouse_medium", {**shape, **numbers}, {}
+
+
+def far_corner(rng: np.random.Generator) -> Drawn:
+    """A nest in the corner of a larger hall."""
+    x, y = rng.choice([6.0, 58.0]), rng.choice([6.0, 34.0])
+    shape = {"width_m": 64.0, "height_m": 40.0, "nest_centre_m": (float(x), float(y)), "nest_size_m": (7.2, 7.2)}
+    return "warehouse_medium", {**shape, "n_objects": 600, "n_robots": int(rng.integers(32, 97))}, {}
+
+
+def two_nests(rng: np.random.Generator) -> Drawn:
+    """Objects anywhere, and two nests."""
+    x = float(rng.integers(34, 41))
+    fields = {"nest_centre_m": (8.0, 24.0), "nest_size_m": (4.8, 6.4), "further_nests": ((x, 34.0, x + 6.0, 40.0),)}
+    return "warehouse_medium", {**fields, **_SMALL_CACHES, "n_robots": int(rng.integers(32, 97))}, {}
+
+
+def gates(rng: np.random.Generator) -> Drawn:
+    """Two walls with a gate each on the way."""
+    boxes: list[tuple[float, float, float, float]] = []
+    for x in (9.0, 21.0):
+        low = float(rng.integers(3, 8))
+        boxes += [(x, 0.2, x + 0.4, low), (x, low + 5.0, x + 0.4, 15.8)]
+    return "warehouse_small", {"obstacles": tuple(boxes), **_SMALL_CACHES, "n_robots": int(rng.integers(8, 49))}, {}
+
+
+def larger_swarm(rng: np.random.Generator) -> Drawn:
+    """More robots than any training has."""
+    preset = ("warehouse_small", "warehouse_medium", "search_and_rescue")[rng.integers(3)]
+    return preset, {"n_robots": int(rng.integers(112, 257)), **({"side_m": 64.0} if preset[0] == "s" else {})}, {}
+
+
+def late_throttle(rng: np.random.Generator) -> Drawn:
+    """Robots lose half of their speed in the second half of the run."""
+    throttle = {"waveform": "step", "amplitude": float(rng.uniform(0.45, 0.6)), "start_s": 2000.0}
+    return "search_and_rescue", {"n_robots": int(rng.integers(16, 65))}, {"throttle": throttle}
+
+
+def rough_sensing(rng: np.random.Generator) -> Drawn:
+    """More noise than any training has, and deaths."""
+    wrappers = {
+        "sensor_noise": {"sigma": float(rng.uniform(0.04, 0.06))},
+        "actuator_noise": {"sigma": float(rng.uniform(0.12, 0.2))},
+        "population": {"death_per_tick": 0.0005},
+    }
+    return "warehouse_dual", {"n_robots": int(rng.integers(16, 97))}, wrappers
+
+
+KINDS: tuple[Callable[[np.random.Generator], Drawn], ...] = (
+    source_in_the_west,
+    source_in_the_south,
+    corridor,
+    few_objects,
+    far_corner,
+    two_nests,
+    gates,
+    larger_swarm,
+    late_throttle,
+    rough_sensing,
+)
+
+
+def worlds(kind: Callable[[np.random.Generator], Drawn], n_draws: int, horizon_s: float) -> list[World]:
+    """Return worlds of a kind; the first are the same, however many are drawn."""
+    rng = np.random.default_rng((DRAWN_BY, KINDS.index(kind)))
+    drawn = [kind(rng) for _ in range(n_draws)]
+    return [
+        World(scenario(preset, physics="compiled", horizon_s=horizon_s, **fields), wrappers_from_mapping(wrappers))
+        for preset, fields, wrappers in drawn
+    ]
+
+
+def shares(asked: Sequence[PolicySpec], there: Sequence[World], jobs: int) -> FloatArray:
+    """Return performance as a share of the best scripted controller, (policies, worlds).
+
+    Where no scripted controller brings anything home, it is 1 for a policy that does not, either, else infinite.
+    """
+    scripted = policy_specs(list(PAPER_POLICIES))
+    every = {policy.label: policy for policy in (*scripted, *asked)}
+    table = finished_runs(Plan.product(every.values(), there, (RUN_SEED,)), jobs=jobs)
+    means = {
+        label: np.array([record.performance.mean() for one in table.plan.of_policy(label) for record in table.of(one)])
+        for label in every
+    }
+    best = np.max([means[policy.label] for policy in scripted], axis=0)
+    own = np.array([means[policy.label] for policy in asked])
+    return np.divide(own, best, out=np.where(own > 0.0, np.inf, 1.0), where=best > 0.0)
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--policy", default="generalist", help="names or files, separated by commas")
+    parser.add_argument("--draws", type=whole(at_least=1), default=5, help="worlds of each kind (default: 5)")
+    parser.add_argument("--horizon", type=float, default=4000.0, help="seconds of a run (default: 4000)")
+    parser.add_argument("--jobs", type=whole(at_least=1), default=1, help="processes (default: 1)")
+    words = parser.parse_args()
+    asked = policy_specs(words.policy.split(","))
+    of_kinds = [shares(asked, worlds(kind, words.draws, words.horizon), words.jobs) for kind in KINDS]
+    rows = [
+        (kind.__name__.replace("_", " "), *(f"{one.min():.2f} to {one.max():.2f}" for one in found))
+        for kind, found in zip(KINDS, of_kinds, strict=True)
+    ]
+    joined = np.concatenate(of_kinds, axis=1)
+    rows += [
+        (f"worlds with at least {AHEAD:g}", *(f"{np.count_nonzero(one >= AHEAD)} of {one.size}" for one in joined)),
+        ("better than all four", *(f"{np.count_nonzero(one > 1.0)} of {one.size}" for one in joined)),
+        ("median", *(f"{np.median(one):.2f}" for one in joined)),
+    ]
+    title = f"Performance as a share of the best scripted controller, {words.horizon:,.0f} s, one run of each"
+    print(Sheet(title=title, header=("worlds", *(policy.label for policy in asked)), rows=rows, notes=[]).text())
+
+
+if __name__ == "__main__":
+    main()
