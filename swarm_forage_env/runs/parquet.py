@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from swarm_forage_env._internal.wording import shown
 
@@ -48,7 +48,7 @@ _TYPE: _Layout = {
     8: _UNIT,
     10: {1: _BYTE, 2: _TRUTH},
 }
-_STATISTICS: _Layout = {**dict.fromkeys((1, 2, 5, 6), _TEXT), 3: _WHOLE, 4: _WHOLE, 7: _TRUTH, 8: _TRUTH}
+_STATISTICS: _Layout = {**dict.fromkeys((1, 2, 5, 6), _TEXT), **dict.fromkeys((3, 4, 9), _WHOLE), 7: _TRUTH, 8: _TRUTH}
 _PAGE: _Structure = {
     **dict.fromkeys((1, 2, 3, 4), _WHOLE),
     5: {**dict.fromkeys((1, 2, 3, 4), _WHOLE), 5: _STATISTICS},
@@ -79,7 +79,7 @@ _FOOTER: _Structure = {
     4: [_GROUP],
     5: [_PAIR],
     6: _TEXT,
-    7: [{1: {}}],
+    7: [{1: {}, 2: {}}],
 }
 
 
@@ -105,7 +105,7 @@ class ParquetFile:
         import polars as pl
 
         try:
-            with _panics_untold():
+            with panics_untold():
                 return pl.read_parquet(BytesIO(self.content), use_pyarrow=False)
         except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
             raise _damaged(error) from error
@@ -128,8 +128,14 @@ def open_parquet(path: Path, most_bytes: int) -> ParquetFile:
     return parse_parquet(path.read_bytes(), most_bytes)
 
 
-def parse_parquet(content: bytes, most_bytes: int) -> ParquetFile:
+def parse_parquet(content: bytes, most_bytes: int, *, ours: bool = True) -> ParquetFile:
     """Read the footer of a file's content, and the heads of its pages; see `open_parquet`.
+
+    Args:
+        content: Of the file.
+        most_bytes: As in `open_parquet`.
+        ours: Whether we wrote it. Files of other programs may have any encoding, and columns of lists and tables; texts
+            in such encodings may unpack to more.
 
     Raises:
         ParquetError: it is no Parquet file of so many bytes.
@@ -141,13 +147,16 @@ def parse_parquet(content: bytes, most_bytes: int) -> ParquetFile:
     try:
         footer = _footer(content)
         n_rows, columns = footer[3], footer[2][1:]  # the first entry is the table itself
-        if any(5 in column for column in columns):
+        is_flat = not any(5 in column for column in columns)
+        if ours and not is_flat:
             raise ParquetError("it has columns of lists or tables, which swarm_forage_env writes none of")
-        n_columns = len(columns)
+        n_columns = sum(5 not in column for column in columns)
         stamp = {pair[1].decode(): pair.get(2, b"").decode() for pair in footer.get(5, ())}
-        if n_rows * n_columns * _BYTES_PER_VALUE > most_bytes:
-            raise ParquetError(f"it has {n_rows:,} rows of {n_columns:,} columns, more than are expected")
-        unpacked = sum(_unpacked(content, group, n_columns) for group in footer[4])
+        check_size(n_rows, n_columns, most_bytes)
+        pages = [page for group in footer[4] for page in _pages(content, group, n_columns, is_flat=is_flat)]
+        if ours and not all(page.encoding in _ENCODINGS for page in pages):
+            raise ParquetError("its values are encoded in a way in which swarm_forage_env writes none")
+        unpacked = sum(max(page.n_bytes, page.n_values * (0 if is_flat else _BYTES_PER_VALUE)) for page in pages)
         if sum(group[3] for group in footer[4]) != n_rows:
             raise _damaged("its row groups have other rows than it says")
     except _BROKEN as error:
@@ -155,6 +164,12 @@ def parse_parquet(content: bytes, most_bytes: int) -> ParquetFile:
     if unpacked > most_bytes:
         raise ParquetError(f"it has {unpacked:,} bytes unpacked, but at most {most_bytes:,} are expected")
     return ParquetFile(content=content, stamp=stamp, n_rows=n_rows)
+
+
+def check_size(n_rows: int, n_columns: int, most_bytes: int) -> None:
+    """Refuse a table whose values alone would have more bytes than they may; see `open_parquet`."""
+    if n_rows * n_columns * _BYTES_PER_VALUE > most_bytes:
+        raise ParquetError(f"it has {n_rows:,} rows of {n_columns:,} columns, more than are expected")
 
 
 def check_columns(
@@ -193,7 +208,7 @@ def check_texts(frame: "pl.DataFrame", most_bytes: int) -> None:
 
 
 @contextmanager
-def _panics_untold() -> Iterator[None]:
+def panics_untold() -> Iterator[None]:
     """Keep what polars says of a panic from stderr, where it would stand for dozens of lines; it raises it as well.
 
     Polars writes past `sys.stderr`, so stderr is another for the whole process: what other threads write there
@@ -226,11 +241,20 @@ def _footer(content: bytes) -> dict[int, Any]:
     return _Thrift(content, len(content) - 8 - length).structure(_FOOTER)
 
 
-def _unpacked(content: bytes, group: Mapping[int, Any], n_columns: int) -> int:
-    """Return how many bytes the pages of a row group unpack to."""
+class _Page(NamedTuple):
+    """What the head of a page says."""
+
+    n_bytes: int
+    """Unpacked."""
+    n_values: int
+    """Of rows; those of a dictionary are not."""
+    encoding: int
+
+
+def _pages(content: bytes, group: Mapping[int, Any], n_columns: int, *, is_flat: bool) -> Iterator[_Page]:
+    """Yield the pages of a row group; with flat columns, each has as many values as rows."""
     if len(group[1]) != n_columns:
         raise _damaged("a row group has other columns than the table")
-    total = 0
     for chunk in group[1]:
         about = chunk[3]
         start = about.get(11, about[9])  # polars begins at the dictionary, wherever it lies
@@ -242,31 +266,31 @@ def _unpacked(content: bytes, group: Mapping[int, Any], n_columns: int) -> int:
         n_values = 0
         while start < end:
             reader = _Thrift(content, start)
-            page = reader.structure(_PAGE)
-            start = reader.at + page[3]
-            if page[2] < 0 or page[3] < 0:
+            head = reader.structure(_PAGE)
+            start = reader.at + head[3]
+            if head[2] < 0 or head[3] < 0:
                 raise _damaged("a page has less than no bytes")
-            total += page[2]
-            n_values += _values_in(page)
+            page = _page(head)
+            n_values += page.n_values
+            yield page
         if start != end:
             raise _damaged("the pages of a column end elsewhere than it says")
-        if n_values != about[5] or n_values != group[3]:
+        if n_values != about[5] or (is_flat and n_values != group[3]):
             raise _damaged("the pages of a column have other rows than its table")
-    return total
 
 
-def _values_in(page: Mapping[int, Any]) -> int:
-    """Return how many values of rows a page has; those of a dictionary are not of rows."""
-    if page[1] == _DICTIONARY_PAGE:
-        head, values = page[7], 0
-    elif page[1] in (_DATA_PAGE, _DATA_PAGE_V2):
-        head = page[5 if page[1] == _DATA_PAGE else 8]
-        values = head[1]
-    else:
-        raise _damaged(f"a page of kind {page[1]}")
-    if head[2 if page[1] != _DATA_PAGE_V2 else 4] not in _ENCODINGS or head[1] < 0:
-        raise ParquetError("its values are encoded in a way in which swarm_forage_env writes none")
-    return values
+def _page(head: Mapping[int, Any]) -> _Page:
+    """Return what the head of a page says, where polars can take memory for it."""
+    kind, n_bytes = head[1], head[2]
+    if kind not in (_DICTIONARY_PAGE, _DATA_PAGE, _DATA_PAGE_V2):
+        raise _damaged(f"a page of kind {kind}")
+    about = head[{_DICTIONARY_PAGE: 7, _DATA_PAGE: 5, _DATA_PAGE_V2: 8}[kind]]
+    if about[1] < 0 or (kind == _DICTIONARY_PAGE and about[1] > n_bytes):
+        raise _damaged("a page has other values than its bytes can hold")
+    if kind == _DATA_PAGE_V2 and (min(about[2], about[3], about[5], about[6]) < 0 or about[5] + about[6] > n_bytes):
+        raise _damaged("a page has other levels than its bytes can hold")
+    n_values = 0 if kind == _DICTIONARY_PAGE else about[1]
+    return _Page(n_bytes, n_values, about[4 if kind == _DATA_PAGE_V2 else 2])
 
 
 class _Thrift:

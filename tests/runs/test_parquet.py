@@ -4,13 +4,14 @@ import json
 import os
 import struct
 import tracemalloc
+from io import BytesIO
 from pathlib import Path
 
 import polars as pl
 import pytest
 
 from swarm_forage_env.runs import parquet
-from swarm_forage_env.runs.parquet import ParquetError, check_texts, open_parquet
+from swarm_forage_env.runs.parquet import ParquetError, check_texts, open_parquet, parse_parquet
 from swarm_forage_env.runs.record import RecordError, RunRecord, is_record
 from tests.support.forged import forge_record
 
@@ -53,14 +54,40 @@ def test_a_text_in_many_rows_is_refused_before_it_is_written_out(tmp_path):
     check_texts(pl.DataFrame({"a": [1]}), 0)
 
 
-def test_lists_and_other_encodings_are_refused(tmp_path):
+def test_lists_and_other_encodings_are_refused(tmp_path, monkeypatch):
     pl.DataFrame({"a": [[1, 2]]}).write_parquet(tmp_path / "lists.parquet")
     with pytest.raises(ParquetError, match="columns of lists"):
         open_parquet(tmp_path / "lists.parquet", 2**20)
+    monkeypatch.setattr(parquet, "_ENCODINGS", frozenset((7,)))
     with pytest.raises(ParquetError, match="encoded in a way"):
-        parquet._values_in({1: 0, 5: {1: 3, 2: 7}})
-    with pytest.raises(ParquetError, match="kind 9"):
-        parquet._values_in({1: 9})
+        open_parquet(SOURCE, 2**28)
+
+
+@pytest.mark.parametrize(
+    ("head", "told"),
+    [
+        ({1: 9, 2: 5}, "kind 9"),
+        ({1: 0, 2: 5, 5: {1: -1, 2: 0}}, "other values"),
+        ({1: 2, 2: 5, 7: {1: 6, 2: 0}}, "other values"),
+        ({1: 3, 2: 5, 8: {1: 3, 2: 0, 3: 3, 4: 0, 5: 4, 6: 2}}, "other levels"),
+        ({1: 3, 2: 5, 8: {1: 3, 2: 0, 3: 3, 4: 0, 5: -1, 6: 2}}, "other levels"),
+    ],
+)
+def test_a_page_that_says_what_cannot_be_is_refused(head, told):
+    with pytest.raises(ParquetError, match=told):
+        parquet._page(head)
+
+
+def test_files_of_other_programs_may_have_lists_and_other_encodings(monkeypatch):
+    content = BytesIO()
+    frame = pl.DataFrame({"a": [[1, 2], None, []] * 100, "b": [{"c": "x"}, {"c": None}, None] * 100, "d": range(300)})
+    frame.write_parquet(content)
+    with pytest.raises(ParquetError, match="columns of lists"):
+        parse_parquet(content.getvalue(), 2**20)
+    monkeypatch.setattr(parquet, "_ENCODINGS", frozenset((7,)))
+    assert parse_parquet(content.getvalue(), 2**20, ours=False).frame().equals(frame)
+    with pytest.raises(ParquetError, match="unpacked"):
+        parse_parquet(content.getvalue(), 300 * 3 * 16, ours=False)
 
 
 def test_a_dictionary_behind_the_values_is_refused(tmp_path):
@@ -179,7 +206,7 @@ def test_reading_leaves_no_file_open_though_there_is_no_stderr(monkeypatch, name
     before = next_number()
     with monkeypatch.context() as patch:
         patch.setattr(parquet.os, name, refuse, raising=False)
-        with parquet._panics_untold():
+        with parquet.panics_untold():
             pass
     assert next_number() == before
 

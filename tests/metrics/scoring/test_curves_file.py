@@ -288,3 +288,17 @@ def test_categories_are_texts(tmp_path):
     named = CROWDING.with_columns(pl.lit("crowd", dtype=pl.Categorical).alias("controller"))
     (scored,) = score_curves(written(named, tmp_path / "named.parquet"))
     assert scored.policy == "crowd"
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_no_changed_byte_leads_to_another_error_or_to_a_word_on_stderr(tmp_path, capfd, suffix):
+    path = written(CROWDING, tmp_path / f"curves{suffix}")
+    content, told = path.read_bytes(), list[str]()
+    for at in range(12, len(content), 14):  # the byte 54 would end this process
+        path.write_bytes(content[:at] + bytes((content[at] ^ 0x55,)) + content[at + 1 :])
+        try:
+            score_curves(path)
+        except CurveError as error:
+            told.append(str(error))
+    assert [text for text in told if len(text.splitlines()) > 1] == []
+    assert capfd.readouterr().err == ""
