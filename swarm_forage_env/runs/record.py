@@ -21,7 +21,14 @@ from swarm_forage_env._internal.fields import number, table, text, whole
 from swarm_forage_env._internal.files import parse_json, replacing
 from swarm_forage_env.contract.types import FloatArray, IntArray
 from swarm_forage_env.runs.answer import Sheet
-from swarm_forage_env.runs.parquet import ParquetError, check_columns, check_texts, open_parquet
+from swarm_forage_env.runs.parquet import (
+    ParquetError,
+    check_columns,
+    check_size,
+    check_texts,
+    open_parquet,
+    parse_parquet,
+)
 from swarm_forage_env.runs.versions import identity
 from swarm_forage_env.scenarios.columns import ALL_COLUMNS, INTERVAL_COLUMNS, KEY_COLUMNS
 from swarm_forage_env.scenarios.performance import performance_curve
@@ -196,14 +203,25 @@ class RunRecord:
 
         Args:
             path: File to create or replace; its folder must exist.
+
+        Raises:
+            RecordError: it is larger than what `read` reads.
+            OSError: the file cannot be written.
         """
         provenance = json.dumps(dict(self.provenance), sort_keys=True)
         values = (str(SCHEMA_VERSION), self.spec, provenance, _digest(self, provenance))
+        frame = self.to_frame()
         with replacing(Path(path)) as draft:
             # By way of memory: polars tells a full disk as an error of its own, among many others.
-            content = BytesIO()
-            self.to_frame().write_parquet(content, metadata=dict(zip(_FILE_KEYS, values, strict=True)))
-            draft.write_bytes(content.getvalue())
+            buffer = BytesIO()
+            frame.write_parquet(buffer, metadata=dict(zip(_FILE_KEYS, values, strict=True)))
+            content = buffer.getvalue()
+            try:
+                check_texts(frame, MOST_BYTES)
+                parse_parquet(content, MOST_BYTES)
+            except ParquetError as error:
+                raise _too_large(self.run_id, error) from error
+            draft.write_bytes(content)
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> "RunRecord":
@@ -236,6 +254,22 @@ class RunRecord:
         if _digest(record, provenance) != digest:
             raise RecordError(f"Cannot read {name}: its content does not match its digest, so the file is damaged.")
         return record
+
+
+def check_intervals(run_id: str, n_intervals: int) -> None:
+    """Refuse a run of more intervals than any record has, before it is made.
+
+    Raises:
+        RecordError: its record would be larger than what `RunRecord.read` reads.
+    """
+    try:
+        check_size(n_intervals, len(RunRecord.column_names()), MOST_BYTES)
+    except ParquetError as error:
+        raise _too_large(run_id, error) from error
+
+
+def _too_large(run_id: str, why: ParquetError) -> RecordError:
+    return RecordError(f"Cannot store run {run_id}: {why}; choose longer intervals (interval_s).")
 
 
 def is_record(path: str | os.PathLike[str]) -> bool:

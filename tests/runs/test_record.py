@@ -188,6 +188,17 @@ def test_a_failed_write_leaves_the_old_file_and_no_litter(record, file, monkeypa
     assert RunRecord.read(file).same_results(record)
 
 
+@pytest.mark.parametrize(("most", "told"), [(100, "its texts have more"), (1000, "bytes, but at most 1,000")])
+def test_what_would_not_be_read_again_is_not_written(record, file, monkeypatch, most, told):
+    before = file.read_bytes()
+    monkeypatch.setattr(recording, "MOST_BYTES", most)
+    with pytest.raises(RecordError, match=rf"Cannot store run {record.run_id}: .*{told}.*; choose longer intervals"):
+        record.write(file)
+    assert {path: path.read_bytes() for path in file.parent.iterdir()} == {file: before}
+    with pytest.raises(RecordError):
+        RunRecord.read(file)
+
+
 @pytest.mark.parametrize("column", ["collected", "performance"])
 @pytest.mark.parametrize("values", [[1.0, 2.0], [1.0, 2.0, np.nan], [1.0, 2.0, np.inf]], ids=["short", "nan", "inf"])
 def test_impossible_columns_are_refused(record, column, values):
