@@ -6,9 +6,10 @@
 
 commands   malformed words and files. A command may end with an exit code that is documented and with one line on
            stderr; a traceback, another exit code or one that takes too long is a fault. Nothing is run, only begun.
-files      valid files of every format, changed by field or by byte, each given to the command that reads it. Likewise;
-           and nothing may be written but into the current folder, or ask for more memory than there is. --format
-           takes those of one format, such as packed.
+files      valid files of every format, changed by field or by byte. Most go to the reader of their format: it returns
+           or raises an error that it documents, takes little memory, and writes nothing, not even a word on stderr.
+           Every 200th goes to a command, as above, which writes into the current folder alone. A case that ends the
+           process is a fault, and another process goes on. --format takes files of one format, such as packed.
 worlds     scenarios, wrappers, actions, wrong calls and snapshots. Walls, objects, observations, rewards, agents and
            records are looked at after every tick, and each run is made twice.
 kills      run, score, compare, train and study run: killed at a random moment and given again, until what they
@@ -19,8 +20,9 @@ signals    Ctrl-C or SIGTERM at a random moment of any command, also while it st
            line, and no half file.
 
 The same number makes the same case again; of the last three, what the machine had done by then may differ. The last
-line holds figures, also after Ctrl-C; --note keeps them in docs/promises.md. In tests/support, malformed.py,
-changed_files.py, random_worlds.py, kills.py and pairs.py say what a case is.
+line holds figures, also after Ctrl-C; --note keeps them in docs/promises.md, and adds them to those of a campaign that
+ended where this one begins. In tests/support, malformed.py, changed_files.py, random_worlds.py, kills.py and pairs.py
+say what a case is.
 """
 
 import argparse
@@ -28,7 +30,6 @@ import os
 import re
 import resource
 import shlex
-import shutil
 import signal
 import sys
 import tempfile
@@ -38,8 +39,10 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from functools import partial
 from importlib.util import find_spec
+from itertools import count as numbers_from
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from pathlib import Path
 from random import Random
 
@@ -54,6 +57,10 @@ LIMIT_S = 120
 """A command that only begins takes a second; our choice for a machine that does other work, too."""
 MEMORY_BYTES = 12 * 2**30
 """Address space while commands are given: one that asks for more fails here and not the machine."""
+MOST_SILENT_S = LIMIT_S + 60.0
+"""Until a process that makes cases, and tells nothing of any, is ended: a library may not listen to Python's clock."""
+IN_MEMORY = Path("/dev/shm")
+"""Where files of cases lie, if there is such a place: disks are slower than all else."""
 
 
 class TooLongError(Exception):
@@ -66,9 +73,8 @@ class Campaign:
 
     kind: str
     first: int
-    case: Callable[[int, Path], tuple[Counter[str], str]]
-    options: str = ""
-    """Further words of its command."""
+    chosen: str = ""
+    """The one format of files; empty for all."""
     n_cases: int = 0
     n_faults: int = 0
     figures: Counter[str] = field(default_factory=Counter)
@@ -78,6 +84,32 @@ class Campaign:
         """Handle Ctrl-C. A command that is tried may turn it into an exit code of its own, so it is noted, too."""
         self.is_stopped = True
         raise KeyboardInterrupt
+
+    @property
+    def options(self) -> str:
+        """Further words of its command."""
+        return f" --format {self.chosen}" if self.chosen else ""
+
+    @property
+    def number(self) -> int:
+        """Number of the next case."""
+        return self.first + self.n_cases
+
+    def goes_on(self, ends: float, count: int | None) -> bool:
+        """Return whether there is time for another case, of so many."""
+        return time.monotonic() < ends and (count is None or self.n_cases < count)
+
+    def take(self, figures: Counter[str], fault: str) -> None:
+        """Count the next case, and show its fault."""
+        if self.is_stopped:
+            raise KeyboardInterrupt
+        number = self.number
+        self.figures += figures
+        self.n_cases += 1
+        if fault:
+            self.n_faults += 1
+            words = f"scripts/fuzz {self.kind} --first {number} --count 1{self.options}"
+            print(f"--- {words}\n{fault}", flush=True)
 
     def told(self) -> str:
         """Figures of the cases."""
@@ -118,22 +150,15 @@ def one_kill(number: int, folder: Path) -> tuple[Counter[str], str]:
 
 
 def one_file(number: int, folder: Path, chosen: str = "") -> tuple[Counter[str], str]:
-    """Give a changed file to the command that reads it; returns figures, and the fault or nothing."""
-    from tests.support.changed_files import FORMATS, changed_file, what_is_wrong
+    """Give a changed file to what reads it; returns figures, and the fault or nothing."""
+    from tests.support.changed_files import EVERY, drawn_format, give
 
     random = Random(number)
-    kind = random.choice(tuple(FORMATS))
-    here = folder / "here"
-    shutil.rmtree(here, ignore_errors=True)
-    here.mkdir()
-    os.chdir(here)
+    drawn = drawn_format(random)
     signal.alarm(LIMIT_S)
-    words = changed_file(random, folder, chosen or kind)
-    code, fault = what_is_wrong(words, folder)
+    outcome, fault = give(random, folder, chosen or drawn, to_a_command=number % EVERY == 0)
     signal.alarm(0)
-    if fault:
-        return Counter(), f"{shlex.join(words)[:2000]}\n{fault}"
-    return Counter({f"ended with exit code {code}": 1}), ""
+    return Counter({outcome: 1, f"of {chosen or drawn}": 1}), fault
 
 
 def one_pair(number: int, folder: Path) -> tuple[Counter[str], str]:
@@ -152,6 +177,10 @@ def one_signal(number: int, folder: Path) -> tuple[Counter[str], str]:
     return seen.figures, seen.fault
 
 
+OF_STRANGERS = ("commands", "files")
+"""Kinds whose cases are made in a process of their own, which they may end."""
+ERRORS = "stderr.txt"
+"""In the folder: what such a process wrote to stderr."""
 KINDS: dict[str, Callable[[int, Path], tuple[Counter[str], str]]] = {
     "commands": one_command,
     "files": one_file,
@@ -174,13 +203,12 @@ def main(words: Sequence[str] | None = None) -> int:
     given = parser.parse_args(words)
     if find_spec("pytest") is None:
         parser.error("expected pytest, with which cases are checked: pip install -e '.[test]'")
-    case = KINDS[given.kind]
     if given.format:
         _check_format(parser, given)
-        case = partial(one_file, chosen=given.format)
-    campaign = Campaign(given.kind, given.first, case, options=f" --format {given.format}" if given.format else "")
-    with _bounded(campaign) as folder, suppress(KeyboardInterrupt):
-        _go_on(campaign, folder, time.monotonic() + 60.0 * given.minutes, given.count)
+    campaign = Campaign(given.kind, given.first, given.format)
+    with _listening(campaign) as folder, suppress(KeyboardInterrupt):
+        ends = time.monotonic() + 60.0 * given.minutes
+        (_go_on_elsewhere if given.kind in OF_STRANGERS else _go_on)(campaign, folder, ends, given.count)
     if campaign.is_stopped:
         print("Stopped by Ctrl-C.")
     print(campaign.last_line())
@@ -197,55 +225,94 @@ def _check_format(parser: argparse.ArgumentParser, given: argparse.Namespace) ->
 
 
 @contextmanager
-def _bounded(campaign: Campaign) -> Iterator[Path]:
-    """Work in an empty folder that is removed, with Ctrl-C told to the campaign, and commands held within bounds."""
-    place, memory = Path.cwd(), resource.getrlimit(resource.RLIMIT_AS)
-    handlers = {signal.SIGINT: campaign.stop, signal.SIGALRM: _too_long}
-    before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
-    if campaign.kind in ("commands", "files"):
-        resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, memory[1]))
+def _listening(campaign: Campaign) -> Iterator[Path]:
+    """Work in an empty folder that is removed, with Ctrl-C told to the campaign."""
+    place, before = Path.cwd(), signal.signal(signal.SIGINT, campaign.stop)
+    in_memory = IN_MEMORY if campaign.kind in OF_STRANGERS and os.access(IN_MEMORY, os.W_OK) else None
     try:
-        with tempfile.TemporaryDirectory() as folder:
+        with tempfile.TemporaryDirectory(dir=in_memory) as folder:
             os.chdir(folder)
             try:
                 yield Path(folder)
             finally:
                 os.chdir(place)
     finally:
-        resource.setrlimit(resource.RLIMIT_AS, memory)
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        signal.signal(signal.SIGINT, before)
 
 
 def _go_on(campaign: Campaign, folder: Path, ends: float, count: int | None) -> None:
     """Try one case after the other."""
-    while time.monotonic() < ends and (count is None or campaign.n_cases < count):
-        number = campaign.first + campaign.n_cases
-        figures, fault = campaign.case(number, folder)
-        if campaign.is_stopped:
-            raise KeyboardInterrupt
-        campaign.figures += figures
-        campaign.n_cases += 1
-        if fault:
-            campaign.n_faults += 1
-            words = f"scripts/fuzz {campaign.kind} --first {number} --count 1{campaign.options}"
-            print(f"--- {words}\n{fault}", flush=True)
+    while campaign.goes_on(ends, count):
+        campaign.take(*KINDS[campaign.kind](campaign.number, folder))
+
+
+def _go_on_elsewhere(campaign: Campaign, folder: Path, ends: float, count: int | None) -> None:
+    """Try one case after the other in another process; where a case ends it, a further one goes on behind that."""
+    while campaign.goes_on(ends, count):
+        receiver, sender = get_context("spawn").Pipe(duplex=False)
+        about = (campaign.kind, campaign.chosen, campaign.number, folder, sender)
+        process = get_context("spawn").Process(target=_make_cases, args=about, daemon=True)
+        process.start()
+        sender.close()
+        try:
+            while campaign.goes_on(ends, count):
+                if not receiver.poll(MOST_SILENT_S):
+                    campaign.take(Counter(), f"told nothing for {MOST_SILENT_S:g} s")
+                    break
+                campaign.take(*receiver.recv())
+        except EOFError:
+            process.join()
+            errors = (folder / ERRORS).read_text(encoding="utf-8", errors="replace")
+            campaign.take(Counter(), f"ended the process, with exit code {process.exitcode}\n{errors[-2000:]}")
+        finally:
+            process.kill()
+            process.join()
+
+
+def _make_cases(kind: str, chosen: str, first: int, folder: Path, sender: Connection) -> None:
+    """Make cases within bounds, and send what came of each; their stderr goes to a file."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started this process hears it, and ends it
+    signal.signal(signal.SIGALRM, _too_long)
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, resource.getrlimit(resource.RLIMIT_AS)[1]))
+    os.dup2(os.open(folder / ERRORS, os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND), 2)
+    os.chdir(folder)
+    with suppress(BrokenPipeError):
+        for number in numbers_from(first):
+            sender.send(one_file(number, folder, chosen) if chosen else KINDS[kind](number, folder))
 
 
 def note(campaign: Campaign) -> None:
-    """Put the figures of a campaign into the page; the rows of other kinds stay."""
-    command = f"`scripts/fuzz {campaign.kind} --first {campaign.first} --count {campaign.n_cases}{campaign.options}`"
-    today = f"{datetime.now(UTC):%Y-%m-%d}"
-    row = [f"{campaign.n_cases:,}", f"{campaign.n_faults:,}", campaign.told(), today, command]
+    """Put the figures of a campaign into the page, with those of the one that it goes on; other kinds stay."""
     text = PAGE.read_text(encoding="utf-8")
     found = BLOCK.search(text)
     if found is None:
         raise ValueError(f"Expected the marks of a table by scripts/fuzz in {PAGE}, found none.")
     cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in found[0].splitlines()]
-    rows = {line[0]: line[1:] for line in cells if line[0] in KINDS} | {campaign.kind: row}
+    rows = {line[0]: line[1:] for line in cells if line[0] in KINDS}
+    whole = _joined(campaign, rows.get(campaign.kind))
+    command = f"`scripts/fuzz {whole.kind} --first {whole.first} --count {whole.n_cases}{whole.options}`"
+    today = f"{datetime.now(UTC):%Y-%m-%d}"
+    rows[whole.kind] = [f"{whole.n_cases:,}", f"{whole.n_faults:,}", whole.told(), today, command]
     lines = [HEADINGS, ["---"] * len(HEADINGS), *([kind, *rows[kind]] for kind in KINDS if kind in rows)]
     table = "\n".join(f"| {' | '.join(line)} |" for line in lines)
     PAGE.write_text(BLOCK.sub(lambda kept: f"{kept[1]}{table}\n{kept[2]}", text), encoding="utf-8")
+
+
+def _joined(campaign: Campaign, row: Sequence[str] | None) -> Campaign:
+    """Return a campaign with what its row in the page has, where it goes on behind that; else the campaign."""
+    found = re.search(r"--first (\d+) --count (\d+)(.*)`", row[-1]) if row else None
+    if row is None or found is None or found[3] != campaign.options:
+        return campaign
+    first, n_cases = int(found[1]), int(found[2])
+    if first + n_cases != campaign.first:
+        return campaign
+    n_faults, told = int(row[1].replace(",", "")), re.findall(r"(\d[\d,]*) (.+?)(?:, (?=\d)|$)", row[2])
+    figures = Counter({name: int(number.replace(",", "")) for number, name in told})
+    joined = Campaign(campaign.kind, first, campaign.chosen, n_cases, n_faults, figures)
+    joined.n_cases += campaign.n_cases
+    joined.n_faults += campaign.n_faults
+    joined.figures += campaign.figures
+    return joined
 
 
 def _too_long(*_: object) -> None:

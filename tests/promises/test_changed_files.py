@@ -1,20 +1,73 @@
-"""Changed files of every format end in one line and a documented exit code; `scripts/fuzz files` gives many more."""
+"""Changed files of every format are read or refused in one line; `scripts/fuzz files` gives many more."""
 
+import os
+import warnings
+from dataclasses import replace
+from pathlib import Path
 from random import Random
 
 import pytest
 
-from tests.support.changed_files import FORMATS, changed_file, what_is_wrong
+from metrics.benchmark import BenchmarkError
+from tests.support import changed_files
+from tests.support.changed_files import FORMATS, give
+
+
+@pytest.fixture(autouse=True)
+def place(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
 
 
 @pytest.mark.filterwarnings("default")  # what a library warns of is no error of a command
 @pytest.mark.parametrize("kind", FORMATS)
-def test_any_changed_file_ends_in_one_line(kind, tmp_path, monkeypatch):
-    here = tmp_path / "here"
-    here.mkdir()
-    monkeypatch.chdir(here)
-    for number in range(4):
-        words = changed_file(Random(number), tmp_path, kind)
-        code, fault = what_is_wrong(words, tmp_path)
-        assert not fault, f"{words}\n{fault}"
-        assert code in (0, 1, 2)
+def test_any_changed_file_is_read_or_refused_in_one_line(kind, tmp_path, capfd):
+    for number in range(12):
+        told, fault = give(Random(number), tmp_path, kind, to_a_command=number % 4 == 0)
+        assert not fault
+        assert told.startswith(("accepted", "refused", "ended with exit code"))
+
+
+def nothing(file: Path) -> None:
+    """A reader without faults."""
+
+
+def panic(file: Path) -> None:
+    raise BaseException("a panic")
+
+
+def say_nothing(file: Path) -> None:
+    raise BenchmarkError
+
+
+FAULTS = {
+    "ValueError": lambda file: int("x"),
+    "a panic": panic,
+    "says nothing": say_nothing,
+    "on stderr": lambda file: os.write(2, b"on stderr"),
+    "wrote into the current folder": lambda file: Path("left").touch(),
+    "wrote left": lambda file: Path("../left").touch(),
+    "of a library": lambda file: warnings.warn("of a library", RuntimeWarning, stacklevel=1),
+    "bytes of memory": lambda file: bytearray(b"x") * 1000,
+}
+"""What a fault says -> a reader that has it."""
+
+
+@pytest.mark.parametrize("told", FAULTS)
+def test_a_fault_of_a_reader_is_told(told, tmp_path, monkeypatch, capfd):
+    reader = FORMATS["entry"]
+    monkeypatch.setattr(changed_files, "MOST_GROWN", -1 if told == "bytes of memory" else 2**40)
+    monkeypatch.setitem(FORMATS, "entry", replace(reader, read=nothing))
+    if told != "bytes of memory":
+        assert give(Random(1), tmp_path, "entry", to_a_command=False) == ("accepted", "")
+    monkeypatch.setitem(FORMATS, "entry", replace(reader, read=FAULTS[told]))
+    assert told in give(Random(1), tmp_path, "entry", to_a_command=False)[1]
+
+
+def test_what_a_reader_documents_is_no_fault(tmp_path, monkeypatch):
+    reader = FORMATS["entry"]
+
+    def refuse(file):
+        raise BenchmarkError("not this one")
+
+    monkeypatch.setitem(FORMATS, "entry", replace(reader, read=refuse))
+    assert give(Random(1), tmp_path, "entry", to_a_command=False) == ("refused", "")
