@@ -2,6 +2,7 @@
 
 import os
 import signal
+import time
 from collections import Counter
 
 import pytest
@@ -63,10 +64,51 @@ def test_figures_come_into_the_page_and_those_of_other_kinds_stay(page, monkeypa
     assert len(lines) == 10
 
 
+def test_figures_of_a_campaign_that_goes_on_are_added(page, monkeypatch):
+    of_worlds(monkeypatch, lambda number, folder: (Counter({"robot-ticks": 1000, "of a kind": 1}), ""))
+    for words in ("--first 5 --count 2", "--first 7 --count 3", "--first 10 --count 1"):
+        fuzz.main(["worlds", *words.split(), "--note"])
+    row = page.read_text().splitlines()[5]
+    assert row.startswith("| worlds | 6 | 0 | 6 of a kind, 6,000 robot-ticks | 2")
+    assert row.endswith("| `scripts/fuzz worlds --first 5 --count 6` |")
+    campaign = fuzz.Campaign("worlds", 11, n_cases=1, n_faults=1)
+    assert (
+        fuzz._joined(campaign, ["6", "0", "6,000 robot-ticks", "", "`scripts/fuzz worlds --first 5 --count 6 --x`"])
+        is campaign
+    )
+    assert (
+        fuzz._joined(campaign, ["6", "0", "6,000 robot-ticks", "", "`scripts/fuzz worlds --first 5 --count 5`"])
+        is campaign
+    )
+
+
+def end_of_a_process(kind, chosen, first, folder, sender):
+    """Cases of which every second one ends the process, but for the last, which says nothing."""
+    (folder / fuzz.ERRORS).write_text("out of memory")
+    sender.send((Counter(fine=1), ""))
+    if first < 4:
+        os._exit(5)
+    time.sleep(60)
+
+
+def test_cases_go_on_behind_one_that_ends_the_process_or_hangs(monkeypatch, capsys):
+    monkeypatch.setattr(fuzz, "_make_cases", end_of_a_process)
+    monkeypatch.setattr(fuzz, "MOST_SILENT_S", 8.0)
+    assert fuzz.main(["files", "--first", "2", "--count", "4"]) == 1
+    assert capsys.readouterr().out.splitlines() == [
+        "--- scripts/fuzz files --first 3 --count 1",
+        "ended the process, with exit code 5",
+        "out of memory",
+        "--- scripts/fuzz files --first 5 --count 1",
+        "told nothing for 8 s",
+        "4 files, 2 faults; 2 fine",
+    ]
+
+
 def test_a_page_without_the_marks_is_told(page):
     page.write_text("nothing")
     with pytest.raises(ValueError, match="marks of a table by scripts/fuzz"):
-        fuzz.note(fuzz.Campaign("worlds", 0, fuzz.one_world))
+        fuzz.note(fuzz.Campaign("worlds", 0))
 
 
 def test_every_kind_of_case_runs(capsys):
