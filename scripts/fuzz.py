@@ -163,9 +163,9 @@ def one_file(number: int, folder: Path, chosen: str = "") -> tuple[Counter[str],
 
 def one_pair(number: int, folder: Path) -> tuple[Counter[str], str]:
     """Give a command twice at once; returns figures, and the fault or nothing."""
-    from tests.support.pairs import can_be_given, pair
+    from tests.support.pairs import MIXED, can_be_given, pair
 
-    seen = pair(Random(number), folder, can_be_given())
+    seen = pair(Random(number), folder, (*can_be_given(), *MIXED))
     return seen.figures, seen.fault
 
 

@@ -13,10 +13,10 @@ from tests.support.pairs import READERS, can_be_given, interrupted, pair
 pytestmark = pytest.mark.slow
 
 
-@pytest.mark.parametrize("name", pairs.WRITERS)
+@pytest.mark.parametrize("name", [*pairs.WRITERS, *pairs.MIXED])
 def test_two_at_once_leave_what_one_leaves(name, tmp_path):
-    if name not in can_be_given():
-        pytest.skip("needs an extra: stable-baselines3 and torch, or Pillow")
+    if name not in (*can_be_given(), *pairs.MIXED):
+        pytest.skip("needs an extra: stable-baselines3 and torch, or Pillow; or the packed results")
     seen = pair(Random(1), tmp_path, (name,))
     assert not seen.fault, seen.fault
 
@@ -24,6 +24,6 @@ def test_two_at_once_leave_what_one_leaves(name, tmp_path):
 @pytest.mark.parametrize("name", [*pairs.WRITERS, *READERS])
 def test_a_signal_ends_any_command_in_one_line(name, tmp_path):
     if name not in (*can_be_given(), *READERS):
-        pytest.skip("needs an extra: stable-baselines3 and torch, or Pillow")
+        pytest.skip("needs an extra: stable-baselines3 and torch, or Pillow; or the packed results")
     seen = interrupted(Random(1), tmp_path, (name,))
     assert not seen.fault, seen.fault
