@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.policies.registry import load_policy, local_policy
+from swarm_forage_env.policies.registry import load_policy, local_policy, policy_class
 from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.cost import RunProgress
 from swarm_forage_env.runs.plan import Plan
-from swarm_forage_env.runs.record import RunRecord
+from swarm_forage_env.runs.record import RecordError, RunRecord
 from swarm_forage_env.runs.run import run_one, run_policy
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import DONE, FAILED, MISSING, RunFailure, RunStore, StoredRuns, read_failure
@@ -198,13 +198,20 @@ def rerun(file: str | Path) -> Rerun:
         file: A record (.parquet) or a failure (.json).
 
     Raises:
-        RecordError: no such file, or another content.
+        RecordError: no such file, another content, or a failure of a policy that is not installed here.
         ConfigError: the policy of a record is not installed here, or its file has gone or changed.
         Exception: whatever a run that had failed raises again.
     """
     path = Path(file)
     if path.suffix == ".json":
-        return Rerun(record=run_one(read_failure(path).spec), file=path, is_same=None)
+        failed = read_failure(path).spec
+        try:
+            policy_class(failed.policy)
+        except ConfigError:  # a file that is not trusted
+            raise
+        except ValueError as error:
+            raise RecordError(f"Cannot run {path} again: {error}") from error
+        return Rerun(record=run_one(failed), file=path, is_same=None)
     stored = RunRecord.read(path)
     spec = RunSpec.from_json(stored.spec)
     try:

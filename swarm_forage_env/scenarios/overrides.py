@@ -7,6 +7,8 @@ Such an arena has the proportions of the scenario and is as large as a swarm nee
 import dataclasses
 import math
 from collections.abc import Mapping
+from functools import cache
+from types import MappingProxyType
 from typing import Any, get_args, get_origin, get_type_hints
 
 from swarm_forage_env._internal import fields
@@ -21,12 +23,13 @@ ARENA_FIELDS = ("width_m", "height_m", "nest_centre_m", "nest_size_m", "further_
 """What a density decides, and what therefore cannot be given beside it."""
 
 
-def field_sections() -> dict[str, str]:
+@cache  # each world asks
+def field_sections() -> Mapping[str, str]:
     """Map every overridable field name to the section that holds it ("" = the scenario itself)."""
     table = {item.name: "" for item in dataclasses.fields(ScenarioConfig) if item.name not in SECTIONS}
     for section, section_class in SECTIONS.items():
         table.update({item.name: section for item in dataclasses.fields(section_class)})
-    return table
+    return MappingProxyType(table)
 
 
 def field_types() -> dict[str, Any]:

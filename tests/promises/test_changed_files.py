@@ -1,5 +1,6 @@
 """Changed files of every format are read or refused in one line; `scripts/fuzz files` gives many more."""
 
+import json
 import os
 import warnings
 from dataclasses import replace
@@ -10,7 +11,8 @@ import pytest
 
 from metrics.benchmark import BenchmarkError
 from tests.support import changed_files
-from tests.support.changed_files import FORMATS, give
+from tests.support.changed_files import FORMATS, give, given_to_a_command
+from tests.support.malformed import outcome
 
 
 @pytest.fixture(autouse=True)
@@ -71,3 +73,21 @@ def test_what_a_reader_documents_is_no_fault(tmp_path, monkeypatch):
 
     monkeypatch.setitem(FORMATS, "entry", replace(reader, read=refuse))
     assert give(Random(1), tmp_path, "entry", to_a_command=False) == ("refused", "")
+
+
+@pytest.mark.parametrize(
+    ("changed", "code", "told"),
+    [
+        ({"policy": "../../x"}, 2, "Cannot run failure.json again: Unknown policy '../../x'."),
+        ({"parameters": {"speed": 1}}, 1, "the run failed again"),
+    ],
+)
+def test_a_failure_fails_again_only_if_its_policy_is_here(changed, code, told, tmp_path):
+    content = json.loads((changed_files.FILES / "failure.json").read_text())
+    content["spec"] |= changed
+    Path("failure.json").write_text(json.dumps(content))
+    ended = outcome(("rerun", "failure.json"))
+    assert ended.code == code
+    assert told in ended.errors.splitlines()[-1]
+    assert ("Traceback" in ended.errors) == (code == 1)
+    assert given_to_a_command(("rerun", "failure.json")) == (code, "")
