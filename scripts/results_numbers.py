@@ -2,6 +2,8 @@
 
     results.C3                                      the answers to a claim under the rules described and program
     results.R2_relative                             the same relative to performance
+    results.A5_ties_program                         how many of the comparisons of a claim tie, such as "19 of 42"
+    results.N2_ties_described_relative              the same relative to performance
     results.S1a_raw_performance_described_crw_128   a mean of measures.csv: set, measure, rules, policy, value,
                                                     and values on other axes, such as _walk_probability_0
     results.runs, .sets, .hours, .version, .code    what was run, and by what
@@ -12,6 +14,7 @@ Answers are ours, by intervals, with the corrected measures; `results_data.py` w
 """
 
 import csv
+import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -20,6 +23,13 @@ from metrics.claims import CLAIMS
 from swarm_forage_env._internal.wording import number
 
 DESCRIBED, PROGRAM = RULES = ("described", "program")
+SENSES = {"": "", "relative to performance": "_relative"}
+"""Sense of a claim in verdicts.csv -> end of the name of a field."""
+TIES = (
+    re.compile(r"(?P<tie>\d+) of (?P<all>\d+) comparisons of .* tie,"),
+    re.compile(r"\d+ of (?P<all>\d+) comparisons differ, (?P<tie>\d+) tie,"),
+)
+"""How the column "why" tells it, of claims that things tie and of claims that nothing differs."""
 ANSWERS = ("supported", "contradicted", "tie", "undecided", "too vague")
 """Columns of the table, in this order; further ones follow."""
 
@@ -33,6 +43,7 @@ def results_fields(folder: Path) -> dict[str, str]:
             f"{name}_relative": ", ".join(given)
             for name, given in _answers(folder / "verdicts.csv", "relative to performance")
         },
+        **dict(_ties(folder / "verdicts.csv")),
         **dict(_means(folder / "measures.csv")),
         **_runs(folder / "runs.csv"),
         "answers": _counts(list(answers.values())),
@@ -57,6 +68,15 @@ def _answers(file: Path, sense: str = "") -> Iterator[tuple[str, tuple[str, str]
     for name in CLAIMS:
         of_formula = given.get((name, ""), "waiting")
         yield name, (given.get((name, DESCRIBED), of_formula), given.get((name, PROGRAM), of_formula))
+
+
+def _ties(file: Path) -> Iterator[tuple[str, str]]:
+    """Yield how many comparisons tie, for each claim and rules; of several conditions of a claim, in the first."""
+    for line in _lines(file):
+        if line["measures"] == "corrected" and line["sense"] in SENSES:
+            name = f"{line['claim']}_ties_{line['rules']}{SENSES[line['sense']]}"
+            first = line["why"].partition("\n")[0]
+            yield from ((name, f"{found['tie']} of {found['all']}") for one in TIES if (found := one.search(first)))
 
 
 def _means(file: Path) -> Iterator[tuple[str, str]]:

@@ -159,9 +159,12 @@ def test_answers_and_means_are_those_beside_the_results(tmp_path):
         "S1a 12345678,spatial_emergence,interactive,described,,crw,4.0,1\n"
     )
     (tmp_path / "verdicts.csv").write_text(
-        "claim,rules,measures,sense,answer\nV1,,,,supported\nE1,described,corrected,,contradicted\n"
-        "E1,described,corrected,of mean curves,tie\nE1,described,corrected,relative to performance,undecided\n"
-        "E1,program,corrected,,supported\nE1,program,paper,,tie\n"
+        "claim,rules,measures,sense,answer,why\nV1,,,,supported,\n"
+        'E1,described,corrected,,contradicted,"S1e: 1 of 3 comparisons of a and b tie, 2 do not\nS1f: 2 of 3 comparisons '
+        'of a and b tie, 1 do not"\n'
+        'E1,described,corrected,of mean curves,tie,"9 of 9 comparisons of a and b tie, 0 do not"\n'
+        'E1,described,corrected,relative to performance,undecided,"0 of 3 comparisons of a and b tie, 3 do not"\n'
+        'E1,program,corrected,,supported,"S1e: 1 of 5 comparisons differ, 4 tie, 0 open"\nE1,program,paper,,tie,\n'
     )
     found = results_fields(tmp_path)
     assert (found["V1"], found["E1"], found["C3"]) == (
@@ -174,6 +177,12 @@ def test_answers_and_means_are_those_beside_the_results(tmp_path):
         "S2a_raw_performance_described_crw_128_walk_probability_0",
     ]
     assert found["E1_relative"] == "undecided, waiting"
+    ties = {name: text for name, text in found.items() if "_ties_" in name}
+    assert ties == {
+        "E1_ties_described": "1 of 3",
+        "E1_ties_described_relative": "0 of 3",
+        "E1_ties_program": "4 of 5",
+    }
     assert found["S1a_raw_performance_described_crw_128"] == "456.4"
     assert (found["runs"], found["sets"], found["hours"], found["code"]) == ("1,240", "2", "0.3", "abc")
     assert found["contradicted"] == "None."
