@@ -49,7 +49,7 @@ def watch(
     The window shows the keys. It needs a display; without one, use record or replay.
     """
     from swarm_forage_env.cli.scenario_options import described_world
-    from swarm_forage_env.inspect.watch import watch_run
+    from swarm_forage_env.inspect.watch import Watch
     from swarm_forage_env.policies.model_files import ModelError
     from swarm_forage_env.policies.network import NetworkError
     from swarm_forage_env.policies.registry import policy_class
@@ -62,7 +62,7 @@ def watch(
     except ValueError as error:  # an unknown name is a mistake in the words; a ValueError of the run is not
         raise typer.BadParameter(str(error)) from error
     try:
-        watched = watch_run(
+        watched = Watch(
             world.scenario,
             policy,
             seed=seed,
@@ -72,6 +72,7 @@ def watch(
             caches=asked_caches,
             wrappers=world.wrappers,
         )
+        watched.show()
     except (RenderError, ModelError, NetworkError) as error:
         raise typer.BadParameter(str(error)) from error
     typer.echo(watched.summary())

@@ -1,4 +1,4 @@
-"""Watching a run in a window: `watch_run` drives a policy and lets a person look, choose, and disturb."""
+"""Watching a run in a window: `Watch` drives a policy and lets a person look, choose, and disturb."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping
@@ -34,7 +34,7 @@ _SIDES_M = (0.8, 1.2, 1.6, 2.4, 4.0, 8.0)
 
 
 class Watch(RunByHand):
-    """A run, and how somebody looks at it.
+    """A run, and how somebody looks at it: `Watch(scenario, "crw").show()` opens a window.
 
     Attributes:
         robot: Row of the chosen robot, None for none.
@@ -55,7 +55,14 @@ class Watch(RunByHand):
         parameters: Mapping[str, Any] | None = None,
         wrappers: Iterable[WrapperConfig] = (),
     ) -> None:
-        """Start the run; arguments and errors are those of `watch_run`."""
+        """Start the run; arguments and errors are those of `RunByHand`, and two more.
+
+        `size_px` is the longer side of the drawn arena, and `theme` is "dark" or "light".
+
+        Raises:
+            RenderError: `size_px` or `speed` out of range, or no such theme.
+            ImportError: Pillow is not installed.
+        """
         with refusing():
             number("speed", speed, above=0.0)
         arena_view(scenario, size_px, theme)  # refuses a bad size or theme before the run starts
@@ -69,6 +76,23 @@ class Watch(RunByHand):
         self.note = ""
         self._side = _SIDES_M.index(1.6)
         self.is_closed = False
+
+    def show(self) -> None:
+        """Show the run in a window until the user closes it. A run that is over stays on the screen.
+
+        Raises:
+            RenderError: There is no display.
+            ImportError: pygame is not installed.
+        """
+        window = Window()
+        try:
+            while not self.is_closed:
+                window.show(self.scene())
+                self.advance(window.wait(FRAMES_PER_S))
+                for event in window.events():
+                    self.handle(event)
+        finally:
+            window.close()
 
     # Keys and clicks
 
@@ -260,60 +284,3 @@ _KEYS: dict[str, Callable[[Watch, Pressed], None]] = {
 
 def _told(level: float | None) -> str:
     return "as given" if level is None else f"{level:g}"
-
-
-def watch_run(
-    scenario: ScenarioConfig,
-    policy: str | Policy,
-    *,
-    seed: int = 0,
-    speed: float = 10.0,
-    size_px: int = 900,
-    theme: str = "dark",
-    caches: str | None = None,
-    parameters: Mapping[str, Any] | None = None,
-    wrappers: Iterable[WrapperConfig] = (),
-) -> Watch:
-    """Run a policy and show it in a window, until the user closes it. A run that is over stays on the screen.
-
-    Args:
-        scenario: The scenario.
-        policy: Name of an installed policy, path of a policy file, or a fresh policy object.
-        seed: Seed of the run; without changes by hand, `run_one` with the same seed makes the same run.
-        speed: Simulated seconds per second at first, above 0.
-        size_px: Longer side of the drawn arena.
-        theme: "dark" or "light".
-        caches: As in `inspect.film.record_run`.
-        parameters: Keyword arguments of a policy that is given by name or path.
-        wrappers: Configurations of noise, throttling and population dynamics, in any order.
-
-    Returns:
-        What was watched, as it was when the window was closed.
-
-    Raises:
-        RenderError: `size_px` or `speed` out of range, no such theme, or there is no display.
-        ConfigError: `parameters` with a policy object.
-        ImportError: Pillow or pygame is not installed.
-        ValueError: unknown policy name, or a policy file that cannot be opened or does not fit the scenario.
-    """
-    window = Window()
-    watch = Watch(
-        scenario,
-        policy,
-        seed=seed,
-        speed=speed,
-        size_px=size_px,
-        theme=theme,
-        caches=caches,
-        parameters=parameters,
-        wrappers=wrappers,
-    )
-    try:
-        while not watch.is_closed:
-            window.show(watch.scene())
-            watch.advance(window.wait(FRAMES_PER_S))
-            for event in window.events():
-                watch.handle(event)
-    finally:
-        window.close()
-    return watch

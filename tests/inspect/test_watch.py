@@ -5,7 +5,7 @@ import pytest
 
 from swarm_forage_env.inspect import run_by_hand
 from swarm_forage_env.inspect.levels_by_hand import LEVELS, Levels, with_idle
-from swarm_forage_env.inspect.watch import HELP, SPEEDS, Watch, watch_run
+from swarm_forage_env.inspect.watch import HELP, SPEEDS, Watch
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.rendering.view import THEMES, RenderError
 from swarm_forage_env.rendering.window import Clicked, Closed, Pressed, Window
@@ -289,7 +289,7 @@ def test_closing_is_noted(watch, event):
     assert watch.is_closed
 
 
-def test_watch_run_lasts_until_the_window_is_closed(monkeypatch):
+def test_the_window_lasts_until_the_window_is_closed(monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     show, shown = Window.show, []
 
@@ -302,7 +302,8 @@ def test_watch_run_lasts_until_the_window_is_closed(monkeypatch):
             pygame.event.post(pygame.event.Event(pygame.QUIT))
 
     monkeypatch.setattr(Window, "show", note)
-    watched = watch_run(SMALL, "crw", seed=1, speed=50.0, size_px=240)
+    watched = Watch(SMALL, "crw", seed=1, speed=50.0, size_px=240)
+    watched.show()
     assert len(shown) == 4
     assert [scene.close_up is None for scene in shown] == [True, True, False, False]
     assert watched.world.tick > 0

@@ -160,8 +160,8 @@ def test_answers_and_means_are_those_beside_the_results(tmp_path):
     )
     (tmp_path / "verdicts.csv").write_text(
         "claim,rules,measures,sense,answer,why\nV1,,,,supported,\n"
-        'E1,described,corrected,,contradicted,"S1e: 1 of 3 comparisons of a and b tie, 2 do not\nS1f: 2 of 3 comparisons '
-        'of a and b tie, 1 do not"\n'
+        'E1,described,corrected,,contradicted,"S1e: 1 of 3 comparisons of a and b tie, 2 do not\n'
+        'S1f: 2 of 3 comparisons of a and b tie, 1 do not"\n'
         'E1,described,corrected,of mean curves,tie,"9 of 9 comparisons of a and b tie, 0 do not"\n'
         'E1,described,corrected,relative to performance,undecided,"0 of 3 comparisons of a and b tie, 3 do not"\n'
         'E1,program,corrected,,supported,"S1e: 1 of 5 comparisons differ, 4 tie, 0 open"\nE1,program,paper,,tie,\n'
