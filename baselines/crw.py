@@ -72,7 +72,7 @@ def step_crw(
 
 
 class CRWPolicy(ScriptedPolicy):
-    """Correlated random walk for every robot.
+    """Search by a correlated random walk.
 
     An instance drives one run.
 

@@ -90,7 +90,9 @@ def step_dpo(
 
 
 class DPOPolicy(ScriptedPolicy):
-    """Decaying pheromone objects for every robot.
+    """Random walk with a memory of objects.
+
+    DPO stands for decaying pheromone objects: what a robot remembers of an object fades.
 
     An instance drives one run.
 

@@ -12,7 +12,9 @@ from .tasks import STOCHM_PARAMETERS, TaskParameters
 
 
 class STOCHMPolicy(TaskPolicy):
-    """Generalists, Harvesters and Collectors around static caches.
+    """Three tasks around static caches.
+
+    Robots work as Generalists, Harvesters and Collectors.
 
     See `TaskPolicy`.
     """

@@ -13,7 +13,7 @@ from .tasks import STOCHX_PARAMETERS, TaskParameters
 
 
 class STOCHXPolicy(TaskPolicy):
-    """All seven tasks around dynamic caches.
+    """Seven tasks around dynamic caches.
 
     See `TaskPolicy`.
     """

@@ -205,7 +205,7 @@ def _settings(policy: Callable[..., Any]) -> Iterator[tuple[str, Any]]:
 
 def _caches(policy: object, if_stated: str = "") -> str:
     stated = stated_caches(policy)
-    return "those of the scenario" if stated is None else f"{stated}{if_stated}"
+    return "the scenario's" if stated is None else f"{stated}{if_stated}"
 
 
 def _file_lines(file: Path) -> Iterator[str]:

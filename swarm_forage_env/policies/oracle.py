@@ -29,7 +29,10 @@ INSET_M = 0.04
 
 
 class OraclePolicy:
-    """Reads the world, so it is no contestant: nearest free object, straight home, passing on the right."""
+    """Sees the whole world; not a contestant.
+
+    It drives to the nearest free object and straight home, and passes other robots on the right.
+    """
 
     reads: ClassVar[tuple[str, ...]] = ()
     caches: ClassVar[str] = "none"

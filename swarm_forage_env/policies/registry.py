@@ -33,7 +33,7 @@ _WORDS: dict[str, Any] = {"true": True, "false": False}
 
 
 class RandomPolicy:
-    """Uniformly random actions: the minimum that every other policy has to beat."""
+    """Random actions, a minimum to beat."""
 
     reads: ClassVar[tuple[str, ...]] = ()
 

@@ -34,7 +34,10 @@ _SIZES = ("n_robots", "n_objects", "side_m", *ARENA_FIELDS)
 
 
 def warehouse_small(**overrides: Any) -> ScenarioConfig:
-    """Indoor warehouse, 32 x 16 m, single source (scenario 1, small). 50 robots, 200 objects."""
+    """Warehouse with one source.
+
+    Small warehouse of scenario 1: 32 x 16 m, 50 robots, 200 objects.
+    """
     base = ScenarioConfig(
         name="warehouse_small",
         arena=ArenaConfig(
@@ -51,7 +54,10 @@ def warehouse_small(**overrides: Any) -> ScenarioConfig:
 
 
 def warehouse_medium(**overrides: Any) -> ScenarioConfig:
-    """Indoor warehouse, 48 x 48 m, random placement (scenario 1, medium). 200 robots, 800 objects."""
+    """Warehouse, objects everywhere.
+
+    Medium warehouse of scenario 1: 48 x 48 m, 200 robots, 800 objects at random places.
+    """
     base = ScenarioConfig(
         name="warehouse_medium",
         arena=ArenaConfig(
@@ -68,7 +74,10 @@ def warehouse_medium(**overrides: Any) -> ScenarioConfig:
 
 
 def warehouse_dual(**overrides: Any) -> ScenarioConfig:
-    """Indoor warehouse, 32 x 16 m, nest in the middle between two sources. 50 robots, 200 objects."""
+    """Warehouse with two sources.
+
+    32 x 16 m, nest in the middle, 50 robots, 200 objects.
+    """
     base = ScenarioConfig(
         name="warehouse_dual",
         arena=ArenaConfig(
@@ -85,7 +94,10 @@ def warehouse_dual(**overrides: Any) -> ScenarioConfig:
 
 
 def warehouse_quad(**overrides: Any) -> ScenarioConfig:
-    """Indoor warehouse, 48 x 48 m, nest in the middle of four sources. 200 robots, 800 objects."""
+    """Warehouse with four sources.
+
+    48 x 48 m, nest in the middle, 200 robots, 800 objects.
+    """
     base = ScenarioConfig(
         name="warehouse_quad",
         arena=ArenaConfig(
@@ -102,7 +114,10 @@ def warehouse_quad(**overrides: Any) -> ScenarioConfig:
 
 
 def classroom(**overrides: Any) -> ScenarioConfig:
-    """Classroom, 8 x 6 m, one nest and one source: first deliveries at once. 10 robots, 40 objects."""
+    """Small room for first tries.
+
+    8 x 6 m, one nest and one source, 10 robots, 40 objects; the first deliveries come at once.
+    """
     base = ScenarioConfig(
         name="classroom",
         arena=ArenaConfig(
@@ -126,7 +141,9 @@ def classroom(**overrides: Any) -> ScenarioConfig:
 
 
 def search_and_rescue(*, side_m: float | None = None, n_robots: int | None = None, **overrides: Any) -> ScenarioConfig:
-    """Outdoor search and rescue: power-law clusters of slowly moving objects (scenario 2).
+    """Clusters of moving objects.
+
+    Outdoor search and rescue of scenario 2: objects lie in power-law clusters and move slowly.
 
     Args:
         side_m: Side of the square arena; default the smallest of 16, 32, ..., 128 m that holds `n_robots` at

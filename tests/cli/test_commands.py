@@ -370,6 +370,7 @@ def test_list_names_everything(command):
     assert code == 0
     for name in (*SCENARIO_NAMES, *policy_names()):
         assert name in out
+    assert max(map(len, out.splitlines())) <= 80, "columns of a terminal"
 
 
 @pytest.mark.parametrize("name", SCENARIO_NAMES)
@@ -392,7 +393,7 @@ def test_info_describes_a_controller(command, name):
 
 
 @pytest.mark.parametrize(
-    ("name", "caches"), [("stochm", "static (the caches it is made for)"), ("random", "those of the scenario")]
+    ("name", "caches"), [("stochm", "static (the caches it is made for)"), ("random", "the scenario's")]
 )
 def test_info_tells_the_caches_that_a_run_would_have(command, name, caches):
     assert re.search(rf"^  caches +{re.escape(caches)}$", command("info", name)[1], re.MULTILINE)

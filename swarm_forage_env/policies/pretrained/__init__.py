@@ -38,7 +38,10 @@ def _shipped(file: str) -> Path | None:
 
 
 class PPOWarehouseSmall(NetworkPolicy):
-    """Trained by PPO in the small warehouse; `ppo_warehouse_small.md` is its card."""
+    """Network trained by PPO in warehouse_small.
+
+    Its card is `ppo_warehouse_small.md`.
+    """
 
     caches: ClassVar[str] = "none"
     """Kind of caches that it was trained with."""
@@ -49,7 +52,10 @@ class PPOWarehouseSmall(NetworkPolicy):
 
 
 class Generalist(NetworkPolicy):
-    """Trained by PPO in all scenarios, calm and under adversity; `generalist.md` is its card."""
+    """Network trained by PPO in all scenarios.
+
+    It was trained with and without adversity. Its card is `generalist.md`.
+    """
 
     caches: ClassVar[str] = "none"
     """Kind of caches that it was trained with."""
