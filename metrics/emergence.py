@@ -1,4 +1,4 @@
-"""Emergent self-organisation: does the swarm do better than its size alone explains? Eqs. (2) and (3)."""
+"""Emergent self-organisation: does a swarm do better than its size explains? Eqs. (2) and (3)."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,9 +39,9 @@ def spatial_emergence(
     The paper's figures use neighbouring sizes (marginal form) or N independent robots (interactive form: n1 = 1, with
     the one-robot curves in both places).
 
-    The loss of one robot drops out of the equation for N1 > 1: P_lost(N1) has N1 P_lost(1) in it, P_lost(N2) has N2
-    P_lost(1), and (N2 / N1) N1 - N2 = 0. So E_S = sum_t [ (N2 / N1) P(N1, t) t_lost(N1, t) - P(N2, t) t_lost(N2, t) ],
-    which needs no run of one robot.
+    For N1 > 1, the loss of one robot cancels: P_lost(N1) contains N1 P_lost(1), P_lost(N2) contains N2 P_lost(1), and
+    (N2 / N1) N1 - N2 = 0. So E_S = sum_t [ (N2 / N1) P(N1, t) t_lost(N1, t) - P(N2, t) t_lost(N2, t) ], and a run of
+    one robot is not needed.
 
     Args:
         perf1: P(N1, t), shape (..., T), objects per interval; `perf2` for the larger swarm.
@@ -50,12 +50,12 @@ def spatial_emergence(
         perf2: P(N2, t).
         t_lost2: Interference fraction of the larger swarm.
         n2: Larger size N2.
-        perf_one: P(1, t) of one robot alone; None where there is no such run, which needs N1 > 1 and no `sierra`.
+        perf_one: P(1, t) of one robot alone. It may be None if N1 > 1, except for `sierra`.
         t_lost_one: Interference fraction of one robot alone, or None as well.
-        variant: `paper` as printed. `corrected` sets P_lost(1) to zero when N1 = 1: it is the loss to walls, which
-            P_lost(N > 1) does not contain, and with it independent robots would seem organised. `sierra` uses
-            fractional losses of the last interval, takes sizes in any order, and is 0 for N2 = 1; independent robots
-            seem organised under it.
+        variant: `paper` is the equation as printed. `corrected` sets P_lost(1) to zero if N1 = 1, because this is the
+            loss to walls, which P_lost(N > 1) leaves out; otherwise independent robots would seem organised. `sierra`
+            uses fractional losses of the last interval, takes sizes in any order, and is 0 for N2 = 1; it makes
+            independent robots seem organised.
         reduce: `sum` as in the paper, `mean` or `last`. `sierra` always reads the last interval.
         t_lost_as: As in `performance_lost`.
         n_reference: As in `performance_lost`.
@@ -67,10 +67,10 @@ def spatial_emergence(
         CurveError: As in `performance_lost`, or n1 >= n2 outside `sierra`.
         ValueError: Unknown variant, reading or reduction, or `sierra` with another reduction than the last interval.
 
-    The paper's sentence introducing this equation calls it the task-based measure; it means the spatial one.
+    The paper introduces this equation as the task-based measure, but means the spatial one.
 
-    The time lost is weighted with the performance achieved. Where performance falls from N1 to N2, so does the weight,
-    and the value can be positive although more time is lost: read `time_emergence` beside it.
+    E_S weights the time lost with performance. If performance falls from N1 to N2, the weight falls too, and E_S can be
+    positive although robots lose more time. So look at `time_emergence`, too.
     """
     n1, n2 = check_size("n1", n1), check_size("n2", n2)
     if perf_one is None and t_lost_one is None and n1 > 1 and variant != "sierra":
@@ -101,25 +101,25 @@ def spatial_emergence(
 def time_emergence(
     t_lost1: ArrayLike, n1: int, t_lost2: ArrayLike, n2: int, *, reduce: Reduction = "mean"
 ) -> FloatArray:
-    """Spatial self-organisation in robot time, E_R(N1, N2): positive if less time is lost per robot in a larger swarm.
+    """Spatial self-organisation in robot time, E_R(N1, N2): positive if each robot of the larger swarm loses less time.
 
         W(N, t) = N t_lost(N, t)                    robots' worth of time lost at N
         E_R = mean_t [ (N2 / N1) W(N1, t) - W(N2, t) ] = N2 mean_t [ t_lost(N1, t) - t_lost(N2, t) ]
 
-    This is Eq. (2) with the time lost itself in place of the performance lost. Eq. (2) weights that time with the
-    performance achieved, so a swarm that achieves nothing loses nothing, and a collapse counts as organisation: with
-    2 robots that deliver 8 objects at 0.2 of the time lost, and 4 that deliver 1.6 at 0.6, E_S is +2.24 (no walls),
-    and E_R = 4 (0.2 - 0.6) = -1.6: avoidance costs 1.6 robots more than in two swarms of 2.
+    Example: 2 robots deliver 8 objects and lose 0.2 of their time, 4 robots deliver 1.6 objects and lose 0.6. E_R = 4
+    (0.2 - 0.6) = -1.6: avoidance costs 1.6 robots more than in two swarms of 2. E_S is +2.24 (without walls), because
+    Eq. (2) weights the time lost with performance: a swarm that delivers nothing loses nothing, so E_S takes a collapse
+    for organisation. E_R is Eq. (2) with time in place of performance.
 
-    Time lost to walls, t_lost(1), is the same in both terms and cancels, so no run of one robot is needed, and N1 = 1
-    is no exception. Robots that do not affect each other score 0 at every pair of sizes. Our addition.
+    Time lost to walls, t_lost(1), is the same in both terms and cancels. So a run of one robot is not needed, and N1 =
+    1 is not an exception. Robots that do not affect each other score 0 at every pair of sizes. This measure is ours.
 
     Args:
         t_lost1: Interference fraction of the smaller swarm, shape (..., T).
         n1: Smaller size N1.
         t_lost2: Interference fraction of the larger swarm, same intervals.
         n2: Larger size N2.
-        reduce: `mean` over the run, in robots, or `last`, or `sum`, in robots times intervals.
+        reduce: `mean` over the run or `last` interval, both in robots, or `sum`, in robots times intervals.
 
     Returns:
         E_R, shape (...,), in robots, from -N2 to N2. Higher is better.
@@ -178,23 +178,24 @@ def interference_gain(
     *,
     relative: bool = False,
 ) -> FloatArray:
-    """Part of task emergence that comes from interference, E_I(N1, N2): negative where more time is lost per robot.
+    """Part of task emergence that comes from interference, E_I(N1, N2): negative if robots lose a larger share of time.
 
-    A swarm of N robots that delivers P objects in a run and loses the share f of its time spends (1 - f) of its time
-    undisturbed. It then achieves u = P / (N (1 - f)) objects per robot whose whole run is undisturbed, so each robot
-    delivers P / N = (1 - f) u. Task emergence, N2 times the change of that product, splits exactly, without a rest:
+    N robots deliver P objects in a run, lose the share f of their time, and spend (1 - f) of it undisturbed. A robot
+    that is undisturbed for a whole run would deliver u = P / (N (1 - f)) objects, so each robot delivers P / N = (1 -
+    f) u. Task emergence is N2 times the change of this product, and splits into two parts without a rest:
 
         E_T = N2 [ (1 - f2) u2 - (1 - f1) u1 ] = E_I + E_U
         E_I = N2 (f1 - f2) (u1 + u2) / 2                 time lost, at the mean rate of undisturbed robots
         E_U = N2 (u2 - u1) (1 - (f1 + f2) / 2)           `undisturbed_gain`
 
-    Each change is weighted with the mean of the other factor over both sizes, so neither size is preferred (Shapley's
-    value of two factors; our choice). Example: 2 robots deliver 8 objects and lose 0.2 of their time, 4 robots deliver
-    1.6 and lose 0.6. Then u1 = 5, u2 = 1, E_T = -14.4, E_I = -4.8 and E_U = -9.6: a third of the loss is avoidance.
+    Each change is weighted with the mean of the other factor over both sizes, so that neither size is preferred
+    (Shapley's value of two factors; our choice). Example: 2 robots deliver 8 objects and lose 0.2 of their time, 4
+    robots deliver 1.6 objects and lose 0.6. Then u1 = 5, u2 = 1, E_T = -14.4, E_I = -4.8 and E_U = -9.6: avoidance
+    explains a third of the loss.
 
-    P and f are those of the whole run (sum and mean over intervals), so that intervals without performance or without
-    undisturbed time need no exception. Avoiding walls is time lost, too; it is the same at both sizes unless robots
-    come closer to walls in larger swarms. Our addition.
+    P and f are the sum and the mean over all intervals of a run, so intervals without performance or without
+    undisturbed time are not exceptions. Time in which robots avoid walls is time lost, too. It is the same at both
+    sizes, unless robots of larger swarms come closer to walls. This measure is ours.
 
     Args:
         perf1: P(N1, t), shape (..., T), objects per interval.
@@ -227,13 +228,13 @@ def undisturbed_gain(
     *,
     relative: bool = False,
 ) -> FloatArray:
-    """Part of task emergence that interference does not explain, E_U(N1, N2): what undisturbed robots get done.
+    """Part of task emergence that interference does not explain, E_U(N1, N2): what undisturbed robots achieve.
 
         E_U = N2 (u2 - u1) (1 - (f1 + f2) / 2),        E_T = E_I + E_U
 
-    with u and f as in `interference_gain`, where the split is derived. Negative where a robot gets less done in the
-    time in which nobody is in its way: because objects are scarce or carried by others, the search takes longer, or
-    robots wait. Positive where robots help each other. Our addition.
+    with u and f as in `interference_gain`, which derives the split. E_U is negative if undisturbed robots of the larger
+    swarm achieve less, for example because objects are scarce or others carry them, because searches take longer, or
+    because robots wait. It is positive if robots help each other. This measure is ours.
 
     Arguments, shapes, results and errors as in `interference_gain`.
     """

@@ -30,11 +30,11 @@ def waveform(
         square      a sgn(sin(2 pi f t + phase)) + o        sgn(0) = +1
         sawtooth    2 a (f t - floor(f t + 1/2) + phase) + o
 
-    The study's sweeps set o = a, so a signal runs from 0 to 2a: the paper's throttling "levels" are half the peak. A
-    step at tick s is a square wave with f = 1 / (2 s); down: phase 0, o = 0; up: phase pi, o = a.
+    The study's sweeps set o = a, so a signal runs from 0 to 2a, and the paper's throttling "levels" are half the peak.
+    A square wave with f = 1 / (2 s) makes a step at tick s: down with phase 0 and o = 0, up with phase pi and o = a.
 
-    At a multiple of half the period the sign of a square wave depends on rounding (sin(2 pi) is slightly negative); the
-    formula is evaluated as written, as the environment does.
+    At multiples of half the period, the sign of a square wave depends on rounding: sin(2 pi) comes out slightly
+    negative. Here and in the environment, the formula is evaluated as written.
 
     Args:
         kind: Name of the signal, in lower or upper case.
@@ -79,22 +79,22 @@ def _period(frequency: float) -> float:
 def environment_scaling(
     v: ArrayLike, i_ec: ArrayLike, *, model: ScalingModel = "linear", clip: bool = False
 ) -> FloatArray:
-    """Factor c_t by which a perfectly reactive swarm's performance follows the environment, Eqs. (5) and (6).
+    """Factor c_t by which the performance of a perfectly reactive swarm changes, Eqs. (5) and (6).
 
         linear        c_t = 1 - (V - I_ec)        throttles: fractions of speed lost
         reciprocal    c_t = I_ec / V              penalties: ticks lost
         paper         c_t = V / I_ec              as printed, (V_dev + I_ec) / I_ec with V_dev = V - I_ec
 
-    The printed form is the reciprocal of what is meant: adverse conditions (V above I_ec) give c_t > 1, so the best
-    swarm would improve when conditions get worse. For I_ec = 0, the value of the paper's own example, it is undefined.
-    The authors' program uses the other two. The physically proportional factor for throttles would be
-    (1 - V) / (1 - I_ec), which `linear` equals for I_ec = 0 only.
+    The printed form is the reciprocal of what the paper means: under adverse conditions (V above I_ec), c_t is above 1,
+    so the best swarm would improve when conditions get worse. For I_ec = 0, as in the paper's own example, the printed
+    form is undefined. The authors' program uses the other two. For throttles, (1 - V) / (1 - I_ec) would be physically
+    proportional; `linear` equals it only for I_ec = 0.
 
     Args:
         v: Applied conditions V(t), shape (..., T) or one number.
         i_ec: Ideal conditions I_ec(t), broadcasting with v.
         model: Which of the three.
-        clip: Set negative factors, which `linear` gives for V - I_ec > 1, to 0. The authors do not.
+        clip: Set negative factors to 0, which `linear` gives for V - I_ec > 1. The authors' program keeps them.
 
     Returns:
         c_t, shape of the broadcast inputs.
@@ -130,8 +130,8 @@ def environment_distance(
 ) -> float:
     """Distance of the applied from the ideal conditions, DTW(I_ec, V): the x axis of the flexibility figures.
 
-    The authors round it to 4 decimals and leave the ideal experiment, at 0, out of the figures. Against a constant
-    I_ec it is sum_t |V(t) - I_ec| under either ground cost.
+    The authors round this distance to 4 decimals, and leave the ideal experiment, at 0, out of their figures. For a
+    constant I_ec, the distance is sum_t |V(t) - I_ec| with either ground cost.
 
     Args:
         v: Applied conditions V(t) at the recording instants, shape (T,); all of V, not its deviation.

@@ -1,4 +1,4 @@
-"""Flexibility and robustness to noise: does performance follow what disturbs it, or withstand it? Eqs. (5) to (8).
+"""Flexibility and robustness to noise: does performance follow the conditions, or stay the same? Eqs. (5) to (8).
 
 Robustness to a changing population is in `population`.
 """
@@ -25,8 +25,8 @@ def reactivity(
 
         P_R*(t) = c_t P_ideal(t)        R = DTW( P_R*, P )
 
-    Lower is better. It pulls against adaptability: a perfectly reactive swarm is not adaptable. Without deviation,
-    V = I_ec, the two are equal. Report `noise_floor` beside it.
+    Lower is better. Reactivity and adaptability exclude each other: a perfectly reactive swarm is not adaptable. If
+    conditions are ideal (V = I_ec), the two are equal. Report `noise_floor`, too.
 
     Args:
         perf_ideal: Performance under ideal conditions, same swarm size and controller, shape (..., T), objects per
@@ -35,8 +35,8 @@ def reactivity(
         v: Applied conditions V(t) at the same instants, shape (..., T) or one number.
         i_ec: Ideal conditions I_ec(t), likewise.
         model: How c_t is computed, see `environment_scaling`; the equation as printed needs model="paper".
-        variant: Distance: exact DTW on values for `paper` and `corrected`; for `sierra` the cost includes the clock, as
-            in the authors' program, so that short delays are not forgiven.
+        variant: Which distance: exact DTW on values for `paper` and `corrected`. For `sierra`, the cost includes the
+            clock, as in the authors' program, so short delays count in full.
         clock: For `sierra`, sample times as in `dtw` (the authors: ticks, steps of 1000). Default: interval numbers.
         relative: Divide by the summed P_ideal, see `metrics.curves.per_performance`.
 
@@ -69,7 +69,7 @@ def adaptability(
 
         P_A*(t) = P_ideal(t)        A = DTW( P_A*, P )
 
-    Lower is better. Report `noise_floor` beside it.
+    Lower is better. Report `noise_floor`, too.
 
     Args:
         perf_ideal: Performance under ideal conditions, same swarm size and controller, shape (..., T), objects per
@@ -101,8 +101,9 @@ def noise_robustness(
 ) -> FloatArray:
     """Sensor and actuator noise robustness B_sa = DTW( P_ideal, P ), Eq. (8). Lower is better.
 
-    It has no sign: a swarm that does better under noise scores badly, too. Report `mean_signed_difference` and
-    `noise_floor` beside it. The paper's x axis is the standard deviation of the noise, starting at 0 = P_ideal.
+    A distance has no sign: a swarm that delivers more under noise scores badly, too. Report `mean_signed_difference`
+    and `noise_floor` as well. The x axis of the paper's figures is the standard deviation of the noise; it starts at 0,
+    where P = P_ideal.
 
     Args:
         perf_ideal: Performance without noise, shape (..., T), objects per interval.
@@ -124,7 +125,7 @@ def noise_robustness(
 
 
 def mean_signed_difference(perf_ideal: ArrayLike, perf: ArrayLike) -> FloatArray:
-    """Mean over intervals of P(N, t) - P_ideal(t), shape (...,): positive if the swarm did better when disturbed.
+    """Mean over intervals of P(N, t) - P_ideal(t), shape (...,): positive if the disturbed swarm delivers more.
 
     Args:
         perf_ideal: Performance without the disturbance, shape (..., T), objects per interval.

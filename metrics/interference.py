@@ -1,4 +1,4 @@
-"""Interference: how much of the swarm's time, and of its performance, goes into avoiding each other. Eq. (1)."""
+"""Interference: how much time and performance robots lose because they avoid each other. Eq. (1)."""
 
 from typing import Literal, TypeAlias
 
@@ -18,7 +18,7 @@ _SIERRA_DECIMALS = 8
 def t_lost_fraction(n_interfering: ArrayLike, n: int) -> FloatArray:
     """Fraction of the swarm that loses time to collision avoidance, t_lost(N, t) = n_int(N, t) / N.
 
-    Avoiding a wall counts too, so a single robot has a fraction above zero.
+    A robot also loses time when it avoids a wall, so the fraction of a single robot is above zero.
 
     Args:
         n_interfering: Robots in collision avoidance, averaged over the ticks of each interval, shape (..., T).
@@ -30,7 +30,7 @@ def t_lost_fraction(n_interfering: ArrayLike, n: int) -> FloatArray:
     Raises:
         CurveError: Negative or infinite counts, more robots than the swarm has, or n < 1.
 
-    Source: notation table of the paper. Its text calls t_lost the number of robots instead; see `performance_lost`.
+    Source: notation table of the paper. The text of the paper calls t_lost a number of robots; see `performance_lost`.
     """
     n = check_size("n", n)
     (counts,) = as_curves(n_interfering=n_interfering)
@@ -55,7 +55,7 @@ def performance_lost(
         P_lost(1, t) = P(1, t) t_lost(1, t)
         P_lost(N, t) = P(N, t) t_lost(N, t) - N P_lost(1, t)        for N > 1
 
-    Lower is better; negative means less loss than N lone robots would have.
+    Lower is better. A negative value means that the swarm loses less than N lone robots would.
 
     Args:
         perf: P(N, t), shape (..., T), objects per interval.
@@ -63,13 +63,13 @@ def performance_lost(
         n: Swarm size N.
         perf_one: P(1, t) of one robot alone.
         t_lost_one: Interference fraction of one robot alone.
-        variant: `paper` and `corrected` are the same here. `sierra` is what the authors' program computed: zero for the
-            first experiment, P(N) t_lost(N) - P(1) n_int(1) for the others (the loss of one lone robot is taken off
-            instead of N), and +inf where P(N) = 0.
-        t_lost_as: `count` multiplies the fractions by the swarm size first, as the paper's text reads. Independent
-            robots then look worse in larger swarms. Not for `sierra`, which has its own reading.
-        n_reference: Robots in the reference run; the authors' program took its first experiment, whatever its size (12
-            robots in search and rescue). Only `sierra` accepts another number than 1.
+        variant: `paper` and `corrected` are the same here. `sierra` is what the authors' program computed: 0 for the
+            first experiment, P(N) t_lost(N) - P(1) n_int(1) for the others (it subtracts the loss of one lone robot,
+            not of N), and +inf where P(N) = 0.
+        t_lost_as: `count` first multiplies the fractions by the swarm size, as the text of the paper says. Independent
+            robots then look worse in larger swarms. `sierra` has its own reading and refuses `count`.
+        n_reference: Number of robots in the reference run. Only `sierra` accepts a number other than 1: the authors'
+            program used its first experiment, which has 12 robots in search and rescue.
 
     Returns:
         P_lost, shape (..., T), in the unit of `perf`.
@@ -78,9 +78,9 @@ def performance_lost(
         CurveError: A curve is missing, negative, infinite or of another length; a fraction above 1; a size below 1.
         ValueError: Unknown variant or reading, or a combination of them that has no meaning.
 
-    The paper contradicts itself: t_lost is a number of robots in the text and a fraction of time in the notation table.
-    Only with the fraction P_lost is 0 for N robots that do not affect each other. The table also calls P_lost a
-    fraction, but the equation is an absolute loss; `fractional_loss` is the fraction.
+    The paper contradicts itself: t_lost is a number of robots in the text, but a fraction of time in the notation
+    table. We use the fraction, because P_lost is then 0 for N robots that do not affect each other. The table also
+    calls P_lost a fraction, but the equation gives a number of objects; `fractional_loss` computes the fraction.
     """
     n = check_size("n", n)
     n_reference = check_size("n_reference", n_reference)
@@ -99,20 +99,19 @@ def performance_lost(
 def cache_congestion(
     lost_near: ArrayLike, lost: ArrayLike, n_caches: ArrayLike, *, floor: float, reach: float
 ) -> FloatArray:
-    """How much more of the time lost is lost near caches than their share of the floor explains, K(N).
+    """Share of the time lost that robots lose near caches, beyond the caches' share of the floor, K(N).
 
         K = sum_t [lost_near(t) - s(t) lost(t)] / sum_t lost(t),    s(t) = min(1, n_caches(t) pi reach^2 / floor)
 
-    0 for robots that are in interference anywhere on the floor alike, at most 1; lower is better. Discs that overlap or
-    reach beyond a wall cover less than s, and walls, at which robots avoid too, lie away from caches: so K is rather
-    too small.
+    K is 0 if interference is spread evenly over the floor, and at most 1. Lower is better. K tends to be too small:
+    discs that overlap or reach beyond a wall cover less than s, and robots also avoid walls, which are far from caches.
 
     Args:
         lost_near: Robot-ticks in interference within `reach` of the centre of a cache, shape (..., T).
         lost: Robot-ticks in interference, shape (..., T).
         n_caches: Caches, mean over the ticks of each interval, shape (..., T).
         floor: Area in which robots move, square metres.
-        reach: Distance from the centre of a cache that is near it, metres.
+        reach: Radius of the disc around the centre of a cache that counts as near it, metres.
 
     Returns:
         K, shape (...), in [-1, 1]; NaN for runs without interference, and for runs without a cache.
@@ -121,8 +120,8 @@ def cache_congestion(
         CurveError: A curve is missing, negative, infinite or of another length; more time lost near caches than in all;
             a floor or a reach that is not positive.
 
-    Source: our choice; the paper expects congestion near caches in words alone. An even spread over the floor is the
-    natural thing to hold it against.
+    Source: ours. The paper expects congestion near caches, but does not measure it. We compare with an even spread over
+    the floor.
     """
     lost_near, lost, n_caches = as_curves(lost_near=lost_near, lost=lost, n_caches=n_caches)
     for name, value in (("floor", floor), ("reach", reach)):
@@ -146,7 +145,7 @@ def fractional_loss(
     variant: Variant = "corrected",
     n_reference: int = 1,
 ) -> FloatArray:
-    """Share of its performance that the swarm loses to interference, FL(N, t) = P_lost(N, t) / P(N, t).
+    """Share of its performance that a swarm loses to interference, FL(N, t) = P_lost(N, t) / P(N, t).
 
     Arguments, shapes and errors as in `performance_lost`. In the `sierra` form FL is 0 for the first experiment and 1
     where P(N) = 0, rounded to 8 decimals; the others follow IEEE arithmetic (-inf or NaN where P(N) = 0).

@@ -49,11 +49,11 @@ def population_robustness(
     reduce: Reduction = "sum",
     relative: bool = False,
 ) -> FloatArray:
-    """Population dynamics robustness B_pd, Eq. (12): performance beyond what the robots at work explain.
+    """Population dynamics robustness B_pd, Eq. (12): performance beyond what the time at work explains.
 
         B_pd = sum_t [ P(N(t), t) - w P_ideal(t) ]
 
-    with w from `population_weight`. Higher is better; 0 if performance fell in proportion to the time at work.
+    with w from `population_weight`. Higher is better. B_pd is 0 if performance falls in proportion to the time at work.
 
     Args:
         perf: Performance with population dynamics, shape (..., T), objects per interval.
@@ -92,13 +92,13 @@ def recorded_population_robustness(
     reduce: Reduction = "sum",
     relative: bool = False,
 ) -> FloatArray:
-    """Population dynamics robustness weighted with the robots that were at work, in place of an expected share.
+    """Population dynamics robustness, weighted with the recorded number of robots at work.
 
         B_pd' = sum_t [ P(N(t), t) - (n(t) / n_ideal(t)) P_ideal(t) ]
 
-    The weight of Eq. (12) is the same for every run with the same rates, so a run in which more robots than expected
-    happened to fail seems less robust. Here each interval has the share of its own robots: a swarm whose performance
-    is proportional to the robots at work scores 0 in every run and interval. Higher is better. Our addition.
+    Eq. (12) weights every run with the same rates alike, so a run in which more robots than expected fail seems less
+    robust. Here, each interval is weighted with the share of its robots that are at work. A swarm whose performance is
+    proportional to the robots at work scores 0 in every run and interval. Higher is better. This measure is ours.
 
     Args:
         perf: Performance with population dynamics, shape (..., T), objects per interval.
@@ -147,11 +147,11 @@ def population_weight(
     | stationary | T (1 - L_N / N), in equilibrium, see `queue_statistics` (ours); 0 with deaths and no births  |
     | sierra     | ideal time *away* over time away, where Eq. (12) has times at work                           |
 
-    The printed time away is the length of *one* absence, so `paper` and `sojourn` hold only if every robot is away
-    exactly once, and turn negative when 1 / (mu - lambda) exceeds T, as it does for the study's 200 robots. The
-    authors' program weighs by k when all rates are k times those of its lowest-rate experiment, which it takes as
-    ideal: B_pd then falls with k whatever the swarm does. That same k, 1 to 8, is the "population variance" on the
-    x axis of its scenario 1 figure.
+    The printed time away is the length of *one* absence. So `paper` and `sojourn` hold only if every robot is away
+    exactly once, and they are negative if 1 / (mu - lambda) exceeds T, as for the study's 200 robots. The authors'
+    program takes its experiment with the lowest rates as ideal. If all rates are k times these rates, its weight is k,
+    so B_pd falls with k, whatever the swarm does. This k, from 1 to 8, is the "population variance" on the x axis of
+    the scenario 1 figure.
 
     Returns:
         The weight; 1 if no robot leaves either swarm. In [0, 1] for `transient` and `stationary` with ideal_rates None.
@@ -186,14 +186,15 @@ def availability(n: int, n_min: int, ratio_out: float) -> float:
 
         p_v = sum_{j=0}^{N - N_min} q^j pi_N = (1 - q^(N - N_min + 1)) / (1 - q^(N + 1)),    q = lambda / mu
 
-    Printed with 1 / rho in place of q. With the rho of the queue equations, lambda / mu, that would be the probability
-    that at least n_min robots are *away*. The paper does not define pi_N, the probability that all are at work; it is
-    (1 - q) / (1 - q^(N + 1)).
+    The paper prints 1 / rho in place of q. With rho = lambda / mu, as in the queue equations, this gives the
+    probability that at least n_min robots are *away*. The paper does not define pi_N, the probability that all robots
+    are at work; it is (1 - q) / (1 - q^(N + 1)).
 
     Args:
         n: Swarm size N.
         n_min: Robots needed; any integer: 1.0 for n_min <= 0, 0.0 for n_min > n.
-        ratio_out: q = lambda / mu, leaving over entering, from 0 (no robot leaves) to inf (no robot returns).
+        ratio_out: q = lambda / mu, the rate of leaving over that of returning, from 0 (robots never leave) to inf
+            (robots never return).
 
     Returns:
         p_v in [0, 1]. Higher is better.
@@ -244,9 +245,9 @@ def ratio_for_availability(n: int, n_min: int, p_v: float) -> float:
 def ratio_for_team(team: float) -> float:
     """Ratio q = lambda / mu = (1 + M) / M at which M robots are at work on average, if the swarm had no size limit.
 
-    Then k robots are at work with probability (1 - 1/q) / q^k, with mean 1 / (q - 1) = M. A swarm of N robots cannot
-    have more than N at work, so its own mean is below M:
-    N - `queue_statistics(PopulationRates(lambda_bd=q, mu_bd=1.0), N).truncated_length`.
+    Then k robots are at work with probability (1 - 1/q) / q^k, and the mean is 1 / (q - 1) = M. A swarm of N robots has
+    at most N at work, so its mean is below M: N - `queue_statistics(PopulationRates(lambda_bd=q, mu_bd=1.0),
+    N).truncated_length`.
 
     Args:
         team: M > 0, robots; need not be whole.
@@ -266,7 +267,7 @@ def availability_curves(n: int, teams: Sequence[float], n_min: Sequence[int] | N
 
         p_v = sum_{k=N_min}^{N} q^-k / sum_{k=0}^{N} q^-k,    q = (1 + M) / M
 
-    This is `availability` at the ratio `ratio_for_team(M)`, and the paper's availability figure.
+    This is `availability` at the ratio `ratio_for_team(M)`, as in the paper's availability figure.
 
     Args:
         n: Swarm size N.

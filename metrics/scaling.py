@@ -1,4 +1,4 @@
-"""Performance over swarm size: scalability, Eq. (4), efficiency, and the performance itself."""
+"""Performance over swarm size: scalability, Eq. (4), efficiency, and performance itself."""
 
 from typing import Literal, TypeAlias
 
@@ -32,13 +32,14 @@ def scalability(
         paper        C = sum_t [ 1 - (S - 1/r) / (1 - 1/r) ]
         sierra       as paper, last interval; 0 if P(N1) = 0 < P(N2)
 
-    The paper names e but prints the speedup where Karp and Flatt have its reciprocal. The printed value is -S times the
-    corrected one, so it reverses the order of swarms: at r = 2, linear gain (S = 2) is 1 corrected and -2 printed, and
-    halved performance is -2 corrected and 1 printed. The text (higher means more cooperative) fits the corrected form.
+    The paper names e, but prints the speedup where Karp and Flatt have its reciprocal. The printed value is -S times
+    the corrected one, so it reverses the order of swarms: at r = 2, a linear gain (S = 2) gives 1 corrected and -2
+    printed, and halved performance gives -2 corrected and 1 printed. The text of the paper (higher means more
+    cooperative) fits the corrected form.
 
-    No form means anything for sizes that are equal (r = 1 divides by zero) or in the wrong order (a smaller swarm would
-    be praised for doing less). The authors' program computes them all the same: 0 if N1 = N2 or N2 = 1, and the printed
-    form with r < 1 otherwise.
+    The sizes must differ (r = 1 divides by zero) and be in order (otherwise a smaller swarm would score well for
+    delivering less). The authors' program accepts any two sizes: it returns 0 if N1 = N2 or N2 = 1, and the printed
+    form with r < 1 if the order is wrong.
 
     Args:
         perf1: P(N1, t), shape (..., T), objects per interval.
@@ -48,12 +49,13 @@ def scalability(
         variant: Which of the three above.
         reduce: Overrides the reduction of the variant: `total` takes S of the summed curves, `sum`, `mean` and `last`
             take S in each interval.
-        zero_policy: `skip` leaves intervals out of `sum` or `mean` in which either swarm did nothing; report
-            `skipped_intervals` beside it. A run in which every interval is skipped gives NaN.
+        zero_policy: `skip` leaves out of `sum` or `mean` all intervals in which either swarm delivered nothing; report
+            `skipped_intervals`, too. A run in which every interval is skipped gives NaN.
 
     Returns:
-        C, shape (...,). Corrected: 1 linear gain, 0 no gain, above 1 superlinear (at most r / (r - 1), also where only
-        P(N1) is 0), negative when the larger swarm does worse (-inf where only P(N2) is 0), NaN where both are 0.
+        C, shape (...,). Corrected: 1 for a linear gain, 0 for no gain, above 1 for a superlinear gain (at most r / (r -
+        1), also if only P(N1) is 0), negative if the larger swarm delivers less (-inf if only P(N2) is 0), NaN if both
+        are 0.
 
     Raises:
         CurveError: Curves are missing, negative, infinite or of different length; n1 >= n2.
