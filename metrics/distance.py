@@ -1,4 +1,4 @@
-"""Distance between two curves: exact dynamic time warping, and its limit without warping."""
+"""Distance between two curves: exact dynamic time warping, and the sum of differences without warping."""
 
 import logging
 from collections.abc import Callable
@@ -42,11 +42,11 @@ def dtw(
         D(0, 0) = 0,  D(i, 0) = D(0, j) = inf
         D(i, j) = c(i, j) + min( D(i-1, j), D(i, j-1), D(i-1, j-1) )
 
-    No slope weights, no division by the path length, no square root. Symmetric and 0 for identical curves, but no
-    metric: the triangle inequality does not hold. The value grows with T, the sampling rate and the scale of the
-    curves: compare only curves of the same kind and length. The paper cites the method but does not give the cost. Its
-    program adds the clock to the cost. The steps of the clock are much larger than the curves, so the published
-    distances do not warp at all and equal `aligned_l1`.
+    Slopes are not weighted, and the sum is neither divided by the path length nor put under a root. The distance is
+    symmetric, and 0 for identical curves. It is not a metric, because the triangle inequality does not hold. It grows
+    with T, the sampling rate and the scale of the curves, so compare only curves of the same kind and length. The paper
+    cites the method but does not give the cost c. The authors' program adds the clock to the cost. The steps of the
+    clock are much larger than the values, so the published distances do not warp at all, and equal `aligned_l1`.
 
     Args:
         x: Curve or curves, shape (..., T); negative values are fine.
@@ -90,7 +90,7 @@ def dtw(
 
 
 def aligned_l1(x: ArrayLike, y: ArrayLike) -> FloatArray:
-    """Distance without warping, sum_t |x_t - y_t|: what the authors' program returns for rates below one clock step.
+    """Distance without warping, sum_t |x_t - y_t|. The authors' program returns it for rates below one clock step.
 
     Args:
         x: Curve or curves, shape (..., T).
@@ -119,11 +119,11 @@ def curve_distance(x: FloatArray, y: FloatArray, variant: Variant, clock: ArrayL
 
 
 def noise_floor(perf_ideal: ArrayLike, *, variant: Variant = "corrected", clock: ArrayLike | None = None) -> FloatArray:
-    """Distances between all pairs of different ideal runs: what a perfect swarm would score by chance alone.
+    """Distances between all pairs of ideal runs: what a perfect swarm would score by chance alone.
 
-    Reactivity, adaptability and noise robustness compare single runs with independent noise and do not go to 0 for a
-    perfect swarm; without warping the floor is about 1.13 sigma T for a standard deviation sigma per interval. Report
-    it beside them.
+    Reactivity, adaptability and noise robustness compare single runs, which scatter independently, so they are above 0
+    even for a perfect swarm. Without warping, the floor is about 1.13 sigma T, where sigma is the standard deviation of
+    an interval. Report the floor together with these measures.
 
     Args:
         perf_ideal: P_ideal of all R >= 2 runs, shape (R, T).

@@ -1,7 +1,8 @@
 """Statistics that look at all runs: interquartile mean, probability of improvement, optimality gap, profile.
 
-A mean of few runs hangs on the best or the worst of them. Near the critical size of a swarm, where some runs break down
-and others do not, it describes neither kind. Source of the measures and of their intervals: Agarwal et al. 2021.
+The mean of a few runs depends strongly on the best or the worst run. Near the critical size of a swarm, some runs break
+down and others do not, and the mean describes neither kind. Source of the measures and of their intervals: Agarwal et
+al. 2021.
 """
 
 import math
@@ -72,7 +73,8 @@ def probability_of_improvement(
 
         probability_of_improvement([3, 4, 5], [1, 2, 4], seed=1).value  # 7.5 of 9 pairs of runs
 
-    P(X > Y) + P(X = Y) / 2 over all pairs of a run of each. 0.5 = no difference; it says how often, not by how much.
+    This is P(X > Y) + P(X = Y) / 2 over all pairs of a run of each policy. 0.5 means no difference. The probability
+    says how often a run is better, not by how much.
 
     Args:
         first: One value per run, (R,), or several levels, (L, R) or L arrays (R_l,). NaN values are left out.
@@ -112,9 +114,9 @@ def probability_of_improvement(
 
 
 def optimality_gap(values: ArrayLike, *, target: float = 1.0) -> float:
-    """By how much runs fall short of a target, mean over all runs; 0 = every run reaches it.
+    """Mean amount by which runs fall short of a target; 0 if every run reaches it.
 
-        optimality_gap([0.5, 1.5])  # 0.25: what lies above the target makes up for nothing
+        optimality_gap([0.5, 1.5]) # 0.25: a run above the target does not make up for one below
 
     Args:
         values: One value per run, any shape. NaN values are left out.

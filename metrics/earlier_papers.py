@@ -17,7 +17,7 @@ Direction: TypeAlias = Literal["positive", "negative"]
 def fractional_maintenance(loss: ArrayLike) -> FloatArray:
     """Share of performance kept in spite of interference, M(N) = 1 - exp(FL(N) - 1) (2019 and 2020).
 
-    1 - 1/e = 0.632 without loss, 0 at a loss of 1.
+    M is 1 - 1/e = 0.632 without loss, and 0 if the loss is 1.
 
     Args:
         loss: FL from `fractional_loss`, any shape.
@@ -34,7 +34,7 @@ def projective_performance(
     direction: Direction = "positive",
     reduce: Reduction = "last",
 ) -> FloatArray:
-    """Performance at x2 relative to what the step from x1 projects, with s = x2 / x1 (2019).
+    """Performance at x2 relative to the performance projected from x1, with s = x2 / x1 (2019).
 
         positive    P2 / (P1 s)          1 = grows in proportion to x
         negative    P2 / (P1 (1 - s))
@@ -68,7 +68,7 @@ def projective_performance(
 def weighted_combination(
     first: ArrayLike, second: ArrayLike, *, weights: tuple[float, float] = (0.5, 0.5)
 ) -> FloatArray:
-    """Two axes of a property as one number, alpha_1 M_1 + alpha_2 M_2 (2020, dropped as unused in 2021).
+    """Two measures of a property as one number, alpha_1 M_1 + alpha_2 M_2 (2020; the authors dropped it in 2021).
 
     The weights were, for task and spatial self-organisation, (0.5, 0.5) in scenario 1 and (0.75, 0.25) in scenario 2;
     reactivity and adaptability (0.5, 0.5); noise and population robustness (0.1, 0.9) and (0.6, 0.4).

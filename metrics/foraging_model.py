@@ -1,4 +1,4 @@
-"""A mean-field model of central-place foraging: what a swarm would do if its robots met like molecules in a gas.
+"""A mean-field model of central-place foraging: a swarm whose robots meet like molecules in a gas.
 
 A robot searches (S) or carries an object home (H), and in both it may meet something and avoid it for a while (AS, AH).
 With N robots, M free objects and the rate e of encounters of a robot:
@@ -9,9 +9,9 @@ With N robots, M free objects and the rate e of encounters of a robot:
     dAS/dt = e S - AS / avoidance_s                              M = n_objects - H - AH
     dAH/dt = e H - AH / avoidance_s                              deliveries per s = H / homing_s
 
-So finding is proportional to the free objects and encounters to the other robots; a delivered object lies in the arena
-again. All is well mixed: no robot is nearer to the nest than another, and nobody queues. What a swarm does beyond that
-shows as its distance from this model.
+So the rate of finding is proportional to the free objects, and the rate of encounters to the other robots. A delivered
+object is placed in the arena again. Robots and objects are well mixed: all robots are equally far from the nest, and
+robots never queue. Where a swarm differs from this model, it does something that the model leaves out.
 
 Source: after Lerman and Galstyan 2002 (foraging with interference). Ours: separate encounters with walls, avoidance
 from both states with one mean duration, and objects that are placed again.
@@ -101,10 +101,10 @@ class SteadyState:
 def steady_state(rates: ForagingRates, n_robots: int) -> SteadyState:
     """Return the steady state of the model, in closed form.
 
-    A robot avoids for the share f = e a / (1 + e a) of its time, with encounters e and avoidance a; then
-    H / homing_s = finding (N (1 - f) - H) (n_objects - H (1 + e a)), a quadratic equation for H. While objects are
-    plenty, this is the law of contention: deliveries are proportional to N / (1 + s (N - 1)) with
-    s = encounters a / (1 + walls a).
+    A robot spends the share f = e a / (1 + e a) of its time on avoidance, with the rate of encounters e and the
+    duration of an avoidance a. Then H / homing_s = finding (N (1 - f) - H) (n_objects - H (1 + e a)), a quadratic
+    equation for H. While objects are plentiful, this is the law of contention: deliveries are proportional to N / (1 +
+    s (N - 1)) with s = encounters a / (1 + walls a).
 
     Raises:
         CurveError: n_robots < 1.
@@ -192,10 +192,10 @@ def estimate_rates(
 ) -> ForagingRates:
     """Estimate the rates from recorded columns of runs of one small swarm, all robots at work.
 
-    Each rate is the number of events over the time in which they could happen: finds over the time of robots that
-    neither carry nor avoid times the free objects, deliveries over the time of robots that carry and do not avoid. The
-    odds of avoiding, f / (1 - f), are the encounters times the duration; avoidance is taken to be as frequent with an
-    object as without, because the columns do not tell these apart.
+    Each rate is the number of events divided by the time in which they could happen. For finds, this is the time of
+    robots that neither carry nor avoid, times the free objects. For deliveries, it is the time of robots that carry and
+    do not avoid. The odds of avoidance, f / (1 - f), are the rate of encounters times the duration. The function
+    assumes that robots avoid as often with an object as without, because the columns do not distinguish the two.
 
     Args:
         n_robots: Swarm size N.
@@ -207,8 +207,8 @@ def estimate_rates(
         n_objects: Objects in the arena.
         lone_interference: The share of robots alone in the same arena, (R', T) or a number: what is lost to walls.
             Without it there are no walls, and a swarm of one robot shows nothing of encounters.
-        avoidance_s: Mean duration of an avoidance, s; the columns do not tell it. It sets how fast shares settle, not
-            where.
+        avoidance_s: Mean duration of an avoidance, s; the columns do not contain it. It sets how fast the shares
+            settle, not their final values.
 
     Raises:
         CurveError: Curves that are missing, negative, infinite or of different shape, shares above 1, more robots that

@@ -1,7 +1,7 @@
 """A ladder of swarm sizes described by laws: parameters, critical size and class of scaling, each with an interval.
 
-`prediction` asks which law continues a ladder best. Here every law is fitted to the whole of it, to be drawn beside the
-data.
+`prediction` chooses the law that extrapolates best. Here, every law is fitted to all sizes, so that it can be drawn
+beside the data.
 """
 
 import math

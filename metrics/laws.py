@@ -1,15 +1,16 @@
 """Laws of performance over swarm size: what each says, and how it is fitted to measured means.
 
-`LAW_WORDS` has the formulas. In them a is the performance of one robot (nearly, for the last law), s (contention) the
-share of work that robots do one at a time, k (coherency) the cost per pair of robots. b tells what robots gain from
-each other, more than their number above 1; c <= 0 tells how much they hinder each other. With a = 2, s = 0.1, k = 0.01,
-ten robots deliver 20 / (1 + 0.9 + 0.9) = 7.14 objects, and a swarm of sqrt(0.9 / 0.01) = 9.49 robots delivers most.
+With a = 2, s = 0.1 and k = 0.01, ten robots deliver 20 / (1 + 0.9 + 0.9) = 7.14 objects, and a swarm of sqrt(0.9 /
+0.01) = 9.49 robots delivers most. `LAW_WORDS` has the formulas. a is the performance of one robot (nearly, in the last
+law), s (contention) is the share of the work that robots can only do one after the other, and k (coherency) is the cost
+per pair of robots. If b is above 1, performance grows faster than the number of robots. c <= 0 says how much robots
+hinder each other.
 
 Sources: Amdahl 1967 for contention, whose serial fraction the paper's scalability, Eq. (4), estimates; Gunther 1993 for
 the universal law, which contains the two before it; Hamann 2013 for cooperation times interference, N^b exp(c N).
 
-Square roots of performance are compared, not performance itself (our choice): deliveries are counts, whose variance
-grows with their mean, and the variance of their square roots does not.
+We compare square roots of performance (our choice). Deliveries are counts: their variance grows with their mean, but
+the variance of their square roots does not.
 """
 
 import math

@@ -64,12 +64,12 @@ class SizePrediction:
 
 
 def forward_error(name: LawName, sizes: Sequence[int], performance: ArrayLike) -> float:
-    """How well a law, fitted to the smallest swarms, predicts the next larger ones: what the law is chosen for.
+    """Error of a law that is fitted to the smallest swarms and predicts the next larger ones.
 
-    The law is fitted to the 3, 4, ... smallest sizes, and each time the larger ones up to `REACH` times the largest of
-    them are predicted. The error is the root of the mean squared difference of the square roots of predicted and
-    measured performance. A criterion of fit, such as Akaike's, judges a law inside the range that it was fitted to; a
-    law that is asked to continue is judged by continuing.
+    The function fits the law to the 3, 4, ... smallest sizes. Each time, it predicts the larger sizes, up to `REACH`
+    times the largest fitted one. The error is the root mean squared difference between the square roots of predicted
+    and measured performance. A criterion of fit, such as Akaike's, judges a law inside the range of its data. Here a
+    law has to extrapolate, so we judge it by extrapolating.
 
     Args:
         name: One of `ALL_LAWS`.
@@ -98,11 +98,11 @@ def predict_performance(
 
         predict_performance([1, 2, 4, 8], [[10, 11], [19, 22], [38, 37], [70, 66]], at=[16, 32], seed=1)
 
-    Of the three laws that with the smallest `forward_error` is taken. Each resample draws the runs of every size anew,
-    adds what the law misses at the fitted sizes beyond that scatter, chooses and fits a law, and adds the scatter of
-    a mean around it. So the interval covers: which runs there happened to be, the scatter of the runs that are
-    predicted (a mean over as many as each size has), the misfit of the law, and the choice between the three laws. It
-    does not cover what begins only in larger swarms, a jam for example.
+    The function takes the law with the smallest `forward_error`. Each resample draws the runs of every size again and
+    adds the misfit of the law at the fitted sizes beyond the scatter of their runs. Then it chooses and fits a law, and
+    adds the scatter of a mean. So the interval covers the chance in the runs, the scatter of the predicted mean (over
+    as many runs as each size has), the misfit of the law, and the choice between the three laws. It does not cover
+    effects that begin only in larger swarms, such as a jam.
 
     Args:
         sizes: Swarm sizes in rising order, (S,), at least `MIN_SIZES`.

@@ -1,7 +1,8 @@
 """Queue model of a changing population: how many robots are away, for how long, in equilibrium and in a finite run.
 
-S is the sub-swarm at work. Deaths and temporary departures take robots out of S, births and returns bring them in. The
-paper models the robots *not* in S as one M/M/1 queue with arrival rate lambda and service rate mu, Eqs. (9) to (11).
+S is the part of the swarm at work. Robots leave S when they die or break down, and enter it when they are born or
+repaired. The paper models the robots *not* in S as one M/M/1 queue with arrival rate lambda and service rate mu, Eqs.
+(9) to (11).
 """
 
 import math
@@ -54,9 +55,9 @@ class PopulationRates:
 class QueueStats:
     """Equilibrium of the queue of robots away from work; numbers of robots, times in ticks.
 
-    The unlimited quantities are infinite when the queue is not stable and NaN for rates per robot, which have no
-    unlimited counterpart. The paper prints the number *waiting* as the number away, and a time that counts the service
-    twice: 1 / (mu - lambda) contains it already.
+    The unlimited quantities are infinite if the queue is not stable, and NaN for rates per robot, which have no
+    unlimited counterpart. The paper prints the number of robots *waiting* as the number away. Its time away counts the
+    service twice, because 1 / (mu - lambda) already contains it.
     """
 
     lam: float
@@ -87,7 +88,7 @@ class QueueStats:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PopulationComparison:
-    """Robots at work over time, as the queue model expects and as runs had them; divide by N for shares."""
+    """Robots at work over time, expected by the queue model and recorded in runs; divide by N for shares."""
 
     predicted: FloatArray
     """Expected robots at work in each interval, (T,)."""
@@ -107,11 +108,11 @@ class PopulationComparison:
 
 
 def queue_statistics(rates: PopulationRates, n: int | None = None, *, per_robot: bool = False) -> QueueStats:
-    """Equilibrium quantities of the queue of robots away from work, Eqs. (9) to (11) and what they should be.
+    """Equilibrium of the queue of robots away from work, Eqs. (9) to (11), as printed and corrected.
 
-    A swarm of n robots cannot have more than n away. With constant rates cut off at 0 and n (which is how the study's
-    population process works), n robots are away with probability rho^n / sum_k rho^k, for every rho. The paper writes
-    this M/M/1/N(t)/N, with the current size in the capacity slot; capacity and population are both N.
+    At most N robots of a swarm can be away. The study's population process has constant rates that stop at 0 and N, so
+    n robots are away with probability rho^n / sum_k rho^k, for every rho. The paper writes M/M/1/N(t)/N for this queue,
+    with the current size as the capacity; capacity and population are both N.
 
     Args:
         rates: Rates per tick.
@@ -155,9 +156,9 @@ def queue_statistics(rates: PopulationRates, n: int | None = None, *, per_robot:
 def mean_away(rates: PopulationRates, n: int, horizon: float, *, per_robot: bool = False) -> float:
     """Mean number of robots away during a run that starts with no robot away, m_T.
 
-    This solves the queue of `queue_statistics` in time. Runs have 50,000 ticks, which is far less than its relaxation
-    time (253,000 ticks for the study's 50 robots, 4,000,000 for 200): most of the swarm is at work throughout. With the
-    generator Q of the chain and pi(0) = (1, 0, ..., 0):
+    This solves the queue of `queue_statistics` over time. Runs have 50,000 ticks. The relaxation time is much longer
+    (253,000 ticks for the study's 50 robots, 4,000,000 for 200), so most robots are at work during the whole run. With
+    the generator Q of the chain and pi(0) = (1, 0, ..., 0):
 
         d pi / dt = pi Q,    m_T = (1 / T) int_0^T sum_n n pi_n(s) ds
 
@@ -222,7 +223,7 @@ def compare_population(
     per_robot: bool = False,
     level: float = 0.95,
 ) -> PopulationComparison:
-    """Hold the robots that runs had at work against what the queue model expects, interval by interval.
+    """Compare the robots at work in runs with the number that the queue model expects, interval by interval.
 
     Args:
         n_active: Robots at work, mean over each interval, (R, T), the same rates in all runs.

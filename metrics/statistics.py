@@ -87,8 +87,8 @@ def aggregate(
     Args:
         values: One value per run, shape (R,). NaN values are left out and counted.
         method: `t`: Student's interval for the mean. `two_sd`: mean +- 2 standard deviations, which the paper shades
-            and calls a 95 % confidence interval. It is where single runs lie; the interval for the mean of 192 runs is
-            some 14 times narrower. `bootstrap`: percentile interval of the mean over resampled runs.
+            and calls a 95 % confidence interval. This interval shows where single runs lie; the interval for the mean
+            of 192 runs is about 14 times narrower. `bootstrap`: percentile interval of the mean over resampled runs.
         level: Confidence level of `t` and `bootstrap`.
         seed: Seed of the bootstrap; None draws a fresh one.
 
@@ -131,8 +131,8 @@ def bootstrap_measure(
 ) -> Summary:
     """Value of a measure of one or more experiments with a bootstrap interval.
 
-    The runs of each experiment are resampled on their own: seeds of two experiments are independent in the study, so
-    run i of one has nothing to do with run i of the other.
+    The function resamples the runs of each experiment separately, because the study's experiments have independent
+    seeds: run i of one experiment is not related to run i of another.
 
         bootstrap_measure(adaptability, ideal_runs, throttled_runs, order="mean_curve", seed=1)
 
