@@ -2,6 +2,7 @@
 
     scripts/judge_rules.py                      five minutes or more
     scripts/judge_rules.py --worlds 50 --runs 4 16
+    scripts/judge_rules.py --only "is higher" --worlds 2000
     scripts/judge_rules.py --looks 64           judged after 4, 8, 16, 32 and 64 runs, as until claims are decided
 
 Each rule meets made worlds: one in which what it states holds, one in which it does not, and one at the border, where
@@ -263,12 +264,13 @@ def share(found: Sequence[str], wanted: Sequence[str]) -> float:
     return sum(answer in wanted for answer in found) / len(found)
 
 
-def rows(n_worlds: int, n_runs: Sequence[int]) -> Iterator[list[str]]:
-    """Yield the rows of the table, its headings first."""
+def rows(names: Iterable[str], n_worlds: int, n_runs: Sequence[int]) -> Iterator[list[str]]:
+    """Yield the rows of the table for some of `RULES`, its headings first."""
     questions = ("wrong at the border", "supported where it holds", "contradicted (or a tie) where it fails")
     columns = [f"{question}, {runs} runs" for question in questions for runs in n_runs]
     yield ["rule", *columns]
-    for name, rule in RULES.items():
+    for name in names:
+        rule = RULES[name]
         worlds = (("border", rule.wrong), ("holds", ("supported",)), ("fails", (rule.failing,)))
         shares = [share(answers(rule, world, runs, n_worlds), wanted) for world, wanted in worlds for runs in n_runs]
         yield [name, *(f"{one:.0%}" for one in shares)]
@@ -328,6 +330,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--worlds", type=int, default=200, help="worlds of each kind")
     parser.add_argument("--runs", type=int, nargs="+", default=[4, 16, 64], help="runs at each level")
+    parser.add_argument("--only", choices=RULES, metavar="RULE", help="one rule, as the table names it")
     parser.add_argument("--looks", type=int, metavar="MOST", help="instead: looking several times, up to so many runs")
     given = parser.parse_args()
     if given.looks:
@@ -335,7 +338,7 @@ def main() -> None:
         print()
         show(rows_of_looks(given.worlds, looks_up_to(given.looks)))
     else:
-        show(rows(given.worlds, given.runs))
+        show(rows([given.only] if given.only else RULES, given.worlds, given.runs))
 
 
 if __name__ == "__main__":

@@ -143,6 +143,13 @@ def test_a_number_that_begins_a_line_is_found(before, tmp_path, monkeypatch, cap
     assert update_docs.main(["--check"]) == 0
 
 
+def test_the_page_of_policies_has_the_multiple_of_the_page_of_speed():
+    policies, speed = ((ROOT / f"docs/{name}.md").read_text() for name in ("policies", "speed"))
+    (said,) = re.findall(r"the example takes ([\d.]+) times as\s+long as DPO", policies)
+    (measured,) = re.findall(r"^\| `function-200` .*\| ([\d.]+) \(.*\) x dpo-200 \|$", speed, re.MULTILINE)
+    assert said == measured
+
+
 def test_a_block_is_written_from_the_store():
     page = "before <!-- generated: run.crw by scripts/update_docs -->1.00 ± 0.10<!-- end --> after"
     assert update_docs.written(page, {"run": {"crw": "2.00 ± 0.20"}}) == page.replace("1.00 ± 0.10", "2.00 ± 0.20")
