@@ -373,14 +373,22 @@ class _Pool(ProcessPoolExecutor):
     """A process pool whose workers never see Ctrl-C, not even while they start; only the driver handles it."""
 
     def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Submit with SIGINT blocked, because a worker that starts here inherits the blocked signals."""
-        if not hasattr(signal, "pthread_sigmask"):  # Windows: workers ignore Ctrl-C from `_start_worker` on
+        """Submit, which may start a worker."""
+        with deaf_children():
             return super().submit(fn, *args, **kwargs)
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
-            return super().submit(fn, *args, **kwargs)
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def deaf_children() -> Iterator[None]:
+    """Processes started inside this context never see Ctrl-C: they inherit that SIGINT is blocked."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows: they have to ignore it themselves
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager
@@ -388,8 +396,8 @@ def _process_pool(n_workers: int) -> Iterator[ProcessPoolExecutor]:
     """A pool of spawned, single-threaded processes that exit at once when the driver stops or dies."""
     context = get_context("spawn")
     lifeline, held_by_driver = context.Pipe(duplex=False)
-    with _single_threaded_children():
-        pool = _Pool(n_workers, mp_context=context, initializer=_start_worker, initargs=(lifeline,))
+    with single_threaded_children():
+        pool = _Pool(n_workers, mp_context=context, initializer=live_with_driver, initargs=(lifeline,))
         try:
             yield pool
         except BaseException:
@@ -401,8 +409,12 @@ def _process_pool(n_workers: int) -> Iterator[ProcessPoolExecutor]:
         lifeline.close()
 
 
-def _start_worker(lifeline: Connection) -> None:
-    """Prepare a worker process: it ignores Ctrl-C, and exits when the driver is gone."""
+def live_with_driver(lifeline: Connection) -> None:
+    """Prepare a process that a driver has started: it ignores Ctrl-C, and exits when the driver is gone.
+
+    Args:
+        lifeline: Its other end is the driver's, who sends nothing.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_leave_at_end_of, args=(lifeline,), daemon=True).start()
 
@@ -415,7 +427,7 @@ def _leave_at_end_of(lifeline: Connection) -> None:
 
 
 @contextmanager
-def _single_threaded_children() -> Iterator[None]:
+def single_threaded_children() -> Iterator[None]:
     """Processes started inside this context use one thread each; libraries read the settings at import."""
     before = {name: os.environ.get(name) for name in THREAD_SETTINGS}
     os.environ.update(dict.fromkeys(THREAD_SETTINGS, "1"))

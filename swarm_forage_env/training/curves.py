@@ -22,6 +22,7 @@ from swarm_forage_env.runs.policy_spec import policy_specs
 from swarm_forage_env.scenarios.performance import performance_of
 from swarm_forage_env.training.evaluations import (
     TrainingCurve,
+    chosen,
     finished_runs,
     in_all_worlds,
     judged,
@@ -57,7 +58,7 @@ class TrainingCurves(Answer):
         return (Sheet(header=("policy", "decisions", heading, "interference"), rows=rows),)
 
     def _best(self) -> list[tuple[str, int, float, float]]:
-        best = [(one.label, max(one.evaluations, key=lambda each: each.performance)) for one in self.trainings]
+        best = [(one.label, chosen(one.evaluations)) for one in self.trainings]
         return [(label, each.steps, each.performance, each.interference_fraction) for label, each in best]
 
     def to_mapping(self) -> dict[str, Any]:

@@ -5,6 +5,7 @@ for all. They are readable without the library that trained.
 """
 
 import csv
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
@@ -60,12 +61,17 @@ class Evaluation:
     """Mean fraction of active robots in interference."""
     worlds: tuple[WorldEvaluation, ...] = ()
     """How it did in each of several worlds; none where there is only that of the plan."""
+    cpu_time_s: float = math.nan
+    """Processor time spent on the training, s, counted on like `wall_time_s`, but for further processes of its arenas;
+    NaN where a training of an earlier day did not tell it."""
 
     def to_mapping(self) -> dict[str, Any]:
-        """Return the evaluation as plain values, with `worlds` only where there are some."""
+        """Return the evaluation as plain values, with `worlds` and `cpu_time_s` only where they are known."""
         plain = asdict(self)
         if not self.worlds:
             del plain["worlds"]
+        if math.isnan(self.cpu_time_s):
+            del plain["cpu_time_s"]
         return plain
 
 
@@ -198,10 +204,16 @@ def ratio_to(baseline: float, performance: float, seconds: float) -> float:
     return performance / max(baseline, 1000.0 / seconds)
 
 
+def chosen(evaluations: Sequence[Evaluation]) -> Evaluation:
+    """Return the evaluation whose network is kept: the best one, and the latest of equal ones."""
+    return max(reversed(evaluations), key=lambda each: each.performance)
+
+
 PLAN_FILE = "plan.json"
 EVALUATIONS_FILE = "evaluations.csv"
 MODEL_FILE = "model.zip"
-_TOLD_ONCE = ("steps", "wall_time_s")
+POLICY_FILE = "policy.npz"
+_TOLD_ONCE = ("steps", "wall_time_s", "cpu_time_s")
 """Columns that are the same in the rows of all worlds of an evaluation."""
 _COLUMNS = tuple(item.name for item in fields(Evaluation) if item.name != "worlds")
 _WORLD_COLUMNS = (*_TOLD_ONCE, *(item.name for item in fields(WorldEvaluation)))

@@ -46,6 +46,8 @@ ALGORITHMS = ("ppo", "a2c", "dqn", "sac")
 """Algorithms of stable-baselines3 that train; the first two on rollouts, the others from replay."""
 SAMPLING = ("ppo", "a2c")
 """Those whose networks give probabilities of discrete actions."""
+EXPORTABLE = ("ppo", "a2c", "dqn")
+"""Those whose networks a file can hold."""
 MOST_ARENAS, MOST_LAYERS, MOST_UNITS = 10_000, 20, 10_000
 """Sizes of a training that are far beyond sense and still fit into the memory of a machine; our choice."""
 LEARNING = PolicySpec(label="policy", policy="policy")

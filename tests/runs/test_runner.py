@@ -356,7 +356,7 @@ def test_workers_that_cannot_start_are_an_error_with_a_hint(monkeypatch):
 def test_thread_settings_are_put_back(monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", "7")
     monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
-    with workers._single_threaded_children():
+    with workers.single_threaded_children():
         assert {os.environ[name] for name in workers.THREAD_SETTINGS} == {"1"}
     assert os.environ["OMP_NUM_THREADS"] == "7"
     assert "MKL_NUM_THREADS" not in os.environ

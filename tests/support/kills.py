@@ -113,7 +113,7 @@ COMMANDS = {
 }  # fmt: skip
 NOT_COMPARED = re.compile(r"tensorboard/|model\.zip$|\.png$|(^|/)\.[^/]*\.tmp$")
 """Files that hold clock times inside, or are drawn from files that are compared; and drafts, which nothing reads."""
-CLOCK_KEYS = re.compile(r"created|wall|seconds|elapsed|^(date|out|folder|picture|file|commit)$")
+CLOCK_KEYS = re.compile(r"created|wall|cpu_time|seconds|elapsed|^(date|out|folder|picture|file|commit)$")
 """Keys of JSON and columns of tables that hold clock times, or names of folders; and the commit, which somebody may
 make while a campaign runs."""
 

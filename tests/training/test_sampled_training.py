@@ -19,7 +19,14 @@ from swarm_forage_env.runs.table import Table
 from swarm_forage_env.scenarios.presets import warehouse_small
 from swarm_forage_env.training import evaluations
 from swarm_forage_env.training.evaluation_worlds import EvaluationWorld
-from swarm_forage_env.training.evaluations import Evaluation, baseline_runs, best_baselines, ratio_to, read_evaluations
+from swarm_forage_env.training.evaluations import (
+    Evaluation,
+    baseline_runs,
+    best_baselines,
+    chosen,
+    ratio_to,
+    read_evaluations,
+)
 from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan, named_plan, read_plan
 from swarm_forage_env.training.recipe import recipe
 from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv, training
@@ -139,6 +146,14 @@ def test_plans_without_worlds_write_what_they_always_wrote():
     assert list(mapping["stages"][0]) == ["steps", "scenario", "options"]
     plain = Evaluation(steps=1, wall_time_s=1.0, performance=1.0, baseline=1.0, interference_fraction=0.0)
     assert list(plain.to_mapping()) == ["steps", "wall_time_s", "performance", "baseline", "interference_fraction"]
+
+
+def test_of_equal_evaluations_the_latest_is_chosen():
+    first, again, worse = (
+        Evaluation(steps=steps, wall_time_s=1.0, performance=reached, baseline=1.0, interference_fraction=0.0)
+        for steps, reached in ((1, 5.0), (2, 5.0), (3, 4.0))
+    )
+    assert chosen([first, again, worse]) is again
 
 
 def test_a_baseline_that_finds_nothing_counts_as_one_object():

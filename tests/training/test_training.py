@@ -222,10 +222,11 @@ def test_time_spent_counts_on(trained, tmp_path):
     shutil.copytree(trained, folder)
     path = folder / "evaluations.csv"
     before = read_evaluations(path)
-    write_evaluations(path, [dataclasses.replace(each, wall_time_s=1000.0) for each in before])
+    write_evaluations(path, [dataclasses.replace(each, wall_time_s=1000.0, cpu_time_s=500.0) for each in before])
     told = []
     result = train(dataclasses.replace(SHORT, stages=(Stage(steps=256),)), folder, resume=True, report=told.append)
     assert 1000.0 < result.evaluations[-1].wall_time_s < 2000.0
+    assert 500.0 < result.evaluations[-1].cpu_time_s < 1000.0
     assert all(1000.0 < news.wall_time_s < 2000.0 for news in told)
 
 

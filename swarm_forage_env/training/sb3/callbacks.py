@@ -7,7 +7,8 @@ Only the command line and Python name callbacks. A plan, which may come from any
 """
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -34,14 +35,31 @@ def named_callbacks(names: Iterable[str]) -> tuple[BaseCallback, ...]:
     return tuple(map(_made, names))
 
 
-def _made(name: str) -> BaseCallback:
+def check_callbacks(names: Iterable[str]) -> None:
+    """Refuse names under which there is nothing to make; nothing is made, as that may begin something.
+
+    Raises:
+        ConfigError: see `named_callbacks`.
+    """
+    for name in names:
+        with _refusing(name):
+            _found(name)
+
+
+@contextmanager
+def _refusing(name: str) -> Iterator[None]:
     try:
-        made = _found(name)()
+        yield
     except ConfigError:
         raise
     except Exception as error:  # code of the user, which may raise anything
         reason = " ".join(str(error).split()) or "no message"
         raise ConfigError(f"Cannot make the callback {name!r}: {type(error).__name__}: {reason}") from error
+
+
+def _made(name: str) -> BaseCallback:
+    with _refusing(name):
+        made = _found(name)()
     if not isinstance(made, BaseCallback):
         raise ConfigError(
             f"Expected {name!r} to make a callback of stable-baselines3, got {type(made).__name__}; derive its class "

@@ -34,6 +34,7 @@ from swarm_forage_env.policies.model_files import MODEL_FAULTS, deterministic_ch
 from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.first_compilation import compile_world
+from swarm_forage_env.runs.run import Started
 from swarm_forage_env.runs.versions import software_versions
 from swarm_forage_env.runs.workers import available_cores
 from swarm_forage_env.training.evaluation_worlds import BEST
@@ -41,10 +42,12 @@ from swarm_forage_env.training.evaluations import (
     EVALUATIONS_FILE,
     MODEL_FILE,
     PLAN_FILE,
+    POLICY_FILE,
     Evaluation,
     TrainingStatus,
     baseline_runs,
     best_baselines,
+    chosen,
     finished_runs,
     in_all_worlds,
     judged,
@@ -53,7 +56,7 @@ from swarm_forage_env.training.evaluations import (
     read_evaluations,
     write_evaluations,
 )
-from swarm_forage_env.training.plan import LEARNING, Stage, TrainingPlan
+from swarm_forage_env.training.plan import EXPORTABLE, LEARNING, Stage, TrainingPlan
 from swarm_forage_env.training.sb3.buffers import ActiveRolloutBuffer, EmptyRolloutError, PresentReplayBuffer
 from swarm_forage_env.training.sb3.export import ACTIVATION_CLASSES, export_network, note_interface
 from swarm_forage_env.training.sb3.ppo import SwarmPPO
@@ -61,8 +64,6 @@ from swarm_forage_env.views.stable_baselines3 import SwarmVecEnv
 
 ALGORITHM_CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": SwarmPPO, "a2c": A2C, "dqn": DQN, "sac": SAC}
 ON_POLICY = ("ppo", "a2c")
-EXPORTABLE = ("ppo", "a2c", "dqn")
-POLICY_FILE = "policy.npz"
 _REPORT_EVERY_S = 1.0
 _TOLD = ("algorithm", "seed", "n_arenas", "hidden", "activation", "interface", "options", "stages", "scenario.reward",
          "scenario.name", "scenario.robots.n_robots", "sampler")  # fmt: skip
@@ -134,13 +135,12 @@ def train(
             files; another call that trains in the folder; a stage whose scenario cannot be built; or a training that
             diverged.
     """
-    _check_options(plan)
+    check_plan(plan)
     if not 0 <= n_processes <= plan.n_arenas:
         raise ConfigError(f"Expected processes from 0 to n_arenas = {plan.n_arenas}, got {n_processes}.")
     check_folder(folder)
     with alone_in(folder, ConfigError):
-        _check_folder(folder, plan, resume=resume)
-        _check_baseline(plan)
+        check_place(folder, plan, resume=resume)
         return _train(plan, folder, n_processes, resume, report or _keep_quiet, callbacks)
 
 
@@ -204,6 +204,16 @@ def _arenas(plan: TrainingPlan, stage: Stage, n_processes: int) -> SwarmVecEnv:
     )
 
 
+def check_plan(plan: TrainingPlan) -> None:
+    """Refuse options and baselines that no training can have.
+
+    Raises:
+        ConfigError: see above.
+    """
+    _check_options(plan)
+    _check_baseline(plan)
+
+
 def _check_options(plan: TrainingPlan) -> None:
     """Refuse options that the algorithm does not know, which a checkpoint would take without a word."""
     known = set(inspect.signature(ALGORITHM_CLASSES[plan.algorithm]).parameters) - _OURS
@@ -220,8 +230,12 @@ def _check_options(plan: TrainingPlan) -> None:
             raise ConfigError(f"Unknown option {name!r} of {plan.algorithm}.{suggestion(name, sorted(known))}")
 
 
-def _check_folder(folder: Path, plan: TrainingPlan, *, resume: bool) -> None:
-    """Refuse a folder with a training run that is not this one, or without one where it is to be resumed."""
+def check_place(folder: Path, plan: TrainingPlan, *, resume: bool) -> None:
+    """Refuse a folder with a training run that is not this one, or without one where it is to be resumed.
+
+    Raises:
+        ConfigError: see above.
+    """
     if resume:
         differences = plan.differences(kept_plan(folder))
         if differences:
@@ -328,7 +342,7 @@ class _Watch(BaseCallback):
         self._plan = plan
         self._folder = folder
         self._report = report
-        self._started = time.perf_counter()
+        self._started = Started.now()
         self._last_report = -math.inf
         self._next_evaluation = 0
         self.evaluations = read_evaluations(folder / EVALUATIONS_FILE)
@@ -338,10 +352,14 @@ class _Watch(BaseCallback):
             for sampler in (plan.sampler, *(stage.sampler for stage in plan.stages))
             for config in (() if sampler is None else sampler.corners)
         }
-        self._spent_s = self.evaluations[-1].wall_time_s if self.evaluations else 0.0
+        last = self.evaluations[-1] if self.evaluations else None
+        self._spent_s, self._spent_cpu_s = (0.0, 0.0) if last is None else (last.wall_time_s, last.cpu_time_s)
 
     def _wall_time_s(self) -> float:
-        return self._spent_s + time.perf_counter() - self._started
+        return self._spent_s + time.perf_counter() - self._started.wall_s
+
+    def _cpu_time_s(self) -> float:
+        return self._spent_cpu_s + time.process_time() - self._started.cpu_s
 
     def keep(self, model: BaseAlgorithm) -> None:
         """Write a checkpoint, beside the plan that it is one of.
@@ -422,9 +440,7 @@ class _Watch(BaseCallback):
             self.logger.record(f"evaluation/ratio/{world.world}", world.ratio)
         self.evaluations.append(evaluation)
         # The network before the table: a table must not boast of a network that is not there.
-        if self._plan.algorithm in EXPORTABLE and evaluation.performance >= max(
-            past.performance for past in self.evaluations
-        ):
+        if self._plan.algorithm in EXPORTABLE and chosen(self.evaluations) is evaluation:
             self._export(evaluation)
         write_evaluations(self._folder / EVALUATIONS_FILE, self.evaluations)
         self._report(evaluation)
@@ -462,6 +478,7 @@ class _Watch(BaseCallback):
             baseline=1.0 if plan.evaluation.worlds else worlds[0].baseline,
             interference_fraction=interference,
             worlds=worlds if plan.evaluation.worlds else (),
+            cpu_time_s=round(self._cpu_time_s(), 1),
         )
 
     def _policy(self) -> Policy:
