@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, whole
 from swarm_forage_env.cli.options import (
     EXIT_FAILURE,
     AsJson,
@@ -35,10 +35,13 @@ from swarm_forage_env.training.defaults import (
 if TYPE_CHECKING:
     from swarm_forage_env.training.plan import TrainingPlan
 
+PICTURE_FILE = "curves.png"
 _HIDDEN = ",".join(map(str, DEFAULT_HIDDEN))
-_OF_PLAN = ("plan", "out", "seed", "turned", "callbacks", "jobs", "resume")
+_OF_SEEDS = ("picture", "as_json")
+"""Options that go with --seeds only."""
+_OF_PLAN = ("plan", "out", "seed", "turned", "seeds", *_OF_SEEDS, "callbacks", "jobs", "resume")
 """Options that go with --plan."""
-_OF_RESUMING = ("steps", "out", "callbacks", "jobs", "resume")
+_OF_RESUMING = ("steps", "out", "seeds", *_OF_SEEDS, "callbacks", "jobs", "resume")
 """Options that say nothing of the plan that is resumed."""
 
 
@@ -155,6 +158,14 @@ def train(
         ),
     ] = None,
     asked: RecipeOptions,
+    seeds: Annotated[
+        int | None,
+        typer.Option(
+            "--seeds",
+            min=1,
+            help="Train so many seeds, from 0 or the plan's upwards, into --out/seed_0 and so on (docs/training.md).",
+        ),
+    ] = None,
     callbacks: Annotated[
         list[str] | None,
         typer.Option(
@@ -165,14 +176,22 @@ def train(
         ),
     ] = None,
     jobs: Annotated[
-        int, typer.Option("--jobs", min=1, help="Number of processes for the arenas; 1 = only this process.")
-    ] = 1,
+        int | None,
+        typer.Option(
+            "--jobs",
+            min=1,
+            help="Number of processes: for the arenas, default 1; with --seeds for whole trainings, default one per "
+            "usable core. 1 = only this process.",
+        ),
+    ] = None,
     resume: Annotated[
         bool,
         typer.Option(
             "--resume", help="Continue from the checkpoint in --out (needs --trust-models); --steps sets a new total."
         ),
     ] = False,
+    picture: Picture = None,
+    as_json: AsJson = False,
 ) -> None:
     """Train one policy that every robot shares, and compare it with a scripted controller meanwhile.
 
@@ -180,11 +199,15 @@ def train(
     scenario. If deliveries count, they alone are too rare to learn from. The training then sets nest_progress=0.05 and
     first_pickup=1, unless --set or the file of --scenario does, and begins in a smaller arena. plan.json holds all
     choices. Ctrl-C keeps a checkpoint; swarm-forage --trust-models train --out FOLDER --resume continues.
+
+    With --seeds, it trains several seeds, draws them and their mean into curves.png after every evaluation, and shows a
+    table at the end, as JSON with --json.
     """
-    from swarm_forage_env.cli.training_report import run_training
+    from swarm_forage_env.cli.training_report import run_seeds, run_training
     from swarm_forage_env.training.evaluations import resumed_plan
     from swarm_forage_env.training.plan import named_plan
 
+    _check_seeds(context, asked.seed, seeds)
     if plan is not None:
         refuse_others(context, "--plan", _OF_PLAN, "which it decides; write them into its file")
         chosen = named_plan(plan, asked.seed, asked.turned)
@@ -192,12 +215,27 @@ def train(
     else:
         chosen = asked.plan(described)
         name = f"{chosen.scenario.name}_{chosen.algorithm}"
-    folder = out or Path("results/training") / name
+    folder = out or Path("results/training") / (name if seeds is None else f"{name}_seeds")
     if resume and plan is None:
         says_more = bool(given_options(context, besides=_OF_RESUMING))
-        chosen = resumed_plan(folder, chosen if says_more else None, asked.steps)
-    n_processes = 0 if jobs == 1 else min(jobs, chosen.n_arenas)
-    run_training(chosen, folder, n_processes=n_processes, resume=resume, callbacks=callbacks or ())
+        chosen = resumed_plan(folder, chosen if says_more else None, asked.steps, is_shared=seeds is not None)
+    how: dict[str, Any] = {"resume": resume, "callbacks": callbacks or ()}
+    if seeds is None:
+        run_training(chosen, folder, n_processes=0 if jobs in (None, 1) else min(jobs, chosen.n_arenas), **how)
+    else:
+        several = range(chosen.seed, chosen.seed + seeds)
+        run_seeds(chosen, several, folder, jobs=jobs, picture=picture or folder / PICTURE_FILE, as_json=as_json, **how)
+
+
+def _check_seeds(context: typer.Context, seed: int | None, seeds: int | None) -> None:
+    """Refuse seeds that are said twice, or too many, and options that go with several only."""
+    if seeds is None:
+        others = [param.name for param in context.command.params if param.name not in _OF_SEEDS]
+        refuse_others(context, "one training", [str(name) for name in others], "which go with --seeds")
+        return
+    whole("--seeds", seeds, at_least=1, at_most=MOST_SEEDS)
+    if seed is not None:
+        raise typer.BadParameter("Expected --seed for one training or --seeds for several, got both.")
 
 
 def _given(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -222,9 +260,6 @@ def _argument(word: str) -> tuple[str, float | int]:
         except ValueError:
             continue
     raise ConfigError(f"Expected an argument of the algorithm as key=number, got {word!r}.")
-
-
-PICTURE_FILE = "curves.png"
 
 
 def curves(

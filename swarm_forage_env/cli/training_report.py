@@ -1,21 +1,31 @@
 """What `swarm-forage train` shows: progress, evaluations as they come, a picture, and where the results are."""
 
+import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Protocol
 
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from swarm_forage_env._internal.wording import counted
-from swarm_forage_env.cli.options import complain, no_picture
+from swarm_forage_env.cli.options import EXIT_FAILURE, complain, no_picture
 from swarm_forage_env.cli.signals import EXIT_INTERRUPTED
 from swarm_forage_env.runs.cost import duration
-from swarm_forage_env.training.curves import curve_of_training, place_of
+from swarm_forage_env.runs.workers import processes_of
+from swarm_forage_env.training.curves import beside_baseline, place_of
 from swarm_forage_env.training.evaluation_worlds import ALL_WORLDS
-from swarm_forage_env.training.evaluations import MODEL_FILE, Evaluation, TrainingCurve, TrainingStatus
+from swarm_forage_env.training.evaluations import (
+    MODEL_FILE,
+    PLAN_FILE,
+    Evaluation,
+    TrainingCurve,
+    TrainingStatus,
+)
 from swarm_forage_env.training.plan import TrainingPlan
+from swarm_forage_env.training.seeds import TrainingFailure, is_finished, read_seeds, seed_folder
 
 PICTURE_FILE = "training.png"
 LINE_EVERY_S = 60.0
@@ -36,11 +46,10 @@ def run_training(
 
     added = named_callbacks(callbacks)
 
-    console = Console(stderr=True, highlight=False, markup=False, emoji=False)
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+    with _bar() as bar:
+        console = bar.console
         try:
-            report = _reporter(plan, bar)
+            report = _reporter(plan, bar, plan.total_steps)
             result = train(plan, folder, n_processes=n_processes, resume=resume, report=report, callbacks=added)
         except KeyboardInterrupt:
             words = _farewell(folder, is_kept=(folder / MODEL_FILE).exists())
@@ -55,6 +64,12 @@ def run_training(
     console.print(", ".join(f"{what} {file}" for what, file in files.items() if file is not None), soft_wrap=True)
 
 
+def _bar() -> Progress:
+    console = Console(stderr=True, highlight=False, markup=False, emoji=False)
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+
+
 def _farewell(folder: Path, *, is_kept: bool) -> str:
     if is_kept:
         return f"Stopped. To go on: swarm-forage --trust-models train --out {folder} --resume"
@@ -66,7 +81,7 @@ def _draw(plan: TrainingPlan, evaluations: Sequence[Evaluation], path: Path, con
     if not evaluations:
         return None
     try:
-        curve_of_training(TrainingCurve(label="trained policy", plan=plan, evaluations=tuple(evaluations))).draw(path)
+        beside_baseline(TrainingCurve(label="trained policy", plan=plan, evaluations=tuple(evaluations))).draw(path)
     except ImportError as error:
         console.print(str(error))
         return None
@@ -76,31 +91,154 @@ def _draw(plan: TrainingPlan, evaluations: Sequence[Evaluation], path: Path, con
     return path
 
 
-def _reporter(plan: TrainingPlan, bar: Progress) -> Callable[[TrainingStatus | Evaluation], None]:
-    task = bar.add_task("training", total=plan.total_steps)
-    first_words = heading(plan)
+def run_seeds(
+    plan: TrainingPlan,
+    seeds: Sequence[int],
+    folder: Path,
+    *,
+    jobs: int | None,
+    resume: bool,
+    callbacks: Sequence[str],
+    picture: Path,
+    as_json: bool,
+) -> None:
+    """Train several seeds, show how all go and draw them meanwhile, and print a table; arguments as in `train_seeds`.
+
+    Raises:
+        ImportError: stable-baselines3 is not installed.
+        ConfigError: see `training.sb3.seeds.train_seeds` and `rendering.figures.check_picture`.
+        typer.Exit: Ctrl-C, or a training failed.
+    """
+    from swarm_forage_env.cli.printer import show
+    from swarm_forage_env.rendering.figures import check_picture
+    from swarm_forage_env.training.sb3.seeds import train_seeds
+
+    check_picture(picture)
+    with _bar() as bar:
+        shown = _SeedsShown(plan, seeds, folder, picture, processes_of(len(seeds), jobs), bar)
+        try:
+            found = train_seeds(plan, seeds, folder, jobs=jobs, resume=resume, report=shown, callbacks=callbacks)
+        except KeyboardInterrupt:
+            raise typer.Exit(complain(_farewell_of_seeds(plan, seeds, folder), EXIT_INTERRUPTED)) from None
+    show(found, picture if found.has_picture and shown.can_draw else None, as_json=as_json)
+    for seed in found.failures:
+        place = seed_folder(folder, seed)
+        trust, resuming = ("--trust-models ", " --resume") if (place / MODEL_FILE).exists() else ("", "")
+        words = f"{trust}train --plan {folder / PLAN_FILE} --seed {seed} --out {place}{resuming}"
+        typer.echo(f"again, alone: swarm-forage {words}", err=True)
+    if found.failures:
+        raise typer.Exit(EXIT_FAILURE)
+
+
+def _farewell_of_seeds(plan: TrainingPlan, seeds: Sequence[int], folder: Path) -> str:
+    if not (folder / PLAN_FILE).exists():
+        return "Interrupted before there was anything to keep; the same command starts again."
+    finished = sum(is_finished(plan, seed_folder(folder, seed)) for seed in seeds)
+    return (
+        f"Interrupted: {finished} of {counted(len(seeds), 'training')} finished. To go on: "
+        f"swarm-forage --trust-models train --out {folder} --seeds {len(seeds)} --resume"
+    )
+
+
+class _SeedsShown:
+    """Shows how several trainings go, as if they were one, and draws all evaluations whenever there is a new one.
+
+    Attributes:
+        can_draw: Whether matplotlib is installed, as far as is known.
+    """
+
+    def __init__(
+        self, plan: TrainingPlan, seeds: Sequence[int], folder: Path, picture: Path, n_at_once: int, bar: Progress
+    ) -> None:
+        self._plan, self._seeds, self._folder, self._picture = plan, seeds, folder, picture
+        self._n_at_once = n_at_once
+        self._failures: dict[int, str] = {}
+        self._latest: dict[int, TrainingStatus] = {}
+        for seed, training in read_seeds(plan, folder, seeds).trainings.items():
+            self._note(seed, training.evaluations[-1])
+        total = plan.total_steps * len(seeds)
+        self._report = _reporter(plan, bar, total, begun=self._together().steps, whose=f"{'seed':>6}")
+        self._console = bar.console
+        self.can_draw = True
+
+    def __call__(self, seed: int, news: TrainingStatus | Evaluation | TrainingFailure) -> None:
+        """Show the news of a training."""
+        if isinstance(news, TrainingFailure):
+            self._failures[seed] = news.reason
+            self._console.print(f"Seed {seed} failed: {news.reason}", soft_wrap=True)
+            return
+        self._note(seed, news)
+        if isinstance(news, Evaluation):
+            self._report(news, f"{seed:>6}")
+            self._draw()
+        else:
+            self._report(self._together())
+
+    def _note(self, seed: int, news: TrainingStatus | Evaluation) -> None:
+        before = self._latest.get(seed)
+        known = math.nan if before is None else before.episode_return
+        self._latest[seed] = TrainingStatus(
+            steps=min(news.steps, self._plan.total_steps),  # the last rollout is a whole one
+            wall_time_s=news.wall_time_s,
+            episode_return=news.episode_return if isinstance(news, TrainingStatus) else known,
+        )
+
+    def _together(self) -> TrainingStatus:
+        """All trainings as one that makes the decisions of all in the time that they take side by side."""
+        known = [one.episode_return for one in self._latest.values() if not math.isnan(one.episode_return)]
+        return TrainingStatus(
+            steps=sum(one.steps for one in self._latest.values()),
+            wall_time_s=sum(one.wall_time_s for one in self._latest.values()) / self._n_at_once,
+            episode_return=sum(known) / len(known) if known else math.nan,
+        )
+
+    def _draw(self) -> None:
+        if not self.can_draw:
+            return
+        try:
+            read_seeds(self._plan, self._folder, self._seeds, self._failures).draw(self._picture)
+        except ImportError as error:
+            self._console.print(str(error))
+            self.can_draw = False
+        except OSError as error:  # the next picture may find room
+            self._console.print(no_picture(self._picture, error))
+
+
+class _Reporter(Protocol):
+    def __call__(self, news: TrainingStatus | Evaluation, whose: str = "") -> None:
+        """Show the news; `whose` evaluation stands before it."""
+
+
+def _reporter(plan: TrainingPlan, bar: Progress, total: int, *, begun: int = 0, whose: str = "") -> _Reporter:
+    """Return what shows how trainings go that make `total` decisions together; `whose` stands above names of them."""
+    task = bar.add_task("training", total=total, completed=begun)
+    *first_words, names = heading(plan).splitlines()
+    first_words += _beside(whose, [names])
     has_begun = False
     told: TrainingStatus | None = None
     told_at = time.monotonic()
 
-    def report(news: TrainingStatus | Evaluation) -> None:
+    def report(news: TrainingStatus | Evaluation, whose: str = "") -> None:
         nonlocal first_words, has_begun, told, told_at
         if bar.disable and not has_begun:
-            bar.console.print(f"{plan.total_steps:,} decisions; a line about every minute says how many are done.")
+            bar.console.print(f"{total:,} decisions; a line about every minute says how many are done.")
             has_begun = True
         if isinstance(news, Evaluation):
-            if first_words:
-                bar.console.print(first_words)
-                first_words = ""
-            for line in evaluation_lines(news):
+            for line in (*first_words, *_beside(whose, evaluation_lines(news))):
                 bar.console.print(line)
+            first_words = []
         elif not bar.disable:
             bar.update(task, completed=news.steps, description=f"mean return {news.episode_return:.2f}")
         elif time.monotonic() - told_at >= LINE_EVERY_S:
-            bar.console.print(progress_line(plan, news, told))
+            bar.console.print(progress_line(total, news, told))
             told, told_at = news, time.monotonic()
 
     return report
+
+
+def _beside(whose: str, lines: Sequence[str]) -> list[str]:
+    """Lines beside the name of a training."""
+    return [f"{whose} {line}" for line in lines] if whose else [*lines]
 
 
 def heading(plan: TrainingPlan) -> str:
@@ -134,11 +272,11 @@ def evaluation_lines(news: Evaluation) -> list[str]:
     ]
 
 
-def progress_line(plan: TrainingPlan, now: TrainingStatus, before: TrainingStatus | None) -> str:
-    """Say how far a training is, and how long it takes at the pace since the line before."""
+def progress_line(total: int, now: TrainingStatus, before: TrainingStatus | None) -> str:
+    """Say how far a training of `total` decisions is, and how long it takes at the pace since the line before."""
     steps, seconds = (0, 0.0) if before is None else (before.steps, before.wall_time_s)
-    left_s = (plan.total_steps - now.steps) * (now.wall_time_s - seconds) / max(1, now.steps - steps)
+    left_s = (total - now.steps) * (now.wall_time_s - seconds) / max(1, now.steps - steps)
     return (
-        f"{now.steps:,} of {plan.total_steps:,} decisions, mean return {now.episode_return:.2f}, "
+        f"{now.steps:,} of {total:,} decisions, mean return {now.episode_return:.2f}, "
         f"about {duration(max(0.0, left_s))} left"
     )

@@ -93,10 +93,23 @@ def _running_mean(values: FloatArray) -> FloatArray:
     return np.convolve(values, window, "same") / np.convolve(np.ones_like(values), window, "same")
 
 
+class MeanCurve(NamedTuple):
+    """The mean of several trainings, with an interval."""
+
+    label: str
+    steps: Sequence[int]
+    """(E,) decisions before each evaluation."""
+    performance: FloatArray
+    """(3, E): mean, lower and upper bound of what the scenario counts."""
+    interference: FloatArray
+    """(3, E): the same of the mean fraction of active robots in interference."""
+
+
 def draw_trainings(
     path: str | Path,
     trainings: Mapping[str, tuple[Sequence[int], Sequence[float], Sequence[float]]],
     *,
+    mean: MeanCurve | None = None,
     beside: Mapping[str, tuple[float, float]],
     stage_ends: Sequence[int],
     title: str,
@@ -109,6 +122,7 @@ def draw_trainings(
         path: File to write; as in `saved_figure`, whose errors this has.
         trainings: Name -> (E,) decisions before each evaluation, (E,) what the scenario counts, and (E,) mean fraction
             of active robots in interference.
+        mean: Of the trainings, with a band for its interval; they themselves are then thin lines of one colour.
         beside: Controllers to compare with -> what they achieve, and their interference, NaN if unknown.
         stage_ends: Decisions at which the stages of the training end.
         title: Headline.
@@ -117,11 +131,17 @@ def draw_trainings(
     """
     with saved_figure(path, (9.0, 5.0), title=title, style=style) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
-        found = looks((*trainings, *beside))
-        for look, (steps, performance, interference) in zip(found, trainings.values(), strict=False):
-            millions = np.asarray(steps) / 1e6
-            upper.plot(millions, performance, color=look.colour, marker="o", label=look.name, clip_on=False)
-            lower.plot(millions, interference, color=look.colour, marker="o", clip_on=False)
+        found = looks((*(trainings if mean is None else (mean.label,) * len(trainings)), *beside))
+        line: dict[str, Any] = {"marker": "o"} if mean is None else {"linewidth": 0.8, "alpha": 0.5}
+        for look, (steps, *curves) in zip(found, trainings.values(), strict=False):
+            for axes, curve in zip((upper, lower), curves, strict=True):
+                shown = look.name if mean is None else f"each of {len(trainings)}"
+                axes.plot(np.asarray(steps) / 1e6, curve, color=look.colour, label=shown, clip_on=False, **line)
+        if mean is not None:
+            for axes, (middle, low, high) in ((upper, mean.performance), (lower, mean.interference)):
+                millions = np.asarray(mean.steps) / 1e6
+                axes.plot(millions, middle, color=found[0].colour, marker="o", label=mean.label, clip_on=False)
+                shade(axes, millions, low, high, found[0].colour)
         dashes = ("--", "-.", ":", (0, (6, 1))) * len(beside)
         for look, levels, dash in zip(found[len(trainings) :], beside.values(), dashes, strict=False):
             for axes, level in zip((upper, lower), levels, strict=True):
@@ -135,7 +155,8 @@ def draw_trainings(
             for end in stage_ends[:-1]:
                 axes.axvline(end / 1e6, color="black", linestyle=":", linewidth=1)
         # Beside the axes: levels of others may lie anywhere in them.
-        figure.legend(*upper.get_legend_handles_labels(), loc="outside right upper")
+        shown_once = {label: handle for handle, label in zip(*upper.get_legend_handles_labels(), strict=True)}
+        figure.legend([*shown_once.values()], [*shown_once], loc="outside right upper")
 
 
 Box: TypeAlias = tuple[float, float, float, float]

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -31,14 +31,23 @@ from swarm_forage_env.training.evaluations import (
 )
 from swarm_forage_env.training.plan import TrainingPlan
 
+if TYPE_CHECKING:
+    from swarm_forage_env.rendering.plots import MeanCurve
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TrainingCurves(Answer):
-    """Trainings that are judged by the same runs, and other policies in them."""
+    """Trainings that are judged by the same runs, and other policies in them.
+
+    The picture shows the mean over trainings of one plan as far as all of them have come, with a band: Student's 95 %
+    interval of that mean. Between evaluations, which a resumed training makes at other times, curves are straight.
+    """
 
     trainings: tuple[TrainingCurve, ...]
     beside: Mapping[str, tuple[float, float]]
     """Policy -> what counts of it in the evaluations, and its interference; NaN where it is not known."""
+    averaged: tuple[str, ...] = ()
+    """Labels of trainings of one plan, whose mean is drawn; fewer than two have none."""
 
     @property
     def plan(self) -> TrainingPlan:
@@ -81,7 +90,9 @@ class TrainingCurves(Answer):
         """
         from swarm_forage_env.rendering.plots import draw_trainings
 
-        plan, is_alone = self.plan, len(self.trainings) == 1
+        plan, mean = self.plan, self._mean()
+        is_one_plan = len(self.trainings) == 1 or mean is not None
+        title = f"{plan.algorithm} in {place_of(plan)}" if is_one_plan else place_of(plan)
         draw_trainings(
             Path(path),
             {
@@ -92,11 +103,36 @@ class TrainingCurves(Answer):
                 )
                 for one in self.trainings
             },
+            mean=mean,
             beside=dict(self.beside),
-            stage_ends=np.cumsum([stage.steps for stage in plan.stages]).tolist() if is_alone else (),
-            title=f"{plan.algorithm} in {place_of(plan)}" if is_alone else place_of(plan),
+            stage_ends=np.cumsum([stage.steps for stage in plan.stages]).tolist() if is_one_plan else (),
+            title=title,
             ylabel=counted_in(plan),
             style=style,
+        )
+
+    def _mean(self) -> "MeanCurve | None":
+        """The mean of those that are averaged, as far as all of them have come; None where there is none."""
+        from metrics.statistics import aggregate  # late: see training.evaluations
+        from swarm_forage_env.rendering.plots import MeanCurve
+
+        averaged = [one.evaluations for one in self.trainings if one.label in self.averaged]
+        if len(averaged) < 2:
+            return None
+        steps = [np.array([each.steps for each in one]) for one in averaged]
+        first, last = max(each[0] for each in steps), min(each[-1] for each in steps)
+        common = [step for step in np.unique(np.concatenate(steps)).tolist() if first <= step <= last]
+        if not common:
+            return None
+
+        def of(name: str) -> Any:
+            values = [[getattr(each, name) for each in one] for one in averaged]
+            found = [np.interp(common, x, y) for x, y in zip(steps, values, strict=True)]
+            each_step = [aggregate(column) for column in np.transpose(found)]
+            return np.array([(one.mean, one.lower, one.upper) for one in each_step]).T
+
+        return MeanCurve(
+            "mean with its\n95 % interval\n(Student's)", common, of("performance"), of("interference_fraction")
         )
 
 
@@ -127,10 +163,12 @@ def curves(
     return TrainingCurves(trainings=found, beside=_levels(found[0], beside, jobs, progress=progress))
 
 
-def curve_of_training(curve: TrainingCurve) -> TrainingCurves:
-    """Return how one training went, beside the baseline of its evaluations."""
-    name = "baseline of each world" if curve.plan.evaluation.worlds else curve.plan.evaluation.baseline
-    return TrainingCurves(trainings=(curve,), beside={name: (curve.evaluations[-1].baseline, math.nan)})
+def beside_baseline(*trainings: TrainingCurve, averaged: Sequence[str] = ()) -> TrainingCurves:
+    """Return how trainings that are judged by the same runs went, beside the baseline of their evaluations."""
+    first = trainings[0]
+    name = "baseline of each world" if first.plan.evaluation.worlds else first.plan.evaluation.baseline
+    level = first.evaluations[-1].baseline, math.nan
+    return TrainingCurves(trainings=trainings, beside={name: level}, averaged=tuple(averaged))
 
 
 def read_trainings(folders: Sequence[str | Path]) -> tuple[TrainingCurve, ...]:

@@ -248,33 +248,38 @@ def read_training(folder: Path) -> TrainingCurve:
     )
 
 
-def kept_plan(folder: Path) -> TrainingPlan:
-    """Return the plan of the training that a folder holds.
+def kept_plan(folder: Path, *, is_shared: bool = False) -> TrainingPlan:
+    """Return the plan of the training that a folder holds, or that several have in common (`is_shared`).
 
     Raises:
-        ConfigError: it does not hold a training that can be resumed.
+        ConfigError: it does not hold a training that can be resumed, or no plan of several.
     """
-    for name in (PLAN_FILE, MODEL_FILE):
+    for name in (PLAN_FILE,) if is_shared else (PLAN_FILE, MODEL_FILE):
         if not (folder / name).exists():
-            raise ConfigError(
-                f"Expected {folder} to hold a training to resume, {PLAN_FILE} and the checkpoint {MODEL_FILE}, found "
-                f"no {name}; without resume a new one starts."
+            wanted = (
+                f"trainings to resume, with {PLAN_FILE}"
+                if is_shared
+                else (f"a training to resume, {PLAN_FILE} and the checkpoint {MODEL_FILE}")
             )
+            raise ConfigError(f"Expected {folder} to hold {wanted}, found no {name}; without resume a new one starts.")
     return read_plan(folder / PLAN_FILE)
 
 
-def resumed_plan(folder: Path, described: TrainingPlan | None = None, steps: int | None = None) -> TrainingPlan:
+def resumed_plan(
+    folder: Path, described: TrainingPlan | None = None, steps: int | None = None, *, is_shared: bool = False
+) -> TrainingPlan:
     """Return the plan of the training in a folder, to resume it; `steps` can make it longer.
 
     Args:
         folder: Folder of the training.
         described: Plan that must agree with it but for the number of steps; None if there is none.
         steps: Decisions in all; None = those of the plan.
+        is_shared: The folder is that of several trainings; see `training.seeds`.
 
     Raises:
         ConfigError: no training in the folder, options that differ from its plan, or fewer steps.
     """
-    kept = kept_plan(folder)
+    kept = kept_plan(folder, is_shared=is_shared)
     plan = kept if steps is None else kept.longer(steps)
     if described is not None:
         begun, wanted = ([(stage.scenario, stage.options) for stage in each.stages] for each in (kept, described))
