@@ -43,7 +43,7 @@ def calls(monkeypatch):
         if plan.seed == 3:
             raise RuntimeError("the disk\nis gone")
         made = Evaluation(
-            steps=140, wall_time_s=2.0, performance=4.0 + plan.seed, baseline=2.0, interference_fraction=0.1
+            steps=140, wall_time_s=2.0, performance=4.0 + plan.seed, baseline=10.0, interference_fraction=0.1
         )
         write_evaluations(folder / EVALUATIONS_FILE, [made])
         report(made)
@@ -73,9 +73,9 @@ def test_seeds_are_trained_drawn_and_told(command, calls, pictures, monkeypatch)
     assert "64 of 256 decisions, mean return 2.00, about 3 s left" in err
     assert "192 of 256 decisions, mean return 2.50" in err
     assert re.search(r"^  seed +decisions +per 1,000 s", err, re.MULTILINE)
-    assert re.search(r"^     1 +140 +5\.0 +2\.0 +0\.100$", err, re.MULTILINE)
+    assert re.search(r"^     1 +140 +5\.0 +10\.0 +0\.100$", err, re.MULTILINE)
     assert err.endswith("picture all/curves.png\n")
-    assert re.search(r"^mean +4\.5 +2\.25 +0\.100$", out, re.MULTILINE)
+    assert re.search(r"^mean +4\.5 +0\.45 +0\.100$", out, re.MULTILINE)
     policies = "--policy all/seed_0/policy.npz --policy all/seed_1/policy.npz"
     assert out.endswith(f"swarm-forage benchmark {policies} --name all\n")
 
@@ -89,7 +89,7 @@ def test_a_plan_names_the_folder_and_the_first_seed(command, calls, pictures):
     assert [one["policy"] for one in answer["trainings"]] == [
         f"results/training/mine_seeds/seed_{seed}/policy.npz" for seed in (7, 8)
     ]
-    assert answer["means"]["ratio"]["mean"] == 11.5
+    assert answer["means"]["ratio"]["mean"] == pytest.approx(1.15)
     assert answer["picture"] == "results/training/mine_seeds/curves.png"
 
 
