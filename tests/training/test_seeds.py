@@ -140,6 +140,17 @@ def test_what_cannot_begin_is_refused_before_anything_is_trained(tmp_path, monke
     assert calls == []
 
 
+def test_a_second_command_in_the_folder_is_refused_while_the_first_is_under_way(tmp_path, monkeypatch):
+    calls = fake(monkeypatch)
+
+    def again(seed, news):
+        with pytest.raises(ConfigError, match="Expected to be the only one that writes to"):
+            train_seeds(PLAN, range(2), tmp_path, jobs=1, resume=True)
+
+    assert not train_seeds(PLAN, range(1), tmp_path, jobs=1, report=again).failures
+    assert calls == [(0, False)]
+
+
 def test_a_process_that_is_killed_ends_no_other_training(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "_train_here", fake_trainings.one_is_killed)
     told = []
