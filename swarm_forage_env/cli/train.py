@@ -145,6 +145,37 @@ class RecipeOptions:
         return _given({name: getattr(self, name) for name in names})
 
 
+@dataclass(frozen=True, kw_only=True, slots=True)
+class SeedsOptions:
+    """Several seeds of one training, and what only they have."""
+
+    seeds: Annotated[
+        int | None,
+        typer.Option(
+            "--seeds",
+            min=1,
+            help="Train so many seeds, from 0 or the plan's upwards, into --out/seed_0 and so on (docs/training.md).",
+        ),
+    ] = None
+    picture: Picture = None
+    as_json: AsJson = False
+
+    def check(self, context: typer.Context, seed: int | None) -> None:
+        """Refuse seeds that are said twice, or too many, and options that go with several only.
+
+        Raises:
+            typer.BadParameter: see above.
+            ConfigError: too many.
+        """
+        if self.seeds is None:
+            others = [str(param.name) for param in context.command.params if param.name not in _OF_SEEDS]
+            refuse_others(context, "one training", others, "which go with --seeds")
+            return
+        whole("--seeds", self.seeds, at_least=1, at_most=MOST_SEEDS)
+        if seed is not None:
+            raise typer.BadParameter("Expected --seed for one training or --seeds for several, got both.")
+
+
 def train(
     context: typer.Context,
     described: WorldOptions,
@@ -158,14 +189,7 @@ def train(
         ),
     ] = None,
     asked: RecipeOptions,
-    seeds: Annotated[
-        int | None,
-        typer.Option(
-            "--seeds",
-            min=1,
-            help="Train so many seeds, from 0 or the plan's upwards, into --out/seed_0 and so on (docs/training.md).",
-        ),
-    ] = None,
+    several: SeedsOptions,
     callbacks: Annotated[
         list[str] | None,
         typer.Option(
@@ -180,8 +204,7 @@ def train(
         typer.Option(
             "--jobs",
             min=1,
-            help="Number of processes: for the arenas, default 1; with --seeds for whole trainings, default one per "
-            "usable core. 1 = only this process.",
+            help="Processes: for the arenas, default 1; with --seeds for trainings, default one per usable core.",
         ),
     ] = None,
     resume: Annotated[
@@ -190,8 +213,6 @@ def train(
             "--resume", help="Continue from the checkpoint in --out (needs --trust-models); --steps sets a new total."
         ),
     ] = False,
-    picture: Picture = None,
-    as_json: AsJson = False,
 ) -> None:
     """Train one policy that every robot shares, and compare it with a scripted controller meanwhile.
 
@@ -207,7 +228,7 @@ def train(
     from swarm_forage_env.training.evaluations import resumed_plan
     from swarm_forage_env.training.plan import named_plan
 
-    _check_seeds(context, asked.seed, seeds)
+    several.check(context, asked.seed)
     if plan is not None:
         refuse_others(context, "--plan", _OF_PLAN, "which it decides; write them into its file")
         chosen = named_plan(plan, asked.seed, asked.turned)
@@ -215,27 +236,16 @@ def train(
     else:
         chosen = asked.plan(described)
         name = f"{chosen.scenario.name}_{chosen.algorithm}"
-    folder = out or Path("results/training") / (name if seeds is None else f"{name}_seeds")
+    folder = out or Path("results/training") / (name if several.seeds is None else f"{name}_seeds")
     if resume and plan is None:
         says_more = bool(given_options(context, besides=_OF_RESUMING))
-        chosen = resumed_plan(folder, chosen if says_more else None, asked.steps, is_shared=seeds is not None)
+        chosen = resumed_plan(folder, chosen if says_more else None, asked.steps, is_shared=several.seeds is not None)
     how: dict[str, Any] = {"resume": resume, "callbacks": callbacks or ()}
-    if seeds is None:
+    if several.seeds is None:
         run_training(chosen, folder, n_processes=0 if jobs in (None, 1) else min(jobs, chosen.n_arenas), **how)
     else:
-        several = range(chosen.seed, chosen.seed + seeds)
-        run_seeds(chosen, several, folder, jobs=jobs, picture=picture or folder / PICTURE_FILE, as_json=as_json, **how)
-
-
-def _check_seeds(context: typer.Context, seed: int | None, seeds: int | None) -> None:
-    """Refuse seeds that are said twice, or too many, and options that go with several only."""
-    if seeds is None:
-        others = [param.name for param in context.command.params if param.name not in _OF_SEEDS]
-        refuse_others(context, "one training", [str(name) for name in others], "which go with --seeds")
-        return
-    whole("--seeds", seeds, at_least=1, at_most=MOST_SEEDS)
-    if seed is not None:
-        raise typer.BadParameter("Expected --seed for one training or --seeds for several, got both.")
+        seeds, picture = range(chosen.seed, chosen.seed + several.seeds), several.picture or folder / PICTURE_FILE
+        run_seeds(chosen, seeds, folder, jobs=jobs, picture=picture, as_json=several.as_json, **how)
 
 
 def _given(values: Mapping[str, Any]) -> dict[str, Any]:
