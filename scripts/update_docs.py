@@ -105,6 +105,8 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "stochx_program": ((f"python {ROOT}/scripts/stochx_beside_program.py",), ()),
     "from_scenario": ((f"python {ROOT}/scripts/from_scenario.py",), ()),
     "emptying": ((f"python {ROOT}/scripts/emptying_floor.py",), ("crw", "dpo")),
+    "turned": ((f"python {ROOT}/scripts/turned_worlds.py",), ()),
+    "unseen": ((f"python {ROOT}/scripts/unseen_worlds.py",), ()),
     **{
         f"lesson_{size}": (
             (f"swarm-forage run crw,dpo --scenario classroom --robots {size} --seeds 4",),
