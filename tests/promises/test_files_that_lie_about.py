@@ -7,6 +7,7 @@ import pickle
 import re
 import subprocess
 import sys
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -35,6 +36,7 @@ class Evil:
         return Path.touch, (self.marker,)
 
 
+@cache
 def kernels() -> list[tuple[Path, str, int]]:
     """File, name and first line of all functions that may be kept compiled."""
     return [
@@ -53,8 +55,8 @@ def marker(tmp_path):
 
 
 @pytest.fixture
-def cache(tmp_path, marker):
-    """A forged cache of compiled functions."""
+def forged(tmp_path, marker):
+    """The cache that the file in `here` names, with forged functions."""
     folder = tmp_path / "cache"
     abi = f"py{sys.version_info[0]}{sys.version_info[1]}{sys.abiflags}"
     for file, name, line in kernels():
@@ -62,16 +64,15 @@ def cache(tmp_path, marker):
         place.mkdir(parents=True, exist_ok=True)
         for mark in ("", "-called", "-callback"):
             (place / f"{file.stem}.{name}-{line}.{abi}{mark}.nbi").write_bytes(pickle.dumps(Evil(marker)))
-    return folder
 
 
 @pytest.fixture
-def here(tmp_path, cache):
-    """A folder with a file that tells numba to use the forged cache; JSON is YAML, too."""
-    folder = tmp_path / "here"
+def here(tmp_path):
+    """A folder with a file that tells numba to use another cache; JSON is YAML, too."""
+    folder, other = tmp_path / "here", tmp_path / "cache"
     folder.mkdir()
     (folder / ".numba_config.yaml").write_text(
-        json.dumps({"cache_dir": str(cache), "chrome_trace": str(cache / "trace"), "boundscheck": 1})
+        json.dumps({"cache_dir": str(other), "chrome_trace": str(other / "trace"), "boundscheck": 1})
     )
     return folder
 
@@ -94,7 +95,7 @@ def command(here: Path, *words: str, **environ: str) -> subprocess.CompletedProc
 
 
 @pytest.mark.compiled
-def test_a_forged_cache_that_a_file_names_is_not_opened(here, marker):
+def test_a_forged_cache_that_a_file_names_is_not_opened(here, forged, marker):
     ended = command(here, "run", "--policy", "crw", *SHORT, "--jobs", "1")
     assert "swarm-forage: .numba_config.yaml in the current folder is not read" in ended.stderr
     program = "from metrics.distance import dtw; dtw([0.0, 1.0], [1.0, 1.0])"
@@ -130,7 +131,7 @@ PLUGIN = "[swarm_forage_env.policies]\nevil = multiprocessing:Evil\n[numba_exten
 
 
 @pytest.fixture
-def console(tmp_path, here, marker):
+def console(tmp_path, here, marker, forged):
     """The console command, as an installer writes it, in a folder where whatever might be taken for something lies."""
     evil = f"import os; os.close(os.open({str(marker)!r}, os.O_CREAT)); raise ImportError('a file of somebody else')\n"
     for name in {*sys.stdlib_module_names, *FOREIGN, "sitecustomize", "usercustomize"}:
