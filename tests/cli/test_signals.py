@@ -29,10 +29,19 @@ cli.main()
 """Says when the command has begun to hear: before, Python itself answers."""
 
 
-@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM], ids=lambda sent: sent.name)
-@pytest.mark.parametrize("words", [RUN, ("list",), ("study", "list")], ids=lambda words: words[0])
-@pytest.mark.parametrize("after_s", [0.0, 0.05, 0.4])
-def test_a_signal_ends_a_command_in_one_line(tmp_path, words, sent, after_s):
+COMMANDS = (RUN, ("list",), ("study", "list"))
+DELAYS_S = (0.0, 0.05, 0.4)
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+GIVEN = [
+    pytest.param(words, after_s, SIGNALS[(i + j) % 2], id=f"{words[0]}-{after_s}-{SIGNALS[(i + j) % 2].name}")
+    for i, words in enumerate(COMMANDS)
+    for j, after_s in enumerate(DELAYS_S)
+]
+"""Each command and each delay meets both signals; `scripts/fuzz signals` gives as many as fit into a time."""
+
+
+@pytest.mark.parametrize(("words", "after_s", "sent"), GIVEN)
+def test_a_signal_ends_a_command_in_one_line(tmp_path, words, after_s, sent):
     with subprocess.Popen([sys.executable, "-c", HEARS, *words], cwd=tmp_path, text=True, stdout=subprocess.PIPE,
                           stderr=subprocess.PIPE) as started:  # fmt: skip
         try:
