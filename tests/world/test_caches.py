@@ -175,6 +175,7 @@ def test_nothing_is_drawn_while_every_cache_stands():
     assert rng.bit_generator.state == before
 
 
+@pytest.mark.compiled
 @in_each_engine
 def test_steps_restore_from_the_tasks_that_the_policy_tells():
     actions = np.zeros((15, 3), np.float32)

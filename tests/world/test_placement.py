@@ -157,6 +157,7 @@ def test_the_largest_arena_is_furnished():
     assert_consistent(objects)
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("share_free", [0.9, 0.02], ids=["by trying", "by listing"])
 def test_every_free_cell_is_equally_likely(share_free):
     rng = np.random.default_rng(11)
@@ -176,6 +177,7 @@ def test_every_free_cell_is_equally_likely(share_free):
     assert chisquare(counts[free]).pvalue > SIGNIFICANCE
 
 
+@pytest.mark.compiled
 def test_a_crowded_region_is_filled_uniformly():
     # Three of four cells are taken each time, so both ways of drawing a cell take part.
     counts = np.zeros((6, 8), int)
@@ -188,6 +190,7 @@ def test_a_crowded_region_is_filled_uniformly():
     assert 25 < statistic < 80  # 0.1 and 99.9 percent points of chi-square with 47 degrees lie at 23 and 83
 
 
+@pytest.mark.compiled
 def test_groups_then_regions_are_equally_likely():
     regions = np.array([(0, 0, 4, 4), (5, 0, 9, 4), (10, 0, 14, 4), (15, 0, 25, 10)], np.int32)
     source = Source(regions, np.array([8, 8, 8, 16], np.int32), np.array([0, 3, 4], np.int32))
@@ -201,6 +204,7 @@ def test_groups_then_regions_are_equally_likely():
     assert chisquare(counts, [1_000, 1_000, 1_000, 3_000]).pvalue > SIGNIFICANCE
 
 
+@pytest.mark.compiled
 def test_the_two_sources_are_equally_likely_and_stand_in_for_each_other():
     source = Source(
         np.array([(0, 0, 2, 2), (5, 0, 9, 4)], np.int32), np.full(2, UNLIMITED, np.int32), np.array([0, 2], np.int32)

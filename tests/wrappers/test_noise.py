@@ -56,6 +56,7 @@ def noisy(world: ForageEnv, obs: np.ndarray, times: int, **fields) -> np.ndarray
 # Sizes and clamps
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("distribution", ["gaussian", "uniform"])
 def test_units_of_sigma(world, distribution):
     sigma, obs = 0.05, middling_obs(world)
@@ -141,6 +142,7 @@ def test_only_chosen_groups_are_noisy(world, group):
         assert changed.tolist() == list(range(columns.start, columns.stop))
 
 
+@pytest.mark.compiled
 def test_a_group_may_have_a_sigma_of_its_own(world):
     obs = middling_obs(world)
     seen = noisy(world, obs, 20, sigma=0.02, groups=("proximity", "ground"), sigmas={"ground": 0.1, "light": 0.04})
