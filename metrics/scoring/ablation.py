@@ -1,9 +1,9 @@
-"""Which quirk makes which result: each one switched on in the description, and off in the authors' program.
+"""Which quirk has which effect: each is switched on in the rules as described, and off in those of the program.
 
 print(ablate_quirks(["warehouse_small"], ["crw", "dpo"], quirks=["explore_double_start"]).markdown())
 
-A quirk whose first run equals that of its rules, bit for bit, is taken to do nothing there; its other seeds are not
-run.
+If the first run with a quirk equals that without it, bit for bit, we take the quirk to have no effect in this world,
+and its other seeds do not run.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -224,7 +224,7 @@ class Ablation(Answer):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AblationQuestion(Question[Ablation]):
-    """What each quirk does. The plan has all runs, those of quirks without effect included."""
+    """The question what each quirk does. Its plan contains all runs, also those of quirks without effect."""
 
     switches: tuple[Switch, ...]
     """One per condition of the plan, in its order."""
@@ -313,21 +313,21 @@ def ablate_quirks(
     executor: "Executor | None" = None,
     progress: bool = True,
 ) -> Ablation:
-    """Switch one quirk at a time, on in the description and off in the authors' program, and say what it moves.
+    """Switch one quirk at a time, on in the rules as described and off in those of the program, and show its effect.
 
     Args:
         worlds: The worlds, with their numbers of robots; their own quirks are replaced.
         policies: As in `compare_policies`.
-        quirks: Names of the quirks to switch; none = compare the two rules only.
-        seeds: How many, or which; differences are taken seed by seed.
-        caches: Which caches there are; default those of each policy.
+        quirks: Names of the quirks to switch; without names, only the two sets of rules are compared.
+        seeds: Their number, or a list; differences are computed seed by seed.
+        caches: Kind of caches; default those of each policy.
         out: As in `score_policy`, and so are all further arguments.
         jobs: Processes; default one per core.
-        executor: Runs the work instead.
+        executor: Makes the runs in place of the processes.
         progress: Show progress and an estimate on stderr.
 
     Raises:
-        ConfigError: an unknown quirk or policy, no policy, no seed, or two worlds of one name and size.
+        ConfigError: an unknown quirk or policy, an empty list of policies or seeds, or two worlds of one name and size.
         swarm_forage_env.runs.runner.RunsInterrupted: Ctrl-C; finished runs are in `out`.
     """
     question = ablation_question(worlds, policies, quirks=quirks, seeds=seeds, caches=caches)
@@ -342,7 +342,7 @@ def ablation_question(
     seeds: int | Sequence[int] = 3,
     caches: str | None = None,
 ) -> AblationQuestion:
-    """Return what `ablate_quirks` asks; arguments and errors as there."""
+    """Return the question of `ablate_quirks`; arguments and errors as there."""
     for name in quirks:
         known_name("quirk", name, QUIRK_NAMES)
     chosen_seeds = tuple(range(seeds) if isinstance(seeds, int) else seeds)

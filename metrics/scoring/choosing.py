@@ -1,4 +1,4 @@
-"""Which policy meets given constraints: runs under each of them, verdicts with confidence, and a ranking."""
+"""Which policy meets given constraints: runs under each constraint, verdicts with confidence, and a ranking."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -287,23 +287,23 @@ def choose_policy(
 
     Args:
         policies: As in `compare_policies`, one or more.
-        world: Name of a preset, a complete configuration, or a world with wrappers, which are then in all runs: it says
-            how many robots there are, how long a run is, and what performance is.
-        deliver: Performance that an undisturbed run must reach, summed over its intervals, more than 0.
-        keep: Share of `deliver` that is still demanded under each disturbance.
+        world: Name of a preset, a complete configuration, or a world with wrappers, which then act in all runs. The
+            world sets the number of robots and the length of a run, and defines performance.
+        deliver: Performance that an undisturbed run must reach, summed over its intervals; above 0.
+        keep: Share of `deliver` that a run must reach under each disturbance.
         failures: Malfunctions per tick of the whole swarm. Robots stop where they are and are repaired one after the
             other, a little faster than they fail, see `swarm_forage_env.studies.ladders.repairs_per_tick`.
-        deaths: Robots that are expected to die during a run, one by one at random times; they do not come back.
+        deaths: Expected number of robots that die during a run, one by one at random times; they do not come back.
         noise: Standard deviation of the noise of all sensors and wheels, see `SensorNoise` and `ActuatorNoise`.
-        seeds: How many, at least two, or which. All policies and conditions share them.
+        seeds: Their number, at least two, or a list. All policies and conditions use the same seeds.
         caches: As in `score_policy`, and so are all further arguments.
-        out: Folder for run records; runs that it holds are not repeated.
+        out: Folder for run records; runs that it already holds are not made again.
         jobs: Processes; default one per core.
-        executor: Runs the work instead.
+        executor: Makes the runs in place of the processes.
         progress: Show progress and an estimate on stderr.
 
     Raises:
-        CurveError: a demand or a disturbance that is no number above 0, more deaths than robots, or fewer than two
+        CurveError: a demand or a disturbance that is not a number above 0, more deaths than robots, or fewer than two
             seeds.
         ValueError: an unknown policy or scenario.
         swarm_forage_env.runs.runner.RunsInterrupted: Ctrl-C; finished runs are in `out`.
@@ -334,7 +334,7 @@ def choice_question(
     seeds: int | Sequence[int] = 4,
     caches: str | None = None,
 ) -> ChoiceQuestion:
-    """Return what `choose_policy` asks; arguments and errors as there."""
+    """Return the question of `choose_policy`; arguments and errors as there."""
     chosen = world_of(world)
     given = {"deliver": deliver, "keep": keep, "failures": failures, "deaths": deaths, "noise": noise}
     for name, value in given.items():

@@ -1,4 +1,4 @@
-"""Swarms predicted from the scenario alone, and held against runs: what `random_search` says of world and policy."""
+"""Swarms predicted from the scenario alone by `random_search`, and compared with runs."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -69,7 +69,7 @@ class MeasuredRuns:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ScenarioPrediction(Answer):
-    """The prediction for one policy, beside what its runs showed."""
+    """The prediction for one policy, and the results of its runs."""
 
     policy: str
     scenario: str
@@ -253,7 +253,7 @@ class ScenarioPredictions(Answer):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ScenarioQuestion(Question[ScenarioPredictions]):
-    """The runs that predictions are held against; the answer is a table per policy."""
+    """The runs that predictions are compared with; the answer is a table per policy."""
 
     world: World
     sizes: tuple[int, ...]
@@ -281,14 +281,14 @@ def predict_from_scenario(
     """Predict swarms from the scenario alone, without any run.
 
     Args:
-        policies: Names of controllers that search by a random walk with the parameters of `crw`. Of one that remembers,
-            this is what it would do without its memory.
-        world: As in `predict_policy`, without wrappers, obstacles, further nests and caches.
-        sizes: Swarm sizes; default as in `predict_policy`, and one robot.
+        policies: Names of controllers that search by a random walk with the parameters of `crw`. For a controller with
+            a memory, the prediction is what it would do without this memory.
+        world: As in `predict_policy`, but without wrappers, obstacles, further nests and caches.
+        sizes: Swarm sizes; default those of `predict_policy` and one robot.
         caches: As there.
 
     Raises:
-        CurveError: a policy or a world that the model does not know, or sizes that do not exist.
+        CurveError: a policy or a world that the model cannot describe, or sizes that do not exist.
     """
     chosen = world_of(world)
     specs = policy_specs(list(policies), caches=caches)
@@ -305,7 +305,7 @@ def scenario_question(
     seeds: int | Sequence[int] = 4,
     caches: str | None = None,
 ) -> ScenarioQuestion:
-    """Return the question that holds predictions against runs of the sizes in `hold`.
+    """Return the question that compares predictions with runs of the sizes in `hold`.
 
     Arguments and errors as in `predict_from_scenario` and `predict_policy`.
     """

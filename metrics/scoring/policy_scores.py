@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ScoreQuestion(Question[Comparison]):
-    """The runs that score some policies; several are compared."""
+    """The runs that score policies, and that compare them if there are several."""
 
     world: World
     """What the worlds of the plan are variants of."""
@@ -124,36 +124,39 @@ def score_policy(
     """Run a policy in all experiments that the measures need, and score it.
 
     Args:
-        policy: See `PolicyLike`. Objects, classes and functions are run in this process, one run at a time; objects
-            are copied for each run.
-        world: Name of a preset, a complete configuration, or a world with wrappers, which are then in all runs; horizon
-            and interval are those of the budget.
+        policy: See `PolicyLike`. Objects, classes and functions run in this process, one run at a time; each run gets
+            its own copy of an object.
+        world: Name of a preset, a complete configuration, or a world with wrappers, which then act in all runs. The
+            budget sets horizon and interval.
         measures: Names out of `MEASURE_CRITERIA`; default all.
         budget: "quick", "standard", "paper" (`swarm_forage_env.studies.ladders.BUDGETS`), or one of your own.
-        seeds: How many, or which; default those of the budget. Experiments share them, so runs are paired.
+        seeds: Their number, or a list; default those of the budget. All experiments use the same seeds, so runs are
+            paired.
         horizon_s: Length of a run in seconds, whole intervals; default that of the budget.
-        performance: What P(N, t) is: a recorded column ("n_carrying"), "1/" and a column of which less is better
+        performance: What P(N, t) is: a recorded column ("n_carrying"), "1/" and a column in which less is better
             ("1/interference_fraction"), "task_balance", "cache_load", or a function of a record (`Performance`).
-            Default that of the scenario. It changes how runs are read, so those in `out` are not repeated.
-        name: Name in tables and stored runs. A policy given as object or function needs one for `out`; it then stands
-            for the code: give another name when the code has changed.
+            Default: the performance of the scenario. It only changes how runs are read, so runs in `out` are not
+            repeated.
+        name: Name in tables and stored runs. A policy that is an object or a function needs a name for `out`. Give
+            another name when its code has changed.
         parameters: Keyword arguments of a registered policy or a class.
         caches: "none", "static", "dynamic"; default see `swarm_forage_env.runs.spec.chosen_caches`.
-        density: Robots per m^2 that all swarm sizes keep: the arena grows with the swarm, one robot is in the smallest.
-            Default: all sizes in the scenario's arena (in search and rescue at its density).
-        disturbance: What reactivity and adaptability are scored under: "throttle" (robots lose speed) or
-            "handling_cost" (picking up and dropping take longer).
+        density: Robots per m^2 at all swarm sizes: the arena grows with the swarm, and one robot is in the smallest
+            arena. Default: all sizes are in the scenario's arena (in search and rescue: at its density).
+        disturbance: Disturbance for reactivity and adaptability: "throttle" (robots lose speed) or "handling_cost"
+            (picking up and dropping take longer).
         forms: Variants and forms of the measures; default the corrected marginal one.
-        out: Folder for run records. Runs that it already holds are not repeated, so you can repeat an interrupted call.
+        out: Folder for run records. Runs that it already holds are not made again, so you can repeat an interrupted
+            call.
         jobs: Processes; default one per core.
-        executor: Runs the work instead, for example Dask's `client.get_executor()`.
+        executor: Makes the runs in place of the processes, for example Dask's `client.get_executor()`.
         progress: Show progress and an estimate on stderr.
 
     Returns:
-        The table. Scores that lack runs say so in their note, and `failures` says why runs failed.
+        The table. The note of a score says if runs are missing, and `failures` says why runs failed.
 
     Raises:
-        CurveError: unknown measures, or a performance that is negative or no number.
+        CurveError: unknown measures, or a performance that is negative or not a number.
         ValueError: an unknown policy, performance, scenario, budget, or values that describe no run.
         ImportError: the policy is a model, and stable-baselines3 is not installed.
         swarm_forage_env.runs.runner.RunsInterrupted: Ctrl-C; finished runs are in `out`.
@@ -231,7 +234,7 @@ def score_question(
     disturbance: str = THROTTLE,
     forms: ScoreForms | None = None,
 ) -> ScoreQuestion:
-    """Return what `score_policy` and `compare_policies` ask; arguments and errors as there."""
+    """Return the question of `score_policy` and `compare_policies`; arguments and errors as there."""
     wanted = check_measures(measures)
     allowed = ladders.budget(budget) if isinstance(budget, str) else budget
     if horizon_s is not None:
@@ -263,13 +266,14 @@ def score_curves(
 
     Args:
         path: CSV or Parquet file with the columns of `CURVE_COLUMNS`.
-        measures: Default all that the columns allow; the table says which others are missing, and why.
-        performance: Another column of the file than `performance`, "1/" and a column, or a function of the rows of a
+        measures: Names of measures; default all that the columns allow. The table says which others are missing, and
+            why.
+        performance: A column of the file in place of `performance`, "1/" and a column, or a function of the rows of a
             run (`Performance`).
         forms: As in `score_policy`.
 
     Raises:
-        CurveError: whatever is wrong with the file, or a measure that was asked for and cannot be computed.
+        CurveError: a file with an error, or a measure that you name and that cannot be computed.
     """
     wanted = check_measures(measures)
     own = own_performance(performance)

@@ -1,4 +1,4 @@
-"""Performance of larger swarms, predicted from the runs of smaller ones and held against runs that were held back."""
+"""Performance of larger swarms, predicted from runs of smaller ones, and compared with held-back runs."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -49,7 +49,7 @@ _HEADER = ("robots", "runs", "measured", "law", "95 % interval", "used", "inside
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PredictionTable(Answer):
-    """The prediction for one policy, beside what its runs showed."""
+    """The prediction for one policy, and the results of its runs."""
 
     policy: str
     scenario: str
@@ -279,26 +279,26 @@ def predict_policy(
     executor: "Executor | None" = None,
     progress: bool = True,
 ) -> PredictionTable:
-    """Run a policy in small swarms, predict larger ones, and hold the prediction against runs that are not fitted.
+    """Run a policy in small swarms, predict larger ones, and compare the prediction with held-back runs.
 
     Args:
         policy: See `PolicyLike`.
-        world: Name of a preset, a complete configuration, or a world with wrappers, which are then in all runs. As in
+        world: Name of a preset, a complete configuration, or a world with wrappers, which then act in all runs. As in
             scores, warehouses have enough objects for the largest swarm, and the arena of search and rescue grows with
-            the swarm. It names the performance, too.
-        fit: Swarm sizes that are fitted, `MIN_SIZES` or more; default see `fit_sizes`.
-        hold: Larger sizes that are run, too, and not fitted.
-        seeds: How many, at least two, or which.
+            the swarm. The world also defines the performance.
+        fit: Swarm sizes to fit, `MIN_SIZES` or more; default see `fit_sizes`.
+        hold: Larger sizes to run but not to fit.
+        seeds: Their number, at least two, or a list.
         name: As in `score_policy`, and so are all further arguments.
         parameters: Keyword arguments of a registered policy or a class.
         caches: "none", "static", "dynamic".
-        out: Folder for run records; runs that it holds are not repeated.
+        out: Folder for run records; runs that it already holds are not made again.
         jobs: Processes; default one per core.
-        executor: Runs the work instead.
+        executor: Makes the runs in place of the processes.
         progress: Show progress and an estimate on stderr.
 
     Raises:
-        CurveError: too few sizes, sizes that are not rising or do not exist, too few runs that did not fail.
+        CurveError: too few sizes, sizes that are not rising or do not exist, or too few finished runs.
         ValueError: an unknown policy or scenario.
         swarm_forage_env.runs.runner.RunsInterrupted: Ctrl-C; finished runs are in `out`.
     """
@@ -324,7 +324,7 @@ def prediction_question(
     parameters: Mapping[str, Any] | None = None,
     caches: str | None = None,
 ) -> PredictionQuestion:
-    """Return what `predict_policy` asks; arguments and errors as there."""
+    """Return the question of `predict_policy`; arguments and errors as there."""
     chosen = world_of(world)
     fitted, held = _checked_sizes(fit_sizes(chosen.scenario) if fit is None else fit, hold)
     worlds = [
@@ -338,7 +338,7 @@ def prediction_question(
 def fit_sizes(scenario: "ScenarioConfig") -> tuple[int, ...]:
     """Return the sizes that are fitted unless others are given: `FIT_SIZES`, or those that fill the smallest arenas.
 
-    Power-law clusters are in arenas that grow with the swarm. One robot is left out there: it has a density of its own.
+    With power-law clusters, arenas grow with the swarm. One robot is then left out, because its density differs.
     """
     if scenario.objects.placement != "power_law":
         return FIT_SIZES
@@ -356,12 +356,12 @@ def predict_curves(
 
     Args:
         path: CSV or Parquet file with the columns of `CURVE_COLUMNS`; rows of criterion population_size are used.
-        fit: Sizes that are fitted; default all below the held-back ones.
-        hold: Sizes that are held back.
-        performance: What is read as performance, as in `score_curves`.
+        fit: Sizes to fit; default all below the held-back ones.
+        hold: Sizes to hold back.
+        performance: As in `score_curves`.
 
     Raises:
-        CurveError: whatever is wrong with the file, or sizes that it does not have.
+        CurveError: a file with an error, or sizes that it does not have.
     """
     tables: list[PredictionTable] = []
     for study in read_curves(path, performance):

@@ -1,4 +1,4 @@
-"""What runs were, condition by condition: performance, deliveries, interference, and the same of each part of a swarm.
+"""What runs achieved in each condition: performance, deliveries and interference, of swarms and of their parts.
 
 table = run_plan(Plan.product(policy_specs(["crw", "dpo"]), [World(scenario("warehouse_small"))], seeds=range(4)))
 print(summarize_runs(table))
@@ -44,7 +44,7 @@ _ENDS = ("mean", "low", "high")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PartSummary:
-    """What one part of a mixed swarm does, or one kind of robots."""
+    """What one part of a mixed swarm, or one kind of robots, achieves."""
 
     policy: str
     n_robots: int
@@ -58,7 +58,7 @@ class PartSummary:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ConditionSummary:
-    """What the runs of a policy in a world were."""
+    """What the runs of a policy in a world achieved."""
 
     condition: Condition
     caches: str
@@ -80,7 +80,7 @@ class ConditionSummary:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RunSummary(Answer):
-    """What the runs of a table were."""
+    """What the runs of a table achieved."""
 
     table: Table
     rows: tuple[ConditionSummary, ...]
@@ -203,7 +203,7 @@ class RunSummary(Answer):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RunQuestion(Question[RunSummary]):
-    """How policies do in worlds; the answer is what their runs were."""
+    """The question what policies achieve in worlds."""
 
     def answer(self, table: Table) -> RunSummary:
         """Return the summary of all runs."""
@@ -217,12 +217,12 @@ def run_question(
     parameters: Mapping[str, Any] | None = None,
     caches: str | None = None,
 ) -> RunQuestion:
-    """Return the question how policies do in worlds, which `summarize_runs` answers.
+    """Return the question what policies achieve in worlds, which `summarize_runs` answers.
 
     Args:
         policies: As in `compare_policies`.
-        worlds: Each a `World`, a configuration or the name of a preset.
-        seeds: How many, or which.
+        worlds: Each is a `World`, a configuration or the name of a preset.
+        seeds: Their number, or a list.
         parameters: As in `score_policy`.
         caches: As in `score_policy`.
 
@@ -234,7 +234,7 @@ def run_question(
 
 
 def summarize_runs(table: Table) -> RunSummary:
-    """Say what the runs of a table were, one row per condition that has finished runs."""
+    """Return what the runs of a table achieved, one row per condition that has finished runs."""
     return RunSummary(table=table, rows=tuple(_condition_summaries(table)))
 
 
