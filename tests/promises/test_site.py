@@ -66,9 +66,9 @@ def shown():
     ]
     cells = [{**cell, "id": f"two-{number}"} for number, cell in enumerate(cells)]
     timed = {"execution": {"shell.execute_reply": "2026-11-25T12:00:00"}}
-    executed = [
-        {**cell, "metadata": timed, "outputs": [output]} for cell, output in zip(cells[1:], outputs, strict=True)
-    ]
+    executed = [{**cell, "metadata": timed} for cell in cells[1:]]
+    executed[0]["outputs"] = [outputs[0], {**outputs[0], "text": ["the end of the first output, once more\n"]}]
+    executed[1]["outputs"] = outputs[1:]
     return {"cells": cells, "metadata": {}}, {"cells": [cells[0], *executed], "metadata": {}}
 
 
@@ -86,6 +86,7 @@ def test_texts_and_pictures_are_stored_without_what_the_machine_adds(shown):
 
 def test_other_texts_than_the_stored_are_named_by_their_cell(shown):
     kept = stored_notebooks.stored(*shown)
+    shown[1]["cells"][1]["outputs"][0]["text"] = ["1\n", "\n"]
     assert stored_notebooks.differences(kept, shown[1]) == []
     shown[1]["cells"][1]["outputs"][0]["text"] = ["2\n"]
     assert stored_notebooks.differences(kept, shown[1]) == ["two-1"]
