@@ -143,25 +143,26 @@ def saved_figure(
         if title and style.title:
             figure.suptitle(title, wrap=True)
         yield figure
-        if style.width_in is not None:
-            _fit_words(figure)
+        _fit_words(figure, style)
         _spread_numbers(figure)
         for file, ending in zip(files, endings, strict=True):
             with replacing(file, ending=ending) as draft:
                 figure.savefig(draft, metadata=_UNDATED[ending])
 
 
-def _fit_words(figure: Figure) -> None:
-    """Wrap titles and labels that are longer than their panel.
+def _fit_words(figure: Figure, style: FigureStyle) -> None:
+    """Wrap titles and labels that are longer than their panel: they would reach into the next one, or be cut.
 
     Raises:
-        ConfigError: words leave no room for panels.
+        ConfigError: the style has a width in which words leave no room for panels.
     """
     try:
         with warnings.catch_warnings():
             warnings.filterwarnings("error", "constrained_layout not applied")
             figure.draw_without_rendering()
     except UserWarning:
+        if style.width_in is None:
+            return  # nobody chose this size, and a crowded picture is better than none
         width, height = figure.get_size_inches()
         raise ConfigError(
             f"Expected a style that leaves room for the panels, got {width:g} x {height:.3g} inches, which words fill; "

@@ -169,8 +169,9 @@ def test_words_that_leave_no_room_are_refused(tmp_path):
     assert not (tmp_path / "it.png").exists()
 
 
-def test_long_words_are_wrapped_in_narrow_panels(tmp_path):
-    with saved_panels(tmp_path / "it.svg", 2, (3.0, 2.0), style=PAPER) as panels:
+@pytest.mark.parametrize("style", [PAPER, FigureStyle()])
+def test_long_words_are_wrapped_in_narrow_panels(tmp_path, style):
+    with saved_panels(tmp_path / "it.svg", 2, (3.0, 2.0), style=style) as panels:
         panels[1].set_title("a title that is much longer than the panel below it")
     words = words_in(tmp_path / "it.svg")
     assert " ".join(line for line in words if line.isascii() and line[0].isalpha()) == (

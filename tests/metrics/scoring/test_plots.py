@@ -148,4 +148,4 @@ def test_the_x_axis_of_flexibility_is_the_distance_of_the_conditions(tmp_path, m
     figure = drawn(monkeypatch, tmp_path / "scores.png", [given])
     panel = panel_of(figure, "reactivity")
     assert [text.get_text() for text in panel.get_xticklabels()] == ["7.4 (0.15)", "19.4 (0.4)"]
-    assert panel.get_xlabel() == "distance from ideal conditions, DTW(I_ec, V) (amplitude)"
+    assert " ".join(panel.get_xlabel().split()) == "distance from ideal conditions, DTW(I_ec, V) (amplitude)"
