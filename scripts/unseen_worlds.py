@@ -2,7 +2,7 @@
 
     python scripts/unseen_worlds.py                              generalist, the table of docs/generalist.md
     python scripts/unseen_worlds.py --policy a.npz,b.npz         other policies
-    python scripts/unseen_worlds.py --draws 1 --horizon 400      a first look
+    python scripts/unseen_worlds.py --draws 1                    a first look, at one world of each kind
 
 Ten kinds of worlds, five drawn of each by the seed below: directions, shapes, numbers and disturbances that no shipped
 training plan has. Nobody may choose a plan by them; run them once for a plan that is fixed.
@@ -69,7 +69,7 @@ def few_objects(rng: np.random.Generator) -> Drawn:
 
 
 def far_corner(rng: np.random.Generator) -> Drawn:
-    """A nest in the corner of a larger hall."""
+    """A nest in a corner of a larger hall."""
     x, y = rng.choice([6.0, 58.0]), rng.choice([6.0, 34.0])
     shape = {"width_m": 64.0, "height_m": 40.0, "nest_centre_m": (float(x), float(y)), "nest_size_m": (7.2, 7.2)}
     return "warehouse_medium", {**shape, "n_objects": 600, "n_robots": int(rng.integers(32, 97))}, {}
@@ -143,7 +143,9 @@ def shares(asked: Sequence[PolicySpec], there: Sequence[World], jobs: int) -> Fl
     Where no scripted controller brings anything home, it is 1 for a policy that does not, either, else infinite.
     """
     scripted = policy_specs(list(PAPER_POLICIES))
-    every = {policy.label: policy for policy in (*scripted, *asked)}
+    every = {policy.label: policy for policy in (*asked, *scripted)}
+    if any(every[policy.label] != policy for policy in asked):
+        raise SystemExit(f"Expected files of other names than {', '.join(PAPER_POLICIES)}, which are the yardstick.")
     table = finished_runs(Plan.product(every.values(), there, (RUN_SEED,)), jobs=jobs)
     means = {
         label: np.array([record.performance.mean() for one in table.plan.of_policy(label) for record in table.of(one)])

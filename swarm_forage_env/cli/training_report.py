@@ -1,6 +1,7 @@
 """What `swarm-forage train` shows: progress, evaluations as they come, a picture, and where the results are."""
 
 import math
+import shlex
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -124,8 +125,9 @@ def run_seeds(
     for seed in found.failures:
         place = seed_folder(folder, seed)
         trust, resuming = ("--trust-models ", " --resume") if (place / MODEL_FILE).exists() else ("", "")
-        words = f"{trust}train --plan {folder / PLAN_FILE} --seed {seed} --out {place}{resuming}"
-        typer.echo(f"again, alone: swarm-forage {words}", err=True)
+        words = shlex.join(["train", "--plan", str(folder / PLAN_FILE), "--seed", str(seed), "--out", str(place)])
+        further = "".join(f" --callback {shlex.quote(name)}" for name in callbacks)
+        typer.echo(f"again, alone: swarm-forage {trust}{words}{further}{resuming}", err=True)
     if found.failures:
         raise typer.Exit(EXIT_FAILURE)
 
@@ -136,7 +138,8 @@ def _farewell_of_seeds(plan: TrainingPlan, seeds: Sequence[int], folder: Path) -
     finished = sum(is_finished(plan, seed_folder(folder, seed)) for seed in seeds)
     return (
         f"Interrupted: {finished} of {counted(len(seeds), 'training')} finished. To go on: "
-        f"swarm-forage --trust-models train --out {folder} --seeds {len(seeds)} --resume"
+        f"swarm-forage --trust-models train --out {shlex.quote(str(folder))} --seeds {len(seeds)} --resume, with the "
+        "same --picture, --jobs and --callback, if any"
     )
 
 

@@ -36,7 +36,7 @@ from swarm_forage_env.runs.first_compilation import (
     compile_start,
     is_first_run,
 )
-from swarm_forage_env.runs.record import RunRecord, check_intervals
+from swarm_forage_env.runs.record import RecordError, RunRecord, check_intervals
 from swarm_forage_env.runs.run import run_one, warm_up
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import RunFailure, RunStore
@@ -166,8 +166,11 @@ def _stored(outcomes: Generator[Outcome], store: RunStore | None) -> Generator[O
         for outcome in outcomes:
             if store is not None:
                 if isinstance(outcome, RunRecord):
-                    store.write(outcome)
-                else:
+                    try:
+                        store.write(outcome)
+                    except RecordError as error:  # too large to be read again; the other runs go on
+                        outcome = _failure(RunSpec.from_json(outcome.spec), error)
+                if not isinstance(outcome, RunRecord):
                     store.write_failure(outcome)
             yield outcome
 

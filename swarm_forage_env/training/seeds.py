@@ -121,14 +121,19 @@ class SeedTrainings(Answer):
         """
         from metrics.statistics import aggregate  # late: see training.evaluations
 
-        kept = [one for one in self.kept() if one.seed not in self.failures]
+        kept = self._finished()
         return {name: aggregate([getattr(one, name) for one in kept]) for name, *_ in self._columns if kept}
 
-    def command(self) -> str:
-        """Return the command that scores what is kept as one entry of the benchmark."""
+    def _finished(self) -> list[KeptNetwork]:
+        """What is kept of trainings that did not fail."""
+        return [one for one in self.kept() if one.seed not in self.failures]
+
+    def command(self) -> str | None:
+        """Return the command that scores these networks as one entry of the benchmark; None where all failed."""
         from metrics.benchmark.running import entry_command  # late: see training.evaluations
 
-        return entry_command([one.policy for one in self.kept()], self.folder.resolve().name)
+        policies = [one.policy for one in self._finished()]
+        return entry_command(policies, self.folder.resolve().name) if policies else None
 
     @property
     def _columns(self) -> tuple[_Column, ...]:
@@ -159,9 +164,10 @@ class SeedTrainings(Answer):
             rows.append(("95 %", "", *(f"{one.text(of.lower)} to {one.text(of.upper)}" for one, of in bounds), ""))
             notes.append("95 %: Student's interval of the mean over trainings.")
         notes += [f"Seed {seed} failed and is not in the mean: {reason}" for seed, reason in self.failures.items()]
-        if rows:
+        command = self.command()
+        if command is not None:
             notes.append("These evaluations chose the networks and flatter them. To score all in runs of their own:")
-            notes.append(self.command())
+            notes.append(command)
         return (
             Sheet(
                 title=f"{counted(len(self.trainings), 'training')} by {self.plan.algorithm} in {place_of(self.plan)}",
@@ -183,7 +189,7 @@ class SeedTrainings(Answer):
                 for name, of in self.means().items()
             },
             "failures": {str(seed): reason for seed, reason in self.failures.items()},
-            "benchmark": self.command() if self.trainings else None,
+            "benchmark": self.command(),
         }
 
     @property

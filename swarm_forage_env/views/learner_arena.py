@@ -202,19 +202,24 @@ class LearnerArena:
             env.arena.decide(*act, end - env.tick, env.reward_model, rewards)
 
     def _decide_disturbed(self, wrapped: SwarmWrapper, chosen: np.ndarray, end: int, rewards: np.ndarray) -> None:
-        """Do what `_decide` does until tick `end` or the death of all; a wrapper that has to act gets its tick."""
+        """Do what `_decide` does until tick `end` or the death of all; a wrapper that has to act gets its tick.
+
+        There is at least one tick: where all died between two decisions, it ends the run.
+        """
         env, interface = self.forage_env, self.interface
         env.refuse_bad_step(env.checked_actions(interface.carry_out(chosen, wrapped.last_obs)), None)
         act = interface.keeping_on(chosen)
         try:
-            while env.tick < end and not env.terminated.all():
+            while True:
                 before = env.tick
                 n_ahead, disturbances = wrapped.told_ahead(end - before)
                 if n_ahead == 0:
                     rewards += wrapped.step_batch(interface.carry_out(chosen, wrapped.last_obs))[1]
-                    continue
-                n_observed = env.arena.decide(*act, n_ahead, env.reward_model, rewards, disturbances)
-                wrapped.pass_ticks(env.tick - before, n_observed)
+                else:
+                    n_observed = env.arena.decide(*act, n_ahead, env.reward_model, rewards, disturbances)
+                    wrapped.pass_ticks(env.tick - before, n_observed)
+                if env.tick >= end or env.terminated.all():
+                    break
         except Exception:
             env.break_off()  # wrappers have drawn numbers for ticks that have not happened
             raise

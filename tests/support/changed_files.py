@@ -453,7 +453,7 @@ FORMATS = {
         make=_toml("plan.toml", _plan_text),
         read=read_plan,
         refusals=(ConfigError,),
-        commands=("train --plan FILE --dry-run",),
+        commands=("train --plan FILE",),
         share=42,
     ),
     "curves": Format(

@@ -196,8 +196,8 @@ def test_the_table_has_what_is_kept_and_its_mean(tmp_path):
     assert "flatter" in flatter
     assert command.startswith("swarm-forage benchmark ")
     assert [Path(word).parent.name for word in command.split() if word.endswith("policy.npz")] == [
-        f"seed_{seed}" for seed in range(4)
-    ]
+        f"seed_{seed}" for seed in range(3)
+    ], "one that failed is in no entry"
     assert command.endswith(f"--name {tmp_path.name}")
     mapping = json.loads(found.json())
     assert mapping["means"]["ratio"]["mean"] == pytest.approx(2.6)

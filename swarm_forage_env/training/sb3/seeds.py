@@ -18,7 +18,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
-from swarm_forage_env._internal.fields import ConfigError, several
+from swarm_forage_env._internal.fields import ConfigError, as_whole, several
 from swarm_forage_env._internal.files import alone_in, check_folder
 from swarm_forage_env.policies import trust
 from swarm_forage_env.runs.first_compilation import WAKE_UP_EVERY_S, compile_world
@@ -77,9 +77,10 @@ def train_seeds(
         callbacks: Names of further callbacks, as `training.sb3.callbacks.named_callbacks` takes them.
 
     Raises:
-        ConfigError: no seeds, or equal ones; what `train` refuses before it begins, for any of the seeds; or another
-            call that trains in the folder.
+        ConfigError: jobs below 1; no seeds, or equal ones; what `train` refuses before it begins, for any of the seeds;
+            or another call that trains in the folder.
     """
+    jobs = as_whole("jobs", jobs, at_least=1, or_none=True)
     several("seeds", tuple(seeds), "seeds")
     if len(set(seeds)) < len(seeds):
         raise ConfigError(f"Expected different seeds, got {', '.join(map(str, seeds))}.")

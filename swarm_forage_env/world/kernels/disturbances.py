@@ -69,7 +69,10 @@ def no_noise() -> Noise:
 
 
 class Disturbances(NamedTuple):
-    """What wrappers do in some ticks that follow each other, for `tick.run`; as it is made here, nothing."""
+    """What wrappers do in some ticks that follow each other; as it is made here, nothing.
+
+    `tick.run` and `tick.decide` take it.
+    """
 
     throttles: FloatArray = np.zeros(0)
     """(ticks,) strength in each; (0,) without."""

@@ -322,7 +322,6 @@ def run(
         light_is_due[0] = True  # for what Python may have to finish
         if outcome == DONE:
             disturb_senses(d, k, a)
-        if outcome == DONE:
             s.kept[0] = d.draws.shape[0] == 0 and (is_due or s.kept[0])
         counted = outcome >= 0 or tasks.shape[0] == 0 or add_task_shares(tasks, swarm.active, task_shares)
         if outcome != DONE or not counted:
