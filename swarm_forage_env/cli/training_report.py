@@ -138,8 +138,7 @@ def _farewell_of_seeds(plan: TrainingPlan, seeds: Sequence[int], folder: Path) -
     finished = sum(is_finished(plan, seed_folder(folder, seed)) for seed in seeds)
     return (
         f"Interrupted: {finished} of {counted(len(seeds), 'training')} finished. To go on: "
-        f"swarm-forage --trust-models train --out {shlex.quote(str(folder))} --seeds {len(seeds)} --resume, with the "
-        "same --picture, --jobs and --callback, if any"
+        f"swarm-forage --trust-models train --out {shlex.quote(str(folder))} --seeds {len(seeds)} --resume"
     )
 
 

@@ -137,6 +137,20 @@ def test_a_refused_decision_leaves_the_noise_as_it_was():
     np.testing.assert_array_equal(asked.observe(), other.observe())
 
 
+def test_a_swarm_that_dies_between_two_decisions_ends_with_the_next_tick():
+    chosen = plan("population:death_per_tick=1e-6", interface=DRIVEN, tick=-1.0)
+    ends = []
+    for arena in (LearnerArena(chosen), TickByTick(chosen)):
+        arena.reset(2)
+        for row in range(N_ROBOTS):
+            assert arena.env.kill(row)
+        rewards = np.zeros(N_ROBOTS, np.float32)
+        dead, all_dead, _ = arena.step(np.zeros((N_ROBOTS, 2), np.float32), rewards)
+        ends.append((dead.tolist(), all_dead, arena.forage_env.tick, rewards.tolist()))
+    assert ends[0] == ends[1]
+    assert ends[0][1:3] == (True, 1)
+
+
 def test_arenas_with_other_weights_are_not_stepped_together():
     batch = ArenaBatch(plan(), 2)
     batch.reset([0, 1], [None, {"scenario": {"first_pickup": 3.0}}])

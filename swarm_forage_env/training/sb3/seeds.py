@@ -80,7 +80,8 @@ def train_seeds(
         ConfigError: jobs below 1; no seeds, or equal ones; what `train` refuses before it begins, for any of the seeds;
             or another call that trains in the folder.
     """
-    jobs = as_whole("jobs", jobs, at_least=1, or_none=True)
+    if jobs is not None:
+        jobs = as_whole("jobs", jobs, at_least=1, or_none=True)
     several("seeds", tuple(seeds), "seeds")
     if len(set(seeds)) < len(seeds):
         raise ConfigError(f"Expected different seeds, got {', '.join(map(str, seeds))}.")
