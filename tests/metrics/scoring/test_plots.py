@@ -132,7 +132,9 @@ def test_variants_and_forms_have_panels_of_their_own(tmp_path, monkeypatch):
     figure = drawn(monkeypatch, tmp_path / "scores.png", [given])
     lone = "scalability, against lone robots"
     names = ["scalability", lone, "scalability, paper", f"{lone}, paper"]
-    assert [axes.get_title() for axes in figure.axes] == [f"{name} (higher is better)" for name in names]
+    assert [axes.get_title().replace("\n", " ") for axes in figure.axes] == [
+        f"{name} (higher is better)" for name in names
+    ], "long ones are wrapped"
 
 
 def test_the_x_axis_of_flexibility_is_the_distance_of_the_conditions(tmp_path, monkeypatch):
