@@ -51,8 +51,8 @@ def performance(network: Network, config: ScenarioConfig, turn: Turn, seed: int)
         preferences = network.outputs(arena.observe())
         _, _, over = arena.step(np.argmax(preferences + rng.gumbel(size=preferences.shape), axis=1), rewards)
     counters = arena.forage_env.events.counters
-    counted = Counter.COLLECTED if config.performance == "collected" else Counter.FIRST_PICKED
-    return 1000.0 * float(counters[counted]) / config.horizon_s
+    counter = Counter.COLLECTED if config.performance == "collected" else Counter.FIRST_PICKED
+    return 1000.0 * float(counters[counter]) / config.horizon_s
 
 
 def main() -> None:
