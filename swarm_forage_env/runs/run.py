@@ -20,7 +20,7 @@ from swarm_forage_env.runs.record import RunRecord
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.versions import software_versions
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig, wrap_in_order
+from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig, needs_no_python, steps_as_made, wrap_in_order
 from swarm_forage_env.wrappers.recorder import RunRecorder
 
 WARM_UP_TICKS = 5
@@ -84,26 +84,17 @@ class LiveRun:
 
 
 def compiled_policy_of(stack: ForageEnv | SwarmWrapper, policy: Policy) -> CompiledPolicy | None:
-    """Return a policy, which was reset, for a run without Python between ticks; None where anybody might have a say.
+    """Return a policy, which was reset, for a run without Python between ticks; None where Python might have a say.
 
-    That is a wrapper that does not tell what it does ahead, a recorder that is a subclass, a method that was replaced,
-    neighbours, messages or an own sensor that the policy reads, a mixed swarm, robots of several kinds, Chipmunk, or a
-    window in which every tick is shown.
+    That is where `needs_no_python` says so, a recorder that is a subclass or was changed, a mixed swarm, or robots of
+    several kinds.
     """
+    if type(stack) is not RunRecorder or "after_step" in vars(stack) or not steps_as_made(stack):
+        return None
     env = stack.unwrapped
     if _told_apart(policy, env.scenario):  # parts are counted tick by tick
         return None
-    if type(stack) is not RunRecorder or type(env) is not ForageEnv:
-        return None
-    if env.scenario.physics != "compiled" or not hasattr(type(policy), "compiled"):
-        return None
-    if env.render_mode == "human":  # every tick is shown
-        return None
-    if "after_step" in vars(stack) or "step_batch" in {*vars(stack), *vars(env)}:
-        return None
-    if not all(wrapper.tells_ahead for wrapper in stack.stack[1:]):
-        return None
-    if env.arena.needs_python:
+    if not hasattr(type(policy), "compiled") or not needs_no_python(env, stack.stack[1:]):
         return None
     return policy.compiled()  # type: ignore[attr-defined] - optional, see Policy
 

@@ -25,12 +25,12 @@ from swarm_forage_env.contract.policy import COMMANDS
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.views.bookkeeping import Bookkeeping, can_book_together
-from swarm_forage_env.views.learner_arena import LearnerArena, steps_as_made
+from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.plans import ArenaPlan
 from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.world.kernels.reward import book_rows
 from swarm_forage_env.world.lockstep import Lockstep, can_go_in_lockstep
-from swarm_forage_env.wrappers.base import SwarmWrapper
+from swarm_forage_env.wrappers.base import SwarmWrapper, steps_as_made
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

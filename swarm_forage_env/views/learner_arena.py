@@ -26,7 +26,7 @@ from swarm_forage_env.scenarios.overrides import field_sections
 from swarm_forage_env.views.plans import ArenaPlan
 from swarm_forage_env.views.turns import AS_IT_IS, Turn, turn_of
 from swarm_forage_env.world.snapshots import Snapshot, SnapshotError
-from swarm_forage_env.wrappers.base import SwarmWrapper
+from swarm_forage_env.wrappers.base import SwarmWrapper, needs_no_python
 from swarm_forage_env.wrappers.world import World
 
 SCENARIO_OPTION = "scenario"
@@ -176,17 +176,7 @@ class LearnerArena:
         """Whether the ticks of a decision are one compiled call, but for those in which a wrapper has to act."""
         env = self.forage_env
         layers = self.env.stack if isinstance(self.env, SwarmWrapper) else ()
-        return (
-            type(env) is ForageEnv
-            and env.scenario.physics == "compiled"
-            and is_compiled(keep_on)
-            and env.render_mode != "human"
-            and not env.arena.needs_python
-            and env.reward_model.payment is not None
-            and all(layer.tells_ahead for layer in layers)
-            and steps_as_made(self.env)
-            and steps_as_made(env)
-        )
+        return is_compiled(keep_on) and env.reward_model.payment is not None and needs_no_python(env, layers)
 
     def _decide(self, actions: np.ndarray, rewards: np.ndarray) -> None:
         """Do what `step` does, in as few calls as wrappers allow."""
@@ -321,12 +311,6 @@ class LearnerArena:
         padded = np.zeros((self.n_rows, *rows.shape[1:]), rows.dtype)
         padded[: len(rows)] = rows
         return padded
-
-
-def steps_as_made(layer: ForageEnv | SwarmWrapper) -> bool:
-    """Whether nobody has replaced how a layer steps."""
-    ours = SwarmWrapper.step_batch, ForageEnv.step_batch
-    return type(layer).step_batch in ours and "step_batch" not in vars(layer)
 
 
 _FIXED = ("interface", "wrappers")

@@ -411,3 +411,26 @@ def wrap_in_order(env: ForageEnv, wrappers: Iterable[WrapperConfig]) -> ForageEn
     for config in sorted(wrappers, key=lambda config: config.stack_position, reverse=True):
         stack = config.wrap(stack)
     return stack
+
+
+def steps_as_made(layer: ForageEnv | SwarmWrapper) -> bool:
+    """Whether a layer steps as its class in this package does."""
+    ours = SwarmWrapper.step_batch, ForageEnv.step_batch
+    return type(layer).step_batch in ours and "step_batch" not in vars(layer)
+
+
+def needs_no_python(env: ForageEnv, layers: Iterable[SwarmWrapper]) -> bool:
+    """Whether several ticks can be one compiled call, but for those in which a layer has to act.
+
+    They cannot with Chipmunk, an open window, neighbours, messages or an own sensor that the policy reads, a layer that
+    does not tell what it does ahead, or a method that was replaced.
+    """
+    layers = tuple(layers)
+    return (
+        type(env) is ForageEnv
+        and env.scenario.physics == "compiled"
+        and env.render_mode != "human"
+        and not env.arena.needs_python
+        and all(layer.tells_ahead for layer in layers)
+        and all(map(steps_as_made, (*layers, env)))
+    )
