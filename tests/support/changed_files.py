@@ -62,6 +62,8 @@ EVERY = 200
 """Of so many cases, one is a command."""
 MOST_GROWN = 2**30
 """By so many bytes at most may the memory of this process grow in a case; our choice."""
+PEAK = Path("/proc/self/status")
+"""Where Linux says how much memory this process has held."""
 OF_THE_RUN = re.compile(
     r"^((swarm_forage_env|baselines)\.\S*Error: .*"
     r"|TypeError: \S+\(\) (got an unexpected keyword argument|takes no arguments).*)\n"
@@ -132,7 +134,7 @@ def give(random: Random, folder: Path, kind: str, *, to_a_command: bool) -> tupl
         os.chdir(here)
     file = changed_file(random, folder, kind)
     words = words_for(random, file, kind) if to_a_command else ()
-    before, n_errors, peak = _names(folder), _n_errors(), _peak_bytes()
+    before, n_errors, least = _names(folder), _n_errors(), _peak_bytes(anew=True)
     if words:
         code, fault = given_to_a_command(words)
         told = f"ended with exit code {code}"
@@ -140,7 +142,7 @@ def give(random: Random, folder: Path, kind: str, *, to_a_command: bool) -> tupl
         told, fault = read_by_its_reader(kind, file)
         fault = fault or ("wrote into the current folder" if _names(here) else "")
     new = _names(folder) - before
-    grown = _peak_bytes() - peak
+    grown = _peak_bytes() - least
     fault = fault or (f"wrote {', '.join(new)}" if new else "") or _errors(n_errors)
     fault = fault or (f"took {grown:,} bytes of memory" if grown > MOST_GROWN else "")
     return told, f"{shlex.join(words or (kind, file.name))[:2000]}\n{fault}" if fault else ""
@@ -161,8 +163,14 @@ def _errors(n_before: int) -> str:
     return os.pread(2, 4000, n_before).decode("utf-8", "replace") if _n_errors() > n_before else ""
 
 
-def _peak_bytes() -> int:
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+def _peak_bytes(*, anew: bool = False) -> int:
+    """Return the most memory that this process has held since it was last asked to begin anew."""
+    if not PEAK.exists():  # not Linux: the most since the process began, in which a smaller peak hides
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    if anew:
+        PEAK.with_name("clear_refs").write_text("5")
+    _, _, held = PEAK.read_bytes().partition(b"VmHWM:")
+    return int(held.split(b"kB", 1)[0]) * 1024
 
 
 def read_by_its_reader(kind: str, file: Path) -> tuple[str, str]:
