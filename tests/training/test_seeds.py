@@ -29,6 +29,7 @@ from swarm_forage_env.training.evaluations import (
 from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.sb3 import seeds as module
 from swarm_forage_env.training.sb3.seeds import train_seeds
+from swarm_forage_env.training.sb3.training import train
 from swarm_forage_env.training.seeds import TrainingFailure, is_finished, read_seeds, seed_folder
 from swarm_forage_env.wrappers.world import World
 from tests.support import fake_trainings
@@ -80,11 +81,18 @@ def fake(monkeypatch, *, fails=()) -> list[tuple[int, bool]]:
     return calls
 
 
-def test_each_seed_is_trained_in_its_folder_as_alone(tmp_path):
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_each_seed_is_trained_in_its_folder_as_alone(jobs, tmp_path, tmp_path_factory):
     told = []
-    found = train_seeds(PLAN, [3, 4], tmp_path, jobs=1, report=lambda seed, news: told.append((seed, type(news))))
-    assert [seed for seed, kind in told if kind is Evaluation] == [3, 4]
+    found = train_seeds(PLAN, [3, 4], tmp_path, jobs=jobs, report=lambda seed, news: told.append((seed, type(news))))
+    assert sorted(seed for seed, kind in told if kind is Evaluation) == [3, 4]
     assert {path.name for path in tmp_path.iterdir()} == {"plan.json", "seed_3", "seed_4"}
+    alone = tmp_path_factory.mktemp("alone") / "run"
+    train(dataclasses.replace(PLAN, seed=4), alone)
+    same, other = (np.load(folder / "policy.npz") for folder in (alone, tmp_path / "seed_4"))
+    names = [name for name in same.files if name != "about"]  # which tells when it was trained
+    assert "weight_0" in names
+    assert all(np.array_equal(same[name], other[name]) for name in names)
     assert read_plan(tmp_path / "plan.json") == PLAN
     for seed in (3, 4):
         assert read_plan(tmp_path / f"seed_{seed}" / "plan.json") == dataclasses.replace(PLAN, seed=seed)
@@ -160,8 +168,13 @@ def test_a_process_that_is_killed_ends_no_other_training(tmp_path, monkeypatch):
     found = train_seeds(PLAN, range(3), tmp_path, jobs=2, report=lambda *news: told.append(news))
     assert sorted(seed for seed, news in told if news == STATUS) == [0, 1, 2]
     assert [*found.failures] == [1]
-    assert f"killed (exit code {-signal.SIGKILL}), most likely because memory ran out" in found.failures[1]
+    assert "its process was killed, most likely because memory ran out" in found.failures[1]
     assert not found.trainings
+
+
+@pytest.mark.parametrize(("code", "how"), [(3, "exit code 3"), (0, "exit code 0"), (-signal.SIGSEGV, "signal 11")])
+def test_how_a_process_ended_is_no_guess(code, how):
+    assert module._how_it_ended(code).startswith(f"its process ended with {how} before")
 
 
 def test_an_interrupt_lets_processes_keep_what_they_have(tmp_path, monkeypatch):

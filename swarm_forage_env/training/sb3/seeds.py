@@ -31,12 +31,6 @@ from swarm_forage_env.training.seeds import SeedTrainings, TrainingFailure, is_f
 
 KEEP_S = 20.0
 """How long an interrupted training may take to keep a checkpoint, before it is killed; our choice."""
-KILLED = (
-    "its process was killed (exit code {code}), most likely because memory ran out; try fewer trainings at a time "
-    "(--jobs 1)"
-)
-"""What is said of a training whose process died."""
-
 
 News: TypeAlias = TrainingStatus | Evaluation | TrainingFailure
 SeedReport: TypeAlias = Callable[[int, News], None]
@@ -182,8 +176,19 @@ def _heard(connection: Any, process: BaseProcess) -> tuple[News | None, bool]:
         news = connection.recv()
     except (EOFError, OSError):
         process.join()
-        return TrainingFailure(KILLED.format(code=process.exitcode)), True
+        return TrainingFailure(_how_it_ended(process.exitcode or 0)), True
     return news, news is None
+
+
+def _how_it_ended(code: int) -> str:
+    """Say how a process ended that did not say it itself, and what to do."""
+    if code == -signal.SIGKILL:
+        return (
+            "its process was killed, most likely because memory ran out; try fewer trainings at a time (--jobs 1), "
+            "then --resume"
+        )
+    how = f"exit code {code}" if code >= 0 else f"signal {-code}"
+    return f"its process ended with {how} before the training was over; --resume goes on with it"
 
 
 def _started(job: _Job) -> tuple[Any, BaseProcess]:
