@@ -3,8 +3,10 @@
 import difflib
 import math
 import re
+import textwrap
 import unicodedata
 from collections.abc import Iterable, Sequence
+from itertools import zip_longest
 from typing import Any
 
 _MOST_SHOWN = 200
@@ -21,14 +23,64 @@ _MOST_NEAR = 4
 """Names that a message lists where there are too many to list all."""
 _NEAR = 0.5
 """Likeness of such names; less than is asked of one that is meant (our choice)."""
+_MOST_INDENTED = 0.6
+"""Share of the width that is left empty before a continued line at most (our choice)."""
 _BESIDE = {"train": ' "torch==2.13.0"'}
 """What an extra is installed together with."""
 
 
-def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return rows of texts as lines with columns under each other."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+def aligned(rows: Sequence[Sequence[str]], *, width: int | None = None) -> list[str]:
+    """Return rows of texts as lines with columns under each other.
+
+    Args:
+        rows: Cells of each row.
+        width: Most characters of a line: cells of the widest columns are wrapped, but no word is broken, so that many
+            columns can still be wider. None = one line per row.
+    """
+    columns = list(zip(*rows, strict=True))
+    widths = [max(map(len, column)) for column in columns]
+    if width is not None:
+        widths = _narrowed(widths, [max(map(_longest_word, column)) for column in columns], width)
+        rows = [line for row in rows for line in _wrapped(row, widths)]
     return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+
+
+def _narrowed(widths: list[int], least: list[int], width: int) -> list[int]:
+    """Take characters from the widest columns until all fit, or no column can give any."""
+    found = list(widths)
+    while sum(found) + 2 * (len(found) - 1) > width:
+        can_give = [column for column, most in enumerate(found) if most > least[column]]
+        if not can_give:
+            break
+        found[max(can_give, key=found.__getitem__)] -= 1
+    return found
+
+
+def _longest_word(cell: str) -> int:
+    return max(map(len, cell.split()), default=0)
+
+
+def _wrapped(row: Sequence[str], widths: Sequence[int]) -> list[tuple[str, ...]]:
+    """Return the lines of one row."""
+    return list(zip_longest(*map(_folded_cell, row, widths), fillvalue=""))
+
+
+def _folded_cell(cell: str, width: int) -> list[str]:
+    return textwrap.wrap(cell, max(width, 1), break_long_words=False, break_on_hyphens=False) or [""]
+
+
+def folded(line: str, width: int) -> str:
+    """Return a line of columns in lines of at most a width, the further ones below the last column; no word is broken.
+
+    Columns have two or more spaces between them. A line without columns stays whole, because it may be a command, which
+    people copy.
+    """
+    columns = [gap.end() for gap in re.finditer(r"(?<=\S)  +", line) if gap.end() <= _MOST_INDENTED * width]
+    if len(line) <= width or not columns:
+        return line
+    return textwrap.fill(
+        line, width, subsequent_indent=" " * columns[-1], break_long_words=False, break_on_hyphens=False
+    )
 
 
 def counted(count: int, noun: str) -> str:

@@ -7,7 +7,7 @@ import typer
 
 from swarm_forage_env._internal.wording import printable
 from swarm_forage_env.cli.options import AsJson, Picture, PolicyOptions, Seed, WorldOptions, no_picture
-from swarm_forage_env.cli.printer import notes, progress_bar
+from swarm_forage_env.cli.printer import notes, progress_bar, width_of_terminal
 
 
 def list_everything(
@@ -20,7 +20,7 @@ def list_everything(
     from swarm_forage_env.inspect.descriptions import overview
 
     listed = overview(what)
-    typer.echo(listed.json() if as_json else listed.text())
+    typer.echo(listed.json() if as_json else listed.text(width=width_of_terminal()))
 
 
 def info(
@@ -31,7 +31,8 @@ def info(
     from swarm_forage_env.inspect.descriptions import describe
 
     found = describe(name)
-    typer.echo(printable(found.json() if as_json else found.text()))  # a file may hold anything
+    text = found.json() if as_json else found.text(width=width_of_terminal())
+    typer.echo(printable(text))  # a file may hold anything
 
 
 def watch(

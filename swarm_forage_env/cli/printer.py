@@ -4,6 +4,8 @@ Names of policies, files and scenarios are shown as they are: no console reads m
 """
 
 import json
+import shutil
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -32,6 +34,11 @@ def output() -> Console:
     if not console.is_terminal:
         console.width = _WIDTH_WITHOUT_TERMINAL
     return console
+
+
+def width_of_terminal() -> int | None:
+    """Return how many characters a line on stdout may have; None for a file or a pipe, which get one line per row."""
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else None
 
 
 def notes() -> Console:
@@ -170,7 +177,8 @@ def show(answer: "Answer", picture: Path | None = None, *, as_json: bool = False
         told = {"picture": None if drawn is None else str(drawn)} if may_be_drawn else {}
         typer.echo(json.dumps({**answer.to_mapping(), **told}, indent=1))
     else:
-        typer.echo(printable((answer.markdown() if as_markdown else answer.text()).rstrip("\n")))
+        text = answer.markdown() if as_markdown else answer.text(width=width_of_terminal())
+        typer.echo(printable(text.rstrip("\n")))
     if drawn is not None:
         typer.echo(f"picture {drawn}", err=True)
 

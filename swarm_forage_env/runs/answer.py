@@ -19,7 +19,7 @@ from typing import Any
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import replacing
-from swarm_forage_env._internal.wording import aligned, plain_markdown
+from swarm_forage_env._internal.wording import aligned, folded, plain_markdown
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 
 
@@ -33,10 +33,14 @@ class Sheet:
     notes: Sequence[str] = ()
     """Lines below the table."""
 
-    def text(self) -> str:
-        """Return the table with its columns under each other."""
-        table = aligned([self.header, *self.rows] if self.header else self.rows) if self.rows else []
-        return "\n".join([*([self.title] if self.title else []), *table, *self.notes])
+    def text(self, *, width: int | None = None) -> str:
+        """Return the table with its columns under each other; with a width, cells and notes of columns are wrapped."""
+        rows = [self.header, *self.rows] if self.header else self.rows
+        table = aligned(rows, width=width) if self.rows else []
+        notes = [line for note in self.notes for line in note.split("\n")]
+        if width is not None:
+            notes = [folded(line, width) for line in notes]
+        return "\n".join([*([self.title] if self.title else []), *table, *notes])
 
     def markdown(self) -> str:
         """Return the table in the form of GitHub; names in title and cells make no links."""
@@ -83,9 +87,9 @@ class Answer(ABC):
         """
         raise ValueError(f"Expected an answer with a picture, got a {type(self).__name__} with nothing to draw.")
 
-    def text(self) -> str:
-        """Return everything for people."""
-        return "\n\n".join(filter(None, (sheet.text() for sheet in self.sheets())))
+    def text(self, *, width: int | None = None) -> str:
+        """Return everything for people; with a width, tables are wrapped to it where their words allow."""
+        return "\n\n".join(filter(None, (sheet.text(width=width) for sheet in self.sheets())))
 
     def markdown(self) -> str:
         """Return everything as Markdown."""
