@@ -37,14 +37,14 @@ from .protocol import BenchmarkError, Protocol, load_protocol
 from .standing import Reference, Standing, reference_of, scripted_entries, shares_of, standing_of
 
 _MOST_SHADE = 2.0
-"""Share of the best scripted controller from which a cell is as blue as it gets: as far from 1 as nothing is."""
+"""Share of the best scripted controller at which a cell has the darkest blue: as far above 1 as 0 is below."""
 _LINES = ("-", "--", ":")
-"""Of entries that share a colour."""
+"""Line styles that tell entries of one colour apart."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Board(Answer):
-    """What entries are worth, the scripted controllers among them."""
+    """What entries are worth, including the scripted controllers."""
 
     standings: tuple[Standing, ...]
     """The highest score first."""
@@ -89,17 +89,17 @@ class Board(Answer):
 
 
 def board_of(entries: Sequence[Entry], protocol: Protocol | None = None) -> Board:
-    """Return what entries are worth, and what the scripted controllers are beside them.
+    """Return what entries are worth, and with them the scripted controllers.
 
-    An entry of a scripted controller that was made again is shown in place of the one that comes with the package. All
-    are held against those that come with the package.
+    A new entry of a scripted controller is shown in place of the one in the package. All entries are compared with the
+    scripted controllers of the package.
 
     Args:
-        entries: All of one protocol.
-        protocol: Default the full one of the latest version.
+        entries: Entries of one protocol.
+        protocol: Default: the full protocol of the latest version.
 
     Raises:
-        BenchmarkError: two entries of one name, or one with the name of a scripted controller that is none of it.
+        BenchmarkError: two entries with one name, or another policy under the name of a scripted controller.
     """
     full = load_protocol()
     scripted = scripted_entries(full)
@@ -122,7 +122,7 @@ def board_of(entries: Sequence[Entry], protocol: Protocol | None = None) -> Boar
 
 
 def entry_files(given: Sequence[Path]) -> list[Path]:
-    """Return entry files; a folder stands for those in it, in the order of their names."""
+    """Return entry files; a folder stands for the entry files in it, sorted by name."""
     return [file for path in given for file in (sorted(path.glob("*.json")) if path.is_dir() else [path])]
 
 
@@ -164,9 +164,9 @@ def draw_benchmark(
     Args:
         standings: All entries.
         reference: The best scripted controllers.
-        protocol: What they are entries of.
-        path: File to write; as in `saved_figure`, whose errors this has.
-        style: Of the figure.
+        protocol: The protocol of the entries.
+        path: File to write; raises as `saved_figure`.
+        style: Style of the figure.
     """
     ranked = sorted_standings(standings)
     n_worlds = len(protocol.scored)

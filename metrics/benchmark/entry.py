@@ -3,9 +3,9 @@
     entry = read_entry("dpo.json", load_protocol())
     entry.performance("two sources, 8 robots")  # per 1,000 s, (policies, seeds)
 
-A file is taken only if it is whole: of this version of the protocol, every run of every world, and the digest that was
-written with it. This finds mistakes, such as a broken copy or a slip of the hand. It does not find intent: who alters
-numbers can also write a new digest. To be sure of an entry, run its command again.
+`read_entry` accepts a file only if it is whole: it follows this version of the protocol, has every run of every world,
+and its digest matches. This finds mistakes, such as a broken copy or a slip of the hand. It does not find fraud: anyone
+who alters numbers can also write a new digest. To be sure of an entry, run its command again.
 """
 
 import json
@@ -25,21 +25,21 @@ from ..curves import FloatArray
 from .protocol import BenchmarkError, Protocol
 
 TRAINED_IN = ("given", "other", "nothing", "unknown")
-"""Where a policy was trained: in the training worlds only, also elsewhere, not at all, or nobody said."""
+"""Where a policy was trained: in the training worlds only, also elsewhere, not at all, or the author does not say."""
 Rows: TypeAlias = tuple[tuple[float | None, ...], ...]
 """(policies, seeds); None where a run has no such value."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Training:
-    """How the policies of an entry were made, as its author says."""
+    """How the author says that the policies of an entry were made."""
 
     worlds: str = "unknown"
     """One of `TRAINED_IN`."""
     command: str = ""
     library: str = ""
     core_hours: Amount | None = None
-    """Of all its trainings together."""
+    """Core-hours of all its trainings together."""
 
     def __post_init__(self) -> None:
         if self.worlds not in TRAINED_IN:
@@ -53,15 +53,15 @@ class EntryPolicy:
     """One policy of an entry: one training seed of a learner."""
 
     name: str
-    """For people, see `swarm_forage_env.policies.registry.policy_label`: of a file without folder and ending."""
+    """Name for people, see `swarm_forage_env.policies.registry.policy_label`; for a file without folder and ending."""
     digest: str = ""
-    """Hash of the content of its file; of a mixed swarm those of all its files, joined by +. Empty without any file."""
+    """Hash of the content of its file, or for a mixed swarm of all its files, joined by +. Empty without a file."""
     training_seed: Count | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class EntryMeasure:
-    """One measure of swarm engineering at one level, of all policies and seeds."""
+    """One measure of swarm engineering at one level, for all policies and seeds."""
 
     group: str
     label: str
@@ -72,17 +72,17 @@ class EntryMeasure:
     higher_is_better: bool
     values: Rows
     relative: Rows = ()
-    """The same over the performance that they are compared with; empty for measures that are relative themselves."""
+    """`values` divided by the performance that they are compared with; empty for measures that are relative already."""
 
     @property
     def key(self) -> tuple[str, str, str]:
-        """What it is about, the same for all entries."""
+        """What it measures: equal keys of two entries can be compared."""
         return self.group, self.label, self.at
 
 
 @dataclass(frozen=True, kw_only=True)
 class WorldRuns:
-    """The runs of a world in an entry file, (policies, seeds) each."""
+    """The runs of a world in an entry file; each array has shape (policies, seeds)."""
 
     performance: tuple[tuple[Amount, ...], ...]
     """Per 1,000 s."""
@@ -92,7 +92,7 @@ class WorldRuns:
 
 @dataclass(frozen=True, kw_only=True)
 class Edition:
-    """What an entry file is an entry of."""
+    """The edition of the benchmark that an entry file belongs to."""
 
     version: int
     identity: str
@@ -101,7 +101,7 @@ class Edition:
 
 @dataclass(frozen=True, kw_only=True)
 class EntryFile:
-    """An entry file as it stands; the schema of entries is made of this."""
+    """The content of an entry file; the schema of entries follows from this class."""
 
     benchmark: Edition
     name: Name
@@ -111,7 +111,7 @@ class EntryFile:
     core_hours: Amount | None
     versions: Mapping[str, str]
     runs: Mapping[str, WorldRuns]
-    """By world."""
+    """World -> its runs."""
     measures: tuple[EntryMeasure, ...]
     digest: str
 
@@ -122,7 +122,7 @@ class Entry:
 
     version: int
     identity: str
-    """Of the protocol, see `Protocol.identity`."""
+    """Identity of the protocol, see `Protocol.identity`."""
     is_quick: bool
     name: str
     command: str
@@ -132,7 +132,7 @@ class Entry:
     measures: tuple[EntryMeasure, ...] = ()
     training: Training = field(default_factory=Training)
     core_hours: float | None = 0.0
-    """That the runs of the entry took, as far as their records tell; None where none of them does."""
+    """Core-hours that the runs of the entry took, as far as their records say; None if no record says it."""
     versions: Mapping[str, str] = field(default_factory=dict[str, str])
 
     def performance(self, world: str) -> FloatArray:
@@ -145,12 +145,12 @@ class Entry:
 
     @property
     def is_scripted(self) -> bool:
-        """Whether it is of the installed policy whose name it has."""
+        """Whether the entry is that of an installed policy, under the name of that policy."""
         return [(policy.name, policy.digest) for policy in self.policies] == [(self.name, "")]
 
     @property
     def is_trained(self) -> bool:
-        """Whether trainings made its policies, as far as its author says: then trainings of one plan may differ."""
+        """Whether its policies are trained, according to its author: trainings of one plan may differ."""
         return self.training.worlds != "nothing"
 
     @property
@@ -184,7 +184,7 @@ class Entry:
         """Refuse an entry of another protocol, or one that lacks runs.
 
         Args:
-            protocol: What it must be an entry of.
+            protocol: The protocol that it must belong to.
             where: Name of the entry in messages.
 
         Raises:
@@ -226,7 +226,7 @@ def read_entry(path: str | Path, protocol: Protocol) -> Entry:
     """Read an entry file.
 
     Raises:
-        BenchmarkError: the file cannot be read, holds no whole entry of `protocol`, or its digest does not fit.
+        BenchmarkError: the file cannot be read, its entry of `protocol` is not whole, or its digest does not match.
     """
     content = read_json(Path(path), BenchmarkError)
     try:
@@ -286,10 +286,10 @@ def _text(content: Mapping[str, Any]) -> str:
 
 
 def six_digits(value: float) -> float:
-    """Return a number as entry files hold it: more digits would say nothing, and make files longer."""
+    """Return a number as entry files hold it: further digits would only make files longer."""
     return float(f"{value:.6g}")
 
 
 def rounded(value: float) -> float | None:
-    """Return the same; None where there is no number."""
+    """Return a number with six digits, None for NaN and infinity."""
     return six_digits(value) if math.isfinite(value) else None

@@ -1,11 +1,11 @@
-"""What an entry is worth: its runs as shares of the best scripted controller's, made one number.
+"""What an entry is worth: its runs, compared with the best scripted controller, as one number.
 
-The performance of each run is divided by the mean of that scripted controller which is best in the world. So 1 is as
-good as the best of the four there, and worlds of few and of many deliveries count alike. The score is the
-interquartile mean of all held-out runs: a world in which a policy is lucky, or breaks down, does not decide it.
+In each world, the performance of a run is divided by the mean of the best of the four scripted controllers. So 1 is as
+good as this controller, and worlds with few and with many deliveries count alike. The score is the interquartile mean
+of all held-out runs, so a single world in which a policy is lucky or breaks down does not decide it.
 
-An interval counts what varied. Trainings of one plan differ far more than runs of one network, so the interval of a
-trained entry is over its trainings; that of a scripted one is over its runs.
+Trainings of one plan differ far more than runs of one network. So the interval of a trained entry covers its trainings,
+and the interval of a scripted one covers its runs.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,12 +22,12 @@ from .entry import Entry, EntryMeasure, read_entry
 from .protocol import BenchmarkError, Protocol, ProtocolWorld
 
 _SEED = 1
-"""Of the bootstrap; fixed, so that the same entries give the same page."""
+"""Seed of the bootstrap; fixed, so that the same entries give the same page."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Reference:
-    """The best scripted controller of each world that counts or is trained in."""
+    """The best scripted controller in each held-out world and each training world."""
 
     best: dict[str, str]
     """World -> name of the controller with the highest mean."""
@@ -47,11 +47,11 @@ class Standing:
     score: Estimate
     """Interquartile mean over the runs of all held-out worlds; 1 = as good as the best scripted controller."""
     improvement: Estimate
-    """How probably one of its runs is better than one of the best scripted controller in the same world, in [0, 1]."""
+    """Probability that one of its runs beats a run of the best scripted controller in the same world, in [0, 1]."""
     gap: float
     """Optimality gap: how far runs in held-out worlds fall short of the best scripted controller, mean over runs."""
     n_won: int
-    """Held-out worlds in which its mean is above that of every scripted controller."""
+    """Number of held-out worlds in which its mean is higher than the mean of every scripted controller."""
     n_worlds: int
     calm: float
     """Interquartile mean over undisturbed held-out worlds."""
@@ -79,7 +79,7 @@ def scripted_entries(protocol: Protocol, folder: Path | None = None) -> tuple[En
         folder: Where they are; default in the package.
 
     Raises:
-        BenchmarkError: one is missing, or is no entry of this protocol.
+        BenchmarkError: one is missing, or belongs to another protocol.
     """
     return tuple(read_entry((folder or scripted_folder()) / f"{name}.json", protocol) for name in PAPER_POLICIES)
 
@@ -88,7 +88,7 @@ def reference_of(scripted: Sequence[Entry], protocol: Protocol) -> Reference:
     """Return the best scripted controller of each world.
 
     Raises:
-        BenchmarkError: nobody achieves anything in a world that counts, so nothing can be held against it.
+        BenchmarkError: no scripted controller achieves anything in a world that counts, so shares are undefined there.
     """
     best: dict[str, str] = {}
     runs: dict[str, FloatArray] = {}
@@ -105,7 +105,7 @@ def reference_of(scripted: Sequence[Entry], protocol: Protocol) -> Reference:
 
 
 def standing_of(entry: Entry, reference: Reference, protocol: Protocol) -> Standing:
-    """Return what an entry is worth; a quick one is held against full runs, whose rates are those of longer runs."""
+    """Return what an entry is worth; the rates of a quick entry are compared with rates of longer runs."""
     shares = {world.name: shares_of(entry, world, reference) for world in _judged(protocol)}
 
     def middle(chosen: Callable[[ProtocolWorld], bool]) -> float:

@@ -1,10 +1,10 @@
-"""Whether an entry's numbers come again: its runs, or a sample of its worlds, made anew and compared.
+"""Whether an entry's numbers can be reproduced: its runs, or a sample of its worlds, made again and compared.
 
     print(verify_entry("docs/benchmark/generalist.json", ["generalist", "seed_1.npz", "seed_2.npz"]))
 
 Scripted controllers and network files give the same bits everywhere with the same versions, so their numbers must be
-the same. Any other policy may round otherwise on another machine, and its runs then part as those of other seeds do:
-its numbers must agree within chance.
+the same. Any other policy may round differently on another machine. Its runs then differ like runs with other seeds,
+so its numbers must agree within chance.
 """
 
 import math
@@ -35,7 +35,7 @@ from .running import check_finished, policy_origin
 
 Verdict: TypeAlias = Literal["same", "within chance", "differs"]
 N_WORLDS = 8
-"""Sampled by default: a few minutes on two cores (our choice)."""
+"""Worlds per policy in the default sample: a few minutes on two cores (our choice)."""
 
 
 _FEWEST = 3
@@ -54,7 +54,7 @@ class VerifiedWorld:
     stored: FloatArray
     """Performance per 1,000 s, (seeds,)."""
     again: FloatArray
-    """The same, made anew, (seeds,)."""
+    """Performance per 1,000 s of the new runs, (seeds,)."""
     is_exact: bool
     """Whether the same bits are promised."""
 
@@ -65,12 +65,12 @@ class VerifiedWorld:
 
     @property
     def shift(self) -> float:
-        """Mean change relative to the stored mean; to 1 per 1,000 s where that is smaller."""
+        """Change of the mean, divided by the stored mean, or by 1 per 1,000 s where the stored mean is smaller."""
         return float((self.again.mean() - self.stored.mean()) / max(abs(self.stored.mean()), 1.0))
 
     @property
     def chance(self) -> float:
-        """Probability of a difference of means as large as this one between runs of one policy: Welch's t-test."""
+        """Probability that two samples of runs of one policy differ this much in their means: Welch's t-test."""
         if self.is_same:
             return 1.0
         variances = [float(runs.var(ddof=1)) / runs.size for runs in (self.stored, self.again)]
@@ -83,23 +83,23 @@ class VerifiedWorld:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Verification(Answer):
-    """What came of an entry's runs when they were made again."""
+    """An entry and its runs, made again."""
 
     entry: Entry
     worlds: tuple[VerifiedWorld, ...]
     n_worlds: int
-    """Of the entry: policies times worlds."""
+    """Number of the entry's policies times worlds."""
     other_versions: tuple[str, ...]
-    """Packages of which another version made the entry, each in words."""
+    """Packages that had another version when the entry was made, each in words."""
     n_stored: int = 0
-    """Runs that were in the folder of records before."""
+    """Number of runs that the folder of records held already."""
 
     @property
     def verdict(self) -> Verdict:
-        """What all runs say together.
+        """The verdict on all runs together.
 
-        Where no bits are promised, neither the mean shift over worlds nor a single world may differ by more than chance
-        allows: at 5 % for all worlds together (Bonferroni).
+        Runs without promised bits may differ only by chance, both in the mean shift over worlds and in each single
+        world: at 5 % for all worlds together (Bonferroni).
         """
         if all(world.is_same for world in self.worlds):
             return "same"
@@ -172,10 +172,10 @@ class VerificationQuestion(Question[Verification]):
     entry: Entry
     protocol: Protocol
     policies: tuple[PolicySpec, ...]
-    """Those of the entry, in its order."""
+    """The policies of the entry, in its order."""
 
     def answer(self, table: Table) -> Verification:
-        """Compare the runs with those of the entry.
+        """Compare the new runs with the runs of the entry.
 
         Raises:
             BenchmarkError: runs failed.
@@ -216,7 +216,7 @@ def verification_question(
     seed: int = 0,
     protocol: Protocol | None = None,
 ) -> VerificationQuestion:
-    """Return what `verify_entry` asks; arguments and errors as there."""
+    """Return the question of `verify_entry`, which explains arguments and errors."""
     chosen = protocol or load_protocol()
     entry = read_entry(file, chosen)
     specs = policy_specs(policies or _installed_policies(entry))
@@ -255,21 +255,21 @@ def verify_entry(
     executor: Executor | None = None,
     progress: bool = True,
 ) -> Verification:
-    """Make runs of an entry again and say whether its numbers come out.
+    """Make runs of an entry again and say whether they give its numbers.
 
     Args:
         file: The entry.
-        policies: Names or files of its policies, in their order; default what is installed under their names.
-        n_worlds: How many of its worlds, counted for each policy, are drawn; None = all.
-        seed: Draws them.
-        protocol: What it is an entry of; default the latest version.
-        out: Folder for run records. Give one of your own: what it already holds is not made again.
+        policies: Names or files of its policies, in their order; default: the installed policies with these names.
+        n_worlds: Size of the random sample of its worlds, counted for each policy; None = all.
+        seed: Seed of this sample.
+        protocol: The protocol of the entry; default the latest version.
+        out: Folder for run records. Give a folder of your own: runs that it already holds are not made again.
         jobs: Processes; default one per core.
         executor: Runs the work instead, for example Dask's `client.get_executor()`.
         progress: Show progress and an estimate on stderr.
 
     Raises:
-        BenchmarkError: no such entry, policies that are missing or others than those of the entry, or runs failed.
+        BenchmarkError: no such entry, its policies are missing or others are given, or runs failed.
         ValueError: an unknown policy, or a file that cannot be opened.
         swarm_forage_env.runs.runner.RunsInterrupted: Ctrl-C; finished runs are in `out`.
     """
