@@ -1,4 +1,4 @@
-"""Claims held against scores: which statements a claim makes of which panels, and the verdict on it."""
+"""Claims compared with scores: which statements a claim makes about which panels, and the verdict on it."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,15 +16,15 @@ class PanelName(NamedTuple):
     """What a panel shows."""
 
     experiment: str
-    """In `EXPERIMENTS`."""
+    """Name in `EXPERIMENTS`."""
     measure: str
-    """In `METRICS`."""
+    """Name in `METRICS`."""
     form: Form = "marginal"
-    """Of a measure that compares two sizes."""
+    """Form of a measure that compares two sizes: with the next smaller swarm, or with lone robots."""
     is_relative: bool = False
-    """Whether scores are shares of the performance that they are compared with."""
+    """Whether scores are divided by the performance that they are compared with."""
     of_mean_curves: bool = False
-    """Whether it shows the measure of the mean curves, which leaves less of what chance adds to distances."""
+    """Whether it shows the measure of mean curves, so that chance adds less to distances."""
 
     @property
     def words(self) -> str:
@@ -38,8 +38,8 @@ Place: TypeAlias = tuple[str, str] | tuple[str, str, Form] | PanelName
 """A panel: experiment, measure, and the form if it is not the marginal one; or its whole name."""
 DISTANCES = ("reactivity", "adaptability", "noise_robustness")
 RELATIVE_TOO = (*DISTANCES, "population_robustness")
-"""Measures in amounts of performance that rank policies by how much they do: claims about them are judged relative to
-performance, too."""
+"""Measures in amounts of performance, which rank policies by how much they do. Claims about them are also judged
+relative to performance."""
 RELATIVE = "relative to performance"
 """Name of these verdicts among the others."""
 
@@ -71,28 +71,28 @@ READINGS: Mapping[str, Callable[[PanelName], PanelName]] = {
     "with the robots recorded at work": _recorded,
     f"with the robots recorded at work, {RELATIVE}": lambda name: _recorded(_relative(name)),
 }
-"""How else measures can be read, in words -> what makes the name of a panel that of the panel read so, which is the
-same name where it cannot be."""
+"""Another reading of measures, in words -> function from the name of a panel to the name of the panel in this reading.
+It returns the same name if the panel does not have this reading."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Statement:
-    """One statement about one panel or two."""
+    """One statement about one or two panels."""
 
     predicate: Callable[..., Outcome]
     """Called with the panels and the parameters."""
     panels: tuple[PanelName, ...]
     parameters: Mapping[str, Any] = field(default_factory=dict[str, Any])
     views: tuple[Callable[[Panel], Panel], ...] = ()
-    """Applied to each panel first, in this order: its rise, its slope, ..."""
+    """Functions that change each panel first, in this order: to its rise, its slope, ..."""
 
     @property
     def policies(self) -> tuple[str, ...]:
-        """Policies that it speaks of: those of the paper among its parameters, in any depth."""
+        """Policies of the paper that its parameters name, also in nested lists."""
         return tuple(name for name in PAPER_POLICIES if name in _words_in(list(self.parameters.values())))
 
     def outcome(self, panels: Mapping[PanelName, Panel], rule: Rule) -> Outcome:
-        """Return what comes of it, with the names of the panels in its reason."""
+        """Return the answer to it; the reason names the panels."""
         absent = [name.words for name in self.panels if name not in panels]
         if absent:
             return without_scores(", ".join(absent))
@@ -112,7 +112,7 @@ def _words_in(value: Any) -> set[str]:
 
 
 def _placed(outcome: Outcome, where: str) -> Outcome:
-    """Return the outcome with the place before its reason, or that of each of its parts."""
+    """Return the outcome with the place before its reason, or before the reasons of its parts."""
     parts = tuple(_placed(part, where) for part in outcome.parts)
     return replace(outcome, parts=parts, why=outcome.why if parts else f"{where}: {outcome.why}")
 
@@ -125,19 +125,19 @@ class Claim:
     text: str
     """What is claimed, in our words."""
     figure: str
-    """Where it is shown."""
+    """Figure of the paper that shows it."""
     statements: tuple[Statement, ...] = ()
     needs: Literal["all", "most"] = "all"
     """How many of the statements must hold."""
     otherwise: Mapping[str, tuple[Statement, ...]] = field(default_factory=dict[str, tuple[Statement, ...]])
-    """Where the paper's words, its captions, its file names or its program disagree on what was meant: what else the
-    claim may mean, in words -> statements of that."""
+    """Another meaning of the claim, in words -> its statements. The paper's text, captions, file names or program
+    disagree on what such a claim means."""
     vague: str = ""
-    """Of a claim without statements, why no run can answer it, told from its text alone."""
+    """Why no run can answer the claim, which its text alone shows; empty for a claim with statements."""
 
     @property
     def panels(self) -> tuple[PanelName, ...]:
-        """Panels that are needed, each once; without those of `otherwise`."""
+        """Panels that its statements need, each once; `other_panels` has those of `otherwise`."""
         return _panels_of(self.statements)
 
     @property
@@ -148,7 +148,7 @@ class Claim:
 
 
 def read_otherwise(claim: Claim) -> dict[str, Claim]:
-    """Return what a claim says in each of `READINGS` that makes a difference, by the words of the reading."""
+    """Return the claim in each of `READINGS` that changes it, by the words of the reading."""
     found: dict[str, Claim] = {}
     for words, read in READINGS.items():
         statements = tuple(replace(one, panels=tuple(map(read, one.panels))) for one in claim.statements)
@@ -163,36 +163,35 @@ def _panels_of(statements: Iterable[Statement]) -> tuple[PanelName, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
-    """What scores say of a claim."""
+    """What scores say about a claim."""
 
     claim: str
     answer: Answer
-    """By intervals, our rule."""
+    """Answer by intervals, our rule."""
     by_bands: Answer
-    """By overlapping bands of two standard deviations, the paper's rule."""
+    """Answer by bands of two standard deviations that overlap or not, the paper's rule."""
     statistic: float
-    """What was decided on, by our rule, and `why` says what it is; of several statements the share that holds."""
+    """Number that decides by our rule; `why` says what it is. For several statements, the share of them that holds."""
     effect: float
-    """Size of the difference or change, as a share of the largest mean in the panel; of several statements the median
-    of those with this answer; NaN where there is none."""
+    """Size of the difference or change, as a share of the panel's scale. For several statements, the median of those
+    with this answer. NaN where there is none."""
     n_runs: int
-    """Smallest number of runs behind any number that was used; 0 for formulas and missing scores."""
+    """Smallest number of runs behind any number that the rule used; 0 for formulas and missing scores."""
     why: str
-    """What was found and the limit that it was held against; one line per statement."""
+    """What the rule found, and the limit that it compared this with; one line per statement."""
     otherwise: Mapping[str, "Verdict"] = field(default_factory=dict[str, "Verdict"])
-    """Verdicts on what else the claim may mean, and on how else it can be read (`READINGS`); those without any scores
-    are left out."""
+    """Verdicts on other meanings of the claim and on its other readings (`READINGS`), where there are scores."""
 
 
 def check_claim(claim: Claim, panels: Mapping[PanelName, Panel] | Mapping[tuple[str, str], Panel]) -> Verdict:
-    """Hold one claim against scores.
+    """Test a claim with scores.
 
     Args:
-        claim: One of `CLAIMS`, or of your own.
+        claim: One of `CLAIMS`, or your own.
         panels: (experiment, measure), (experiment, measure, form) or `PanelName` -> scores of all policies.
 
     Raises:
-        CurveError: A panel lacks a policy that the claim speaks of.
+        CurveError: A panel lacks a policy that the claim names.
     """
     if claim.vague:
         return _told(claim, Outcome(answer="too vague", statistic=nan, effect=nan, n_runs=0, why=claim.vague))
@@ -204,7 +203,7 @@ def check_claim(claim: Claim, panels: Mapping[PanelName, Panel] | Mapping[tuple[
 
 
 def joined(claim: Claim, outcomes: Sequence[Outcome]) -> Outcome:
-    """Return the outcome of a claim from those of its statements."""
+    """Return the outcome of a claim from the outcomes of its statements."""
     return all_of(outcomes) if claim.needs == "all" else most_of(outcomes)
 
 
@@ -215,7 +214,7 @@ def _verdict(claim: Claim, statements: tuple[Statement, ...], panels: Mapping[Pa
 
 
 def _told(claim: Claim, ours: Outcome, bands: Outcome | None = None) -> Verdict:
-    """The verdict of an outcome by our rule and one by the paper's, or of one that needs no rule."""
+    """Return the verdict from an outcome by each rule, or from one outcome that needs no rule."""
     return Verdict(
         claim=claim.name,
         answer=ours.answer,

@@ -19,13 +19,13 @@ def availability_is(*, n: int, n_min: int, team: float, expected: float, within:
 def is_less_available(*, few: int, many: int, needed: Sequence[tuple[int, int]], team: float) -> Outcome:
     """Whether a second swarm is less available than the first with the same mean team at work.
 
-    Then it needs a larger team for the same availability. Availability is 1 where no robot is needed, so it has also
-    dropped more steeply on the way there.
+    It then needs a larger team for the same availability. Availability is 1 where no robot is needed, so the curve of
+    the second swarm has also dropped more steeply.
 
     Args:
         few: Size of the first swarm.
         many: Size of the second.
-        needed: Robots needed of the first and of the second; it must be so for all.
+        needed: Pairs: robots needed of the first and of the second swarm. The statement must hold for all pairs.
         team: Mean robots at work in both.
     """
     ratio = ratio_for_team(team)

@@ -1,9 +1,9 @@
-"""What the paper expected of each algorithm before its experiments, as claims that scores can answer.
+"""What the paper's authors expected of each algorithm before their experiments, as claims that scores can answer.
 
 The paper has two tables of intuitions, one per scenario. Their words are vague: "modest", "moderate", "low". Here each
-is a comparison with the other algorithms: high is better than all three others, low is worse than CRW and STOCHX or, of
-one of these, worse than both others; modest lies between. That is our choice. Only congestion near caches needs no
-other algorithm: it is held against interference that is spread evenly over the floor.
+is a comparison with the other algorithms. "High" means better than all three others. "Low" means worse than CRW and
+STOCHX, and for one of these two worse than both others. "Modest" lies between. This is our choice. Congestion near
+caches is compared with interference that is spread evenly over the floor, not with another algorithm.
 """
 
 from .checking import Claim, Place, Statement

@@ -1,13 +1,13 @@
-"""Scores that are looked at while runs are still being made, and what each look may decide.
+"""Judging several times while runs are still being made, and what each look may decide.
 
-Whoever looks seven times and stops when the answer is there is wrong more often than once in twenty. So each look has a
-part of these 5 %, in proportion to the runs that it adds (Lan and DeMets 1983; Kim and DeMets 1987), and judges by
-intervals of a higher confidence. All intervals of one comparison hold at once, so it does not matter when and why one
-stops (repeated confidence intervals, Jennison and Turnbull 1990). The same confidence serves Welch's t, the two
-one-sided tests of a tie and resampled numbers: a level that follows from the normal distribution is used for any test.
+If you look seven times and stop when there is an answer, you are wrong more often than once in twenty. So each look
+gets a part of these 5 %, in proportion to the runs that it adds (Lan and DeMets 1983; Kim and DeMets 1987), and uses
+intervals with a higher confidence. All intervals of one comparison hold at the same time, so the time and the reason
+for stopping do not matter (repeated confidence intervals, Jennison and Turnbull 1990). Welch's t, the two one-sided
+tests of a tie and resampled numbers use the same confidence: every test uses a level from the normal distribution.
 
-Policies and panels may have unequally many runs. A statement is judged on the first runs of each, as many as all that
-it speaks of have had looked at, so that no look at it is more than one.
+Policies and panels may have different numbers of runs. A statement is judged on equally many first runs of all its
+policies, at the last look that all of them have reached. So further runs of one policy do not count as a further look.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -23,15 +23,15 @@ from ..curves import FloatArray
 from .panel import CONFIDENCE, Looks, Panel, mean_over_runs
 
 LOOKS: Looks = (4, 8, 16, 32, 64, 128, 192)
-"""Doubled each time, up to the runs of the paper."""
+"""Numbers of runs, doubled each time, up to the number in the paper."""
 N_NODES = 200
 N_HALVINGS = 60
 FARTHEST = 30.0
-"""Standard deviations, farther than any bound."""
+"""Number of standard deviations that is larger than any bound."""
 
 
 def looks_up_to(most: int) -> Looks:
-    """Return looks of which the last is after so many runs."""
+    """Return looks, the last one after `most` runs."""
     return (*(n_runs for n_runs in LOOKS if n_runs < most), most)
 
 
@@ -42,10 +42,10 @@ def confidence_at(looks: Looks, n_runs: int) -> float:
 
 @cache
 def _levels(looks: Looks) -> tuple[float, ...]:
-    """Two-sided level of each look, by which all together are wrong once in twenty.
+    """Two-sided level of each look, so that all looks together are wrong once in twenty times.
 
-    Sums of normal numbers that stayed within the bounds of all looks before are followed from look to look (Armitage,
-    McPherson and Rowe 1969), by Gauss-Legendre quadrature.
+    The computation follows sums of normal numbers from look to look, as long as they stay within the bounds of all
+    earlier looks (Armitage, McPherson and Rowe 1969), by Gauss-Legendre quadrature.
     """
     nodes, weights = leggauss(N_NODES)
     sums, masses = np.zeros(1), np.ones(1)  # before the first run
@@ -62,7 +62,7 @@ def _levels(looks: Looks) -> tuple[float, ...]:
 
 
 def _bound(sums: FloatArray, masses: FloatArray, sd: float, share: float) -> float:
-    """Size that so many sums exceed after a normal number is added to each; by halving."""
+    """Bound that a share of the sums exceeds after a normal number is added to each; by bisection."""
     low, high = 0.0, float(np.abs(sums).max()) + FARTHEST * sd
     for _ in range(N_HALVINGS):
         middle = 0.5 * (low + high)
@@ -72,15 +72,15 @@ def _bound(sums: FloatArray, masses: FloatArray, sd: float, share: float) -> flo
 
 
 def last_look(looks: Looks, n_runs: int) -> int:
-    """Return the last look that so many runs have reached; 0 before the first."""
+    """Return the last look that `n_runs` runs have reached; 0 before the first."""
     return max((after for after in looks if after <= n_runs), default=0)
 
 
 def at_last_look(panels: Sequence[Panel], policies: Collection[str]) -> list[Panel]:
-    """Return panels with the runs that some policies have in all of them, and the confidence of the last look at these.
+    """Return panels with the runs that some policies have in all of them, and with the confidence of their last look.
 
-    Panels that are looked at once stay as they are, but for the confidence if others are looked at several times. Of
-    panels with different looks it is a look of all, and the highest confidence.
+    Panels without looks keep their runs, but get this confidence if other panels have looks. If panels have different
+    looks, the function uses the last look that all of them share, and the highest confidence.
     """
     several = [panel for panel in panels if panel.looks]
     if not several:
@@ -105,9 +105,9 @@ def _first(scores: Mapping[str, FloatArray], n_runs: int) -> dict[str, FloatArra
 
 
 def as_if(panel: Panel, n_runs: int) -> Panel:
-    """Return a panel as it would be if all policies had so many runs, and further ones were like those there are.
+    """Return the panel that follows if all policies get `n_runs` runs, and further runs are like those they have.
 
-    Means and standard deviations stay as they are. Policies without runs stay without.
+    Means and standard deviations stay as they are. Policies without runs stay without runs.
     """
     reached = {name: n_runs if before else 0 for name, before in panel.reached.items()}
 

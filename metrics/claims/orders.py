@@ -1,11 +1,10 @@
-"""Statements about the order of policies in two panels: the same, the opposite, or one that has nothing to do with it.
+"""Statements about the order of policies in two panels: the same, the opposite, or unrelated orders.
 
-All rest on Kendall's tau between two orders: 1 if all pairs of policies stand alike in both, -1 if all stand the other
-way round. A pair has an order in a panel if one of the two is higher at more levels than the other: by intervals where
-the means are further apart than the margin, by bands where the bands do not overlap. Tau is that of the pairs which
-have an order in both panels; these must be half of all pairs or more, else the answer is undecided. For orders that
-have nothing to do with each other they must be `ORDERED`: where policies tie, an order is neither tied to another nor
-free.
+All use Kendall's tau between two orders: 1 if all pairs of policies have the same order in both panels, -1 if all have
+the opposite order. A pair has an order in a panel if one policy is higher at more levels than the other: by intervals
+where the means are further apart than the margin, by bands where the bands do not overlap. Tau counts only pairs that
+have an order in both panels. If these are fewer than half of all pairs, the answer is undecided. For unrelated orders,
+the share must be `ORDERED`, because policies that tie do not show whether two orders are related.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,13 +18,12 @@ from .panel import MANY, Panel, Rule, bounds, resampled_means, signs
 from .predicates import every_pair
 
 LOOSE = 0.5
-"""Largest Kendall's tau, up or down, of orders that are not tied to each other (our choice)."""
+"""Largest absolute value of Kendall's tau between unrelated orders (our choice)."""
 ORDERED = 2.0 / 3.0
-"""Share of pairs that must have an order in both panels where orders have nothing to do with each other (our choice).
-One of four policies apart from three that tie is half: in every other case chance puts it at the same end or the other.
-"""
+"""Share of pairs that must have an order in both panels if the orders are unrelated (our choice). If one of four
+policies stands apart and three tie, half of the pairs have an order, and chance alone gives tau 1 or -1."""
 SAME = 5.0 / 6.0
-"""Above this tau four policies without ties have the same order. Of 24 random orders one has that, four reach 2/3."""
+"""Above this tau, four policies without ties have the same order. One of 24 random orders does, and four reach 2/3."""
 
 
 def same_order(
@@ -46,8 +44,8 @@ def same_order(
         second: The other; levels and runs may differ.
         policies: Policies to order, two or more.
         better: 1 or -1 for each panel: whether higher or lower is better there.
-        least: `SAME`, or `LOOSE` for orders that go with each other and need not be the same. A single random order
-            passes the latter in four of 24 cases, so a claim needs several panels of that kind.
+        least: `SAME`, or `LOOSE` for orders that only have to be similar. A single random order passes `LOOSE` in four
+            of 24 cases, so a claim needs several such panels.
         rule: As everywhere.
     """
 
@@ -66,7 +64,7 @@ def opposite_order(
     least: float = SAME,
     rule: Rule = "intervals",
 ) -> Outcome:
-    """Whether policies have the opposite order in two panels: as `same_order`, with tau of the other sign."""
+    """Whether policies have the opposite order in two panels: `same_order` with the opposite sign of tau."""
 
     def decide(tau: float, lower: float, upper: float) -> Answer:
         return _is_above(least, -tau, -upper, -lower)
@@ -75,10 +73,10 @@ def opposite_order(
 
 
 def unrelated(first: Panel, second: Panel, *, policies: Sequence[str], rule: Rule = "intervals") -> Outcome:
-    """Whether the order in one panel has nothing to do with that in the other: tau lies within `LOOSE` of 0.
+    """Whether the orders in two panels are unrelated: tau lies within `LOOSE` of 0.
 
-    Contradicted if its interval leaves out 0 on either side: the opposite order is a strong tie, too. By bands, if tau
-    itself is beyond `LOOSE`. Undecided if fewer than `ORDERED` of the pairs have an order in both.
+    Contradicted by intervals if the interval of tau leaves out 0 on either side, because opposite orders are related,
+    too; by bands, if tau is beyond `LOOSE`. Undecided if fewer than `ORDERED` of the pairs have an order in both.
     """
 
     def decide(_: float, lower: float, upper: float) -> Answer:
@@ -140,13 +138,13 @@ def _of_tau(
 
 
 def _by_bands(panel: Panel, policies: Sequence[str]) -> FloatArray:
-    """Order of each pair, 1 if the first is higher, -1 if the second is, 0 if neither at more levels than the other."""
+    """Order of each pair: 1 if the first is higher at more levels, -1 if the second is, else 0."""
     found = np.array([signs(panel, first, second, "bands") for first, second in every_pair(policies)])
     return np.sign((found == 1.0).sum(axis=1) - (found == -1.0).sum(axis=1))
 
 
 def _by_means(means: FloatArray, margins: FloatArray) -> FloatArray:
-    """The same by means beyond the margins, (..., P, L) and (L,) to (..., pairs)."""
+    """Order of each pair by means beyond the margins, (..., P, L) and (L,) to (..., pairs)."""
     above, below = np.triu_indices(means.shape[-2], k=1)
     gaps = means[..., above, :] - means[..., below, :]
     return np.sign((np.sign(gaps) * (np.abs(gaps) > margins)).sum(axis=-1))

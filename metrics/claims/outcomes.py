@@ -11,9 +11,9 @@ from ..checks import check_option
 from .panel import LEAST_RUNS, MANY, Panel, Rule
 
 Answer: TypeAlias = Literal["supported", "contradicted", "tie", "too vague", "undecided", "no scores"]
-"""`tie`: the claim says that there is a difference, and what it compares ties. `too vague`: its text alone leaves open
-what would speak against it, and no run is looked at. `undecided`: the runs leave it open. `no scores`: there was
-nothing to judge, because runs are missing or a measure has no finite value."""
+"""`tie`: the claim says that there is a difference, but what it compares ties. `too vague`: its text does not say which
+runs would contradict it, so the rule does not look at runs. `undecided`: the runs leave it open. `no scores`: runs are
+missing, or a measure does not have a finite value."""
 DECIDED: tuple[Answer, ...] = ("supported", "contradicted", "tie")
 """Answers that runs give."""
 BoolArray: TypeAlias = NDArray[np.bool_]
@@ -21,19 +21,19 @@ BoolArray: TypeAlias = NDArray[np.bool_]
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What came of one statement, or of several."""
+    """The answer to one statement or to several, with its reason."""
 
     answer: Answer
     statistic: float
-    """What was decided on; `why` says what it is."""
+    """Number that decides; `why` says what it is."""
     effect: float
     """Size of the difference or change, as a share of the panel's scale; NaN where a statement has none."""
     n_runs: int
-    """Smallest number of runs behind any number that was used."""
+    """Smallest number of runs behind any number that the rule used."""
     why: str
-    """What was found and what it was held against."""
+    """What the rule found, and what it compared this with."""
     parts: tuple["Outcome", ...] = field(default=(), repr=False)
-    """Of several statements, those that they consist of."""
+    """The outcomes of the single statements, if there are several."""
 
     @property
     def lines(self) -> tuple[str, ...]:
@@ -51,8 +51,8 @@ def scored_levels(panel: Panel, policies: Sequence[str], rule: Rule) -> Panel | 
 
     Args:
         panel: All levels.
-        policies: Which must have scores.
-        rule: Says how many runs are enough.
+        policies: Policies that must have scores.
+        rule: Decides how many runs are enough.
 
     Returns:
         The panel, or the outcome of a statement about it if half of the levels or more have too few runs.
@@ -71,7 +71,7 @@ def scored_levels(panel: Panel, policies: Sequence[str], rule: Rule) -> Panel | 
 
 
 def where_scored(panel: Panel, policies: Sequence[str], rule: Rule, judge: Callable[[Panel], Outcome]) -> Outcome:
-    """Return what `judge` finds of the `scored_levels`; says how many levels that leaves out."""
+    """Return what `judge` finds in the `scored_levels`; the reason says how many levels are left out."""
     part = scored_levels(panel, policies, rule)
     if isinstance(part, Outcome):
         return part
@@ -88,13 +88,13 @@ def within_limit(interval: tuple[float, float], limit: float) -> Answer:
 
 
 def contrary(outcome: Outcome) -> Outcome:
-    """Return the outcome of the contrary statement; what is neither supported nor contradicted stays so."""
+    """Return the outcome of the contrary statement; answers other than supported and contradicted stay."""
     turned: dict[Answer, Answer] = {"supported": "contradicted", "contradicted": "supported"}
     return replace(outcome, answer=turned.get(outcome.answer, outcome.answer))
 
 
 def all_of(outcomes: Sequence[Outcome]) -> Outcome:
-    """Return one outcome for several statements that must all hold: one that fails, or is a tie, decides."""
+    """Return one outcome for several statements that must all hold: a single one that fails or ties decides."""
     answers = [outcome.answer for outcome in outcomes]
     order: tuple[Answer, ...] = ("contradicted", "tie", "no scores", "undecided", "supported")
     return _joined(outcomes, next(answer for answer in order if answer in answers))
@@ -109,7 +109,7 @@ def most_of(outcomes: Sequence[Outcome]) -> Outcome:
 
 
 def _of_most(n_for: int, n_against: int, n_tied: int, *, total: int) -> Answer | None:
-    """The answer that more than half of the votes give, if one does; ties speak against what is stated, too."""
+    """The answer that more than half of the votes give, if any; ties also count against a statement."""
     if n_for > MANY * total:
         return "supported"
     if n_tied > MANY * total:
@@ -118,7 +118,7 @@ def _of_most(n_for: int, n_against: int, n_tied: int, *, total: int) -> Answer |
 
 
 def _joined(outcomes: Sequence[Outcome], answer: Answer) -> Outcome:
-    """One outcome: its statistic is the share of what is supported, its effect the median of what gave the answer."""
+    """One outcome: its statistic is the share of supported parts, its effect the median of parts with this answer."""
     if len(outcomes) == 1:
         return outcomes[0]
     parts = tuple(leaf for outcome in outcomes for leaf in outcome.parts or (outcome,))

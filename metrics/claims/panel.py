@@ -1,4 +1,4 @@
-"""A figure as numbers, and the two rules by which the heights of two curves in it are told apart."""
+"""A figure as numbers, and the two rules that compare the heights of two curves in it."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -13,28 +13,28 @@ from ..checks import CurveError, check_option
 from ..curves import FloatArray
 
 Rule: TypeAlias = Literal["intervals", "bands"]
-"""`bands`, the paper's: two curves differ where their bands of the mean plus and minus two standard deviations of
-single runs do not overlap, else they tie. `intervals`, ours, tests the difference of means with Welch's t: the curves
-tie where two one-sided tests find it within the margin of the panel (Schuirmann 1987), differ where its 95 % interval
-leaves out zero, and else it is open which."""
+"""`bands` is the paper's rule. The band of a curve is its mean plus and minus two standard deviations of single runs.
+Two curves tie where their bands overlap, and differ where they do not. `intervals` is our rule. It tests the difference
+of means with Welch's t: the curves tie where two one-sided tests find the difference within the margin of the panel
+(Schuirmann 1987), differ where its 95 % interval leaves out zero, and the question is open elsewhere."""
 Levels: TypeAlias = Literal["all", "low", "high"]
-"""All levels of a panel, or its lower or upper half; of an odd number the middle one is in neither half."""
+"""All levels of a panel, or its lower or upper half; the middle one of an odd number is in neither half."""
 Looks: TypeAlias = tuple[int, ...]
-"""Numbers of runs, rising."""
+"""Rising numbers of runs, after each of which the rules judge."""
 
 TIE = 0.1
-"""Margin of a tie, as a share of the scale, where a panel has none of its own (our choice: what looks alike in a
-figure; with many runs even the smallest difference is significant)."""
+"""Margin of a tie, as a share of the scale, for panels without margins (our choice: such curves look alike in a figure;
+with many runs, even the smallest difference is significant)."""
 MANY = 0.5
-"""Share of levels that is most of them."""
+"""A statement holds at most levels if it holds at more than this share."""
 MIN_RUNS = 4
-"""Fewer runs decide nothing by intervals (our choice: the deviation of three is off by half and more too often)."""
+"""Runs that `intervals` needs to decide (our choice: the deviation of three runs is too often wrong by half)."""
 LEAST_RUNS: dict[Rule, int] = {"intervals": MIN_RUNS, "bands": 2}
 """Runs that a level needs to be judged by each rule."""
 CONFIDENCE = 0.95
 N_RESAMPLES = 1000
 _SEED = 1
-"""Fixed, so that the same runs give the same answer."""
+"""Seed of all draws; fixed, so that the same runs give the same answer."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -44,27 +44,27 @@ class Panel:
         Panel(levels=[1, 2], scores={"crw": [[3.0, 3.1], [4.0, 4.2]], "dpo": [[5.0, 5.1], [7.0, 6.8]]})
 
     Raises:
-        CurveError: No policy, scores that do not fit to the levels or to each other, levels that do not rise, or
+        CurveError: No policy, scores that do not match the levels or each other, levels that do not rise, or
             margins or a unit that are not positive.
     """
 
     levels: FloatArray
-    """What is varied, rising, (L,)."""
+    """Rising values of what the experiment varies, (L,)."""
     scores: Mapping[str, FloatArray]
     """Policy -> one score per level and run, (L, R). NaN and infinite values are runs without a score."""
     margins: FloatArray | None = None
     """Largest difference that is a tie at each level, (L,), in the unit of the scores. None: `TIE` of the scale. A
     margin in the measure's own unit lets curves near zero tie, too."""
     undisturbed: Mapping[str, FloatArray] | None = None
-    """Policy -> scores without any disturbance, (R,), which are no level here; see `shapes.from_undisturbed`."""
+    """Policy -> scores without any disturbance, (R,). They are not a level; see `shapes.from_undisturbed`."""
     unit: float | None = None
-    """What shares are shares of, such as 1 for scalability. None: the `scale` of the scores."""
+    """Number by which the rules divide scores to get shares, for example 1 for scalability. None: `scale`."""
     looks: Looks = ()
-    """Numbers of runs after which the scores are looked at (`looks`); empty: once, when all runs are there."""
+    """Numbers of runs after which the rules judge (`looks`); empty: once, after all runs."""
     reached: Mapping[str, int] = field(default_factory=dict[str, int])
-    """Where `looks` are several, policy -> the last one that its runs have reached; 0 before the first."""
+    """With several `looks`, policy -> the last one that its runs have reached; 0 before the first."""
     confidence: float = CONFIDENCE
-    """Of intervals; of scores that are looked at several times that of one look."""
+    """Confidence of intervals; with several `looks`, the confidence at each look."""
 
     def __post_init__(self) -> None:
         levels = np.asarray(self.levels, dtype=np.float64)
@@ -92,7 +92,7 @@ class Panel:
     def scale(self) -> float:
         """`unit`, else the median over levels of the largest absolute mean of any policy; 1 if that is 0.
 
-        The median, because one level at which one policy is far off would make every other difference small.
+        A mean over levels would let one level at which one policy is far off make every other difference small.
         """
         if self.unit is not None:
             return self.unit
@@ -103,7 +103,7 @@ class Panel:
 
     @property
     def tie_margins(self) -> FloatArray:
-        """`margins`, or what stands for them, (L,)."""
+        """`margins`, by default `TIE` of the scale, (L,)."""
         return np.full(self.levels.shape, TIE * self.scale) if self.margins is None else self.margins
 
     def of(self, policies: Iterable[str]) -> FloatArray:
@@ -126,7 +126,7 @@ class Panel:
         return self.at({"all": place >= 0, "low": place < half, "high": place >= self.levels.size - half}[levels])
 
     def at(self, kept: NDArray[np.bool_]) -> "Panel":
-        """Return the panel with the levels of a mask, (L,); its scale stays that of the whole."""
+        """Return the panel with the levels of a mask, (L,); it keeps the scale of the whole panel."""
         scores = {name: values[kept] for name, values in self.scores.items()}
         margins, unit = self.tie_margins[kept], self.scale
         return replace(self, levels=self.levels[kept], scores=scores, margins=margins, unit=unit, undisturbed=None)
@@ -138,7 +138,7 @@ class Panel:
         return replace(self, levels=self.levels[-1:], scores=rows, margins=margins, unit=None, undisturbed=None)
 
     def runs_at_levels(self, policies: Iterable[str]) -> NDArray[np.int64]:
-        """Return the number of runs with a score at each level, of the policy that has fewest of these, (L,)."""
+        """Return the number of runs with a score at each level, for the policy that has the fewest there, (L,)."""
         return np.isfinite(self.of(policies)).sum(axis=-1).min(axis=0)
 
     def n_runs(self, policies: Iterable[str]) -> int:
@@ -150,7 +150,7 @@ class Panel:
 def of_equal_runs(first: Panel, second: Panel, policies: Iterable[str]) -> tuple[Panel, Panel]:
     """Return two panels with equally many runs, the first ones that have all scores of these policies.
 
-    Intervals narrow with the number of runs, so a panel of more runs would show more differences for that alone.
+    Intervals narrow with the number of runs, so more runs alone would make more differences.
     """
     names = list(policies)
     complete = [np.flatnonzero(np.isfinite(panel.of(names)).all(axis=(0, 1))) for panel in (first, second)]
@@ -178,14 +178,14 @@ def std_over_runs(values: FloatArray) -> FloatArray:
 
 
 def widening(n_runs: NDArray[np.int64], confidence: float = CONFIDENCE) -> FloatArray:
-    """Factor by which the mean of resampled runs has to vary more, so that its percentile interval is Student's.
+    """Factor that stretches the mean of resampled runs until its percentile interval is as wide as Student's.
 
-    The mean of n resampled runs varies by sqrt((n - 1) / n) too little, and its percentiles take the standard deviation
-    of a few runs for the true one: with four runs the factor is 1.87, with sixteen 1.12.
+    The mean of n resampled runs varies too little, by a factor of sqrt((n - 1) / n), and its percentiles treat the
+    standard deviation of a few runs as the true one. The factor is 1.87 with four runs and 1.12 with sixteen.
 
     Args:
-        n_runs: Of each mean.
-        confidence: Of Student's interval; percentiles are always at `CONFIDENCE`, and a thousand draws suffice.
+        n_runs: Number of runs in each mean.
+        confidence: Confidence of Student's interval. Percentiles always use `CONFIDENCE`, so a thousand draws suffice.
     """
     with np.errstate(divide="ignore", invalid="ignore"):  # a single run
         students = stdtrit(n_runs - 1.0, 0.5 + 0.5 * confidence)
@@ -199,13 +199,13 @@ def complete_runs(values: FloatArray) -> FloatArray:
 
 
 def resampled_runs(values: FloatArray) -> FloatArray:
-    """Resample the runs, at each level those that have all scores there; the same draws at all levels.
+    """Resample at each level the runs that have all scores there, with the same draws at all levels.
 
     Args:
         values: Scores, (..., L, R).
 
     Returns:
-        (N_RESAMPLES, ..., L, R), filled up with NaN at levels with fewer runs.
+        (N_RESAMPLES, ..., L, R), padded with NaN at levels with fewer runs.
     """
     known = np.isfinite(complete_runs(values)).reshape(-1, *values.shape[-2:])[0]
     shares = np.random.default_rng(_SEED).random((N_RESAMPLES, values.shape[-1]))
@@ -219,20 +219,20 @@ def resampled_runs(values: FloatArray) -> FloatArray:
 
 
 def resampled_means(values: FloatArray, confidence: float = CONFIDENCE) -> tuple[FloatArray, FloatArray]:
-    """Return the means of scores (..., L, R) over runs, (..., L), and those of resampled runs, (N_RESAMPLES, ..., L).
+    """Return means of scores (..., L, R) over runs, (..., L), and over resampled runs, (N_RESAMPLES, ..., L).
 
-    The latter are moved away from the former by `widening`.
+    `widening` stretches the distances of the resampled means from the means.
     """
     complete = complete_runs(values)
     return _widened(values, mean_over_runs(complete), mean_over_runs(resampled_runs(values)), confidence)
 
 
 def resampled_deviations(values: FloatArray, confidence: float = CONFIDENCE) -> tuple[FloatArray, FloatArray]:
-    """Return the same for standard deviations, made right on average.
+    """Return standard deviations over runs and over resampled runs, corrected for their bias.
 
-    That of four normal numbers is 8 % too small on average, and that of n resampled ones another sqrt((n - 1) / n).
-    Resampled ones are mirrored (the basic bootstrap): few runs show too small a deviation far more often than too large
-    a one, so the true one lies on the side on which resampled ones do not lie.
+    The standard deviation of four normal numbers is 8 % too small on average, and that of n resampled ones smaller by
+    another factor of sqrt((n - 1) / n). Resampled deviations are mirrored (the basic bootstrap): few runs show too
+    small a deviation far more often than too large a one, so the true one lies on the other side.
     """
     complete = complete_runs(values)
     n_runs = np.isfinite(complete).sum(axis=-1)
@@ -263,8 +263,9 @@ def signs(panel: Panel, first: str, second: str, rule: Rule, n_tests: int = 1) -
         panel: The scores.
         first: One policy.
         second: The other.
-        rule: How they are told apart.
-        n_tests: Of how many tests one alone must not be wrong by chance (Bonferroni); ties are not corrected by it.
+        rule: The rule that compares them.
+        n_tests: Number of tests that together are wrong by chance once in twenty times (Bonferroni); does not affect
+            ties.
 
     Raises:
         CurveError: A policy without scores.
@@ -284,18 +285,19 @@ def signs(panel: Panel, first: str, second: str, rule: Rule, n_tests: int = 1) -
 
 
 def interval_of(first: FloatArray, second: FloatArray, confidence: float = CONFIDENCE) -> tuple[float, float]:
-    """Bounds of Welch's interval of the difference of two means; NaN for fewer than `MIN_RUNS` of one.
+    """Bounds of Welch's interval of the difference of two means; NaN if either has fewer than `MIN_RUNS` runs.
 
-    Where the runs of both are equal among themselves, they show no scatter that Welch's t could use. Then the bounds
-    are the difference itself if most runs of each surely score so, by the sign test, else NaN: six runs each at 95 %.
+    If all runs of a policy score the same, for both policies, Welch's t does not have a scatter to compare with. Then
+    the bounds are the difference itself if the sign test shows for both that most runs have this score (at 95 %, six
+    runs each), else NaN.
 
-    Runs are not paired by seed: that two policies meet the same world correlates their scores by 0.04 to 0.15, which
-    gains less than half of the degrees of freedom that pairing costs.
+    Runs are not paired by seed: common seeds correlate scores by 0.04 to 0.15 only, and pairing costs half of the
+    degrees of freedom.
 
     Args:
         first: Scores of runs, (R1,), all finite.
-        second: Of the other policy, (R2,).
-        confidence: Of the interval.
+        second: Scores of the other policy, (R2,), all finite.
+        confidence: Confidence of the interval.
     """
     if min(first.size, second.size) < MIN_RUNS:
         return np.nan, np.nan
