@@ -26,7 +26,7 @@ from .statements import (
 
 
 def _flexibility(letter: str, measure: str) -> tuple[Claim, ...]:
-    """Return the four claims that the paper makes of reactivity and of adaptability in the same words."""
+    """Return the four claims that the paper makes in the same words about reactivity and about adaptability."""
     small, medium = ("S1c", measure), ("S1d", measure)
     where = f"scenario 1, {measure}"
     others = ("crw", "dpo", "stochm")
@@ -194,7 +194,7 @@ NOISE = (
 )
 
 _NEEDED = (1, 5, 10, 20, 40)
-"""Of 50 robots, in the availability figure."""
+"""Numbers of robots needed of 50, in the availability figure."""
 _TEAMS = (5.0, 10.0, 20.0)
 
 

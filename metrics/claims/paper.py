@@ -1,12 +1,12 @@
-"""The claims of the paper about its figures, as data: what is said, where, and which statements that makes.
+"""The claims of the paper about its figures, as data: what each claim says, where, and the statements that it makes.
 
 E are claims about self-organisation, C about scalability, P about raw performance, R about reactivity, A about
 adaptability, N about noise, V about availability, D about population dynamics, X about several figures together. Where
-the paper says nothing of a direction but its text implies one, the text of a claim says "(implied)". Where its words,
-its captions, its file names or its program disagree on what was meant, `otherwise` has what else a claim may mean.
+the paper does not name a direction but its text implies one, the text of a claim says "(implied)". Where the paper's
+text, captions, file names or program disagree, `otherwise` holds the other possible meanings of a claim.
 
-The statements are the general ones of `predicates`, `shapes` and `orders`. Some of their rules were changed after runs
-had been seen: see docs/metrics.md, "Rules that changed after runs were seen".
+The statements come from `predicates`, `shapes` and `orders`. We changed some of their rules after we had seen runs: see
+docs/metrics.md, "Rules that changed after runs were seen".
 """
 
 from .adversity import FLEXIBILITY, NOISE, POPULATION

@@ -1,7 +1,7 @@
-"""What a claim can say of the heights of curves in a figure: few general statements, each with an answer.
+"""What a claim can say about the heights of curves in a figure: a few general statements, each with an answer.
 
-A statement about several levels is supported if it holds at more than half of them and contradicted if it fails at more
-than half; else it is undecided. The thresholds are the same for every claim.
+A statement about several levels is supported if it holds at more than half of them, contradicted if it fails at more
+than half, and else undecided. The thresholds are the same for every claim.
 """
 
 from collections.abc import Mapping, Sequence
@@ -46,16 +46,16 @@ from .panel import (
 Pairs: TypeAlias = Sequence[tuple[str, str]]
 
 FLAT = 0.25
-"""Largest spread of a curve that is roughly constant, largest width of a narrow band, and largest lead that is a small
-one, as a share of the panel's scale (our choice)."""
+"""Largest spread of a curve that is roughly constant, largest width of a narrow band, and largest small lead, as a
+share of the panel's scale (our choice)."""
 MORE = 0.1
-"""Share of comparisons by which one panel has more differences than another (our choice)."""
+"""One panel has more differences than another if it has them in this share of comparisons more (our choice)."""
 CLEAR = 2.0
-"""Student's t at which a difference is half as clear as can be: about where it becomes significant."""
+"""Student's t at which the clarity of a difference is a half: about where the difference becomes significant."""
 MIN_CONSTANT = 4
-"""Levels from which on one may be wild in a curve that is constant (our choice: three others still show a curve)."""
+"""Levels that a constant curve needs so that one of them may be wild (our choice: three others still show a curve)."""
 WIDER = 1.5
-"""Ratio of the widths of two bands from which on one looks wider (our choice)."""
+"""Ratio of the widths of two bands at which one looks wider (our choice)."""
 
 
 def ties(panel: Panel, *, pairs: Pairs, levels: Levels = "all", rule: Rule = "intervals") -> Outcome:
@@ -83,7 +83,7 @@ def never_differ(panel: Panel, *, pairs: Pairs, n_panels: int = 1, rule: Rule = 
     Args:
         panel: The scores.
         pairs: Of policies.
-        n_panels: Panels of which a claim says this; a difference in one of them contradicts it.
+        n_panels: Number of panels about which a claim says this; a difference in one of them contradicts the claim.
         rule: As everywhere.
     """
     names = sorted({name for pair in pairs for name in pair})
@@ -100,13 +100,13 @@ def never_differ(panel: Panel, *, pairs: Pairs, n_panels: int = 1, rule: Rule = 
 
 
 def _gap(panel: Panel, pairs: Pairs) -> float:
-    """Mean distance of the means of pairs, as a share of the scale."""
+    """Mean distance between the means of pairs, as a share of the scale."""
     gaps = np.array([mean_over_runs(panel.scores[a]) - mean_over_runs(panel.scores[b]) for a, b in pairs])
     return float(mean_over_runs(np.abs(gaps).ravel())) / panel.scale
 
 
 def stays_alike(first: Panel, second: Panel, *, policy: str, rule: Rule = "intervals") -> Outcome:
-    """Whether a policy scores alike in two panels of the same levels and runs: it ties with itself at most levels."""
+    """Whether a policy ties with itself, at most levels, in two panels with the same levels and runs."""
     scores = {"first": first.scores[policy], "second": second.scores[policy]}
     both = replace(first, scores=scores, margins=np.maximum(first.tie_margins, second.tie_margins))
     outcome = ties(both, pairs=(("first", "second"),), rule=rule)
@@ -114,7 +114,7 @@ def stays_alike(first: Panel, second: Panel, *, policy: str, rule: Rule = "inter
 
 
 def differ(panel: Panel, *, pairs: Pairs, levels: Levels = "all", rule: Rule = "intervals") -> Outcome:
-    """Whether pairs of policies mostly differ; the contrary of `ties`."""
+    """Whether pairs of policies mostly differ: the contrary of `ties`."""
     outcome = ties(panel, pairs=pairs, levels=levels, rule=rule)
     return replace(outcome, answer="tie") if outcome.answer == "supported" else contrary(outcome)
 
@@ -124,8 +124,8 @@ def is_higher(
 ) -> Outcome:
     """Whether each of some policies is higher than each of others, at more than half of the levels.
 
-    A level speaks against it if one of the pairs ties or is the other way round. The answer is a tie if at more than
-    half of the levels pairs tie and none is the other way round.
+    A level counts against the statement if one of the pairs ties or has the opposite order. The answer is a tie if, at
+    more than half of the levels, pairs tie and none has the opposite order.
     """
     part = panel.part(levels)
     names = (*upper, *lower)
@@ -148,10 +148,10 @@ def leads_by_little(
 ) -> Outcome:
     """Whether a policy is highest by a little, at more than half of the levels.
 
-    Its lead over each of others must be sure but may be smaller than `TIE`, and its lead over the best of them must be
-    at most `FLAT` of the scale. A level speaks against it if one of the others is surely higher, or the lead is surely
-    larger. By intervals "surely" means the whole interval; by bands that bands do not overlap, and the lead is that of
-    the means.
+    Its lead over each of the others must surely be above 0, but may be smaller than `TIE`. Its lead over the best of
+    them must be at most `FLAT` of the scale. A level counts against the statement if another policy is surely higher,
+    or if the lead is surely larger than `FLAT`. By intervals, "surely" means the whole interval. By bands, it means
+    that bands do not overlap, and the lead is the difference of the means.
     """
     part = panel.part(levels)
     names = (leader, *others)
@@ -203,44 +203,44 @@ def is_not_higher(
 def is_constant(panel: Panel, *, policies: Sequence[str], rule: Rule = "intervals") -> Outcome:
     """Whether each policy is roughly constant over the levels, or over all but one of `MIN_CONSTANT` or more.
 
-    One wild level does not decide for all others, but a fall over several does. By intervals: its largest less its
-    smallest mean is at most `FLAT` of the scale. By bands: one height lies within the bands of these levels.
+    One wild level does not decide for all others, but a fall over several levels does. By intervals: the largest mean
+    less the smallest is at most `FLAT` of the scale. By bands: one height lies within the bands of all these levels.
     """
     return all_of([_constancy(panel, policy, rule) for policy in policies])
 
 
 def varies(panel: Panel, *, policies: Sequence[str], rule: Rule = "intervals") -> Outcome:
-    """Whether each policy varies with the level: for each the contrary of `is_constant`."""
+    """Whether each policy varies with the level: the contrary of `is_constant` for each."""
     return all_of([contrary(_constancy(panel, policy, rule)) for policy in policies])
 
 
 def is_narrow(panel: Panel, *, policies: Sequence[str], rule: Rule = "intervals") -> Outcome:
     """Whether the bands of policies, four standard deviations wide, are at most `FLAT` of the scale at most levels.
 
-    By intervals: their median over the levels, which one wild level does not move.
+    By intervals, the rule looks at the median width over the levels, which one wild level does not change.
     """
     return all_of([_narrowness(panel, policy, rule) for policy in policies])
 
 
 def is_wide(panel: Panel, *, policies: Sequence[str], rule: Rule = "intervals") -> Outcome:
-    """Whether the bands of policies are wider than that; for each the contrary of `is_narrow`."""
+    """Whether the bands of policies are wider than this: the contrary of `is_narrow` for each."""
     return all_of([contrary(_narrowness(panel, policy, rule)) for policy in policies])
 
 
 def is_wider(panel: Panel, *, upper: Sequence[str], lower: Sequence[str], rule: Rule = "intervals") -> Outcome:
-    """Whether each of some policies scatters more between runs than each of others.
+    """Whether the runs of each of some policies scatter more than the runs of each of others.
 
-    By intervals: median over the levels. By bands: at more than half of the levels the band is `WIDER` times as wide;
-    contradicted if that holds of the other policy, else undecided.
+    By intervals: in the median over the levels. By bands: the band is `WIDER` times as wide at more than half of the
+    levels. Contradicted if this holds for the other policy, else undecided.
     """
     return all_of([_more_scatter(panel, a, b, rule) for a in upper for b in lower])
 
 
 def reaches_higher(panel: Panel, *, upper: Sequence[str], lower: Sequence[str], rule: Rule = "intervals") -> Outcome:
-    """Whether the upper edges of the bands of some policies are above those of others.
+    """Whether the upper edges of the bands of some policies are above the upper edges of others.
 
-    By intervals: median over the levels. By bands: at more than half of the levels the edge is above the other by `TIE`
-    of the scale; contradicted if that holds of the other policy, else undecided.
+    By intervals: in the median over the levels. By bands: the edge is above the other by `TIE` of the scale at more
+    than half of the levels. Contradicted if this holds for the other policy, else undecided.
     """
     return all_of([_higher_edge(panel, a, b, rule) for a in upper for b in lower])
 
@@ -248,10 +248,10 @@ def reaches_higher(panel: Panel, *, upper: Sequence[str], lower: Sequence[str], 
 def differs_more(few: Panel, many: Panel, *, pairs: Pairs, rule: Rule = "intervals") -> Outcome:
     """Whether the second panel has more pairs and levels that differ than the first.
 
-    Of both, equally many runs are looked at: as many as the panel with fewer of them has. By intervals each comparison
-    counts by its clarity, t^2 / (t^2 + 4), which is a half where it becomes significant and lets a comparison count for
-    more the clearer it is. Supported if the gain in mean clarity is surely above 0, contradicted if it is surely below
-    `MORE`. By bands the share of comparisons that differ must gain, or lose, `MORE`.
+    The rule looks at equally many runs of both panels. By intervals, it weights each comparison with its clarity, t^2 /
+    (t^2 + 4), which is a half where the difference becomes significant and grows with the difference. Supported if the
+    gain in mean clarity is surely above 0, contradicted if it is surely below `MORE`. By bands, the share of
+    comparisons that differ must rise, or fall, by `MORE`.
     """
     names = sorted({name for pair in pairs for name in pair})
     parts: list[Panel] = []
@@ -290,9 +290,10 @@ def _share_apart(panel: Panel, pairs: Pairs) -> float:
 
 
 def _clarity(panel: Panel, pairs: Pairs) -> tuple[float, float]:
-    """Mean clarity of the comparisons of a panel, and its standard deviation by the jackknife.
+    """Mean clarity of the comparisons in a panel, and its standard deviation by the jackknife.
 
-    The jackknife leaves out a run of one policy at all levels: levels may share what they are compared with.
+    The jackknife leaves out one run of one policy at all levels, because levels may share the run that they are
+    compared with.
     """
     names = sorted({name for pair in pairs for name in pair})
     scores = {name: panel.scores[name] for name in names}
@@ -347,7 +348,7 @@ def _constancy(panel: Panel, policy: str, rule: Rule) -> Outcome:
 
 
 def _but_one(n_levels: int) -> list[BoolArray]:
-    """Return masks of the levels over which a curve has to be constant: all but each one, of few levels all."""
+    """Return masks of the levels over which a curve has to be constant: all but each one; all if there are few."""
     every = np.ones((1, n_levels), dtype=np.bool_)
     return list(every if n_levels < MIN_CONSTANT else every ^ np.eye(n_levels, dtype=np.bool_))
 
@@ -404,7 +405,7 @@ def _by_sight(
     fails: BoolArray,
     what: str,
 ) -> Outcome:
-    """Whether something is seen at most levels, or its reverse; `found` is what is compared, (2, L)."""
+    """Whether the first of two values is larger at most levels, or the second; `found` holds both, (2, L)."""
     gap = float((found[0] - found[1]).mean()) / panel.scale
     return by_majority(holds, fails, what, effect=gap, n_runs=panel.n_runs(names), against="the reverse")
 

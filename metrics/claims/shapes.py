@@ -1,4 +1,4 @@
-"""Statements about the shape of curves: from where on they change, how steep and how straight they are."""
+"""Statements about the shape of curves: where they begin to change, how steep and how straight they are."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -11,17 +11,17 @@ from .outcomes import Answer, Outcome, all_of, where_scored
 from .panel import CONFIDENCE, Panel, Rule, bounds, mean_over_runs, resampled_means, std_over_runs
 
 ROUNDING = 1e-9
-"""Share by which a level may be off its place in the ladder."""
+"""Share by which rounding may move a level from its place in the ladder."""
 ZERO = "zero"
 """Name of the policy that `with_zero` adds."""
 LINEAR = 0.9
-"""Share of the variance between levels that a line explains where growth is nearly linear (our choice)."""
+"""Share of the variance between levels that a line explains if growth is nearly linear (our choice)."""
 MIN_LEVELS = 4
-"""A broken line needs two levels on either side of its bend, which may share one, and one more to be judged by."""
+"""A broken line needs two levels on either side of its bend, which may share one, and one more that tests it."""
 
 
 def rise_of(panel: Panel) -> Panel:
-    """Return a panel of one level: the score at the last level less that at the first, run by run."""
+    """Return a panel of one level: the score at the last level less the score at the first, run by run."""
     return panel.reduced({name: values[-1] - values[0] for name, values in panel.scores.items()})
 
 
@@ -35,7 +35,7 @@ def slope_of(panel: Panel) -> Panel:
 def bend_of(panel: Panel) -> Panel:
     """Return a panel of one level: how much steeper the upper half of the levels is than the lower, run by run.
 
-    Both slopes are multiplied by the span of all levels; of an odd number the middle level belongs to both halves.
+    Both slopes are multiplied by the span of all levels; the middle one of an odd number of levels is in both halves.
 
     Raises:
         CurveError: Fewer than three levels.
@@ -54,13 +54,13 @@ def bend_of(panel: Panel) -> Panel:
 
 
 def with_zero(panel: Panel) -> Panel:
-    """Return the panel with a policy `zero` that always scores 0, to hold others against."""
+    """Return the panel with a further policy `zero` that always scores 0, for comparison."""
     first = next(iter(panel.scores.values()))
     return replace(panel, scores={**panel.scores, ZERO: np.zeros_like(first)})
 
 
 def from_undisturbed(panel: Panel) -> Panel:
-    """Return the panel with level 0 in front, where it knows the scores of undisturbed swarms; else as it is."""
+    """Return the panel with a level 0 before the others if it has scores of undisturbed swarms, else as it is."""
     if panel.undisturbed is None:
         return panel
     scores = {name: np.vstack([panel.undisturbed[name], values]) for name, values in panel.scores.items()}
@@ -73,24 +73,24 @@ def from_undisturbed(panel: Panel) -> Panel:
 def changes_within(
     panel: Panel, *, policies: Sequence[str], between: tuple[float, float], rule: Rule = "intervals"
 ) -> Outcome:
-    """Whether each policy changes its behaviour from a level between two values on, both included.
+    """Whether the behaviour of each policy begins to change at a level between two values, both included.
 
-    By intervals: two lines that meet at one of the inner levels are fitted to the means. The change must be real (the
-    slope differs before and after, with its interval), and 95 % of the resamples must have the bend between the two
-    values; it is contradicted if at most 5 % have it there, or if the slope changes by less than a tie. By bands: the
-    first level whose band does not overlap that of the first level lies between the values.
+    By intervals: the rule fits two lines that meet at one of the inner levels to the means. The change must be real
+    (the interval of the change of slope leaves out 0), and 95 % of the resamples must have the bend between the two
+    values. Contradicted if at most 5 % have it there, or if the slope changes by less than a tie. By bands: the first
+    level whose band does not overlap the band of the lowest one lies between the values.
 
-    Where the change is real, its place is undecided if the levels cannot tell it: to support it, one level below the
-    two values and one above must have been possible; to contradict it, one between them. Where the first level is 0,
-    undisturbed, nothing below is needed: what changes from there on is a straight line, without a bend.
+    If the levels cannot locate a real change, the answer is undecided. To support the statement, a bend must have been
+    possible at a level below the two values and at one above; to contradict it, at one between them. If the first level
+    is 0, undisturbed, no level below is needed: a curve that changes from there on is a straight line without a bend.
     """
     return all_of([_change(panel, policy, between, rule) for policy in policies])
 
 
 def changes_before(panel: Panel, *, first: str, others: Sequence[str], rule: Rule = "intervals") -> Outcome:
-    """Whether a policy changes at a lower level than each of others; where each changes is as in `changes_within`.
+    """Whether a policy changes at a lower level than each of others; `changes_within` says where a policy changes.
 
-    Undecided if one of the two does not change for sure.
+    Undecided if one of the two does not surely change.
     """
     return all_of([_earlier(panel, first, other, rule) for other in others])
 
@@ -99,8 +99,8 @@ def is_linear(panel: Panel, *, policies: Sequence[str], rule: Rule = "intervals"
     """Whether each policy grows nearly linearly with the level.
 
     A rising line explains `LINEAR` of the variance between the means; by intervals, with its interval. Contradicted if
-    it explains less, or surely rises by less than a tie over all levels. By bands: the same of the means
-    alone, however little they rise, if the bands of two levels are apart; else nothing is seen to grow: undecided.
+    it explains less, or surely rises by less than a tie over all levels. By bands, the rule looks at the means alone,
+    however little they rise. If no two levels have bands that are apart, no growth is visible: undecided.
     """
     return all_of([_straightness(panel, policy, rule) for policy in policies])
 
@@ -109,7 +109,7 @@ def broken_line(levels: FloatArray, means: FloatArray) -> tuple[FloatArray, Floa
     """Fit two lines that meet at an inner level, by least squares.
 
     Args:
-        levels: Rising, (L,), L >= `MIN_LEVELS`.
+        levels: Rising values, (L,), L >= `MIN_LEVELS`.
         means: Curves, (B, L).
 
     Returns:
@@ -127,7 +127,7 @@ def broken_line(levels: FloatArray, means: FloatArray) -> tuple[FloatArray, Floa
 
 
 def _onset(panel: Panel, policy: str) -> float:
-    """First level whose band does not overlap that of the first level; infinite if none."""
+    """Lowest level whose band does not overlap the band of the first level; infinite if there is none."""
     (values,) = panel.of((policy,))
     means, deviations = mean_over_runs(values), std_over_runs(values)
     apart = np.abs(means - means[0]) > 2.0 * (deviations + deviations[0])
@@ -141,11 +141,11 @@ class _Bends:
     places: FloatArray
     """Level of the bend in each resample, (B,)."""
     change: float
-    """Of the slope, over the span of levels, as a share of the scale."""
+    """Change of the slope, times the span of levels, as a share of the scale."""
     chance: float
-    """How much the runs may have added to it by chance, at `CONFIDENCE`."""
+    """Part of it that chance may have added, at `CONFIDENCE`."""
     tie: float
-    """Margin of a tie, as a share of the scale: a smaller change is none."""
+    """Margin of a tie, as a share of the scale: a smaller change does not count."""
 
     @property
     def is_real(self) -> bool:
@@ -185,7 +185,7 @@ def _few_levels(panel: Panel, policies: Sequence[str]) -> Outcome | None:
 def _located(
     answer: Answer, levels: FloatArray, possible: FloatArray, between: tuple[float, float]
 ) -> tuple[Answer, str]:
-    """Return the answer as far as the levels can tell it, and why not if they cannot; `possible` ones can show it."""
+    """Return the answer, or undecided with the reason if `possible`, the levels that can show a change, are too few."""
     low, high = between
     where = f"{low:.3g} to {high:.3g}"
     if answer == "contradicted" and not ((possible >= low) & (possible <= high)).any():
@@ -198,7 +198,7 @@ def _located(
 
 
 def _rounded(between: tuple[float, float]) -> tuple[float, float]:
-    """Bounds moved apart by what rounding may do to a level."""
+    """Bounds, moved apart by as much as rounding may move a level."""
     return between[0] * (1.0 - ROUNDING), between[1] * (1.0 + ROUNDING)
 
 
@@ -295,12 +295,12 @@ def _straightness(panel: Panel, policy: str, rule: Rule) -> Outcome:
 
 
 def _ratio(above: float, below: float) -> float:
-    """Square of a ratio of two lengths, from 0 to 1; a length below 0 is none."""
+    """Square of the ratio of two lengths, from 0 to 1; a length below 0 counts as 0."""
     return min(1.0, (max(0.0, above) / below) ** 2) if below > 0.0 else 1.0
 
 
 def _line(levels: FloatArray, means: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Fit a line to curves (B, L): sum of squares that it leaves, that of the curve, and rise over the span; (B,)."""
+    """Fit lines to curves (B, L): residual sum of squares, total sum of squares, and rise over the span; (B,) each."""
     x, y = levels - levels.mean(), means - means.mean(axis=1, keepdims=True)
     slope = y @ x / (x @ x)
     total = (y**2).sum(axis=1)

@@ -36,7 +36,7 @@ from .statements import (
 
 
 def _about_small_swarms(panel: Place) -> dict[str, tuple[Statement, ...]]:
-    """What E1 to E3 say of spatial self-organisation in the small warehouse."""
+    """What E1 to E3 say about spatial self-organisation in the small warehouse."""
     return {
         # The figure shows the share of performance that is lost.
         "E1": (states(is_constant, as_shares(panel), policies=POLICIES),),
@@ -46,7 +46,7 @@ def _about_small_swarms(panel: Place) -> dict[str, tuple[Statement, ...]]:
 
 
 def _about_large_swarms(panel: Place) -> dict[str, tuple[Statement, ...]]:
-    """What E4 to E6 say of self-organisation in the medium warehouse."""
+    """What E4 to E6 say about self-organisation in the medium warehouse."""
     return {
         "E4": (states(ties, panel, pairs=every_pair(("crw", "dpo", "stochm"))),),
         "E5": (best_of(panel, "stochx"),),
@@ -55,7 +55,7 @@ def _about_large_swarms(panel: Place) -> dict[str, tuple[Statement, ...]]:
 
 
 def _steady_and_not(panel: Place) -> tuple[Statement, ...]:
-    """What E7 and E9 say of self-organisation in search and rescue."""
+    """What E7 and E9 say about self-organisation in search and rescue."""
     return (states(is_constant, panel, policies=STEADY), states(varies, panel, policies=UNSTEADY))
 
 
@@ -123,7 +123,7 @@ SELF_ORGANISATION = (
 
 
 def _about_bands(panel: Place) -> dict[str, tuple[Statement, ...]]:
-    """What C1 to C3 say of scalability in a warehouse."""
+    """What C1 to C3 say about scalability in a warehouse."""
     return {
         "C1": (states(is_narrow, panel, policies=SIMPLE),),
         "C2": (states(is_wide, panel, policies=COMPLEX),),

@@ -1,4 +1,4 @@
-"""Short ways to write statements: experiments, levels, policies, measures, and what is said of them most often."""
+"""Short ways to write statements: experiments, levels, policies, measures, and the most frequent statements."""
 
 from collections.abc import Callable
 from typing import Any
@@ -38,15 +38,15 @@ EXPERIMENTS: dict[str, str] = {
     "S2d 115": "search and rescue, 115 robots, deaths",
     "S2d 320": "search and rescue, 320 robots, deaths",
 }
-"""Experiments whose scores the claims speak of. In S1a, S1b and S2a the levels are swarm sizes, in S1c, S1d and S2b
-distances from ideal conditions, in the others the disturbance; the undisturbed level is left out."""
+"""Experiments that the claims are about. The levels are swarm sizes in S1a, S1b and S2a, distances from ideal
+conditions in S1c, S1d and S2b, and strengths of the disturbance in the others, without the undisturbed level."""
 
 SIGMAS = 0.03 / 7.0 * np.arange(8)
 """Standard deviations of noise in the warehouses, from none to the largest."""
 ONSET = (float(SIGMAS[3]), float(SIGMAS[5]))
-"""About 0.017, the fifth of them: from the one below it to the one above."""
+"""About 0.017: from the level below the fifth of `SIGMAS` to the level above it."""
 LARGER = (0.01, 0.05)
-"""Where noise changes behaviour in search and rescue."""
+"""Standard deviations between which noise changes behaviour in search and rescue."""
 
 
 def states(
@@ -55,14 +55,14 @@ def states(
     views: tuple[Callable[[Panel], Panel], ...] = (),
     **parameters: Any,
 ) -> Statement:
-    """Statement that a predicate makes of panels, with these parameters; a panel without a form is the marginal one."""
+    """Statement that a predicate makes about panels, with these parameters; panels without a form are marginal."""
     return Statement(
         predicate=predicate, panels=tuple(named(name) for name in panels), views=views, parameters=parameters
     )
 
 
 def spatial(experiment: str) -> tuple[str, str, Form]:
-    """Panel of spatial self-organisation as the paper shows it: in scenario 1 N robots beside N lone robots."""
+    """Panel of spatial self-organisation as the paper shows it; in scenario 1, N robots compared with N lone robots."""
     return (experiment, E_S, "interactive" if experiment.startswith("S1") else "marginal")
 
 
