@@ -1,4 +1,4 @@
-"""What a study varies, how far it is, what came of its runs, and what the sets of the paper take."""
+"""What a study varies, how many of its runs are done, and how many runs the sets of the paper need."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ class StudyDescription(Answer):
     spec: StudySpec
 
     def sheets(self) -> Sequence[Sheet]:
-        """Return one row per thing that is to be said."""
+        """Return one row per fact."""
         spec = self.spec
         words = [value_words(axis.values) for axis in spec.axes]
         axes = [f"{axis.name}: {', '.join(of.values())}" for axis, of in zip(spec.axes, words, strict=True)]
@@ -45,7 +45,7 @@ class StudyDescription(Answer):
         return (Sheet(rows=rows),)
 
     def to_mapping(self) -> dict[str, Any]:
-        """Return the study, its numbers of conditions and runs, and what it leaves out of the paper's values."""
+        """Return the study, its numbers of conditions and runs, and the paper's values that it leaves out."""
         spec = self.spec
         return {
             "study": spec.to_mapping(),
@@ -70,7 +70,7 @@ class PaperSets(Answer):
     specs: tuple[StudySpec, ...]
 
     def sheets(self) -> Sequence[Sheet]:
-        """Return one row per set; of another budget than the paper's also what it leaves out."""
+        """Return one row per set; for budgets other than the paper's, also what they leave out."""
         is_paper = self.budget == PAPER
         more = () if is_paper else ("runs each", "length, s")
         rows = []
@@ -95,10 +95,10 @@ class PaperSets(Answer):
 
 
 def paper_sets(budget: str = PAPER) -> PaperSets:
-    """List the experiment sets of the paper: what they take, and what a budget leaves out.
+    """List the experiment sets of the paper: how many runs they make, and what a budget leaves out.
 
     Raises:
-        ConfigError: they have no such budget.
+        ConfigError: the sets do not have this budget.
     """
     return PaperSets(budget=budget, specs=tuple(load_study(name, budget, rules=("described",)) for name in set_names()))
 
@@ -113,7 +113,7 @@ def _numbers(specs: Sequence[StudySpec]) -> tuple[str, str, str]:
 
 
 FAILURES_SHOWN = 10
-"""Failed runs that are named; the packed file and `to_mapping` have all."""
+"""Number of failed runs in a printed list; the packed file and `to_mapping` have all of them."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -135,7 +135,7 @@ class StudyStatus(Answer):
         return f"{spec.name}, budget {spec.budget}: {_counts(totals)}"
 
     def sheets(self) -> Sequence[Sheet]:
-        """Return how far it is, the conditions that are not complete, and failed runs."""
+        """Return how many runs are in which state, the conditions that are not complete, and failed runs."""
         spec, versions, states = self.table.spec, self.table.versions, self.table.place_states()
         left = [state for state in states if not state.is_complete]
         lines = [f"{len(states) - len(left):,} of {counted(len(states), 'condition')} complete"]
@@ -172,19 +172,19 @@ class StudyStatus(Answer):
 
 
 def status(table: StudyTable) -> StudyStatus:
-    """Say how far a study is, from `read_study`."""
+    """Return which runs of a study are done, failed and missing, from the table that `read_study` returns."""
     return StudyStatus(table=table)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StudyOutcome(Answer):
-    """What came of the runs that one call made."""
+    """How the runs of one call ended."""
 
     outcomes: Outcomes
     folder: StudyFolder
 
     def sheets(self) -> Sequence[Sheet]:
-        """Return how many are done, and how to make each failed one again."""
+        """Return how many runs are done, and how to make each failed run again."""
         files = [str(file) for file in self._failed()]
         lines = [f"  again, alone: swarm-forage rerun {file}" for file in files[:FAILURES_SHOWN]]
         numbers = [self.outcomes.count(name) for name in STATES]

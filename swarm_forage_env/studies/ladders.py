@@ -29,7 +29,7 @@ from swarm_forage_env.wrappers.world import SIZE, World, WorldLike, world_of
 
 CRITERIA = ("population_size", "throttle", "handling_cost", "noise", "population_dynamics")
 STUDY_HORIZON_S = 10_000.0
-"""Length of the study's runs, for which the periods of its throttle waveforms are chosen."""
+"""Length of the study's runs, which its throttle waveforms have their periods for."""
 SIZE_SWEEP_OBJECTS = {
     "warehouse_small": 512,
     "warehouse_medium": 2048,
@@ -62,8 +62,8 @@ class Budget:
     """How much computing a score may cost."""
 
     horizon_s: float
-    """Length of a run. Throttle waveforms are compressed to it, so that they pass as many cycles as in the study;
-    population rates and noise stay as they are."""
+    """Length of a run. Waveforms are compressed to it, so that they pass as many cycles as in the study; population
+    rates and noise stay as they are."""
     interval_s: float
     """Length of a recording interval."""
     n_seeds: int
@@ -96,14 +96,13 @@ def budget(name: str) -> Budget:
 def plan_worlds(
     base: WorldLike, criteria: Collection[str], budget: Budget, *, density: float | None = None
 ) -> tuple[World, ...]:
-    """Return the worlds of `criteria`, reference worlds included, none of them twice.
+    """Return the worlds of `criteria` and their reference worlds, each once.
 
     Args:
-        base: The world; its horizon and recording interval are replaced by those of the budget, and its wrappers are in
-            all worlds.
+        base: The world. All worlds get its wrappers, and the horizon and the recording interval of the budget.
         criteria: Some of `CRITERIA`.
         budget: How many sizes and levels, and how long a run is.
-        density: Robots per m^2 that all swarm sizes keep, see `size_ladder`; None = all sizes in the scenario's arena.
+        density: Robots per m^2 for all swarm sizes, see `size_ladder`; None = all sizes in the scenario's arena.
 
     Raises:
         ConfigError: an unknown criterion, a swarm of one robot when sizes are varied, a size for which the arena has no
@@ -136,10 +135,10 @@ def plan_worlds(
 def joined_wrappers(
     always: Sequence[WrapperConfig], varied: Sequence[WrapperConfig], criterion: str
 ) -> tuple[WrapperConfig, ...]:
-    """Return the wrappers of all worlds with those of a level.
+    """Return the wrappers of all worlds, followed by the wrappers of a level.
 
     Raises:
-        ConfigError: both have one of a kind.
+        ConfigError: both contain a wrapper of the same kind.
     """
     taken = sorted({config.name for config in always} & {config.name for config in varied})
     if taken:
@@ -166,7 +165,7 @@ def size_ladder(
     smallest arena.
 
     Args:
-        scenario: With the usual number of robots.
+        scenario: Scenario with the usual number of robots.
         count: Number of sizes; None = powers of two up to 2.56 times the usual size (which gives the study's 128 and
             512), or all eight arenas of search and rescue.
         density: Robots per m^2 of all sizes but one robot; the arenas have the proportions of the scenario. Sizes for
@@ -194,16 +193,16 @@ def size_ladder(
 def swarms_of_sizes(
     scenario: ScenarioConfig, sizes: Sequence[int], density: float | None = None
 ) -> dict[int, ScenarioConfig]:
-    """Return the scenario with each of some swarm sizes, by size; the rules are those of `size_ladder`.
+    """Return the scenario with each of some swarm sizes, by size, under the rules of `size_ladder`.
 
     Args:
         scenario: The scenario.
         sizes: Numbers of robots, each once.
-        density: Robots per m^2 that all sizes but one robot keep; None = the arena of the scenario, in search and
-            rescue the smallest of its arenas that holds the swarm at 5 %.
+        density: Robots per m^2 for all sizes but one robot; None = the arena of the scenario, in search and rescue the
+            smallest of its arenas that holds the swarm at 5 %.
 
     Raises:
-        ConfigError: a size for which there is no room, or no arena.
+        ConfigError: the arena does not have room for a size, or there is no arena for it.
     """
     for size in sizes:
         whole("population_size", size, at_least=1)
@@ -229,12 +228,12 @@ def study_values(scenario: ScenarioConfig, criterion: str) -> tuple[float, ...]:
 
 
 def wrappers_at(scenario: ScenarioConfig, criterion: str, value: float) -> tuple[WrapperConfig, ...]:
-    """Return the wrappers that make a value of a criterion, also a value that the study does not have.
+    """Return the wrappers that make a value of a criterion, which may be a value that the study does not use.
 
     Args:
-        scenario: With its horizon, to which waveforms are compressed, and its number of robots.
+        scenario: The scenario; its horizon, to which waveforms are compressed, and its number of robots matter.
         criterion: One of `CRITERIA` but the swarm size.
-        value: 0 is the ideal throttle or handling cost, and for the others no disturbance at all.
+        value: 0 is the ideal throttle or handling cost; for the other criteria it means no disturbance.
 
     Raises:
         ConfigError: an unknown criterion, or a value that its wrapper refuses.
@@ -250,7 +249,7 @@ def wrappers_at(scenario: ScenarioConfig, criterion: str, value: float) -> tuple
 
 
 def _in_one_arena(scenario: ScenarioConfig, sizes: Sequence[int]) -> tuple[ScenarioConfig, ...]:
-    """The scenario with each size; a warehouse with its usual number of objects gets that of the size sweep."""
+    """The scenario with each size; a warehouse with its usual number of objects gets more, for the size sweep."""
     if scenario.objects.n_objects == _preset_objects(scenario.name):
         scenario = replace(scenario, objects=replace(scenario.objects, n_objects=SIZE_SWEEP_OBJECTS[scenario.name]))
     return tuple(replace(scenario, robots=replace(scenario.robots, n_robots=size)) for size in sizes)
@@ -343,16 +342,16 @@ def _population_levels(scenario: ScenarioConfig) -> tuple[list[_Level], list[_Le
 
 
 def repairs_per_tick(malfunction_per_tick: float, n_robots: int) -> float:
-    """Return the repair rate at which a queue without limit has `AWAY_SHARE` of the swarm in it, in equilibrium.
+    """Return the repair rate at which an unlimited queue holds `AWAY_SHARE` of the swarm, in equilibrium.
 
-    rho / (1 - rho) = AWAY_SHARE * N with rho = malfunctions / repairs. A swarm can lose no more robots than it has, so
-    fewer are away in its own equilibrium (docs/deciding.md).
+    rho / (1 - rho) = AWAY_SHARE * N with rho = malfunctions / repairs. A swarm cannot lose more robots than it has, so
+    fewer robots are away in its own equilibrium (docs/deciding.md).
     """
     return malfunction_per_tick * (1.0 + 1.0 / (AWAY_SHARE * n_robots))
 
 
 def _malfunctions(n_robots: int) -> tuple[PopulationConfig, ...]:
-    """Rates of the study; for other swarm sizes rates with the same share of the swarm away (our choice)."""
+    """Rates of the study; for other swarm sizes, rates that keep the same share of the swarm away (our choice)."""
     if n_robots in STUDY_SIZES_OF_MALFUNCTIONS:
         return malfunction_levels(n_robots)
     repair = repairs_per_tick(MALFUNCTION_PER_TICK, n_robots)
@@ -382,7 +381,7 @@ def _population_at(config: PopulationConfig, level: float, value: float) -> Popu
 
 
 class _Adversity(NamedTuple):
-    """One kind of adversity: the levels of the study, and what makes another level of one of them."""
+    """One kind of adversity: the levels of the study, and a function that makes another level from one of them."""
 
     levels: Callable[[ScenarioConfig], tuple[list[_Level], list[_Level]]]
     """Scenario -> the reference, if it has wrappers, and the disturbed levels."""

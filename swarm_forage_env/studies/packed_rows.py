@@ -1,4 +1,4 @@
-"""The rows of a packed study, as somebody's file has them: of the right types, and those of the study that it names."""
+"""Checks of the rows in a packed study, which may come from a stranger: their types, and whether they fit the study."""
 
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -14,21 +14,21 @@ if TYPE_CHECKING:
     from swarm_forage_env.studies.study import StudySpec
 
 AXIS = "axis_"
-"""Prefix of the columns of axes, which may be called like columns of records: throttle, handling_cost."""
+"""Prefix of the columns of axes, because axes may have the names of columns of records: throttle, handling_cost."""
 LOSS_COLUMNS = ("state", "error", "traceback", "rerun")
 """Last columns: one of `study_folder.STATES`; for failed runs the exception in one line, its traceback, and the command
-that makes the run again, given in the folder of the study."""
+that makes the run again from within the folder of the study."""
 MOST_BYTES = 2**31
-"""What a packed study may have, in the file, unpacked and in memory; our choice: fifty times the largest of ours."""
+"""Largest packed study, in the file, unpacked and in memory; our choice: fifty times our largest one."""
 _NEEDED = ("cell", "run_id", "seed", "interval", "state")
 _TEXTS = ("study", "reading", "policy", "run_id", "scenario", "criterion", *LOSS_COLUMNS)
 
 
 def check_types(frame: "pl.DataFrame") -> None:
-    """Refuse a table that lacks columns, or has some of other types than a packed study; see `check_columns`.
+    """Refuse a table that lacks columns of a packed study, or has them with other types; see `check_columns`.
 
     Raises:
-        ParquetError: names the column.
+        ParquetError: a column is missing or has another type.
     """
     axes = {name: (*_types()["text"], *_types()["number"], *_types()["truth"])
             for name in frame.columns if name.startswith(AXIS)}  # fmt: skip
@@ -37,11 +37,11 @@ def check_types(frame: "pl.DataFrame") -> None:
 
 
 def check_rows(frame: "pl.DataFrame", spec: "StudySpec") -> None:
-    """Refuse rows that are not those of a study: each run of each condition once, in order, whole or lost.
+    """Refuse rows that do not fit a study: each run of each condition once, in order, whole or lost.
 
     Raises:
-        ParquetError: says what is wrong.
-        ConfigError: a run has a name that is none of a file.
+        ParquetError: rows are missing, repeated or in another order.
+        ConfigError: a run has a name that cannot be the name of a file.
     """
     import polars as pl
 
@@ -67,7 +67,7 @@ def check_rows(frame: "pl.DataFrame", spec: "StudySpec") -> None:
 
 
 def _check_intervals(done: "pl.DataFrame", n_runs: int) -> None:
-    """Refuse runs that are torn apart or of several lengths, and columns of records that some of their rows lack."""
+    """Refuse runs whose rows do not lie together, runs of several lengths in a condition, and times of 0 or less."""
     import polars as pl
 
     runs = done.group_by("cell", "seed", maintain_order=True).agg(
@@ -75,7 +75,7 @@ def _check_intervals(done: "pl.DataFrame", n_runs: int) -> None:
     )
     is_whole = len(runs) == n_runs == done.select("cell", "seed", "run_id").to_struct("run").rle_id().n_unique()
     if not is_whole or not (runs["run_id"] == 1).all() or not runs["interval"].list.all().all():
-        raise ParquetError("expected the intervals 0, 1, 2, ... of each run behind each other")
+        raise ParquetError("expected the intervals 0, 1, 2, ... of each run one after the other")
     if not runs.group_by("cell").agg(pl.col("length").n_unique() == 1)["length"].all():
         raise ParquetError("expected runs of one length in each condition")
     if "t_end_s" in done.columns and not (done["t_end_s"] > 0.0).all():
@@ -84,7 +84,7 @@ def _check_intervals(done: "pl.DataFrame", n_runs: int) -> None:
 
 @cache
 def _types() -> dict[str, tuple[Any, ...]]:
-    """The types of polars by what they hold; `Null` where nothing is."""
+    """The types of polars by what they hold; `Null` for columns without values."""
     import polars as pl
 
     whole = (pl.Int64, pl.Int32, pl.UInt32)
@@ -98,7 +98,7 @@ def _types() -> dict[str, tuple[Any, ...]]:
 
 @cache
 def _kinds() -> dict[str, tuple[Any, ...]]:
-    """Column -> types that it may have."""
+    """Column -> the types that it may have."""
     of = _types()
     whole = {name: of["whole"] for name in (*RunRecord.column_names(), "cell") if name not in _TEXTS}
     numbers = {name: of["number"] for name in (*COLUMN_DTYPES, "criterion_value") if name != "interval"}

@@ -1,8 +1,8 @@
 """StudySpec: all runs of a study as data: a scenario, policies, axes along which it varies, rules and seeds.
 
-A condition is one policy under one of the rules at one value of every axis, and `Place` its address. It is run once per
-seed, and all conditions share the seeds. The last axis is the one that is plotted along x; each condition has its
-reference on it (`StudySpec.reference`).
+A condition is one policy under one of the rules at one value of every axis, and `Place` is its address. Each condition
+runs once per seed, and all conditions share the seeds. The last axis is the x axis of figures; each condition has its
+reference on this axis (`StudySpec.reference`).
 """
 
 import json
@@ -43,24 +43,24 @@ if TYPE_CHECKING:
     from swarm_forage_env.wrappers.base import WrapperConfig
 
 Value: TypeAlias = float | str | bool
-"""Where something is on an axis."""
+"""Value on an axis."""
 
 RULES_NAMES = {"described": "DESCRIBED", "program": "AUTHORS_PROGRAM"}
 """Word of studies -> name of the rules in `scenarios.quirks.RULES`."""
 SCENARIO_FIELDS = (*field_sections(), "density", "side_m")
-"""What a study may set, and vary, of a scenario: all that `scenarios.presets.scenario` takes by name."""
+"""Scenario fields that a study may set and vary: all arguments that `scenarios.presets.scenario` takes by name."""
 OF_THE_STUDY = {
     "horizon_s": "the budget of a study sets it",
     "interval_s": "the budget of a study sets it",
     "quirks": "the rules of a study set them",
 }
-"""Scenario fields that something else in a study decides, and what."""
+"""Scenario field that a study must not set -> what decides it instead."""
 _STORED = {"rules": "readings"}
-"""Field -> its key in files, where that is another word."""
+"""Field -> its key in files, where the two differ."""
 MOST_CONDITIONS = 100_000
-"""Rules times policies times values of all axes; our choice: 400 times those of the largest set."""
+"""Largest number of rules times policies times values of all axes; our choice: 400 times that of the largest set."""
 NOTHING = "none"
-"""On an axis of lists, the list without entries."""
+"""Name of the empty list on an axis of lists."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -68,14 +68,14 @@ class Axis:
     """What a study varies, and its values.
 
     Raises:
-        ConfigError: a name that nothing has, no values, equal ones, or values of several kinds.
+        ConfigError: an unknown name, no values, equal values, or values of several kinds.
     """
 
     name: str
     """A criterion (`ladders.CRITERIA`), a scenario field, a field of a wrapper ("sensor_noise.sigma",
     "throttle.waveform.amplitude"), or `SHARE`, which policies like "mixed:ppo=share,crw=rest" have."""
     values: tuple[Value, ...]
-    """Numbers, texts or truth values. Of a field that holds a list, texts with its entries between commas
+    """Numbers, texts or truth values. For a field that holds a list, texts with its entries between commas
     (`list_word`)."""
 
     def __post_init__(self) -> None:
@@ -112,7 +112,7 @@ def _kind(value: Any) -> str:
 def list_word(entries: Sequence[Any]) -> str:
     """Return a list as a value on an axis: ["nest_distance", "x"] is "nest_distance,x", [] is "none".
 
-    Lists in it are joined by plus signs: [[1, 2], [3, 4]] is "1,2+3,4". So are tables, which are kinds of robots:
+    Plus signs join lists within it: [[1, 2], [3, 4]] is "1,2+3,4". They also join tables, which are kinds of robots:
     [{name = "scout", share = 0.2}, {name = "hauler"}] is "scout:share=0.2+hauler".
     """
     if entries and all(isinstance(entry, Mapping) for entry in entries):
@@ -154,7 +154,7 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class StoredPolicy:
-    """What a file says of a policy, see `PolicySpec`."""
+    """A policy as study files store it, see `PolicySpec`."""
 
     label: str
     policy: str
@@ -163,15 +163,15 @@ class StoredPolicy:
 
 
 POLICY_KEYS = tuple(StoredPolicy.__dataclass_fields__)
-"""The same, as keys."""
+"""The keys of `StoredPolicy`."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class StudySpec:
-    """A study as frozen data; all values are written out, nothing is left to a budget.
+    """A study as frozen data, with all values that its budget chose.
 
     Raises:
-        ConfigError: whatever cannot be: unknown names, values that scenarios or wrappers refuse, equal labels.
+        ConfigError: unknown names, values that scenarios or wrappers refuse, or equal labels.
     """
 
     name: str
@@ -181,22 +181,22 @@ class StudySpec:
     settings: Mapping[str, Any] = field(default_factory=dict, hash=False)
     """Scenario fields that differ from the preset, by name."""
     wrappers: "tuple[WrapperConfig, ...]" = ()
-    """In all runs; an axis may vary a field of them."""
+    """Wrappers of all runs; an axis may vary one of their fields."""
     policies: tuple[PolicySpec, ...]
     axes: tuple[Axis, ...]
     reference: Value | None = None
-    """Value on the last axis at which the reference conditions are; None = the study has none."""
+    """Value of the reference conditions on the last axis; None = the study does not have a reference."""
     rules: tuple[str, ...] = tuple(RULES_NAMES)
     budget: str = ""
-    """Name of the budget that the values follow; empty = none."""
+    """Name of the budget that chose the values; empty = none."""
     seeds: tuple[int, ...]
     horizon_s: float
     interval_s: float
     file: str = field(default="", compare=False)
-    """Path of the study file as it was given; empty for the paper's sets, and for studies made in Python."""
+    """Path of the study file as the user gave it; empty for the paper's sets, and for studies made in Python."""
     looks: tuple[int, ...] = ()
-    """Numbers of runs of a condition after which claims are judged, while more are being made; empty: once, at the end.
-    Whoever judges takes the same first runs, and corrects for looking several times."""
+    """Numbers of runs of a condition after which the claims are judged while runs continue; empty: once, at the end.
+    Every judgement uses the same first runs, and corrects for several looks."""
 
     def __post_init__(self) -> None:
         check_file_name("name of a study", self.name)
@@ -254,7 +254,7 @@ class StudySpec:
         return tuple(Place(*address) for address in addresses)
 
     def place_words(self, *others: "StudySpec") -> dict[Place, tuple[str, ...]]:
-        """Return how conditions are shown, those of other studies with the same axes, too: rules, policy, values."""
+        """Return conditions, also of other studies with the same axes, as shown to people: rules, policy, values."""
         places = dict.fromkeys(place for study in (self, *others) for place in study.places)
         words = [value_words(values) for values in zip(*(place.values for place in places), strict=True)]
         return {
@@ -264,12 +264,12 @@ class StudySpec:
 
     @property
     def n_runs(self) -> int:
-        """How many runs there are."""
+        """Number of runs."""
         return len(self.places) * len(self.seeds)
 
     @property
     def n_experiments(self) -> int:
-        """How many combinations of values there are, which each policy runs under each of the rules."""
+        """Number of combinations of values; each policy runs all of them under each of the rules."""
         return len(self.places) // (len(self.policies) * len(self.rules))
 
     @property
@@ -278,7 +278,7 @@ class StudySpec:
         return self.plan.robot_ticks
 
     def reference_of(self, place: Place) -> Place | None:
-        """Return what a condition is compared with, the same but for the last axis; None = the study has none."""
+        """Return the reference of a condition, which differs from it on the last axis only; None = no reference."""
         if self.reference is None:
             return None
         # The value of the axis, not an equal one of another kind: 1 and 1.0 are the same.
@@ -286,11 +286,11 @@ class StudySpec:
         return place._replace(values=(*place.values[:-1], value))
 
     def world(self, place: Place) -> World:
-        """Return the world of a condition, with the criterion that its runs are labelled with."""
+        """Return the world of a condition, with the criterion that labels its runs."""
         return self._worlds[place.rules, place.values]
 
     def condition(self, place: Place) -> Condition:
-        """Return what is run in a condition."""
+        """Return the policy and the world of a condition."""
         return self._conditions[place]
 
     @cached_property
@@ -304,7 +304,7 @@ class StudySpec:
 
     @property
     def study_id(self) -> str:
-        """Short hexadecimal hash of all that decides which runs there are and how they are addressed."""
+        """Short hexadecimal hash of everything that decides which runs the study has, and their addresses."""
         mapping = self.to_mapping()
         for told in ("title", "budget", "file", "looks"):
             mapping.pop(told, None)
@@ -349,7 +349,7 @@ class StudySpec:
         """Build a study back from `to_mapping`.
 
         Raises:
-            ConfigError: unknown or missing keys, or values that describe no study.
+            ConfigError: unknown or missing keys, or values that do not describe a study.
         """
         own = [_STORED.get(item.name, item.name) for item in fields(cls)]
         known_keys(table("a study", mapping), own, "key of a study")
@@ -446,7 +446,7 @@ class StudySpec:
 
 
 def value_words(values: Iterable[Value]) -> dict[Value, str]:
-    """Return how the values of an axis are shown: 2/7 as 0.285714, but with all digits where two would look alike."""
+    """Return the values of an axis in words: 2/7 as 0.285714, but with all digits if two values would look alike."""
     short = {value: _short(value) for value in values}
     shown = Counter(short.values())
     return {value: word if shown[word] == 1 else str(value) for value, word in short.items()}
@@ -459,7 +459,7 @@ def _short(value: Value) -> str:
 
 
 def _with_value(mapping: Mapping[str, Any], path: Sequence[str], value: Value) -> dict[str, Any]:
-    """Return nested tables with another value at the end of a path of keys."""
+    """Return nested tables in which the value at the end of a path of keys is replaced."""
     first, *others = path
     inner = mapping.get(first, {})
     return {**mapping, first: _with_value(table(first, inner), others, value) if others else value}

@@ -1,4 +1,4 @@
-"""Study files: TOML that says what a study varies, and in budgets how much of it is run.
+"""Study files: TOML that says what a study varies, with budgets that say how much of it to run.
 
     name = "S1e"
     title = "Noise, small warehouse"
@@ -14,14 +14,14 @@
 
     [[axis]]                               # any number; the last one is plotted along x
     criterion = "noise"                    # or field = "n_objects", "sensor_noise.sigma" or "share" (mixed swarms)
-    values = [0.01, 0.02, 0.03]            # of a criterion; default those of the paper
+    values = [0.01, 0.02, 0.03]            # default for a criterion: the paper's values
     reference = 0.0                        # only on the last axis; default see `load_study`
 
-    [budget.smoke]                         # all keys may be left out; default those of the paper
+    [budget.smoke]                         # all keys are optional; default: as in the paper
     seeds = 2
     horizon_s = 1000.0
     interval_s = 100.0
-    values = { noise = 2 }                 # so many values besides the reference, evenly spread, or a list
+    values = { noise = 2 }                 # number of values besides the reference, evenly spread, or a list of values
 
 The files of the paper's sets are in the folder `sets`.
 """
@@ -54,7 +54,7 @@ from swarm_forage_env.wrappers.world import SIZE
 SETS = Path(__file__).parent / "sets"
 """Folder of the paper's sets."""
 PAPER = "paper"
-"""Name of the budget that every study has: as long, and as many runs, as in the paper."""
+"""Name of the budget that every study has: runs as long, and as many, as in the paper."""
 FORMER_RULES = "readings"
 """Key of `rules` in study files of earlier versions."""
 FILE_KEYS = ("name", "title", "scenario", "policies", "rules", FORMER_RULES, "set", "wrappers", "axis", "budget")
@@ -87,7 +87,7 @@ def find_study(name: str | Path) -> Path:
 
 
 def budget_names(name: str | Path) -> tuple[str, ...]:
-    """Return the budgets of a study: those of its file, and `PAPER`; raises as `load_study`."""
+    """Return the names of a study's budgets: those in its file, and `PAPER`; raises as `load_study`."""
     return tuple(_budgets(_read(find_study(name))))
 
 
@@ -98,19 +98,19 @@ def load_study(
     seeds: int | None = None,
     rules: Sequence[str] | None = None,
 ) -> StudySpec:
-    """Read a study file and return what one of its budgets runs.
+    """Read a study file and return the study with one of its budgets.
 
-    The reference is on the last axis. Default: one robot if that is among the sizes, else the smallest size; 0, the
-    ideal conditions, for other criteria; none for a field. It is always run, whatever values a budget chooses.
+    The reference is on the last axis. Default: for swarm sizes, one robot if it is among the sizes, else the smallest
+    size; for other criteria 0, the ideal conditions; for a field, none. Every budget runs the reference.
 
     Args:
         name: Name of one of the paper's sets, or path of a file.
         budget: Name of a budget; default the first of the file.
-        seeds: How many, instead of those of the budget: 0, 1, 2, ...
-        rules: Instead of those of the file.
+        seeds: Number of seeds, 0, 1, 2, ..., in place of the seeds of the budget.
+        rules: Rules in place of those in the file.
 
     Raises:
-        ConfigError: the file is missing or no TOML, or describes no study; the message names the file.
+        ConfigError: the file is missing, is not TOML, or does not describe a study; the message names the file.
     """
     file = find_study(name)
     try:
@@ -121,7 +121,7 @@ def load_study(
 
 
 def is_set_of_paper(spec: StudySpec) -> bool:
-    """Return whether a study is one of the paper's sets at one of its budgets, with any seeds, or only has its name."""
+    """Return whether a study is a set of the paper at one of its budgets, with any seeds, not only by its name."""
     if spec.name not in set_names():  # else a file of that name would be opened
         return False
     try:
@@ -136,7 +136,7 @@ def left_out(spec: StudySpec) -> dict[str, tuple[str, ...]]:
 
         left_out(load_study("S2a", "reduced"))["walk_probability"]  # ("0.026",)
 
-    It is empty for a set that has all of them, and for any other study.
+    The mapping is empty for a set with all values, and for any other study.
     """
     if not is_set_of_paper(spec):
         return {}
@@ -150,7 +150,7 @@ def left_out(spec: StudySpec) -> dict[str, tuple[str, ...]]:
 
 
 def left_out_words(spec: StudySpec) -> str:
-    """Return the same as one text, "walk_probability 0.026; population_size 460, 627, 819"; "" for nothing."""
+    """Return `left_out` as one text, "walk_probability 0.026; population_size 460, 627, 819"; "" for nothing."""
     return "; ".join(f"{axis} {', '.join(values)}" for axis, values in left_out(spec).items())
 
 
@@ -216,7 +216,7 @@ def _listed(where: str, value: Any) -> list[Any]:
 
 
 def _seeds(given: Any) -> tuple[int, ...]:
-    """The seeds of a budget, from how many or which."""
+    """The seeds of a budget, which gives their number or a list."""
     if isinstance(given, list):
         return tuple(given)
     whole("seeds", given, at_least=1, at_most=MOST_SEEDS)
@@ -235,7 +235,7 @@ def _policy(entry: Any, folder: Path) -> PolicySpec:
 
 
 def _beside(word: str, folder: Path) -> str:
-    """Return a policy with the paths of files, also those in a mixed swarm, as they are seen from a folder."""
+    """Return a policy with the paths of its files, also those in a mixed swarm, relative to a folder."""
     if is_mixture(word):
         return mixture_of([Part(_beside(part.policy, folder), part.amount) for part in mixture_parts(word)])
     return str(folder / word) if is_policy_file(word) else word
@@ -296,7 +296,7 @@ def _usual_reference(name: str, values: Sequence[Value]) -> Value | None:
 
 
 def _chosen(name: str, values: list[Value], reference: Value | None, asked: Any) -> tuple[Value, ...]:
-    """The values that a budget runs: all, some, or so many besides the reference."""
+    """The values that a budget runs: all, a list, or a number of values besides the reference."""
     if asked is None:
         return tuple(values)
     if isinstance(asked, list):

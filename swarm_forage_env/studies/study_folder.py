@@ -1,10 +1,10 @@
-"""Running a study: what its folder holds, which runs are left to do, and doing them.
+"""Running a study: what its folder holds, which runs are missing, and how to make them.
 
     <folder>/study.json     the study (`StudySpec.to_mapping`)
     <folder>/runs/          its runs and failures, see `store`
     <folder>/<name>.parquet all runs in one file, see `study_table`
 
-A folder can be filled by several machines, each with a shard, and copied together.
+Several machines can fill a folder, each with a shard. Folders of shards can also be copied into one.
 """
 
 import errno
@@ -26,11 +26,11 @@ from swarm_forage_env.studies.study import RULES_NAMES, Place, StudySpec
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class PlaceState:
-    """How far a condition is."""
+    """How many runs of a condition are in which state."""
 
     place: Place
     n_runs: Mapping[str, int]
-    """State -> how many runs are in it."""
+    """State -> number of runs in it."""
 
     @property
     def is_complete(self) -> bool:
@@ -45,7 +45,7 @@ class StudyFolder:
         """Use `folder`.
 
         Raises:
-            NotADirectoryError: there is a file of that name.
+            NotADirectoryError: a file has this name.
         """
         self.folder = Path(folder)
         if self.folder.exists() and not self.folder.is_dir():
@@ -57,7 +57,7 @@ class StudyFolder:
         """Return the study that the folder holds.
 
         Raises:
-            RecordError: it holds none, or its file is damaged.
+            RecordError: the folder does not hold a study, or the file of the study is damaged.
         """
         try:
             return StudySpec.from_mapping(parse_json(self.study_file.read_text(encoding="utf-8")))
@@ -69,7 +69,7 @@ class StudyFolder:
             raise RecordError(f"Cannot use {self.study_file}: {error}") from error
 
     def take(self, spec: StudySpec) -> StudySpec:
-        """Make it the folder of a study; a study that differs in seeds and rules alone is added to the one there.
+        """Make it the folder of a study. If it holds a study that differs in seeds and rules alone, the two are joined.
 
         Returns:
             The study that the folder holds now.
@@ -107,7 +107,7 @@ class StudyFolder:
         return kept
 
     def place_states(self) -> tuple[PlaceState, ...]:
-        """Return how far each condition of the study is."""
+        """Return how many runs of each condition are in which state."""
         spec = self.study()
         runs = {place: spec.specs_of(place) for place in spec.places}
         states = self.store.look_up((run for of in runs.values() for run in of), keep=False).states
@@ -121,15 +121,15 @@ def place_state(place: Place, states: Iterable[str]) -> PlaceState:
 
 
 def shard(specs: Sequence[RunSpec], index: int, count: int) -> tuple[RunSpec, ...]:
-    """Return a part of the runs; the parts of all indices are disjoint, complete and equally much work.
+    """Return a part of the runs; the parts are disjoint, together have all runs, and take about equally long.
 
     Args:
         specs: All runs, in the same order on every machine.
-        index: Which part, from 1.
-        count: How many parts there are.
+        index: Number of the part, from 1.
+        count: Number of parts.
 
     Raises:
-        ConfigError: no such part.
+        ConfigError: there is no such part.
     """
     whole("the number of shards", count, at_least=1)
     whole("the shard", index, at_least=1, at_most=count)
@@ -145,24 +145,24 @@ def run_study(
     executor: Executor | None = None,
     progress: bool = False,
 ) -> Outcomes:
-    """Run what is missing of a study; its records are in the folder alone.
+    """Make the missing runs of a study; the function stores their records in the folder and does not return them.
 
-    Runs that are there are read, and skipped if they are whole; damaged and failed ones are made again. Ctrl-C ends the
-    runs under way and leaves all others stored, so that the same call does the rest.
+    It reads the runs that the folder holds, and makes damaged and failed ones again. Ctrl-C stops the current runs and
+    keeps the finished ones, so the same call then does the rest.
 
     Args:
         spec: The study.
-        folder: Where it goes.
-        part: Index from 1 and number of shards; only the runs of this shard are made.
-        jobs: As in `runs.runner.run_specs`, and so are all further arguments.
-        executor: Runs the work instead; it is not shut down.
+        folder: Folder of the study.
+        part: Index from 1 and number of shards; the call makes the runs of this shard only.
+        jobs: As in `runs.runner.run_specs`, like all further arguments.
+        executor: Runs the work instead; the call does not shut it down.
         progress: Show progress, an estimate and damaged files on stderr.
 
     Returns:
-        What became of the shard's runs.
+        How the runs of the shard ended.
 
     Raises:
-        ConfigError: no such shard.
+        ConfigError: there is no such shard.
         RecordError: the folder holds another study.
         RunsInterrupted: Ctrl-C.
         WorkerError: no worker process could be started.
@@ -176,7 +176,7 @@ def parse_shard(word: str) -> tuple[int, int]:
     """Turn "2/8" into (2, 8).
 
     Raises:
-        ConfigError: no two whole numbers, or a shard that is not among them.
+        ConfigError: not two whole numbers, or a shard that does not exist.
     """
     index, _, count = word.partition("/")
     try:

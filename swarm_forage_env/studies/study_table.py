@@ -1,11 +1,11 @@
 """StudyTable: the table of a study's runs, as rows, and the Parquet file that holds it.
 
-It is a `Table` like that of any plan; its conditions also have addresses, and its records are read when asked for.
+It is a `Table` like that of any plan. In addition, its conditions have addresses, and it reads records on demand.
 
-One row per interval of a run, in the order of the study's conditions, seeds and intervals. A run that failed or is
-missing is one row without an interval, so that no run is a silent hole. The file needs nothing beside it: its metadata
-hold the study, the versions that made its runs, and a digest by which a damaged file is noticed. The same runs make the
-same bytes, in whatever order and on however many machines they were made.
+It has one row per interval of a run, in the order of the study's conditions, seeds and intervals. A failed or missing
+run has one row without an interval, so that readers notice it. The file needs no other file: its metadata hold the
+study, the versions that made its runs, and a digest that reveals damage. The same runs make the same bytes, in any
+order and on any number of machines.
 """
 
 import hashlib
@@ -44,9 +44,9 @@ Versions: TypeAlias = tuple[Mapping[str, str], ...]
 _PREFIX = "swarm_forage_env.study."
 _FILE_KEYS = tuple(_PREFIX + name for name in ("table_version", "study", "versions", "digest"))
 _COMPRESSION = 19
-"""Of Zstandard; it takes a second for a thousand runs, and files are read as quickly."""
+"""Level of Zstandard; packing a thousand runs takes a second, and reading them is as quick."""
 _NOT_KEPT = "controller"
-"""Column of records that is left out: the policy stands in a column of its own, under its label."""
+"""Column of records that the table leaves out, because it has a column with the label of the policy."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -56,13 +56,13 @@ class StudyTable(Table):
     spec: StudySpec
     frame: "pl.DataFrame" = field()  # pyright: ignore[reportIncompatibleVariableOverride] - here it is given
     """Columns: `study`, `cell` (index in `spec.places`), `reading` (the rules), `policy`, one `AXIS` column per axis;
-    those of `RunRecord`, null where a run has no such column; `LOSS_COLUMNS`."""
+    the columns of `RunRecord`, null for runs without such a column; `LOSS_COLUMNS`."""
     versions: Versions
     wall_time_s: float | None = None
-    """How long all finished runs took together, by the clock. None where it is not known: a file leaves it out, so that
-    the same runs make the same bytes."""
+    """Sum of the times that the finished runs took, by the clock. None if unknown: files leave it out, so that the same
+    runs make the same bytes."""
     damaged: tuple[str, ...] = ()
-    """Of a folder: why files of runs cannot be used; these runs count as missing."""
+    """Why the table cannot use some files of a folder; their runs count as missing."""
     plan: Plan = field(init=False)
     records: Mapping[str, RunRecord] = field(init=False)
     failures: Mapping[str, RunFailure] = field(init=False)
@@ -77,7 +77,7 @@ class StudyTable(Table):
 
     @property
     def damaged_lines(self) -> tuple[str, ...]:
-        """What to say of damaged files: the first, and how many more there are."""
+        """Lines about damaged files: the first one, and how many more there are."""
         if not self.damaged:
             return ()
         first, *others = self.damaged
@@ -85,7 +85,7 @@ class StudyTable(Table):
         return (f"Counts as missing, until 'study run' makes it again: {first}{more}",)
 
     def rows(self, place: Place) -> "pl.DataFrame":
-        """Return the rows of a condition, those of failed and missing runs included.
+        """Return the rows of a condition, including failed and missing runs.
 
         Raises:
             KeyError: the study has no such condition.
@@ -97,11 +97,11 @@ class StudyTable(Table):
         """Return the finished runs of a condition as arrays.
 
         Args:
-            condition: One of the plan, or its place; that of its reference is `spec.reference_of(place)`.
-            columns: Columns of records; those that the condition's runs do not have are left out. Default all.
+            condition: A condition of the plan, or its place; the place of its reference is `spec.reference_of(place)`.
+            columns: Columns of records; columns that its runs do not have are left out. Default all.
 
         Returns:
-            The seeds of the R runs, rising, and for each column its values in T intervals, (R, T).
+            The rising seeds of the R runs, and for each column its values in T intervals, (R, T).
 
         Raises:
             KeyError: the study has no such condition.
@@ -117,7 +117,7 @@ class StudyTable(Table):
         return seeds, curves
 
     def spec_of(self, run_id: str) -> RunSpec:
-        """Return the specification of a run, by which it can be made again anywhere.
+        """Return the specification of a run, from which any machine can make it again.
 
         Raises:
             KeyError: the study has no such run.
@@ -138,7 +138,7 @@ class StudyTable(Table):
         )
 
     def places(self) -> "pl.DataFrame":
-        """Return one row per condition: where it is, whether it is a reference, how many runs are in which state."""
+        """Return one row per condition: address, whether it is a reference, and the number of runs in each state."""
         import polars as pl
 
         rows = [
@@ -154,14 +154,14 @@ class StudyTable(Table):
 
     @property
     def digest(self) -> str:
-        """Hash of everything that a file of the table holds, the one by which a damaged file is noticed."""
+        """Hash of everything that a file of the table holds; it reveals damage."""
         return _digest(self.frame, *self._texts)
 
     def write(self, path: str | Path) -> None:
         """Write the table to a Parquet file, whole or not at all.
 
         Raises:
-            RecordError: it is larger than what `read_study` reads.
+            RecordError: the table is too large for `read_study`.
             OSError: the file cannot be written.
         """
         values = (str(TABLE_VERSION), *self._texts, self.digest)
@@ -193,7 +193,7 @@ class StudyTable(Table):
 
     @cached_property
     def _of_run(self) -> dict[str, tuple[int, int]]:
-        """First row of each run, and how many it has; runs that several conditions share count in the first."""
+        """First row and number of rows of each run; a run that several conditions share counts in the first of them."""
         runs = self.frame["run_id"].rle().struct
         lengths = runs.field("len").to_numpy()
         starts = (np.cumsum(lengths) - lengths).tolist()
@@ -211,7 +211,7 @@ class StudyTable(Table):
         return self.frame.slice(*self._of_run[run_id])
 
     def _record(self, run_id: str) -> RunRecord:
-        """The record of a finished run. Its provenance are the versions of all runs: a table does not say whose."""
+        """The record of a finished run, with the versions of all runs: a table does not say which run has which."""
         import polars as pl
 
         rows, spec = self._rows_of(run_id), self.spec_of(run_id)
@@ -230,7 +230,7 @@ _T = TypeVar("_T")
 
 
 class _InState(Mapping[str, _T]):
-    """The runs of a table that are in one state: run_id -> what is read of it when it is asked for."""
+    """The runs of a table in one state: run_id -> what is read from the table on demand."""
 
     def __init__(self, table: StudyTable, state: str, read: Callable[[str], _T]) -> None:
         self._table, self._state, self._read = table, state, cache(read)
@@ -253,7 +253,7 @@ class _InState(Mapping[str, _T]):
 
 
 def place_columns(spec: StudySpec, place: Place) -> dict[str, Any]:
-    """Return where a condition is, by column: rules, policy, and its value on each axis; numbers are floats."""
+    """Return the address of a condition by column: rules, policy, and its value on each axis; numbers are floats."""
     values = {
         AXIS + axis.name: value if isinstance(value, str | bool) else float(value)
         for axis, value in zip(spec.axes, place.values, strict=True)
@@ -267,12 +267,12 @@ def gather_study(
     """Return all runs of a study's folder as a table.
 
     Args:
-        folder: Of the study.
-        spec: The study, if it is another than the folder says. None: that one.
-        places: Conditions whose runs are read; the table has no rows of others. None: all.
+        folder: Folder of the study.
+        spec: A study to use in place of the one that the folder holds. None: the one in the folder.
+        places: Conditions to read; the table has no rows for others. None: all.
 
     Raises:
-        RecordError: the folder holds no study, or a file of a failure is none.
+        RecordError: the folder does not hold a study, or the file of a failure is damaged.
     """
     import polars as pl
 
@@ -309,15 +309,15 @@ def gather_study(
 
 
 def pack_study(folder: StudyFolder, chosen: Path | None = None, *, tell: Callable[[str], None] | None = None) -> Path:
-    """Put all runs of a study into one file; of several calls at once, the last one to write has read the last runs.
+    """Put all runs of a study into one file. If several calls do so at once, the file has the latest runs in the end.
 
     Args:
-        folder: Of the study.
-        chosen: The file; default NAME.parquet in the folder.
-        tell: Called with words about damaged files.
+        folder: Folder of the study.
+        chosen: File to write; default NAME.parquet in the folder.
+        tell: Function that gets lines about damaged files.
 
     Returns:
-        The file.
+        The file that was written.
 
     Raises:
         RecordError: see `gather_study` and `StudyTable.write`.
@@ -335,16 +335,17 @@ def pack_study(folder: StudyFolder, chosen: Path | None = None, *, tell: Callabl
 
 
 def unpack_study(table: StudyTable, folder: StudyFolder) -> int:
-    """Put the finished runs of a table into the folder of its study, so that `run_study` and others go on from there.
+    """Put the finished runs of a table into a folder, so that `run_study` and other functions can continue from there.
 
-    Runs that the folder has stay as they are. Records lack what a packed file leaves out: how long each run took.
+    Runs that the folder holds stay as they are. The added records lack the time that each run took, because a packed
+    file leaves it out.
 
     Args:
-        table: From the packed file.
-        folder: Made if it is not there.
+        table: Table of a packed file.
+        folder: Folder of the study; made if it does not exist.
 
     Returns:
-        How many runs were added.
+        Number of runs that were added.
 
     Raises:
         RecordError: the folder holds another study.
@@ -357,10 +358,10 @@ def unpack_study(table: StudyTable, folder: StudyFolder) -> int:
 
 
 def read_study(path: str | Path) -> StudyTable:
-    """Read a study's table from its file; from its folder, gather it.
+    """Read a study's table from its packed file, or gather it from its folder.
 
     Raises:
-        RecordError: the file is missing, no study, damaged, or of another layout; the message names it.
+        RecordError: the file is missing, is not a study, is damaged, or has another layout; the message names it.
     """
     if Path(path).is_dir():
         return gather_study(StudyFolder(path))
@@ -401,7 +402,7 @@ def _parsed(told: str) -> Any:
 
 
 def _record(store: RunStore, run: RunSpec, damaged: list[str]) -> RunRecord | None:
-    """The record of a run, read with the performance that the study asks for; None if it is missing or damaged."""
+    """The record of a run, with the performance that the study asks for; None if it is missing or damaged."""
     if run.run_id not in store:
         return None
     try:
@@ -431,7 +432,7 @@ def _loss(store: RunStore, run: RunSpec) -> dict[str, Any]:
 
 
 def _losses(rows: Sequence[Mapping[str, Any]]) -> "pl.DataFrame":
-    """Rows of `_loss`; without a row, the columns alone."""
+    """Rows of `_loss`; without rows, only the columns."""
     import polars as pl
 
     schema: dict[str, Any] = {"run_id": str, "scenario": str, "n_robots": int, "criterion": str}
@@ -450,7 +451,7 @@ def _frame(records: Sequence[RunRecord]) -> "pl.DataFrame":
 
 
 def _in_order(columns: Sequence[str], spec: StudySpec) -> list[str]:
-    """Columns of the place first, those of every record, contributed ones by name, and those of losses last."""
+    """Columns in order: address, columns of every record, contributed columns by name, and losses."""
     first = ["study", "cell", "reading", "policy", *(AXIS + axis.name for axis in spec.axes)]
     of_records = [name for name in RunRecord.column_names() if name in columns]
     contributed = sorted({*columns} - {*first, *of_records, *LOSS_COLUMNS})
@@ -466,7 +467,7 @@ def _digest(frame: "pl.DataFrame", *texts: str) -> str:
 
 
 def _content(frame: "pl.DataFrame") -> Iterator[str | bytes]:
-    """The content of a table as bytes; texts, of which most rows repeat the one above, as values and lengths."""
+    """The content of a table as bytes; texts, which most rows repeat from the row above, as values and lengths."""
     import polars as pl
 
     for column in frame.iter_columns():
