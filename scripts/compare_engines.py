@@ -258,7 +258,7 @@ def main(words: Sequence[str] | None = None) -> int:
             if chosen.all or chosen.check or row.n_parted:
                 print(row.text, flush=True)
     print(f"{n_alike} of {len(cases)} cases have the same numbers in both engines.")
-    print(f"In {n_apart} of the {n_rows} rows with other numbers the interval of the difference leaves out zero.")
+    print(f"In {n_apart} of the {n_rows} rows that differ, the interval of the difference leaves out zero.")
     if chosen.check and n_parted:
         print(f"The engines differ: in {n_parted} cases more than {MOST_PARTED:.0%} of the runs have other numbers.")
     return int(chosen.check and n_parted > 0)

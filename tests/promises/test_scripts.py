@@ -61,7 +61,7 @@ def test_two_engines_are_compared(run):
     assert all(line.startswith("| warehouse_small | dpo | 30 |") for line in lines[2:15])
     assert lines[15:] == [
         "1 of 1 cases have the same numbers in both engines.",
-        "In 0 of the 0 rows with other numbers the interval of the difference leaves out zero.",
+        "In 0 of the 0 rows that differ, the interval of the difference leaves out zero.",
     ]
 
 
