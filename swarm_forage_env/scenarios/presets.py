@@ -123,10 +123,7 @@ def classroom(**overrides: Any) -> ScenarioConfig:
         arena=ArenaConfig(
             width_m=8.0,  # our choice: a room; in the window a robot is a disc of 10 pixels or more
             height_m=6.0,
-            nest_centre_m=(
-                1.0,
-                3.0,
-            ),  # our choice: at the left wall but clear of it; half way up
+            nest_centre_m=(1.0, 3.0),  # our choice: at the left wall but clear of it; half way up
             nest_size_m=(1.6, 4.8),  # our choice: 0.2 X by 0.8 Y; 0.1 X has no room for two robots side by side
         ),
         robots=RobotConfig(
