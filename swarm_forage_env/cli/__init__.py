@@ -46,5 +46,5 @@ def _interrupted() -> int:
     """Tell it, where no command has told what is kept; returns the exit code."""
     code = signals.exit_code()
     signals.end_at_once(code)
-    sys.stderr.write("swarm-forage: Interrupted. What was under way is not kept; the same command starts it again.\n")
+    sys.stderr.write("swarm-forage: Interrupted. Unfinished work is not kept; run the same command to start again.\n")
     return code

@@ -124,6 +124,6 @@ def test_an_interrupt_leaves_no_file(command, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("swarm_forage_env.runs.run.LiveRun.advance", interrupted)
-    told = "swarm-forage: Interrupted. What was under way is not kept; the same command starts it again.\n"
+    told = "swarm-forage: Interrupted. Unfinished work is not kept; run the same command to start again.\n"
     assert command("replay", "random", *SHORT, "--file", "run.html") == (130, "", told)
     assert not list(Path().iterdir())

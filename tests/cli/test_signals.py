@@ -12,7 +12,7 @@ import pytest
 from swarm_forage_env.cli import signals
 from tests.support.console import answer, heard
 
-TOLD = "swarm-forage: Interrupted. What was under way is not kept; the same command starts it again.\n"
+TOLD = "swarm-forage: Interrupted. Unfinished work is not kept; run the same command to start again.\n"
 RUN = ("run", "--policy", "crw", "--robots", "2", "--objects", "10", "--horizon", "4", "--set", "interval_s=2")
 HEARS = """
 import sys
