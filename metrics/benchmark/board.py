@@ -33,7 +33,7 @@ from ..distributions import performance_profile
 from ..statistics import Estimate
 from .entry import Entry
 from .page import board_sheet, details_page, page_block, share, sorted_standings, with_block
-from .protocol import BenchmarkError, Protocol, load_protocol
+from .protocol import USUAL, BenchmarkError, Protocol, load_protocol
 from .standing import Reference, Standing, reference_of, scripted_entries, shares_of, standing_of
 
 _MOST_SHADE = 2.0
@@ -96,12 +96,12 @@ def board_of(entries: Sequence[Entry], protocol: Protocol | None = None) -> Boar
 
     Args:
         entries: Entries of one protocol.
-        protocol: Default: the full protocol of the latest version.
+        protocol: Default: the full protocol of their version.
 
     Raises:
         BenchmarkError: two entries with one name, or another policy under the name of a scripted controller.
     """
-    full = load_protocol()
+    full = load_protocol(version=entries[0].version if entries else USUAL)
     scripted = scripted_entries(full)
     reference = reference_of(scripted, full)
     digests = {entry.digest for entry in scripted}
@@ -129,6 +129,7 @@ def entry_files(given: Sequence[Path]) -> list[Path]:
 def _mapping(standing: Standing) -> dict[str, Any]:
     return {
         "name": standing.entry.name,
+        **({"track": standing.entry.training.track} if standing.entry.training.track else {}),
         "score": _bounds(standing.score),
         "improvement": _bounds(standing.improvement),
         "optimality_gap": plain(standing.gap),

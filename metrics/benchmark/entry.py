@@ -1,11 +1,11 @@
 """An entry of the benchmark: one JSON file with every number that the page needs.
 
-    entry = read_entry("dpo.json", load_protocol())
+    entry = read_entry("dpo.json")
     entry.performance("two sources, 8 robots")  # per 1,000 s, (policies, seeds)
 
-`read_entry` accepts a file only if it is whole: it follows this version of the protocol, has every run of every world,
-and its digest matches. This finds mistakes, such as a broken copy or a slip of the hand. It does not find fraud: anyone
-who alters numbers can also write a new digest. To be sure of an entry, run its command again.
+`read_entry` accepts a file only if it is whole: it follows a known version of the protocol, has every run of every
+world, and its digest matches. This finds mistakes, such as a broken copy or a slip of the hand. It does not find fraud:
+anyone who alters numbers can also write a new digest. To be sure of an entry, run its command again.
 """
 
 import json
@@ -17,12 +17,12 @@ from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import number
+from swarm_forage_env._internal.fields import number, whole
 from swarm_forage_env._internal.files import read_json, replacing
 from swarm_forage_env._internal.typed import Amount, Count, Name, Within, typed
 
 from ..curves import FloatArray
-from .protocol import BenchmarkError, Protocol
+from .protocol import OPEN, BenchmarkError, Protocol, load_protocol, protocol_versions
 
 TRAINED_IN = ("given", "other", "nothing", "unknown")
 """Where a policy was trained: in the training worlds only, also elsewhere, not at all, or the author does not say."""
@@ -40,12 +40,62 @@ class Training:
     library: str = ""
     core_hours: Amount | None = None
     """Core-hours of all its trainings together."""
+    track: str = ""
+    """One of the protocol's tracks, or `OPEN`; empty if the protocol has no tracks."""
+    decisions: Count | None = None
+    """Decisions of its longest training, counted over all robots."""
 
     def __post_init__(self) -> None:
         if self.worlds not in TRAINED_IN:
             raise BenchmarkError(f"Expected training worlds to be one of {', '.join(TRAINED_IN)}, got {self.worlds!r}.")
         if self.core_hours is not None:
             number("core-hours of training", self.core_hours, at_least=0.0)
+        whole("decisions of a training", self.decisions, at_least=0, or_none=True)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return it as plain values; entries of version 1 have neither track nor decisions."""
+        told = asdict(self)
+        return told if self.track else {key: told[key] for key in told if key not in ("track", "decisions")}
+
+    def check_track(self, protocol: Protocol, n_policies: int) -> None:
+        """Refuse a training that does not fit its track.
+
+        Args:
+            protocol: That has the tracks.
+            n_policies: How many trainings there are.
+
+        Raises:
+            BenchmarkError: an unknown track; or one with a budget for policies that trained elsewhere, too long or too
+                seldom, or whose author does not say so.
+        """
+        tracks = (*protocol.tracks, OPEN) if protocol.tracks else ("",)
+        if self.track not in tracks:
+            known = ", ".join(tracks) or "none"
+            raise BenchmarkError(
+                f"Expected a track of the benchmark, {protocol.name} ({known}), got {self.track!r}; choose one with "
+                "--track."
+            )
+        if self.decisions is not None and not self.track:
+            raise BenchmarkError(f"Expected decisions with a track, got them for {protocol.name}, which has none.")
+        budget = protocol.tracks.get(self.track)
+        if budget is None:
+            return
+        if self.worlds != "given":
+            raise BenchmarkError(
+                f"Expected a training in the training worlds only (given) for the track {self.track}, got "
+                f"{self.worlds!r}; say --trained-in given, or choose --track {OPEN}."
+            )
+        if self.decisions is None or self.decisions > budget:
+            told = "none" if self.decisions is None else f"{self.decisions:,}"
+            raise BenchmarkError(
+                f"Expected at most {budget:,} decisions of a training for the track {self.track}, got {told}; say how "
+                f"many with --decisions, or choose --track {OPEN}."
+            )
+        if n_policies < protocol.n_trainings:
+            raise BenchmarkError(
+                f"Expected {protocol.n_trainings} trainings for the track {self.track}, got {n_policies}; give one "
+                f"--policy for each, or choose --track {OPEN}."
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,7 +214,7 @@ class Entry:
             "benchmark": {"version": self.version, "identity": self.identity, "quick": self.is_quick},
             "name": self.name,
             "command": self.command,
-            "training": asdict(self.training),
+            "training": self.training.to_mapping(),
             "policies": [asdict(policy) for policy in self.policies],
             "core_hours": self.core_hours,
             "versions": dict(self.versions),
@@ -210,6 +260,7 @@ class Entry:
                 raise BenchmarkError(f"Expected runs of the worlds of the benchmark in {where}, got {world!r}, too.")
             for name, rows in of_world.items():
                 self._check_rows(f"{name} in the world {world!r} of {where}", rows, protocol)
+        self.training.check_track(protocol, len(self.policies))
         for measure in self.measures:
             for name in ("values", "relative") if measure.relative else ("values",):
                 self._check_rows(f"{name} of {', '.join(measure.key)} in {where}", getattr(measure, name), protocol)
@@ -222,11 +273,15 @@ class Entry:
             )
 
 
-def read_entry(path: str | Path, protocol: Protocol) -> Entry:
+def read_entry(path: str | Path, protocol: Protocol | None = None) -> Entry:
     """Read an entry file.
 
+    Args:
+        path: The file.
+        protocol: What it must be an entry of; default that of the version which it names.
+
     Raises:
-        BenchmarkError: the file cannot be read, its entry of `protocol` is not whole, or its digest does not match.
+        BenchmarkError: the file cannot be read, its entry of the protocol is not whole, or its digest does not match.
     """
     content = read_json(Path(path), BenchmarkError)
     try:
@@ -234,13 +289,32 @@ def read_entry(path: str | Path, protocol: Protocol) -> Entry:
     except ValueError as error:
         raise BenchmarkError(f"Cannot use the entry {path}: {error}") from error
     entry = _entry(stored)
-    entry.check(protocol, str(path))
+    if protocol is None and entry.version not in protocol_versions():
+        known = " or ".join(map(str, protocol_versions()))
+        raise BenchmarkError(f"Expected an entry of version {known} of the benchmark, got {entry.version} in {path}.")
+    entry.check(protocol or load_protocol(version=entry.version), str(path))
     if entry.digest != stored.digest:
         raise BenchmarkError(
             f"Expected the numbers of {path} as swarm-forage benchmark wrote them, got others: the digest does not "
             "fit. Make the entry again."
         )
     return entry
+
+
+def read_entries(paths: Sequence[Path]) -> list[Entry]:
+    """Read entry files that are shown side by side.
+
+    Raises:
+        BenchmarkError: as `read_entry`, or entries of different versions.
+    """
+    entries = [read_entry(path) for path in paths]
+    for path, entry in zip(paths, entries, strict=True):
+        if entry.version != entries[0].version:
+            raise BenchmarkError(
+                f"Expected entries of one version of the benchmark, got one of version {entry.version} in {path} "
+                f"beside one of version {entries[0].version} in {paths[0]}."
+            )
+    return entries
 
 
 def _entry(stored: EntryFile) -> Entry:

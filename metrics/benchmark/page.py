@@ -39,9 +39,11 @@ def sorted_standings(standings: Sequence[Standing]) -> list[Standing]:
 
 
 def board_sheet(standings: Sequence[Standing]) -> Sheet:
-    """Return one row per entry."""
+    """Return one row per entry; with its track where there are tracks."""
+    has_tracks = any(standing.entry.training.track for standing in standings)
     header = (
         "entry",
+        *(("track",) if has_tracks else ()),
         "score",
         "better than the best scripted",
         "worlds won",
@@ -54,6 +56,7 @@ def board_sheet(standings: Sequence[Standing]) -> Sheet:
     rows = [
         (
             standing.entry.name,
+            *((standing.entry.training.track,) if has_tracks else ()),
             bounded(standing.score),
             percent_of(standing.improvement.value),
             f"{standing.n_won} of {standing.n_worlds}",
@@ -108,8 +111,9 @@ def details_page(standings: Sequence[Standing], reference: Reference, protocol: 
         page: Path of the page of the benchmark, as this one links it.
     """
     entries = [standing.entry for standing in sorted_standings(standings)]
+    of_version = "" if protocol.version == 1 else f", version {protocol.version}"
     parts = [
-        "# Benchmark in detail",
+        f"# Benchmark in detail{of_version}",
         f"The numbers behind the [benchmark]({page}), the entry with the highest score first. `swarm-forage benchmark "
         "page` writes this page.",
         "## World by world\n\nPerformance per 1,000 s, mean over runs; the best of all entries is bold.\n\n"
@@ -149,9 +153,11 @@ def percent_of(value: float, decimals: int = 0) -> str:
 
 
 def _origins(entries: Sequence[Entry]) -> Sheet:
+    has_tracks = any(entry.training.track for entry in entries)
     header = (
         "entry",
         "trained in",
+        *(("decisions of a training",) if has_tracks else ()),
         "library",
         "training seeds",
         "core-hours of training",
@@ -162,6 +168,7 @@ def _origins(entries: Sequence[Entry]) -> Sheet:
         (
             entry.name,
             _TRAINED[entry.training.worlds],
+            *((_decisions(entry),) if has_tracks else ()),
             entry.training.library or "-",
             ", ".join("-" if p.training_seed is None else str(p.training_seed) for p in entry.policies),
             "-" if entry.training.core_hours is None else number(entry.training.core_hours),
@@ -171,6 +178,10 @@ def _origins(entries: Sequence[Entry]) -> Sheet:
         for entry in entries
     ]
     return Sheet(header=header, rows=rows)
+
+
+def _decisions(entry: Entry) -> str:
+    return "-" if entry.training.decisions is None else f"{entry.training.decisions:,}"
 
 
 def _commands(entries: Sequence[Entry]) -> str:
@@ -202,15 +213,16 @@ def _matched(entries: Sequence[Entry]) -> Sheet:
     for entry in scripted:
         for measure in entry.measures:
             best[measure.key] = max(best.get(measure.key, -math.inf), _goodness(measure))  # NaN is never the larger
+    compared = [label for label in MATCHED if any(key[1] == label for key in best)]
     rows: list[tuple[str, ...]] = []
     for entry in entries:
-        won = {label: [0, 0] for label in MATCHED}
+        won = {label: [0, 0] for label in compared}
         for measure in entry.measures:
             if measure.label in won and measure.key in best:
                 won[measure.label][0] += _goodness(measure) >= best[measure.key]
                 won[measure.label][1] += 1
         rows.append((entry.name, *(f"{reached} of {of}" if of else "-" for reached, of in won.values())))
-    return Sheet(header=("entry", *(label.replace("_", " ") for label in MATCHED)), rows=rows)
+    return Sheet(header=("entry", *(label.replace("_", " ") for label in compared)), rows=rows)
 
 
 def _goodness(measure: EntryMeasure) -> float:

@@ -1,16 +1,18 @@
 """The protocol of the benchmark: which worlds, which seeds, how long, read from a TOML file that never changes.
 
 protocol = load_protocol()          # version 1
-protocol.worlds[0].name             # "small warehouse"
+protocol.worlds[0].name             # "training: small warehouse"
+load_protocol(version=2)            # held-out worlds that ask for more, and tracks of equal budget
 load_protocol(quick=True)           # the same worlds, shorter and with fewer seeds: for a look
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swarm_forage_env.runs.answer import Answer, Sheet
+from swarm_forage_env.scenarios.floor import CELL_M, POSITIONS
 from swarm_forage_env.studies.ladders import wrappers_at
 from swarm_forage_env.wrappers.registry import wrappers_from_mapping
 from swarm_forage_env.wrappers.world import SIZE, World
@@ -19,12 +21,14 @@ if TYPE_CHECKING:
     from swarm_forage_env.scenarios.config import ScenarioConfig
     from swarm_forage_env.wrappers.base import WrapperConfig
 
-LATEST = 1
-"""Version of the protocol that is run where none is asked for."""
-_KEYS = ("version", "physics", "horizon_s", "interval_s", "seeds", "quick", "training", "group")
+USUAL = 1
+"""Version of the protocol that is run where none is asked for: commands that entries have stored name none."""
+OPEN = "open"
+"""The track without a budget, of every protocol that has tracks."""
+_KEYS = ("version", "physics", "horizon_s", "interval_s", "seeds", "trainings", "tracks", "quick", "training", "group")
 _QUICK_KEYS = ("horizon_s", "seeds")
 _TRAINING_KEYS = ("name", "scenario", "set")
-_GROUP_KEYS = ("name", "scenario", "set", "sizes", "levels", "disturbed")
+_GROUP_KEYS = ("name", "scenario", "set", "sizes", "levels", "disturbed", "variants")
 _LEVEL_WORDS = {"handling_cost": "handling", "population_dynamics": "failures"}
 """Criterion -> its word in the name of a world, where that is another."""
 
@@ -94,6 +98,10 @@ class Protocol(Answer):
     worlds: tuple[ProtocolWorld, ...]
     """The worlds to train in first."""
     groups: tuple[Group, ...]
+    tracks: Mapping[str, int]
+    """Track with a budget -> the most decisions that one training may take. Empty where there are no tracks."""
+    n_trainings: int
+    """That an entry with a budget needs."""
 
     @property
     def scored(self) -> tuple[ProtocolWorld, ...]:
@@ -131,19 +139,30 @@ def protocol_folder() -> Path:
     return Path(__file__).parent
 
 
-def load_protocol(file: str | Path | None = None, *, quick: bool = False) -> Protocol:
+def protocol_versions() -> tuple[int, ...]:
+    """Return the versions that there are, the oldest first."""
+    found = (path.stem.removeprefix("benchmark_v") for path in protocol_folder().glob("benchmark_v*.toml"))
+    return tuple(sorted(int(number) for number in found))
+
+
+def load_protocol(file: str | Path | None = None, *, version: int = USUAL, quick: bool = False) -> Protocol:
     """Read a protocol.
 
     Args:
-        file: Default that of the latest version.
+        file: Default that of the version.
+        version: One of `protocol_versions`.
         quick: Shorter runs with fewer seeds, as the file says; no entry can be made of them.
 
     Raises:
-        BenchmarkError: the file cannot be read, or describes no protocol; the message names it.
+        BenchmarkError: there is no such version, or the file cannot be read or describes no protocol; the message names
+            it.
     """
     from swarm_forage_env._internal.files import parse_toml
 
-    path = protocol_folder() / f"benchmark_v{LATEST}.toml" if file is None else Path(file)
+    if file is None and version not in protocol_versions():
+        known = " or ".join(map(str, protocol_versions()))
+        raise BenchmarkError(f"Expected version {known} of the benchmark, got {version}.")
+    path = protocol_folder() / f"benchmark_v{version}.toml" if file is None else Path(file)
     try:
         return _protocol(parse_toml(path.read_text(encoding="utf-8")), quick=quick)
     except OSError as error:
@@ -171,7 +190,7 @@ def _protocol(content: Mapping[str, Any], *, quick: bool) -> Protocol:
     groups: list[Group] = []
     for entry in content["group"]:
         known_keys(entry, _GROUP_KEYS, prefix="group.")
-        group, of_group = _group(entry, _scenario(entry, chosen))
+        group, of_group = _group(entry, _scenario(entry, chosen), chosen)
         groups.append(group)
         worlds += of_group
     unique_names("worlds", tuple(world.name for world in worlds))
@@ -184,6 +203,8 @@ def _protocol(content: Mapping[str, Any], *, quick: bool) -> Protocol:
         seeds=seeds,
         worlds=tuple(worlds),
         groups=tuple(groups),
+        tracks=content.get("tracks", {}),
+        n_trainings=content.get("trainings", 1),
     )
 
 
@@ -191,10 +212,25 @@ def _scenario(entry: Mapping[str, Any], of_all: Mapping[str, Any]) -> "ScenarioC
     from swarm_forage_env.scenarios.presets import scenario
     from swarm_forage_env.studies.study import plain_settings
 
-    return scenario(entry["scenario"], **plain_settings(entry.get("set", {})), **of_all)
+    settings = {**entry.get("set", {})}
+    if "sources" in settings:
+        settings |= {"placement": POSITIONS, "object_positions_m": _cell_middles(settings.pop("sources"))}
+    return scenario(entry["scenario"], **plain_settings(settings), **of_all)
 
 
-def _group(entry: Mapping[str, Any], base: "ScenarioConfig") -> tuple[Group, list[ProtocolWorld]]:
+def _cell_middles(boxes: Sequence[Sequence[float]]) -> list[tuple[float, float]]:
+    """The middles of all cells in boxes (x low, y low, x high, y high), in m."""
+    return [
+        ((x + 0.5) * CELL_M, (y + 0.5) * CELL_M)
+        for x_low, y_low, x_high, y_high in boxes
+        for x in range(round(x_low / CELL_M), round(x_high / CELL_M))
+        for y in range(round(y_low / CELL_M), round(y_high / CELL_M))
+    ]
+
+
+def _group(
+    entry: Mapping[str, Any], base: "ScenarioConfig", of_all: Mapping[str, Any]
+) -> tuple[Group, list[ProtocolWorld]]:
     """The worlds of a group, and what they are to the measures."""
     name: str = entry["name"]
     worlds: dict[str, ProtocolWorld] = {}
@@ -207,7 +243,9 @@ def _group(entry: Mapping[str, Any], base: "ScenarioConfig") -> tuple[Group, lis
         worlds[world.name] = ProtocolWorld(world=world, group=name, **told)
         return world.name
 
-    for size in entry["sizes"]:
+    for what, fields in entry.get("variants", {}).items():
+        add(what, _scenario({**entry, "set": {**entry.get("set", {}), **fields}}, of_all))
+    for size in entry.get("sizes", ()):
         sized = replace(base, robots=replace(base.robots, n_robots=size))
         place = add(f"{size} robot{'s' if size > 1 else ''}", sized, is_scored=size > 1)
         roles.append((place, World(sized, criterion=SIZE, value=size)))

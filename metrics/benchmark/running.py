@@ -27,7 +27,7 @@ from ..scoring.question import Question, ask
 from ..scoring.run_curves import INTERVAL_COLUMNS, StudyCurves, curves_in_worlds
 from ..scoring.scores import Score
 from .entry import Entry, EntryMeasure, EntryPolicy, Training, rounded, six_digits
-from .protocol import BenchmarkError, Group, Protocol, load_protocol
+from .protocol import OPEN, USUAL, BenchmarkError, Group, Protocol, load_protocol
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -110,6 +110,11 @@ def benchmark_question(
         raise BenchmarkError(
             f"Expected one training seed per policy, got {len(training_seeds)} for {len(policies)} policies."
         )
+    told = training or Training()
+    if chosen.tracks and not told.track:
+        told = replace(told, track=OPEN)
+    if not chosen.is_quick:
+        told.check_track(chosen, len(policies))
     specs = policy_specs(policies)
     omniscient = [spec.label for spec in specs if sees_world(policy_class(spec.policy))]
     if omniscient:
@@ -121,8 +126,8 @@ def benchmark_question(
         plan=Plan.product(specs, [each.world for each in chosen.worlds], chosen.seeds),
         name=name,
         protocol=chosen,
-        command=command or entry_command(policies, name),
-        training=training or Training(),
+        command=command or entry_command(policies, name, version=chosen.version),
+        training=told,
         training_seeds=tuple(training_seeds),
     )
 
@@ -145,7 +150,7 @@ def run_benchmark(
     Args:
         policies: Registered names or policy files; several are training seeds of one method, and one entry.
         name: Name of the entry in tables.
-        protocol: Default the latest version.
+        protocol: Default that of version 1; `load_protocol` has the others.
         command: What the page tells people to type to make the entry again; default `entry_command`.
         training: How the policies were made; what a network file tells of it is added.
         training_seeds: One per policy; default what network files tell.
@@ -156,7 +161,7 @@ def run_benchmark(
 
     Raises:
         BenchmarkError: runs failed, there is not one training seed per policy, or the name is that of a scripted
-            controller.
+            controller, or the training does not fit its track.
         ConfigError: a name without characters, or with some that no terminal shows.
         ValueError: an unknown policy, or a file that cannot be opened.
         swarm_forage_env.runs.runner.RunsInterrupted: Ctrl-C; finished runs are in `out`.
@@ -178,10 +183,11 @@ def entry_name(policy: str, *, quick: bool = False) -> str:
     return f"{label}, quick" if quick and label in PAPER_POLICIES else label
 
 
-def entry_command(policies: Sequence[str], name: str) -> str:
+def entry_command(policies: Sequence[str], name: str, *, version: int = USUAL) -> str:
     """Return what makes an entry again from the current folder: policies as given, but files without whole paths."""
     words = [word for policy in policies for word in ("--policy", _from_here(policy))]
-    return shlex.join(["swarm-forage", "benchmark", *words, "--name", name])
+    edition = [] if version == USUAL else ["--version", str(version)]
+    return shlex.join(["swarm-forage", "benchmark", *words, "--name", name, *edition])
 
 
 def _from_here(policy: str) -> str:
@@ -245,7 +251,7 @@ def _runs(protocol: Protocol, table: Table) -> dict[str, dict[str, tuple[tuple[f
 def _measures(protocol: Protocol, table: Table) -> tuple[EntryMeasure, ...]:
     """All measures of all groups; a measure for which a group has no runs is left out."""
     found: list[EntryMeasure] = []
-    for group in protocol.groups:
+    for group in filter(lambda group: group.roles, protocol.groups):
         scores = [score_study(_study(group, table, policy.label))[0] for policy in table.plan.policies]
         found += [_measure(group, of_all, protocol.seeds) for of_all in zip(*scores, strict=True)]
     return tuple(measure for measure in found if any(value is not None for row in measure.values for value in row))

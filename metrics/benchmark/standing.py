@@ -66,9 +66,10 @@ class Standing:
     """Score of each policy, where there are several: the spread over trainings."""
 
 
-def scripted_folder() -> Path:
-    """Return where the entries of the scripted controllers are."""
-    return Path(__file__).parent / "scripted"
+def scripted_folder(version: int) -> Path:
+    """Return where the entries of the scripted controllers in a version of the benchmark are."""
+    folder = Path(__file__).parent / "scripted"
+    return folder if version == 1 else folder / f"v{version}"
 
 
 def scripted_entries(protocol: Protocol, folder: Path | None = None) -> tuple[Entry, ...]:
@@ -81,7 +82,8 @@ def scripted_entries(protocol: Protocol, folder: Path | None = None) -> tuple[En
     Raises:
         BenchmarkError: one is missing, or belongs to another protocol.
     """
-    return tuple(read_entry((folder or scripted_folder()) / f"{name}.json", protocol) for name in PAPER_POLICIES)
+    place = folder or scripted_folder(protocol.version)
+    return tuple(read_entry(place / f"{name}.json", protocol) for name in PAPER_POLICIES)
 
 
 def reference_of(scripted: Sequence[Entry], protocol: Protocol) -> Reference:

@@ -217,8 +217,8 @@ def verification_question(
     protocol: Protocol | None = None,
 ) -> VerificationQuestion:
     """Return the question of `verify_entry`, which explains arguments and errors."""
-    chosen = protocol or load_protocol()
-    entry = read_entry(file, chosen)
+    entry = read_entry(file, protocol)
+    chosen = protocol or load_protocol(version=entry.version)
     specs = policy_specs(policies or _installed_policies(entry))
     if len(specs) != len(entry.policies):
         raise BenchmarkError(
@@ -262,7 +262,7 @@ def verify_entry(
         policies: Names or files of its policies, in their order; default: the installed policies with these names.
         n_worlds: Size of the random sample of its worlds, counted for each policy; None = all.
         seed: Seed of this sample.
-        protocol: The protocol of the entry; default the latest version.
+        protocol: The protocol of the entry; default that of the version which it names.
         out: Folder for run records. Give a folder of your own: runs that it already holds are not made again.
         jobs: Processes; default one per core.
         executor: Runs the work instead, for example Dask's `client.get_executor()`.

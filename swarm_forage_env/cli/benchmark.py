@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 Entries = Annotated[
     list[Path], typer.Argument(metavar="ENTRY...", help="Entry files; the scripted four are always shown, too.")
 ]
+Version = Annotated[int, typer.Option("--version", metavar="1|2", help="Version of the benchmark.")]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -44,12 +45,24 @@ class TrainedOptions:
         ),
     ] = None
 
+    track: Annotated[
+        str, typer.Option("--track", help="10M, 40M or open: most decisions of a training. Version 2; default open.")
+    ] = ""
+    decisions: Annotated[
+        int | None, typer.Option("--decisions", min=0, help="Decisions of the longest training, of all its robots.")
+    ] = None
+
     def training(self) -> "Training":
         """Return it as an entry tells it."""
         from metrics.benchmark import Training
 
         return Training(
-            worlds=self.trained_in, command=self.training_command, library=self.library, core_hours=self.training_hours
+            worlds=self.trained_in,
+            command=self.training_command,
+            library=self.library,
+            core_hours=self.training_hours,
+            track=self.track,
+            decisions=self.decisions,
         )
 
 
@@ -57,8 +70,10 @@ def run(
     policies: PolicyOptions,
     *,
     name: Annotated[str | None, typer.Option("--name", help="Name of the entry; default the policy's.")] = None,
+    version: Version = 1,
     file: Annotated[
-        Path | None, typer.Option("--file", help="Entry to write; default results/benchmark/NAME.json.")
+        Path | None,
+        typer.Option("--file", help="Entry to write; default NAME.json in results/benchmark, of version 2 in its v2."),
     ] = None,
     out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Folder for records of runs.")] = Path(
         "results/benchmark/records"
@@ -87,7 +102,7 @@ def run(
     from swarm_forage_env._internal.files import as_file_name, check_file
     from swarm_forage_env.cli.errors import resumable
 
-    protocol = load_protocol(quick=quick)
+    protocol = load_protocol(version=version, quick=quick)
     called = name or entry_name(names[0], quick=quick)
     question = benchmark_question(
         names,
@@ -99,11 +114,11 @@ def run(
     if dry_run:
         typer.echo(_plan_text(question, out, jobs))
         return
-    entry_file = None if quick else file or Path("results/benchmark", f"{as_file_name(called)}.json")
+    entry_file = None if quick else file or _of_version("results/benchmark", version) / f"{as_file_name(called)}.json"
     if entry_file is not None:
         check_file(entry_file)
     if called not in PAPER_POLICIES:
-        scripted_entries(load_protocol())  # what it will be shown beside
+        scripted_entries(load_protocol(version=version))  # what it will be shown beside
     with resumable(out):
         entry = ask(question, out=out, jobs=jobs)
     if entry_file is not None:
@@ -114,12 +129,12 @@ def run(
         typer.echo("A quick look, no entry: shorter runs than those of the scripted controllers.", err=True)
 
 
-def worlds(as_json: AsJson = False) -> None:
+def worlds(version: Version = 1, as_json: AsJson = False) -> None:
     """Show the worlds of the benchmark: training worlds and held-out worlds."""
     from metrics.benchmark import load_protocol
     from swarm_forage_env.cli.printer import show as print_answer
 
-    print_answer(load_protocol(), as_json=as_json)
+    print_answer(load_protocol(version=version), as_json=as_json)
 
 
 def show(entries: Entries, as_json: AsJson = False) -> None:
@@ -173,24 +188,37 @@ def verify(
 
 def page(
     entries: Entries,
-    file: Annotated[Path, typer.Option("--file", help="Page whose generated part to write again.")] = Path(
-        "docs/benchmark.md"
-    ),
-    picture: Annotated[Path, typer.Option("--picture", help="Figure that the page shows.")] = Path(
-        "docs/images/benchmark.png"
-    ),
+    file: Annotated[
+        Path | None,
+        typer.Option(
+            "--file",
+            help="Page whose generated part to write again; default docs/benchmark.md, of version 2 "
+            "docs/benchmark_v2.md.",
+        ),
+    ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option("--picture", help="Figure that the page shows; default of the page's name, in docs/images."),
+    ] = None,
 ) -> None:
     """Write the tables of all entries into a page, and draw its figure."""
-    for written in _board_of(entries).write_page(file, picture):
+    board = _board_of(entries)
+    name = "benchmark" if board.protocol.version == 1 else f"benchmark_v{board.protocol.version}"
+    for written in board.write_page(file or Path(f"docs/{name}.md"), picture or Path(f"docs/images/{name}.png")):
         typer.echo(written)
 
 
 def _board_of(paths: list[Path]) -> "Board":
-    from metrics.benchmark import board_of, load_protocol, read_entry
+    from metrics.benchmark import board_of
     from metrics.benchmark.board import entry_files
+    from metrics.benchmark.entry import read_entries
 
-    protocol = load_protocol()
-    return board_of([read_entry(path, protocol) for path in entry_files(paths)])
+    return board_of(read_entries(entry_files(paths)))
+
+
+def _of_version(folder: str, version: int) -> Path:
+    """The folder for entries of a version: a folder holds those of one."""
+    return Path(folder) if version == 1 else Path(folder, f"v{version}")
 
 
 def _show(board: "Board", *, as_json: bool) -> None:

@@ -28,7 +28,7 @@ def folder(tmp_path_factory):
 @pytest.fixture
 def tiny(folder, monkeypatch):
     monkeypatch.setattr("metrics.benchmark.protocol.protocol_folder", lambda: folder)
-    monkeypatch.setattr("metrics.benchmark.standing.scripted_folder", lambda: folder)
+    monkeypatch.setattr("metrics.benchmark.standing.scripted_folder", lambda version: folder)
 
 
 @pytest.fixture
@@ -133,7 +133,7 @@ def test_nothing_is_run_under_the_name_of_a_scripted_controller_or_without_their
         code, _, err = command("benchmark", *words, "--jobs", "1")
         assert (code, len(err.splitlines())) == (2, 1)
         assert "Expected another name than 'dpo'" in err
-    monkeypatch.setattr("metrics.benchmark.standing.scripted_folder", lambda: tmp_path)
+    monkeypatch.setattr("metrics.benchmark.standing.scripted_folder", lambda version: tmp_path)
     code, _, err = command("benchmark", "--policy", "random", "--jobs", "1")
     assert (code, len(err.splitlines())) == (2, 1)
     assert "crw.json" in err

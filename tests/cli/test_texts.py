@@ -287,7 +287,7 @@ def _write_benchmark(folder: Path, patch: pytest.MonkeyPatch) -> None:
     made_up_entry(load_protocol(TINY), "mine", lambda world: 13.0 + 2.0 * world, n_policies=2).write(Path("mine.json"))
     Path("page.md").write_text(f"# Benchmark\n\n{BEGIN}\n{END}\n\nend\n")
     patch.setattr("metrics.benchmark.protocol.protocol_folder", lambda: folder)
-    patch.setattr("metrics.benchmark.standing.scripted_folder", lambda: folder)
+    patch.setattr("metrics.benchmark.standing.scripted_folder", lambda version: folder)
 
 
 def _write_tables() -> None:
