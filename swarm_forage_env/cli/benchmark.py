@@ -203,7 +203,8 @@ def page(
 ) -> None:
     """Write the tables of all entries into a page, and draw its figure."""
     board = _board_of(entries)
-    name = "benchmark" if board.protocol.version == 1 else f"benchmark_v{board.protocol.version}"
+    version = board.protocol.version
+    name = "benchmark" if version == 1 else f"benchmark_v{version}"
     for written in board.write_page(file or Path(f"docs/{name}.md"), picture or Path(f"docs/images/{name}.png")):
         typer.echo(written)
 

@@ -2,13 +2,14 @@
 
 import json
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
 from metrics import PAPER_POLICIES
-from metrics.benchmark import load_protocol
+from metrics.benchmark import Training, load_protocol
 from metrics.benchmark.entry import EntryPolicy
 from metrics.benchmark.page import BEGIN, END
 from metrics.benchmark.running import entry_command
@@ -17,18 +18,31 @@ from tests.support.entries import TINY, made_up_entry
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A place with the entries of the scripted controllers, and the tiny protocol."""
+    """A place with the tiny protocol in two versions, and with the entries of the scripted controllers in both."""
     place = tmp_path_factory.mktemp("benchmark")
-    (place / "benchmark_v1.toml").write_text(TINY.read_text())
-    for k, name in enumerate(PAPER_POLICIES):
-        made_up_entry(load_protocol(TINY), name, lambda _, k=k: 10.0 + k).write(place / f"{name}.json")
+    told = TINY.read_text()
+    tracks = "version = 2\ntrainings = 2\ntracks = { short = 100 }"
+    for version, text in ((1, told), (2, told.replace("version = 1", tracks))):
+        protocol_file = place / f"benchmark_v{version}.toml"
+        protocol_file.write_text(text)
+        of_version = scripted_of(place, version)
+        of_version.mkdir(exist_ok=True)
+        training = Training(worlds="nothing", track="open" if version == 2 else "")
+        for k, name in enumerate(PAPER_POLICIES):
+            entry = made_up_entry(load_protocol(protocol_file), name, lambda _, k=k: 10.0 + k, training=training)
+            entry.write(of_version / f"{name}.json")
     return place
+
+
+def scripted_of(place, version):
+    """Where the entries of the scripted controllers in a version are."""
+    return place if version == 1 else place / f"v{version}"
 
 
 @pytest.fixture
 def tiny(folder, monkeypatch):
     monkeypatch.setattr("metrics.benchmark.protocol.protocol_folder", lambda: folder)
-    monkeypatch.setattr("metrics.benchmark.standing.scripted_folder", lambda version: folder)
+    monkeypatch.setattr("metrics.benchmark.standing.scripted_folder", partial(scripted_of, folder))
 
 
 @pytest.fixture
@@ -53,6 +67,33 @@ def test_a_policy_becomes_an_entry_that_can_be_shown(command, tiny):
     assert (code, shown) == (0, out)
     code, told, _ = command("benchmark", "show", "results/benchmark", "--json")
     assert {standing["name"] for standing in json.loads(told)} == {*PAPER_POLICIES, "again"}
+
+
+def test_an_entry_of_version_2_names_its_track_and_goes_to_the_page_of_its_version(command, tiny):
+    words = ("--policy", "crw", "--policy", "random", "--name", "again", "--trained-in", "given")
+    words = (*words, "--track", "short", "--version", "2", "--jobs", "1")
+    code, out, err = command("benchmark", *words, "--decisions", "101")
+    assert (code, len(err.splitlines())) == (2, 1)
+    assert "Expected at most 100 decisions of a training for the track short, got 101" in err
+    code, out, err = command("benchmark", *words, "--decisions", "100")
+    assert code == 0, err
+    assert next(row for row in out.splitlines() if row.startswith("again")).split()[1] == "short"
+    file = Path("results/benchmark/v2/again.json")
+    assert json.loads(file.read_text())["command"].endswith("--name again --version 2")
+    assert command("benchmark", "show", str(file))[:2] == (0, out)
+    Path("docs").mkdir()
+    Path("docs/benchmark_v2.md").write_text(f"{BEGIN}\n{END}\n")
+    code, out, err = command("benchmark", "page", str(file))
+    assert code == 0, err
+    assert out.split() == ["docs/benchmark_v2.md", "docs/benchmark_v2_in_detail.md", "docs/images/benchmark_v2.png"]
+    assert "| again | training worlds | 100 |" in Path("docs/benchmark_v2.md").read_text()
+    assert Path("docs/benchmark_v2_in_detail.md").read_text().startswith("# Benchmark in detail, version 2\n")
+
+
+def test_entries_of_two_versions_are_not_shown_together(command, folder, mine):
+    code, _, err = command("benchmark", "show", "mine.json", str(folder / "v2/crw.json"))
+    assert (code, len(err.splitlines())) == (2, 1)
+    assert "Expected entries of one version of the benchmark, got one of version 2" in err
 
 
 def test_a_quick_look_writes_no_entry(command, tiny):
@@ -163,6 +204,9 @@ def test_an_altered_entry_is_refused_in_one_line(command, mine):
         (("--policy", "none.npz"), "none.npz"),
         (("--policy", "crw", "--trained-in", "mars"), "got 'mars'"),
         (("--policy", "crw", "--training-seed", "1", "--training-seed", "2"), "got 2 for 1 policies"),
+        (("--policy", "crw", "--version", "3"), "Expected version 1 or 2 of the benchmark, got 3"),
+        (("worlds", "--version", "3"), "Expected version 1 or 2 of the benchmark, got 3"),
+        (("--policy", "crw", "--track", "10M"), "got '10M'; choose one with --track"),
         (("show", "none.json"), "Cannot read none.json"),
         (("show", "mine.json", "mine.json"), "'mine' twice"),
         (("show", "dpo.json"), "another policy with the name 'dpo'"),
