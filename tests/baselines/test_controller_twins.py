@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from baselines.cpfa import CPFAPolicy
 from baselines.crw import CRWPolicy
 from baselines.dpo import DPOPolicy
 from baselines.robots import DRAWS, VectorState
@@ -140,7 +141,7 @@ def test_objects_come_home_round_a_wide_wall(policy, caches):
     assert delivered[0] >= 2 > delivered[1]
 
 
-@pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy])
+@pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy, CPFAPolicy])
 def test_only_declared_slices_are_read(policy_class):
     task = make_spec(N_ROBOTS)
     fuzz = Fuzz(task, seed=3)
@@ -165,7 +166,7 @@ def test_only_declared_slices_are_read(policy_class):
         np.testing.assert_array_equal(fooled.act(other, active), expected)
 
 
-@pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy])
+@pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy, CPFAPolicy])
 def test_actions_repeat_with_the_seed_and_stay_in_range(policy_class):
     task = make_spec(N_ROBOTS)
 

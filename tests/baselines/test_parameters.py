@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from baselines.cpfa import CPFAPolicy
 from baselines.crw import CRWPolicy
 from baselines.dpo import DPOPolicy
 from baselines.object_choice import MemoryParameters
@@ -75,7 +76,7 @@ def test_durations_become_ticks_and_quirks_reach_the_kernels():
     assert kernel_constants(ControllerParameters(), task)[0].explore_double_start == 1
 
 
-@pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy, STOCHMPolicy, STOCHXPolicy])
+@pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy, CPFAPolicy, STOCHMPolicy, STOCHXPolicy])
 def test_observations_of_another_swarm_are_refused(policy_class):
     policy = policy_class()
     policy.reset(make_spec(4), np.random.default_rng(0))
@@ -86,7 +87,7 @@ def test_observations_of_another_swarm_are_refused(policy_class):
         policy.act(np.zeros((4, policy._spec.layout.size), np.float32), np.ones(5, np.bool_))
 
 
-@pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy, STOCHMPolicy, STOCHXPolicy])
+@pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy, CPFAPolicy, STOCHMPolicy, STOCHXPolicy])
 def test_acting_without_a_reset_is_refused(policy_class):
     with pytest.raises(ObservationError, match="Expected reset before act"):
         policy_class().act(np.zeros((1, 114), np.float32), np.ones(1, np.bool_))
@@ -97,6 +98,7 @@ def test_acting_without_a_reset_is_refused(policy_class):
     [
         (CRWPolicy, {"wander_speed_mps": 0.1}, "to be ControllerParameters, got dict; give single numbers by name"),
         (DPOPolicy, ControllerParameters(), "to be MemoryParameters, got ControllerParameters"),
+        (CPFAPolicy, MemoryParameters(), "to be CPFAParameters, got MemoryParameters"),
         (STOCHXPolicy, MemoryParameters(), "to be TaskParameters, got MemoryParameters"),
     ],
 )

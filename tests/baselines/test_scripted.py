@@ -6,6 +6,7 @@ import pickle
 import numpy as np
 import pytest
 
+from baselines.cpfa import CPFAPolicy
 from baselines.crw import CRWPolicy
 from baselines.dpo import DPOPolicy
 from baselines.stochm import STOCHMPolicy
@@ -15,7 +16,7 @@ from tests.support.stage import OPEN_CELL, load, stand, tidy_world
 
 N_ROBOTS = 5
 TICKS = 40
-POLICIES = [CRWPolicy, DPOPolicy, STOCHMPolicy, STOCHXPolicy]
+POLICIES = [CRWPolicy, DPOPolicy, CPFAPolicy, STOCHMPolicy, STOCHXPolicy]
 
 
 def started(policy_class):

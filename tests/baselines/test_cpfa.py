@@ -1,0 +1,335 @@
+"""CPFA: its rules one by one, its stages, and the compiled controller beside the slow one."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from baselines.cpfa import (
+    CPFA_DRAWS,
+    STAGE_WORDS,
+    CPFAParameters,
+    CPFAPolicy,
+    Stage,
+    aim_at_wall,
+    normal,
+    poisson_cdf,
+    search_turn_rad,
+)
+from baselines.parameters import ParameterError, kernel_constants
+from baselines.robots import ACTIVITY_WORDS, Activity, new_robots, sense
+from swarm_forage_env.contract.codes import Event, Grip
+from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
+from tests.baselines.test_controller_twins import Fuzz
+from tests.reference.cpfa import CPFARobot
+from tests.support.observations import Observations, make_spec
+
+SITE = (20.0, 8.0)
+NEST = (3.2, 8.0)
+
+
+@pytest.mark.parametrize("rate", [0.0, 0.3, 4.0, 20.0])
+def test_the_poisson_distribution_is_that_of_scipy(rate):
+    for count in range(25):
+        assert poisson_cdf(count, rate) == pytest.approx(stats.poisson.cdf(count, rate), rel=1e-12)
+
+
+def constants_of(**parameters):
+    return kernel_constants(CPFAParameters(**parameters), make_spec(), search_step_ticks=5)[0]
+
+
+def test_an_informed_search_begins_in_any_direction_and_becomes_like_the_other():
+    c = constants_of(uninformed_turn_rad=0.5, informed_decay_per_tick=0.1)
+    assert search_turn_rad(True, 0, c) == pytest.approx(4.0 * math.pi)
+    assert search_turn_rad(True, 10, c) == pytest.approx(0.5 + (4.0 * math.pi - 0.5) / math.e)
+    assert search_turn_rad(True, 1000, c) == pytest.approx(0.5)
+    assert {search_turn_rad(False, ticks, c) for ticks in (0, 10, 1000)} == {0.5}
+
+
+def test_turns_are_normally_distributed():
+    draws = np.random.default_rng(1).random((2000, 2))
+    assert stats.kstest([normal(u, v) for u, v in draws], "norm").pvalue > 0.01
+    assert normal(0.0, 0.3) == 0.0
+    assert math.isfinite(normal(np.nextafter(1.0, 0.0), 0.0))
+
+
+@pytest.mark.parametrize(
+    ("degrees", "goal"),
+    [
+        (0.0, (31.5, 5.0)),
+        (180.0, (0.5, 5.0)),
+        (90.0, (10.0, 15.5)),
+        (-90.0, (10.0, 0.5)),
+        (45.0, (20.5, 15.5)),
+        (135.0, (0.5, 14.5)),
+    ],
+)
+def test_a_new_direction_ends_before_the_wall(degrees, goal):
+    seen, robot = Observations(make_spec()), new_robots(1)[0]
+    seen.pose(10.0, 5.0)
+    c = constants_of(wall_margin_m=0.5)
+    aim_at_wall(robot, sense(seen.array[0], c), math.radians(degrees), c)
+    assert (robot.goal_x_m, robot.goal_y_m) == pytest.approx(goal, abs=1e-5)
+
+
+def test_who_stands_nearer_to_a_wall_than_that_does_not_drive_into_it():
+    seen, robot = Observations(make_spec()), new_robots(1)[0]
+    seen.pose(31.8, 5.0)
+    c = constants_of()
+    aim_at_wall(robot, sense(seen.array[0], c), 0.1, c)
+    assert (robot.goal_x_m, robot.goal_y_m) == pytest.approx((31.8, 5.0), abs=1e-5)
+
+
+class Robot:
+    """A single robot under CPFA, which never begins a search nor gives one up by chance unless told."""
+
+    def __init__(self, **parameters):
+        self.seen = Observations(make_spec())
+        self.policy = CPFAPolicy(**{"search_per_tick": 0.0, "give_up_per_tick": 0.0, **parameters})
+        self.policy.reset(self.seen.spec, np.random.default_rng(5))
+
+    def act(self, ticks: int = 1) -> np.ndarray:
+        for _ in range(ticks):
+            action = self.policy.act(self.seen.array, np.ones(1, np.bool_))[0].copy()
+        return action
+
+    @property
+    def record(self) -> np.record:
+        return self.policy._robots[0]
+
+    @property
+    def stage(self) -> Stage:
+        assert self.activity is Activity.ACQUIRE
+        return Stage(int(self.record["stage"]))
+
+    @property
+    def activity(self) -> Activity:
+        return Activity(int(self.policy.activity[0]))
+
+    @property
+    def goal(self) -> tuple[float, float]:
+        return float(self.record["goal_x_m"]), float(self.record["goal_y_m"])
+
+    @property
+    def word(self) -> str:
+        states = self.policy.describe_robots()
+        return states.words[states.activity[0]]
+
+    def arrive(self) -> None:
+        self.seen.pose(*self.goal)
+        self.act()
+
+    def pick_up(self, n_nearby: int = 0) -> None:
+        """Find an object at the site among others, and take it."""
+        self.arrive()
+        self.seen.pose(*SITE)
+        self.seen.ground("object")
+        self.act()
+        assert self.activity is Activity.WAIT_PICKUP
+        self.seen.ground("floor")
+        self.seen.window({(k % 5 - 2, k // 5 - 2): k for k in range(n_nearby)})
+        self.seen.event(Event.PICKED_UP)
+        self.seen.carry(50)
+        self.act()
+        self.seen.event(Event.NONE)
+        self.seen.window({})
+
+    def deliver(self) -> None:
+        self.seen.ground("nest")
+        self.seen.pose(*NEST)
+        self.act(2)
+        assert self.activity is Activity.WAIT_DROP
+        self.seen.event(Event.DELIVERED)
+        self.seen.carry(None)
+        self.act()
+        self.seen.event(Event.NONE)
+        self.seen.ground("floor")
+
+
+def test_the_first_trip_goes_in_a_direction_by_chance():
+    seen = Observations(make_spec(500))
+    policy = CPFAPolicy()
+    policy.reset(seen.spec, np.random.default_rng(5))
+    policy.act(seen.array, np.ones(500, np.bool_))
+    robots = policy._robots
+    assert not robots["is_informed"].any()
+    angles = np.arctan2(robots["goal_y_m"] - 10.0, robots["goal_x_m"] - 10.0)
+    assert stats.kstest(angles, stats.uniform(-np.pi, 2.0 * np.pi).cdf).pvalue > 0.01
+
+
+def test_a_robot_on_its_way_looks_at_no_object():
+    robot = Robot()
+    robot.seen.window({(1, 0): 3})
+    robot.seen.ground("object")
+    robot.act(20)
+    assert robot.stage is Stage.TRAVEL
+    assert robot.word == "going out"
+
+
+def test_it_searches_where_the_way_ends_or_by_chance():
+    robot, soon = Robot(), Robot(search_per_tick=1.0)
+    robot.act(5)
+    robot.arrive()
+    assert robot.stage is Stage.SEARCH
+    soon.act()
+    assert soon.stage is Stage.TRAVEL
+    soon.act()
+    assert soon.stage is Stage.SEARCH
+    assert soon.word == "searching"
+
+
+def test_a_search_goes_to_the_nearest_object_in_view_and_takes_it():
+    robot = Robot()
+    robot.act()
+    robot.arrive()
+    robot.seen.pose(10.1, 10.1)
+    robot.seen.window({(2, 0): 3, (1, 0): 4, (-2, -2): 5})
+    left, right, grip = robot.act()
+    assert robot.goal == pytest.approx((10.3, 10.1), abs=1e-5)
+    assert left == pytest.approx(right, abs=1e-5)
+    assert grip == pytest.approx(Grip.RELEASE)
+    robot.seen.pose(10.3, 10.1)
+    robot.seen.ground("object")
+    assert robot.act() == pytest.approx([0.0, 0.0, Grip.GRASP])
+    robot.seen.event(Event.NOTHING_HERE)
+    robot.seen.ground("floor")
+    robot.seen.window({})
+    robot.act()
+    assert robot.stage is Stage.SEARCH, "it goes on where somebody else was faster"
+
+
+def test_steps_are_equally_long_and_turns_on_the_spot_do_not_count():
+    robot = Robot(search_step_s=1.0, uninformed_turn_rad=0.0)
+    robot.act()
+    robot.arrive()
+    assert robot.act() == pytest.approx([0.45, 0.45, Grip.RELEASE])
+    left = [int(robot.record["step_ticks"]) for _ in range(14) if robot.act() is not None]
+    assert left == [3, 2, 1, 0, 5, 4, 3, 2, 1, 0, 5, 4, 3, 2]
+    robot.seen.pose(10.0, 10.0, heading=math.pi / 2)
+    turning = robot.act(10)
+    assert turning[0] == -turning[1]
+    assert robot.record["step_ticks"] == 1
+
+
+def test_a_search_goes_on_in_the_direction_in_which_it_avoids():
+    robot = Robot()
+    robot.act()
+    robot.arrive()
+    robot.seen.obstacle(math.radians(40.0))
+    robot.act()
+    robot.seen.obstacle(None)
+    course = float(robot.record["course_rad"])
+    assert -math.pi / 2 < course < -math.radians(15.0)
+    left, right, _ = robot.act()
+    assert left > 0.0 > right
+
+
+def test_who_gives_up_goes_to_the_nest_with_nothing_and_forgets_the_site():
+    robot = Robot(site_fidelity_rate=0.0)
+    robot.act()
+    robot.pick_up()
+    robot.deliver()
+    robot.arrive()
+    assert robot.stage is Stage.SEARCH
+    robot.policy._constants["give_up_per_tick"] = 1.0
+    robot.seen.window({(1, 0): 3})
+    robot.act()
+    assert robot.stage is Stage.GIVE_UP
+    assert robot.goal == pytest.approx(NEST)
+    assert robot.word == "going home with nothing"
+    assert robot.policy.n_remembered.tolist() == [0]
+    robot.act(20)
+    assert robot.stage is Stage.GIVE_UP, "it looks at no object on its way"
+    robot.seen.pose(4.7, 8.0)
+    robot.seen.ground("nest")
+    robot.act()
+    assert robot.stage is Stage.TRAVEL
+    assert not robot.record["is_informed"]
+
+
+def test_it_returns_to_where_it_found_many():
+    robot = Robot(site_fidelity_rate=2.0)
+    robot.act()
+    robot.pick_up(n_nearby=10)
+    assert robot.record["n_nearby"] == 10
+    assert robot.policy.describe_memories().place_m.tolist() == [pytest.approx(SITE, abs=1e-5)]
+    robot.deliver()
+    assert robot.stage is Stage.TRAVEL
+    assert robot.goal == pytest.approx(SITE, abs=1e-5)
+    robot.policy._constants["search_per_tick"] = 1.0
+    robot.act(20)
+    assert robot.stage is Stage.TRAVEL, "only trips in a new direction end by chance"
+    robot.arrive()
+    assert robot.stage is Stage.SEARCH
+    assert robot.record["is_informed"]
+
+
+def test_a_place_with_few_objects_is_left():
+    """POIS(0, 20) is 2e-9."""
+    robot = Robot(site_fidelity_rate=20.0)
+    robot.act()
+    robot.pick_up(n_nearby=0)
+    robot.deliver()
+    assert not robot.record["is_informed"]
+    assert robot.goal != pytest.approx(SITE, abs=1e-2)
+
+
+def test_returns_are_as_likely_as_the_poisson_distribution_says():
+    n_robots, c = 2000, 3
+    seen = Observations(make_spec(n_robots))
+    policy = CPFAPolicy(site_fidelity_rate=4.0)
+    policy.reset(seen.spec, np.random.default_rng(6))
+    policy._robots["has_site"] = True
+    policy._robots["n_nearby"] = c
+    policy.act(seen.array, np.ones(n_robots, np.bool_))
+    share = policy._robots["is_informed"].mean()
+    assert stats.binomtest(round(share * n_robots), n_robots, stats.poisson.cdf(c, 4.0)).pvalue > 0.01
+
+
+def test_what_carries_is_described_as_in_other_controllers():
+    robot = Robot()
+    robot.act()
+    robot.pick_up()
+    assert robot.word == "going home"
+    words = robot.policy.describe_robots().words
+    assert words == (*ACTIVITY_WORDS, *STAGE_WORDS)
+    assert len(STAGE_WORDS) == len(Stage)
+
+
+@pytest.mark.parametrize("values", [{"search_per_tick": 1.1}, {"give_up_per_tick": 2.0}, {"uninformed_turn_rad": 13.0}])
+def test_values_that_make_no_sense_are_refused(values):
+    ((name, value),) = values.items()
+    with pytest.raises(ParameterError, match=f"Expected {name} <= .*, got {value}"):
+        CPFAParameters(**values)
+
+
+OFTEN = {"search_per_tick": 0.1, "give_up_per_tick": 0.02, "site_fidelity_rate": 0.5, "informed_decay_per_tick": 0.05}
+
+
+@pytest.mark.parametrize("quirks", [Quirks(), AUTHORS_PROGRAM], ids=["as described", "authors' program"])
+def test_compiled_controller_acts_like_the_slow_one(quirks):
+    n_robots = 6
+    spec, parameters = make_spec(n_robots, quirks=quirks), CPFAParameters(**OFTEN)
+    fuzz, policy = Fuzz(spec, seed=1), CPFAPolicy(parameters)
+    policy.reset(spec, np.random.default_rng(2))
+    draws_again = np.random.default_rng(2)
+    twins = [CPFARobot(spec, parameters=parameters) for _ in range(n_robots)]
+    met: set[tuple[str, str, bool]] = set()
+    for _ in range(1500):
+        for i, twin in enumerate(twins):
+            fuzz.perturb(i, twin.goal)
+        active = fuzz.rng.random(n_robots) < 0.95
+        actions = policy.act(fuzz.seen.array, active)
+        draws = draws_again.random((n_robots, CPFA_DRAWS))
+        for i in np.flatnonzero(active):
+            assert actions[i] == pytest.approx(twins[i].act(fuzz.seen.array[i], draws[i]), abs=2e-6)
+        robots = policy._robots
+        assert [Stage(int(code)).name.lower().replace("_", " ") for code in robots["stage"]] == [
+            twin.stage for twin in twins
+        ]
+        assert robots["has_site"].tolist() == [twin.site is not None for twin in twins]
+        met |= {(twin.stage, twin.vector, twin.informed) for twin in twins if twin.state == "acquire"}
+    for informed in (False, True):
+        assert met >= {("search", "idle", informed), ("search", "vector", informed), ("travel", "vector", informed)}
+    assert {stage for stage, _, _ in met} >= {"give up", "search", "travel"}
