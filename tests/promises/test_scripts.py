@@ -308,6 +308,24 @@ def test_networks_are_run_in_turned_worlds(run):
     assert as_drawn > 20.0 > half, "a specialist that knows the compass by heart"
 
 
+@pytest.mark.compiled
+def test_numbers_of_a_controller_evolve(run):
+    pytest.importorskip("cma", reason="needs the evolve extra: cma")
+    ranges = ("wander_speed_mps=0.01:0.1:log", "wander_max_change_deg=1:20")
+    size = ("--generations", "2", "--population", "4", "--horizon", "200", "--judging", "2")
+    code, out, err = run("evolve_controller", "crw", *ranges, *size)
+    assert code == 0, err
+    assert re.findall(r"generation (\S+): best \d\.\d{3}", err) == ["1/2", "2/2"]
+    title, header, yardstick, before, evolved, _, found = out.splitlines()
+    assert title == "Performance of crw in 200 s"
+    assert header.split()[1:] == ["warehouse_small", "warehouse_medium", "search_and_rescue"]
+    assert [line.split()[0] for line in (yardstick, before, evolved)] == ["dpo,", "before", "evolved"]
+    speed, angle = (float(number) for number in re.findall(r"=(\S+)", found))
+    assert 0.01 <= speed <= 0.1
+    assert 1.0 <= angle <= 20.0
+    assert run("evolve_controller", "crw", *ranges, *size)[1] == out, "equal seeds, equal numbers"
+
+
 def test_laws_are_written_beside_the_runs_of_a_study(run):
     pytest.importorskip("matplotlib", reason="needs the plots extra: matplotlib")
     foraging_table().write("laws.parquet")
@@ -334,6 +352,9 @@ def test_sketches_of_theory_are_those_of_the_docs(run):
         assert (ROOT / "docs/images" / name).is_file()
 
 
+RANGE, NO_RANGE = "name=low:high[:log]", "expected name=low:high, or name=low:high:log from above 0, got"
+
+
 @pytest.mark.parametrize(
     ("script", "words", "fault"),
     [
@@ -341,6 +362,10 @@ def test_sketches_of_theory_are_those_of_the_docs(run):
         ("compare_engines", "--policy crv", "Unknown policy 'crv'. Did you mean 'crw'?"),
         ("bench", "nothing", "expected some of crw-50, crw-200, "),
         ("bench", "crw --peers venvs", "expected some of vmas-discovery, "),
+        ("evolve_controller", "dpo rate=3:1", f"argument {RANGE}: {NO_RANGE} 'rate=3:1'"),
+        ("evolve_controller", "dpo rate=0:1:log", f"argument {RANGE}: {NO_RANGE} 'rate=0:1:log'"),
+        ("evolve_controller", "dpo object_priority=0:1", "expected two numbers or more: CMA-ES learns how they go"),
+        ("evolve_controller", "dpo object_priority=0:1 weight=0:1", "expected numbers of dpo, got 'weight'"),
         ("bench", "--against .", "expected a revision or a checkout of this project, got /"),
     ],
 )

@@ -1,0 +1,158 @@
+"""Evolve numbers of a policy in the training worlds of the benchmark, by CMA-ES (pip install ".[evolve]").
+
+    python scripts/evolve_controller.py cpfa search_per_tick=0.001:0.5:log uninformed_turn_rad=0:2
+    python scripts/evolve_controller.py dpo wander_speed_mps=0.02:0.1 wander_max_change_deg=1:20:log
+
+A number is named with the range in which it is looked for; "log" looks in equal ratios. A set of numbers is worth its
+performance as a share of DPO's, averaged over the worlds. All sets of a generation run with the same seed, which the
+next generation changes, so nothing is fitted to one seed. The table compares what was found with the numbers of before,
+with seeds that no generation had.
+"""
+
+import argparse
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from arguments import whole
+
+from metrics import aggregate
+from metrics.benchmark import load_protocol
+from swarm_forage_env.contract.types import FloatArray
+from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.runs.answer import Sheet
+from swarm_forage_env.runs.plan import Plan
+from swarm_forage_env.runs.policy_spec import PolicySpec, policy_spec
+from swarm_forage_env.training.evaluations import finished_runs
+from swarm_forage_env.wrappers.world import World
+
+YARDSTICK = "dpo"
+"""The best of the paper's controllers in these worlds."""
+FIRST_SEED, JUDGING_SEED = 100_000, 200_000
+"""Seeds of the generations and of the table; far from those of the benchmark."""
+WIDTH = 0.25
+"""Standard deviation of the first generation, as a share of each range; pycma advises about that much."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """A number that evolves, from 0 to 1 along its range."""
+
+    name: str
+    low: float
+    high: float
+    by_ratio: bool
+
+    def number(self, share: float) -> float:
+        """Return the number at a share of the range."""
+        if self.by_ratio:
+            return self.low * (self.high / self.low) ** share
+        return self.low + share * (self.high - self.low)
+
+    def share(self, number: float) -> float:
+        """Return where in the range a number lies; at an end, if it lies outside."""
+        number = min(max(number, self.low), self.high)
+        if self.by_ratio:
+            return math.log(number / self.low) / math.log(self.high / self.low)
+        return (number - self.low) / (self.high - self.low)
+
+
+def read_range(text: str) -> Range:
+    """Return the range of a word such as `give_up_per_tick=1e-5:1e-2:log`."""
+    name, _, ends = text.partition("=")
+    low, high, *how = ends.split(":") if ":" in ends else ("", "")
+    try:
+        found = Range(name, float(low), float(high), how == ["log"])
+    except ValueError:
+        found = Range(name, 0.0, 0.0, False)
+    if how not in ([], ["log"]) or not found.low < found.high or (found.by_ratio and found.low <= 0.0):
+        raise argparse.ArgumentTypeError(f"expected name=low:high, or name=low:high:log from above 0, got {text!r}")
+    return found
+
+
+def performances(
+    policies: Sequence[PolicySpec], worlds: Sequence[World], seeds: Sequence[int], jobs: int
+) -> FloatArray:
+    """Return what was brought home, (policies, worlds, seeds)."""
+    table = finished_runs(Plan.product(policies, worlds, seeds), jobs=jobs)
+    of_policies = [[table.of(one) for one in table.plan.of_policy(policy.label)] for policy in policies]
+    return np.array([[[run.performance.sum() for run in runs] for runs in each] for each in of_policies])
+
+
+def evolved(
+    policy: str, ranges: Sequence[Range], before: dict[str, float], worlds: Sequence[World], words: argparse.Namespace
+) -> dict[str, float]:
+    """Return the numbers that the last generation is spread around."""
+    import cma
+
+    yardstick = policy_spec(YARDSTICK, label="yardstick")
+    options = {"bounds": [0, 1], "popsize": words.population, "seed": words.seed + 1, "verbose": -9}
+    strategy = cma.CMAEvolutionStrategy([one.share(before[one.name]) for one in ranges], WIDTH, options)
+    for generation in range(words.generations):
+        asked = strategy.ask()
+        sets = [{one.name: one.number(x) for one, x in zip(ranges, point, strict=True)} for point in asked]
+        policies = [policy_spec(policy, parameters=numbers, label=f"set {k}") for k, numbers in enumerate(sets)]
+        seed = FIRST_SEED * (1 + words.seed) + generation
+        found = performances([yardstick, *policies], worlds, (seed,), words.jobs)[..., 0]
+        worth = np.mean(found[1:] / np.maximum(found[0], 1.0), axis=1)
+        strategy.tell(asked, (-worth).tolist())
+        told = f"generation {generation + 1}/{words.generations}: best {worth.max():.3f}, mean {worth.mean():.3f}"
+        print(told, file=sys.stderr, flush=True)
+    middle = np.clip(strategy.result.xfavorite, 0.0, 1.0)
+    return {one.name: float(f"{one.number(x):.3g}") for one, x in zip(ranges, middle, strict=True)}
+
+
+def comparison(policy: str, found: dict[str, float], worlds: Sequence[World], words: argparse.Namespace) -> Sheet:
+    """Return performance before and after, beside that of the yardstick."""
+    seeds = range(JUDGING_SEED, JUDGING_SEED + words.judging)
+    policies = [
+        policy_spec(YARDSTICK, label=f"{YARDSTICK}, unchanged"),
+        policy_spec(policy, label="before"),
+        policy_spec(policy, parameters=found, label="evolved"),
+    ]
+    means = [[aggregate(one) for one in each] for each in performances(policies, worlds, seeds, words.jobs)]
+    return Sheet(
+        title=f"Performance of {policy} in {words.horizon:,.0f} s",
+        header=("numbers", *(world.scenario.name for world in worlds)),
+        rows=[
+            (spec.label, *(f"{one.mean:.1f} ± {one.upper - one.mean:.1f}" for one in each))
+            for spec, each in zip(policies, means, strict=True)
+        ],
+        notes=[f"± 95 % interval of the mean of {words.judging} runs"],
+    )
+
+
+def main() -> None:
+    """Evolve, and print what was found."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("policy", help="name of the policy")
+    parser.add_argument("ranges", nargs="+", type=read_range, metavar="name=low:high[:log]", help="what evolves")
+    parser.add_argument("--generations", type=whole(at_least=1), default=20, help="default: 20")
+    parser.add_argument("--population", type=whole(at_least=4), default=8, help="sets of a generation (default: 8)")
+    parser.add_argument("--seed", type=whole(at_least=0), default=0, help="default: 0")
+    parser.add_argument("--horizon", type=float, default=4000.0, help="seconds of a run (default: 4000)")
+    parser.add_argument("--judging", type=whole(at_least=2), default=4, help="runs behind the table (default: 4)")
+    parser.add_argument("--jobs", type=whole(at_least=1), default=1, help="processes (default: 1)")
+    words = parser.parse_args()
+    numbers: Any = getattr(load_policy(words.policy), "parameters", None)
+    if len(words.ranges) < 2:
+        parser.error("expected two numbers or more: CMA-ES learns how they go together")
+    lacking = [one.name for one in words.ranges if not hasattr(numbers, one.name)]
+    if lacking:
+        parser.error(f"expected numbers of {words.policy}, got {lacking[0]!r}")
+    before = {one.name: float(getattr(numbers, one.name)) for one in words.ranges}
+    worlds = [
+        replace(one.world, scenario=replace(one.world.scenario, horizon_s=words.horizon))
+        for one in load_protocol().worlds
+        if not one.is_held_out
+    ]
+    found = evolved(words.policy, words.ranges, before, worlds, words)
+    print(comparison(words.policy, found, worlds, words).text())
+    print(" ".join(f"--set {name}={number:g}" for name, number in found.items()))
+
+
+if __name__ == "__main__":
+    main()
