@@ -107,15 +107,15 @@ class CPFAParameters(ControllerParameters):
     Values: evolved in the training worlds of the benchmark, see docs/controllers.md.
     """
 
-    search_per_tick: float = 0.05
+    search_per_tick: float = 0.448
     """p_s: chance that a robot on its way in a new direction begins to search, 0 to 1."""
-    give_up_per_tick: float = 0.0005
+    give_up_per_tick: float = 0.0000218
     """p_r: chance that a searching robot gives up and goes home, 0 to 1."""
-    uninformed_turn_rad: float = 0.3
+    uninformed_turn_rad: float = 0.000778
     """omega: standard deviation of the turn between two steps of a search, rad, 0 to 4 pi."""
-    informed_decay_per_tick: float = 0.02
+    informed_decay_per_tick: float = 0.0357
     """lambda_id: rate at which the turns of an informed search become those of any other, per tick."""
-    site_fidelity_rate: float = 1.0
+    site_fidelity_rate: float = 0.0293
     """lambda_sf: the larger, the more objects a robot must have seen at a place to return there; paper: 0 to 20."""
     search_step_s: float = 1.0
     """Time between two turns of a search, without that of turning on the spot; ours: 9 cm at the speed of a search."""

@@ -107,6 +107,12 @@ EXHIBITS = (
         frame_s=2.0,
     ),
     Exhibit(
+        "cpfa",
+        "warehouse_small",
+        ("crw", "cpfa"),
+        "The field's baseline beside CRW. Robots go out straight, search, and return to where they found many objects.",
+    ),
+    Exhibit(
         "warehouse_dual",
         "warehouse_dual",
         ("crw", "dpo", "stochm", "stochx"),

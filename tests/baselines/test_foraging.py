@@ -7,7 +7,11 @@ from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.runs.run import run_one
+from swarm_forage_env.runs.spec import plan_run
+from swarm_forage_env.scenarios.config import PHYSICS_ENGINES
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.wrappers.registry import parse_wrapper
 
 
 def counts(scenario_name: str, policy_name: str, ticks: int, seed: int, **overrides) -> np.ndarray:
@@ -22,7 +26,7 @@ def counts(scenario_name: str, policy_name: str, ticks: int, seed: int, **overri
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("policy_name", ["crw", "dpo"])
+@pytest.mark.parametrize("policy_name", ["crw", "dpo", "cpfa"])
 @pytest.mark.parametrize(
     ("scenario_name", "ticks", "deliveries", "first_pickups"),
     [("warehouse_small", 5000, 10, 15), ("warehouse_medium", 1500, 40, 80), ("search_and_rescue", 2500, 15, 30)],
@@ -55,5 +59,19 @@ def test_one_robot_with_a_memory_delivers_as_a_simple_model_predicts(scenario_na
 def test_memory_pays():
     """Remembering objects beats stumbling on them, in each scenario with its own swarm."""
     for scenario_name in ("warehouse_small", "warehouse_medium", "search_and_rescue"):
-        memory, none = (counts(scenario_name, name, 10_000, seed=2)[Counter.FIRST_PICKED] for name in ("dpo", "crw"))
-        assert memory > none
+        memory, place, none = (
+            counts(scenario_name, name, 10_000, seed=2)[Counter.FIRST_PICKED] for name in ("dpo", "cpfa", "crw")
+        )
+        assert min(memory, place) > none
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("physics", PHYSICS_ENGINES)
+def test_cpfa_forages_in_either_engine_while_robots_die(physics):
+    world = scenario("warehouse_medium", n_robots=50, horizon_s=400.0, physics=physics)
+    spec = plan_run(world, "cpfa", wrappers=[parse_wrapper("population:death_per_tick=0.0005")], seed=1)
+    one, again = run_one(spec).columns(), run_one(spec).columns()
+    assert one["n_active"][-1] < 50
+    assert one["collected"].sum() > 20
+    for name, values in one.items():
+        np.testing.assert_array_equal(again[name], values, err_msg=name)

@@ -43,7 +43,7 @@ def test_a_copy_continues_as_the_original_does(policy_class, copied):
     of_policy = [policy.act(obs, active).copy() for _ in range(2 * TICKS)]
     np.testing.assert_array_equal(of_twin, of_policy)
     np.testing.assert_array_equal(twin.activity, policy.activity)
-    assert not np.array_equal(of_policy[0], of_policy[1])
+    assert np.ptp(of_policy, axis=0).any(), "they do something"
 
 
 @pytest.mark.parametrize("policy_class", POLICIES)

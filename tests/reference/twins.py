@@ -47,6 +47,7 @@ KINDS = Twin("kinds.observe", "world/test_kinds.py", "swarm_forage_env.env.Forag
 NOISE = Twin("adversity.noisy_row", "wrappers/test_noise.py", "swarm_forage_env.wrappers.noise.SensorNoise.observe")
 
 TWINS = {
+    "baselines.cpfa.step_cpfa": Twin("cpfa.CPFARobot", "baselines/test_cpfa.py", "baselines.cpfa.CPFAPolicy.reset"),
     "baselines.crw.step_crw": CRW,
     "baselines.dpo.step_dpo": Twin(
         "controllers.ReferenceRobot", "baselines/test_controller_twins.py", "baselines.dpo.DPOPolicy.reset"

@@ -36,6 +36,7 @@ WORLDS = [
     ("crw", "warehouse_small", {"n_robots": 1}),
     ("crw", "warehouse_small", {}),
     ("dpo", "search_and_rescue", {}),
+    ("cpfa", "search_and_rescue", {}),
     ("stochm", "warehouse_small", {"nest_centre_m": (3.2, 8.0), "nest_size_m": (3.2, 12.8)}),
     ("stochx", "warehouse_medium", {}),
     # Where objects lie still, robots look at the floor again only near what has changed.

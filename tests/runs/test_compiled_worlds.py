@@ -69,7 +69,7 @@ def assert_same_in_pieces(policy: Callable[[], Policy], world: ScenarioConfig, s
 
 @pytest.mark.compiled
 @pytest.mark.parametrize("fields", WORLDS.values(), ids=WORLDS.keys())
-@pytest.mark.parametrize("policy", ["crw", "dpo", "stochx"])
+@pytest.mark.parametrize("policy", ["crw", "dpo", "cpfa", "stochx"])
 def test_scripted_policies_do_the_same_in_pieces(policy, fields):
     world = world_with(fields, getattr(load_policy(policy), "caches", "none"))
     assert_same_in_pieces(lambda: load_policy(policy), world, seed=len(policy))

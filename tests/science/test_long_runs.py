@@ -77,7 +77,7 @@ def test_objects_survive_long_runs_with_robots_that_come_and_go(name, caches):
     assert env.events.counters[Counter.FREE_PICKUPS] > 50
 
 
-@pytest.mark.parametrize("policy", ["crw", "dpo", "stochm", "stochx"])
+@pytest.mark.parametrize("policy", ["crw", "dpo", "cpfa", "stochm", "stochx"])
 def test_controllers_deliver_over_a_whole_run(policy):
     for caches in made_for(policy)[:1]:
         env = ForageEnv(scenario("warehouse_small", caches=caches))

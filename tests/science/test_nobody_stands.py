@@ -10,7 +10,7 @@ from swarm_forage_env.wrappers.registry import parse_wrapper
 
 pytestmark = [pytest.mark.slow, pytest.mark.compiled]
 
-CONTROLLERS = ["crw", "dpo", "stochm", "stochx"]
+CONTROLLERS = ["crw", "dpo", "cpfa", "stochm", "stochx"]
 SMALL = ("warehouse_small", {"horizon_s": 4000.0})
 CROWDED = ("warehouse_small", {"horizon_s": 2000.0, "n_robots": 128})
 MEDIUM = ("warehouse_medium", {"horizon_s": 2000.0})

@@ -10,7 +10,7 @@ from swarm_forage_env import parse_wrapper, plan_run, scenario
 from swarm_forage_env.runs.run import warm_up
 from swarm_forage_env.world.compiled import compile_half
 
-POLICIES = {"random": "none", "crw": "none", "dpo": "none", "stochm": "static", "stochx": "dynamic"}
+POLICIES = {"random": "none", "crw": "none", "dpo": "none", "cpfa": "none", "stochm": "static", "stochx": "dynamic"}
 """Policy -> caches of its world."""
 DISTURBED = ("sensor_noise:sigma=0.1", "actuator_noise:sigma=0.1", "throttle:waveform=constant,amplitude=0.3")
 

@@ -34,7 +34,7 @@ AS_THEN = (
 """Marks of tests whose numbers hold for the machine and the versions of the golden runs only."""
 CHIPMUNK_POLICIES = ("crw", "stochx")
 """Those that also run with Chipmunk's bodies. The other policies do nothing with bodies that these two do not do."""
-POLICIES = ("crw", "dpo", "stochm", "stochx", "ppo_warehouse_small", "generalist")
+POLICIES = ("crw", "dpo", "cpfa", "stochm", "stochx", "ppo_warehouse_small", "generalist")
 READINGS = {"described": Quirks(), "program": AUTHORS_PROGRAM}
 WRAPPERS = {"calm": (), "adverse": mild_wrappers()}
 FAR: dict[str, dict[str, Any]] = {

@@ -33,7 +33,14 @@ from tests.support.invariants import look_at, look_at_record
 from tests.support.misuse import misuse, misuse_before_reset
 from tests.support.random_scenarios import random_sampler, random_scenario, random_wrappers
 
-SCRIPTED = {"crw": "none", "dpo": "none", "stochm": "static", "stochx": "dynamic", "ppo_warehouse_small": "none"}
+SCRIPTED = {
+    "crw": "none",
+    "dpo": "none",
+    "cpfa": "none",
+    "stochm": "static",
+    "stochx": "dynamic",
+    "ppo_warehouse_small": "none",
+}
 """Policy -> the caches that it is made for."""
 DRIVERS = ("uniform", "corners", "beyond", "wall", "busy", *SCRIPTED)
 MOST_TRIALS = 200
