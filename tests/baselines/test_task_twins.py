@@ -157,7 +157,7 @@ def test_compiled_controller_acts_like_the_slow_one(policy_class, quirks):
         for i in np.flatnonzero(active):
             expected = twins[i].tick(fuzz.seen.array[i], policy._draws[i], now)
             assert [TASKS[policy.task[i]], STATES[policy.activity[i]]] == [twins[i].job, twins[i].state]
-            assert actions[i] == pytest.approx(expected, abs=2e-6)
+            assert np.abs(actions[i] - expected).max() <= 2e-6  # pytest.approx takes longer than the controller
             visited.add((Task(int(policy.task[i])), Activity(int(policy.activity[i]))))
             goals.add(int(policy._robots[i].goal_kind))
             searching += policy._robots[i].is_searching

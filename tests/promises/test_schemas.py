@@ -107,7 +107,7 @@ def test_what_is_written_keeps_its_schema(name, written):
     [
         ("record", from_parquet, "tests/files/record.parquet"),
         ("packed_study", from_parquet, "tests/support/blessed*.parquet"),
-        ("packed_study", from_parquet, "docs/results/*.parquet"),
+        ("packed_study", from_parquet, "docs/results/S?d.parquet"),
         ("study_file", from_toml, "swarm_forage_env/studies/sets/*.toml"),
         ("study_file", from_toml, "docs/*.toml"),
         ("study_file", from_toml, "tests/support/blessed*.toml"),
