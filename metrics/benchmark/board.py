@@ -141,6 +141,7 @@ def _mapping(standing: Standing) -> dict[str, Any]:
         "groups": {name: plain(value) for name, value in standing.groups.items()},
         "interference": plain(standing.interference),
         "by_policy": [plain(value) for value in standing.by_policy],
+        "worlds_won_by_policy": [*standing.won_by_policy],
     }
 
 

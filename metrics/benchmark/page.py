@@ -5,7 +5,7 @@ What is wide and long, every world and every measure, is a page of its own, `det
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from swarm_forage_env._internal.wording import number, percent
 from swarm_forage_env.runs.answer import Sheet
@@ -195,16 +195,21 @@ def _commands(entries: Sequence[Entry]) -> str:
 def _groups(ranked: Sequence[Standing], protocol: Protocol) -> Sheet:
     names = [group.name for group in protocol.groups]
     several = any(standing.by_policy for standing in ranked)
-    header = ("entry", *names, *(("score of each training",) if several else ()))
+    header = ("entry", *names, *(("score of each training", "worlds won by each") if several else ()))
     rows = [
         (
             standing.entry.name,
             *(share(standing.groups[name]) for name in names),
-            *((", ".join(map(share, standing.by_policy)) or "-",) if several else ()),
+            *(_of_each(map(share, standing.by_policy)) if several else ()),
+            *(_of_each(map(str, standing.won_by_policy)) if several else ()),
         )
         for standing in ranked
     ]
     return Sheet(header=header, rows=rows)
+
+
+def _of_each(numbers: Iterable[str]) -> tuple[str]:
+    return (", ".join(numbers) or "-",)
 
 
 def _matched(entries: Sequence[Entry]) -> Sheet:

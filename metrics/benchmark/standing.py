@@ -64,6 +64,8 @@ class Standing:
     """Share of robot time lost in held-out worlds, mean over runs."""
     by_policy: tuple[float, ...]
     """Score of each policy, where there are several: the spread over trainings."""
+    won_by_policy: tuple[int, ...]
+    """Number of held-out worlds that each policy wins, where there are several."""
 
 
 def scripted_folder(version: int) -> Path:
@@ -121,6 +123,7 @@ def standing_of(entry: Entry, reference: Reference, protocol: Protocol) -> Stand
     chances = [
         probability_of_improvement([runs[k] for runs in performances], theirs, seed=_SEED) for k in _policies(entry)
     ]
+    won = [_n_won([runs[k] for runs in performances], theirs) for k in _policies(entry)]
     score = interquartile_mean([shares[world.name].ravel() for world in counting], seed=_SEED)
     improvement = probability_of_improvement([runs.ravel() for runs in performances], theirs, seed=_SEED)
     return Standing(
@@ -128,8 +131,7 @@ def standing_of(entry: Entry, reference: Reference, protocol: Protocol) -> Stand
         score=over_trainings(score, scores) if entry.is_trained else score,
         improvement=_within_0_and_1(over_trainings(improvement, chances)) if entry.is_trained else improvement,
         gap=optimality_gap(np.concatenate([shares[world.name].ravel() for world in counting])),
-        # Of performances, not of shares: a share of itself may be rounded to a little more than 1.
-        n_won=sum(bool(our.mean() > their.mean()) for our, their in zip(performances, theirs, strict=True)),
+        n_won=_n_won(performances, theirs),
         n_worlds=len(counting),
         calm=middle(lambda world: world.counts and not world.is_disturbed),
         disturbed=middle(lambda world: world.counts and world.is_disturbed),
@@ -137,7 +139,13 @@ def standing_of(entry: Entry, reference: Reference, protocol: Protocol) -> Stand
         groups={group.name: middle(lambda world, of=group.name: world.group == of) for group in protocol.groups},
         interference=float(np.mean([entry.interference(world.name).mean() for world in counting])),
         by_policy=tuple(each.value for each in scores) if len(scores) > 1 else (),
+        won_by_policy=tuple(won) if len(won) > 1 else (),
     )
+
+
+def _n_won(ours: Sequence[FloatArray], theirs: Sequence[FloatArray]) -> int:
+    """Count the worlds in which our mean performance is higher; as shares, equal ones may differ by rounding."""
+    return sum(bool(our.mean() > their.mean()) for our, their in zip(ours, theirs, strict=True))
 
 
 def over_trainings(pooled: Estimate, by_training: Sequence[Estimate]) -> Estimate:

@@ -76,7 +76,7 @@ def test_the_score_is_the_interquartile_mean_of_shares(protocol, reference):
     assert (standing.calm, standing.disturbed, standing.training) == pytest.approx((2.0, 2.0, 2.0))
     assert standing.groups == {"room": pytest.approx(2.0)}
     assert standing.interference == pytest.approx(0.1)
-    assert standing.by_policy == ()
+    assert standing.by_policy == standing.won_by_policy == ()
 
 
 def test_one_world_in_which_a_policy_is_lucky_does_not_decide(protocol, reference):
@@ -90,6 +90,7 @@ def test_one_world_in_which_a_policy_is_lucky_does_not_decide(protocol, referenc
 def test_each_training_seed_has_a_score_of_its_own(protocol, reference):
     standing = standing_of(made_up_entry(protocol, "two", lambda k: 18.5, n_policies=2), reference, protocol)
     assert standing.by_policy == (pytest.approx(19.5 / 20), pytest.approx(20.5 / 20))
+    assert standing.won_by_policy == (0, 6)
 
 
 def test_the_interval_of_a_trained_entry_counts_its_trainings(protocol, reference):
