@@ -152,7 +152,7 @@ class StudyTable(Table):
         ]
         return pl.DataFrame(rows, infer_schema_length=None)
 
-    @property
+    @cached_property
     def digest(self) -> str:
         """Hash of everything that a file of the table holds; it reveals damage."""
         return _digest(self.frame, *self._texts)
