@@ -102,7 +102,7 @@ TRIP_FIELDS: list[tuple[str, type]] = [
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class CPFAParameters(ControllerParameters):
-    """Numbers of CPFA. Ticks are 0.2 s long; the first five are what the paper evolves, in its ranges.
+    """Numbers of CPFA. Ticks are 0.2 s long; the first five are what the paper evolves.
 
     Values: evolved in the training worlds of the benchmark, see docs/controllers.md.
     """
@@ -116,9 +116,9 @@ class CPFAParameters(ControllerParameters):
     informed_decay_per_tick: float = 0.0357
     """lambda_id: rate at which the turns of an informed search become those of any other, per tick."""
     site_fidelity_rate: float = 0.0293
-    """lambda_sf: the larger, the more objects a robot must have seen at a place to return there; paper: 0 to 20."""
-    search_step_s: float = 1.0
-    """Time between two turns of a search, without that of turning on the spot; ours: 9 cm at the speed of a search."""
+    """lambda_sf: the larger, the more objects a robot must have seen at a place to return there, 0 to 20."""
+    search_step_s: float = 1.2
+    """Time between two turns of a search, without that of turning on the spot; ours: 11 cm at the speed of a search."""
     site_tolerance_m: float = 0.2
     """A robot this near to the place it goes to is there; ours: nearer, it would ignore obstacles."""
     wall_margin_m: float = 0.5
@@ -133,6 +133,7 @@ class CPFAParameters(ControllerParameters):
             ("search_per_tick", 1.0),
             ("give_up_per_tick", 1.0),
             ("uninformed_turn_rad", WIDEST_TURN_RAD),
+            ("site_fidelity_rate", 20.0),
         ):
             if getattr(self, name) > most:
                 raise ParameterError(f"Expected {name} <= {most:g}, got {getattr(self, name)}.")
@@ -394,7 +395,7 @@ class CPFAPolicy(ScriptedPolicy):
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run: every robot sets out from where it stands, in a direction of its own."""
-        step_ticks = max(1, round(self.parameters.search_step_s / spec.dt_s))
+        step_ticks = max(1, round(self.parameters.search_step_s / spec.dt_s)) - 1  # after the tick of the turn
         constants = kernel_constants(self.parameters, spec, search_step_ticks=step_ticks)
         self._start_script(spec, rng, CPFA_DRAWS, constants, new_robots(spec.n_robots, TRIP_FIELDS))
 

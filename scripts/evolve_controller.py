@@ -1,9 +1,10 @@
 """Evolve numbers of a policy in the training worlds of the benchmark, by CMA-ES (pip install ".[evolve]").
 
     python scripts/evolve_controller.py cpfa search_per_tick=0.001:0.5:log uninformed_turn_rad=0:2
-    python scripts/evolve_controller.py dpo wander_speed_mps=0.02:0.1 wander_max_change_deg=1:20:log
+    python scripts/evolve_controller.py dpo wander_speed_mps=0.02:0.1 wander_max_change_deg=1:20:log@5
 
-A number is named with the range in which it is looked for; "log" looks in equal ratios. A set of numbers is worth its
+A number is named with the range in which it is looked for; "log" looks in equal ratios. The search begins at the number
+behind "@", else at that of the policy. A set of numbers is worth its
 performance as a share of DPO's, averaged over the worlds. All sets of a generation run with the same seed, which the
 next generation changes, so nothing is fitted to one seed. The table compares what was found with the numbers of before,
 with seeds that no generation had.
@@ -45,6 +46,8 @@ class Range:
     low: float
     high: float
     by_ratio: bool
+    start: float | None = None
+    """Where the search begins; None = at the number of the policy."""
 
     def number(self, share: float) -> float:
         """Return the number at a share of the range."""
@@ -62,15 +65,21 @@ class Range:
 
 def read_range(text: str) -> Range:
     """Return the range of a word such as `give_up_per_tick=1e-5:1e-2:log`."""
-    name, _, ends = text.partition("=")
+    name, _, rest = text.partition("=")
+    ends, _, start = rest.partition("@")
     low, high, *how = ends.split(":") if ":" in ends else ("", "")
     try:
-        found = Range(name, float(low), float(high), how == ["log"])
+        found = Range(name, float(low), float(high), how == ["log"], float(start) if start else None)
     except ValueError:
         found = Range(name, 0.0, 0.0, False)
     if how not in ([], ["log"]) or not found.low < found.high or (found.by_ratio and found.low <= 0.0):
-        raise argparse.ArgumentTypeError(f"expected name=low:high, or name=low:high:log from above 0, got {text!r}")
+        raise argparse.ArgumentTypeError(f"expected name=low:high[:log][@start], log from above 0, got {text!r}")
     return found
+
+
+def seed_of(generation: int, seed: int) -> int:
+    """Return the seed of the runs of a generation; none is one of the table's, which begin at `JUDGING_SEED`."""
+    return FIRST_SEED * (1 + 2 * seed) + generation
 
 
 def performances(
@@ -95,8 +104,8 @@ def evolved(
         asked = strategy.ask()
         sets = [{one.name: one.number(x) for one, x in zip(ranges, point, strict=True)} for point in asked]
         policies = [policy_spec(policy, parameters=numbers, label=f"set {k}") for k, numbers in enumerate(sets)]
-        seed = FIRST_SEED * (1 + words.seed) + generation
-        found = performances([yardstick, *policies], worlds, (seed,), words.jobs)[..., 0]
+        seeds = (seed_of(generation, words.seed),)
+        found = performances([yardstick, *policies], worlds, seeds, words.jobs)[..., 0]
         worth = np.mean(found[1:] / np.maximum(found[0], 1.0), axis=1)
         strategy.tell(asked, (-worth).tolist())
         told = f"generation {generation + 1}/{words.generations}: best {worth.max():.3f}, mean {worth.mean():.3f}"
@@ -105,12 +114,18 @@ def evolved(
     return {one.name: float(f"{one.number(x):.3g}") for one, x in zip(ranges, middle, strict=True)}
 
 
-def comparison(policy: str, found: dict[str, float], worlds: Sequence[World], words: argparse.Namespace) -> Sheet:
+def comparison(
+    policy: str,
+    before: dict[str, float],
+    found: dict[str, float],
+    worlds: Sequence[World],
+    words: argparse.Namespace,
+) -> Sheet:
     """Return performance before and after, beside that of the yardstick."""
     seeds = range(JUDGING_SEED, JUDGING_SEED + words.judging)
     policies = [
         policy_spec(YARDSTICK, label=f"{YARDSTICK}, unchanged"),
-        policy_spec(policy, label="before"),
+        policy_spec(policy, parameters=before, label="before"),
         policy_spec(policy, parameters=found, label="evolved"),
     ]
     means = [[aggregate(one) for one in each] for each in performances(policies, worlds, seeds, words.jobs)]
@@ -129,7 +144,9 @@ def main() -> None:
     """Evolve, and print what was found."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("policy", help="name of the policy")
-    parser.add_argument("ranges", nargs="+", type=read_range, metavar="name=low:high[:log]", help="what evolves")
+    parser.add_argument(
+        "ranges", nargs="+", type=read_range, metavar="name=low:high[:log][@start]", help="what evolves"
+    )
     parser.add_argument("--generations", type=whole(at_least=1), default=20, help="default: 20")
     parser.add_argument("--population", type=whole(at_least=4), default=8, help="sets of a generation (default: 8)")
     parser.add_argument("--seed", type=whole(at_least=0), default=0, help="default: 0")
@@ -143,14 +160,14 @@ def main() -> None:
     lacking = [one.name for one in words.ranges if not hasattr(numbers, one.name)]
     if lacking:
         parser.error(f"expected numbers of {words.policy}, got {lacking[0]!r}")
-    before = {one.name: float(getattr(numbers, one.name)) for one in words.ranges}
+    before = {one.name: float(getattr(numbers, one.name)) if one.start is None else one.start for one in words.ranges}
     worlds = [
         replace(one.world, scenario=replace(one.world.scenario, horizon_s=words.horizon))
         for one in load_protocol().worlds
         if not one.is_held_out
     ]
     found = evolved(words.policy, words.ranges, before, worlds, words)
-    print(comparison(words.policy, found, worlds, words).text())
+    print(comparison(words.policy, before, found, worlds, words).text())
     print(" ".join(f"--set {name}={number:g}" for name, number in found.items()))
 
 

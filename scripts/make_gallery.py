@@ -63,7 +63,7 @@ EXHIBITS = (
         "warehouse_small",
         "warehouse_small",
         ("crw", "dpo", "stochm", "stochx"),
-        "The four scripted controllers in the small warehouse. CRW walks at random. DPO goes back to objects that it "
+        "The paper's four controllers in the small warehouse. CRW walks at random. DPO goes back to objects that it "
         "remembers. In STOCHM and STOCHX, robots hand objects over at caches, so each carries them part of the way.",
     ),
     Exhibit(
@@ -76,8 +76,8 @@ EXHIBITS = (
         "generalist",
         "warehouse_small",
         ("dpo", "generalist"),
-        "One network for all scenarios, beside DPO, the scripted controller that delivers most. This is a whole run of "
-        "10,000 s in the small warehouse.",
+        "One network for all scenarios, beside DPO, the one of the paper's four that delivers most. This is a "
+        "whole run of 10,000 s in the small warehouse.",
         frame_s=10.0,
         horizon_s=10_000.0,
     ),

@@ -99,9 +99,16 @@ def board_of(entries: Sequence[Entry], protocol: Protocol | None = None) -> Boar
         protocol: Default: the full protocol of their version.
 
     Raises:
-        BenchmarkError: two entries with one name, or another policy under the name of a scripted controller.
+        BenchmarkError: entries of two versions, two with one name, or another policy under the name of a scripted
+            controller.
     """
     full = load_protocol(version=entries[0].version if entries else USUAL)
+    others = {entry.version for entry in entries} - {full.version}
+    if others:
+        raise BenchmarkError(
+            f"Expected entries of one version of the benchmark, got version {min(others)} beside version "
+            f"{full.version}."
+        )
     scripted = scripted_entries(full)
     reference = reference_of(scripted, full)
     digests = {entry.digest for entry in scripted}

@@ -24,6 +24,7 @@ from swarm_forage_env._internal.typed import Amount, Count, Name, Within, typed
 from ..curves import FloatArray
 from .protocol import OPEN, BenchmarkError, Protocol, load_protocol, protocol_versions
 
+_WITHOUT_TRACKS = "leave out --track and --decisions, or say --version 2"
 TRAINED_IN = ("given", "other", "nothing", "unknown")
 """Where a policy was trained: in the training worlds only, also elsewhere, not at all, or the author does not say."""
 Rows: TypeAlias = tuple[tuple[float | None, ...], ...]
@@ -70,13 +71,16 @@ class Training:
         """
         tracks = (*protocol.tracks, OPEN) if protocol.tracks else ("",)
         if self.track not in tracks:
-            known = ", ".join(tracks) or "none"
+            if not protocol.tracks:
+                raise BenchmarkError(f"Expected no track for {protocol.name}, got {self.track!r}; {_WITHOUT_TRACKS}.")
             raise BenchmarkError(
-                f"Expected a track of the benchmark, {protocol.name} ({known}), got {self.track!r}; choose one with "
-                "--track."
+                f"Expected a track of the benchmark, {protocol.name} ({', '.join(tracks)}), got {self.track!r}; choose "
+                "one with --track."
             )
         if self.decisions is not None and not self.track:
-            raise BenchmarkError(f"Expected decisions with a track, got them for {protocol.name}, which has none.")
+            raise BenchmarkError(
+                f"Expected no decisions for {protocol.name}, got {self.decisions:,}; {_WITHOUT_TRACKS}."
+            )
         budget = protocol.tracks.get(self.track)
         if budget is None:
             return
@@ -251,6 +255,9 @@ class Entry:
                 f"Expected an entry of the benchmark, {protocol.name}, got {told} in {where}; run swarm-forage "
                 "benchmark again, without --quick and with this version of the package."
             )
+        digests = [policy.digest for policy in self.policies if policy.digest]
+        if self.training.track in protocol.tracks and len({*digests}) < len(digests):
+            raise BenchmarkError(f"Expected different trainings in {where}, got one file twice.")
         worlds = [world.name for world in protocol.worlds]
         for world in worlds:
             if world not in self.runs:

@@ -93,7 +93,7 @@ def page_block(standings: Sequence[Standing], protocol: Protocol, picture: str =
         "These commands repeat them:\n\n" + _commands(entries),
         "### Group by group\n\n" + _groups(ranked, protocol).markdown(),
         "### Measure by measure\n\nEach cell counts the rows of a measure in which the entry is at least as good as "
-        "the best of the four scripted controllers. Amounts and distances are compared as shares of performance.\n\n"
+        "the best of the paper's four controllers. Amounts and distances are compared as shares of performance.\n\n"
         + _matched(entries).markdown(),
         "### One against the other\n\nHow often a run of the row's entry is better than a run of the column's entry in "
         "the same world.\n\n" + _duels(entries, protocol).markdown(),

@@ -101,7 +101,7 @@ class Protocol(Answer):
     tracks: Mapping[str, int]
     """Track with a budget -> the most decisions that one training may take. Empty where there are no tracks."""
     n_trainings: int
-    """That an entry with a budget needs."""
+    """Number of trainings that an entry with a budget needs."""
 
     @property
     def scored(self) -> tuple[ProtocolWorld, ...]:

@@ -126,7 +126,7 @@ def benchmark_question(
         plan=Plan.product(specs, [each.world for each in chosen.worlds], chosen.seeds),
         name=name,
         protocol=chosen,
-        command=command or entry_command(policies, name, version=chosen.version),
+        command=command or entry_command(policies, name, version=chosen.version, training=told),
         training=told,
         training_seeds=tuple(training_seeds),
     )
@@ -183,11 +183,17 @@ def entry_name(policy: str, *, quick: bool = False) -> str:
     return f"{label}, quick" if quick and label in PAPER_POLICIES else label
 
 
-def entry_command(policies: Sequence[str], name: str, *, version: int = USUAL) -> str:
-    """Return what makes an entry again from the current folder: policies as given, but files without whole paths."""
+def entry_command(policies: Sequence[str], name: str, *, version: int = USUAL, training: Training | None = None) -> str:
+    """Return what makes an entry again from the current folder: policies as given, but files without whole paths.
+
+    What a training was is among the words only where its track asks for it.
+    """
     words = [word for policy in policies for word in ("--policy", _from_here(policy))]
     edition = [] if version == USUAL else ["--version", str(version)]
-    return shlex.join(["swarm-forage", "benchmark", *words, "--name", name, *edition])
+    budget: list[str] = []
+    if training is not None and training.track not in ("", OPEN):
+        budget = ["--trained-in", training.worlds, "--track", training.track, "--decisions", str(training.decisions)]
+    return shlex.join(["swarm-forage", "benchmark", *words, "--name", name, *edition, *budget])
 
 
 def _from_here(policy: str) -> str:

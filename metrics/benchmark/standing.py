@@ -1,6 +1,6 @@
 """What an entry is worth: its runs, compared with the best scripted controller, as one number.
 
-In each world, the performance of a run is divided by the mean of the best of the four scripted controllers. So 1 is as
+In each world, the performance of a run is divided by the mean of the best of the paper's four controllers. So 1 is as
 good as this controller, and worlds with few and with many deliveries count alike. The score is the interquartile mean
 of all held-out runs, so a single world in which a policy is lucky or breaks down does not decide it.
 
@@ -51,7 +51,7 @@ class Standing:
     gap: float
     """Optimality gap: how far runs in held-out worlds fall short of the best scripted controller, mean over runs."""
     n_won: int
-    """Number of held-out worlds in which its mean is higher than the mean of every scripted controller."""
+    """Number of held-out worlds in which its mean is higher than the means of the paper's four controllers."""
     n_worlds: int
     calm: float
     """Interquartile mean over undisturbed held-out worlds."""

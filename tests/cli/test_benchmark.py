@@ -79,7 +79,9 @@ def test_an_entry_of_version_2_names_its_track_and_goes_to_the_page_of_its_versi
     assert code == 0, err
     assert next(row for row in out.splitlines() if row.startswith("again")).split()[1] == "short"
     file = Path("results/benchmark/v2/again.json")
-    assert json.loads(file.read_text())["command"].endswith("--name again --version 2")
+    assert json.loads(file.read_text())["command"].endswith(
+        "--name again --version 2 --trained-in given --track short --decisions 100"
+    )
     assert command("benchmark", "show", str(file))[:2] == (0, out)
     Path("docs").mkdir()
     Path("docs/benchmark_v2.md").write_text(f"{BEGIN}\n{END}\n")
@@ -206,7 +208,7 @@ def test_an_altered_entry_is_refused_in_one_line(command, mine):
         (("--policy", "crw", "--training-seed", "1", "--training-seed", "2"), "got 2 for 1 policies"),
         (("--policy", "crw", "--version", "3"), "Expected version 1 or 2 of the benchmark, got 3"),
         (("worlds", "--version", "3"), "Expected version 1 or 2 of the benchmark, got 3"),
-        (("--policy", "crw", "--track", "10M"), "got '10M'; choose one with --track"),
+        (("--policy", "crw", "--track", "10M"), "got '10M'; leave out --track and --decisions"),
         (("show", "none.json"), "Cannot read none.json"),
         (("show", "mine.json", "mine.json"), "'mine' twice"),
         (("show", "dpo.json"), "another policy with the name 'dpo'"),

@@ -107,12 +107,12 @@ def test_what_is_written_keeps_its_schema(name, written):
     [
         ("record", from_parquet, "tests/files/record.parquet"),
         ("packed_study", from_parquet, "tests/support/blessed*.parquet"),
-        ("packed_study", from_parquet, "docs/results/S?d.parquet"),
+        ("packed_study", from_parquet, "docs/results/S?d.parquet"),  # two of twelve: one takes a second
         ("study_file", from_toml, "swarm_forage_env/studies/sets/*.toml"),
         ("study_file", from_toml, "docs/*.toml"),
         ("study_file", from_toml, "tests/support/blessed*.toml"),
-        ("entry", lambda file: parse_json(file.read_text(encoding="utf-8")), "docs/benchmark/*.json"),
-        ("entry", lambda file: parse_json(file.read_text(encoding="utf-8")), "metrics/benchmark/scripted/*.json"),
+        ("entry", lambda file: parse_json(file.read_text(encoding="utf-8")), "docs/benchmark/**/*.json"),
+        ("entry", lambda file: parse_json(file.read_text(encoding="utf-8")), "metrics/benchmark/scripted/**/*.json"),
         ("replay", from_page, "docs/gallery/warehouse_small.html"),
     ],
 )

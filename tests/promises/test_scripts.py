@@ -309,9 +309,17 @@ def test_networks_are_run_in_turned_worlds(run):
 
 
 @pytest.mark.compiled
+def test_no_generation_has_the_seeds_that_judge(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "scripts")
+    evolve_controller = importlib.import_module("evolve_controller")
+    used = {evolve_controller.seed_of(generation, seed) for generation in range(100) for seed in range(4)}
+    assert len(used) == 400
+    assert used.isdisjoint(range(evolve_controller.JUDGING_SEED, evolve_controller.JUDGING_SEED + 100))
+
+
 def test_numbers_of_a_controller_evolve(run):
     pytest.importorskip("cma", reason="needs the evolve extra: cma")
-    ranges = ("wander_speed_mps=0.01:0.1:log", "wander_max_change_deg=1:20")
+    ranges = ("wander_speed_mps=0.01:0.1:log@0.02", "wander_max_change_deg=1:20")
     size = ("--generations", "2", "--population", "4", "--horizon", "200", "--judging", "2")
     code, out, err = run("evolve_controller", "crw", *ranges, *size)
     assert code == 0, err
@@ -352,7 +360,7 @@ def test_sketches_of_theory_are_those_of_the_docs(run):
         assert (ROOT / "docs/images" / name).is_file()
 
 
-RANGE, NO_RANGE = "name=low:high[:log]", "expected name=low:high, or name=low:high:log from above 0, got"
+RANGE, NO_RANGE = "name=low:high[:log][@start]", "expected name=low:high[:log][@start], log from above 0, got"
 
 
 @pytest.mark.parametrize(
@@ -363,6 +371,7 @@ RANGE, NO_RANGE = "name=low:high[:log]", "expected name=low:high, or name=low:hi
         ("bench", "nothing", "expected some of crw-50, crw-200, "),
         ("bench", "crw --peers venvs", "expected some of vmas-discovery, "),
         ("evolve_controller", "dpo rate=3:1", f"argument {RANGE}: {NO_RANGE} 'rate=3:1'"),
+        ("evolve_controller", "dpo rate=1:3@x", f"argument {RANGE}: {NO_RANGE} 'rate=1:3@x'"),
         ("evolve_controller", "dpo rate=0:1:log", f"argument {RANGE}: {NO_RANGE} 'rate=0:1:log'"),
         ("evolve_controller", "dpo object_priority=0:1", "expected two numbers or more: CMA-ES learns how they go"),
         ("evolve_controller", "dpo object_priority=0:1 weight=0:1", "expected numbers of dpo, got 'weight'"),

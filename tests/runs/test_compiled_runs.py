@@ -15,6 +15,8 @@ from swarm_forage_env.runs.run import LiveRun, build_env, build_stack
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.recorder import RunRecorder
+from swarm_forage_env.wrappers.throttle import ThrottleConfig
+from swarm_forage_env.wrappers.waveform import Waveform
 from tests.support.drivers import tick_by_tick
 from tests.support.foraging import quick_world
 from tests.support.stage import assert_same_world, snapshot
@@ -130,6 +132,10 @@ def test_python_is_asked_wherever_it_has_a_say():
     patched = build_stack(world)
     patched.after_step = lambda *arguments: None
     assert LiveRun(patched, CRWPolicy(), seed=0).compiled_policy is None
+    inner = build_stack(world, [ThrottleConfig(waveform=Waveform(kind="constant", amplitude=0.1))])
+    assert LiveRun(inner, CRWPolicy(), seed=0).compiled_policy is not None
+    inner.stack[1].step_batch = inner.stack[1].step_batch
+    assert LiveRun(inner, CRWPolicy(), seed=0).compiled_policy is None
     assert not is_compiled(world, tick_by_tick(CRWPolicy()))
     assert not is_compiled(scenario("warehouse_small", n_robots=2, physics="chipmunk"), CRWPolicy())
 

@@ -6,6 +6,7 @@ way and then uses it. Digests are mostly made to fit where the change is inside,
 """
 
 import base64
+import contextlib
 import json
 import os
 import re
@@ -134,7 +135,8 @@ def give(random: Random, folder: Path, kind: str, *, to_a_command: bool) -> tupl
         os.chdir(here)
     file = changed_file(random, folder, kind)
     words = words_for(random, file, kind) if to_a_command else ()
-    before, n_errors, least = _names(folder), _n_errors(), _peak_bytes(anew=True)
+    _forget_peak()
+    before, n_errors, held = _names(folder), _n_errors(), _peak_bytes()
     if words:
         code, fault = given_to_a_command(words)
         told = f"ended with exit code {code}"
@@ -142,7 +144,7 @@ def give(random: Random, folder: Path, kind: str, *, to_a_command: bool) -> tupl
         told, fault = read_by_its_reader(kind, file)
         fault = fault or ("wrote into the current folder" if _names(here) else "")
     new = _names(folder) - before
-    grown = _peak_bytes() - least
+    grown = _peak_bytes() - held
     fault = fault or (f"wrote {', '.join(new)}" if new else "") or _errors(n_errors)
     fault = fault or (f"took {grown:,} bytes of memory" if grown > MOST_GROWN else "")
     return told, f"{shlex.join(words or (kind, file.name))[:2000]}\n{fault}" if fault else ""
@@ -163,12 +165,16 @@ def _errors(n_before: int) -> str:
     return os.pread(2, 4000, n_before).decode("utf-8", "replace") if _n_errors() > n_before else ""
 
 
-def _peak_bytes(*, anew: bool = False) -> int:
-    """Return the most memory that this process has held since it was last asked to begin anew."""
-    if not PEAK.exists():  # not Linux: the most since the process began, in which a smaller peak hides
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-    if anew:
+def _forget_peak() -> None:
+    """Let `_peak_bytes` begin anew, where the system can."""
+    with contextlib.suppress(OSError):
         PEAK.with_name("clear_refs").write_text("5")
+
+
+def _peak_bytes() -> int:
+    """Return the most memory that this process has held since `_forget_peak`, or ever where it cannot be forgotten."""
+    if not PEAK.exists():  # not Linux
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     _, _, held = PEAK.read_bytes().partition(b"VmHWM:")
     return int(held.split(b"kB", 1)[0]) * 1024
 

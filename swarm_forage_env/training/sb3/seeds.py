@@ -182,13 +182,13 @@ def _heard(connection: Any, process: BaseProcess) -> tuple[News | None, bool]:
 
 def _how_it_ended(code: int) -> str:
     """Say how a process ended that did not say it itself, and what to do."""
-    if code == -signal.SIGKILL:
+    if code == -getattr(signal, "SIGKILL", 9):  # Windows has none
         return (
             "its process was killed, most likely because memory ran out; try fewer trainings at a time (--jobs 1), "
-            "then --resume"
+            "then --resume (with --trust-models)"
         )
     how = f"exit code {code}" if code >= 0 else f"signal {-code}"
-    return f"its process ended with {how} before the training was over; --resume goes on with it"
+    return f"its process ended with {how} before the training was over; --resume (with --trust-models) goes on with it"
 
 
 def _started(job: _Job) -> tuple[Any, BaseProcess]:

@@ -19,6 +19,7 @@ from metrics.benchmark import (
     standing_of,
 )
 from metrics.benchmark.page import BEGIN, END, bounded, with_block
+from metrics.benchmark.protocol import protocol_versions
 from metrics.benchmark.standing import improvements, over_trainings, scripted_entries
 from metrics.distributions import interquartile_mean
 from swarm_forage_env._internal.wording import plain_markdown
@@ -52,8 +53,9 @@ def test_the_reference_is_the_best_scripted_controller_of_each_world(protocol, r
     assert "room, 1 robot" not in reference.best
 
 
-def test_no_scripted_controller_wins_against_itself():
-    protocol = load_protocol()
+@pytest.mark.parametrize("version", protocol_versions())
+def test_no_scripted_controller_wins_against_itself(version):
+    protocol = load_protocol(version=version)
     entries = scripted_entries(protocol)
     reference = reference_of(entries, protocol)
     assert [standing_of(entry, reference, protocol).n_won for entry in entries] == [0] * len(entries)
@@ -224,8 +226,9 @@ def test_the_figure_shows_every_entry_and_world(protocol, scripted, reference, t
     assert {"CRW", "DPO", "STOCHM", "STOCHX", "room, noisy wheels"} <= {*words_in(tmp_path / "it.svg")}
 
 
-def test_the_entries_of_the_scripted_controllers_are_whole_and_achieve_something():
-    protocol = load_protocol()
+@pytest.mark.parametrize("version", protocol_versions())
+def test_the_entries_of_the_scripted_controllers_are_whole_and_achieve_something(version):
+    protocol = load_protocol(version=version)
     entries = scripted_entries(protocol)
     assert tuple(entry.name for entry in entries) == PAPER_POLICIES
     reference_of(entries, protocol)

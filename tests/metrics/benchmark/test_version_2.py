@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from metrics.benchmark import BenchmarkError, Training, benchmark_question, load_protocol, read_entry
+from metrics.benchmark import BenchmarkError, Training, benchmark_question, board_of, load_protocol, read_entry
 from metrics.benchmark.entry import read_entries
 from swarm_forage_env import plan_run, scenario
 from swarm_forage_env._internal.fields import as_tuples
@@ -89,9 +89,9 @@ def test_a_training_that_does_not_fit_its_track_is_refused(protocol, fields, n_p
 
 
 def test_version_1_has_no_tracks():
-    with pytest.raises(BenchmarkError, match=r"version 1 \(none\), got '10M'"):
+    with pytest.raises(BenchmarkError, match="Expected no track for version 1, got '10M'; leave out --track"):
         benchmark_question(["crw"], name="one", protocol=load_protocol(), training=IN_10M)
-    with pytest.raises(BenchmarkError, match="Expected decisions with a track"):
+    with pytest.raises(BenchmarkError, match="Expected no decisions for version 1, got 5; leave out --track"):
         Training(decisions=5).check_track(load_protocol(), 1)
 
 
@@ -125,6 +125,22 @@ def test_an_entry_is_read_as_one_of_the_version_that_it_names_and_refused_for_an
 def test_an_entry_whose_training_does_not_fit_its_track_is_no_entry(protocol, tmp_path):
     with pytest.raises(BenchmarkError, match="Expected 5 trainings for the track 10M, got 2"):
         read_entry(entry_file(tmp_path, "two", protocol, n_policies=2, training=IN_10M))
+
+
+def test_one_network_in_five_files_is_no_five_trainings(protocol, tmp_path):
+    entry = made_up_entry(protocol, "copies", lambda k: 10.0, measures=(), n_policies=5, training=IN_10M)
+    for digests in ("abcde", "abcda"):
+        policies = tuple(replace(one, digest=mark) for one, mark in zip(entry.policies, digests, strict=True))
+        replace(entry, policies=policies).write(tmp_path / f"{digests}.json")
+    assert read_entry(tmp_path / "abcde.json").name == "copies"
+    with pytest.raises(BenchmarkError, match=r"Expected different trainings in .*abcda\.json, got one file twice"):
+        read_entry(tmp_path / "abcda.json")
+
+
+def test_entries_of_two_versions_are_on_no_board(protocol):
+    entries = [made_up_entry(of, "one", lambda k: 10.0, measures=()) for of in (load_protocol(version=1), protocol)]
+    with pytest.raises(BenchmarkError, match="one version of the benchmark, got version 2 beside version 1"):
+        board_of(entries)
 
 
 def test_versions_that_there_are_not_are_refused(tmp_path):
