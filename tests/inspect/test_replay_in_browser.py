@@ -262,6 +262,15 @@ def test_the_subtitle_names_what_disturbs_the_runs(replays, pair, desktop, tmp_p
     assert "quiet:" not in desktop.text("#subtitle")
 
 
+def test_the_subtitle_names_a_world_of_ones_own_and_what_differs_from_the_preset(replays, desktop, tmp_path):
+    arena = dataclasses.replace(replays[1].spec.scenario.arena, obstacles=((4.0, 2.0, 4.4, 3.0),))
+    scenario = dataclasses.replace(replays[1].spec.scenario, arena=arena)
+    mine = dataclasses.replace(replays[1].spec, world=World(scenario, name="hall"))
+    desktop.open(write_replays(tmp_path / "mine.html", [dataclasses.replace(replays[1], spec=mine)]))
+    assert desktop.text("#subtitle").startswith("hall (warehouse small) with ")
+    assert "obstacles 4,2,4.4,3" in desktop.text("#subtitle")
+
+
 def test_robots_that_are_not_yet_born_are_not_called_dead(desktop, tmp_path):
     births = parse_wrapper("population:initial_robots=2,birth_per_tick=0.02")
     replay, _ = record_replay(plan_run(WORLD, "random", wrappers=(births,), seed=1), seconds=40.0)

@@ -172,7 +172,7 @@ def _about(replay: Replay) -> dict[str, Any]:
     return {
         "label": replay.label,
         "run_id": spec.run_id,
-        "scenario": scenario.name,
+        "scenario": replace(spec.world, wrappers=()).title(),
         "policy": spec.policy,
         "seed": spec.seed,
         "n_robots": scenario.robots.n_robots,
