@@ -207,6 +207,16 @@ def test_robots_policy_scenario_and_seed_start_another_run():
     assert about["header"]["n_robots"] == scenario("warehouse_small").robots.n_robots
 
 
+def test_a_world_keeps_its_name_until_another_one_is_chosen():
+    session = PlaySession(Setting(world=World(SMALL, name="hall"), policy="crw", seed=3), clock=Clock())
+    for command in (None, {"do": "start", "seed": 9}, {"do": "wall", "box": WALL}):
+        if command is not None:
+            session.carry_out(command)
+        assert session.frame()["about"]["place"] == "hall (warehouse_small)"
+    session.carry_out({"do": "start", "scenario": "warehouse_small"})
+    assert session.frame()["about"]["place"] == "warehouse_small"
+
+
 @pytest.mark.parametrize(
     "command",
     [

@@ -220,6 +220,7 @@ class PlaySession:
         run, here = self.run, self.run.scenario
         return {
             "disturbances": [config.in_words(here.dt_s) for config in run.given],
+            "place": self.setting.world.place,
             "scenarios": list(dict.fromkeys((*PRESETS, here.name))),
             "policies": list(self._policies),
             "policy": self.setting.policy,
@@ -335,9 +336,9 @@ class PlaySession:
         """Start a run, the same or another one, with the levels of now; a chosen scenario begins as its preset."""
         if asked.policy is not None:
             known_name("policy", asked.policy, self._policies)
-        world = World(self.setting.world.scenario, self.run.levels.configs)
+        world = replace(self.setting.world, wrappers=self.run.levels.configs)
         if asked.scenario is not None:
-            world = replace(world, scenario=scenario(asked.scenario))
+            world = replace(world, scenario=scenario(asked.scenario), name="")
         if asked.robots is not None:
             whole("robots", asked.robots, at_least=1, at_most=most_robots(world.scenario))
             world = replace(world, scenario=with_overrides(world.scenario, n_robots=asked.robots))
@@ -353,7 +354,8 @@ class PlaySession:
 
     def _with_walls(self, walls: tuple[Rectangle, ...]) -> str:
         here = with_overrides(self.setting.world.scenario, obstacles=walls)
-        self._begin(replace(self.setting, world=World(here, self.run.levels.configs)))
+        world = replace(self.setting.world, scenario=here, wrappers=self.run.levels.configs)
+        self._begin(replace(self.setting, world=world))
         return f"started again with {len(walls)} wall{'' if len(walls) == 1 else 's'}"
 
     def _add_wall(self, asked: "_Wall") -> str:

@@ -45,7 +45,7 @@ function showSetting(page, about) {
   const facts = [`${header.n_robots} robots`, `${header.n_objects} objects`, `${width_m} × ${height_m} m`,
     `seed ${header.seed}`];
   if (obstacles_m.length > 0) facts.push(obstacles_m.length === 1 ? "1 wall" : `${obstacles_m.length} walls`);
-  document.getElementById("title").textContent = `${header.label} in ${header.scenario.replaceAll("_", " ")}`;
+  document.getElementById("title").textContent = `${header.label} in ${about.place.replaceAll("_", " ")}`;
   document.getElementById("subtitle").textContent = [...facts, ...about.disturbances].join("  ·  ");
   document.getElementById("seed").value = String(header.seed);
   fill("scenario", about.scenarios.map((name) => [name, name.replaceAll("_", " ")]), header.scenario);
