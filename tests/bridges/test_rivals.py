@@ -1,5 +1,7 @@
 """The scripts behind entries of the benchmark carry out a plan, with libraries that `scripts/test_bridges` installs."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,9 @@ from swarm_forage_env.training.plan import read_plan
 from tests.bridges.test_pages import ROOT, check_runs, require, run
 
 PLAN = ROOT / "tests" / "support" / "tiny_plan.toml"
-PLANS = sorted((ROOT / "docs" / "benchmark" / "plans").glob("*.toml"))
+ENTRIES = ROOT / "docs" / "benchmark"
+ELSEWHERE = ENTRIES / "plans" / "minute.toml"
+PLANS = sorted({*(ENTRIES / "plans").glob("*.toml")} - {ELSEWHERE})
 
 
 @pytest.mark.parametrize("path", PLANS, ids=lambda path: path.stem)
@@ -28,6 +32,12 @@ def test_rivals_train_in_the_training_worlds_as_they_are(path):
     sizes = {config.name: (config.arena.width_m, config.arena.height_m) for config in plan.sampler.corners}
     given = [each.world.scenario for each in load_protocol().worlds if not each.is_held_out]
     assert sizes == {config.name: (config.arena.width_m, config.arena.height_m) for config in given}
+
+
+def test_the_entry_of_a_plan_that_trains_elsewhere_says_so():
+    entry = json.loads((ENTRIES / f"{ELSEWHERE.stem}.json").read_text(encoding="utf-8"))
+    assert entry["training"]["worlds"] == "other"
+    assert ELSEWHERE.name in entry["training"]["command"]
 
 
 def test_mappo_with_torchrl_carries_out_a_plan(tmp_path):
