@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -43,7 +44,9 @@ def test_a_copy_continues_as_the_original_does(policy_class, copied):
     of_policy = [policy.act(obs, active).copy() for _ in range(2 * TICKS)]
     np.testing.assert_array_equal(of_twin, of_policy)
     np.testing.assert_array_equal(twin.activity, policy.activity)
-    assert np.ptp(of_policy, axis=0).any(), "they do something"
+    changes = [not np.array_equal(before, after) for before, after in pairwise(of_policy)]
+    # CPFA drives straight for a while; the others turn at once.
+    assert any(changes) if policy_class is CPFAPolicy else changes[0], "they do something"
 
 
 @pytest.mark.parametrize("policy_class", POLICIES)
