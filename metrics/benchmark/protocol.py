@@ -139,6 +139,11 @@ def protocol_folder() -> Path:
     return Path(__file__).parent
 
 
+def folder_of(version: int, folder: Path) -> Path:
+    """Return where a folder of entries holds those of a version: version 1 came first and lies in the folder itself."""
+    return folder if version == 1 else folder / f"v{version}"
+
+
 def protocol_versions() -> tuple[int, ...]:
     """Return the versions that there are, the oldest first."""
     found = (path.stem.removeprefix("benchmark_v") for path in protocol_folder().glob("benchmark_v*.toml"))

@@ -19,7 +19,7 @@ from ..curves import FloatArray
 from ..distributions import interquartile_mean, optimality_gap, probability_of_improvement
 from ..statistics import Estimate, aggregate
 from .entry import Entry, EntryMeasure, read_entry
-from .protocol import BenchmarkError, Protocol, ProtocolWorld
+from .protocol import BenchmarkError, Protocol, ProtocolWorld, folder_of
 
 _SEED = 1
 """Seed of the bootstrap; fixed, so that the same entries give the same page."""
@@ -70,8 +70,7 @@ class Standing:
 
 def scripted_folder(version: int) -> Path:
     """Return where the entries of the scripted controllers in a version of the benchmark are."""
-    folder = Path(__file__).parent / "scripted"
-    return folder if version == 1 else folder / f"v{version}"
+    return folder_of(version, Path(__file__).parent / "scripted")
 
 
 def scripted_entries(protocol: Protocol, folder: Path | None = None) -> tuple[Entry, ...]:

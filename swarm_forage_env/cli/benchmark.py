@@ -97,6 +97,7 @@ def run(
     if quick and file is not None:
         raise typer.BadParameter("Expected --file without --quick: a quick look is no entry.")
     from metrics.benchmark import benchmark_question, board_of, load_protocol, scripted_entries
+    from metrics.benchmark.protocol import folder_of
     from metrics.benchmark.running import entry_name
     from metrics.scoring.question import ask
     from swarm_forage_env._internal.files import as_file_name, check_file
@@ -114,7 +115,9 @@ def run(
     if dry_run:
         typer.echo(_plan_text(question, out, jobs))
         return
-    entry_file = None if quick else file or _of_version("results/benchmark", version) / f"{as_file_name(called)}.json"
+    entry_file = (
+        None if quick else file or folder_of(version, Path("results/benchmark")) / f"{as_file_name(called)}.json"
+    )
     if entry_file is not None:
         check_file(entry_file)
     if called not in PAPER_POLICIES:
@@ -215,11 +218,6 @@ def _board_of(paths: list[Path]) -> "Board":
     from metrics.benchmark.entry import read_entries
 
     return board_of(read_entries(entry_files(paths)))
-
-
-def _of_version(folder: str, version: int) -> Path:
-    """The folder for entries of a version: a folder holds those of one."""
-    return Path(folder) if version == 1 else Path(folder, f"v{version}")
 
 
 def _show(board: "Board", *, as_json: bool) -> None:
