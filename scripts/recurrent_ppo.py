@@ -12,14 +12,13 @@ import argparse
 import dataclasses
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
 from sb3_contrib import RecurrentPPO
 from stable_baselines3.common.vec_env import VecEnvWrapper
 
-from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
+from swarm_forage_env.training.plan import read_plan
 from swarm_forage_env.training.sb3 import SwarmVecEnv
 from swarm_forage_env.training.sb3.export import note_interface
 from swarm_forage_env.training.sb3.training import training_seed
@@ -59,15 +58,6 @@ class UsedRows(VecEnvWrapper):
         return np.asarray(obs)[self._used], rewards[self._used], dones[self._used], [infos[row] for row in self._used]
 
 
-def environment(plan: TrainingPlan, stage: Stage) -> UsedRows:
-    """Return the arenas of a stage."""
-    sampler = stage.sampler or plan.sampler
-    fixed = {"scenario": plan.scenario, "wrappers": plan.wrappers}
-    given: dict[str, Any] = {"sampler": sampler} if sampler else fixed
-    env = SwarmVecEnv(n_arenas=plan.n_arenas, interface=plan.interface, **given)
-    return UsedRows(env, dict(stage.scenario))
-
-
 def main() -> None:
     """Carry the plan out stage by stage, and save the model with a note of its interface."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -82,7 +72,7 @@ def main() -> None:
     started, done, end = time.perf_counter(), 0, 0
     for stage in plan.stages:
         end += stage.steps
-        env = environment(plan, stage)
+        env = UsedRows(SwarmVecEnv(**plan.arenas_of(stage)), dict(stage.scenario))
         options = {**plan.options, **stage.options, "seed": training_seed(plan.seed, done)}
         if done:  # the same weights in other arenas
             model = RecurrentPPO.load(args.out, env=env, device="cpu", **options)

@@ -153,14 +153,6 @@ def rollout(envs: SwarmVectorEnv, learner: Learner, obs: np.ndarray, active: np.
     return taught, obs, active, float(batch["reward"][batch["at_work"]].mean())
 
 
-def environment(plan: TrainingPlan, stage: Stage) -> SwarmVectorEnv:
-    """Return the arenas of a stage."""
-    sampler = stage.sampler or plan.sampler
-    fixed = {"scenario": plan.scenario, "wrappers": plan.wrappers}
-    given: dict[str, Any] = {"sampler": sampler} if sampler else fixed
-    return SwarmVectorEnv(n_arenas=plan.n_arenas, interface=plan.interface, **given)
-
-
 def options_of(plan: TrainingPlan, stage: Stage) -> dict:
     """Return the numbers of PPO in a stage; refuses a plan for another algorithm, and options that it does not know."""
     options = {**plan.options, **stage.options}
@@ -187,7 +179,7 @@ def main() -> None:
     started, done, end = time.perf_counter(), 0, 0
     for stage in plan.stages:
         options = options_of(plan, stage)
-        envs = environment(plan, stage)
+        envs = SwarmVectorEnv(**plan.arenas_of(stage))
         end += stage.steps
         first_seed = int(np.random.default_rng((plan.seed, done)).integers(2**31))  # another one in each stage
         obs, infos = envs.reset(seed=first_seed, options={"scenario": dict(stage.scenario)})

@@ -251,6 +251,12 @@ class TrainingPlan:
             check_turned(self.interface)
         self.judging(LEARNING)  # refuses horizons that cannot be
 
+    def arenas_of(self, stage: Stage) -> dict[str, Any]:
+        """Return the arguments of the vector environments of a stage, such as `SwarmVecEnv`."""
+        sampler = stage.sampler or self.sampler
+        worlds = {"sampler": sampler} if sampler else {"scenario": self.scenario, "wrappers": self.wrappers}
+        return {**worlds, "n_arenas": self.n_arenas, "interface": self.interface, "turned": bool(self.turned)}
+
     def _check_worlds(self) -> None:
         """Refuse worlds that are said twice, that cannot be, or that one policy cannot have in common."""
         if self.sampler is not None and (self.scenario != self.sampler.largest or self.wrappers):

@@ -160,13 +160,13 @@ def test_a_recurrent_rival_carries_out_a_plan(tmp_path, monkeypatch):
 
 def test_a_recurrent_rival_learns_from_rows_of_robots_only():
     require("sb3_contrib", "sb3")
-    from scripts.recurrent_ppo import UsedRows, environment
+    from scripts.recurrent_ppo import UsedRows
     from swarm_forage_env.training.sb3 import SwarmVecEnv
 
     plan = read_plan(PLAN)
-    env = environment(plan, plan.stages[0])
+    env = UsedRows(SwarmVecEnv(**plan.arenas_of(plan.stages[0])), {})
     env.seed(5)
-    every = SwarmVecEnv(n_arenas=2, interface=plan.interface, sampler=plan.sampler)
+    every = SwarmVecEnv(**plan.arenas_of(plan.stages[0]))
     every.seed(5)
     used = [0, 1, 2, 3, 6, 7, 8, 9, 10, 11]
     np.testing.assert_array_equal(env.reset(), every.reset()[used])

@@ -29,7 +29,7 @@ from swarm_forage_env.training.evaluations import (
 )
 from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan, named_plan, read_plan
 from swarm_forage_env.training.recipe import recipe
-from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv, training
+from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv
 from swarm_forage_env.training.sb3.training import train
 from swarm_forage_env.views.turns import AS_IT_IS
 from swarm_forage_env.wrappers.registry import wrapper_configs
@@ -277,8 +277,8 @@ def test_a_plan_beside_a_training_says_how_it_was(turned, tmp_path):
 @pytest.mark.parametrize("turned", [True, False])
 def test_a_training_turns_its_arenas(turned):
     plan = tiny_plan(turned=turned)
-    env = training._arenas(plan, plan.stages[0], 0)
+    env = SwarmVecEnv(**plan.arenas_of(plan.stages[0]))
     env.seed(0)
     env.reset()
-    turns = {arena.turn for arena in env._arenas.arenas}
+    turns = {arena.turn for arena in env._arenas.arenas}  # type: ignore[attr-defined] - all in this process
     assert (turns != {AS_IT_IS}) is turned

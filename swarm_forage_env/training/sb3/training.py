@@ -158,7 +158,7 @@ def _train(
     together = _Together(watch, callbacks)
     if available_cores() > 1:
         compile_world(plan.scenario)
-    env = _arenas(plan, plan.stages[0], n_processes)
+    env = SwarmVecEnv(**plan.arenas_of(plan.stages[0]), n_processes=n_processes)
     sampler = plan.stages[0].sampler
     try:
         model = _checkpoint(plan, folder, env) if resume else None
@@ -170,7 +170,7 @@ def _train(
             if done < ends:
                 if stage.sampler != sampler:
                     env.close()
-                    env, sampler = _arenas(plan, stage, n_processes), stage.sampler
+                    env, sampler = SwarmVecEnv(**plan.arenas_of(stage), n_processes=n_processes), stage.sampler
                 model = _prepared(plan, stage, folder, env, done)
                 _learn(model, ends - done, together, f"stage {number}{_changes(stage)}")
             if together.ended:
@@ -187,20 +187,6 @@ def _train(
         evaluations=tuple(watch.evaluations),
         policy_file=policy_file,
         steps=model.num_timesteps - begun,
-    )
-
-
-def _arenas(plan: TrainingPlan, stage: Stage, n_processes: int) -> SwarmVecEnv:
-    """Return the arenas of a stage."""
-    sampler = stage.sampler or plan.sampler
-    return SwarmVecEnv(
-        plan.scenario if sampler is None else None,
-        sampler=sampler,
-        n_arenas=plan.n_arenas,
-        n_processes=n_processes,
-        interface=plan.interface,
-        wrappers=plan.wrappers if sampler is None else (),
-        turned=bool(plan.turned),
     )
 
 
