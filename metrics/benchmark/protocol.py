@@ -121,7 +121,13 @@ class Protocol(Answer):
         )
         header = ("world", "scenario", "robots", "objects", "arena", "disturbed by", "counts")
         rows = [(world.name, *map(str, scenario_fields(world).values()), world.role) for world in self.worlds]
-        return (Sheet(title=title, header=header, rows=rows),)
+        notes = [
+            f"track {track}: {self.n_trainings} trainings of at most {budget:,} decisions, all in the worlds to train in"
+            for track, budget in self.tracks.items()
+        ]
+        if notes:
+            notes.append(f"track {OPEN}: any training, or none")
+        return (Sheet(title=title, header=header, rows=rows, notes=notes),)
 
     def to_mapping(self) -> dict[str, Any]:
         """Return what there is to run as plain values."""
@@ -130,6 +136,7 @@ class Protocol(Answer):
             "is_quick": self.is_quick,
             "horizon_s": self.horizon_s,
             "seeds": list(self.seeds),
+            "tracks": dict(self.tracks),
             "worlds": [{"world": world.name, **scenario_fields(world), "counts": world.role} for world in self.worlds],
         }
 

@@ -30,6 +30,12 @@ def test_version_2_never_changes(protocol):
     assert (protocol.version, protocol.identity) == (2, IDENTITY_OF_VERSION_2)
 
 
+def test_tracks_stand_below_the_worlds(protocol):
+    assert "track 40M: 5 trainings of at most 40,000,000 decisions" in protocol.text()
+    assert protocol.to_mapping()["tracks"] == {"10M": 10_000_000, "40M": 40_000_000}
+    assert "track" not in load_protocol(version=1).text()
+
+
 def test_it_has_three_worlds_or_more_of_eight_kinds(protocol):
     kinds = [world.group for world in protocol.scored]
     assert len({*kinds}) == 8
