@@ -3,7 +3,7 @@
     python scripts/turned_worlds.py                         generalist, the table of docs/generalist.md
     python scripts/turned_worlds.py --policy a.npz,b.npz    other networks
 
-A turned world has the same physics, and a network sees it as if its arena were turned (`views.turns`). So a network
+A turned world has the same physics, and a network sees it as if its arena were turned (`policies.turns`). So a network
 without a compass has the same performance in all columns of a world, but for chance.
 """
 
@@ -18,12 +18,12 @@ from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.pretrained import network_file
 from swarm_forage_env.policies.registry import policy_label
+from swarm_forage_env.policies.turns import Turn
 from swarm_forage_env.runs.answer import Sheet
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.plans import ArenaPlan
-from swarm_forage_env.views.turns import Turn
 from swarm_forage_env.wrappers.world import World
 
 TURNS = {

@@ -31,6 +31,7 @@ from swarm_forage_env.contract.layout import (
 )
 from swarm_forage_env.contract.policy import COMMANDS, ActionError, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
+from swarm_forage_env.policies.kernels.frames import leave_frames, take_frames
 from swarm_forage_env.policies.kernels.learner import (
     COMPACT_COLUMNS,
     GRIP_COMMANDS,
@@ -50,6 +51,7 @@ from swarm_forage_env.policies.kernels.learner import (
     show_sites,
 )
 from swarm_forage_env.policies.kernels.network import keep_on
+from swarm_forage_env.policies.turns import check_turned, frames_of
 from swarm_forage_env.scenarios.config import ScenarioConfig
 
 OBSERVATIONS = ("full", "compact")
@@ -101,6 +103,9 @@ class InterfaceConfig:
     `neighbours_seen`."""
     site_memory: bool = False
     """Two places that a robot remembers, see `policies.kernels.learner`: eight more columns."""
+    frame_decisions: int = 0
+    """Decisions for which each robot sees the world in a frame of its own, turned and mirrored in one of eight ways,
+    before it takes another, see `policies.kernels.frames`. 0: all see the world as it is."""
     own_sensors: tuple[str, ...] | None = None
     """Names of own sensors that the learner sees beside the columns of the package, in this order. Where nothing is
     said (None), environments and trainings fill in those of their scenario, and a policy sees none."""
@@ -122,8 +127,11 @@ class InterfaceConfig:
         if self.sees_kind is not None:
             switch("interface.sees_kind", self.sees_kind)
         switch("interface.site_memory", self.site_memory)
+        whole("interface.frame_decisions", self.frame_decisions, at_least=0)
         if self.own_sensors is not None:
             unique_names("interface.own_sensors", self.own_sensors)
+            if self.frame_decisions:
+                check_turned(self.own_sensors, "frames of robots' own; say frame_decisions=0")
 
     def for_scenario(self, scenario: ScenarioConfig) -> "InterfaceConfig":
         """Return these choices, with what the scenario has of neighbours, messages, kinds and own sensors unless told.
@@ -192,9 +200,10 @@ class LearnerInterface:
         )
         self._commands = np.zeros((spec.n_robots, spec.action_size), np.float32)
         self.layout = learner_layout(source, config)
-        self.shows_all = self.layout == source
+        self.shows_all = self.layout == source and config.frame_decisions == 0
         says_all = (config.message_size or 0) == spec.message_size
-        self.passes_on = says_all and config.actions != "discrete" and not config.automatic_gripper
+        is_driven = config.actions != "discrete" and not config.automatic_gripper
+        self.passes_on = says_all and is_driven and config.frame_decisions == 0
         own = [column for name in config.sensors for column in range(source[name].start, source[name].stop)]
         half_x, half_y = source.part("position").scale
         self.translation = Translation(
@@ -214,6 +223,7 @@ class LearnerInterface:
             half=(float(half_x), float(half_y)),
             reach_cells=np.array(spec.object_reach_cells, np.int32),
             sites=new_site_memory(spec.n_robots),
+            frames=frames_of(config.frame_decisions, self.layout, spec.n_robots),
             wheels=np.array(list(MOTION_WHEELS.values()), np.float32),
             grips=np.array(list(GRIP_COMMANDS.values()), np.float32),
         )
@@ -251,12 +261,13 @@ class LearnerInterface:
             for part, kept in zip(self.translation.sites, memory, strict=True):
                 np.copyto(part, kept)
 
-    def observe(self, obs: ObsArray, out: ObsArray | None = None) -> ObsArray:
+    def observe(self, obs: ObsArray, out: ObsArray | None = None, *, decision: int = 0) -> ObsArray:
         """Return what the learner sees, a new array or `out`; with `site_memory`, robots remember it.
 
         Args:
             obs: (N, D) observations of the environment, in each decision of a run.
             out: (N, d) float32 to write into.
+            decision: How many decisions of the run came before; `frame_decisions` needs it.
         """
         if out is None:
             out = np.empty((len(obs), self.layout.size), np.float32)
@@ -272,6 +283,7 @@ class LearnerInterface:
             at += N_SITES * SITE_COLUMNS
         if len(t.own_columns):
             out[:, at:] = obs[:, t.own_columns]
+        take_frames(out, decision, t.frames)
         return out
 
     def command(self, actions: np.ndarray, obs: ObsArray) -> ActionArray:
@@ -315,6 +327,7 @@ class LearnerInterface:
                 np.copyto(commands[:, COMMANDS:], actions[:, driven:], casting="same_kind")
         if t.grips_itself:
             automatic_grip(obs, t.grip_starts, commands)
+        leave_frames(commands, t.frames)
         return commands
 
     def keeping_on(self, actions: np.ndarray) -> tuple[Callback, tuple[Any, ...]]:

@@ -104,7 +104,7 @@ class LearnedPolicy(InterfacePolicy):
         self._bind(spec)
         self._rng = rng
         self._view = np.empty((spec.n_robots, self.interface.layout.size), np.float32)
-        self._ticks_left = 0
+        self._ticks_left, self._decision = 0, 0
         self._memory: Any = None
 
     @property
@@ -115,10 +115,11 @@ class LearnedPolicy(InterfacePolicy):
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
         """Choose actions; see `Policy.act`. The returned (N, A) array is reused by the next call."""
         if self._ticks_left == 0:
-            view = self.interface.observe(obs, self._view)
+            view = self.interface.observe(obs, self._view, decision=self._decision)
             self._chosen, self._memory = self._remember(view, self._memory, self._rng)
             self._checked = self.interface.checked(self._chosen)
             self._ticks_left = self._config.decision_ticks
+            self._decision += 1
         self._ticks_left -= 1
         return self.interface.carry_out(self._checked, obs)
 

@@ -24,6 +24,7 @@ from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_
 from swarm_forage_env.policies.network import ACTIVATIONS
 from swarm_forage_env.policies.pretrained import plan_file
 from swarm_forage_env.policies.registry import policy_class
+from swarm_forage_env.policies.turns import AS_DRAWN, check_turned
 from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.policy_spec import PolicySpec
 from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -37,7 +38,6 @@ from swarm_forage_env.training.defaults import (
 )
 from swarm_forage_env.training.evaluation_worlds import CHOSEN_BY, COUNTED, EvaluationWorld, scenario_of, tuples
 from swarm_forage_env.views.sampler import ScenarioSampler, columns_of
-from swarm_forage_env.views.turns import check_turned
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import wrappers_from_mapping
 from swarm_forage_env.wrappers.world import World
@@ -215,7 +215,7 @@ class TrainingPlan:
     sampler: ScenarioSampler | None = None
     """Draws the world of each episode; None = it is always `world`. Then `evaluation` has worlds."""
     turned: bool | None = None
-    """Whether the learner sees each episode turned or mirrored (`views.turns`), so that it cannot learn the compass by
+    """Whether the learner sees each episode turned or mirrored (`policies.turns`), so that it cannot learn the compass by
     heart; None = where samplers draw the worlds. Evaluations show their worlds as they are."""
 
     def __post_init__(self) -> None:
@@ -248,7 +248,7 @@ class TrainingPlan:
             object.__setattr__(self, "turned", self.is_sampled)
         switch("turned", self.turned)
         if self.turned:
-            check_turned(self.interface)
+            check_turned(self.interface.own_sensors or (), AS_DRAWN)
         self.judging(LEARNING)  # refuses horizons that cannot be
 
     def arenas_of(self, stage: Stage) -> dict[str, Any]:

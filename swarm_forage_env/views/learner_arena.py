@@ -21,10 +21,10 @@ from swarm_forage_env.policies.interface import (
 )
 from swarm_forage_env.policies.kernels.learner import SiteMemory
 from swarm_forage_env.policies.kernels.network import keep_on
+from swarm_forage_env.policies.turns import AS_IT_IS, Turn, turn_of
 from swarm_forage_env.scenarios.config import SECTIONS
 from swarm_forage_env.scenarios.overrides import field_sections
 from swarm_forage_env.views.plans import ArenaPlan
-from swarm_forage_env.views.turns import AS_IT_IS, Turn, turn_of
 from swarm_forage_env.world.snapshots import Snapshot, SnapshotError
 from swarm_forage_env.wrappers.base import SwarmWrapper, needs_no_python
 from swarm_forage_env.wrappers.world import World
@@ -294,7 +294,9 @@ class LearnerArena:
         """Return what the learner sees now, (rows, d): a new array, or `out`."""
         if out is None:
             out = np.empty((self.n_rows, self.interface.layout.size), np.float32)
-        self.turn.rows(self.interface.observe(self.env.last_obs, out[: self.n_robots]), self.interface.layout)
+        decision = self.forage_env.tick // self._plan.interface.decision_ticks
+        seen = self.interface.observe(self.env.last_obs, out[: self.n_robots], decision=decision)
+        self.turn.rows(seen, self.interface.layout)
         out[self.n_robots :] = 0.0
         return out
 

@@ -9,11 +9,11 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 from swarm_forage_env._internal.fields import ConfigError, instance, switch
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import GivenInterface, InterfaceConfig, chosen_interface
+from swarm_forage_env.policies.turns import AS_DRAWN, check_turned
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import scenario_of_same_size
 from swarm_forage_env.scenarios.presets import chosen_scenario
 from swarm_forage_env.views.sampler import ScenarioSampler
-from swarm_forage_env.views.turns import check_turned
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig, wrap_in_order
 from swarm_forage_env.wrappers.registry import wrapper_configs
 from swarm_forage_env.wrappers.world import World
@@ -38,7 +38,7 @@ class ArenaPlan:
     snapshots: bool = False
     """Keep what copies and snapshots need; see `ForageEnv`."""
     turned: bool = False
-    """Whether learners see each run turned or mirrored, see `views.turns`."""
+    """Whether learners see each run turned or mirrored, see `policies.turns`."""
 
     def build(self, overrides: Mapping[str, Any], world: World | None = None) -> ForageEnv | SwarmWrapper:
         """Build the environment with its wrappers.
@@ -110,7 +110,7 @@ def plan_arena(
         render_mode: None, "rgb_array" or "human"; see `ForageEnv`.
         snapshots: Keep what copies and snapshots need; see `ForageEnv`.
         turned: Show each run turned by quarter turns or mirrored, one of eight ways that its seed draws, so that a
-            learner cannot learn the compass by heart (`views.turns`). `ForageEnv` itself shows the world as it is.
+            learner cannot learn the compass by heart (`policies.turns`). `ForageEnv` itself shows the world as it is.
         overrides: Scenario fields by name (`n_robots=20`, `n_objects=100`, `caches="static"`).
 
     Raises:
@@ -136,7 +136,7 @@ def plan_arena(
     chosen = chosen_interface(interface).for_scenario(config)
     switch("turned", turned)
     if turned:
-        check_turned(chosen)
+        check_turned(chosen.own_sensors or (), AS_DRAWN)
     return ArenaPlan(
         world=World(config, disturbing),
         sampler=sampler,

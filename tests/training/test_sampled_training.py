@@ -15,6 +15,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.training_report import heading
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.network import Network
+from swarm_forage_env.policies.turns import AS_IT_IS
 from swarm_forage_env.runs.table import Table
 from swarm_forage_env.scenarios.presets import warehouse_small
 from swarm_forage_env.training import evaluations
@@ -31,7 +32,6 @@ from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan, 
 from swarm_forage_env.training.recipe import recipe
 from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv
 from swarm_forage_env.training.sb3.training import train
-from swarm_forage_env.views.turns import AS_IT_IS
 from swarm_forage_env.wrappers.registry import wrapper_configs
 from swarm_forage_env.wrappers.world import World
 from tests.support.sampled import TWO_WORLDS, sampler

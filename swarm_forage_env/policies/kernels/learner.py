@@ -18,6 +18,7 @@ from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.contract.detection import is_obstacle_vector, ring_sum, sees_cache, sees_nest
 from swarm_forage_env.contract.layout import GROUND_SENSORS, RING_SENSORS, WINDOW_CELLS
 from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env.policies.kernels.frames import Frames
 from swarm_forage_env.scenarios.floor import CELLS_PER_M
 
 COMPACT_COLUMNS = 23
@@ -215,6 +216,7 @@ class Translation(NamedTuple):
     reach_cells: IntArray
     """(N,) see `is_near`."""
     sites: SiteMemory
+    frames: Frames
     wheels: ActionArray
     """(N_MOTIONS, 2)."""
     grips: ActionArray

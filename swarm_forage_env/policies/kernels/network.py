@@ -12,6 +12,7 @@ import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, IntArray, ObsArray, Row
+from swarm_forage_env.policies.kernels.frames import leave_frames, take_frames
 from swarm_forage_env.policies.kernels.learner import (
     N_SITES,
     SITE_COLUMNS,
@@ -170,7 +171,7 @@ def pick(logits: Row, samples: bool, chance: float, powers: FloatArray) -> int:
 
 
 @kernel
-def see(obs: ObsArray, t: Translation, view: ObsArray) -> None:
+def see(obs: ObsArray, decision: int, t: Translation, view: ObsArray) -> None:
     """Write what robots see (N, d), as `LearnerInterface.observe` does, and let them remember it."""
     if t.is_compact:
         compact_view(obs, t.view_starts, t.half[0], t.half[1], t.behind_counts, view)
@@ -186,12 +187,13 @@ def see(obs: ObsArray, t: Translation, view: ObsArray) -> None:
     for i in range(obs.shape[0]):
         for c in range(t.own_columns.shape[0]):
             view[i, at + c] = obs[i, t.own_columns[c]]
+    take_frames(view, decision, t.frames)
 
 
 @kernel
-def decide(obs: ObsArray, draws: FloatArray, t: Translation, layers: Layers, choice: Choice) -> None:
-    """Make the decision of every robot that is in the world."""
-    see(obs, t, choice.seen)
+def decide(obs: ObsArray, draws: FloatArray, decision: int, t: Translation, layers: Layers, choice: Choice) -> None:
+    """Make the decision of every robot that is in the world; `decision` = how many were made before."""
+    see(obs, decision, t, choice.seen)
     heading = t.pose_starts[1]
     for i in range(obs.shape[0]):
         choice.is_made[i] = obs[i, heading] != 0.0 or obs[i, heading + 1] != 0.0
@@ -222,6 +224,7 @@ def carry_out(obs: ObsArray, t: Translation, number: IntArray, values: ObsArray,
                 actions[i, actions.shape[1] - n_said + c] = values[i, n_driven + c]
     if t.grips_itself:
         automatic_grip(obs, t.grip_starts, actions)
+    leave_frames(actions, t.frames)
 
 
 @kernel
@@ -251,5 +254,5 @@ def step_network(
     """
     t, layers, choice, actions = state
     if (now - 1) % t.decision_ticks == 0:
-        decide(obs, draws, t, layers, choice)
+        decide(obs, draws, (now - 1) // t.decision_ticks, t, layers, choice)
     carry_out(obs, t, choice.number, choice.outputs, actions)

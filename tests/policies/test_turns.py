@@ -11,13 +11,13 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.own_functions import register_sensor
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
+from swarm_forage_env.policies.turns import AS_IT_IS, TURNS, Turn, turn_of
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.arenas import ArenaBatch
 from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv
 from swarm_forage_env.views.plans import plan_arena
 from swarm_forage_env.views.processes import ArenaProcesses
-from swarm_forage_env.views.turns import AS_IT_IS, TURNS, Turn, turn_of
 from tests.support.sampled import sampler
 from tests.support.stage import build_cache, clear, lay, load, put
 

@@ -5,6 +5,7 @@ so nothing in it needs to change: it is enough to turn what robots see of it. Th
 is exact. An arena that is turned by a quarter shows itself as one whose width and height are exchanged.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
@@ -25,8 +26,11 @@ from swarm_forage_env.contract.layout import (
 )
 from swarm_forage_env.contract.policy import state_size
 from swarm_forage_env.contract.types import BoolArray, IntArray, ObsArray
-from swarm_forage_env.policies.interface import GRIPS, MOTIONS, InterfaceConfig
+from swarm_forage_env.policies.kernels.frames import N_FRAMES, Frames
+from swarm_forage_env.policies.kernels.learner import GRIP_COMMANDS, MOTION_WHEELS
 
+AS_DRAWN = "turned worlds; say turned=False (--as-drawn)"
+"""What turns all that a learner sees, and how to do without, for `check_turned`."""
 _ROBOT_FIELDS, _OBJECT_FIELDS = state_size(1, 0), state_size(0, 1)
 _ABSOLUTE = {"position": (0,), "heading": (0,), "los_cell": (0,), "event_cache": (1,)}
 """Slices with directions or places of the arena: the columns of x, each before its y."""
@@ -98,17 +102,41 @@ def turn_of(seed: int) -> Turn:
     return TURNS[stream_rng(seed, Stream.TURN).integers(len(TURNS))]
 
 
-def check_turned(interface: InterfaceConfig) -> None:
-    """Refuse own sensors, of which only their author knows what a turn does to them; raises ConfigError."""
-    if interface.own_sensors:
+def frames_of(length: int, layout: ObservationLayout, n_robots: int) -> Frames:
+    """Return what kernels need so that robots see the world in frames of their own.
+
+    Args:
+        length: Decisions for which a robot keeps a frame, 0 = all see the world as it is.
+        layout: Columns of what they see.
+        n_robots: Number of robots.
+    """
+    columns = [_columns(turn, layout) for turn in TURNS]
+    assert len(columns) == N_FRAMES
+    return Frames(
+        length=length,
+        source=np.array([each.source for each in columns], np.int32),
+        sign=np.array([each.sign for each in columns], np.float32),
+        taken=np.zeros(n_robots, np.int32),
+        row=np.zeros(layout.size, np.float32),
+    )
+
+
+def check_turned(own_sensors: Sequence[str], what: str) -> None:
+    """Refuse own sensors, of which only their author knows what a turn does to them; raises ConfigError.
+
+    Args:
+        own_sensors: Names of own sensors that the learner sees.
+        what: What turns them, and how to do without.
+    """
+    if own_sensors:
         raise ConfigError(
-            f"Expected worlds as they are where learners see own sensors, got turned ones with "
-            f"{', '.join(interface.own_sensors)}: a turn would have to turn these, too. Say turned=False (--as-drawn)."
+            f"Expected worlds as they are where learners see own sensors, got {', '.join(own_sensors)} with {what}. A "
+            "turn would have to turn these sensors, too."
         )
 
 
 def _mirrored_numbers() -> IntArray:
-    names = (*MOTIONS, *GRIPS)
+    names = (*MOTION_WHEELS, *GRIP_COMMANDS)
     other = {"left": "right", "right": "left"}
     mirrored = (" ".join(other.get(word, word) for word in name.split()) for name in names)
     return np.array([names.index(name) for name in mirrored], np.int32)
