@@ -122,7 +122,7 @@ class Protocol(Answer):
         header = ("world", "scenario", "robots", "objects", "arena", "disturbed by", "counts")
         rows = [(world.name, *map(str, scenario_fields(world).values()), world.role) for world in self.worlds]
         notes = [
-            f"track {track}: {self.n_trainings} trainings of at most {budget:,} decisions, all in the worlds to train in"
+            f"track {track}: {self.n_trainings} trainings of at most {budget:,} decisions, in the worlds to train in"
             for track, budget in self.tracks.items()
         ]
         if notes:

@@ -74,6 +74,13 @@ class RecipeOptions:
             "--site-memory/--no-site-memory", help="Whether robots remember two places with objects; default yes."
         ),
     ] = None
+    frame_decisions: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            help="Decisions for which each robot sees the world turned in a way of its own; 0: as it is; default 0.",
+        ),
+    ] = None
     samples: Annotated[
         bool | None,
         typer.Option(
@@ -132,7 +139,9 @@ class RecipeOptions:
         scenario(world.preset, **world.fields)  # or the recipe could take unknown fields for its own arguments
         return recipe(
             world.preset,
-            interface=self._chosen("observation", "actions", "automatic_gripper", "decision_ticks", "site_memory"),
+            interface=self._chosen(
+                "observation", "actions", "automatic_gripper", "decision_ticks", "site_memory", "frame_decisions"
+            ),
             wrappers=world.wrappers,
             options=dict(map(_argument, self.arguments)),
             evaluation=_given({"every_steps": self.evaluate_every, "horizon_s": self.evaluation_horizon}),

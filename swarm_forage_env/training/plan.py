@@ -215,8 +215,8 @@ class TrainingPlan:
     sampler: ScenarioSampler | None = None
     """Draws the world of each episode; None = it is always `world`. Then `evaluation` has worlds."""
     turned: bool | None = None
-    """Whether the learner sees each episode turned or mirrored (`policies.turns`), so that it cannot learn the compass by
-    heart; None = where samplers draw the worlds. Evaluations show their worlds as they are."""
+    """Whether the learner sees each episode turned or mirrored (`policies.turns`), so that it cannot learn the compass
+    by heart; None = where samplers draw the worlds. Evaluations show their worlds as they are."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "interface", self.interface.for_scenario(self.scenario))

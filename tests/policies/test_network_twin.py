@@ -34,6 +34,8 @@ def random_network(interface: InterfaceConfig, env: ForageEnv, **about) -> Netwo
     [
         (DISCRETE | COMPACT, {"samples": True}, {}),
         (DISCRETE | COMPACT, {"activation": "relu"}, {}),
+        (DISCRETE | COMPACT | {"frame_decisions": 4}, {"samples": True}, {}),
+        ({"frame_decisions": 5}, {}, {}),
         ({"actions": "discrete", "decision_ticks": 2}, {"samples": True}, {"caches": "dynamic"}),
         ({"site_memory": True}, {}, {}),
         ({"automatic_gripper": True, "neighbours_seen": 2}, {"activation": "relu"}, {"neighbours_seen": 2}),

@@ -32,6 +32,12 @@ SITES = Twin(
     "policies/test_site_memory.py",
     "swarm_forage_env.policies.interface.LearnerInterface.observe",
 )
+SEEN_IN_FRAMES = Twin(
+    "frames.seen", "policies/test_frames.py", "swarm_forage_env.policies.interface.LearnerInterface.observe"
+)
+DONE_IN_FRAMES = Twin(
+    "frames.commands", "policies/test_frames.py", "swarm_forage_env.policies.interface.LearnerInterface.command"
+)
 PERCEPTRON = Twin("perceptron.outputs", "policies/test_network.py", "swarm_forage_env.policies.network.Network.outputs")
 INTERFERENCE = Twin("sensing.interferes", "world/test_interference.py", "swarm_forage_env.env.ForageEnv.step_batch")
 OBSERVED = Twin("sensing.observe", "world/test_sensors.py", "swarm_forage_env.world.arena.ForagingArena.observe")
@@ -64,6 +70,8 @@ TWINS = {
     "swarm_forage_env.contract.detection.sees_nest": COMPACT_VIEW,
     "swarm_forage_env.contract.detection.sees_object": CRW,
     "swarm_forage_env.contract.detection.sees_obstacle": INTERFERENCE,
+    "swarm_forage_env.policies.kernels.frames.take_frames": SEEN_IN_FRAMES,
+    "swarm_forage_env.policies.kernels.frames.leave_frames": DONE_IN_FRAMES,
     "swarm_forage_env.policies.kernels.learner.automatic_grip": Twin(
         "commands.automatic_grip",
         "policies/test_interface_twins.py",

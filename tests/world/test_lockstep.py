@@ -3,6 +3,7 @@
 import copy
 import pickle
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -84,6 +85,7 @@ def joined(steps: list[ArenaStep]) -> dict[str, np.ndarray]:
         ((), {"nest_progress": 0.1, "interference": -0.1, "tick": -0.01}, (True, True, True, True)),
         ((), {"nest_progress": 0.1, "team": True}, (True, True, False, True)),
         ((), {"interface": DRIVEN, "first_pickup": 1.0}, (False, True, True, False)),
+        ((), {"interface": replace(DRIVEN, frame_decisions=3)}, (False, True, True, False)),
         (("throttle:waveform=constant",), {"interface": DRIVEN}, (False, True, False, False)),
         ((*ADVERSITY, "actuator_noise:sigma=0.1"), {"interface": DRIVEN}, (False, True, False, False)),
         (("handling_cost:waveform=constant",), {"interface": DRIVEN}, (True, True, False, False)),
@@ -97,6 +99,7 @@ def joined(steps: list[ArenaStep]) -> dict[str, np.ndarray]:
         "rewards",
         "a team",
         "an interface",
+        "an interface with frames",
         "a throttled interface",
         "an interface under all kinds of adversity",
         "an interface with a wrapper that acts in every tick",

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarm_forage_env.contract.policy import COMMANDS, SwarmSpec
-from swarm_forage_env.policies.interface import GRIPS, MOTIONS
+from swarm_forage_env.policies.interface import GRIPS, MOTIONS, InterfaceConfig
 from swarm_forage_env.policies.kernels.learner import GRIP_COMMANDS, MOTION_WHEELS
 from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -63,7 +63,7 @@ def manual_of(network: Network, scenario: ScenarioConfig, name: str) -> Manual:
             f"Arena: X = {arena.width_m:g} m, Y = {arena.height_m:g} m. All inputs lie in [-1, 1].",
         ),
         outputs=tuple(_numbered(about.samples, network) if is_discrete else _commands(network)),
-        use=tuple(_use(about.interface.automatic_gripper, every_s)),
+        use=tuple(_use(about.interface, every_s)),
     )
 
 
@@ -97,11 +97,17 @@ def _commands(network: Network) -> list[str]:
     return [*(f"{k:>9}  {name}" for k, name in enumerate(names)), "All outputs are cut to [-1, 1]."]
 
 
-def _use(automatic_gripper: bool, every_s: float) -> list[str]:
+def _use(interface: InterfaceConfig, every_s: float) -> list[str]:
     lines = [f"Ask the network every {every_s:g} s, and keep its wheel speeds in between."]
-    if automatic_gripper:
+    if interface.automatic_gripper:
         lines.append(
             "The gripper works by itself, in every tick: an empty robot grasps over an object or a cache, one with an "
             "object lets go in the nest."
+        )
+    if interface.frame_decisions:
+        lines.append(
+            "In the simulator each robot sees the world turned by quarter turns or mirrored, in one of eight ways, and "
+            f"in another one after {interface.frame_decisions:,} decisions, so that a swarm spreads. Turn positions, "
+            "headings and, where the world is mirrored, left and right of inputs and wheels in the same way."
         )
     return lines
