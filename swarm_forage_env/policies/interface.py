@@ -23,7 +23,6 @@ from swarm_forage_env.contract.layout import (
     KIND,
     MESSAGES,
     NEIGHBOURS,
-    LayoutRow,
     ObservationLayout,
     layout_of,
     messages_row,
@@ -31,9 +30,9 @@ from swarm_forage_env.contract.layout import (
 )
 from swarm_forage_env.contract.policy import COMMANDS, ActionError, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
+from swarm_forage_env.policies.compact_layout import COMPACT_READS, SITE_ROWS, compact_layout
 from swarm_forage_env.policies.kernels.frames import leave_frames, take_frames
 from swarm_forage_env.policies.kernels.learner import (
-    COMPACT_COLUMNS,
     GRIP_COMMANDS,
     MOTION_WHEELS,
     N_GRIPS,
@@ -61,16 +60,6 @@ MOTIONS = tuple(MOTION_WHEELS)
 """Discrete actions that move, in order."""
 GRIPS = tuple(GRIP_COMMANDS)
 """Discrete actions of the gripper, in order after the motions; the wheels stand."""
-_SHARED = ("wheel_speed", "position", "heading", "carrying", "interacting", "active")
-"""Slices that the compact view takes as they are, in order."""
-_SITE_ROWS: tuple[LayoutRow, ...] = tuple(
-    (name, (1.0,) * SITE_COLUMNS, "", f"{what}: m forward, m left, at most 1 m long; 1 if it is known; distance / 20 m")
-    for name, what in (
-        ("pickup_site", "where the robot picked an object up last"),
-        ("sighting_site", "where it last saw an object while carrying"),
-    )
-)
-_COMPACT_READS = ("proximity", "light", "ground", *_SHARED, "los_cell", "los_object", "los_cache")
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -163,7 +152,7 @@ class InterfaceConfig:
     @property
     def reads(self) -> tuple[str, ...] | None:
         """Observation slices that are used, None = all; the value for `ForageEnv(reads=...)`."""
-        return (*_COMPACT_READS, *self.sensors) if self.observation == "compact" else None
+        return (*COMPACT_READS, *self.sensors) if self.observation == "compact" else None
 
 
 class LearnerInterface:
@@ -216,7 +205,7 @@ class LearnerInterface:
             n_shown=self.layout.size - len(own) - (N_SITES * SITE_COLUMNS if config.site_memory else 0),
             n_driven=2 if config.automatic_gripper else COMMANDS,
             own_columns=np.array(own, np.int32),
-            view_starts=tuple(start[name] for name in _COMPACT_READS),
+            view_starts=tuple(start[name] for name in COMPACT_READS),
             pose_starts=(start["position"], start["heading"]),
             cargo_starts=(start["carrying"], start["los_cell"], start["los_object"]),
             grip_starts=(start["ground"], start["carrying"], start["los_object"]),
@@ -406,7 +395,7 @@ def learner_layout(source: ObservationLayout, config: InterfaceConfig) -> Observ
     else:
         built_in = [part.row for part in source if part.name in BUILT_IN_SLICES]
     if config.site_memory:
-        built_in += _SITE_ROWS
+        built_in += SITE_ROWS
     taken = sorted({row[0] for row in built_in}.intersection(config.sensors))
     if taken:
         raise ConfigError(f"Expected slices of different names, got {taken[0]!r} twice; rename the own sensor.")
@@ -435,29 +424,6 @@ def _check_company(source: ObservationLayout, config: InterfaceConfig) -> None:
             "Expected a scenario whose robots are of several kinds, which the policy sees, got one in which all are "
             "alike; give the scenario two or more robot_kinds."
         )
-
-
-def compact_layout(source: ObservationLayout) -> ObservationLayout:
-    """Build the layout of the compact view (our choice of what a driver needs); directions are forward and left.
-
-    Args:
-        source: Layout of the environment's observations, from which some slices are taken as they are.
-    """
-    reach = (1.0, 1.0, 1.0)
-    table: list[LayoutRow] = [
-        ("proximity", (1.0, 1.0), "proximity", "sum of the 24 readings as vectors, cut to length 1"),
-        ("obstacle", (1.0,), "proximity", "1 when that sum means an obstacle"),
-        ("light", (1.0, 1.0), "light", "direction of the nest lights, length 1; zeros in the dark"),
-        ("on_object", (1.0,), "", "1 when a free object lies in the robot's cell"),
-        ("on_nest", (1.0,), "ground", "1 when the ground sensors see the nest"),
-        ("on_cache", (1.0,), "ground", "1 when the ground sensors see a cache"),
-        *(source.part(name).row for name in _SHARED),
-        ("object", reach, "", "nearest object in view: m forward, m left, at most 1 m long; 1 if there is one"),
-        ("cache", reach, "", "nearest cache in view: m forward, m left, cut to 1 m; 1 if there is one"),
-    ]
-    layout = layout_of(table)
-    assert layout.size == COMPACT_COLUMNS
-    return layout
 
 
 GivenInterface: TypeAlias = InterfaceConfig | Mapping[str, Any] | None
