@@ -250,14 +250,22 @@ class LearnerInterface:
             for part, kept in zip(self.translation.sites, memory, strict=True):
                 np.copyto(part, kept)
 
-    def observe(self, obs: ObsArray, out: ObsArray | None = None, *, decision: int = 0) -> ObsArray:
+    def observe(self, obs: ObsArray, out: ObsArray | None = None, *, decision: int | None = None) -> ObsArray:
         """Return what the learner sees, a new array or `out`; with `site_memory`, robots remember it.
 
         Args:
             obs: (N, D) observations of the environment, in each decision of a run.
             out: (N, d) float32 to write into.
             decision: How many decisions of the run came before; `frame_decisions` needs it.
+
+        Raises:
+            ValueError: robots have frames of their own, and the decision is not told.
         """
+        if decision is None and self.config.frame_decisions:
+            raise ValueError(
+                "Expected the number of decisions before this one, which says what frames robots have, got none; call "
+                "observe(observations, decision=...)."
+            )
         if out is None:
             out = np.empty((len(obs), self.layout.size), np.float32)
         t = self.translation
@@ -272,7 +280,7 @@ class LearnerInterface:
             at += N_SITES * SITE_COLUMNS
         if len(t.own_columns):
             out[:, at:] = obs[:, t.own_columns]
-        take_frames(out, decision, t.frames)
+        take_frames(out, decision or 0, t.frames)
         return out
 
     def command(self, actions: np.ndarray, obs: ObsArray) -> ActionArray:

@@ -101,6 +101,14 @@ def test_an_arena_comes_back_with_its_frames():
     np.testing.assert_array_equal(go_on(), first)
 
 
+def test_frames_need_the_number_of_the_decision():
+    env = busy_world()
+    plain, own = interfaces(env, 3)
+    plain.observe(env.arena.observe())
+    with pytest.raises(ValueError, match="got none; call observe"):
+        own.observe(env.arena.observe())
+
+
 def test_frames_need_a_length_and_no_own_sensors():
     with pytest.raises(ConfigError, match=r"interface\.frame_decisions"):
         InterfaceConfig(frame_decisions=-1)

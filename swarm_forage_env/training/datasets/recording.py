@@ -317,7 +317,7 @@ def _record_run(plan: DatasetPlan, seed: int, folder: Path, tell: Callable[[int]
     policy.reset(world.swarm_spec, stream_rng(seed, Stream.POLICY))
     obs = env.reset_batch(seed)
     interface, chunk = LearnerInterface(config, world.swarm_spec), _Chunk(plan)
-    interface.observe(obs, chunk.observations[0])
+    interface.observe(obs, chunk.observations[0], decision=0)
     chunk.active[0] = world.active
     lengths, digests = list[int](), list[str]()
     gone, over = np.zeros(len(world.active), np.bool_), False
