@@ -39,7 +39,7 @@ PICTURE_FILE = "curves.png"
 _HIDDEN = ",".join(map(str, DEFAULT_HIDDEN))
 _OF_SEEDS = ("picture", "as_json")
 """Options that go with --seeds only."""
-_OF_PLAN = ("plan", "out", "seed", "turned", "seeds", *_OF_SEEDS, "callbacks", "jobs", "resume")
+_OF_PLAN = ("plan", "out", "seed", "turned", "frame_decisions", "seeds", *_OF_SEEDS, "callbacks", "jobs", "resume")
 """Options that go with --plan."""
 _OF_RESUMING = ("steps", "out", "seeds", *_OF_SEEDS, "callbacks", "jobs", "resume")
 """Options that say nothing of the plan that is resumed."""
@@ -240,7 +240,7 @@ def train(
     several.check(context, asked.seed)
     if plan is not None:
         refuse_others(context, "--plan", _OF_PLAN, "which it decides; write them into its file")
-        chosen = named_plan(plan, asked.seed, asked.turned)
+        chosen = named_plan(plan, seed=asked.seed, turned=asked.turned, frame_decisions=asked.frame_decisions)
         name = Path(plan).stem if asked.seed is None else f"{Path(plan).stem}_seed_{asked.seed}"
     else:
         chosen = asked.plan(described)

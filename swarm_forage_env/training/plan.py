@@ -446,15 +446,19 @@ def read_plan(path: Path) -> TrainingPlan:
         raise ConfigError(f"Cannot use the plan {path}: {error}") from error
 
 
-def named_plan(name: str, seed: int | None = None, turned: bool | None = None) -> TrainingPlan:
-    """Return the plan of a file, or of a shipped policy by its name, with another seed or turned worlds if given.
+def named_plan(
+    name: str, *, seed: int | None = None, turned: bool | None = None, frame_decisions: int | None = None
+) -> TrainingPlan:
+    """Return the plan of a file, or of a shipped policy by its name, with what is given in place of its own.
 
     Raises:
         ConfigError: there is none, or it cannot be used.
     """
     shipped = plan_file(name)
     plan = read_plan(Path(name) if shipped is None else shipped)
-    given = {name: value for name, value in (("seed", seed), ("turned", turned)) if value is not None}
+    given: dict[str, Any] = {key: value for key, value in (("seed", seed), ("turned", turned)) if value is not None}
+    if frame_decisions is not None:
+        given["interface"] = dataclasses.replace(plan.interface, frame_decisions=frame_decisions)
     return dataclasses.replace(plan, **given)
 
 

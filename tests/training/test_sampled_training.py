@@ -258,6 +258,7 @@ def test_drawn_worlds_are_turned_unless_the_plan_says_no(tmp_path):
     plan.write_text(text)
     assert read_plan(plan).turned is True
     assert named_plan(str(plan), turned=False).turned is False
+    assert named_plan(str(plan), frame_decisions=9).interface.frame_decisions == 9
     plan.write_text(f"turned = false\n{text}")
     assert read_plan(plan).turned is False
 
