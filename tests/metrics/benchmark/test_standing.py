@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from metrics.benchmark import (
     draw_benchmark,
     load_protocol,
     page_block,
+    read_entry,
     reference_of,
     standing_of,
 )
@@ -232,3 +234,16 @@ def test_the_entries_of_the_scripted_controllers_are_whole_and_achieve_something
     entries = scripted_entries(protocol)
     assert tuple(entry.name for entry in entries) == PAPER_POLICIES
     reference_of(entries, protocol)
+
+
+def test_readme_tells_of_the_minute_what_its_entry_says():
+    root = Path(__file__).parents[3]
+    protocol = load_protocol()
+    entry = read_entry(root / "docs/benchmark/minute.json")
+    standing = standing_of(entry, reference_of(scripted_entries(protocol), protocol), protocol)
+    assert len(standing.won_by_policy) == 5
+    median = sorted(standing.won_by_policy)[2]
+    assert median >= 20
+    words = " ".join((root / "README.md").read_text(encoding="utf-8").split())
+    assert f"of five such trainings, the median beats all four of the paper's controllers in {median} of 26" in words
+    assert len(protocol.scored) == 26
