@@ -3,7 +3,6 @@
 import ast
 import importlib
 import re
-import runpy
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -32,25 +31,6 @@ from tests.support.foraging_table import foraging_table
 from tests.support.made_tables import FOUR, made_study, made_table
 
 ROOT = Path(__file__).resolve().parents[2]
-
-
-@pytest.fixture
-def run(tmp_path, monkeypatch, capsys):
-    """Run a script in an empty folder, in this process: a new one would import for seconds; returns code and texts."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(ROOT / "scripts")
-
-    def call(script, *words):
-        monkeypatch.setattr(sys, "argv", [f"{script}.py", *words])
-        code = 0
-        try:
-            runpy.run_path(str(ROOT / f"scripts/{script}.py"), run_name="__main__")
-        except SystemExit as end:
-            code = end.code
-        shown = capsys.readouterr()
-        return code, shown.out, shown.err
-
-    return call
 
 
 @pytest.mark.compiled
@@ -308,32 +288,6 @@ def test_networks_are_run_in_turned_worlds(run):
     assert as_drawn > 20.0 > half, "a specialist that knows the compass by heart"
 
 
-@pytest.mark.compiled
-def test_no_generation_has_the_seeds_that_judge(monkeypatch):
-    monkeypatch.syspath_prepend(ROOT / "scripts")
-    evolve_controller = importlib.import_module("evolve_controller")
-    used = {evolve_controller.seed_of(generation, seed) for generation in range(100) for seed in range(4)}
-    assert len(used) == 400
-    assert used.isdisjoint(range(evolve_controller.JUDGING_SEED, evolve_controller.JUDGING_SEED + 100))
-
-
-def test_numbers_of_a_controller_evolve(run):
-    pytest.importorskip("cma", reason="needs the evolve extra: cma")
-    ranges = ("wander_speed_mps=0.01:0.1:log@0.02", "wander_max_change_deg=1:20")
-    size = ("--generations", "2", "--population", "4", "--horizon", "200", "--judging", "2")
-    code, out, err = run("evolve_controller", "crw", *ranges, *size)
-    assert code == 0, err
-    assert re.findall(r"generation (\S+): best \d\.\d{3}", err) == ["1/2", "2/2"]
-    title, header, yardstick, before, evolved, _, found = out.splitlines()
-    assert title == "Performance of crw in 200 s"
-    assert header.split()[1:] == ["warehouse_small", "warehouse_medium", "search_and_rescue"]
-    assert [line.split()[0] for line in (yardstick, before, evolved)] == ["dpo,", "before", "evolved"]
-    speed, angle = (float(number) for number in re.findall(r"=(\S+)", found))
-    assert 0.01 <= speed <= 0.1
-    assert 1.0 <= angle <= 20.0
-    assert run("evolve_controller", "crw", *ranges, *size)[1] == out, "equal seeds, equal numbers"
-
-
 def test_laws_are_written_beside_the_runs_of_a_study(run):
     pytest.importorskip("matplotlib", reason="needs the plots extra: matplotlib")
     foraging_table().write("laws.parquet")
@@ -375,6 +329,7 @@ RANGE, NO_RANGE = "name=low:high[:log][@start]", "expected name=low:high[:log][@
         ("evolve_controller", "dpo rate=0:1:log", f"argument {RANGE}: {NO_RANGE} 'rate=0:1:log'"),
         ("evolve_controller", "dpo object_priority=0:1", "expected two numbers or more: CMA-ES learns how they go"),
         ("evolve_controller", "dpo object_priority=0:1 weight=0:1", "expected numbers of dpo, got 'weight'"),
+        ("evolve_network", "--plan plan.toml --out o", "Cannot read"),
         ("bench", "--against .", "expected a revision or a checkout of this project, got /"),
     ],
 )

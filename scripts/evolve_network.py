@@ -1,0 +1,258 @@
+"""Evolve the weights of a small network in the worlds of a training plan, by separable CMA-ES.
+
+    pip install ".[evolve]"  # in a checkout
+    python scripts/evolve_network.py --plan docs/benchmark/plans/ippo.toml --seeds 5 --out results/evolved_network
+    swarm-forage run crw,results/evolved_network/seed_0/policy.npz
+
+Of a plan of `swarm-forage train` it takes the worlds, rewards, stages and evaluations, and how robots see and act. All
+networks of a generation are in the same arenas at once: each robot runs one of them for `--n-steps` decisions, and the
+next generation deals the robots anew, wherever they are. So 50 robots try 50 networks in the time of one run. A network
+is worth what its robots earn, in each world in standard deviations from the mean of all networks. An evaluation runs
+the network in the middle of its generation; the best one is kept. A training ends before it has more decisions than
+the plan.
+"""
+
+import argparse
+import itertools
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from arguments import whole
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.contract.policy import SwarmSpec
+from swarm_forage_env.contract.types import FloatArray, IntArray, ObsArray
+from swarm_forage_env.policies.interface import LearnerInterface
+from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkPolicy
+from swarm_forage_env.rendering.plots import draw_trainings
+from swarm_forage_env.runs.policy_spec import policy_spec
+from swarm_forage_env.runs.versions import software_versions
+from swarm_forage_env.training.evaluations import (
+    EVALUATIONS_FILE,
+    POLICY_FILE,
+    Baselines,
+    Evaluation,
+    baseline_runs,
+    best_baselines,
+    chosen,
+    finished_runs,
+    in_all_worlds,
+    judged,
+    read_evaluations,
+    write_evaluations,
+)
+from swarm_forage_env.training.plan import LEARNING, Stage, TrainingPlan, read_plan
+from swarm_forage_env.training.seeds import seed_folder
+from swarm_forage_env.views.gymnasium import SwarmVectorEnv
+
+WIDTH = 0.5
+"""Standard deviation of the weights of the first generation, around 0."""
+
+
+def layers_of(points: np.ndarray, sizes: Sequence[int]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return weights (K, in, out) and biases (K, out) of each layer of K networks, from their numbers (K, n).
+
+    `sizes` are those of the layers, inputs first.
+    """
+    layers, at = [], 0
+    for before, after in itertools.pairwise(sizes):
+        middle, end = at + before * after, at + (before + 1) * after
+        layers.append((points[:, at:middle].reshape(-1, before, after), points[:, middle:end]))
+        at = end
+    return layers
+
+
+def n_numbers(sizes: Sequence[int]) -> int:
+    """Return how many weights and biases a network has."""
+    return sum((before + 1) * after for before, after in itertools.pairwise(sizes))
+
+
+def outputs(rows: ObsArray, layers: Sequence[tuple[np.ndarray, np.ndarray]]) -> ObsArray:
+    """Return values of the last layer (R, m) for observations (R, d), each row by the network of its own."""
+    for k, (weight, bias) in enumerate(layers):
+        rows = np.einsum("ri,rij->rj", np.tanh(rows) if k else rows, weight) + bias
+    return rows
+
+
+class World:
+    """The arenas of one kind of world, so that no row is to spare. Robots go on where the last generation left them."""
+
+    def __init__(self, env: SwarmVectorEnv, obs: ObsArray) -> None:
+        """Take the arenas and what their robots see first."""
+        self.env, self._obs = env, obs
+
+    def earned(self, points: np.ndarray, sizes: Sequence[int], n_steps: int, rng: np.random.Generator) -> FloatArray:
+        """Return what a robot of each of K networks (K, n) earns in `n_steps` decisions, (K,); NaN without a robot."""
+        n_robots, n_networks = len(self._obs), len(points)
+        which: IntArray = rng.permutation(rng.permutation(n_networks)[np.arange(n_robots) % n_networks])
+        layers = layers_of(points[which].astype(np.float32), sizes)
+        total = np.zeros(n_robots)
+        for _ in range(n_steps):
+            values = outputs(self._obs, layers)
+            drawn = np.argmax(values + rng.gumbel(size=values.shape), axis=1)  # by the probabilities of the softmax
+            self._obs, rewards, _, _, _ = self.env.step(drawn)
+            total += rewards
+        robots = np.bincount(which, minlength=n_networks)
+        of_each = np.bincount(which, total, minlength=n_networks)
+        return np.where(robots > 0, of_each / np.maximum(robots, 1), np.nan)
+
+
+def worlds_of(plan: TrainingPlan, stage: Stage, seed: int) -> list[World]:
+    """Return the worlds of a stage, with as many of the plan's arenas as their weights say, at least one each."""
+    sampler = stage.sampler or plan.sampler
+    assert sampler is not None, "other plans are refused"
+    share = plan.n_arenas / sum(world.weight for world in sampler.worlds)
+    worlds = []
+    for k, world in enumerate(sampler.worlds):
+        env = SwarmVectorEnv(
+            n_arenas=max(1, round(share * world.weight)),
+            sampler=replace(sampler, worlds=(world,)),
+            interface=plan.interface,
+            turned=bool(plan.turned),
+        )
+        obs, _ = env.reset(seed=seed + 1000 * k, options={"scenario": dict(stage.scenario)})
+        worlds.append(World(env, obs))
+    return worlds
+
+
+def worth(earned: FloatArray) -> FloatArray:
+    """Return what networks are worth, (K,), by what they earned, (worlds, K), NaN where a network had no robot."""
+    spread = np.nanstd(earned, axis=1, keepdims=True)
+    apart = (earned - np.nanmean(earned, axis=1, keepdims=True)) / np.where(spread > 0.0, spread, 1.0)
+    return np.nan_to_num(apart).mean(axis=0)
+
+
+class Training:
+    """A training by a plan: its search, and its evaluations."""
+
+    def __init__(self, plan: TrainingPlan, baselines: Baselines, words: argparse.Namespace) -> None:
+        """Begin with networks around zero."""
+        import cma
+
+        robot = LearnerInterface(plan.interface, SwarmSpec.of(plan.scenario))
+        self.sizes = (robot.layout.size, *plan.hidden, int(robot.action_space.n))  # type: ignore[attr-defined] - discrete
+        options = {"popsize": words.population, "seed": plan.seed + 1, "CMA_diagonal": True, "verbose": -9}
+        self.strategy = cma.CMAEvolutionStrategy(np.zeros(n_numbers(self.sizes)), WIDTH, options)
+        self.plan, self.done = plan, 0
+        self.evaluations: list[Evaluation] = []
+        self._baselines, self._words = baselines, words
+        self._folder = seed_folder(words.out, plan.seed)
+        self._rng = np.random.default_rng(plan.seed)
+        self._started = time.perf_counter(), time.process_time()
+
+    def carry_out(self) -> None:
+        """Evolve stage by stage, and evaluate meanwhile."""
+        end, next_evaluation = 0, self.plan.evaluation.every_steps
+        for stage in self.plan.stages:
+            end += stage.steps
+            worlds = worlds_of(self.plan, stage, int(np.random.default_rng((self.plan.seed, end)).integers(2**31)))
+            n_decisions = sum(world.env.num_envs for world in worlds) * self._words.n_steps
+            while self.done + n_decisions <= end:
+                self._generation(worlds)
+                self.done += n_decisions
+                if self.done >= next_evaluation:
+                    next_evaluation += self.plan.evaluation.every_steps
+                    self._evaluate()
+            for world in worlds:
+                world.env.close()
+        if not self.evaluations or self.evaluations[-1].steps < self.done:
+            self._evaluate()
+
+    def _generation(self, worlds: Sequence[World]) -> None:
+        points = self.strategy.ask()
+        asked = np.array(points)
+        earned = np.array([world.earned(asked, self.sizes, self._words.n_steps, self._rng) for world in worlds])
+        self.strategy.tell(points, (-worth(earned)).tolist())
+
+    def _evaluate(self) -> None:
+        """Run the network in the middle of the generation, and keep it if it is the best so far."""
+        layers = layers_of(np.array([self.strategy.result.xfavorite], np.float32), self.sizes)
+        about = NetworkAbout(interface=self.plan.interface, samples=True, caches=self.plan.scenario.caches)
+        network = Network(tuple(weight[0] for weight, _ in layers), tuple(bias[0] for _, bias in layers), about)
+        spec = policy_spec(NetworkPolicy(network), label=LEARNING.label)
+        table = finished_runs(self.plan.judging(spec), jobs=1)
+        found = judged(table, LEARNING.label, self._baselines)
+        performance, interference = in_all_worlds(self.plan.evaluation, found)
+        evaluation = Evaluation(
+            steps=self.done,
+            wall_time_s=time.perf_counter() - self._started[0],
+            cpu_time_s=time.process_time() - self._started[1],
+            performance=performance,
+            baseline=1.0,
+            interference_fraction=interference,
+            worlds=found,
+        )
+        self.evaluations.append(evaluation)
+        if chosen(self.evaluations) is evaluation:
+            card = {"plan": self.plan.to_mapping(), "evaluation": evaluation.to_mapping(), **made_by(self._words)}
+            replace(network, about=replace(about, card=card)).save(self._folder / POLICY_FILE)
+        write_evaluations(self._folder / EVALUATIONS_FILE, self.evaluations)
+        told = f"seed {self.plan.seed}: {self.done:,} decisions, {performance:.2f} of the baselines, "
+        print(f"{told}interference {interference:.3f}", file=sys.stderr, flush=True)
+
+
+def made_by(words: argparse.Namespace) -> dict[str, Any]:
+    """Return what a card says beside plan and evaluation."""
+    import cma
+
+    said = {"population": words.population, "n_steps": words.n_steps}
+    return {
+        "by": "scripts/evolve_network.py",
+        "evolution": said,
+        "versions": {**software_versions(), "cma": cma.__version__},
+    }
+
+
+def evolving_plan(words: argparse.Namespace) -> TrainingPlan:
+    """Return the plan with a hidden layer of ours; raises ConfigError for one that evolution cannot carry out."""
+    plan = read_plan(words.plan)
+    if plan.interface.actions != "discrete" or not all(stage.sampler or plan.sampler for stage in plan.stages):
+        raise ConfigError(f"Expected a plan with samplers and discrete actions in {words.plan}.")
+    return replace(plan, hidden=(words.hidden,), options={}, samples=True)
+
+
+def main() -> None:
+    """Carry out a training per seed, and draw how they went."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--plan", type=Path, required=True, help="plan of a training, as TOML")
+    parser.add_argument("--out", type=Path, required=True, help="folder of the trainings")
+    parser.add_argument("--seed", type=whole(at_least=0), default=0, help="of the first training (default: 0)")
+    parser.add_argument("--seeds", type=whole(at_least=1), default=1, help="trainings (default: 1)")
+    parser.add_argument("--hidden", type=whole(at_least=1), default=8, help="units of the hidden layer (default: 8)")
+    parser.add_argument("--population", type=whole(at_least=4), default=48, help="networks at once (default: 48)")
+    parser.add_argument("--n-steps", type=whole(at_least=1), default=128, help="decisions of a robot (default: 128)")
+    words = parser.parse_args()
+    try:
+        plan = evolving_plan(words)
+    except ConfigError as error:
+        parser.error(str(error))
+    baselines = best_baselines(finished_runs(baseline_runs(plan), jobs=1))
+    for seed in range(words.seed, words.seed + words.seeds):
+        seed_folder(words.out, seed).mkdir(parents=True, exist_ok=True)
+        Training(replace(plan, seed=seed), baselines, words).carry_out()
+    draw(words.out, plan)
+
+
+def draw(out: Path, plan: TrainingPlan) -> None:
+    """Draw all trainings of the folder, also those of earlier commands."""
+    trainings = {}
+    for file in sorted(out.glob(f"*/{EVALUATIONS_FILE}")):
+        told = [(one.steps, one.performance, one.interference_fraction) for one in read_evaluations(file)]
+        trainings[file.parent.name.replace("_", " ")] = tuple(zip(*told, strict=True))
+    draw_trainings(
+        out / "curves.png",
+        trainings,
+        beside={"baseline of each world": (1.0, np.nan)},
+        stage_ends=np.cumsum([stage.steps for stage in plan.stages]).tolist(),
+        title="Networks that evolve",
+        ylabel=f"{plan.evaluation.chosen_by} ratio to the baselines",
+    )
+
+
+if __name__ == "__main__":
+    main()
