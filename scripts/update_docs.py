@@ -105,6 +105,22 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "stochx_program": ((f"python {ROOT}/scripts/stochx_beside_program.py",), ()),
     "from_scenario": ((f"python {ROOT}/scripts/from_scenario.py",), ()),
     "emptying": ((f"python {ROOT}/scripts/emptying_floor.py",), ("crw", "dpo")),
+    "cpfa_evolved": (
+        (
+            f"python {ROOT}/scripts/evolve_controller.py cpfa search_per_tick=0.001:0.5:log@0.05 "
+            "give_up_per_tick=0.00001:0.02:log@0.0005 uninformed_turn_rad=0:1.5@0.3 "
+            "informed_decay_per_tick=0.001:1:log@0.02 site_fidelity_rate=0.01:20:log@1 --generations 18",
+        ),
+        (),
+    ),
+    "dpo_front": (
+        (
+            f"python {ROOT}/scripts/evolve_controller.py dpo wander_speed_mps=0.03:0.1 wander_max_change_deg=1:20:log "
+            "arrival_speed_mps=0.03:0.1 recovery_s=0:10 evaporation_per_tick=0.000001:0.01:log --generations 8 "
+            f"--population 10 --horizon 2000 --front {ROOT}/docs/images/front_dpo.png",
+        ),
+        (),
+    ),
     "turned": ((f"python {ROOT}/scripts/turned_worlds.py",), ()),
     "unseen": ((f"python {ROOT}/scripts/unseen_worlds.py",), ()),
     **{
@@ -153,10 +169,12 @@ def make(name: str) -> dict[str, Any]:
 def fields(printed: str, labels: tuple[str, ...]) -> dict[str, str]:
     """Return the table without the text around it, and the deliveries of each row by its label.
 
+    Without labels, the table is all that was printed.
+
     Raises:
         ValueError: The table has another number of rows than labels.
     """
-    found = deliveries(printed)
+    found = deliveries(printed) if labels else []
     if len(found) != len(labels):
         raise ValueError(f"Expected a table with deliveries of {', '.join(labels)}, got:\n{printed}")
     lines = [line.rstrip() for line in printed.rstrip().splitlines()]
