@@ -16,6 +16,7 @@ says which of them are on the front by the new seeds, too.
 """
 
 import argparse
+import json
 import math
 import sys
 from collections.abc import Sequence
@@ -280,7 +281,7 @@ def main() -> None:
         return
     found = evolved(words.policy, words.ranges, before, worlds, words)
     print(comparison(words.policy, before, found, worlds, words).text())
-    print(" ".join(f"--set {name}={number:g}" for name, number in found.items()))
+    print(f'load_policy("{words.policy}", {json.dumps(found)})')
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """Numbers of controllers and weights of networks evolve: short, to see that the scripts still fit the packages."""
 
 import importlib
+import json
 import re
 from pathlib import Path
 
@@ -44,7 +45,7 @@ def test_numbers_of_a_controller_evolve(run):
     assert title == "Performance of crw in 200 s"
     assert header.split()[1:] == ["warehouse_small", "warehouse_medium", "search_and_rescue"]
     assert [line.split()[0] for line in (yardstick, before, evolved)] == ["dpo,", "before", "evolved"]
-    speed, angle = (float(number) for number in re.findall(r"=(\S+)", found))
+    speed, angle = (float(number) for number in json.loads(found.partition(", ")[2][:-1]).values())
     assert 0.01 <= speed <= 0.1
     assert 1.0 <= angle <= 20.0
     assert run("evolve_controller", "crw", *ranges, *size)[1] == out, "equal seeds, equal numbers"
