@@ -41,7 +41,8 @@ class ScriptedPolicy(KernelPolicy):
         self._robots = robots
         robots["object_reach"] = spec.object_reach_cells
         robots["cache_reach"] = spec.cache_reach_cells
-        self._start(spec, rng, n_draws, constants, robots, *memory, np.zeros((spec.n_robots, 3), np.float32))
+        actions = np.zeros((spec.n_robots, spec.action_size), np.float32)
+        self._start(spec, rng, n_draws, constants, robots, *memory, actions)
 
     @property
     def activity(self) -> CodeArray:

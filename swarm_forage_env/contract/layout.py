@@ -11,6 +11,8 @@ RING_SENSORS = 24
 """Proximity beams, and as many light sensors: on one ring, every 15 degrees, the first at 7.5 degrees to the left."""
 LIGHT_IF_CARRYING = "light if carrying"
 """Entry of `reads`: light is read in rows of robots that carry; the others may stay zero."""
+MESSAGES_IF_ANY = "messages if any"
+"""Entry of `reads`: messages are read in scenarios that have them; the policy also runs in others."""
 GROUND_SENSORS = 4
 WINDOW_CELLS = WINDOWS_CELLS[-1]
 """Side of the square line-of-sight window, in cells (1.0 m)."""

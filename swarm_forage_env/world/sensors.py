@@ -13,7 +13,14 @@ import numpy as np
 from swarm_forage_env._internal.fields import ConfigError, known_name
 from swarm_forage_env._internal.prefetching import LARGE
 from swarm_forage_env.contract.codes import ObjectStatus
-from swarm_forage_env.contract.layout import KIND, LIGHT_IF_CARRYING, MESSAGES, NEIGHBOURS, ObservationLayout
+from swarm_forage_env.contract.layout import (
+    KIND,
+    LIGHT_IF_CARRYING,
+    MESSAGES,
+    MESSAGES_IF_ANY,
+    NEIGHBOURS,
+    ObservationLayout,
+)
 from swarm_forage_env.contract.types import ObsArray
 from swarm_forage_env.scenarios.config import ArenaConfig, ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M
@@ -47,8 +54,10 @@ def read_slices(reads: Collection[str] | None, layout: ObservationLayout) -> tup
                 f"Expected a scenario with {what}, because the policy reads the slice {name!r}, got one without; give "
                 f"it {field}."
             )
-        known_name("entry of reads", name, (*layout.names, LIGHT_IF_CARRYING))
-    return tuple("light" if name == LIGHT_IF_CARRYING else name for name in reads)
+        known_name("entry of reads", name, (*layout.names, LIGHT_IF_CARRYING, MESSAGES_IF_ANY))
+    plain = {LIGHT_IF_CARRYING: "light", MESSAGES_IF_ANY: MESSAGES}
+    names = (plain.get(name, name) for name in reads)
+    return tuple(name for name in names if name in layout.names)
 
 
 def light_of_carriers_only(reads: Collection[str] | None) -> bool:
