@@ -22,7 +22,7 @@ from swarm_forage_env._internal.files import read_json, replacing
 from swarm_forage_env._internal.typed import Amount, Count, Name, Within, typed
 
 from ..curves import FloatArray
-from .protocol import OPEN, BenchmarkError, Protocol, load_protocol, protocol_versions
+from .protocol import OPEN, BenchmarkError, Protocol, known_versions, load_protocol, protocol_versions
 
 _WITHOUT_TRACKS = "leave out --track and --decisions, or say --version 2"
 TRAINED_IN = ("given", "other", "nothing", "unknown")
@@ -297,8 +297,9 @@ def read_entry(path: str | Path, protocol: Protocol | None = None) -> Entry:
         raise BenchmarkError(f"Cannot use the entry {path}: {error}") from error
     entry = _entry(stored)
     if protocol is None and entry.version not in protocol_versions():
-        known = " or ".join(map(str, protocol_versions()))
-        raise BenchmarkError(f"Expected an entry of version {known} of the benchmark, got {entry.version} in {path}.")
+        raise BenchmarkError(
+            f"Expected an entry of version {known_versions()} of the benchmark, got {entry.version} in {path}."
+        )
     entry.check(protocol or load_protocol(version=entry.version), str(path))
     if entry.digest != stored.digest:
         raise BenchmarkError(

@@ -13,6 +13,7 @@ from swarm_forage_env.runs.answer import Sheet
 from ..controllers import PAPER_POLICIES
 from ..statistics import Estimate
 from .entry import Entry, EntryMeasure
+from .pairs import pairs_sheet
 from .protocol import BenchmarkError, Protocol, scenario_fields
 from .standing import Reference, Standing, improvements, measure_mean
 
@@ -21,6 +22,16 @@ END = "<!-- end of entries -->"
 _BLOCK = re.compile(re.escape(BEGIN) + r".*?" + re.escape(END), re.DOTALL)
 _TRAINED = {"given": "training worlds", "other": "also other worlds", "nothing": "not trained", "unknown": "not said"}
 """`Training.worlds` -> words of the table."""
+_COORDINATION = (
+    "### What coordination brings\n\nEach cell says how much better the entry is in a world than in the same world "
+    "without, with its 95 % interval, and the two performances per 1,000 s. Runs with the same seed are compared with "
+    "each other.\n\n"
+)
+_ALL_MEASURES = "## All measures\n\nMeans over runs; amounts and distances as shares of performance.\n\n"
+_MEASURES = (
+    "### Measure by measure\n\nEach cell counts the rows of a measure in which the entry is at least as good as the "
+    "best of the paper's four controllers. Amounts and distances are compared as shares of performance.\n\n"
+)
 MATCHED = (
     "spatial_emergence",
     "task_emergence",
@@ -83,6 +94,7 @@ def page_block(standings: Sequence[Standing], protocol: Protocol, picture: str =
     ranked = sorted_standings(standings)
     entries = [standing.entry for standing in ranked]
     n_runs = len(protocol.scored) * len(protocol.seeds)
+    has_measures = any(entry.measures for entry in entries)
     parts = [
         f"Version {protocol.version} has {len(protocol.scored)} held-out worlds and {len(protocol.seeds)} seeds, so "
         f"{n_runs} runs of {protocol.horizon_s:,g} s count for each policy.",
@@ -92,9 +104,8 @@ def page_block(standings: Sequence[Standing], protocol: Protocol, picture: str =
         "### How each was made\n\n" + _origins(entries).markdown(),
         "These commands repeat them:\n\n" + _commands(entries),
         "### Group by group\n\n" + _groups(ranked, protocol).markdown(),
-        "### Measure by measure\n\nEach cell counts the rows of a measure in which the entry is at least as good as "
-        "the best of the paper's four controllers. Amounts and distances are compared as shares of performance.\n\n"
-        + _matched(entries).markdown(),
+        *([_COORDINATION + pairs_sheet(entries, protocol).markdown()] if protocol.pairs else []),
+        *([_MEASURES + _matched(entries).markdown()] if has_measures else []),
         "### One against the other\n\nHow often a run of the row's entry is better than a run of the column's entry in "
         "the same world.\n\n" + _duels(entries, protocol).markdown(),
     ]
@@ -111,6 +122,7 @@ def details_page(standings: Sequence[Standing], reference: Reference, protocol: 
         page: Path of the page of the benchmark, as this one links it.
     """
     entries = [standing.entry for standing in sorted_standings(standings)]
+    has_measures = any(entry.measures for entry in entries)
     of_version = "" if protocol.version == 1 else f", version {protocol.version}"
     parts = [
         f"# Benchmark in detail{of_version}",
@@ -118,8 +130,7 @@ def details_page(standings: Sequence[Standing], reference: Reference, protocol: 
         "page` writes this page.",
         "## World by world\n\nPerformance per 1,000 s, mean over runs; the best of all entries is bold.\n\n"
         + _worlds(entries, reference, protocol).markdown(),
-        "## All measures\n\nMeans over runs; amounts and distances as shares of performance.\n\n"
-        + _measures(entries).markdown(),
+        *([_ALL_MEASURES + _measures(entries).markdown()] if has_measures else []),
     ]
     return "\n\n".join(parts) + "\n"
 

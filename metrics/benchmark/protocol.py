@@ -3,6 +3,7 @@
 protocol = load_protocol()          # version 1
 protocol.worlds[0].name             # "training: small warehouse"
 load_protocol(version=2)            # held-out worlds that ask for more, and tracks of equal budget
+load_protocol("draft_v3.toml")      # a file: worlds in which coordination pays, each also without it
 load_protocol(quick=True)           # the same worlds, shorter and with fewer seeds: for a look
 """
 
@@ -25,10 +26,22 @@ USUAL = 1
 """Version of the protocol that is run where none is asked for: commands that entries have stored name none."""
 OPEN = "open"
 """The track without a budget, of every protocol that has tracks."""
-_KEYS = ("version", "physics", "horizon_s", "interval_s", "seeds", "trainings", "tracks", "quick", "training", "group")
+_KEYS = (
+    "version",
+    "physics",
+    "horizon_s",
+    "interval_s",
+    "seeds",
+    "trainings",
+    "tracks",
+    "quick",
+    "set",
+    "training",
+    "group",
+)
 _QUICK_KEYS = ("horizon_s", "seeds")
 _TRAINING_KEYS = ("name", "scenario", "set")
-_GROUP_KEYS = ("name", "scenario", "set", "sizes", "levels", "disturbed", "variants")
+_GROUP_KEYS = ("name", "scenario", "set", "sizes", "levels", "disturbed", "variants", "without")
 _LEVEL_WORDS = {"handling_cost": "handling", "population_dynamics": "failures"}
 """Criterion -> its word in the name of a world, where that is another."""
 
@@ -47,6 +60,8 @@ class ProtocolWorld:
     """The group of worlds it belongs to; empty for a world to train in."""
     is_scored: bool = True
     """Whether its performance counts; if not, measures use it as their reference."""
+    lacks: str = ""
+    """Name of the world that is the same but for what robots coordinate by, which they lack here; empty for others."""
 
     @property
     def name(self) -> str:
@@ -71,6 +86,8 @@ class ProtocolWorld:
     @property
     def role(self) -> str:
         """Whether it counts, in words."""
+        if self.lacks:
+            return "no, to compare with"
         return "yes" if self.counts else "reference of measures" if self.is_held_out else "no, to train in"
 
 
@@ -107,6 +124,12 @@ class Protocol(Answer):
     def scored(self) -> tuple[ProtocolWorld, ...]:
         """The held-out worlds whose performance counts."""
         return tuple(world for world in self.worlds if world.counts)
+
+    @property
+    def pairs(self) -> tuple[tuple[ProtocolWorld, ProtocolWorld], ...]:
+        """Worlds in which robots can coordinate, each with the one in which they lack what they do it by."""
+        by_name = {world.name: world for world in self.worlds}
+        return tuple((by_name[world.lacks], world) for world in self.worlds if world.lacks)
 
     @property
     def name(self) -> str:
@@ -157,6 +180,12 @@ def protocol_versions() -> tuple[int, ...]:
     return tuple(sorted(int(number) for number in found))
 
 
+def known_versions() -> str:
+    """Return the versions that there are, for messages: "1, 2 or 3"."""
+    *others, last = map(str, protocol_versions())
+    return f"{', '.join(others)} or {last}"
+
+
 def load_protocol(file: str | Path | None = None, *, version: int = USUAL, quick: bool = False) -> Protocol:
     """Read a protocol.
 
@@ -172,8 +201,7 @@ def load_protocol(file: str | Path | None = None, *, version: int = USUAL, quick
     from swarm_forage_env._internal.files import parse_toml
 
     if file is None and version not in protocol_versions():
-        known = " or ".join(map(str, protocol_versions()))
-        raise BenchmarkError(f"Expected version {known} of the benchmark, got {version}.")
+        raise BenchmarkError(f"Expected version {known_versions()} of the benchmark, got {version}.")
     path = protocol_folder() / f"benchmark_v{version}.toml" if file is None else Path(file)
     try:
         return _protocol(parse_toml(path.read_text(encoding="utf-8")), quick=quick)
@@ -189,7 +217,7 @@ def _protocol(content: Mapping[str, Any], *, quick: bool) -> Protocol:
     from swarm_forage_env.runs.spec import identity_of
 
     known_keys(content, _KEYS, "key of a protocol")
-    chosen = {name: content[name] for name in ("physics", "horizon_s", "interval_s", "seeds")}
+    chosen = {name: content[name] for name in ("physics", "horizon_s", "interval_s", "seeds")} | content.get("set", {})
     if quick:
         known_keys(content["quick"], _QUICK_KEYS, prefix="quick.")
         chosen |= content["quick"]
@@ -224,10 +252,10 @@ def _scenario(entry: Mapping[str, Any], of_all: Mapping[str, Any]) -> "ScenarioC
     from swarm_forage_env.scenarios.presets import scenario
     from swarm_forage_env.studies.study import plain_settings
 
-    settings = {**entry.get("set", {})}
+    settings = {**of_all, **entry.get("set", {})}
     if "sources" in settings:
         settings |= {"placement": POSITIONS, "object_positions_m": _cell_middles(settings.pop("sources"))}
-    return scenario(entry["scenario"], **plain_settings(settings), **of_all)
+    return scenario(entry["scenario"], **plain_settings(settings))
 
 
 def _cell_middles(boxes: Sequence[Sequence[float]]) -> list[tuple[float, float]]:
@@ -248,15 +276,20 @@ def _group(
     worlds: dict[str, ProtocolWorld] = {}
     roles: list[tuple[str, World]] = []
 
-    def add(what: str, scenario: "ScenarioConfig", wrappers: "tuple[WrapperConfig, ...]" = (), **told: bool) -> str:
+    def add(what: str, scenario: "ScenarioConfig", wrappers: "tuple[WrapperConfig, ...]" = (), **told: Any) -> str:
         world = World(scenario, wrappers, name=f"{name}, {what}")
         if world.name in worlds:
             raise BenchmarkError(f"Expected worlds of different names, got {world.name!r} twice.")
         worlds[world.name] = ProtocolWorld(world=world, group=name, **told)
         return world.name
 
+    def variant(fields: Mapping[str, Any]) -> "ScenarioConfig":
+        return _scenario({**entry, "set": {**entry.get("set", {}), **fields}}, of_all)
+
     for what, fields in entry.get("variants", {}).items():
-        add(what, _scenario({**entry, "set": {**entry.get("set", {}), **fields}}, of_all))
+        whole = add(what, variant(fields))
+        for lack, lacking in entry.get("without", {}).items():
+            add(f"{what}, {lack}", variant({**fields, **lacking}), is_scored=False, lacks=whole)
     for size in entry.get("sizes", ()):
         sized = replace(base, robots=replace(base.robots, n_robots=size))
         place = add(f"{size} robot{'s' if size > 1 else ''}", sized, is_scored=size > 1)
