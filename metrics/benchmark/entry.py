@@ -24,7 +24,7 @@ from swarm_forage_env._internal.typed import Amount, Count, Name, Within, typed
 from ..curves import FloatArray
 from .protocol import OPEN, BenchmarkError, Protocol, known_versions, load_protocol, protocol_versions
 
-_WITHOUT_TRACKS = "leave out --track and --decisions, or say --version 2"
+_WITHOUT_TRACKS = "leave out --track and --decisions, or say --version 2 or 3"
 TRAINED_IN = ("given", "other", "nothing", "unknown")
 """Where a policy was trained: in the training worlds only, also elsewhere, not at all, or the author does not say."""
 Rows: TypeAlias = tuple[tuple[float | None, ...], ...]

@@ -3,7 +3,7 @@
 protocol = load_protocol()          # version 1
 protocol.worlds[0].name             # "training: small warehouse"
 load_protocol(version=2)            # held-out worlds that ask for more, and tracks of equal budget
-load_protocol("draft_v3.toml")      # a file: worlds in which coordination pays, each also without it
+load_protocol(version=3)            # worlds in which coordination pays, each also without it
 load_protocol(quick=True)           # the same worlds, shorter and with fewer seeds: for a look
 """
 

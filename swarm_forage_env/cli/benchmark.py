@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 Entries = Annotated[
     list[Path], typer.Argument(metavar="ENTRY...", help="Entry files; the scripted four are always shown, too.")
 ]
-Version = Annotated[int, typer.Option("--version", metavar="1|2", help="Version of the benchmark.")]
+Version = Annotated[int, typer.Option("--version", metavar="1|2|3", help="Version of the benchmark.")]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -46,7 +46,10 @@ class TrainedOptions:
     ] = None
 
     track: Annotated[
-        str, typer.Option("--track", help="10M, 40M or open: most decisions of a training. Version 2; default open.")
+        str,
+        typer.Option(
+            "--track", help="10M, 40M or open: most decisions of a training. From version 2 on; default open."
+        ),
     ] = ""
     decisions: Annotated[
         int | None, typer.Option("--decisions", min=0, help="Decisions of the longest training, of all its robots.")
@@ -73,7 +76,7 @@ def run(
     version: Version = 1,
     file: Annotated[
         Path | None,
-        typer.Option("--file", help="Entry to write; default NAME.json in results/benchmark, of version 2 in its v2."),
+        typer.Option("--file", help="Entry to write; default NAME.json in results/benchmark, or in its v2 or v3."),
     ] = None,
     out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Folder for records of runs.")] = Path(
         "results/benchmark/records"
@@ -195,8 +198,8 @@ def page(
         Path | None,
         typer.Option(
             "--file",
-            help="Page whose generated part to write again; default docs/benchmark.md, of version 2 "
-            "docs/benchmark_v2.md.",
+            help="Page whose generated part to write again; default docs/benchmark.md, of later versions "
+            "docs/benchmark_v2.md or docs/benchmark_v3.md.",
         ),
     ] = None,
     picture: Annotated[

@@ -150,10 +150,10 @@ def test_entries_of_two_versions_are_on_no_board(protocol):
 
 
 def test_versions_that_there_are_not_are_refused(tmp_path):
-    with pytest.raises(BenchmarkError, match="Expected version 1 or 2 of the benchmark, got 4"):
+    with pytest.raises(BenchmarkError, match="Expected version 1, 2 or 3 of the benchmark, got 4"):
         load_protocol(version=4)
     file = entry_file(tmp_path, "fourth", replace(load_protocol(TINY), version=4))
-    with pytest.raises(BenchmarkError, match=r"version 1 or 2 of the benchmark, got 4 in .*fourth\.json"):
+    with pytest.raises(BenchmarkError, match=r"version 1, 2 or 3 of the benchmark, got 4 in .*fourth\.json"):
         read_entry(file)
 
 

@@ -7,17 +7,22 @@ import numpy as np
 import pytest
 
 from metrics import PAPER_POLICIES
-from metrics.benchmark import BenchmarkError, details_page, load_protocol, page_block, reference_of, standing_of
+from metrics.benchmark import (
+    BenchmarkError,
+    details_page,
+    load_protocol,
+    page_block,
+    reference_of,
+    standing_of,
+)
 from metrics.benchmark.pairs import SAME, gain, pairs_sheet
-from metrics.benchmark.protocol import protocol_folder
+from metrics.benchmark.standing import scripted_entries
 from metrics.statistics import aggregate
 from swarm_forage_env import plan_run
 from swarm_forage_env.contract.policy import layout_for
 from swarm_forage_env.env import ForageEnv
 from tests.support.entries import TINY, made_up_entry
 
-DRAFT = protocol_folder() / "draft_v3.toml"
-"""It becomes a version when entries of the scripted controllers are there."""
 IDENTITY_OF_VERSION_3 = "48411ee7f3279c63"
 """A change of worlds, seeds, lengths or tracks is another version: entries of this one must stay comparable."""
 LACKS = {"messages": "nobody hears", "neighbours": "nobody seen", "kinds": "all alike"}
@@ -25,7 +30,7 @@ LACKS = {"messages": "nobody hears", "neighbours": "nobody seen", "kinds": "all 
 
 @pytest.fixture(scope="module")
 def protocol():
-    return load_protocol(DRAFT)
+    return load_protocol(version=3)
 
 
 def test_version_3_never_changes(protocol):
@@ -131,6 +136,13 @@ def test_the_page_shows_gains_where_there_are_pairs_and_measures_where_there_are
         assert ("### What coordination brings" in block) is is_there
         assert ("### Measure by measure" in block) is not is_there
         assert ("## All measures" in details) is not is_there
+
+
+def test_who_reads_no_messages_runs_the_same_where_nobody_hears(protocol):
+    for entry in scripted_entries(protocol):
+        for whole, lacking in protocol.pairs:
+            if whole.group != "kinds":
+                assert entry.runs[whole.name] == entry.runs[lacking.name]
 
 
 def test_a_key_that_a_group_does_not_know_is_refused(tmp_path):
