@@ -154,8 +154,14 @@ class Search:
 
 
 def on_front(points: FloatArray) -> list[bool]:
-    """Return of points (2, n) whether no other one has more of the first and less of the second."""
-    return [not ((points[0] > more) & (points[1] < less)).any() for more, less in points.T]
+    """Return of points (2, n) which are on the Pareto front: no other is as good in both, and better in one.
+
+    Much of the first is good, and little of the second.
+    """
+    more, less = points
+    as_good = (more >= more[:, None]) & (less <= less[:, None])
+    better = (more > more[:, None]) | (less < less[:, None])
+    return (~(as_good & better).any(axis=1)).tolist()
 
 
 def searched(

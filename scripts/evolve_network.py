@@ -1,6 +1,6 @@
 """Evolve the weights of a small network in the worlds of a training plan, by separable CMA-ES.
 
-    pip install ".[evolve]"  # in a checkout
+    pip install ".[evolve,plots]"  # in a checkout
     python scripts/evolve_network.py --plan docs/benchmark/plans/ippo.toml --seeds 5 --out results/evolved_network
     swarm-forage run crw,results/evolved_network/seed_0/policy.npz
 
@@ -13,6 +13,7 @@ the plan.
 """
 
 import argparse
+import importlib
 import itertools
 import sys
 import time
@@ -115,7 +116,9 @@ def worlds_of(plan: TrainingPlan, stage: Stage, seed: int) -> list[World]:
             interface=plan.interface,
             turned=bool(plan.turned),
         )
-        obs, _ = env.reset(seed=seed + 1000 * k, options={"scenario": dict(stage.scenario)})
+        obs, infos = env.reset(seed=seed + 1000 * k, options={"scenario": dict(stage.scenario)})
+        if not infos["active"].all():
+            raise SystemExit("Expected worlds with fixed numbers of robots, got spare rows: take another plan.")
         worlds.append(World(env, obs))
     return worlds
 
@@ -209,11 +212,15 @@ def made_by(words: argparse.Namespace) -> dict[str, Any]:
 
 
 def evolving_plan(words: argparse.Namespace) -> TrainingPlan:
-    """Return the plan with a hidden layer of ours; raises ConfigError for one that evolution cannot carry out."""
+    """Return the plan with a network of ours; raises ConfigError for one that evolution cannot carry out."""
     plan = read_plan(words.plan)
     if plan.interface.actions != "discrete" or not all(stage.sampler or plan.sampler for stage in plan.stages):
-        raise ConfigError(f"Expected a plan with samplers and discrete actions in {words.plan}.")
-    return replace(plan, hidden=(words.hidden,), options={}, samples=True)
+        raise ConfigError(
+            f"Expected a plan with samplers and discrete actions in {words.plan}, such as "
+            f"docs/benchmark/plans/ippo.toml, got {plan.interface.actions} actions or a stage without a sampler."
+        )
+    stages = tuple(replace(stage, options={}) for stage in plan.stages)  # they are those of gradients
+    return replace(plan, hidden=(words.hidden,), activation="tanh", options={}, stages=stages, samples=True)
 
 
 def main() -> None:
@@ -227,6 +234,11 @@ def main() -> None:
     parser.add_argument("--population", type=whole(at_least=4), default=48, help="networks at once (default: 48)")
     parser.add_argument("--n-steps", type=whole(at_least=1), default=128, help="decisions of a robot (default: 128)")
     words = parser.parse_args()
+    try:
+        for module in ("cma", "matplotlib"):  # one is needed at the end
+            importlib.import_module(module)
+    except ImportError as error:
+        parser.error(f'{error}; pip install ".[evolve,plots]"')
     try:
         plan = evolving_plan(words)
     except ConfigError as error:

@@ -31,7 +31,7 @@ from swarm_forage_env.contract.layout import (
 from swarm_forage_env.contract.policy import COMMANDS, ActionError, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.policies.compact_layout import COMPACT_READS, SITE_ROWS, compact_layout
-from swarm_forage_env.policies.kernels.frames import leave_frames, take_frames
+from swarm_forage_env.policies.kernels.frames import frame_of, leave_frames, take_frames
 from swarm_forage_env.policies.kernels.learner import (
     GRIP_COMMANDS,
     MOTION_WHEELS,
@@ -121,6 +121,10 @@ class InterfaceConfig:
             unique_names("interface.own_sensors", self.own_sensors)
             if self.frame_decisions:
                 check_turned(self.own_sensors, "frames of robots' own; say frame_decisions=0")
+
+    def decisions_in(self, ticks: int) -> int:
+        """Return how many decisions there are in so many ticks of a run, with one that its end cuts short."""
+        return -(-ticks // self.decision_ticks)
 
     def for_scenario(self, scenario: ScenarioConfig) -> "InterfaceConfig":
         """Return these choices, with what the scenario has of neighbours, messages, kinds and own sensors unless told.
@@ -237,7 +241,7 @@ class LearnerInterface:
 
     def forget(self) -> None:
         """Forget what robots remember: a run begins."""
-        for part in self.translation.sites:
+        for part in (*self.translation.sites, self.translation.frames.taken):
             part[...] = 0
 
     def memory(self) -> SiteMemory | None:
@@ -250,6 +254,12 @@ class LearnerInterface:
             for part, kept in zip(self.translation.sites, memory, strict=True):
                 np.copyto(part, kept)
 
+    def enter(self, decision: int) -> None:
+        """Let robots have the frames of a decision without looking, which `observe` does anyway; see there."""
+        frames = self.translation.frames
+        if frames.length:
+            frames.taken[:] = [frame_of(robot, decision, frames.length) for robot in range(len(frames.taken))]
+
     def observe(self, obs: ObsArray, out: ObsArray | None = None, *, decision: int | None = None) -> ObsArray:
         """Return what the learner sees, a new array or `out`; with `site_memory`, robots remember it.
 
@@ -259,8 +269,13 @@ class LearnerInterface:
             decision: How many decisions of the run came before; `frame_decisions` needs it.
 
         Raises:
-            ValueError: robots have frames of their own, and the decision is not told.
+            ValueError: robots have frames of their own, and the decision is not told; or another number of rows than
+                robots, where they have these or memories.
         """
+        if self.translation.has_memory or self.config.frame_decisions:
+            n_robots = len(self._commands)
+            if len(obs) != n_robots:
+                raise ValueError(f"Expected observations of {n_robots} robots, each with its row, got {len(obs)} rows.")
         if decision is None and self.config.frame_decisions:
             raise ValueError(
                 "Expected the number of decisions before this one, which says what frames robots have, got none; call "

@@ -138,6 +138,7 @@ class LearnerArena:
         self.turn = turn_of(seed) if self._plan.turned else AS_IT_IS
         self.env.reset_batch(seed)
         self.interface.forget()
+        self.interface.enter(0)
 
     def _change(self, overrides: dict[str, Any], world: World | None) -> None:
         """Build another environment, if the one that there is has another world."""
@@ -284,18 +285,22 @@ class LearnerArena:
         self._seeds.bit_generator.state = snapshot.seeds
         self.interface.recall(snapshot.memory)
         self.turn = snapshot.turn
+        self.interface.enter(self._decision)
 
     @property
     def active(self) -> BoolArray:
         """Which rows are at work, (rows,): a new array."""
         return self._with_spare_rows(self.forage_env.active)
 
+    @property
+    def _decision(self) -> int:
+        return self._plan.interface.decisions_in(self.forage_env.tick)
+
     def observe(self, out: ObsArray | None = None) -> ObsArray:
         """Return what the learner sees now, (rows, d): a new array, or `out`."""
         if out is None:
             out = np.empty((self.n_rows, self.interface.layout.size), np.float32)
-        decision = self.forage_env.tick // self._plan.interface.decision_ticks
-        seen = self.interface.observe(self.env.last_obs, out[: self.n_robots], decision=decision)
+        seen = self.interface.observe(self.env.last_obs, out[: self.n_robots], decision=self._decision)
         self.turn.rows(seen, self.interface.layout)
         out[self.n_robots :] = 0.0
         return out

@@ -48,6 +48,12 @@ def test_robots_take_all_frames_alike_and_at_different_times():
     assert len({int(np.flatnonzero(np.diff(row))[0]) for row in taken}) > 10
 
 
+def test_frames_are_those_of_the_slow_twin():
+    for robot in (0, 1, 2, 511):
+        for decision in (0, 1, 199, 200, 123_456_789):
+            assert frame_of(robot, decision, 200) == frames.frame(robot, decision, 200)
+
+
 @pytest.mark.parametrize("choices", VIEWS, ids=["full", "compact"])
 def test_robots_see_the_world_as_their_slow_twins(choices):
     env = busy_world()
@@ -96,9 +102,19 @@ def test_an_arena_comes_back_with_its_frames():
     kept, state = arena.snapshot(), rng.bit_generator.state
     first = go_on()
     arena.restore(kept)
-    arena.observe()
     rng.bit_generator.state = state
     np.testing.assert_array_equal(go_on(), first)
+
+
+def test_a_decision_that_the_end_of_a_run_cuts_short_counts():
+    assert [InterfaceConfig(decision_ticks=5).decisions_in(ticks) for ticks in (0, 4, 5, 6, 10)] == [0, 1, 1, 2, 2]
+
+
+def test_each_robot_has_a_row():
+    env = busy_world()
+    _, own = interfaces(env, 3)
+    with pytest.raises(ValueError, match="of 16 robots, each with its row, got 17 rows"):
+        own.observe(np.zeros((N_ROBOTS + 1, env.layout.size), np.float32), decision=0)
 
 
 def test_frames_need_the_number_of_the_decision():

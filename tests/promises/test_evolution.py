@@ -51,9 +51,9 @@ def test_numbers_of_a_controller_evolve(run):
     assert run("evolve_controller", "crw", *ranges, *size)[1] == out, "equal seeds, equal numbers"
 
 
-def test_a_set_is_on_the_front_unless_another_one_is_better_in_both(evolve_controller):
-    performance, interference = [1.0, 0.9, 0.8, 0.7], [1.0, 0.5, 0.6, 0.5]
-    assert evolve_controller.on_front(np.array([performance, interference])) == [True, True, False, True]
+def test_a_set_is_on_the_front_unless_another_one_is_as_good_in_both_and_better_in_one(evolve_controller):
+    performance, interference = [1.0, 0.9, 0.8, 0.7, 0.9], [1.0, 0.5, 0.6, 0.5, 0.5]
+    assert evolve_controller.on_front(np.array([performance, interference])) == [True, True, False, False, True]
 
 
 def test_numbers_of_a_controller_trade_performance_against_interference(run):

@@ -70,6 +70,9 @@ TWINS = {
     "swarm_forage_env.contract.detection.sees_nest": COMPACT_VIEW,
     "swarm_forage_env.contract.detection.sees_object": CRW,
     "swarm_forage_env.contract.detection.sees_obstacle": INTERFERENCE,
+    "swarm_forage_env.policies.kernels.frames.frame_of": Twin(
+        "frames.frame", "policies/test_frames.py", "swarm_forage_env.policies.kernels.frames.frame_of"
+    ),
     "swarm_forage_env.policies.kernels.frames.take_frames": SEEN_IN_FRAMES,
     "swarm_forage_env.policies.kernels.frames.leave_frames": DONE_IN_FRAMES,
     "swarm_forage_env.policies.kernels.learner.automatic_grip": Twin(

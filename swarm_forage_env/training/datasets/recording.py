@@ -338,7 +338,7 @@ def _record_run(plan: DatasetPlan, seed: int, folder: Path, tell: Callable[[int]
         if truncated:
             np.logical_not(dead, out=chunk.truncated[row])
         gone = dead.copy()
-        interface.observe(obs, chunk.observations[row + 1], decision=world.tick // config.decision_ticks)
+        interface.observe(obs, chunk.observations[row + 1], decision=config.decisions_in(world.tick))
         chunk.active[row + 1] = world.active
         chunk.length += 1
         if chunk.is_full or over:

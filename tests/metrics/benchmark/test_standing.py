@@ -246,4 +246,5 @@ def test_readme_tells_of_the_minute_what_its_entry_says():
     assert median >= 20
     words = " ".join((root / "README.md").read_text(encoding="utf-8").split())
     assert f"of five such trainings, the median beats all four of the paper's controllers in {median} of 26" in words
+    assert f", and the worst in {min(standing.won_by_policy)}. " in words
     assert len(protocol.scored) == 26
