@@ -43,6 +43,8 @@ def _cell(entry: Entry, whole: ProtocolWorld, lacking: ProtocolWorld) -> str:
     if (entry.performance(whole.name) == entry.performance(lacking.name)).all():
         return SAME
     found = gain(entry, whole, lacking)
+    if math.isnan(found.mean):
+        return f"{number(float(entry.performance(whole.name).mean()))} against nothing"
     bounds = "" if math.isnan(found.lower) else f" ({found.lower:+.0%} to {found.upper:+.0%})"
     means = (number(float(entry.performance(world.name).mean())) for world in (whole, lacking))
     return f"{found.mean:+.0%}{bounds}: {' against '.join(means)}".replace("%", " %")

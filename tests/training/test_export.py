@@ -141,6 +141,7 @@ def test_the_words_say_what_goes_in_and_out():
         "Draw the action k",
         "every 1 s",
         "The gripper works by itself",
+        "and in another one after 200 decisions",
     ):
         assert words in text
     text = "\n".join(manual_of(NETWORKS["relu and gripper"], scenario("warehouse_small"), "net").lines)

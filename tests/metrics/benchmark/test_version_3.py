@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from metrics.benchmark import (
     details_page,
     load_protocol,
     page_block,
+    read_entry,
     reference_of,
     standing_of,
 )
@@ -119,7 +121,9 @@ def test_the_interval_of_several_trainings_is_that_over_trainings(protocol):
 
 
 def test_a_gain_over_nothing_is_no_number(protocol):
-    assert math.isnan(gain(pair_entry(protocol, [[1.0] * 3], [[0.0] * 3]), *protocol.pairs[0]).mean)
+    entry = pair_entry(protocol, [[1.0] * 3], [[0.0] * 3])
+    assert math.isnan(gain(entry, *protocol.pairs[0]).mean)
+    assert pairs_sheet([entry], protocol).rows[0][2] == "1 against nothing"
 
 
 def test_runs_that_do_not_differ_are_called_the_same(protocol):
@@ -150,3 +154,9 @@ def test_a_key_that_a_group_does_not_know_is_refused(tmp_path):
     file.write_text(TINY.read_text() + '\n[group.with]\n"x" = {}\n')
     with pytest.raises(BenchmarkError, match=r"group\.with"):
         load_protocol(file)
+
+
+def test_messages_pay_in_the_stored_runs_of_cpfa(protocol):
+    of_cpfa = read_entry(Path(__file__).parents[3] / "docs/benchmark/v3/cpfa.json")
+    found = [gain(of_cpfa, *pair) for pair in protocol.pairs if pair[0].name == "messages, one heap"]
+    assert [each.lower > 0.0 for each in found] == [True]
