@@ -12,6 +12,8 @@ import pytest
 from swarm_forage_env import ConfigError, load_policy, plan_run, run_one, scenario
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.policies.interface import LearnerInterface
+from swarm_forage_env.policies.network import Network
+from swarm_forage_env.policies.pretrained import network_file
 from swarm_forage_env.runs.run import build_env
 from swarm_forage_env.training.datasets import recording
 from swarm_forage_env.training.datasets.layout import DatasetError, chunk_file, summary_file
@@ -104,6 +106,11 @@ def test_observations_can_be_compact_for_any_policy(tmp_path):
 def test_what_robots_remember_is_recorded_where_it_is_asked_for_or_seen(policy, tmp_path):
     """It is what an interface of the same choices says of the recorded rows, from the first on."""
     is_seen = policy == "generalist"
+    if is_seen:  # without frames of robots' own, so that the plain rows are those that the interface is given
+        policy = str(tmp_path / "as_it_is.npz")
+        network = Network.load(network_file("generalist"))
+        interface = replace(network.about.interface, frame_decisions=0)
+        replace(network, about=replace(network.about, interface=interface)).save(policy)
     columns = len(plan(policy).card.columns)
     assert len(plan(policy, site_memory=not is_seen).card.columns) == columns + (-8 if is_seen else 8)
     remembering, plain = plan(policy, observation="full", site_memory=True), plan(policy, observation="full")
