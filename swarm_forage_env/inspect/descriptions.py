@@ -12,6 +12,7 @@ from typing import Any
 from swarm_forage_env._internal.fields import ConfigError, known_name
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.policy import SwarmSpec
+from swarm_forage_env.inspect.networks import network_lines, plain
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.policies.mixture import is_mixture, mixture_parts
 from swarm_forage_env.policies.network import Network
@@ -161,9 +162,9 @@ def _scenario_lines(config: ScenarioConfig, headline: str) -> Iterator[str]:
         if dataclasses.is_dataclass(value):
             yield f"  [{item.name}]"
             for inner in dataclasses.fields(value):
-                yield f"    {inner.name:<34}{_plain(getattr(value, inner.name))}"
+                yield f"    {inner.name:<34}{plain(getattr(value, inner.name))}"
         else:
-            yield f"  {item.name:<36}{_plain(value)}"
+            yield f"  {item.name:<36}{plain(value)}"
     yield ""
     yield "Spaces, per robot:"
     yield f"  action       {interface.action_space}: left wheel, right wheel, gripper"
@@ -189,7 +190,7 @@ def _policy_lines(name: str) -> Iterator[str]:
     else:
         yield ""
         yield "Parameters (change them in a study file, or in Python with plan_run(..., parameters={name: value})):"
-        yield from (f"  {field:<34}{_plain(value)}" for field, value in settings)
+        yield from (f"  {field:<34}{plain(value)}" for field, value in settings)
 
 
 def _settings(policy: Callable[..., Any]) -> Iterator[tuple[str, Any]]:
@@ -222,22 +223,7 @@ def _file_lines(file: Path) -> Iterator[str]:
         network = Network.load(file)
     except ValueError as error:
         raise ConfigError(str(error)) from error
-    about = network.about
-    sizes = [network.weights[0].shape[0], *(weight.shape[1] for weight in network.weights)]
-    yield f"{file}: a network of {' x '.join(map(str, sizes))} units ({about.activation})"
-    yield ""
-    for name, value in dataclasses.asdict(about.interface).items():
-        yield f"  {name:<20}{_plain(value)}"
-    yield f"  {'caches':<20}{about.caches} (the caches it is made for)"
-    for part, values in about.card.items():
-        if part != "plan":  # shown on its own page
-            yield ""
-            yield f"  [{part}]"
-            if isinstance(values, dict):
-                for name, value in values.items():
-                    yield f"    {name:<24}{value:.6g}" if isinstance(value, float) else f"    {name:<24}{_plain(value)}"
-            else:
-                yield f"    {_plain(values)}"
+    yield from network_lines(file, network)
 
 
 def _first_paragraph(documented: Any) -> str:
@@ -246,9 +232,3 @@ def _first_paragraph(documented: Any) -> str:
 
 def _first_line(documented: Any) -> str:
     return _first_paragraph(documented).splitlines()[0]
-
-
-def _plain(value: Any) -> str:
-    if isinstance(value, tuple) and all(isinstance(part, int | float) for part in value):
-        return " x ".join(f"{part:g}" for part in value)
-    return ", ".join(map(_plain, value)) if isinstance(value, tuple) else str(value)
