@@ -22,6 +22,7 @@ from swarm_forage_env.training.datasets.recording import plan_dataset, record_da
 from swarm_forage_env.views.gymnasium import JointForageEnv
 from swarm_forage_env.wrappers.population import PopulationConfig
 from swarm_forage_env.wrappers.registry import parse_wrapper
+from tests.reference import frames
 
 WORLD = scenario("warehouse_small", n_robots=4, n_objects=400, horizon_s=20.0, interval_s=20.0, physics="compiled")
 DEADLY = (PopulationConfig(death_per_tick=0.03),)
@@ -75,12 +76,23 @@ def test_a_run_of_a_data_set_is_the_run_of_that_seed(tmp_path):
     assert summary.truncated
 
 
-def test_a_learned_policy_is_recorded_as_it_decides(tmp_path):
-    planned = plan("ppo_warehouse_small")
+def generalist(folder, frame_decisions):
+    """The shipped policy with frames for so many decisions, as a file."""
+    network = Network.load(network_file("generalist"))
+    interface = replace(network.about.interface, frame_decisions=frame_decisions)
+    file = folder / f"frames_{frame_decisions}.npz"
+    replace(network, about=replace(network.about, interface=interface)).save(file)
+    return str(file)
+
+
+@pytest.mark.parametrize("frame_decisions", [None, 3])
+def test_a_learned_policy_is_recorded_as_it_decides(frame_decisions, tmp_path):
+    """Its actions, taken again, make the same run, also where robots have frames of their own."""
+    planned = plan("ppo_warehouse_small" if frame_decisions is None else generalist(tmp_path, frame_decisions))
     config = planned.card.interface
-    assert (config.observation, config.decision_ticks) == ("compact", 5)
-    record_dataset(planned, tmp_path)
-    steps = TrajectoryDataset(tmp_path).steps(3)
+    assert (config.observation, config.decision_ticks, config.frame_decisions) == ("compact", 5, frame_decisions or 0)
+    record_dataset(planned, tmp_path / "data")
+    steps = TrajectoryDataset(tmp_path / "data").steps(3)
     assert (len(steps), steps.actions.shape, steps.actions.dtype) == (20, (20, 4), np.int64)
     env = JointForageEnv(WORLD, interface=config)
     obs, _ = env.reset(seed=3)
@@ -91,6 +103,26 @@ def test_a_learned_policy_is_recorded_as_it_decides(tmp_path):
         np.testing.assert_array_equal(info["active"], steps.active[number + 1])
     assert truncated
     np.testing.assert_array_equal(steps.observations[-1], obs)
+
+
+def test_with_frames_rows_and_actions_are_those_that_robots_see_and_choose_in_them(tmp_path):
+    planned = plan(generalist(tmp_path, 3))
+    record_dataset(planned, tmp_path / "data")
+    steps = TrajectoryDataset(tmp_path / "data").steps(3)
+    env = build_env(WORLD)
+    plain = LearnerInterface(replace(planned.card.interface, frame_decisions=0), env_spec())
+    obs, as_it_is = env.reset_batch(3), []
+    for decision, (actions, rewards) in enumerate(zip(steps.actions, steps.rewards, strict=True)):
+        as_it_is.append(plain.observe(obs))
+        np.testing.assert_array_equal(
+            steps.observations[decision], frames.seen(as_it_is[-1], plain.layout, decision, 3)
+        )
+        earned = np.zeros(4)
+        for _ in range(5):
+            obs, reward, _, _ = env.step_batch(frames.commands(plain.command(actions, obs), decision, 3))
+            earned += reward
+        np.testing.assert_array_equal(earned, rewards)
+    assert (np.array(as_it_is) != steps.observations[:-1]).any(axis=2).mean() > 0.5, "most robots see it as it is"
 
 
 def test_observations_can_be_compact_for_any_policy(tmp_path):
@@ -107,10 +139,7 @@ def test_what_robots_remember_is_recorded_where_it_is_asked_for_or_seen(policy, 
     """It is what an interface of the same choices says of the recorded rows, from the first on."""
     is_seen = policy == "generalist"
     if is_seen:  # without frames of robots' own, so that the plain rows are those that the interface is given
-        policy = str(tmp_path / "as_it_is.npz")
-        network = Network.load(network_file("generalist"))
-        interface = replace(network.about.interface, frame_decisions=0)
-        replace(network, about=replace(network.about, interface=interface)).save(policy)
+        policy = generalist(tmp_path, 0)
     columns = len(plan(policy).card.columns)
     assert len(plan(policy, site_memory=not is_seen).card.columns) == columns + (-8 if is_seen else 8)
     remembering, plain = plan(policy, observation="full", site_memory=True), plan(policy, observation="full")
