@@ -150,7 +150,8 @@ def saliency(
     """Show what a trained network looks at.
 
     For example, give a robot the light readings of another robot: how often does it then decide otherwise? The command
-    does this for each part of what robots see. The policy is a shipped network, or the .npz file of a training.
+    does this for each part of what robots see. The policy is a shipped network, or the .npz file of a training. Where
+    robots have frames of their own, position, heading and directions are in these frames, as the network sees them.
     """
     from swarm_forage_env.cli.scenario_options import described_world, plan_runs
     from swarm_forage_env.inspect.saliency import open_network_of

@@ -36,6 +36,8 @@ EXCHANGES = 8
 Group: TypeAlias = Literal["all", "empty", "carrying"]
 """Which robots a number is about."""
 GROUPS: tuple[Group, ...] = get_args(Group)
+_FRAMES = "position, heading and directions are those that each robot sees in its own frame"
+"""What table and figure say beside the numbers of a network whose robots have frames of their own."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,6 +60,8 @@ class Saliency(Answer):
     if outputs were logits, which they are in ppo and a2c. None for continuous actions."""
     title: str = ""
     """What it is about: policy and run."""
+    in_frames: bool = False
+    """Whether robots have frames of their own, in which the network sees position, heading and all directions."""
 
     @property
     def ranked(self) -> tuple[int, ...]:
@@ -77,7 +81,7 @@ class Saliency(Answer):
                 title=self.title,
                 header=("slice", "columns", *counts, *moved, "what it holds"),
                 rows=[self._row(row) for row in self.ranked],
-                notes=(f"{self._words} when a slice comes from another observation",),
+                notes=(f"{self._words} when a slice comes from another observation", *([_FRAMES] * self.in_frames)),
             ),
         )
 
@@ -92,6 +96,7 @@ class Saliency(Answer):
         return {
             "what": self.title,
             "seen": dict(self.n_rows),
+            "in_frames": self.in_frames,
             "slices": {
                 self.slices[row]: {
                     "columns": self.n_columns[row],
@@ -115,7 +120,8 @@ class Saliency(Answer):
             else "(0: it is not looked at; commands lie in [-1, 1], so at most 2)"
         )
         bars = {group: self.changed[group] for group in GROUPS[1:] if self.n_rows[group]}
-        draw_saliency(path, self.slices, bars, title=self.title, xlabel=f"{exchanged}\n{ends}", style=style)
+        label = "\n".join((exchanged, ends, *([_FRAMES] * self.in_frames)))
+        draw_saliency(path, self.slices, bars, title=self.title, xlabel=label, style=style)
 
 
 def open_network_of(policy: str) -> Network:
@@ -182,7 +188,8 @@ def saliency_of_rows(network: Network, layout: ObservationLayout, rows: ObsArray
     Args:
         network: The network.
         layout: Columns of what it sees.
-        rows: (K, d) observations, at least one.
+        rows: (K, d) observations as the network sees them, at least one; with `frame_decisions` each is in the frame of
+            its robot.
         rng: Chooses whose slice an observation gets.
     """
     is_discrete = network.about.interface.actions == "discrete"
@@ -213,6 +220,7 @@ def saliency_of_rows(network: Network, layout: ObservationLayout, rows: ObsArray
         n_rows={group: int(rows_of_group.sum()) for group, rows_of_group in members.items()},
         changed={group: np.array(values) for group, values in changed.items()},
         moved={group: np.array(values) for group, values in moved.items()} if is_discrete else None,
+        in_frames=network.about.interface.frame_decisions > 0,
     )
 
 

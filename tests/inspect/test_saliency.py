@@ -77,6 +77,32 @@ def test_observations_are_those_of_a_run():
         saliency(open_network_of("ppo_warehouse_small"), spec, seconds=21.0)
 
 
+@pytest.mark.compiled
+@pytest.mark.parametrize("frame_decisions", [0, 3])
+def test_robots_with_frames_of_their_own_are_asked_in_them(frame_decisions):
+    """Robots drive straight on, so in the world as it is their headings stay; in frames they turn and are mirrored."""
+    world = scenario("warehouse_medium", n_robots=3, n_objects=20, horizon_s=4.0, interval_s=4.0)
+    interface = InterfaceConfig(observation="compact", automatic_gripper=True, frame_decisions=frame_decisions)
+    weights = np.zeros((23, 2), np.float32)
+    straight = Network((weights,), (np.ones(2, np.float32),), NetworkAbout(interface=interface))
+    asked = []
+
+    class Asked(Network):
+        def outputs(self, rows):
+            asked.append(rows.copy())
+            return super().outputs(rows)
+
+    found = saliency(
+        Asked(straight.weights, straight.biases, straight.about), RunSpec(world=World(world), policy="straight", seed=1)
+    )
+    column = found.n_columns[: found.slices.index("heading")]
+    headings = asked[0].reshape(20, 3, 23)[:, :, sum(column) : sum(column) + 2]
+    ways = [len(np.unique(headings[:, robot].round(3), axis=0)) for robot in range(3)]
+    assert min(ways) > 2 if frame_decisions else max(ways) == 1
+    assert found.in_frames == bool(frame_decisions)
+    assert ("each robot sees in its own frame" in found.text()) == bool(frame_decisions)
+
+
 def test_policies_without_a_network_are_refused():
     for name in ("crw", "model.zip"):
         with pytest.raises(ConfigError, match=r"Expected a network.*policy\.npz"):
