@@ -103,12 +103,12 @@ def board_of(entries: Sequence[Entry], protocol: Protocol | None = None) -> Boar
             controller.
     """
     full = load_protocol(version=entries[0].version if entries else USUAL)
-    others = {entry.version for entry in entries} - {full.version}
-    if others:
-        raise BenchmarkError(
-            f"Expected entries of one version of the benchmark, got version {min(others)} beside version "
-            f"{full.version}."
-        )
+    for entry in entries:
+        if entry.version != full.version:
+            raise BenchmarkError(
+                f"Expected entries of one version of the benchmark, got {entry.name!r} of version {entry.version} "
+                f"beside {entries[0].name!r} of version {full.version}; show each version by itself."
+            )
     scripted = scripted_entries(full)
     reference = reference_of(scripted, full)
     digests = {entry.digest for entry in scripted}

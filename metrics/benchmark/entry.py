@@ -309,22 +309,6 @@ def read_entry(path: str | Path, protocol: Protocol | None = None) -> Entry:
     return entry
 
 
-def read_entries(paths: Sequence[Path]) -> list[Entry]:
-    """Read entry files that are shown side by side.
-
-    Raises:
-        BenchmarkError: as `read_entry`, or entries of different versions.
-    """
-    entries = [read_entry(path) for path in paths]
-    for path, entry in zip(paths, entries, strict=True):
-        if entry.version != entries[0].version:
-            raise BenchmarkError(
-                f"Expected entries of one version of the benchmark, got one of version {entry.version} in {path} "
-                f"beside one of version {entries[0].version} in {paths[0]}."
-            )
-    return entries
-
-
 def _entry(stored: EntryFile) -> Entry:
     about = stored.benchmark
     return Entry(

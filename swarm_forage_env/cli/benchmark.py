@@ -216,11 +216,10 @@ def page(
 
 
 def _board_of(paths: list[Path]) -> "Board":
-    from metrics.benchmark import board_of
+    from metrics.benchmark import board_of, read_entry
     from metrics.benchmark.board import entry_files
-    from metrics.benchmark.entry import read_entries
 
-    return board_of(read_entries(entry_files(paths)))
+    return board_of([read_entry(file) for file in entry_files(paths)])
 
 
 def _show(board: "Board", *, as_json: bool) -> None:
