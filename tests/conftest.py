@@ -22,7 +22,6 @@ MAY_BE_SKIPPED = {
     ),
     r"needs a C compiler: .*": "it comes with the operating system, not from a package registry",
     r"could not import 'onnx(runtime)?': .*": "its wheels come later than a new Python does",
-    r"could not import 'optuna': .*": "only one page needs it (docs/bridges/optuna.md)",
 }
 """Reason of a skip -> why it is no failure under --no-skips."""
 _skipped: dict[str, str] = {}
