@@ -25,6 +25,26 @@ Seeds = Annotated[int | None, typer.Option("--seeds", min=1, help="Runs per cond
 Rules = Annotated[
     str, typer.Option("--rules", help="described, program (the authors'), both, or file: what the file says.")
 ]
+UntilDecided = Annotated[
+    bool,
+    typer.Option(
+        "--until-decided",
+        help="Judge the paper's claims again and again, and make the runs that decide most in the least time "
+        "(docs/studies.md). --budget is then paper by default, and --seeds sets the most runs per condition; "
+        "default as the folders have it, else 192.",
+    ),
+]
+Hours = Annotated[
+    float | None, typer.Option("--hours", min=0.0, help="With --until-decided: for how many hours of wall time.")
+]
+Cluster = Annotated[
+    str | None,
+    typer.Option(
+        "--cluster",
+        help="Run on Dask: local, slurm, slurm-jobs (--jobs sets their number), or the address of a scheduler "
+        "(docs/studies.md).",
+    ),
+]
 
 
 def list_studies(
@@ -52,7 +72,7 @@ def show(
     typer.echo(f"\nBudgets: {', '.join(budget_names(name))}" + ("" if budget or len(others) < 2 else "; see --budget"))
 
 
-def run(  # long: one parameter per option
+def run(
     names: Annotated[
         list[str], typer.Argument(metavar="NAME|FILE...", help="Sets of the paper (S1a to S2d), or study files.")
     ],
@@ -66,30 +86,13 @@ def run(  # long: one parameter per option
     ] = None,
     seeds: Seeds = None,
     rules: Rules = "file",
-    until_decided: Annotated[
-        bool,
-        typer.Option(
-            "--until-decided",
-            help="Judge the paper's claims again and again, and make the runs that decide most in the least time "
-            "(docs/studies.md). --budget is then paper by default, and --seeds sets the most runs per condition; "
-            "default as the folders have it, else 192.",
-        ),
-    ] = False,
-    hours: Annotated[
-        float | None, typer.Option("--hours", min=0.0, help="With --until-decided: for how many hours of wall time.")
-    ] = None,
+    until_decided: UntilDecided = False,
+    hours: Hours = None,
     shard: Annotated[
         str, typer.Option("--shard", metavar="I/N", help="Make only the I-th of N equal parts of the runs.")
     ] = "1/1",
     jobs: Jobs = None,
-    cluster: Annotated[
-        str | None,
-        typer.Option(
-            "--cluster",
-            help="Run on Dask: local, slurm, slurm-jobs (--jobs sets their number), or the address of a scheduler "
-            "(docs/studies.md).",
-        ),
-    ] = None,
+    cluster: Cluster = None,
     dry_run: DryRun = False,
 ) -> None:
     """Make the missing runs of studies, and pack each study into one file.
