@@ -4,6 +4,7 @@
     <folder>/seed_000003_0000.npz         first chunk of the run with seed 3
     <folder>/seed_000003_0001.npz         second chunk
     <folder>/seed_000003.json             summary of the run (`RunSummary`), written when all of its chunks are there
+    <folder>/croissant.json               the same for others (`describe_dataset`); nothing here reads it
 
 A chunk has n decisions of all N robots; row i is robot i. The observations that follow its last decision are its last
 row, and the first row of the next chunk.
@@ -28,6 +29,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from swarm_forage_env._internal.archives import Kind
 from swarm_forage_env._internal.fields import ConfigError, table
 from swarm_forage_env._internal.files import read_json, replacing
 from swarm_forage_env._internal.typed import Count, Within, typed
@@ -176,6 +178,20 @@ def chunk_file(folder: Path, seed: int, chunk: int) -> Path:
 def _write_json(file: Path, values: Mapping[str, Any]) -> None:
     with replacing(file) as draft:
         draft.write_text(json.dumps(values, indent=1, sort_keys=True), encoding="utf-8")
+
+
+def chunk_kinds(card: Card, n_decisions: int | None = None) -> dict[str, Kind]:
+    """Return type and shape of each array of a chunk of some decisions; None = of any number."""
+    n_robots = card.spec.scenario.robots.n_robots
+    each, longer = (n_decisions, n_robots), (None if n_decisions is None else n_decisions + 1, n_robots)
+    return {
+        "observations": (np.float32, (*longer, len(card.columns))),
+        "actions": (np.float32 if card.n_actions is None else np.int64, (n_decisions, *card.action_shape)),
+        "rewards": (np.float64, each),
+        "terminated": (np.bool_, each),
+        "truncated": (np.bool_, each),
+        "active": (np.bool_, longer),
+    }
 
 
 def chunk_digest(arrays: Mapping[str, np.ndarray]) -> str:

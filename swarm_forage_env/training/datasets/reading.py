@@ -17,6 +17,7 @@ from swarm_forage_env.training.datasets.layout import (
     RunSummary,
     chunk_digest,
     chunk_file,
+    chunk_kinds,
     summary_file,
 )
 
@@ -109,7 +110,7 @@ class TrajectoryDataset:
     def _chunks_of(self, run: RunSummary) -> Iterator[Steps]:
         for number, n_decisions in enumerate(run.chunks):
             file = chunk_file(self.folder, run.seed, number)
-            arrays = _read(file, _kinds(self.card, n_decisions))
+            arrays = _read(file, chunk_kinds(self.card, n_decisions))
             if self.card.n_actions is not None and not _are_below(arrays["actions"], self.card.n_actions):
                 raise DatasetError(f"Expected actions from 0 to {self.card.n_actions - 1} in {file}, got others.")
             if run.digests and chunk_digest(arrays) != run.digests[number]:
@@ -159,20 +160,6 @@ class TrajectoryDataset:
         if not found["rewards"]:
             raise DatasetError(f"Expected a run in {self.folder} that is whole, found none; record it to its end.")
         return Transitions(**{name: np.concatenate(parts) for name, parts in found.items()})
-
-
-def _kinds(card: Card, n_decisions: int) -> dict[str, Kind]:
-    """Return type and shape of each array of a chunk."""
-    n_robots = card.spec.scenario.robots.n_robots
-    each, longer = (n_decisions, n_robots), (n_decisions + 1, n_robots)
-    return {
-        "observations": (np.float32, (*longer, len(card.columns))),
-        "actions": (np.float32 if card.n_actions is None else np.int64, (n_decisions, *card.action_shape)),
-        "rewards": (np.float64, each),
-        "terminated": (np.bool_, each),
-        "truncated": (np.bool_, each),
-        "active": (np.bool_, longer),
-    }
 
 
 def _are_below(actions: np.ndarray, n_actions: int) -> bool:

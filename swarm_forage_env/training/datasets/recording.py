@@ -29,6 +29,7 @@ from swarm_forage_env.runs.run import build_env
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.versions import software_versions
 from swarm_forage_env.runs.workers import Tell, map_runs
+from swarm_forage_env.training.datasets.croissant import describe_dataset
 from swarm_forage_env.training.datasets.layout import (
     CARD_FILE,
     Card,
@@ -215,6 +216,7 @@ def record_dataset(
     _check_room(folder, len(plan.missing(folder)) * plan.run_bytes)
     with alone_in(folder, DatasetError):
         _record_runs(plan, folder, jobs, progress)
+        describe_dataset(folder)
     return tuple(RunSummary.read(folder, seed, card) for seed in plan.card.seeds)
 
 
