@@ -1,6 +1,7 @@
 """A benchmark that others can enter: a fixed protocol of worlds and seeds, entry files, and what they are worth."""
 
 from .board import Board, board_of, draw_benchmark
+from .croissant import describe_entries
 from .entry import Entry, Training, read_entry
 from .page import details_page, page_block
 from .protocol import BenchmarkError, Protocol, ProtocolWorld, load_protocol
@@ -26,6 +27,7 @@ __all__ = [
     "page_block",
     "details_page",
     "draw_benchmark",
+    "describe_entries",
     "Protocol",
     "ProtocolWorld",
     "Entry",

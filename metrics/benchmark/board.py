@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from swarm_forage_env._internal.croissant import CROISSANT_FILE
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.wording import plain
 from swarm_forage_env.rendering.figures import (
@@ -130,7 +131,11 @@ def board_of(entries: Sequence[Entry], protocol: Protocol | None = None) -> Boar
 
 def entry_files(given: Sequence[Path]) -> list[Path]:
     """Return entry files; a folder stands for the entry files in it, sorted by name."""
-    return [file for path in given for file in (sorted(path.glob("*.json")) if path.is_dir() else [path])]
+    return [file for path in given for file in (_entries_in(path) if path.is_dir() else [path])]
+
+
+def _entries_in(folder: Path) -> list[Path]:
+    return sorted(file for file in folder.glob("*.json") if file.name != CROISSANT_FILE)
 
 
 def _mapping(standing: Standing) -> dict[str, Any]:

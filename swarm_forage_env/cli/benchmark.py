@@ -207,12 +207,21 @@ def page(
         typer.Option("--picture", help="Figure that the page shows; default of the page's name, in docs/images."),
     ] = None,
 ) -> None:
-    """Write the tables of all entries into a page, and draw its figure."""
+    """Write the tables of all entries into a page, and draw its figure.
+
+    A folder of entries also gets croissant.json, its metadata in the format of ML Commons.
+    """
+    from metrics.benchmark import describe_entries
+    from metrics.benchmark.board import entry_files
+
     board = _board_of(entries)
     version = board.protocol.version
     name = "benchmark" if version == 1 else f"benchmark_v{version}"
     for written in board.write_page(file or Path(f"docs/{name}.md"), picture or Path(f"docs/images/{name}.png")):
         typer.echo(written)
+    for folder in entries:
+        if folder.is_dir() and entry_files([folder]):
+            typer.echo(describe_entries(folder))
 
 
 def _board_of(paths: list[Path]) -> "Board":

@@ -13,6 +13,7 @@ from metrics.benchmark import Training, load_protocol
 from metrics.benchmark.entry import EntryPolicy
 from metrics.benchmark.page import BEGIN, END
 from metrics.benchmark.running import entry_command
+from tests.support.croissant import faults
 from tests.support.entries import TINY, made_up_entry
 
 
@@ -135,6 +136,22 @@ def test_a_page_is_written_with_its_figure(command, mine):
     assert "](benchmark_in_detail.md)" in text
     assert "| room, noisy wheels | " in Path("docs/benchmark_in_detail.md").read_text()
     assert text.endswith(f"{END}\n\nend\n")
+
+
+def test_a_folder_of_entries_gets_its_metadata_with_the_page(command, mine):
+    Path("entries").mkdir()
+    Path("mine.json").rename("entries/mine.json")
+    Path("page.md").write_text(f"{BEGIN}\n{END}\n")
+    words = ("benchmark", "page", "entries", "--file", "page.md", "--picture", "page.png")
+    code, out, err = command(*words)
+    assert code == 0, err
+    assert out.split()[-1] == "entries/croissant.json"
+    assert faults(Path("entries")) == []
+    first = Path("entries/croissant.json").read_bytes()
+    assert command(*words)[0] == 0, "the metadata are no entry"
+    assert Path("entries/croissant.json").read_bytes() == first
+    Path("entries/mine.json").unlink()
+    assert command(*words)[1].split()[-1] == "page.png"
 
 
 def test_a_mixed_swarm_can_be_run_again_with_the_command_of_its_entry():
