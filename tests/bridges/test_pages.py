@@ -18,7 +18,7 @@ from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterfac
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLE = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
-PAGES = {"benchmarl": "benchmarl", "rllib": "ray", "torchrl": "torchrl"}
+PAGES = {"agilerl": "agilerl", "benchmarl": "benchmarl", "rllib": "ray", "torchrl": "torchrl"}
 """Page in docs/bridges -> module that it needs."""
 
 
