@@ -16,9 +16,9 @@ from swarm_forage_env._internal.croissant import (
 )
 from swarm_forage_env._internal.wording import counted
 
-from .board import entry_files
-from .entry import read_entries
-from .protocol import BenchmarkError, Protocol, load_protocol
+from .board import board_of, entry_files
+from .entry import read_entry
+from .protocol import BenchmarkError, Protocol
 
 _FILES = "entry_files"
 _UNITS = {
@@ -43,7 +43,7 @@ def describe_entries(folder: str | Path) -> Path:
     files = entry_files([folder])
     if not files:
         raise BenchmarkError(f"Expected entry files in {folder}, found none.")
-    protocol = load_protocol(version=read_entries(files)[0].version)
+    protocol = board_of([read_entry(file) for file in files]).protocol  # which refuses two versions
     names = [file.name for file in files]  # a pattern would also find those of other versions in folders below
     return write_croissant(
         folder,
