@@ -105,17 +105,13 @@ class World:
 
 def worlds_of(plan: TrainingPlan, stage: Stage, seed: int) -> list[World]:
     """Return the worlds of a stage, with as many of the plan's arenas as their weights say, at least one each."""
-    sampler = stage.sampler or plan.sampler
-    assert sampler is not None, "other plans are refused"
+    arenas = plan.arenas_of(stage)
+    sampler = arenas["sampler"]
     share = plan.n_arenas / sum(world.weight for world in sampler.worlds)
     worlds = []
     for k, world in enumerate(sampler.worlds):
-        env = SwarmVectorEnv(
-            n_arenas=max(1, round(share * world.weight)),
-            sampler=replace(sampler, worlds=(world,)),
-            interface=plan.interface,
-            turned=bool(plan.turned),
-        )
+        kind = {"sampler": replace(sampler, worlds=(world,)), "n_arenas": max(1, round(share * world.weight))}
+        env = SwarmVectorEnv(**{**arenas, **kind})
         obs, infos = env.reset(seed=seed + 1000 * k, options={"scenario": dict(stage.scenario)})
         if not infos["active"].all():
             raise SystemExit("Expected worlds with fixed numbers of robots, got spare rows: take another plan.")
