@@ -92,8 +92,25 @@ class Learner:
                 self.optimizer.step()
 
 
+def swarm_state(rows: torch.Tensor, at_work: torch.Tensor) -> torch.Tensor:
+    """Return what a swarm looks like as a whole: per column the mean and the largest over its robots at work.
+
+    Args:
+        rows: (..., N, d), what its robots see.
+        at_work: (..., N) bool.
+
+    Returns:
+        (..., 2 d), zeros where nobody is at work.
+    """
+    at_work = at_work[..., None]
+    n_at_work = at_work.sum(-2)
+    mean = (rows * at_work).sum(-2) / n_at_work.clamp(min=1)
+    largest = torch.where(at_work, rows, -1.0).amax(-2) * (n_at_work > 0)
+    return torch.cat([mean, largest], -1)
+
+
 def swarm_rows(obs: torch.Tensor, active: torch.Tensor, n_arenas: int) -> torch.Tensor:
-    """Return what the critic sees of the swarm: per column the mean and the largest over robots at work of the arena.
+    """Return what the critic sees of the swarm, `swarm_state`, in every row of its arena.
 
     Args:
         obs: (R, d), arena by arena.
@@ -101,13 +118,10 @@ def swarm_rows(obs: torch.Tensor, active: torch.Tensor, n_arenas: int) -> torch.
         n_arenas: Arenas, R / n_arenas rows each.
 
     Returns:
-        (R, 2 d), the same for all rows of an arena; zeros where nobody is at work.
+        (R, 2 d), the same for all rows of an arena.
     """
-    rows, at_work = obs.view(n_arenas, -1, obs.shape[1]), active.view(n_arenas, -1, 1)
-    n_at_work = at_work.sum(1)
-    mean = (rows * at_work).sum(1) / n_at_work.clamp(min=1)
-    largest = torch.where(at_work, rows, -1.0).amax(1) * (n_at_work > 0)
-    return torch.cat([mean, largest], 1).repeat_interleave(rows.shape[1], 0)
+    rows = obs.view(n_arenas, -1, obs.shape[1])
+    return swarm_state(rows, active.view(n_arenas, -1)).repeat_interleave(rows.shape[1], 0)
 
 
 @torch.no_grad()

@@ -1,0 +1,230 @@
+"""QMIX with TorchRL: robots share a network that says what actions are worth, and a mixer makes one worth of them all.
+
+    pip install . "torchrl==0.14.1" "torch==2.13.0"  # in a checkout
+    python scripts/torchrl_qmix.py --plan docs/benchmark/plans/qmix.toml --out qmix.npz
+    swarm-forage run crw,qmix.npz
+
+It carries out a plan of `swarm-forage train`: its worlds, its stages, its evaluations, and options of its own. Our
+vector environment collects; TorchRL's networks, memory and loss learn. The swarm is paid together, the sum of what its
+robots earn, and the mixer learns whose actions were worth it. It has weights for each robot, so all worlds have the
+same number of robots. It sees the swarm as the critic of `torchrl_mappo.py` does. Runs need no mixer: what is worth
+most to a robot is worth most to the swarm. The network that does best in the evaluations is kept.
+"""
+
+import argparse
+import dataclasses
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tensordict
+import torch
+import torchrl
+from gymnasium.spaces import flatdim
+from tensordict import TensorDict
+from tensordict.nn import TensorDictModule
+from torch import nn
+from torchrl.data import LazyTensorStorage, TensorDictReplayBuffer
+from torchrl.data.postprocs import MultiStep
+from torchrl.modules import QValueModule, SafeSequential
+from torchrl.modules.models.multiagent import QMixer
+from torchrl.objectives import HardUpdate, ValueEstimators
+from torchrl.objectives.multiagent import QMixerLoss
+from torchrl_mappo import network, swarm_state
+
+from swarm_forage_env.contract.policy import SwarmSpec
+from swarm_forage_env.contract.types import ObsArray
+from swarm_forage_env.policies.interface import LearnerInterface
+from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkPolicy
+from swarm_forage_env.runs.policy_spec import policy_spec
+from swarm_forage_env.runs.versions import software_versions
+from swarm_forage_env.training.evaluations import (
+    Baselines,
+    baseline_runs,
+    best_baselines,
+    finished_runs,
+    in_all_worlds,
+    judged,
+)
+from swarm_forage_env.training.plan import LEARNING, Stage, TrainingPlan, read_plan
+from swarm_forage_env.views.gymnasium import SwarmVectorEnv
+
+OPTIONS = {"buffer_size": 20_000, "batch_size": 64, "learning_rate": 5e-4, "gamma": 0.99, "n_steps": 1,
+           "train_freq": 32, "gradient_steps": 8, "learning_starts": 1_000, "target_update_interval": 200,
+           "exploration_fraction": 0.3, "exploration_final_eps": 0.05, "mixing_units": 32,
+           "max_grad_norm": 10.0}  # fmt: skip
+"""Options that the script understands, and what they are where a plan leaves them away. They mean what they mean in DQN
+of stable-baselines3, but decisions are counted of whole swarms: memory, batch and `learning_starts`."""
+SEEN = ("agents", "observation")
+
+
+class SwarmMixer(nn.Module):
+    """TorchRL's mixer, with what the swarm looks like as the state that its weights come from."""
+
+    def __init__(self, n_columns: int, n_robots: int, n_units: int) -> None:
+        super().__init__()
+        self.mixer = QMixer((2 * n_columns,), n_units, n_robots, "cpu")
+
+    def forward(self, values: torch.Tensor, seen: torch.Tensor) -> torch.Tensor:
+        """Return the worth to the swarm (..., 1) of values (..., N, 1) of robots that see (..., N, d)."""
+        return self.mixer(values, swarm_state(seen, torch.ones(seen.shape[:-1], dtype=torch.bool)))
+
+
+class Learner:
+    """The network of values, its mixer, the loss of both, and the memory."""
+
+    def __init__(self, n_columns: int, n_actions: int, n_robots: int, hidden: tuple[int, ...], options: dict) -> None:
+        self.body = network(n_columns, n_actions, hidden, last_gain=0.01)  # begins with all actions alike
+        names = [("agents", name) for name in ("action", "action_value", "chosen_action_value")]
+        values = SafeSequential(
+            TensorDictModule(self.body, [SEEN], names[1:2]),
+            QValueModule("categorical", action_value_key=names[1], out_keys=names),
+        )
+        mixer = SwarmMixer(n_columns, n_robots, options["mixing_units"])
+        mixed = TensorDictModule(mixer, [names[2], SEEN], ["chosen_action_value"])
+        self.loss = QMixerLoss(values, mixed, action_space="categorical")
+        self.targets = HardUpdate(self.loss, value_network_update_interval=options["target_update_interval"])
+        self.optimizer = torch.optim.Adam(self.loss.parameters(), eps=1e-5)
+        self.memory = TensorDictReplayBuffer(storage=LazyTensorStorage(options["buffer_size"]))
+
+    def choose(self, obs: ObsArray, explores: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Return actions (R,): those that are worth most, or any where a robot `explores` (R,)."""
+        values = self.body(torch.from_numpy(obs))
+        return np.where(explores, rng.integers(values.shape[1], size=len(obs)), values.argmax(1).numpy())
+
+    def update(self, options: dict) -> None:
+        """Learn from decisions of the swarm that are drawn from memory."""
+        self.loss.make_value_estimator(ValueEstimators.TD0, gamma=options["gamma"])
+        for group in self.optimizer.param_groups:
+            group["lr"] = options["learning_rate"]
+        for _ in range(options["gradient_steps"]):
+            loss = self.loss(self.memory.sample(options["batch_size"]))["loss"]
+            self.optimizer.zero_grad()
+            loss.backward()
+            nn.utils.clip_grad_norm_(self.loss.parameters(), options["max_grad_norm"])
+            self.optimizer.step()
+            self.targets.step()
+
+
+@torch.no_grad()
+def rollout(
+    envs: SwarmVectorEnv, learner: Learner, obs: ObsArray, options: dict, share: float, rng: np.random.Generator
+) -> tuple[TensorDict, ObsArray]:
+    """Collect `train_freq` decisions of every robot, of which `share` explore.
+
+    Returns:
+        Decisions of swarms, (A, T), each with what `n_steps` of them earned and led to; and what robots see at the end.
+    """
+    shape = envs.n_arenas, envs.n_robots
+    steps: list[TensorDict] = []
+    for _ in range(options["train_freq"]):
+        actions = learner.choose(obs, rng.random(len(obs)) < share, rng)
+        before, (obs, reward, _, truncated, infos) = obs, envs.step(actions)
+        if not infos["active"].all():
+            raise SystemExit("Expected worlds with fixed numbers of robots, got robots that come or go.")
+        after = obs
+        if truncated.any():  # ended by time: what would have followed is worth something
+            after = obs.copy()
+            after[truncated] = np.stack(infos["final_obs"][truncated])
+        done = torch.from_numpy(truncated).view(shape)[:, :1]
+        following = {
+            "agents": {"observation": torch.from_numpy(after).view(*shape, -1)},
+            "reward": torch.from_numpy(reward).view(shape).sum(1, keepdim=True),
+            "done": done,
+            "terminated": torch.zeros_like(done),
+        }
+        robots = {"observation": torch.from_numpy(before).view(*shape, -1), "action": torch.from_numpy(actions)}
+        robots["action"] = robots["action"].view(shape)
+        steps.append(TensorDict({"agents": robots, "next": following}, [envs.n_arenas]))
+    batch: Any = MultiStep(options["gamma"], options["n_steps"])(TensorDict.stack(steps, 1))
+    kept = (("next", name) for name in ("agents", "reward", "done", "terminated"))
+    return batch.select("agents", "steps_to_next_obs", *kept), obs
+
+
+def options_of(plan: TrainingPlan, stage: Stage) -> dict:
+    """Return the numbers of QMIX in a stage; refuses plans for something else, and options that it does not know."""
+    options = {**plan.options, **stage.options}
+    if plan.algorithm != "dqn" or not options.keys() <= OPTIONS.keys():
+        raise SystemExit(
+            f"Expected a plan of dqn with options among {', '.join(OPTIONS)}, got {plan.algorithm} and "
+            f"{', '.join(options)}."
+        )
+    return {**OPTIONS, **options}
+
+
+def performance_of(plan: TrainingPlan, network: Network, baselines: Baselines) -> float:
+    """Return how a network does in the plan's evaluation, as a share of the baselines."""
+    spec = policy_spec(NetworkPolicy(network), label=LEARNING.label)
+    found = judged(finished_runs(plan.judging(spec)), LEARNING.label, baselines)
+    return in_all_worlds(plan.evaluation, found)[0]
+
+
+class Training:
+    """A training by a plan."""
+
+    def __init__(self, plan: TrainingPlan, out: Path) -> None:
+        """Begin with values of zero, about, and an empty memory."""
+        robot = LearnerInterface(plan.interface, SwarmSpec.of(plan.scenario))
+        sizes = flatdim(robot.observation_space), flatdim(robot.action_space), plan.scenario.robots.n_robots
+        self.plan, self.done = plan, 0
+        self.learner = Learner(*sizes, plan.hidden, options_of(plan, plan.stages[0]))
+        self._out, self._best = out, -np.inf
+        self._rng = np.random.default_rng(plan.seed)
+        self._baselines = best_baselines(finished_runs(baseline_runs(plan)))
+        self._started = time.process_time()
+
+    def carry_out(self) -> None:
+        """Collect, learn and evaluate, stage by stage."""
+        end, every = 0, self.plan.evaluation.every_steps
+        whole = sum(stage.steps for stage in self.plan.stages)
+        for stage in self.plan.stages:
+            options, envs = options_of(self.plan, stage), SwarmVectorEnv(**self.plan.arenas_of(stage))
+            end += stage.steps
+            first_seed = int(np.random.default_rng((self.plan.seed, self.done)).integers(2**31))
+            obs, _ = envs.reset(seed=first_seed, options={"scenario": dict(stage.scenario)})
+            while self.done < end:
+                batch, obs = rollout(envs, self.learner, obs, options, self._exploring(options), self._rng)
+                self.learner.memory.extend(batch.reshape(-1))
+                if len(self.learner.memory) >= options["learning_starts"]:
+                    self.learner.update(options)
+                before, self.done = self.done, self.done + options["train_freq"] * envs.num_envs
+                if self.done // every > before // every or self.done >= whole:
+                    self._evaluate()
+            envs.close()
+
+    def _exploring(self, options: dict) -> float:
+        """Return the share of robots that explore: less and less, then as many as the options leave."""
+        n_decisions = options["exploration_fraction"] * sum(stage.steps for stage in self.plan.stages)
+        return max(options["exploration_final_eps"], 1.0 - self.done / n_decisions)
+
+    def _evaluate(self) -> None:
+        """Tell how the network does, and keep it if none was better."""
+        about = NetworkAbout(interface=self.plan.interface, caches=self.plan.scenario.caches)
+        network = Network.from_state_dict(self.learner.body.state_dict(), about)
+        performance = performance_of(self.plan, network, self._baselines)
+        seconds = time.process_time() - self._started
+        speed = f"{self.done / seconds:,.0f} per s of a core"
+        print(f"{self.done:>11,} decisions, {speed}, {performance:.2f} of the baselines", flush=True)
+        if performance >= self._best:
+            self._best = performance
+            versions = {**software_versions(), "torchrl": torchrl.__version__, "tensordict": tensordict.__version__}
+            made = {"by": "scripts/torchrl_qmix.py", "decisions": self.done, "versions": versions}
+            card = {"plan": self.plan.to_mapping(), **made}
+            dataclasses.replace(network, about=dataclasses.replace(about, card=card)).save(self._out)
+
+
+def main() -> None:
+    """Carry the plan out, print how its network does meanwhile, and keep the best with the plan in its card."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--plan", type=Path, required=True, help="plan of a training by DQN, as TOML")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--out", type=Path, default=Path("qmix.npz"), help="where the trained network goes")
+    args = parser.parse_args()
+    torch.manual_seed(args.seed)
+    torch.set_num_threads(1)
+    Training(dataclasses.replace(read_plan(args.plan), seed=args.seed), args.out).carry_out()
+
+
+if __name__ == "__main__":
+    main()
