@@ -1,5 +1,4 @@
-"""Training by stable-baselines3: reproducible, resumable, compared with a baseline, exported without loss."""
-# long file: trainings are slow to make, and these tests share them
+"""Training by stable-baselines3: reproducible, resumable, compared with a baseline."""
 
 import contextlib
 import csv
@@ -13,20 +12,19 @@ import pytest
 pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-baselines3 and torch")
 
 import torch
-from stable_baselines3 import DQN, PPO, SAC
+from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.policies.model_files import ModelError, ModelPolicy
-from swarm_forage_env.policies.network import Network, NetworkError, NetworkPolicy
+from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.presets import search_and_rescue, warehouse_small
 from swarm_forage_env.training.evaluations import read_evaluations, write_evaluations
 from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv, training
-from swarm_forage_env.training.sb3.export import export_network, note_interface
 from swarm_forage_env.training.sb3.training import train
 from swarm_forage_env.views.pettingzoo import parallel_env
 from swarm_forage_env.wrappers.registry import parse_wrapper
@@ -454,58 +452,6 @@ def test_other_algorithms_train(tmp_path, algorithm):
         assert isinstance(result.model.replay_buffer, PresentReplayBuffer)
 
 
-@pytest.mark.parametrize(
-    ("algorithm", "interface", "fields"),
-    [
-        (PPO, NUMBERED, {}),
-        (PPO, DRIVEN, {}),
-        (PPO, DRIVEN, {"neighbours_seen": 3, "neighbour_range_m": 1.5, "message_size": 2}),
-        (PPO, DRIVEN, {"robot_kinds": ({"name": "fast", "share": 0.3}, {"name": "slow", "speed": 0.5})}),
-        (DQN, NUMBERED, {}),
-    ],
-)
-def test_exported_networks_choose_as_the_model_does(algorithm, interface, fields, tmp_path):
-    env = SwarmVecEnv("warehouse_small", n_robots=30, n_objects=100, interface=interface, **fields)
-    interface = env.interface.config
-    size = {"buffer_size": 100} if algorithm is DQN else {"n_steps": 8, "batch_size": 240}
-    model = algorithm("MlpPolicy", env, seed=3, device="cpu", **size)
-    network = export_network(model, interface)
-    network.save(tmp_path / "network.npz")
-    network = Network.load(tmp_path / "network.npz")
-    env.seed(0)
-    obs = env.reset()
-    for _ in range(20):
-        expected, _ = model.predict(obs, deterministic=True)
-        outputs = network.outputs(obs)
-        chosen = outputs.argmax(axis=1) if interface.actions == "discrete" else np.clip(outputs, -1.0, 1.0)
-        np.testing.assert_allclose(chosen, expected, atol=1e-5)
-        obs, *_ = env.step(expected)
-
-
-@pytest.mark.parametrize(
-    ("wrong", "reason"),
-    [
-        (
-            {"observation": "full"},
-            r"Expected a model from Box\(\d+\) to Box\(2\) .*, got one from Box\(23\) to Box\(2\)",
-        ),
-        ({"actions": "discrete"}, r"to Discrete\(6\) .* to Box\(2\)"),
-        ({"automatic_gripper": False}, r"to Box\(3\) .* to Box\(2\)"),
-    ],
-)
-def test_the_interface_of_an_export_is_that_of_the_model(wrong, reason):
-    env = SwarmVecEnv("warehouse_small", n_robots=2, n_objects=20, interface=DRIVEN)
-    model = PPO("MlpPolicy", env, n_steps=8, batch_size=16, device="cpu")
-    other = dataclasses.replace(DRIVEN, **wrong)
-    with pytest.raises(NetworkError, match=reason):
-        export_network(model, other)
-    with pytest.raises(NetworkError, match=reason):
-        note_interface(model, other)
-    note_interface(model, DRIVEN)
-    with pytest.raises(NetworkError, match=r"Expected the interface that the model was trained with, .*decision_ticks"):
-        export_network(model, dataclasses.replace(DRIVEN, decision_ticks=4))
-
-
 @pytest.mark.parametrize(("activation", "layer"), [("tanh", torch.nn.Tanh), ("relu", torch.nn.ReLU)])
 def test_a_plan_chooses_what_hidden_layers_do(tmp_path, activation, layer):
     result = train(dataclasses.replace(SHORT, activation=activation), tmp_path)
@@ -514,12 +460,3 @@ def test_a_plan_chooses_what_hidden_layers_do(tmp_path, activation, layer):
         assert [type(each) for each in part] == [torch.nn.Linear, layer]
     assert result.policy_file is not None
     assert Network.load(result.policy_file).about.activation == activation
-
-
-def test_models_that_a_network_file_cannot_hold_are_refused():
-    env = SwarmVecEnv("warehouse_small", n_robots=2, n_objects=20, interface=DRIVEN)
-    with pytest.raises(NetworkError, match="PPO, A2C or DQN"):
-        export_network(SAC("MlpPolicy", env, buffer_size=10, device="cpu"), DRIVEN)
-    odd = {"net_arch": [8], "activation_fn": torch.nn.ELU}
-    with pytest.raises(NetworkError, match="tanh and ReLU"):
-        export_network(PPO("MlpPolicy", env, n_steps=8, batch_size=16, policy_kwargs=odd, device="cpu"), DRIVEN)
