@@ -230,7 +230,7 @@ def _reporter(plan: TrainingPlan, bar: Progress, total: int, *, begun: int = 0, 
                 bar.console.print(line)
             first_words = []
         elif not bar.disable:
-            bar.update(task, completed=news.steps, description=f"mean return {news.episode_return:.2f}")
+            bar.update(task, completed=news.steps, description=_returned(news))
         elif time.monotonic() - told_at >= LINE_EVERY_S:
             bar.console.print(progress_line(total, news, told))
             told, told_at = news, time.monotonic()
@@ -274,11 +274,16 @@ def evaluation_lines(news: Evaluation) -> list[str]:
     ]
 
 
+def _returned(now: TrainingStatus) -> str:
+    """Say what episodes returned; none has ended at the beginning."""
+    return "no episode has ended" if math.isnan(now.episode_return) else f"mean return {now.episode_return:.2f}"
+
+
 def progress_line(total: int, now: TrainingStatus, before: TrainingStatus | None) -> str:
     """Say how far a training of `total` decisions is, and how long it takes at the pace since the line before."""
     steps, seconds = (0, 0.0) if before is None else (before.steps, before.wall_time_s)
     left_s = (total - now.steps) * (now.wall_time_s - seconds) / max(1, now.steps - steps)
     return (
-        f"{now.steps:,} of {total:,} decisions, mean return {now.episode_return:.2f}, "
+        f"{now.steps:,} of {total:,} decisions, {_returned(now)}, "
         f"about {duration(max(0.0, left_s))} left"
     )

@@ -194,3 +194,10 @@ def test_wrong_words_are_one_line_of_complaint(command, calls, words, reason):
     assert reason in err
     assert not calls
     assert not list(Path().iterdir())
+
+
+def test_before_an_episode_has_ended_a_training_has_no_mean_return():
+    at_first = TrainingStatus(steps=64, wall_time_s=1.0, episode_return=float("nan"))
+    line = training_report.progress_line(128, at_first, None)
+    assert line.startswith("64 of 128 decisions, no episode has ended, about ")
+    assert "mean return 2.00" in training_report.progress_line(128, replace(at_first, episode_return=2.0), None)
