@@ -283,7 +283,4 @@ def progress_line(total: int, now: TrainingStatus, before: TrainingStatus | None
     """Say how far a training of `total` decisions is, and how long it takes at the pace since the line before."""
     steps, seconds = (0, 0.0) if before is None else (before.steps, before.wall_time_s)
     left_s = (total - now.steps) * (now.wall_time_s - seconds) / max(1, now.steps - steps)
-    return (
-        f"{now.steps:,} of {total:,} decisions, {_returned(now)}, "
-        f"about {duration(max(0.0, left_s))} left"
-    )
+    return f"{now.steps:,} of {total:,} decisions, {_returned(now)}, about {duration(max(0.0, left_s))} left"
