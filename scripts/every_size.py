@@ -1,6 +1,6 @@
 """How does a policy do in every preset, from small swarms to large ones, beside the best of the paper's controllers?
 
-    python scripts/every_size.py                           generalist, the table of its card
+    python scripts/every_size.py                           generalist; half an hour
     python scripts/every_size.py --policy a.npz --seeds 1  a first look at another policy
 
 Each preset has its own hall in all sizes, so large swarms are crowded. "of the limit" is the share that the policy

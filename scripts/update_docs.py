@@ -123,7 +123,6 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     ),
     "turned": ((f"python {ROOT}/scripts/turned_worlds.py",), ()),
     "unseen": ((f"python {ROOT}/scripts/unseen_worlds.py",), ()),
-    "sizes": ((f"python {ROOT}/scripts/every_size.py",), ()),
     **{
         f"lesson_{size}": (
             (f"swarm-forage run crw,dpo --scenario classroom --robots {size} --seeds 4",),
