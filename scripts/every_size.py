@@ -1,6 +1,6 @@
 """How does a policy do in every preset, from small swarms to large ones, beside the best of the paper's controllers?
 
-    python scripts/every_size.py                           generalist; half an hour
+    python scripts/every_size.py                           generalist; more than half an hour
     python scripts/every_size.py --policy a.npz --seeds 1  a first look at another policy
 
 Each preset has its own hall in all sizes, so large swarms are crowded. "of the limit" is the share that the policy
@@ -39,7 +39,10 @@ def row(policy: PolicySpec, world: World, words: argparse.Namespace) -> tuple[st
     }
     per_1000_s = {name: aggregate(1000.0 * of_runs / words.horizon) for name, of_runs in totals.items()}
     best = max(PAPER_POLICIES, key=lambda name: per_1000_s[name].mean)
-    told = [f"{one.mean:.1f} ± {one.upper - one.mean:.1f}" for one in (per_1000_s[best], per_1000_s[policy.label])]
+    told = [
+        f"{one.mean:.1f}" + (f" ± {one.upper - one.mean:.1f}" if one.n_used > 1 else "")
+        for one in (per_1000_s[best], per_1000_s[policy.label])
+    ]
     ratio = per_1000_s[policy.label].mean / per_1000_s[best].mean
     share = share_text(share_of_limit(world, totals[policy.label].mean()))
     return (world.scenario.name, str(world.scenario.robots.n_robots), best, *told, f"{ratio:.2f}", share)

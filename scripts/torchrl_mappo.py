@@ -36,7 +36,7 @@ from swarm_forage_env.views.gymnasium import SwarmVectorEnv
 
 OPTIONS = {"n_steps": 128, "batch_size": 4096, "n_epochs": 4, "learning_rate": 1e-3, "gamma": 0.99, "gae_lambda": 0.97,
            "ent_coef": 0.01, "clip_range": 0.2, "vf_coef": 0.5, "max_grad_norm": 0.5}  # fmt: skip
-"""Options that the script understands, and what they are where a plan leaves them away."""
+"""Options that the script understands, and what they are where a plan leaves them out."""
 
 
 def network(n_inputs: int, n_outputs: int, hidden: tuple[int, ...], last_gain: float) -> MLP:

@@ -54,8 +54,9 @@ OPTIONS = {"buffer_size": 20_000, "batch_size": 64, "learning_rate": 5e-4, "gamm
            "train_freq": 32, "gradient_steps": 8, "learning_starts": 1_000, "target_update_interval": 200,
            "exploration_fraction": 0.3, "exploration_final_eps": 0.05, "mixing_units": 32,
            "max_grad_norm": 10.0}  # fmt: skip
-"""Options that the script understands, and what they are where a plan leaves them away. They mean what they mean in DQN
-of stable-baselines3, but decisions are counted of whole swarms: memory, batch and `learning_starts`."""
+"""Options that the script understands, and what they are where a plan leaves them out. Names are those of DQN in
+stable-baselines3, but memory, batch and `learning_starts` count decisions of swarms, `train_freq` those of all rows and
+`target_update_interval` steps of the gradient; `mixing_units` is the mixer's."""
 SEEN = ("agents", "observation")
 
 

@@ -155,34 +155,45 @@ def write_croissant(
         folder: Where the files are.
         distribution: The files, see `file_object` and `file_set`.
         record_sets: What is in them, see `record_set`.
-        about: Properties of the whole, such as name and description. Creator, license and address are those of this
-            package if they are not among them.
+        about: Properties of the whole, such as name and description. If creator, license and address are not among
+            them, they are those of the file before, or else of this package.
     """
     package = metadata("swarm-forage-env")
+    publisher: dict[str, Any] = {
+        "creator": {"@type": "Organization", "name": package["Author"]},
+        "license": f"https://spdx.org/licenses/{package['License-Expression']}",
+        "url": package["Project-URL"].partition(", ")[2],
+    }
+    file = folder / CROISSANT_FILE
+    before = _before(file)
     content: dict[str, Any] = {
         "@context": _CONTEXT,
         "@type": "sc:Dataset",
         "conformsTo": "http://mlcommons.org/croissant/1.1",
-        "creator": {"@type": "Organization", "name": package["Author"]},
-        "license": f"https://spdx.org/licenses/{package['License-Expression']}",
-        "url": package["Project-URL"].partition(", ")[2],
+        **{name: before.get(name, value) for name, value in publisher.items()},
         "keywords": package["Keywords"].split(","),
         "datePublished": "",
         **about,
         "distribution": list(distribution),
         "recordSet": list(record_sets),
     }
-    file = folder / CROISSANT_FILE
-    content["datePublished"] = content["datePublished"] or _day(file, content)
+    content["datePublished"] = content["datePublished"] or _day(before, content)
     with replacing(file) as draft:
         draft.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     return file
 
 
-def _day(file: Path, content: Mapping[str, Any]) -> str:
-    """Return the day of the file that is there if it tells the same, else today."""
+def _before(file: Path) -> dict[str, Any]:
+    """Return what the file that is there tells; nothing if there is none, or one that cannot be read."""
     with suppress(ValueError):
         before = read_json(file, ValueError)
-        if isinstance(before, dict) and {**content, "datePublished": before.get("datePublished")} == before:
-            return str(before["datePublished"])
+        if isinstance(before, dict):
+            return before
+    return {}
+
+
+def _day(before: Mapping[str, Any], content: Mapping[str, Any]) -> str:
+    """Return the day of the file before if it tells the same, else today."""
+    if before and {**content, "datePublished": before.get("datePublished")} == before:
+        return str(before["datePublished"])
     return datetime.now(UTC).date().isoformat()

@@ -12,7 +12,7 @@ from typing import Any
 from swarm_forage_env._internal.fields import ConfigError, known_name
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.policy import SwarmSpec
-from swarm_forage_env.inspect.networks import network_lines, plain
+from swarm_forage_env.inspect.networks import in_words, network_lines
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.policies.mixture import is_mixture, mixture_parts
 from swarm_forage_env.policies.network import Network
@@ -162,9 +162,9 @@ def _scenario_lines(config: ScenarioConfig, headline: str) -> Iterator[str]:
         if dataclasses.is_dataclass(value):
             yield f"  [{item.name}]"
             for inner in dataclasses.fields(value):
-                yield f"    {inner.name:<34}{plain(getattr(value, inner.name))}"
+                yield f"    {inner.name:<34}{in_words(getattr(value, inner.name))}"
         else:
-            yield f"  {item.name:<36}{plain(value)}"
+            yield f"  {item.name:<36}{in_words(value)}"
     yield ""
     yield "Spaces, per robot:"
     yield f"  action       {interface.action_space}: left wheel, right wheel, gripper"
@@ -190,7 +190,7 @@ def _policy_lines(name: str) -> Iterator[str]:
     else:
         yield ""
         yield "Parameters (change them in a study file, or in Python with plan_run(..., parameters={name: value})):"
-        yield from (f"  {field:<34}{plain(value)}" for field, value in settings)
+        yield from (f"  {field:<34}{in_words(value)}" for field, value in settings)
 
 
 def _settings(policy: Callable[..., Any]) -> Iterator[tuple[str, Any]]:

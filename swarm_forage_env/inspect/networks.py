@@ -25,7 +25,7 @@ def network_lines(file: Path, network: Network) -> Iterator[str]:
     yield f"{file}: a network of {' x '.join(map(str, sizes))} units ({about.activation})"
     yield ""
     for name, value in dataclasses.asdict(about.interface).items():
-        yield f"  {name:<20}{'none' if value in (None, ()) else plain(value)}"
+        yield f"  {name:<20}{'none' if value in (None, ()) else in_words(value)}"
     yield f"  {'samples':<20}{about.samples} ({_choice(about)})"
     yield f"  {'caches':<20}{about.caches} (the caches it is made for)"
     for part, values in about.card.items():
@@ -39,15 +39,15 @@ def network_lines(file: Path, network: Network) -> Iterator[str]:
             yield from _entry(name, value)
 
 
-def plain(value: Any) -> str:
+def in_words(value: Any) -> str:
     """Return a value as readers like it: sizes as "4 x 6", fields after their names, distributions in words."""
     if isinstance(value, Mapping):
         if len(value) == 1 and (kind := next(iter(value))) in _BETWEEN and isinstance(value[kind], list):
-            return _BETWEEN[kind].join(map(plain, value[kind]))
-        return ", ".join(f"{name} {plain(inner)}" for name, inner in value.items())
+            return _BETWEEN[kind].join(map(in_words, value[kind]))
+        return ", ".join(f"{name} {in_words(inner)}" for name, inner in value.items())
     if isinstance(value, tuple | list):
         is_size = all(isinstance(part, int | float) for part in value)
-        return " x ".join(f"{part:g}" for part in value) if is_size else ", ".join(map(plain, value))
+        return " x ".join(f"{part:g}" for part in value) if is_size else ", ".join(map(in_words, value))
     return str(value)
 
 
@@ -61,7 +61,7 @@ def _entry(name: str, value: Any) -> Iterator[str]:
     """Yield an entry of a card, in which a list of tables takes a line for each of them."""
     rows = value if isinstance(value, list) and all(isinstance(row, Mapping) for row in value) else [value]
     for k, row in enumerate(rows):
-        told = f"{row:.6g}" if isinstance(row, float) else plain(_rounded(row))
+        told = f"{row:.6g}" if isinstance(row, float) else in_words(_rounded(row))
         yield f"    {'' if k else name:<24}{told}" if name else f"    {told}"
 
 
@@ -77,8 +77,8 @@ def _training(plan: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         sampler = _table(plan["sampler"])
         for world in map(_table, _rows(sampler.get("worlds"))):
             fields = dict(_table(world.get("scenario")))
-            yield _name(fields.pop("preset", None)), plain(fields)
-        yield "all of them", plain(_table(sampler.get("scenario"))) or "as they are"
+            yield _name(fields.pop("preset", None)), in_words(fields)
+        yield "all of them", in_words(_table(sampler.get("scenario"))) or "as they are"
         disturbances = sampler.get("wrappers")
     else:
         scenario = _table(plan.get("scenario"))
@@ -87,7 +87,7 @@ def _training(plan: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield "wrappers", ", ".join(_table(disturbances)) or "none"
     yield "turned", str(plan.get("turned", False))
     for k, stage in enumerate(map(_table, _rows(plan.get("stages"))), start=1):
-        own = "in worlds of its own" if "sampler" in stage else plain(_table(stage.get("scenario")))
+        own = "in worlds of its own" if "sampler" in stage else in_words(_table(stage.get("scenario")))
         yield f"stage {k}", f"{stage.get('steps', 'unknown')} decisions{', ' if own else ''}{own}"
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swarm_forage_env.inspect.networks import network_lines, plain
+from swarm_forage_env.inspect.networks import in_words, network_lines
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.network import Network, NetworkAbout
 
@@ -106,4 +106,4 @@ def test_a_card_may_hold_anything(plan):
     ("value", "words"), [((4, 6.5), "4 x 6.5"), (("a", "b"), "a, b"), ({"uniform": 3}, "uniform 3"), (None, "None")]
 )
 def test_values_in_words(value, words):
-    assert plain(value) == words
+    assert in_words(value) == words

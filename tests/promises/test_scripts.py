@@ -278,6 +278,24 @@ def test_unseen_worlds_are_drawn_once_and_shares_are_of_the_best(run):
 
 
 @pytest.mark.compiled
+def test_a_policy_is_compared_with_the_best_in_every_size(run, monkeypatch):
+    from scripts import every_size
+
+    monkeypatch.setattr(every_size, "PRESETS", ("warehouse_small",))
+    monkeypatch.setattr(every_size, "SIZES", (4,))
+    words = ("--policy", "oracle", "--horizon", "600")
+    title, header, row, *_ = run("every_size", *words, "--seeds", "2")[1].splitlines()
+    assert title == "Performance per 1,000 s, means of 2 runs of 600 s"
+    assert header.split()[:2] == ["scenario", "robots"]
+    assert row.startswith("warehouse_small  4 ")
+    assert row.count(" ± ") == 2
+    one_run = run("every_size", *words, "--seeds", "1")[1].splitlines()[2]
+    assert "±" not in one_run
+    assert "nan" not in one_run
+    assert float(one_run.split()[-3]) > 1.0, "the oracle sees everything"
+
+
+@pytest.mark.compiled
 def test_networks_are_run_in_turned_worlds(run):
     words = ("--policy", "ppo_warehouse_small", "--seeds", "1", "--horizon", "600")
     title, header, *rows = run("turned_worlds", *words)[1].splitlines()

@@ -119,6 +119,8 @@ def test_who_publishes_says_what_only_they_know(copied):
     assert (told["creator"], told["url"]) == (person, "https://a.org")
     assert told["license"].endswith("CC-BY-4.0")
     assert {**told, **{name: usual[name] for name in ("creator", "license", "url")}} == usual
+    describe_dataset(copied)  # as recording more runs does
+    assert metadata(copied) == told
 
 
 def test_the_day_stays_until_something_else_changes(copied):

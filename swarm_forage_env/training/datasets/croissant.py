@@ -48,7 +48,8 @@ def describe_dataset(folder: str | Path, **about: Any) -> Path:
     Args:
         folder: A data set of `record_dataset`; its runs that are whole are described.
         about: Properties of the data set in the words of Croissant, such as `creator`, `license`, `url`, `version`,
-            `description`, `citeAs`. Without them, creator, license and address are those of this package.
+            `description`, `citeAs`. Creator, license and address stay those of an earlier call; else they are those
+            of this package.
 
     Returns:
         The file.
