@@ -4,6 +4,7 @@ import ast
 import importlib
 import re
 import sys
+from argparse import Namespace
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from metrics.scoring.study_numbers import FIGURE_MEASURES
 from scripts import results_data
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.runs.policy_spec import policy_specs
 from swarm_forage_env.runs.run import LiveRun, build_env, run_one
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.runs.store import RunStore
@@ -25,6 +27,7 @@ from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.studies.study import Axis
 from swarm_forage_env.studies.study_file import load_study, set_names
 from swarm_forage_env.studies.study_table import read_study
+from swarm_forage_env.wrappers.world import World
 from tests.reference import read_results
 from tests.support.foraging import quick_world
 from tests.support.foraging_table import foraging_table
@@ -277,22 +280,20 @@ def test_unseen_worlds_are_drawn_once_and_shares_are_of_the_best(run):
     assert dpo <= 1.0 < oracle
 
 
+@pytest.mark.usefixtures("run")  # finds the modules beside the scripts
 @pytest.mark.compiled
-def test_a_policy_is_compared_with_the_best_in_every_size(run, monkeypatch):
+def test_a_policy_is_compared_with_the_best_in_every_size():
     from scripts import every_size
 
-    monkeypatch.setattr(every_size, "PRESETS", ("warehouse_small",))
-    monkeypatch.setattr(every_size, "SIZES", (4,))
-    words = ("--policy", "oracle", "--horizon", "600")
-    title, header, row, *_ = run("every_size", *words, "--seeds", "2")[1].splitlines()
-    assert title == "Performance per 1,000 s, means of 2 runs of 600 s"
-    assert header.split()[:2] == ["scenario", "robots"]
-    assert row.startswith("warehouse_small  4 ")
-    assert row.count(" ± ") == 2
-    one_run = run("every_size", *words, "--seeds", "1")[1].splitlines()[2]
-    assert "±" not in one_run
-    assert "nan" not in one_run
-    assert float(one_run.split()[-3]) > 1.0, "the oracle sees everything"
+    (oracle,) = policy_specs(["oracle"])
+    world = World(scenario("warehouse_small", n_robots=4, horizon_s=600.0))
+    two = every_size.row(oracle, world, Namespace(seeds=2, jobs=1, horizon=600.0))
+    assert two[:2] == ("warehouse_small", "4")
+    assert all(" ± " in told for told in two[3:5])
+    one = every_size.row(oracle, world, Namespace(seeds=1, jobs=1, horizon=600.0))
+    assert not any("±" in told or "nan" in told for told in one)
+    assert float(one[5]) == pytest.approx(float(one[4]) / float(one[3]), rel=0.1)
+    assert float(one[5]) > 1.0, "the oracle sees everything"
 
 
 @pytest.mark.compiled
