@@ -103,13 +103,7 @@ def board_of(entries: Sequence[Entry], protocol: Protocol | None = None) -> Boar
         BenchmarkError: entries of two versions, two with one name, or another policy under the name of a scripted
             controller.
     """
-    full = load_protocol(version=entries[0].version if entries else USUAL)
-    for entry in entries:
-        if entry.version != full.version:
-            raise BenchmarkError(
-                f"Expected entries of one version of the benchmark, got {entry.name!r} of version {entry.version} "
-                f"beside {entries[0].name!r} of version {full.version}; show each version by itself."
-            )
+    full = protocol_of(entries)
     scripted = scripted_entries(full)
     reference = reference_of(scripted, full)
     digests = {entry.digest for entry in scripted}
@@ -127,6 +121,22 @@ def board_of(entries: Sequence[Entry], protocol: Protocol | None = None) -> Boar
     standings = [standing_of(entry, reference, full) for entry in scripted if entry.name not in counts]
     standings += [standing_of(entry, reference, protocol or full) for entry in added]
     return Board(standings=tuple(sorted_standings(standings)), reference=reference, protocol=full)
+
+
+def protocol_of(entries: Sequence[Entry]) -> Protocol:
+    """Return the full protocol of entries; of the usual version if there are none.
+
+    Raises:
+        BenchmarkError: entries of two versions.
+    """
+    version = entries[0].version if entries else USUAL
+    for entry in entries:
+        if entry.version != version:
+            raise BenchmarkError(
+                f"Expected entries of one version of the benchmark, got {entry.name!r} of version {entry.version} "
+                f"beside {entries[0].name!r} of version {version}; show each version by itself."
+            )
+    return load_protocol(version=version)
 
 
 def entry_files(given: Sequence[Path]) -> list[Path]:

@@ -16,7 +16,7 @@ from swarm_forage_env._internal.croissant import (
 )
 from swarm_forage_env._internal.wording import counted
 
-from .board import board_of, entry_files
+from .board import entry_files, protocol_of
 from .entry import read_entry
 from .protocol import BenchmarkError, Protocol
 
@@ -43,7 +43,7 @@ def describe_entries(folder: str | Path) -> Path:
     files = entry_files([folder])
     if not files:
         raise BenchmarkError(f"Expected entry files in {folder}, found none.")
-    protocol = board_of([read_entry(file) for file in files]).protocol  # which refuses two versions
+    protocol = protocol_of([read_entry(file) for file in files])
     names = [file.name for file in files]  # a pattern would also find those of other versions in folders below
     return write_croissant(
         folder,
