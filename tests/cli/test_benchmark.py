@@ -96,7 +96,7 @@ def test_an_entry_of_version_2_names_its_track_and_goes_to_the_page_of_its_versi
 def test_entries_of_two_versions_are_not_shown_together(command, folder, mine):
     code, _, err = command("benchmark", "show", "mine.json", str(folder / "v2/crw.json"))
     assert (code, len(err.splitlines())) == (2, 1)
-    assert "Expected entries of one version of the benchmark, got one of version 2" in err
+    assert "Expected entries of one version of the benchmark, got 'crw' of version 2 beside 'mine' of version 1" in err
 
 
 def test_a_quick_look_writes_no_entry(command, tiny):
