@@ -17,7 +17,7 @@ import numpy as np
 
 from ..controllers import PAPER_POLICIES
 from ..curves import FloatArray
-from ..distributions import interquartile_mean, optimality_gap, probability_of_improvement
+from ..distributions import N_RESAMPLES, interquartile_mean, optimality_gap, probability_of_improvement
 from ..statistics import Estimate, aggregate
 from .entry import Entry, EntryMeasure, read_entry
 from .protocol import BenchmarkError, Protocol, ProtocolWorld, folder_of
@@ -46,8 +46,8 @@ class Standing:
 
     entry: Entry
     score: Estimate
-    """Interquartile mean over the runs of all held-out worlds, mean over policies; 1 = as good as the best scripted
-    controller."""
+    """Interquartile mean over the runs of all held-out worlds, mean over trainings if there are any; 1 = as good as the
+    best scripted controller."""
     improvement: Estimate
     """Probability that one of its runs beats a run of the best scripted controller in the same world, in [0, 1]."""
     gap: float
@@ -56,7 +56,7 @@ class Standing:
     """Number of held-out worlds in which its mean is higher than the means of the paper's four controllers."""
     n_worlds: int
     calm: float
-    """Interquartile mean over undisturbed held-out worlds, mean over policies."""
+    """Interquartile mean over undisturbed held-out worlds, mean over trainings if there are any."""
     disturbed: float
     training: float
     """The same over the training worlds."""
@@ -112,30 +112,41 @@ def reference_of(scripted: Sequence[Entry], protocol: Protocol) -> Reference:
 def standing_of(entry: Entry, reference: Reference, protocol: Protocol) -> Standing:
     """Return what an entry is worth; the rates of a quick entry are compared with rates of longer runs."""
     shares = {world.name: shares_of(entry, world, reference) for world in _judged(protocol)}
+    policies = [[k] for k in range(len(entry.policies))]
+    parts = policies if entry.is_trained else [[k for (k,) in policies]]  # what each has a score of its own
+    resampled = 1 if entry.is_trained else N_RESAMPLES  # the interval of trainings needs none
 
-    def scores(chosen: Callable[[ProtocolWorld], bool]) -> list[Estimate]:
-        """Return the score of each policy in some of the worlds; none where there is no such world."""
+    def scores(chosen: Callable[[ProtocolWorld], bool], of: Sequence[list[int]] = parts) -> list[Estimate]:
+        """Return the score of each part in some of the worlds; none where there is no such world."""
         picked = [shares[world.name] for world in _judged(protocol) if chosen(world)]
-        return [interquartile_mean([runs[k] for runs in picked], seed=_SEED) for k in _policies(entry) if picked]
+        return [
+            interquartile_mean([runs[part].ravel() for runs in picked], seed=_SEED, n_resamples=resampled)
+            for part in of
+            if picked
+        ]
 
     def middle(chosen: Callable[[ProtocolWorld], bool]) -> float:
         found = scores(chosen)
         return float(np.mean([one.value for one in found])) if found else float("nan")
 
+    def counts(world: ProtocolWorld) -> bool:
+        return world in counting
+
     counting = protocol.scored
     performances = [entry.performance(world.name) for world in counting]
     theirs = [reference.runs[world.name] for world in counting]
-    by_policy = scores(lambda world: world in counting)
     chances = [
-        probability_of_improvement([runs[k] for runs in performances], theirs, seed=_SEED) for k in _policies(entry)
+        probability_of_improvement(
+            [runs[part].ravel() for runs in performances], theirs, seed=_SEED, n_resamples=resampled
+        )
+        for part in parts
     ]
-    pooled = interquartile_mean([shares[world.name].ravel() for world in counting], seed=_SEED)
-    pooled_chance = probability_of_improvement([runs.ravel() for runs in performances], theirs, seed=_SEED)
-    won = [_n_won([runs[k] for runs in performances], theirs) for k in _policies(entry)]
+    by_policy = scores(counts, policies) if len(policies) > 1 else []
+    won = [_n_won([runs[k] for runs in performances], theirs) for (k,) in policies]
     return Standing(
         entry=entry,
-        score=over_trainings(by_policy) if entry.is_trained else pooled,
-        improvement=_within_0_and_1(over_trainings(chances)) if entry.is_trained else pooled_chance,
+        score=over_trainings(scores(counts)) if entry.is_trained else scores(counts)[0],
+        improvement=_within_0_and_1(over_trainings(chances)) if entry.is_trained else chances[0],
         gap=optimality_gap(np.concatenate([shares[world.name].ravel() for world in counting])),
         n_won=_n_won(performances, theirs),
         n_worlds=len(counting),
@@ -144,7 +155,7 @@ def standing_of(entry: Entry, reference: Reference, protocol: Protocol) -> Stand
         training=middle(lambda world: not world.is_held_out),
         groups={group.name: middle(lambda world, of=group.name: world.group == of) for group in protocol.groups},
         interference=float(np.mean([entry.interference(world.name).mean() for world in counting])),
-        by_policy=tuple(each.value for each in by_policy) if len(by_policy) > 1 else (),
+        by_policy=tuple(each.value for each in by_policy),
         won_by_policy=tuple(won) if len(won) > 1 else (),
     )
 
@@ -174,10 +185,6 @@ def _within_0_and_1(estimate: Estimate) -> Estimate:
     """Cut bounds that a share cannot have; NaN stays NaN."""
     lower, upper = np.clip([estimate.lower, estimate.upper], 0.0, 1.0)
     return replace(estimate, lower=float(lower), upper=float(upper))
-
-
-def _policies(entry: Entry) -> range:
-    return range(len(entry.policies))
 
 
 def shares_of(entry: Entry, world: ProtocolWorld, reference: Reference) -> FloatArray:

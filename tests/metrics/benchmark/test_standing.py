@@ -121,6 +121,18 @@ def test_a_training_that_failed_counts_as_one_of_all(protocol, reference):
     assert standing.calm == pytest.approx(standing.score.value, rel=0.05)
 
 
+def test_policies_without_training_are_judged_by_all_their_runs(protocol, reference):
+    """One is twice as good as the best of the four and one achieves nothing: the middle half of all lies between."""
+    made = made_up_entry(protocol, "two", lambda k: 39.0, n_policies=2)
+    runs = {world: {**run, "performance": [run["performance"][0], [0.0, 0.0]]} for world, run in made.runs.items()}
+    standing = standing_of(replace(made, runs=runs), reference, protocol)
+    whole = interquartile_mean([np.ravel(runs[world.name]["performance"]) / 20.0 for world in protocol.scored])
+    assert standing.score.value == pytest.approx(whole.value)
+    assert standing.score.lower < standing.score.value < standing.score.upper
+    assert standing.groups["room"] == pytest.approx(standing.score.value, rel=0.05)
+    assert standing.by_policy[1] == 0.0
+
+
 @pytest.mark.parametrize("n_trainings", [2, 3, 5])
 @pytest.mark.parametrize("spread", [0.0, 0.05, 0.3])
 def test_intervals_over_trainings_hold_the_truth(n_trainings, spread):
