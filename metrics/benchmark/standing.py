@@ -169,7 +169,7 @@ def over_trainings(by_training: Sequence[Estimate]) -> Estimate:
     """Return the mean of trainings with Student's interval over them; without an interval for one training.
 
     Our choice: resampling trainings, then runs, gives intervals that are too short. By simulation, 71 to 76 % of such
-    95 % intervals hold the truth with three trainings, 85 to 88 % with five, but 94 to 97 % of Student's. This is for
+    95 % intervals hold the truth with three trainings, 85 to 88 % with five, but 94 to 96 % of Student's. This is for
     trainings that scatter about normally. If one of five fails, a third of all entries of five trainings show no
     failure, and their intervals are too short and too high.
 
