@@ -46,7 +46,7 @@ def test_trains_shows_evaluations_and_goes_on(command, painted, monkeypatch):
     assert code == 0, err
     assert "Evaluated in 1 run of 200 s:" in err
     assert err.count("128 decisions; a line about every minute says how many are done.") == 1
-    assert re.search(r"^128 of 128 decisions, mean return .*, about \d+ s left$", err, re.MULTILINE)
+    assert re.search(r"^128 of 128 decisions, no episode has ended, about \d+ s left$", err, re.MULTILINE)
     folder = Path("results/training/warehouse_small_ppo")
     assert "decisions  per 1,000 s" in err
     assert str(folder / "policy.npz") in err
