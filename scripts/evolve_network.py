@@ -16,7 +16,6 @@ import argparse
 import importlib
 import itertools
 import sys
-import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -29,25 +28,11 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import FloatArray, IntArray, ObsArray
 from swarm_forage_env.policies.interface import LearnerInterface
-from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkPolicy
-from swarm_forage_env.rendering.plots import draw_trainings
-from swarm_forage_env.runs.policy_spec import policy_spec
-from swarm_forage_env.runs.versions import software_versions
-from swarm_forage_env.training.evaluations import (
-    EVALUATIONS_FILE,
-    POLICY_FILE,
-    Baselines,
-    Evaluation,
-    baseline_runs,
-    best_baselines,
-    chosen,
-    finished_runs,
-    in_all_worlds,
-    judged,
-    read_evaluations,
-    write_evaluations,
-)
-from swarm_forage_env.training.plan import LEARNING, Stage, TrainingPlan, read_plan
+from swarm_forage_env.policies.network import Network, NetworkAbout
+from swarm_forage_env.training.curves import beside_baseline, read_trainings
+from swarm_forage_env.training.evaluations import EVALUATIONS_FILE
+from swarm_forage_env.training.evaluator import Evaluator
+from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.seeds import seed_folder
 from swarm_forage_env.views.gymnasium import SwarmVectorEnv
 
@@ -129,7 +114,7 @@ def worth(earned: FloatArray) -> FloatArray:
 class Training:
     """A training by a plan: its search, and its evaluations."""
 
-    def __init__(self, plan: TrainingPlan, baselines: Baselines, words: argparse.Namespace) -> None:
+    def __init__(self, plan: TrainingPlan, words: argparse.Namespace) -> None:
         """Begin with networks around zero."""
         import cma
 
@@ -138,15 +123,13 @@ class Training:
         options = {"popsize": words.population, "seed": plan.seed + 1, "CMA_diagonal": True, "verbose": -9}
         self.strategy = cma.CMAEvolutionStrategy(np.zeros(n_numbers(self.sizes)), WIDTH, options)
         self.plan, self.done = plan, 0
-        self.evaluations: list[Evaluation] = []
-        self._baselines, self._words = baselines, words
-        self._folder = seed_folder(words.out, plan.seed)
+        self._words = words
+        self._evaluator = Evaluator(plan, seed_folder(words.out, plan.seed), made_by(words))
         self._rng = np.random.default_rng(plan.seed)
-        self._started = time.perf_counter(), time.process_time()
 
     def carry_out(self) -> None:
         """Evolve stage by stage, and evaluate meanwhile."""
-        end, next_evaluation = 0, self.plan.evaluation.every_steps
+        end = 0
         for stage in self.plan.stages:
             end += stage.steps
             worlds = worlds_of(self.plan, stage, int(np.random.default_rng((self.plan.seed, end)).integers(2**31)))
@@ -154,12 +137,11 @@ class Training:
             while self.done + n_decisions <= end:
                 self._generation(worlds)
                 self.done += n_decisions
-                if self.done >= next_evaluation:
-                    next_evaluation += self.plan.evaluation.every_steps
+                if self._evaluator.is_due(self.done):
                     self._evaluate()
             for world in worlds:
                 world.env.close()
-        if not self.evaluations or self.evaluations[-1].steps < self.done:
+        if not self._evaluator.evaluations or self._evaluator.evaluations[-1].steps < self.done:
             self._evaluate()
 
     def _generation(self, worlds: Sequence[World]) -> None:
@@ -169,30 +151,13 @@ class Training:
         self.strategy.tell(points, (-worth(earned)).tolist())
 
     def _evaluate(self) -> None:
-        """Run the network in the middle of the generation, and keep it if it is the best so far."""
+        """Run the network in the middle of the generation."""
         layers = layers_of(np.array([self.strategy.result.xfavorite], np.float32), self.sizes)
         about = NetworkAbout(interface=self.plan.interface, samples=True, caches=self.plan.scenario.caches)
         network = Network(tuple(weight[0] for weight, _ in layers), tuple(bias[0] for _, bias in layers), about)
-        spec = policy_spec(NetworkPolicy(network), label=LEARNING.label)
-        table = finished_runs(self.plan.judging(spec), jobs=1)
-        found = judged(table, LEARNING.label, self._baselines)
-        performance, interference = in_all_worlds(self.plan.evaluation, found)
-        evaluation = Evaluation(
-            steps=self.done,
-            wall_time_s=time.perf_counter() - self._started[0],
-            cpu_time_s=time.process_time() - self._started[1],
-            performance=performance,
-            baseline=1.0,
-            interference_fraction=interference,
-            worlds=found,
-        )
-        self.evaluations.append(evaluation)
-        if chosen(self.evaluations) is evaluation:
-            card = {"plan": self.plan.to_mapping(), "evaluation": evaluation.to_mapping(), **made_by(self._words)}
-            replace(network, about=replace(about, card=card)).save(self._folder / POLICY_FILE)
-        write_evaluations(self._folder / EVALUATIONS_FILE, self.evaluations)
-        told = f"seed {self.plan.seed}: {self.done:,} decisions, {performance:.2f} of the baselines, "
-        print(f"{told}interference {interference:.3f}", file=sys.stderr, flush=True)
+        evaluation = self._evaluator.evaluate(network, self.done)
+        reached = f"{evaluation.performance:.2f} of the baselines, interference {evaluation.interference_fraction:.3f}"
+        print(f"seed {self.plan.seed}: {self.done:,} decisions, {reached}", file=sys.stderr, flush=True)
 
 
 def made_by(words: argparse.Namespace) -> dict[str, Any]:
@@ -200,11 +165,7 @@ def made_by(words: argparse.Namespace) -> dict[str, Any]:
     import cma
 
     said = {"population": words.population, "n_steps": words.n_steps}
-    return {
-        "by": "scripts/evolve_network.py",
-        "evolution": said,
-        "versions": {**software_versions(), "cma": cma.__version__},
-    }
+    return {"by": "scripts/evolve_network.py", "evolution": said, "versions": {"cma": cma.__version__}}
 
 
 def evolving_plan(words: argparse.Namespace) -> TrainingPlan:
@@ -239,27 +200,10 @@ def main() -> None:
         plan = evolving_plan(words)
     except ConfigError as error:
         parser.error(str(error))
-    baselines = best_baselines(finished_runs(baseline_runs(plan), jobs=1))
     for seed in range(words.seed, words.seed + words.seeds):
-        seed_folder(words.out, seed).mkdir(parents=True, exist_ok=True)
-        Training(replace(plan, seed=seed), baselines, words).carry_out()
-    draw(words.out, plan)
-
-
-def draw(out: Path, plan: TrainingPlan) -> None:
-    """Draw all trainings of the folder, also those of earlier commands."""
-    trainings = {}
-    for file in sorted(out.glob(f"*/{EVALUATIONS_FILE}")):
-        told = [(one.steps, one.performance, one.interference_fraction) for one in read_evaluations(file)]
-        trainings[file.parent.name.replace("_", " ")] = tuple(zip(*told, strict=True))
-    draw_trainings(
-        out / "curves.png",
-        trainings,
-        beside={"baseline of each world": (1.0, np.nan)},
-        stage_ends=np.cumsum([stage.steps for stage in plan.stages]).tolist(),
-        title="Networks that evolve",
-        ylabel=f"{plan.evaluation.chosen_by} ratio to the baselines",
-    )
+        Training(replace(plan, seed=seed), words).carry_out()
+    folders = sorted(file.parent for file in words.out.glob(f"*/{EVALUATIONS_FILE}"))  # of earlier commands, too
+    beside_baseline(*read_trainings(folders)).draw(words.out / "curves.png")
 
 
 if __name__ == "__main__":

@@ -1,17 +1,17 @@
 """MAPPO with TorchRL: robots share an actor that sees what one robot sees, and a critic that sees the whole swarm.
 
     pip install . "torchrl==0.14.1" "torch==2.13.0"  # in a checkout
-    python scripts/torchrl_mappo.py --plan docs/benchmark/plans/ippo.toml --out mappo.npz
-    swarm-forage run crw,mappo.npz
+    python scripts/torchrl_mappo.py --plan docs/benchmark/plans/ippo.toml --out results/mappo
+    swarm-forage run crw,results/mappo/policy.npz
 
 It carries out a plan of `swarm-forage train`: its worlds, its stages, its options of PPO. Our vector environment
 collects, TorchRL's modules and losses learn. The critic gets a robot's own row, and the mean and the largest of each
 column over all robots at work in its arena: as many numbers for eight robots as for five hundred. Runs need no critic.
+The network that does best in the plan's evaluations is kept.
 """
 
 import argparse
 import dataclasses
-import time
 from pathlib import Path
 from typing import Any
 
@@ -30,16 +30,18 @@ from torchrl.objectives.value.functional import generalized_advantage_estimate
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.policies.interface import LearnerInterface
 from swarm_forage_env.policies.network import Network, NetworkAbout
-from swarm_forage_env.runs.versions import software_versions
+from swarm_forage_env.training.evaluations import Evaluation
+from swarm_forage_env.training.evaluator import Evaluator
 from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
 from swarm_forage_env.views.gymnasium import SwarmVectorEnv
 
 OPTIONS = {"n_steps": 128, "batch_size": 4096, "n_epochs": 4, "learning_rate": 1e-3, "gamma": 0.99, "gae_lambda": 0.97,
            "ent_coef": 0.01, "clip_range": 0.2, "vf_coef": 0.5, "max_grad_norm": 0.5}  # fmt: skip
 """Options that the script understands, and what they are where a plan leaves them out."""
+LIBRARIES = {"torch": str(torch.__version__), "torchrl": torchrl.__version__, "tensordict": tensordict.__version__}
 
 
-def network(n_inputs: int, n_outputs: int, hidden: tuple[int, ...], last_gain: float) -> MLP:
+def perceptron(n_inputs: int, n_outputs: int, hidden: tuple[int, ...], last_gain: float) -> MLP:
     """Return a perceptron with orthogonal first weights; the last layer's are as large as `last_gain` says."""
     body = MLP(in_features=n_inputs, out_features=n_outputs, num_cells=list(hidden), activation_class=nn.Tanh)
     layers = [layer for layer in body if isinstance(layer, nn.Linear)]
@@ -53,7 +55,7 @@ class Learner:
     """Actor, critic and the loss of both."""
 
     def __init__(self, n_columns: int, n_actions: int, hidden: tuple[int, ...]) -> None:
-        self.body = network(n_columns, n_actions, hidden, last_gain=0.01)  # begins with all actions alike
+        self.body = perceptron(n_columns, n_actions, hidden, last_gain=0.01)  # begins with all actions alike
         self.actor = ProbabilisticActor(
             TensorDictModule(self.body, ["observation"], ["logits"]),
             in_keys=["logits"],
@@ -61,7 +63,7 @@ class Learner:
             default_interaction_type=InteractionType.RANDOM,  # outside of TorchRL's collectors the default is the mode
             return_log_prob=True,
         )
-        central = network(3 * n_columns, 1, hidden, last_gain=1.0)
+        central = perceptron(3 * n_columns, 1, hidden, last_gain=1.0)
         self.critic = ValueOperator(central, in_keys=["observation", "swarm"])
         self.loss = ClipPPOLoss(  # the options have weights of their own
             self.actor,
@@ -126,7 +128,7 @@ def swarm_rows(obs: torch.Tensor, active: torch.Tensor, n_arenas: int) -> torch.
 
 @torch.no_grad()
 def rollout(envs: SwarmVectorEnv, learner: Learner, obs: np.ndarray, active: np.ndarray, options: dict):
-    """Collect n_steps decisions of every robot; returns those at work, last observation, active robots, mean reward."""
+    """Collect n_steps decisions of every robot; returns those of robots at work, last observation, active robots."""
     steps: list[TensorDict] = []
     for _ in range(options["n_steps"]):
         seen, at_work = torch.from_numpy(obs), torch.from_numpy(active)
@@ -164,7 +166,7 @@ def rollout(envs: SwarmVectorEnv, learner: Learner, obs: np.ndarray, active: np.
     taught = batch[batch["at_work"]].select(
         "observation", "swarm", "action", "action_log_prob", "advantage", "value_target"
     )
-    return taught, obs, active, float(batch["reward"][batch["at_work"]].mean())
+    return taught, obs, active
 
 
 def options_of(plan: TrainingPlan, stage: Stage) -> dict:
@@ -178,19 +180,20 @@ def options_of(plan: TrainingPlan, stage: Stage) -> dict:
     return {**OPTIONS, **options}
 
 
-def main() -> None:
-    """Carry the plan out, print what a robot earns per decision, and save the actor with the plan in its card."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--plan", type=Path, required=True, help="plan of a training by PPO, as TOML")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--out", type=Path, default=Path("mappo.npz"), help="where the trained actor goes")
-    args = parser.parse_args()
-    torch.manual_seed(args.seed)
-    torch.set_num_threads(1)
-    plan = dataclasses.replace(read_plan(args.plan), seed=args.seed, samples=True)
+def told(evaluation: Evaluation) -> str:
+    """Return a line about an evaluation."""
+    speed = f"{evaluation.steps / evaluation.cpu_time_s:,.0f} per s of a core"
+    reached = f"{evaluation.performance:.2f} of the baselines, interference {evaluation.interference_fraction:.3f}"
+    return f"{evaluation.steps:>11,} decisions, {speed}, {reached}"
+
+
+def carry_out(plan: TrainingPlan, folder: Path) -> None:
+    """Collect, learn and evaluate, stage by stage."""
     robot = LearnerInterface(plan.interface, SwarmSpec.of(plan.scenario))
     learner = Learner(flatdim(robot.observation_space), flatdim(robot.action_space), plan.hidden)
-    started, done, end = time.perf_counter(), 0, 0
+    evaluator = Evaluator(plan, folder, {"by": "scripts/torchrl_mappo.py", "versions": LIBRARIES})
+    about = NetworkAbout(interface=plan.interface, samples=True, caches=plan.scenario.caches)
+    done, end = 0, 0
     for stage in plan.stages:
         options = options_of(plan, stage)
         envs = SwarmVectorEnv(**plan.arenas_of(stage))
@@ -199,15 +202,25 @@ def main() -> None:
         obs, infos = envs.reset(seed=first_seed, options={"scenario": dict(stage.scenario)})
         active = infos["active"]
         while done < end:
-            batch, obs, active, reward = rollout(envs, learner, obs, active, options)
+            batch, obs, active = rollout(envs, learner, obs, active, options)
             learner.update(batch, options)
             done += options["n_steps"] * envs.num_envs
-            print(f"{done:>11,} decisions, {done / (time.perf_counter() - started):,.0f} per s, reward {reward:.4f}")
+            if evaluator.is_due(done):
+                network = Network.from_state_dict(learner.body.state_dict(), about)
+                print(told(evaluator.evaluate(network, done)), flush=True)
         envs.close()
-    versions = {**software_versions(), "torchrl": torchrl.__version__, "tensordict": tensordict.__version__}
-    card = {"plan": plan.to_mapping(), "by": "scripts/torchrl_mappo.py", "versions": versions}
-    about = NetworkAbout(interface=plan.interface, samples=True, caches=plan.scenario.caches, card=card)
-    Network.from_state_dict(learner.body.state_dict(), about).save(args.out)
+
+
+def main() -> None:
+    """Carry the plan out, print how its network does meanwhile, and keep the best."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--plan", type=Path, required=True, help="plan of a training by PPO, as TOML")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--out", type=Path, default=Path("mappo"), help="folder of the training")
+    args = parser.parse_args()
+    torch.manual_seed(args.seed)
+    torch.set_num_threads(1)
+    carry_out(dataclasses.replace(read_plan(args.plan), seed=args.seed, samples=True), args.out)
 
 
 if __name__ == "__main__":

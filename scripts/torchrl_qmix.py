@@ -1,8 +1,8 @@
 """QMIX with TorchRL: robots share a network that says what actions are worth, and a mixer makes one worth of them all.
 
     pip install . "torchrl==0.14.1" "torch==2.13.0"  # in a checkout
-    python scripts/torchrl_qmix.py --plan docs/benchmark/plans/qmix.toml --out qmix.npz
-    swarm-forage run crw,qmix.npz
+    python scripts/torchrl_qmix.py --plan docs/benchmark/plans/qmix.toml --out results/qmix
+    swarm-forage run crw,results/qmix/policy.npz
 
 It carries out a plan of `swarm-forage train`: its worlds, its stages, its evaluations, and options of its own. Our
 vector environment collects; TorchRL's networks, memory and loss learn. The swarm is paid together, the sum of what its
@@ -13,14 +13,11 @@ most to a robot is worth most to the swarm. The network that does best in the ev
 
 import argparse
 import dataclasses
-import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tensordict
 import torch
-import torchrl
 from gymnasium.spaces import flatdim
 from tensordict import TensorDict
 from tensordict.nn import TensorDictModule
@@ -31,23 +28,14 @@ from torchrl.modules import QValueModule, SafeSequential
 from torchrl.modules.models.multiagent import QMixer
 from torchrl.objectives import HardUpdate, ValueEstimators
 from torchrl.objectives.multiagent import QMixerLoss
-from torchrl_mappo import network, swarm_state
+from torchrl_mappo import LIBRARIES, perceptron, swarm_state, told
 
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ObsArray
 from swarm_forage_env.policies.interface import LearnerInterface
-from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkPolicy
-from swarm_forage_env.runs.policy_spec import policy_spec
-from swarm_forage_env.runs.versions import software_versions
-from swarm_forage_env.training.evaluations import (
-    Baselines,
-    baseline_runs,
-    best_baselines,
-    finished_runs,
-    in_all_worlds,
-    judged,
-)
-from swarm_forage_env.training.plan import LEARNING, Stage, TrainingPlan, read_plan
+from swarm_forage_env.policies.network import Network, NetworkAbout
+from swarm_forage_env.training.evaluator import Evaluator
+from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
 from swarm_forage_env.views.gymnasium import SwarmVectorEnv
 
 OPTIONS = {"buffer_size": 20_000, "batch_size": 64, "learning_rate": 5e-4, "gamma": 0.99, "n_steps": 1,
@@ -76,7 +64,7 @@ class Learner:
     """The network of values, its mixer, the loss of both, and the memory."""
 
     def __init__(self, n_columns: int, n_actions: int, n_robots: int, hidden: tuple[int, ...], options: dict) -> None:
-        self.body = network(n_columns, n_actions, hidden, last_gain=0.01)  # begins with all actions alike
+        self.body = perceptron(n_columns, n_actions, hidden, last_gain=0.01)  # begins with all actions alike
         names = [("agents", name) for name in ("action", "action_value", "chosen_action_value")]
         values = SafeSequential(
             TensorDictModule(self.body, [SEEN], names[1:2]),
@@ -154,31 +142,21 @@ def options_of(plan: TrainingPlan, stage: Stage) -> dict:
     return {**OPTIONS, **options}
 
 
-def performance_of(plan: TrainingPlan, network: Network, baselines: Baselines) -> float:
-    """Return how a network does in the plan's evaluation, as a share of the baselines."""
-    spec = policy_spec(NetworkPolicy(network), label=LEARNING.label)
-    found = judged(finished_runs(plan.judging(spec)), LEARNING.label, baselines)
-    return in_all_worlds(plan.evaluation, found)[0]
-
-
 class Training:
     """A training by a plan."""
 
-    def __init__(self, plan: TrainingPlan, out: Path) -> None:
+    def __init__(self, plan: TrainingPlan, folder: Path) -> None:
         """Begin with values of zero, about, and an empty memory."""
         robot = LearnerInterface(plan.interface, SwarmSpec.of(plan.scenario))
         sizes = flatdim(robot.observation_space), flatdim(robot.action_space), plan.scenario.robots.n_robots
         self.plan, self.done = plan, 0
         self.learner = Learner(*sizes, plan.hidden, options_of(plan, plan.stages[0]))
-        self._out, self._best = out, -np.inf
         self._rng = np.random.default_rng(plan.seed)
-        self._baselines = best_baselines(finished_runs(baseline_runs(plan)))
-        self._started = time.process_time()
+        self._evaluator = Evaluator(plan, folder, {"by": "scripts/torchrl_qmix.py", "versions": LIBRARIES})
 
     def carry_out(self) -> None:
         """Collect, learn and evaluate, stage by stage."""
-        end, every = 0, self.plan.evaluation.every_steps
-        whole = sum(stage.steps for stage in self.plan.stages)
+        end = 0
         for stage in self.plan.stages:
             options, envs = options_of(self.plan, stage), SwarmVectorEnv(**self.plan.arenas_of(stage))
             end += stage.steps
@@ -189,38 +167,27 @@ class Training:
                 self.learner.memory.extend(batch.reshape(-1))
                 if len(self.learner.memory) >= options["learning_starts"]:
                     self.learner.update(options)
-                before, self.done = self.done, self.done + options["train_freq"] * envs.num_envs
-                if self.done // every > before // every or self.done >= whole:
-                    self._evaluate()
+                self.done += options["train_freq"] * envs.num_envs
+                if self._evaluator.is_due(self.done):
+                    print(told(self._evaluator.evaluate(self._network(), self.done)), flush=True)
             envs.close()
 
     def _exploring(self, options: dict) -> float:
         """Return the share of robots that explore: less and less, then as many as the options leave."""
-        n_decisions = options["exploration_fraction"] * sum(stage.steps for stage in self.plan.stages)
+        n_decisions = options["exploration_fraction"] * self.plan.total_steps
         return max(options["exploration_final_eps"], 1.0 - self.done / n_decisions)
 
-    def _evaluate(self) -> None:
-        """Tell how the network does, and keep it if none was better."""
+    def _network(self) -> Network:
         about = NetworkAbout(interface=self.plan.interface, caches=self.plan.scenario.caches)
-        network = Network.from_state_dict(self.learner.body.state_dict(), about)
-        performance = performance_of(self.plan, network, self._baselines)
-        seconds = time.process_time() - self._started
-        speed = f"{self.done / seconds:,.0f} per s of a core"
-        print(f"{self.done:>11,} decisions, {speed}, {performance:.2f} of the baselines", flush=True)
-        if performance >= self._best:
-            self._best = performance
-            versions = {**software_versions(), "torchrl": torchrl.__version__, "tensordict": tensordict.__version__}
-            made = {"by": "scripts/torchrl_qmix.py", "decisions": self.done, "versions": versions}
-            card = {"plan": self.plan.to_mapping(), **made}
-            dataclasses.replace(network, about=dataclasses.replace(about, card=card)).save(self._out)
+        return Network.from_state_dict(self.learner.body.state_dict(), about)
 
 
 def main() -> None:
-    """Carry the plan out, print how its network does meanwhile, and keep the best with the plan in its card."""
+    """Carry the plan out, print how its network does meanwhile, and keep the best."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--plan", type=Path, required=True, help="plan of a training by DQN, as TOML")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--out", type=Path, default=Path("qmix.npz"), help="where the trained network goes")
+    parser.add_argument("--out", type=Path, default=Path("qmix"), help="folder of the training")
     args = parser.parse_args()
     torch.manual_seed(args.seed)
     torch.set_num_threads(1)

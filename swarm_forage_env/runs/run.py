@@ -164,6 +164,10 @@ class Started(NamedTuple):
         """Read both clocks."""
         return cls(time.perf_counter(), time.process_time())
 
+    def spent_s(self) -> tuple[float, float]:
+        """Return the time since then and its processor time, s."""
+        return time.perf_counter() - self.wall_s, time.process_time() - self.cpu_s
+
 
 def finished_record(recorder: RunRecorder, spec: RunSpec, started: Started) -> RunRecord:
     """Return the record of a run that has ended.
@@ -174,10 +178,11 @@ def finished_record(recorder: RunRecorder, spec: RunSpec, started: Started) -> R
         started: When it began.
     """
     columns: dict[str, Any] = recorder.columns()
+    wall_time_s, cpu_time_s = started.spent_s()
     origin = {
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
-        "wall_time_s": f"{time.perf_counter() - started.wall_s:.3f}",
-        "cpu_time_s": f"{time.process_time() - started.cpu_s:.3f}",
+        "wall_time_s": f"{wall_time_s:.3f}",
+        "cpu_time_s": f"{cpu_time_s:.3f}",
     }
     return RunRecord(
         run_id=spec.run_id,

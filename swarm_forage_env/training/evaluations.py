@@ -6,7 +6,7 @@ for all. They are readable without the library that trained.
 
 import csv
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -142,6 +142,15 @@ def best_baselines(table: Table) -> dict[str, tuple[str, float]]:
     return found
 
 
+def baselines_of(plan: TrainingPlan) -> dict[str, tuple[str, float]]:
+    """Run the policies that a training is compared with; returns the best in each world, as `Baselines`.
+
+    Raises:
+        ConfigError: a run failed.
+    """
+    return best_baselines(finished_runs(baseline_runs(plan)))
+
+
 def known_baselines(plan: TrainingPlan, evaluation: Evaluation) -> dict[str, tuple[str, float]]:
     """Return the baselines of an evaluation, as `Baselines`."""
     if not evaluation.worlds:
@@ -188,6 +197,40 @@ def in_all_worlds(plan: EvaluationPlan, found: Sequence[WorldEvaluation]) -> tup
     """
     performance = CHOSEN_BY[plan.chosen_by]([world.ratio for world in found]) if plan.worlds else found[0].performance
     return float(performance), float(np.mean([world.interference_fraction for world in found]))
+
+
+def evaluated(
+    plan: TrainingPlan,
+    policy: PolicySpec,
+    baselines: Baselines,
+    *,
+    steps: int,
+    spent_s: Callable[[], tuple[float, float]],
+) -> Evaluation:
+    """Return how a policy does in the worlds of the plan's evaluation.
+
+    Args:
+        plan: Of the training.
+        policy: Its policy as it is now.
+        baselines: What it is compared with.
+        steps: Decisions of single robots so far.
+        spent_s: Tells the time of the training so far and its processor time, s; asked after the runs.
+
+    Raises:
+        ConfigError: a run failed.
+    """
+    worlds = judged(finished_runs(plan.judging(policy)), policy.label, baselines)
+    performance, interference = in_all_worlds(plan.evaluation, worlds)
+    wall_time_s, cpu_time_s = spent_s()
+    return Evaluation(
+        steps=steps,
+        wall_time_s=round(wall_time_s, 1),
+        performance=performance,
+        baseline=1.0 if plan.evaluation.worlds else worlds[0].baseline,
+        interference_fraction=interference,
+        worlds=worlds if plan.evaluation.worlds else (),
+        cpu_time_s=round(cpu_time_s, 1),
+    )
 
 
 def ratio_to(baseline: float, performance: float, seconds: float) -> float:

@@ -428,12 +428,13 @@ def _keys() -> list[str]:
     return ["scenario", "wrappers", *(item.name for item in others)]
 
 
-def read_plan(path: Path) -> TrainingPlan:
+def read_plan(path: str | Path) -> TrainingPlan:
     """Read a plan from a TOML file, or from the JSON file that a training run leaves.
 
     Raises:
         ConfigError: the file cannot be read or does not hold a plan; the message names it.
     """
+    path = Path(path)
     try:
         text = path.read_text(encoding="utf-8")
         if path.suffix != ".json":
@@ -455,7 +456,7 @@ def named_plan(
         ConfigError: there is none, or it cannot be used.
     """
     shipped = plan_file(name)
-    plan = read_plan(Path(name) if shipped is None else shipped)
+    plan = read_plan(name if shipped is None else shipped)
     given: dict[str, Any] = {key: value for key, value in (("seed", seed), ("turned", turned)) if value is not None}
     if frame_decisions is not None:
         given["interface"] = dataclasses.replace(plan.interface, frame_decisions=frame_decisions)

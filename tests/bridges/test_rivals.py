@@ -7,6 +7,7 @@ import pytest
 
 from swarm_forage_env import load_policy
 from swarm_forage_env.policies.network import Network
+from swarm_forage_env.training.evaluations import read_training
 from swarm_forage_env.training.plan import read_plan
 from tests.bridges.test_pages import ROOT, check_runs, require, run
 
@@ -47,12 +48,15 @@ def test_the_entry_of_a_plan_that_trains_elsewhere_says_so():
 
 def test_mappo_with_torchrl_carries_out_a_plan(tmp_path):
     require("torchrl", "torchrl")
-    words = ["--plan", str(PLAN), "--seed", "3", "--out", "mappo.npz"]
+    words = ["--plan", str(PLAN), "--seed", "3", "--out", "mappo"]
     lines = run([str(ROOT / "scripts" / "torchrl_mappo.py"), *words], tmp_path).splitlines()
-    assert [int(line.split()[0].replace(",", "")) for line in lines] == [384, 768, 1152]
-    check_runs(tmp_path / "mappo.npz")
-    about = Network.load(tmp_path / "mappo.npz").about
+    told = [int(line.split()[0].replace(",", "")) for line in lines if "decisions" in line]
+    training = read_training(tmp_path / "mappo")
+    assert told == [one.steps for one in training.evaluations] == [1152]
+    check_runs(tmp_path / "mappo" / "policy.npz")
+    about = Network.load(tmp_path / "mappo" / "policy.npz").about
     assert (about.samples, about.card["plan"]["seed"]) == (True, 3)
+    assert {"torch", "torchrl"} <= about.card["versions"].keys()
 
 
 def test_the_critic_of_mappo_with_torchrl_sees_robots_at_work_only():
@@ -105,7 +109,7 @@ def test_mappo_with_torchrl_values_what_would_have_followed_a_time_limit_and_not
         return learner.value(seen, swarm_rows(seen, torch.tensor(active), 1)).detach().numpy()[:, 0]
 
     options = {**OPTIONS, "n_steps": 3, "gae_lambda": 0.0, "gamma": 0.9}
-    batch, obs, active, _ = rollout(envs, learner, envs.seen[0], envs.active[0], options)
+    batch, obs, active = rollout(envs, learner, envs.seen[0], envs.active[0], options)
     ended = value([[0.5], [0.4]], [False, True])  # the swarm as it was, not as the next run begins
     expected = [
         1.0,  # died: nothing follows

@@ -37,15 +37,15 @@ def qmix(monkeypatch):
 def test_qmix_carries_out_a_plan(tmp_path):
     require("torchrl", "torchrl")
     (tmp_path / "plan.toml").write_text(PLAN)
-    for out in ("one.npz", "two.npz"):
+    for out in ("one", "two"):
         words = ["--plan", "plan.toml", "--seed", "3", "--out", out]
         lines = run([str(ROOT / "scripts" / "torchrl_qmix.py"), *words], tmp_path).splitlines()
         told = [int(line.split()[0].replace(",", "")) for line in lines if "decisions" in line]
         assert told == [256, 512, 640]
-    check_runs(tmp_path / "one.npz")
-    one, two = (Network.load(tmp_path / out) for out in ("one.npz", "two.npz"))
+    check_runs(tmp_path / "one" / "policy.npz")
+    one, two = (Network.load(tmp_path / out / "policy.npz") for out in ("one", "two"))
     assert (one.about.samples, one.about.card["plan"]["seed"]) == (False, 3)
-    assert one.about.card["decisions"] in told
+    assert one.about.card["evaluation"]["steps"] in told
     assert all(np.array_equal(mine, other) for mine, other in zip(one.weights, two.weights, strict=True)), "equal seeds"
 
 
@@ -55,7 +55,7 @@ def test_qmix_refuses_worlds_of_several_numbers_of_robots_and_plans_of_others(qm
     (tmp_path / "plan.toml").write_text(several)
     plan = read_plan(tmp_path / "plan.toml")
     with pytest.raises(SystemExit, match="fixed numbers of robots"):
-        qmix.Training(plan, tmp_path / "out.npz").carry_out()
+        qmix.Training(plan, tmp_path / "out").carry_out()
     other = read_plan(PLAN_OF_PPO)
     with pytest.raises(SystemExit, match="got ppo"):
         qmix.options_of(other, other.stages[0])

@@ -123,21 +123,15 @@ def test_the_same_plan_gives_the_same_weights_in_one_process_and_in_two(tmp_path
 @pytest.mark.parametrize(("plan", "evaluated"), [(tiny_plan(), [256, 384, 640, 768]), (SHORT, [128])])
 def test_a_training_that_was_killed_in_an_evaluation_goes_on_with_it(tmp_path, monkeypatch, plan, evaluated):
     """Without the help of Ctrl-C, which keeps a checkpoint itself; after the last decision, too."""
-    finished_runs = training.finished_runs
-    calls = 0
 
-    def kill(plan):
-        nonlocal calls
-        calls += 1
-        if calls == 2:  # the first call is for the baseline
-            raise SystemExit("killed")
-        return finished_runs(plan)
+    def kill(*_, **__):
+        raise SystemExit("killed")
 
-    monkeypatch.setattr(training, "finished_runs", kill)
-    with pytest.raises(SystemExit):
-        train(plan, tmp_path)
+    with monkeypatch.context() as patched:
+        patched.setattr(training, "evaluated", kill)
+        with pytest.raises(SystemExit):
+            train(plan, tmp_path)
     assert not (tmp_path / "policy.npz").exists()
-    monkeypatch.setattr(training, "finished_runs", finished_runs)
     result = train(plan, tmp_path, resume=True)
     assert [each.steps for each in result.evaluations] == evaluated
     assert result.steps == evaluated[-1] - evaluated[0]

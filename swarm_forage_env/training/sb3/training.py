@@ -8,7 +8,6 @@ can hold.
 import importlib.util
 import inspect
 import math
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from io import BytesIO
@@ -45,12 +44,9 @@ from swarm_forage_env.training.evaluations import (
     POLICY_FILE,
     Evaluation,
     TrainingStatus,
-    baseline_runs,
-    best_baselines,
+    baselines_of,
     chosen,
-    finished_runs,
-    in_all_worlds,
-    judged,
+    evaluated,
     kept_plan,
     known_baselines,
     read_evaluations,
@@ -341,11 +337,10 @@ class _Watch(BaseCallback):
         last = self.evaluations[-1] if self.evaluations else None
         self._spent_s, self._spent_cpu_s = (0.0, 0.0) if last is None else (last.wall_time_s, last.cpu_time_s)
 
-    def _wall_time_s(self) -> float:
-        return self._spent_s + time.perf_counter() - self._started.wall_s
-
-    def _cpu_time_s(self) -> float:
-        return self._spent_cpu_s + time.process_time() - self._started.cpu_s
+    def _spent(self) -> tuple[float, float]:
+        """Time and processor time of the training so far, s."""
+        wall_time_s, cpu_time_s = self._started.spent_s()
+        return self._spent_s + wall_time_s, self._spent_cpu_s + cpu_time_s
 
     def keep(self, model: BaseAlgorithm) -> None:
         """Write a checkpoint, beside the plan that it is one of.
@@ -403,7 +398,7 @@ class _Watch(BaseCallback):
             self._evaluate()
 
     def _on_rollout_end(self) -> None:
-        elapsed = self._wall_time_s()
+        elapsed, _ = self._spent()
         if elapsed - self._last_report >= _REPORT_EVERY_S:
             self._last_report = elapsed
             episodes = self.model.ep_info_buffer or ()
@@ -453,19 +448,9 @@ class _Watch(BaseCallback):
         """Run the policy in the worlds of the evaluation, beside the baselines."""
         plan = self._plan
         if not self._baselines:  # their runs are made once, by a resumed training, too
-            self._baselines = best_baselines(finished_runs(baseline_runs(plan)))
-        runs = plan.judging(replace(LEARNING, factory=self._policy))
-        worlds = judged(finished_runs(runs), LEARNING.label, self._baselines)
-        performance, interference = in_all_worlds(plan.evaluation, worlds)
-        return Evaluation(
-            steps=self.num_timesteps,
-            wall_time_s=round(self._wall_time_s(), 1),
-            performance=performance,
-            baseline=1.0 if plan.evaluation.worlds else worlds[0].baseline,
-            interference_fraction=interference,
-            worlds=worlds if plan.evaluation.worlds else (),
-            cpu_time_s=round(self._cpu_time_s(), 1),
-        )
+            self._baselines = baselines_of(plan)
+        policy = replace(LEARNING, factory=self._policy)
+        return evaluated(plan, policy, self._baselines, steps=self.num_timesteps, spent_s=self._spent)
 
     def _policy(self) -> Policy:
         """The policy as it is now; one that draws its actions does so by the chance of its run, not of the training."""

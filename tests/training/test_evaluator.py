@@ -1,0 +1,85 @@
+"""Networks of other learners are judged as those of `swarm-forage train` are, and the best one is kept."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swarm_forage_env.contract.policy import SwarmSpec
+from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
+from swarm_forage_env.policies.network import Network, NetworkAbout
+from swarm_forage_env.runs.policy_spec import policy_spec
+from swarm_forage_env.runs.run import run_one
+from swarm_forage_env.scenarios.presets import warehouse_small
+from swarm_forage_env.training.evaluation_worlds import EvaluationWorld
+from swarm_forage_env.training.evaluations import read_training
+from swarm_forage_env.training.evaluator import Evaluator
+from swarm_forage_env.training.plan import LEARNING, EvaluationPlan, Stage, TrainingPlan
+from swarm_forage_env.wrappers.world import World
+
+QUICK = {"n_robots": 10, "n_objects": 120, "width_m": 12.0, "height_m": 8.0, "nest_centre_m": (3.0, 4.0),
+         "nest_size_m": (4.0, 6.0), "horizon_s": 400.0}  # fmt: skip
+NUMBERED = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5)
+PLAN = TrainingPlan(
+    world=World(warehouse_small(**QUICK)),
+    interface=NUMBERED,
+    hidden=(),
+    stages=(Stage(steps=100), Stage(steps=150)),
+    evaluation=EvaluationPlan(every_steps=60, worlds=(EvaluationWorld(scenario=warehouse_small(**QUICK)),)),
+    samples=True,
+)
+LAYOUT = LearnerInterface(NUMBERED, SwarmSpec.of(PLAN.scenario))
+N_INPUTS, N_ACTIONS = LAYOUT.layout.size, int(LAYOUT.action_space.n)
+
+
+def network(*, stands: bool) -> Network:
+    """A network that takes all actions alike, or always stands."""
+    bias = np.zeros(N_ACTIONS, np.float32)
+    bias[0] = 50.0 if stands else 0.0
+    about = NetworkAbout(interface=NUMBERED, samples=True)
+    return Network((np.zeros((N_INPUTS, N_ACTIONS), np.float32),), (bias,), about)
+
+
+def test_the_folder_becomes_that_of_a_training_and_holds_the_best_network(tmp_path):
+    evaluator = Evaluator(PLAN, tmp_path / "mine", {"by": "a test", "versions": {"learner": "1.0"}})
+    moves, stands = network(stands=False), network(stands=True)
+    told = [evaluator.evaluate(one, 60 * (k + 1)) for k, one in enumerate((stands, moves, stands))]
+    assert told[1].performance > told[0].performance == 0.0
+    training = read_training(tmp_path / "mine")
+    assert training.plan == PLAN
+    assert list(training.evaluations) == told
+    kept = Network.load(tmp_path / "mine" / "policy.npz")
+    assert np.array_equal(kept.biases[0], moves.biases[0])
+    assert kept.about.card["by"] == "a test"
+    assert kept.about.card["evaluation"]["steps"] == 120
+    assert kept.about.card["versions"]["learner"] == "1.0"
+    assert "numpy" in kept.about.card["versions"]
+
+
+def test_an_evaluation_is_the_runs_of_the_plan_beside_its_baseline(tmp_path):
+    evaluator = Evaluator(PLAN, tmp_path, {})
+    found = evaluator.evaluate(network(stands=False), 60)
+    file = str(tmp_path / "policy.npz")
+    runs = [run_one(spec) for spec in PLAN.judging(policy_spec(file, label=LEARNING.label)).specs]
+    assert found.worlds[0].performance == np.mean([record.rate_per_1000_s("performance") for record in runs])
+    assert found.worlds[0].baseline_policy in ("crw", "dpo", "stochm", "stochx")
+    assert found.performance == pytest.approx(found.worlds[0].ratio)
+
+
+def test_an_evaluation_is_due_when_its_decisions_are_full_and_at_the_end(tmp_path):
+    evaluator = Evaluator(PLAN, tmp_path, {})
+    made = []
+    for steps in range(0, 300, 25):
+        if evaluator.is_due(steps):
+            made.append(steps)
+            evaluator.evaluate(network(stands=True), steps)
+    assert made == [75, 125, 200, 250]
+
+
+def test_a_new_training_leaves_nothing_of_another_one(tmp_path):
+    Evaluator(PLAN, tmp_path, {}).evaluate(network(stands=True), 60)
+    evaluator = Evaluator(replace(PLAN, seed=7), tmp_path, {})
+    evaluator.evaluate(network(stands=True), 120)
+    training = read_training(tmp_path)
+    assert [one.steps for one in training.evaluations] == [120]
+    assert training.plan.seed == 7
