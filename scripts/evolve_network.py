@@ -30,7 +30,7 @@ from swarm_forage_env.contract.types import FloatArray, IntArray, ObsArray
 from swarm_forage_env.policies.interface import LearnerInterface
 from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.training.curves import beside_baseline, read_trainings
-from swarm_forage_env.training.evaluations import EVALUATIONS_FILE
+from swarm_forage_env.training.evaluations import Baselines, check_unused
 from swarm_forage_env.training.evaluator import Evaluator
 from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.seeds import seed_folder
@@ -114,7 +114,7 @@ def worth(earned: FloatArray) -> FloatArray:
 class Training:
     """A training by a plan: its search, and its evaluations."""
 
-    def __init__(self, plan: TrainingPlan, words: argparse.Namespace) -> None:
+    def __init__(self, plan: TrainingPlan, words: argparse.Namespace, baselines: Baselines | None) -> None:
         """Begin with networks around zero."""
         import cma
 
@@ -124,7 +124,8 @@ class Training:
         self.strategy = cma.CMAEvolutionStrategy(np.zeros(n_numbers(self.sizes)), WIDTH, options)
         self.plan, self.done = plan, 0
         self._words = words
-        self._evaluator = Evaluator(plan, seed_folder(words.out, plan.seed), made_by(words))
+        folder = seed_folder(words.out, plan.seed)
+        self.evaluator = Evaluator(plan, folder, made_by(words), baselines=baselines)
         self._rng = np.random.default_rng(plan.seed)
 
     def carry_out(self) -> None:
@@ -137,11 +138,11 @@ class Training:
             while self.done + n_decisions <= end:
                 self._generation(worlds)
                 self.done += n_decisions
-                if self._evaluator.is_due(self.done):
+                if self.evaluator.is_due(self.done):
                     self._evaluate()
             for world in worlds:
                 world.env.close()
-        if not self._evaluator.evaluations or self._evaluator.evaluations[-1].steps < self.done:
+        if not self.evaluator.evaluations or self.evaluator.evaluations[-1].steps < self.done:
             self._evaluate()
 
     def _generation(self, worlds: Sequence[World]) -> None:
@@ -155,7 +156,7 @@ class Training:
         layers = layers_of(np.array([self.strategy.result.xfavorite], np.float32), self.sizes)
         about = NetworkAbout(interface=self.plan.interface, samples=True, caches=self.plan.scenario.caches)
         network = Network(tuple(weight[0] for weight, _ in layers), tuple(bias[0] for _, bias in layers), about)
-        evaluation = self._evaluator.evaluate(network, self.done)
+        evaluation = self.evaluator.evaluate(network, self.done)
         reached = f"{evaluation.performance:.2f} of the baselines, interference {evaluation.interference_fraction:.3f}"
         print(f"seed {self.plan.seed}: {self.done:,} decisions, {reached}", file=sys.stderr, flush=True)
 
@@ -196,14 +197,21 @@ def main() -> None:
             importlib.import_module(module)
     except ImportError as error:
         parser.error(f'{error}; pip install ".[evolve,plots]"')
+    seeds = range(words.seed, words.seed + words.seeds)
+    folders, baselines = [seed_folder(words.out, seed) for seed in seeds], None
     try:
         plan = evolving_plan(words)
-    except ConfigError as error:
+        for folder in folders:  # before the first training
+            check_unused(folder, "choose another folder (--out), or other seeds (--seed)")
+        for seed in seeds:
+            training = Training(replace(plan, seed=seed), words, baselines)
+            training.carry_out()
+            baselines = training.evaluator.baselines
+    except (ConfigError, OSError) as error:
         parser.error(str(error))
-    for seed in range(words.seed, words.seed + words.seeds):
-        Training(replace(plan, seed=seed), words).carry_out()
-    folders = sorted(file.parent for file in words.out.glob(f"*/{EVALUATIONS_FILE}"))  # of earlier commands, too
-    beside_baseline(*read_trainings(folders)).draw(words.out / "curves.png")
+    trainings = read_trainings(folders)
+    curves = beside_baseline(*trainings, averaged=[one.label for one in trainings])
+    curves.draw(words.out / "curves.png")
 
 
 if __name__ == "__main__":

@@ -27,6 +27,7 @@ from torchrl.modules import MLP, ProbabilisticActor, ValueOperator
 from torchrl.objectives import ClipPPOLoss
 from torchrl.objectives.value.functional import generalized_advantage_estimate
 
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.policies.interface import LearnerInterface
 from swarm_forage_env.policies.network import Network, NetworkAbout
@@ -182,20 +183,20 @@ def options_of(plan: TrainingPlan, stage: Stage) -> dict:
 
 def told(evaluation: Evaluation) -> str:
     """Return a line about an evaluation."""
-    speed = f"{evaluation.steps / evaluation.cpu_time_s:,.0f} per s of a core"
+    speed = f"{evaluation.steps / max(evaluation.cpu_time_s, 0.1):,.0f} per s of a core"
     reached = f"{evaluation.performance:.2f} of the baselines, interference {evaluation.interference_fraction:.3f}"
     return f"{evaluation.steps:>11,} decisions, {speed}, {reached}"
 
 
 def carry_out(plan: TrainingPlan, folder: Path) -> None:
     """Collect, learn and evaluate, stage by stage."""
+    options_of_stages = [options_of(plan, stage) for stage in plan.stages]
     robot = LearnerInterface(plan.interface, SwarmSpec.of(plan.scenario))
     learner = Learner(flatdim(robot.observation_space), flatdim(robot.action_space), plan.hidden)
     evaluator = Evaluator(plan, folder, {"by": "scripts/torchrl_mappo.py", "versions": LIBRARIES})
     about = NetworkAbout(interface=plan.interface, samples=True, caches=plan.scenario.caches)
     done, end = 0, 0
-    for stage in plan.stages:
-        options = options_of(plan, stage)
+    for stage, options in zip(plan.stages, options_of_stages, strict=True):
         envs = SwarmVectorEnv(**plan.arenas_of(stage))
         end += stage.steps
         first_seed = int(np.random.default_rng((plan.seed, done)).integers(2**31))  # another one in each stage
@@ -216,11 +217,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--plan", type=Path, required=True, help="plan of a training by PPO, as TOML")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--out", type=Path, default=Path("mappo"), help="folder of the training")
+    parser.add_argument("--out", type=Path, default=Path("results/mappo"), help="folder of the training")
     args = parser.parse_args()
     torch.manual_seed(args.seed)
     torch.set_num_threads(1)
-    carry_out(dataclasses.replace(read_plan(args.plan), seed=args.seed, samples=True), args.out)
+    try:
+        carry_out(dataclasses.replace(read_plan(args.plan), seed=args.seed, samples=True), args.out)
+    except (ConfigError, OSError) as error:
+        parser.error(str(error))
 
 
 if __name__ == "__main__":

@@ -30,6 +30,7 @@ from torchrl.objectives import HardUpdate, ValueEstimators
 from torchrl.objectives.multiagent import QMixerLoss
 from torchrl_mappo import LIBRARIES, perceptron, swarm_state, told
 
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ObsArray
 from swarm_forage_env.policies.interface import LearnerInterface
@@ -147,18 +148,19 @@ class Training:
 
     def __init__(self, plan: TrainingPlan, folder: Path) -> None:
         """Begin with values of zero, about, and an empty memory."""
+        self._options = [options_of(plan, stage) for stage in plan.stages]
         robot = LearnerInterface(plan.interface, SwarmSpec.of(plan.scenario))
         sizes = flatdim(robot.observation_space), flatdim(robot.action_space), plan.scenario.robots.n_robots
         self.plan, self.done = plan, 0
-        self.learner = Learner(*sizes, plan.hidden, options_of(plan, plan.stages[0]))
+        self.learner = Learner(*sizes, plan.hidden, self._options[0])
         self._rng = np.random.default_rng(plan.seed)
         self._evaluator = Evaluator(plan, folder, {"by": "scripts/torchrl_qmix.py", "versions": LIBRARIES})
 
     def carry_out(self) -> None:
         """Collect, learn and evaluate, stage by stage."""
         end = 0
-        for stage in self.plan.stages:
-            options, envs = options_of(self.plan, stage), SwarmVectorEnv(**self.plan.arenas_of(stage))
+        for stage, options in zip(self.plan.stages, self._options, strict=True):
+            envs = SwarmVectorEnv(**self.plan.arenas_of(stage))
             end += stage.steps
             first_seed = int(np.random.default_rng((self.plan.seed, self.done)).integers(2**31))
             obs, _ = envs.reset(seed=first_seed, options={"scenario": dict(stage.scenario)})
@@ -187,11 +189,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--plan", type=Path, required=True, help="plan of a training by DQN, as TOML")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--out", type=Path, default=Path("qmix"), help="folder of the training")
+    parser.add_argument("--out", type=Path, default=Path("results/qmix"), help="folder of the training")
     args = parser.parse_args()
     torch.manual_seed(args.seed)
     torch.set_num_threads(1)
-    Training(dataclasses.replace(read_plan(args.plan), seed=args.seed), args.out).carry_out()
+    try:
+        Training(dataclasses.replace(read_plan(args.plan), seed=args.seed), args.out).carry_out()
+    except (ConfigError, OSError) as error:
+        parser.error(str(error))
 
 
 if __name__ == "__main__":

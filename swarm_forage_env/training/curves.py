@@ -92,7 +92,6 @@ class TrainingCurves(Answer):
 
         plan, mean = self.plan, self._mean()
         is_one_plan = len(self.trainings) == 1 or mean is not None
-        title = f"{plan.algorithm} in {place_of(plan)}" if is_one_plan else place_of(plan)
         draw_trainings(
             Path(path),
             {
@@ -106,7 +105,7 @@ class TrainingCurves(Answer):
             mean=mean,
             beside=dict(self.beside),
             stage_ends=np.cumsum([stage.steps for stage in plan.stages]).tolist() if is_one_plan else (),
-            title=title,
+            title=f"trainings in {place_of(plan)}",
             ylabel=counted_in(plan),
             style=style,
         )

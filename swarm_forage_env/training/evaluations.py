@@ -199,6 +199,16 @@ def in_all_worlds(plan: EvaluationPlan, found: Sequence[WorldEvaluation]) -> tup
     return float(performance), float(np.mean([world.interference_fraction for world in found]))
 
 
+def lacks_evaluation(plan: TrainingPlan, evaluations: Sequence[Evaluation], steps: int) -> bool:
+    """Return whether an evaluation is due after so many decisions of single robots.
+
+    That is when `every_steps` of the plan have passed since the last one, and at the end of each stage.
+    """
+    last = evaluations[-1].steps if evaluations else 0
+    ends = np.cumsum([stage.steps for stage in plan.stages])
+    return steps - last >= plan.evaluation.every_steps or bool(np.any((ends > last) & (ends <= steps)))
+
+
 def evaluated(
     plan: TrainingPlan,
     policy: PolicySpec,
@@ -289,6 +299,16 @@ def read_training(folder: Path) -> TrainingCurve:
     return TrainingCurve(
         label=folder.resolve().name, plan=read_plan(folder / PLAN_FILE), evaluations=tuple(evaluations)
     )
+
+
+def check_unused(folder: Path, advice: str) -> None:
+    """Refuse a folder that holds a training; `advice` says what to do about it.
+
+    Raises:
+        ConfigError: see above.
+    """
+    if any((folder / name).exists() for name in (MODEL_FILE, EVALUATIONS_FILE, POLICY_FILE)):
+        raise ConfigError(f"Expected an unused folder, got {folder} with a training run; {advice}.")
 
 
 def kept_plan(folder: Path, *, is_shared: bool = False) -> TrainingPlan:

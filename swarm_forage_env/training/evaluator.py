@@ -13,6 +13,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.files import check_folder
 from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.runs.policy_spec import policy_spec
 from swarm_forage_env.runs.run import Started
@@ -21,10 +23,13 @@ from swarm_forage_env.training.evaluations import (
     EVALUATIONS_FILE,
     PLAN_FILE,
     POLICY_FILE,
+    Baselines,
     Evaluation,
     baselines_of,
+    check_unused,
     chosen,
     evaluated,
+    lacks_evaluation,
     write_evaluations,
 )
 from swarm_forage_env.training.plan import LEARNING, TrainingPlan
@@ -34,35 +39,48 @@ class Evaluator:
     """Runs networks in the worlds of a plan's evaluation, beside its baselines.
 
     Attributes:
+        plan: Of the training.
+        baselines: What networks are compared with in each world.
         evaluations: All of them, oldest first.
     """
 
-    def __init__(self, plan: TrainingPlan, folder: str | Path, made_by: Mapping[str, Any]) -> None:
-        """Begin a training; `folder` gets its plan.
+    def __init__(
+        self,
+        plan: TrainingPlan,
+        folder: str | Path,
+        made_by: Mapping[str, Any],
+        *,
+        baselines: Baselines | None = None,
+    ) -> None:
+        """Begin a training: run its baselines, and write its plan.
 
         Args:
-            plan: Says the worlds, how often they are run, and which network counts as best.
-            folder: Gets `plan.json`, `evaluations.csv` and `policy.npz`. It is made if it is not there. What another
-                training left there is replaced.
+            plan: Says the worlds, when they are run, and which network counts as best.
+            folder: Gets `plan.json`, `evaluations.csv` and `policy.npz`. It is made if it is not there.
             made_by: What the card of the network says besides plan, evaluation and versions, as plain values. Its
                 `versions`, if any, are added to ours.
+            baselines: Those of another training with the same evaluation, which saves their runs.
+
+        Raises:
+            ConfigError: the folder holds a training, or a run of a baseline failed.
+            OSError: the folder cannot be made or written to.
         """
         self.plan, self.evaluations = plan, list[Evaluation]()
         self._folder = Path(folder)
-        self._made_by = {**made_by, "versions": {**software_versions(), **made_by.get("versions", {})}}
-        self._folder.mkdir(parents=True, exist_ok=True)
-        (self._folder / EVALUATIONS_FILE).unlink(missing_ok=True)
-        plan.write(self._folder / PLAN_FILE)
-        self._baselines = baselines_of(plan)
         self._started = Started.now()
+        self._made_by = {**made_by, "versions": {**software_versions(), **made_by.get("versions", {})}}
+        check_unused(self._folder, "choose another folder, or remove it")
+        check_folder(self._folder)
+        self.baselines = baselines_of(plan) if baselines is None else baselines
+        self._folder.mkdir(parents=True, exist_ok=True)
+        plan.write(self._folder / PLAN_FILE)
 
     def is_due(self, steps: int) -> bool:
         """Return whether an evaluation is due after so many decisions of single robots.
 
-        That is each time when `every_steps` of the plan are full, and at its end.
+        That is when `every_steps` of the plan have passed since the last one, and at the end of each stage.
         """
-        last, every = (self.evaluations[-1].steps if self.evaluations else 0), self.plan.evaluation.every_steps
-        return steps // every > last // every or steps >= self.plan.total_steps > last
+        return lacks_evaluation(self.plan, self.evaluations, steps)
 
     def evaluate(self, network: Network, steps: int) -> Evaluation:
         """Run a network, and write its file if none did better.
@@ -72,13 +90,20 @@ class Evaluator:
             steps: Decisions of single robots so far.
 
         Raises:
-            ConfigError: a run failed.
+            ConfigError: the network sees or acts in another way, or a run failed.
         """
+        plan, about = self.plan, network.about
+        found = about.interface.for_scenario(plan.scenario), about.samples
+        if found != (plan.interface, plan.samples):
+            raise ConfigError(
+                f"Expected a network with the plan's interface and samples, {plan.interface} and {plan.samples}, got "
+                f"{found[0]} and {found[1]}; make it with NetworkAbout(interface=plan.interface, samples=plan.samples)."
+            )
         spec = policy_spec(NetworkPolicy(network), label=LEARNING.label)
-        evaluation = evaluated(self.plan, spec, self._baselines, steps=steps, spent_s=self._started.spent_s)
+        evaluation = evaluated(plan, spec, self.baselines, steps=steps, spent_s=self._started.spent_s)
         self.evaluations.append(evaluation)
         if chosen(self.evaluations) is evaluation:  # the network first: no table without it
-            card = {"plan": self.plan.to_mapping(), "evaluation": evaluation.to_mapping(), **self._made_by}
-            replace(network, about=replace(network.about, card=card)).save(self._folder / POLICY_FILE)
+            card = {**self._made_by, "plan": plan.to_mapping(), "evaluation": evaluation.to_mapping()}
+            replace(network, about=replace(about, card=card)).save(self._folder / POLICY_FILE)
         write_evaluations(self._folder / EVALUATIONS_FILE, self.evaluations)
         return evaluation

@@ -115,7 +115,7 @@ class EvaluationPlan:
     """
 
     every_steps: int = EVALUATE_EVERY
-    """Decisions between two evaluations; there is one more at the end."""
+    """Decisions between two evaluations; there is one more at the end of each stage."""
     horizon_s: float | None = None
     """Length of a run, s; None = that of the plan's scenario. Jams build up, so that short runs promise too much."""
     n_runs: int = 1

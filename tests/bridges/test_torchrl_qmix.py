@@ -41,7 +41,7 @@ def test_qmix_carries_out_a_plan(tmp_path):
         words = ["--plan", "plan.toml", "--seed", "3", "--out", out]
         lines = run([str(ROOT / "scripts" / "torchrl_qmix.py"), *words], tmp_path).splitlines()
         told = [int(line.split()[0].replace(",", "")) for line in lines if "decisions" in line]
-        assert told == [256, 512, 640]
+        assert told == [256, 384, 640]
     check_runs(tmp_path / "one" / "policy.npz")
     one, two = (Network.load(tmp_path / out / "policy.npz") for out in ("one", "two"))
     assert (one.about.samples, one.about.card["plan"]["seed"]) == (False, 3)

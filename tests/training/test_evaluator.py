@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.policies.network import Network, NetworkAbout
@@ -66,20 +67,34 @@ def test_an_evaluation_is_the_runs_of_the_plan_beside_its_baseline(tmp_path):
     assert found.performance == pytest.approx(found.worlds[0].ratio)
 
 
-def test_an_evaluation_is_due_when_its_decisions_are_full_and_at_the_end(tmp_path):
+def test_an_evaluation_is_due_when_its_decisions_are_full_and_at_the_end_of_each_stage(tmp_path):
     evaluator = Evaluator(PLAN, tmp_path, {})
     made = []
     for steps in range(0, 300, 25):
         if evaluator.is_due(steps):
             made.append(steps)
             evaluator.evaluate(network(stands=True), steps)
-    assert made == [75, 125, 200, 250]
+    assert made == [75, 100, 175, 250]
 
 
-def test_a_new_training_leaves_nothing_of_another_one(tmp_path):
+def test_a_folder_with_a_training_is_refused(tmp_path):
+    Evaluator(PLAN, tmp_path, {})  # it has begun, and left nothing to lose
     Evaluator(PLAN, tmp_path, {}).evaluate(network(stands=True), 60)
-    evaluator = Evaluator(replace(PLAN, seed=7), tmp_path, {})
-    evaluator.evaluate(network(stands=True), 120)
-    training = read_training(tmp_path)
-    assert [one.steps for one in training.evaluations] == [120]
-    assert training.plan.seed == 7
+    with pytest.raises(ConfigError, match="with a training run; choose another folder"):
+        Evaluator(PLAN, tmp_path, {})
+    (tmp_path / "file").touch()
+    with pytest.raises(OSError, match="file"):
+        Evaluator(PLAN, tmp_path / "file", {})
+
+
+def test_baselines_of_another_training_save_their_runs(tmp_path, monkeypatch):
+    first = Evaluator(PLAN, tmp_path / "first", {})
+    monkeypatch.setattr("swarm_forage_env.training.evaluator.baselines_of", None)
+    assert Evaluator(PLAN, tmp_path / "second", {}, baselines=first.baselines).baselines == first.baselines
+
+
+@pytest.mark.parametrize("changes", [{"samples": False}, {"interface": InterfaceConfig()}])
+def test_a_network_that_sees_or_acts_in_another_way_is_refused(tmp_path, changes):
+    moves = network(stands=False)
+    with pytest.raises(ConfigError, match="Expected a network with the plan's interface and samples"):
+        Evaluator(PLAN, tmp_path, {}).evaluate(replace(moves, about=replace(moves.about, **changes)), 60)

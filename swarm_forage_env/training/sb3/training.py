@@ -45,10 +45,12 @@ from swarm_forage_env.training.evaluations import (
     Evaluation,
     TrainingStatus,
     baselines_of,
+    check_unused,
     chosen,
     evaluated,
     kept_plan,
     known_baselines,
+    lacks_evaluation,
     read_evaluations,
     write_evaluations,
 )
@@ -225,11 +227,8 @@ def check_place(folder: Path, plan: TrainingPlan, *, resume: bool) -> None:
                 f"Expected the plan in {folder / PLAN_FILE} to resume its training, got another plan: "
                 f"{'; '.join(differences)}."
             )
-    elif any((folder / name).exists() for name in (MODEL_FILE, EVALUATIONS_FILE, POLICY_FILE)):
-        raise ConfigError(
-            f"Expected an unused folder, got {folder} with a training run; resume it (--resume), or choose another "
-            "folder (--out)."
-        )
+    else:
+        check_unused(folder, "resume it (--resume), or choose another folder (--out)")
 
 
 def _check_baseline(plan: TrainingPlan) -> None:
@@ -358,9 +357,7 @@ class _Watch(BaseCallback):
 
     def lacks_evaluation(self, steps: int) -> bool:
         """Return whether an evaluation was due by so many decisions, and was not finished."""
-        last = self.evaluations[-1].steps if self.evaluations else 0
-        ends = np.cumsum([stage.steps for stage in self._plan.stages])
-        return steps - last >= self._plan.evaluation.every_steps or bool(np.any((ends > last) & (ends <= steps)))
+        return lacks_evaluation(self._plan, self.evaluations, steps)
 
     def _write_plan(self) -> None:
         self._folder.mkdir(parents=True, exist_ok=True)
