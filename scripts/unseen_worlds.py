@@ -62,7 +62,7 @@ def corridor(rng: np.random.Generator) -> Drawn:
 
 
 def few_objects(rng: np.random.Generator) -> Drawn:
-    """A larger hall with fewer objects."""
+    """A larger hall than in any training, with few objects."""
     shape = {"width_m": 64.0, "height_m": 64.0, "nest_centre_m": (32.0, 32.0), "nest_size_m": (9.6, 9.6)}
     numbers = {"n_objects": int(rng.integers(30, 80)), "n_robots": int(rng.integers(16, 65))}
     return "warehouse_medium", {**shape, **numbers}, {}
