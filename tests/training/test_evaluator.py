@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gymnasium.spaces import flatdim
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.policy import SwarmSpec
@@ -29,8 +30,8 @@ PLAN = TrainingPlan(
     evaluation=EvaluationPlan(every_steps=60, worlds=(EvaluationWorld(scenario=warehouse_small(**QUICK)),)),
     samples=True,
 )
-LAYOUT = LearnerInterface(NUMBERED, SwarmSpec.of(PLAN.scenario))
-N_INPUTS, N_ACTIONS = LAYOUT.layout.size, int(LAYOUT.action_space.n)
+ROBOT = LearnerInterface(NUMBERED, SwarmSpec.of(PLAN.scenario))
+N_INPUTS, N_ACTIONS = flatdim(ROBOT.observation_space), flatdim(ROBOT.action_space)
 
 
 def network(*, stands: bool) -> Network:
