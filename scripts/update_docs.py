@@ -122,6 +122,13 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         (),
     ),
     "turned": ((f"python {ROOT}/scripts/turned_worlds.py",), ()),
+    "wall": (
+        (
+            "swarm-forage run dpo,generalist --scenario warehouse_small --robots 20 --set n_objects=60 "
+            "--set obstacles=10,4,11,12 --seeds 4",
+        ),
+        ("dpo", "generalist"),
+    ),
     "unseen": ((f"python {ROOT}/scripts/unseen_worlds.py",), ()),
     **{
         f"lesson_{size}": (

@@ -13,8 +13,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import check_folder
+from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.runs.policy_spec import policy_spec
 from swarm_forage_env.runs.run import Started
@@ -62,15 +65,18 @@ class Evaluator:
             baselines: Those of another training with the same evaluation, which saves their runs.
 
         Raises:
-            ConfigError: the folder holds a training, or a run of a baseline failed.
-            OSError: the folder cannot be made or written to.
+            ConfigError: the folder holds a training, or cannot be made or written to; or a run of a baseline failed.
         """
         self.plan, self.evaluations = plan, list[Evaluation]()
         self._folder = Path(folder)
         self._started = Started.now()
         self._made_by = {**made_by, "versions": {**software_versions(), **made_by.get("versions", {})}}
         check_unused(self._folder, "choose another folder, or remove it")
-        check_folder(self._folder)
+        try:
+            check_folder(self._folder)
+        except OSError as error:
+            reason = error.strerror or error
+            raise ConfigError(f"Expected a folder to write to, got {folder}: {reason}; choose another.") from error
         self.baselines = baselines_of(plan) if baselines is None else baselines
         self._folder.mkdir(parents=True, exist_ok=True)
         plan.write(self._folder / PLAN_FILE)
@@ -87,10 +93,12 @@ class Evaluator:
 
         Args:
             network: It sees and acts as the plan says.
-            steps: Decisions of single robots so far.
+            steps: Decisions of single robots so far, more than at the last evaluation. They need not be due.
 
         Raises:
-            ConfigError: the network sees or acts in another way, or a run failed.
+            ConfigError: the network sees or acts in another way, there are no more decisions than at the last
+                evaluation, or a run failed.
+            NetworkError: the network has another number of inputs or outputs than its interface.
         """
         plan, about = self.plan, network.about
         found = about.interface.for_scenario(plan.scenario), about.samples
@@ -99,6 +107,11 @@ class Evaluator:
                 f"Expected a network with the plan's interface and samples, {plan.interface} and {plan.samples}, got "
                 f"{found[0]} and {found[1]}; make it with NetworkAbout(interface=plan.interface, samples=plan.samples)."
             )
+        # Layers that do not fit are refused here, not in the middle of runs.
+        NetworkPolicy(network).reset(SwarmSpec.of(plan.scenario), np.random.default_rng())
+        last = self.evaluations[-1].steps if self.evaluations else -1
+        if steps <= last:
+            raise ConfigError(f"Expected more decisions than at the last evaluation, {last}, got {steps}.")
         spec = policy_spec(NetworkPolicy(network), label=LEARNING.label)
         evaluation = evaluated(plan, spec, self.baselines, steps=steps, spent_s=self._started.spent_s)
         self.evaluations.append(evaluation)
