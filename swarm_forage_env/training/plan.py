@@ -101,6 +101,8 @@ class Stage:
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "Stage":
         """Build a stage from nested plain values; raises ConfigError where one cannot be."""
         values = _known(cls, mapping, "stages.")
+        if "steps" not in values:
+            raise ConfigError(f"Expected a stage with its steps, such as steps = 1_000_000, got {dict(mapping)}.")
         values["scenario"] = tuples(table("stages.scenario", values.get("scenario", {})))
         if "sampler" in values:
             values["sampler"] = ScenarioSampler.from_mapping(values["sampler"])

@@ -113,6 +113,7 @@ def test_a_plan_is_read_back_from_what_it_writes(plan, tmp_path):
         ("[options]", "[[options]]", "options to be a table"),
         ("n_arenas = 2", "n_arenas = 2\nseed = -1", "seed to be a whole number >= 0"),
         ("width_m = 20.0", "n_robots = 5", "n_robots to stay 6"),
+        ("steps = 100", "", "Expected a stage with its steps, such as steps = 1_000_000"),
         ("scenario = { width_m = 20.0, nest_centre_m = [2.0, 8.0] }", "scenario = 5", "stages.scenario to be a table"),
         ("options = { learning_rate = 0.1 }", "options = 5", "stage.options to be a table"),
         ("horizon_s = 400.0", 'horizon_s = 400.0\nbaseline = "crv"', "Did you mean 'crw'"),
