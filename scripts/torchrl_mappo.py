@@ -12,6 +12,7 @@ The network that does best in the plan's evaluations is kept.
 
 import argparse
 import dataclasses
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -189,7 +190,8 @@ def told(evaluation: Evaluation) -> str:
 
 
 def carry_out(plan: TrainingPlan, folder: Path) -> None:
-    """Collect, learn and evaluate, stage by stage."""
+    """Collect, learn and evaluate, stage by stage; the best network is kept, and draws its actions."""
+    plan = dataclasses.replace(plan, samples=True)
     options_of_stages = [options_of(plan, stage) for stage in plan.stages]
     robot = LearnerInterface(plan.interface, SwarmSpec.of(plan.scenario))
     learner = Learner(flatdim(robot.observation_space), flatdim(robot.action_space), plan.hidden)
@@ -212,20 +214,20 @@ def carry_out(plan: TrainingPlan, folder: Path) -> None:
         envs.close()
 
 
-def main() -> None:
-    """Carry the plan out, print how its network does meanwhile, and keep the best."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--plan", type=Path, required=True, help="plan of a training by PPO, as TOML")
+def begin(description: str | None, out: str, carry_out: Callable[[TrainingPlan, Path], None]) -> None:
+    """Read the words of the command, and carry their plan out into the folder that they name."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--plan", type=Path, required=True, help="plan of a training, as TOML")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--out", type=Path, default=Path("results/mappo"), help="folder of the training")
+    parser.add_argument("--out", type=Path, default=Path(out), help="folder of the training")
     args = parser.parse_args()
     torch.manual_seed(args.seed)
     torch.set_num_threads(1)
     try:
-        carry_out(dataclasses.replace(read_plan(args.plan), seed=args.seed, samples=True), args.out)
+        carry_out(dataclasses.replace(read_plan(args.plan), seed=args.seed), args.out)
     except (ConfigError, OSError) as error:
         parser.error(str(error))
 
 
 if __name__ == "__main__":
-    main()
+    begin(__doc__, "results/mappo", carry_out)

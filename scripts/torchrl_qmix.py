@@ -11,8 +11,6 @@ same number of robots. It sees the swarm as the critic of `torchrl_mappo.py` doe
 most to a robot is worth most to the swarm. The network that does best in the evaluations is kept.
 """
 
-import argparse
-import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -28,15 +26,14 @@ from torchrl.modules import QValueModule, SafeSequential
 from torchrl.modules.models.multiagent import QMixer
 from torchrl.objectives import HardUpdate, ValueEstimators
 from torchrl.objectives.multiagent import QMixerLoss
-from torchrl_mappo import LIBRARIES, perceptron, swarm_state, told
+from torchrl_mappo import LIBRARIES, begin, perceptron, swarm_state, told
 
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ObsArray
 from swarm_forage_env.policies.interface import LearnerInterface
 from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.training.evaluator import Evaluator
-from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
+from swarm_forage_env.training.plan import Stage, TrainingPlan
 from swarm_forage_env.views.gymnasium import SwarmVectorEnv
 
 OPTIONS = {"buffer_size": 20_000, "batch_size": 64, "learning_rate": 5e-4, "gamma": 0.99, "n_steps": 1,
@@ -184,20 +181,5 @@ class Training:
         return Network.from_state_dict(self.learner.body.state_dict(), about)
 
 
-def main() -> None:
-    """Carry the plan out, print how its network does meanwhile, and keep the best."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--plan", type=Path, required=True, help="plan of a training by DQN, as TOML")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--out", type=Path, default=Path("results/qmix"), help="folder of the training")
-    args = parser.parse_args()
-    torch.manual_seed(args.seed)
-    torch.set_num_threads(1)
-    try:
-        Training(dataclasses.replace(read_plan(args.plan), seed=args.seed), args.out).carry_out()
-    except (ConfigError, OSError) as error:
-        parser.error(str(error))
-
-
 if __name__ == "__main__":
-    main()
+    begin(__doc__, "results/qmix", lambda plan, folder: Training(plan, folder).carry_out())
