@@ -1,10 +1,10 @@
-"""Fifty worlds unlike those of any training, drawn once: how do policies do there beside the best scripted controller?
+"""Worlds unlike those of any training, drawn once: how do policies do there beside the best scripted controller?
 
     python scripts/unseen_worlds.py                              generalist, the table of docs/generalist.md
     python scripts/unseen_worlds.py --policy a.npz,b.npz         other policies
     python scripts/unseen_worlds.py --draws 1                    a first look, at one world of each kind
 
-Ten kinds of worlds, five drawn of each by the seed below: directions, shapes, numbers and disturbances that no shipped
+Eleven kinds of worlds, five drawn of each by the seed below: directions, shapes, numbers and disturbances that no shipped
 training plan has. Nobody may choose a plan by them; run them once for a plan that is fixed.
 """
 
@@ -113,6 +113,16 @@ def rough_sensing(rng: np.random.Generator) -> Drawn:
     return "warehouse_dual", {"n_robots": int(rng.integers(16, 97))}, wrappers
 
 
+def long_wall(rng: np.random.Generator) -> Drawn:
+    """One wall on the way, anywhere; a kind that was added when one such wall had stopped the network of that time."""
+    length_dm = int(rng.integers(60, 101))
+    x_dm = int(rng.choice([*range(80, 121), *range(165, 221)]))  # clear of caches in the middle
+    y_dm = int(rng.integers(2, 159 - length_dm))
+    wall = (x_dm / 10, y_dm / 10, (x_dm + 8) / 10, (y_dm + length_dm) / 10)
+    numbers = {"n_robots": int(rng.integers(8, 65)), "n_objects": int(rng.integers(40, 201))}
+    return "warehouse_small", {"obstacles": (wall,), **_SMALL_CACHES, **numbers}, {}
+
+
 KINDS: tuple[Callable[[np.random.Generator], Drawn], ...] = (
     source_in_the_west,
     source_in_the_south,
@@ -124,6 +134,7 @@ KINDS: tuple[Callable[[np.random.Generator], Drawn], ...] = (
     larger_swarm,
     late_throttle,
     rough_sensing,
+    long_wall,
 )
 
 
