@@ -2,17 +2,19 @@
 """PPO in one file, in the manner of CleanRL: plain torch on `gymnasium.make_vec`.
 
     pip install . "torch==2.13.0"  # in a checkout
-    python scripts/cleanrl_ppo.py --total-timesteps 3000000 --out cleanrl_ppo.npz
-    swarm-forage run crw,cleanrl_ppo.npz
+    python scripts/cleanrl_ppo.py --total-timesteps 3000000 --out results/cleanrl_ppo
+    swarm-forage run crw,results/cleanrl_ppo/policy.npz
+    swarm-forage train curves results/cleanrl_ppo
 
 It differs from the textbook in two places, because sub-environments are robots. Arenas start anew within the step that
 ends them, so the value of the last observation is added where an episode was truncated. And steps of robots that are
-not at work (`infos["active"]`) are in no minibatch.
+not at work (`infos["active"]`) are in no minibatch. The network that does best in whole runs is kept.
 """
 
 import argparse
 import time
 from pathlib import Path
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -23,10 +25,16 @@ from torch import nn
 import swarm_forage_env  # noqa: F401 - registers the environments
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.network import Network, NetworkAbout
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.training.evaluator import Evaluator
+from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan
+from swarm_forage_env.wrappers.world import World
 
 INTERFACE = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5)
 NARROW = {"width_m": 12.0, "nest_centre_m": (1.2, 8.0), "nest_size_m": (1.2, 12.8)}
 """A first stage in which the way home is a third as long."""
+REWARDED: dict[str, Any] = {"horizon_s": 600.0, "first_pickup": 1.0, "nest_progress": 0.05}
+"""What an episode is like, besides its robots."""
 
 
 class Agent(nn.Module):
@@ -68,7 +76,9 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--clip-coef", type=float, default=0.2)
     parser.add_argument("--ent-coef", type=float, default=0.003)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--out", type=Path, default=Path("cleanrl_ppo.npz"), help="where the trained network goes")
+    parser.add_argument(
+        "--out", type=Path, default=Path("results/cleanrl_ppo"), help="folder of network and evaluations"
+    )
     return parser.parse_args()
 
 
@@ -130,33 +140,46 @@ def rollout(envs, agent: Agent, obs: np.ndarray, active: np.ndarray, args: argpa
     return {name: values[at_work] for name, values in batch.items()}, obs, active, earned
 
 
+def plan_of(args: argparse.Namespace) -> TrainingPlan:
+    """Return what is trained in: half of it in the narrow arena, half in the real one, where networks are judged."""
+    half = args.total_timesteps // 2
+    return TrainingPlan(
+        world=World(scenario("warehouse_small", n_robots=args.n_robots, **REWARDED)),
+        interface=INTERFACE,
+        samples=True,
+        n_arenas=args.n_arenas,
+        stages=(Stage(steps=half, scenario=NARROW), Stage(steps=args.total_timesteps - half)),
+        evaluation=EvaluationPlan(every_steps=max(1, args.total_timesteps // 10), horizon_s=2000.0, baseline="dpo"),
+        seed=args.seed,
+    )
+
+
 def main() -> None:
-    """Train, half in the narrow arena and half in the real one, print what a robot earns per decision, and save."""
+    """Train; print what a robot earns per decision, and how much whole runs deliver."""
     args = parse()
     torch.manual_seed(args.seed)
     torch.set_num_threads(1)
-    envs = gymnasium.make_vec(
-        "swarm_forage/warehouse_small-v2",
-        n_arenas=args.n_arenas,
-        n_robots=args.n_robots,
-        interface=INTERFACE,
-        horizon_s=600.0,
-        first_pickup=1.0,
-        nest_progress=0.05,
-    )
+    plan = plan_of(args)
+    evaluator = Evaluator(plan, args.out, {"by": "scripts/cleanrl_ppo.py"})
+    sizes: dict[str, Any] = {"n_arenas": args.n_arenas, "n_robots": args.n_robots}
+    envs = gymnasium.make_vec("swarm_forage/warehouse_small-v2", **sizes, interface=INTERFACE, **REWARDED)
     agent = Agent(flatdim(envs.single_observation_space), flatdim(envs.single_action_space))
     optimizer = torch.optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
-    started, steps = time.perf_counter(), 0
-    for until, changes in ((args.total_timesteps // 2, NARROW), (args.total_timesteps, {})):
-        obs, infos = envs.reset(seed=args.seed, options={"scenario": changes})
+    steps, until, spent_s = 0, 0, 0.0
+    for stage in plan.stages:
+        until += stage.steps
+        obs, infos = envs.reset(seed=args.seed, options={"scenario": stage.scenario})
         active = infos["active"]
         while steps < until:
+            started = time.perf_counter()
             batch, obs, active, reward = rollout(envs, agent, obs, active, args)
             update(agent, optimizer, batch, args)
-            steps += args.num_steps * envs.num_envs
-            print(f"{steps:>10,} decisions, {steps / (time.perf_counter() - started):,.0f} per s, reward {reward:.4f}")
+            steps, spent_s = steps + args.num_steps * envs.num_envs, spent_s + time.perf_counter() - started
+            print(f"{steps:>10,} decisions, {steps / spent_s:,.0f} per s, reward {reward:.4f}")
+            if evaluator.is_due(steps):
+                delivered = evaluator.evaluate(agent.network(), steps).performance
+                print(f"{steps:>10,} decisions, {delivered:.2f} objects per 1,000 s in whole runs")
     envs.close()
-    agent.network().save(args.out)
 
 
 if __name__ == "__main__":

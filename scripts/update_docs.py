@@ -68,8 +68,8 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     ),
     "cleanrl": (
         (
-            f"python {ROOT}/scripts/cleanrl_ppo.py --total-timesteps 3000000 --out cleanrl_ppo.npz",
-            "swarm-forage run crw,cleanrl_ppo.npz --seeds 4",
+            f"python {ROOT}/scripts/cleanrl_ppo.py --total-timesteps 3000000 --out results/cleanrl_ppo",
+            "swarm-forage run crw,results/cleanrl_ppo/policy.npz --seeds 4",
         ),
         ("crw", "policy"),
     ),
@@ -129,7 +129,15 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ),
         ("dpo", "generalist"),
     ),
+    "corner": (
+        (
+            "swarm-forage run dpo,generalist --scenario warehouse_medium --robots 64 --set n_objects=400 "
+            "--set obstacles=14,14,14.6,34+14.6,14,34,14.6 --seeds 4",
+        ),
+        ("dpo", "generalist"),
+    ),
     "unseen": ((f"python {ROOT}/scripts/unseen_worlds.py",), ()),
+    "sizes": ((f"python {ROOT}/scripts/every_size.py",), ()),
     **{
         f"lesson_{size}": (
             (f"swarm-forage run crw,dpo --scenario classroom --robots {size} --seeds 4",),

@@ -15,6 +15,7 @@ import pytest
 
 from swarm_forage_env import RunSpec, World, load_policy, parallel_env, run_one, scenario
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
+from swarm_forage_env.training.evaluations import EVALUATIONS_FILE, read_evaluations
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLE = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
@@ -57,10 +58,12 @@ def test_the_example_of_a_page_trains(page, tmp_path):
 def test_cleanrl_trains(tmp_path):
     require("torch", "cleanrl")
     sizes = {"total-timesteps": 2000, "n-robots": 4, "n-arenas": 2, "num-steps": 64, "minibatch-size": 128}
-    words = [*(f"--{name}={size}" for name, size in sizes.items()), "--out=cleanrl.npz"]
+    words = [*(f"--{name}={size}" for name, size in sizes.items()), "--out=trained"]
     lines = run([str(ROOT / "scripts" / "cleanrl_ppo.py"), *words], tmp_path).splitlines()
-    assert [int(line.split()[0].replace(",", "")) for line in lines] == [512, 1024, 1536, 2048]
-    check_runs(tmp_path / "cleanrl.npz")
+    told = [int(line.split()[0].replace(",", "")) for line in lines if "reward" in line]
+    assert told == [512, 1024, 1536, 2048]
+    assert len(read_evaluations(tmp_path / "trained" / EVALUATIONS_FILE)) == len(lines) - len(told) > 1
+    check_runs(tmp_path / "trained" / "policy.npz")
 
 
 def test_the_example_of_stable_baselines3_trains_and_exports(tmp_path):

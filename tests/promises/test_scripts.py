@@ -273,9 +273,9 @@ def test_unseen_worlds_are_drawn_once_and_shares_are_of_the_best(run):
     title, header, *kinds, keeping_up, better, median = run("unseen_worlds", *words)[1].splitlines()
     assert title == "Performance as a share of the best scripted controller, 400 s, one run of each"
     assert header.split() == ["worlds", "dpo", "oracle"]
-    assert len(kinds) == 10
-    assert better.split()[4:] == ["0", "of", "10", "10", "of", "10"], "DPO is one of the four"
-    assert re.search(r"(\d+) of 10  +10 of 10$", keeping_up)
+    assert len(kinds) == 11
+    assert better.split()[4:] == ["0", "of", "11", "11", "of", "11"], "DPO is one of the four"
+    assert re.search(r"(\d+) of 11  +11 of 11$", keeping_up)
     dpo, oracle = (float(word) for word in median.split()[1:])
     assert dpo <= 1.0 < oracle
 
