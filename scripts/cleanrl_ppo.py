@@ -2,7 +2,7 @@
 """PPO in one file, in the manner of CleanRL: plain torch on `gymnasium.make_vec`.
 
     pip install . "torch==2.13.0"  # in a checkout
-    python scripts/cleanrl_ppo.py --total-timesteps 3000000 --out results/cleanrl_ppo
+    python scripts/cleanrl_ppo.py --total-timesteps 6000000 --out results/cleanrl_ppo
     swarm-forage run crw,results/cleanrl_ppo/policy.npz
     swarm-forage train curves results/cleanrl_ppo
 

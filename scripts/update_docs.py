@@ -68,7 +68,7 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     ),
     "cleanrl": (
         (
-            f"python {ROOT}/scripts/cleanrl_ppo.py --total-timesteps 3000000 --out results/cleanrl_ppo",
+            f"python {ROOT}/scripts/cleanrl_ppo.py --total-timesteps 6000000 --out results/cleanrl_ppo",
             "swarm-forage run crw,results/cleanrl_ppo/policy.npz --seeds 4",
         ),
         ("crw", "policy"),
@@ -232,6 +232,8 @@ def written(text: str, store: dict[str, dict[str, Any]]) -> str:
     """Return a page with its blocks as they are stored."""
 
     def block(match: re.Match[str]) -> str:
+        if match["source"] not in store:
+            raise SystemExit(f"No numbers are stored of {match['source']}; --remake {match['source']} makes them.")
         value = store[match["source"]][match["field"]]
         if match["field"] == "table":
             value = f"\n```\n{value}\n```\n"
