@@ -4,8 +4,8 @@
     python scripts/unseen_worlds.py --policy a.npz,b.npz         other policies
     python scripts/unseen_worlds.py --draws 1                    a first look, at one world of each kind
 
-Eleven kinds of worlds, five drawn of each by the seed below: directions, shapes, numbers and disturbances that no shipped
-training plan has. Nobody may choose a plan by them; run them once for a plan that is fixed.
+Eleven kinds of worlds, five drawn of each by the seed below: directions, shapes, numbers and disturbances that no
+shipped training plan has. Nobody may choose a plan by them; run them once for a plan that is fixed.
 """
 
 import argparse

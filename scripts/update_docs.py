@@ -137,7 +137,6 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("dpo", "generalist"),
     ),
     "unseen": ((f"python {ROOT}/scripts/unseen_worlds.py",), ()),
-    "sizes": ((f"python {ROOT}/scripts/every_size.py",), ()),
     **{
         f"lesson_{size}": (
             (f"swarm-forage run crw,dpo --scenario classroom --robots {size} --seeds 4",),
