@@ -2,13 +2,13 @@
 """PPO in one file, in the manner of CleanRL: plain torch on `gymnasium.make_vec`.
 
     pip install . "torch==2.13.0"  # in a checkout
-    python scripts/cleanrl_ppo.py --total-timesteps 6000000 --out results/cleanrl_ppo
+    python scripts/cleanrl_ppo.py --out results/cleanrl_ppo
     swarm-forage run crw,results/cleanrl_ppo/policy.npz
     swarm-forage train curves results/cleanrl_ppo
 
 It differs from the textbook in two places, because sub-environments are robots. Arenas start anew within the step that
 ends them, so the value of the last observation is added where an episode was truncated. And steps of robots that are
-not at work (`infos["active"]`) are in no minibatch. The network that does best in whole runs is kept.
+not at work (`infos["active"]`) are in no minibatch. The network that does best in evaluations of 2,000 s is kept.
 """
 
 import argparse
@@ -33,7 +33,7 @@ from swarm_forage_env.wrappers.world import World
 INTERFACE = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5)
 NARROW = {"width_m": 12.0, "nest_centre_m": (1.2, 8.0), "nest_size_m": (1.2, 12.8)}
 """A first stage in which the way home is a third as long."""
-REWARDED: dict[str, Any] = {"horizon_s": 600.0, "first_pickup": 1.0, "nest_progress": 0.05}
+EPISODE: dict[str, Any] = {"horizon_s": 600.0, "first_pickup": 1.0, "nest_progress": 0.05}
 """What an episode is like, besides its robots."""
 
 
@@ -66,7 +66,7 @@ def parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--n-arenas", type=int, default=8)
     parser.add_argument("--n-robots", type=int, default=50)
-    parser.add_argument("--total-timesteps", type=int, default=1_000_000, help="decisions of single robots")
+    parser.add_argument("--total-timesteps", type=int, default=6_000_000, help="decisions of single robots")
     parser.add_argument("--num-steps", type=int, default=128)
     parser.add_argument("--learning-rate", type=float, default=1e-3)
     parser.add_argument("--gamma", type=float, default=0.99)
@@ -144,7 +144,7 @@ def plan_of(args: argparse.Namespace) -> TrainingPlan:
     """Return what is trained in: half of it in the narrow arena, half in the real one, where networks are judged."""
     half = args.total_timesteps // 2
     return TrainingPlan(
-        world=World(scenario("warehouse_small", n_robots=args.n_robots, **REWARDED)),
+        world=World(scenario("warehouse_small", n_robots=args.n_robots, **EPISODE)),
         interface=INTERFACE,
         samples=True,
         n_arenas=args.n_arenas,
@@ -155,14 +155,15 @@ def plan_of(args: argparse.Namespace) -> TrainingPlan:
 
 
 def main() -> None:
-    """Train; print what a robot earns per decision, and how much whole runs deliver."""
+    """Train; print what a robot earns per decision, and what evaluations deliver."""
     args = parse()
     torch.manual_seed(args.seed)
     torch.set_num_threads(1)
     plan = plan_of(args)
-    evaluator = Evaluator(plan, args.out, {"by": "scripts/cleanrl_ppo.py"})
-    sizes: dict[str, Any] = {"n_arenas": args.n_arenas, "n_robots": args.n_robots}
-    envs = gymnasium.make_vec("swarm_forage/warehouse_small-v2", **sizes, interface=INTERFACE, **REWARDED)
+    options = {name: value for name, value in vars(args).items() if name != "out"}
+    evaluator = Evaluator(plan, args.out, {"by": "scripts/cleanrl_ppo.py", "options": options})
+    arenas = {"n_arenas": args.n_arenas, "n_robots": args.n_robots, "interface": INTERFACE, **EPISODE}
+    envs = gymnasium.make_vec("swarm_forage/warehouse_small-v2", **arenas)
     agent = Agent(flatdim(envs.single_observation_space), flatdim(envs.single_action_space))
     optimizer = torch.optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
     steps, until, spent_s = 0, 0, 0.0
@@ -178,7 +179,7 @@ def main() -> None:
             print(f"{steps:>10,} decisions, {steps / spent_s:,.0f} per s, reward {reward:.4f}")
             if evaluator.is_due(steps):
                 delivered = evaluator.evaluate(agent.network(), steps).performance
-                print(f"{steps:>10,} decisions, {delivered:.2f} objects per 1,000 s in whole runs")
+                print(f"{steps:>10,} decisions, {delivered:.2f} objects per 1,000 s in its evaluation")
     envs.close()
 
 

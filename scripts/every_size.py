@@ -3,8 +3,8 @@
     python scripts/every_size.py                           generalist; more than half an hour
     python scripts/every_size.py --policy a.npz --seeds 1  a first look at another policy
 
-Each preset has its own hall in all sizes, so large swarms are crowded. "of the limit" is the share that the policy
-reaches of what `metrics.limit_of` estimates for the world.
+Each warehouse has the same hall in all sizes, so large swarms are crowded; that of search and rescue grows with them.
+"of the limit" is the share that the policy reaches of what `metrics.limit_of` estimates for the world.
 """
 
 import argparse

@@ -5,7 +5,8 @@
     python scripts/unseen_worlds.py --draws 1                    a first look, at one world of each kind
 
 Eleven kinds of worlds, five drawn of each by the seed below: directions, shapes, numbers and disturbances that no
-shipped training plan has. Nobody may choose a plan by them; run them once for a plan that is fixed.
+shipped training plan has; long walls differ in place and length only. Nobody may choose a plan by them; run them once
+for a plan that is fixed.
 """
 
 import argparse
@@ -114,7 +115,7 @@ def rough_sensing(rng: np.random.Generator) -> Drawn:
 
 
 def long_wall(rng: np.random.Generator) -> Drawn:
-    """One wall on the way, anywhere; a kind that was added when one such wall had stopped the network of that time."""
+    """One wall of 6 to 10 m on the way; added when one had stopped a generalist, and drawn before any run."""
     length_dm = int(rng.integers(60, 101))
     x_dm = int(rng.choice([*range(80, 121), *range(165, 221)]))  # clear of caches in the middle
     y_dm = int(rng.integers(2, 159 - length_dm))

@@ -68,7 +68,7 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     ),
     "cleanrl": (
         (
-            f"python {ROOT}/scripts/cleanrl_ppo.py --total-timesteps 6000000 --out results/cleanrl_ppo",
+            f"python {ROOT}/scripts/cleanrl_ppo.py --out results/cleanrl_ppo",
             "swarm-forage run crw,results/cleanrl_ppo/policy.npz --seeds 4",
         ),
         ("crw", "policy"),
@@ -137,6 +137,7 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("dpo", "generalist"),
     ),
     "unseen": ((f"python {ROOT}/scripts/unseen_worlds.py",), ()),
+    "sizes": ((f"python {ROOT}/scripts/every_size.py",), ()),
     **{
         f"lesson_{size}": (
             (f"swarm-forage run crw,dpo --scenario classroom --robots {size} --seeds 4",),

@@ -15,6 +15,7 @@ import pytest
 
 from swarm_forage_env import RunSpec, World, load_policy, parallel_env, run_one, scenario
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
+from swarm_forage_env.policies.network import Network
 from swarm_forage_env.training.evaluations import EVALUATIONS_FILE, read_evaluations
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -64,6 +65,7 @@ def test_cleanrl_trains(tmp_path):
     assert told == [512, 1024, 1536, 2048]
     assert len(read_evaluations(tmp_path / "trained" / EVALUATIONS_FILE)) == len(lines) - len(told) > 1
     check_runs(tmp_path / "trained" / "policy.npz")
+    assert Network.load(tmp_path / "trained" / "policy.npz").about.card["options"]["num_steps"] == 64
 
 
 def test_the_example_of_stable_baselines3_trains_and_exports(tmp_path):

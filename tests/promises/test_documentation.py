@@ -124,6 +124,11 @@ def test_numbers_of_runs_are_those_of_the_store():
         assert [number for number in numbers if number in by_hand] == [], f"{page}: a number outside of a block"
 
 
+def test_numbers_that_are_not_stored_say_how_to_make_them():
+    with pytest.raises(SystemExit, match="--remake walls makes them"):
+        update_docs.written("<!-- generated: walls.table by scripts/update_docs --><!-- end -->", {})
+
+
 def test_numbers_of_runs_leave_paragraphs_whole():
     for page in update_docs.PAGES:
         assert update_docs.broken_lines(page.read_text()) == [], f"{page}: put a word before the number"

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from swarm_forage_env.policies.pretrained import network_file
 from swarm_forage_env.training.export.c_header import c_header
 from swarm_forage_env.training.export.manual import manual_of
 
+EXPORT_PAGE = Path(__file__).resolve().parents[2] / "docs" / "export.md"
 PROGRAM = """\
 #include <stdio.h>
 #include "NAME.h"
@@ -101,6 +103,14 @@ def test_the_header_computes_what_the_policy_does(which, tmp_path):
     seen = rows(network)
     found = np.frombuffer(answer(tmp_path, "my_net", PROGRAM, seen.tobytes()), np.float32)
     np.testing.assert_allclose(found.reshape(LARGE, -1), expected(network, seen), rtol=1e-6, atol=1e-6)
+
+
+def test_the_page_tells_how_large_the_generalist_is():
+    network = Network.load(network_file("generalist"))
+    products = sum(weights.size for weights in network.weights)
+    kilobytes = 4 * (products + sum(biases.size for biases in network.biases)) / 1000
+    told = f"The generalist takes {products:,} multiplications per decision, and {kilobytes:.0f} kB of constants."
+    assert told in " ".join(EXPORT_PAGE.read_text().split())
 
 
 def test_the_header_chooses_as_the_policy_does(tmp_path):

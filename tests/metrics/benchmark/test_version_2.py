@@ -1,5 +1,6 @@
 """Version 2 of the benchmark: its worlds, and tracks of equal budget."""
 
+import itertools
 import json
 import tomllib
 from dataclasses import replace
@@ -157,24 +158,31 @@ def test_versions_that_there_are_not_are_refused(tmp_path):
         read_entry(file)
 
 
-def test_no_world_has_an_arena_in_which_the_shipped_generalist_was_trained_or_chosen(protocol):
+@pytest.mark.parametrize("version", [2, 3])
+def test_no_world_has_an_arena_in_which_the_shipped_generalist_was_trained_or_evaluated(version):
     plan = tomllib.loads(PLAN.read_text())
     parts = (plan["sampler"], *(stage["sampler"] for stage in plan["stages"] if "sampler" in stage), plan["evaluation"])
     drawn = [world["scenario"] for part in parts for world in part["worlds"]]
     arenas = {
-        scenario(fields["preset"], **as_one(fields) | {"n_robots": n_robots}).arena
+        scenario(fields["preset"], **variant | {"n_robots": n_robots}).arena
         for fields in drawn
+        for variant in variants(fields)
         for n_robots in bounds(fields["n_robots"])
     }
-    assert len(arenas) > 8
-    assert not [world.name for world in protocol.scored if world.world.scenario.arena in arenas]
+    assert len(arenas) > 20
+    assert not [world.name for world in load_protocol(version=version).scored if world.world.scenario.arena in arenas]
 
 
 def bounds(value):
     return value["uniform"] if isinstance(value, dict) else [value]
 
 
-def as_one(fields):
-    """Fields of a sampled world that have one value, as a scenario takes them."""
-    chosen = {name: value for name, value in fields.items() if name != "preset" and not isinstance(value, dict)}
-    return {name: as_tuples(value) for name, value in chosen.items()}
+def variants(fields):
+    """Fields of a sampled world as a scenario takes them, once for each choice; those within bounds are left out."""
+    choices = {
+        name: value["choice"] if isinstance(value, dict) else [value]
+        for name, value in fields.items()
+        if name != "preset" and not (isinstance(value, dict) and "uniform" in value)
+    }
+    for picked in itertools.product(*choices.values()):
+        yield dict(zip(choices, map(as_tuples, picked), strict=True))
