@@ -12,6 +12,7 @@ not at work (`infos["active"]`) are in no minibatch. The network that does best 
 """
 
 import argparse
+import logging
 import time
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ import torch
 from gymnasium.spaces import flatdim
 from torch import nn
 
-import swarm_forage_env  # noqa: F401 - registers the environments
+import swarm_forage_env  # registers the environments
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.scenarios.presets import scenario
@@ -66,7 +67,7 @@ def parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--n-arenas", type=int, default=8)
     parser.add_argument("--n-robots", type=int, default=50)
-    parser.add_argument("--total-timesteps", type=int, default=6_000_000, help="decisions of single robots")
+    parser.add_argument("--total-timesteps", type=int, default=6_000_000, help="at least; halves end with a rollout")
     parser.add_argument("--num-steps", type=int, default=128)
     parser.add_argument("--learning-rate", type=float, default=1e-3)
     parser.add_argument("--gamma", type=float, default=0.99)
@@ -141,15 +142,16 @@ def rollout(envs, agent: Agent, obs: np.ndarray, active: np.ndarray, args: argpa
 
 
 def plan_of(args: argparse.Namespace) -> TrainingPlan:
-    """Return what is trained in: half of it in the narrow arena, half in the real one, where networks are judged."""
-    half = args.total_timesteps // 2
+    """Return what is trained in: half in the narrow arena, half in the real one, where networks are judged."""
+    rollout = args.num_steps * args.n_arenas * args.n_robots
+    half = rollout * -(-args.total_timesteps // (2 * rollout))
     return TrainingPlan(
         world=World(scenario("warehouse_small", n_robots=args.n_robots, **EPISODE)),
         interface=INTERFACE,
         samples=True,
         n_arenas=args.n_arenas,
-        stages=(Stage(steps=half, scenario=NARROW), Stage(steps=args.total_timesteps - half)),
-        evaluation=EvaluationPlan(every_steps=max(1, args.total_timesteps // 10), horizon_s=2000.0, baseline="dpo"),
+        stages=(Stage(steps=half, scenario=NARROW), Stage(steps=half)),
+        evaluation=EvaluationPlan(every_steps=max(1, half // 5), horizon_s=2000.0, baseline="dpo"),
         seed=args.seed,
     )
 
@@ -159,9 +161,13 @@ def main() -> None:
     args = parse()
     torch.manual_seed(args.seed)
     torch.set_num_threads(1)
-    plan = plan_of(args)
+    logging.basicConfig(level=logging.INFO)  # says when something is compiled for the first time
     options = {name: value for name, value in vars(args).items() if name != "out"}
-    evaluator = Evaluator(plan, args.out, {"by": "scripts/cleanrl_ppo.py", "options": options})
+    try:
+        plan = plan_of(args)
+        evaluator = Evaluator(plan, args.out, {"by": "scripts/cleanrl_ppo.py", "options": options})
+    except swarm_forage_env.ConfigError as error:
+        raise SystemExit(str(error)) from error
     arenas = {"n_arenas": args.n_arenas, "n_robots": args.n_robots, "interface": INTERFACE, **EPISODE}
     envs = gymnasium.make_vec("swarm_forage/warehouse_small-v2", **arenas)
     agent = Agent(flatdim(envs.single_observation_space), flatdim(envs.single_action_space))

@@ -168,6 +168,12 @@ def shares(asked: Sequence[PolicySpec], there: Sequence[World], jobs: int) -> Fl
     return np.divide(own, best, out=np.where(own > 0.0, np.inf, 1.0), where=best > 0.0)
 
 
+def between(found: FloatArray) -> str:
+    """Return the least and the largest share, or the only one."""
+    least, largest = f"{found.min():.2f}", f"{found.max():.2f}"
+    return least if found.size == 1 else f"{least} to {largest}"
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -179,8 +185,7 @@ def main() -> None:
     asked = policy_specs(words.policy.split(","))
     of_kinds = [shares(asked, worlds(kind, words.draws, words.horizon), words.jobs) for kind in KINDS]
     rows = [
-        (kind.__name__.replace("_", " "), *(f"{one.min():.2f} to {one.max():.2f}" for one in found))
-        for kind, found in zip(KINDS, of_kinds, strict=True)
+        (kind.__name__.replace("_", " "), *map(between, found)) for kind, found in zip(KINDS, of_kinds, strict=True)
     ]
     joined = np.concatenate(of_kinds, axis=1)
     rows += [

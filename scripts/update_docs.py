@@ -129,13 +129,16 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ),
         ("dpo", "generalist"),
     ),
-    "corner": (
-        (
-            "swarm-forage run dpo,generalist --scenario warehouse_medium --robots 64 --set n_objects=400 "
-            "--set obstacles=14,14,14.6,34+14.6,14,34,14.6 --seeds 4",
-        ),
-        ("dpo", "generalist"),
-    ),
+    **{
+        f"near_wall{suffix}": (
+            (
+                "swarm-forage run crw,dpo,stochx,generalist --scenario warehouse_dual --set obstacles=11,2,11.6,14 "
+                f"--seeds 4{option}",
+            ),
+            ("crw", "dpo", "stochx", "generalist"),
+        )
+        for suffix, option in (("", ""), ("_short", " --horizon 1000"))
+    },
     "unseen": ((f"python {ROOT}/scripts/unseen_worlds.py",), ()),
     "sizes": ((f"python {ROOT}/scripts/every_size.py",), ()),
     **{
