@@ -143,8 +143,8 @@ def rollout(envs, agent: Agent, obs: np.ndarray, active: np.ndarray, args: argpa
 
 def plan_of(args: argparse.Namespace) -> TrainingPlan:
     """Return what is trained in: half in the narrow arena, half in the real one, where networks are judged."""
-    rollout = args.num_steps * args.n_arenas * args.n_robots
-    half = rollout * -(-args.total_timesteps // (2 * rollout))
+    per_rollout = max(1, args.num_steps * args.n_arenas * args.n_robots)
+    half = per_rollout * -(-args.total_timesteps // (2 * per_rollout))
     return TrainingPlan(
         world=World(scenario("warehouse_small", n_robots=args.n_robots, **EPISODE)),
         interface=INTERFACE,
