@@ -129,6 +129,20 @@ class Network:
         forward(np.ascontiguousarray(rows, np.float32), self.layers(), np.ones(len(rows), np.bool_), values)
         return values
 
+    def at_temperature(self, temperature: float) -> "Network":
+        """Return a network that draws discrete actions by probabilities to the power of 1 / temperature.
+
+        Its last layer is divided by the temperature: below 1, likely actions become likelier; the likeliest stays it.
+        """
+        if temperature == 1.0:
+            return self
+        divisor = np.float32(temperature)
+        return dataclasses.replace(
+            self,
+            weights=(*self.weights[:-1], self.weights[-1] / divisor),
+            biases=(*self.biases[:-1], self.biases[-1] / divisor),
+        )
+
     def layers(self) -> Layers:
         """Return the layers as kernels take them, with room of their own to work in."""
         width = -(-max(*(len(bias) for bias in self.biases), len(self.weights[0])) // LANES) * LANES

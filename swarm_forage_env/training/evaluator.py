@@ -89,7 +89,7 @@ class Evaluator:
         return lacks_evaluation(self.plan, self.evaluations, steps)
 
     def evaluate(self, network: Network, steps: int) -> Evaluation:
-        """Run a network, and write its file if none did better.
+        """Run a network at the plan's temperature, and write its file if none did better.
 
         Args:
             network: It sees and acts as the plan says.
@@ -109,6 +109,7 @@ class Evaluator:
             )
         # Layers that do not fit are refused here, not in the middle of runs.
         NetworkPolicy(network).reset(SwarmSpec.of(plan.scenario), np.random.default_rng())
+        network = network.at_temperature(plan.temperature)
         last = self.evaluations[-1].steps if self.evaluations else -1
         if steps <= last:
             raise ConfigError(f"Expected more decisions than at the last evaluation, {last}, got {steps}.")

@@ -214,6 +214,9 @@ class TrainingPlan:
     samples: bool = False
     """Whether the policy that comes of it draws its discrete actions by their probabilities, as it did while it learnt
     (PPO, A2C). Robots that always take the likeliest one may block each other for ever."""
+    temperature: float = 1.0
+    """How the policy that comes of it draws: by probabilities to the power of 1 / temperature, scaled to the sum 1. Below
+    1, rare actions become rarer than they were while it learnt."""
     sampler: ScenarioSampler | None = None
     """Draws the world of each episode; None = it is always `world`. Then `evaluation` has worlds."""
     turned: bool | None = None
@@ -233,6 +236,9 @@ class TrainingPlan:
                 f"Expected samples only with discrete actions of {' or '.join(SAMPLING)}, which have probabilities, "
                 f"got {self.interface.actions} ones of {self.algorithm}."
             )
+        number("temperature", self.temperature, above=0.0)
+        if self.temperature != 1.0 and not self.samples:
+            raise ConfigError(f"Expected temperature only with samples = true, got {self.temperature} without.")
         whole("n_arenas", self.n_arenas, at_least=1, at_most=MOST_ARENAS)
         if not isinstance(self.hidden, tuple):  # pyright: ignore[reportUnnecessaryIsInstance] - files hold anything
             raise ConfigError(f"Expected hidden to be sizes of layers, for example [64, 64], got {self.hidden!r}.")

@@ -82,6 +82,17 @@ def test_discrete_choices_are_the_likeliest_or_drawn_by_their_probabilities():
     assert pick(np.array([2.0, 2.0], np.float32), False, 0.0, room) == 0, "the first of several"
 
 
+def test_a_temperature_makes_likely_actions_likelier():
+    about = NetworkAbout(interface=InterfaceConfig(actions="discrete"), samples=True)
+    network = Network((np.array([[0.5, -1.0, 2.0]], np.float32),), (np.array([0.25, 1.5, -2.0], np.float32),), about)
+    row = np.array([[1.5]], np.float32)
+    learnt, sharp = (
+        np.array(perceptron.probabilities(one.outputs(row)[0])) for one in (network, network.at_temperature(0.5))
+    )
+    assert sharp == pytest.approx(learnt**2 / np.sum(learnt**2), rel=1e-5), "to the power of 1 / 0.5"
+    assert network.at_temperature(1.0) is network
+
+
 def test_what_is_next_to_impossible_is_never_a_fault():
     logits, room = np.array([-1e9, 0.0, -200.0, -np.inf], np.float32), np.zeros(4)
     assert [pick(logits, True, chance, room) for chance in (0.0, 0.5, np.nextafter(1.0, 0.0))] == [0, 1, 1]

@@ -42,6 +42,11 @@ def network(*, stands: bool) -> Network:
     return Network((np.zeros((N_INPUTS, N_ACTIONS), np.float32),), (bias,), about)
 
 
+def test_a_network_is_run_and_kept_at_the_temperature_of_the_plan(tmp_path):
+    Evaluator(replace(PLAN, temperature=0.25), tmp_path, {}).evaluate(network(stands=True), 60)
+    assert Network.load(tmp_path / "policy.npz").biases[0][0] == 200.0
+
+
 def test_the_folder_becomes_that_of_a_training_and_holds_the_best_network(tmp_path):
     evaluator = Evaluator(PLAN, tmp_path / "mine", {"by": "a test", "versions": {"learner": "1.0"}})
     moves, stands = network(stands=False), network(stands=True)

@@ -25,6 +25,7 @@ from swarm_forage_env.scenarios.presets import search_and_rescue, warehouse_smal
 from swarm_forage_env.training.evaluations import read_evaluations, write_evaluations
 from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv, training
+from swarm_forage_env.training.sb3.export import export_network
 from swarm_forage_env.training.sb3.training import train
 from swarm_forage_env.views.pettingzoo import parallel_env
 from swarm_forage_env.wrappers.registry import parse_wrapper
@@ -327,6 +328,15 @@ def test_a_policy_that_draws_its_actions_is_judged_and_kept_as_such(tmp_path):
     assert same(weights(result.model), weights(train(SHORT, tmp_path / "same").model)), (
         "drawing takes no chance from learning"
     )
+
+
+def test_a_policy_is_judged_and_kept_at_the_temperature_of_its_plan(tmp_path):
+    plan = tiny_plan(samples=True, temperature=0.5, stages=(Stage(steps=128),))
+    result = train(plan, tmp_path)
+    learnt = export_network(result.model, plan.interface, samples=True)
+    kept = Network.load(tmp_path / "policy.npz")
+    np.testing.assert_allclose(kept.weights[-1], 2.0 * learnt.weights[-1], rtol=1e-6)
+    np.testing.assert_array_equal(kept.weights[0], learnt.weights[0])
 
 
 def test_the_last_checkpoint_holds_all_that_was_learnt(tmp_path):

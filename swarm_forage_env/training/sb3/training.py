@@ -439,7 +439,8 @@ class _Watch(BaseCallback):
 
     def _network(self, card: dict[str, Any] | None = None) -> Network:
         plan = self._plan
-        return export_network(self.model, plan.interface, samples=plan.samples, caches=plan.scenario.caches, card=card)
+        learnt = export_network(self.model, plan.interface, samples=plan.samples, caches=plan.scenario.caches, card=card)
+        return learnt.at_temperature(plan.temperature)
 
     def _judged(self) -> Evaluation:
         """Run the policy in the worlds of the evaluation, beside the baselines."""
