@@ -215,8 +215,8 @@ class TrainingPlan:
     """Whether the policy that comes of it draws its discrete actions by their probabilities, as it did while it learnt
     (PPO, A2C). Robots that always take the likeliest one may block each other for ever."""
     temperature: float = 1.0
-    """How the policy that comes of it draws: by probabilities to the power of 1 / temperature, scaled to the sum 1. Below
-    1, rare actions become rarer than they were while it learnt."""
+    """How the policy that comes of it draws: by probabilities to the power of 1 / temperature, scaled to a sum
+    of 1. Below 1, rare actions become rarer than they were while it learnt."""
     sampler: ScenarioSampler | None = None
     """Draws the world of each episode; None = it is always `world`. Then `evaluation` has worlds."""
     turned: bool | None = None

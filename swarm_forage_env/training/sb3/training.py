@@ -439,7 +439,8 @@ class _Watch(BaseCallback):
 
     def _network(self, card: dict[str, Any] | None = None) -> Network:
         plan = self._plan
-        learnt = export_network(self.model, plan.interface, samples=plan.samples, caches=plan.scenario.caches, card=card)
+        caches = plan.scenario.caches
+        learnt = export_network(self.model, plan.interface, samples=plan.samples, caches=caches, card=card)
         return learnt.at_temperature(plan.temperature)
 
     def _judged(self) -> Evaluation:
