@@ -22,7 +22,7 @@ from swarm_forage_env.runs.plan import Condition, Plan
 from swarm_forage_env.runs.policy_spec import PolicyLike, policy_specs
 from swarm_forage_env.runs.record import RunRecord
 from swarm_forage_env.runs.runner import run_plan
-from swarm_forage_env.runs.store import RunFailure, RunStore
+from swarm_forage_env.runs.store import RunFailure, RunStore, failure_lines
 from swarm_forage_env.runs.table import Table
 from swarm_forage_env.scenarios.performance import Performance, performance_of
 from swarm_forage_env.scenarios.quirks import QUIRK_NAMES, RULES
@@ -167,7 +167,7 @@ class Ablation(Answer):
                     parts.append(Sheet(title=title, notes=("None changes a first run.",)))
                 if moving:
                     parts += self._moved([effect for effect in own if effect.switch.quirk in moving])
-        failures = [f"failed: {failure.spec.describe()}: {failure.error}" for failure in self.failures]
+        failures = [f"failed: {line}" for line in failure_lines(self.failures)]
         return *parts, Sheet(notes=failures)
 
     def _numbers(self, records: Sequence[RunRecord]) -> tuple[float, float]:

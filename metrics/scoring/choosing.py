@@ -23,7 +23,7 @@ from swarm_forage_env.wrappers.world import World, WorldLike, world_of
 from ..checks import CurveError
 from ..significance import SIGNIFICANT, paired_p
 from ..statistics import Summary, aggregate
-from .question import Question, ask, failure_lines, plan_totals, run_totals, unit_text
+from .question import Question, ask, plan_totals, run_totals, unit_text
 from .run_curves import NOISE, POPULATION
 from .scores import bounds, interval
 
@@ -259,7 +259,7 @@ class ChoiceQuestion(Question[Choice]):
                 Evidence(constraint=constraint, per_seed=run_totals(table, condition))
                 for constraint, condition in zip(self.constraints, self.plan.of_policy(policy), strict=True)
             ),
-            failures=failure_lines(table, policy),
+            failures=table.failure_lines(policy),
         )
 
 

@@ -29,7 +29,7 @@ from ..random_search import SearchCurves, SearchFloor, Walker, heading_diffusion
 from ..scaling import scalability
 from ..statistics import aggregate
 from .prediction import fit_sizes, with_robots
-from .question import Question, failure_lines, plan_totals
+from .question import Question, plan_totals
 
 if TYPE_CHECKING:
     from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -268,7 +268,7 @@ class ScenarioQuestion(Question[ScenarioPredictions]):
             for condition in self.plan.of_policy(policy.label)
             if (records := table.of(condition))
         }
-        return _table_of(policy, self.world, self.sizes, runs, failure_lines(table, policy.label))
+        return _table_of(policy, self.world, self.sizes, runs, table.failure_lines(policy.label))
 
 
 def predict_from_scenario(

@@ -17,7 +17,7 @@ from ..checks import CurveError, chosen_seeds
 from .by_adversity import forecast_population
 from .curves_file import read_curves
 from .measures import score_study
-from .question import Question, ask, failure_lines
+from .question import Question, ask
 from .run_curves import THROTTLE, PerformanceLike, own_performance, policy_curves
 from .score_tables import Comparison, ScoreTable, side_by_side
 from .scores import Score, ScoreForms, check_measures, criteria_of
@@ -77,7 +77,7 @@ class ScoreQuestion(Question[Comparison]):
             scores=scores,
             forecasts=forecast_population(study),
             missing=missing,
-            failures=failure_lines(table, policy),
+            failures=table.failure_lines(policy),
             settings={
                 "budget": self.budget,
                 "horizon_s": scenario.horizon_s,

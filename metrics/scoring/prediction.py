@@ -25,7 +25,7 @@ from ..prediction import SizePrediction, predict_performance
 from ..statistics import Summary, aggregate
 from .curves_file import read_curves
 from .plots import draw_predictions
-from .question import Question, ask, failure_lines, plan_totals, run_totals, unit_text
+from .question import Question, ask, plan_totals, run_totals, unit_text
 from .run_curves import PerformanceLike
 from .scores import bounds
 
@@ -241,7 +241,7 @@ class PredictionQuestion(Question[Predictions]):
             condition.world.n_robots: tuple(run_totals(table, condition).values())
             for condition in self.plan.of_policy(policy)
         }
-        failures = failure_lines(table, policy)
+        failures = table.failure_lines(policy)
         usable = tuple(size for size in self.fit if len(totals[size]) > 1)
         if len(usable) < MIN_SIZES:
             raise CurveError(

@@ -79,12 +79,6 @@ def ask(
     return question.answer(question.make_runs(store=store, jobs=jobs, executor=executor, progress=progress))
 
 
-def failure_lines(table: Table, policy: str) -> tuple[str, ...]:
-    """Return the runs of a policy that failed, one line each."""
-    failed = [failure for condition in table.plan.of_policy(policy) for failure in table.failures_of(condition)]
-    return tuple(f"{failure.spec.describe()}: {failure.error}" for failure in failed)
-
-
 def plan_totals(
     policies: Sequence[PolicyLike] | Mapping[str, PolicyLike],
     worlds: Sequence[World],

@@ -21,7 +21,7 @@ from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.plan import Condition, Plan
 from swarm_forage_env.runs.policy_spec import PolicyLike, policy_specs
 from swarm_forage_env.runs.record import RunRecord
-from swarm_forage_env.runs.store import RunStore
+from swarm_forage_env.runs.store import RunStore, failure_lines
 from swarm_forage_env.runs.table import Table
 from swarm_forage_env.scenarios.columns import part_column
 from swarm_forage_env.scenarios.performance import Performance, performance_curve, performance_of
@@ -97,9 +97,8 @@ class RunSummary(Answer):
         return performance_of(self.world.scenario.performance)
 
     def sheets(self) -> tuple[Sheet, ...]:
-        """Return one row per condition and part, and runs that failed."""
-        told = [f"failed: {failure.spec.describe()}: {failure.error}" for failure in self.table.failures.values()]
-        failures = Sheet(notes=told)
+        """Return one row per condition and part, and why runs failed."""
+        failures = Sheet(notes=[f"failed: {line}" for line in failure_lines(self.table.failures.values())])
         if not self.rows:
             return (failures,)
         n_worlds = len({condition.world for condition in self.table.plan.conditions})

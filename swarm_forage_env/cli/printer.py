@@ -98,7 +98,7 @@ def _are_numbers(column: Sequence[str]) -> bool:
 
 
 FAILURES_SHOWN = 10
-"""Failed runs for which the command that makes them again is told; the folder has all."""
+"""Failed runs for which the command that makes them again is told; the folder has those of all runs."""
 
 
 @contextmanager
@@ -199,11 +199,13 @@ def _drawn(answer: "Answer", picture: Path) -> Path | None:
 
 
 def _tell_of_records(table: "Table", store: "RunStore") -> None:
-    """Say on stderr where the records are, and how failed runs are made again."""
+    """Say on stderr where the records are, and how a failed run is made again, one for each policy and reason."""
+    from swarm_forage_env.runs.store import failed_alike
+
     if table.records:
         typer.echo(f"{counted(len(table.records), 'record')} in {store.folder}", err=True)
-    failed = [*table.failures]
-    for run_id in failed[:FAILURES_SHOWN]:
-        typer.echo(f"again, alone: swarm-forage rerun {store.failure_path(run_id)}", err=True)
-    if len(failed) > FAILURES_SHOWN:
-        typer.echo(f"and {len(failed) - FAILURES_SHOWN} more", err=True)
+    reasons = failed_alike(table.failures.values())
+    for first, *_ in reasons[:FAILURES_SHOWN]:
+        typer.echo(f"again, alone: swarm-forage rerun {store.failure_path(first.run_id)}", err=True)
+    if len(reasons) > FAILURES_SHOWN:
+        typer.echo(f"and {len(reasons) - FAILURES_SHOWN} more", err=True)

@@ -46,6 +46,24 @@ class RunFailure:
         return self.spec.run_id
 
 
+def failed_alike(failures: Iterable[RunFailure]) -> tuple[tuple[RunFailure, ...], ...]:
+    """Return runs that failed, those together that a policy failed in for one reason."""
+    found: dict[tuple[str, str], list[RunFailure]] = {}
+    for failure in failures:
+        found.setdefault((failure.spec.policy, failure.error), []).append(failure)
+    return tuple(map(tuple, found.values()))
+
+
+def failure_lines(failures: Iterable[RunFailure]) -> tuple[str, ...]:
+    """Return why runs failed, a line per policy and reason: one that cannot run at all fails in all runs alike."""
+    return tuple(_failure_line(*alike) for alike in failed_alike(failures))
+
+
+def _failure_line(first: RunFailure, *others: RunFailure) -> str:
+    more = f", and {len(others):,} more of its runs" if others else ""
+    return f"{first.spec.describe()}{more}: {first.error}"
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class StoredRuns:
     """What a store holds of planned runs."""

@@ -18,7 +18,7 @@ from swarm_forage_env.runs.plan import Condition, Plan
 from swarm_forage_env.runs.policy_spec import PolicySpec
 from swarm_forage_env.runs.record import RunRecord
 from swarm_forage_env.runs.spec import RunSpec
-from swarm_forage_env.runs.store import RunFailure, load
+from swarm_forage_env.runs.store import RunFailure, failure_lines, load
 from swarm_forage_env.scenarios.differences import preset_of
 from swarm_forage_env.wrappers.world import UNDISTURBED
 
@@ -56,6 +56,11 @@ class Table:
         """Return the runs of a condition that failed."""
         ids = (spec.run_id for spec in self.plan.specs_of(condition))
         return tuple(self.failures[run_id] for run_id in ids if run_id in self.failures)
+
+    def failure_lines(self, policy: str) -> tuple[str, ...]:
+        """Return why runs of a policy failed, see `store.failure_lines`."""
+        conditions = self.plan.of_policy(policy)
+        return failure_lines(failure for condition in conditions for failure in self.failures_of(condition))
 
     def curves(self, condition: Condition, *columns: str) -> Curves:
         """Return the finished runs of a condition as arrays.

@@ -243,10 +243,11 @@ def _check_cache_squares(config: ScenarioConfig, centres: tuple[tuple[int, int],
         inside = square[0] >= 0 and square[1] >= 0 and square[2] <= nx and square[3] <= ny
         if not inside or any(overlap_cells(square, other) for other in taken):
             side_m = config.cache_side_cells * CELL_M
+            smaller_fits = not any(overlap_cells((x, y, x + 1, y + 1), other) for other in taken)
             raise ConfigError(
                 f"Expected static caches inside the arena, clear of nest, obstacles and each other, got a square of "
-                f"{side_m:.1f} m centred at ({(x + 0.5) * CELL_M:.1f}, {(y + 0.5) * CELL_M:.1f}) m; lower "
-                "cache.side_share or move nest or obstacles."
+                f"{side_m:.1f} m centred at ({(x + 0.5) * CELL_M:.1f}, {(y + 0.5) * CELL_M:.1f}) m; "
+                f"{'lower side_share, ' if smaller_fits else ''}move nest or obstacles, or do without static caches."
             )
         if not overlap_cells((x, y, x + 1, y + 1), config.arena.distributable_cells):
             raise ConfigError(

@@ -1,5 +1,6 @@
 """How commands end: one line on stderr, whatever happens, and names are shown as they are."""
 
+import json
 import os
 import re
 import shutil
@@ -122,3 +123,15 @@ def test_a_missing_word_is_explained_and_our_own_words_have_no_prefix(command):
     assert code == 2
     assert err.startswith("swarm-forage: Missing option '--deliver'. It is: Total performance")
     assert command("saliency")[2].startswith("swarm-forage: Expected a policy")
+
+
+def test_a_policy_that_cannot_run_at_all_is_told_once_with_the_reason_and_what_to_do(command):
+    in_the_way = ("--set", "obstacles=13.5,7.5,15.5,8.5")
+    code, out, err = command("run", "stochm", *SHORT, *in_the_way, "--seeds", "4")
+    assert code == 1
+    (told,) = out.splitlines()
+    assert "stochm in warehouse_small, 2 robots, seed 0, and 3 more of its runs: " in told
+    assert told.endswith("; move nest or obstacles, or do without static caches.")
+    assert err.count("again, alone: ") == 1
+    _, out, _ = command("run", "stochm", *SHORT, *in_the_way, "--seeds", "4", "--json")
+    assert len(json.loads(out)["failures"]) == 4

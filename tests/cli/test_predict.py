@@ -143,7 +143,8 @@ def test_a_size_whose_runs_fail_is_left_out_and_the_command_exits_with_1(command
     code, out, _ = command(*words, *WORLD)
     assert code == 1
     assert "fitted to 1, 3, 4, 5 robots" in out
-    assert out.count("failed: ") == 2
+    assert out.count("failed: ") == 1
+    assert "random in warehouse_small, 2 robots, seed 0, population_size = 2, and 1 more of its runs: Assert" in out
 
 
 def test_runs_that_leave_nothing_to_predict_end_with_one_line(command):

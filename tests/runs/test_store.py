@@ -13,7 +13,17 @@ from swarm_forage_env.runs.record import RecordError, RunRecord
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.runner import run_specs
 from swarm_forage_env.runs.spec import RunSpec
-from swarm_forage_env.runs.store import DONE, FAILED, MISSING, STATES, RunFailure, RunStore, load, read_failure
+from swarm_forage_env.runs.store import (
+    DONE,
+    FAILED,
+    MISSING,
+    STATES,
+    RunFailure,
+    RunStore,
+    failure_lines,
+    load,
+    read_failure,
+)
 from swarm_forage_env.scenarios.config import whole_intervals
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.world import World
@@ -60,6 +70,18 @@ def test_files_of_other_kinds_and_drafts_are_left_alone(store):
     (store.folder / ".draft.parquet").write_bytes(b"x")
     (store.folder / ".abc.parquet.12.tmp").write_bytes(b"x")
     assert len(load(store.folder)) == 3
+
+
+def test_runs_of_a_policy_that_failed_for_one_reason_share_a_line():
+    runs = [replace(SPEC, seed=seed) for seed in range(3)]
+    other = replace(SPEC, policy="crw")
+    told = [(runs[0], "no room"), (runs[1], "killed"), (runs[2], "no room"), (other, "no room")]
+    failures = [RunFailure(spec=spec, error=error, traceback="") for spec, error in told]
+    assert failure_lines(failures) == (
+        f"{runs[0].describe()}, and 1 more of its runs: no room",
+        f"{runs[1].describe()}: killed",
+        f"{other.describe()}: no room",
+    )
 
 
 @pytest.mark.parametrize("damage", ["foreign", "cut off", "renamed"])

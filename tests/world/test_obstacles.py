@@ -197,7 +197,7 @@ def test_without_boxes_nothing_is_drawn_otherwise():
 
 
 def test_static_caches_on_a_box_are_refused():
-    with pytest.raises(ConfigError, match="clear of nest, obstacles and each other"):
+    with pytest.raises(ConfigError, match=r"clear of nest, obstacles and each other, got .* m; move nest or obs"):
         ForageEnv(scenario("warehouse_small", caches="static", obstacles=((14.0, 0.2, 17.0, 15.8),))).reset_batch(0)
 
 

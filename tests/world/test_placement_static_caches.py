@@ -73,14 +73,14 @@ def test_squares_share_no_cell_with_nest_or_each_other(config):
 
 
 @pytest.mark.parametrize(
-    "overrides",
-    [{"nest_centre_m": (12.0, 24.0)}, {"side_share": 0.5}],
+    ("overrides", "way_out"),
+    [({"nest_centre_m": (12.0, 24.0)}, "move nest"), ({"side_share": 0.5}, "lower side_share, move nest")],
     ids=["on the nest", "over each other"],
 )
-def test_squares_that_cannot_be_told_apart_are_refused(overrides):
+def test_squares_that_cannot_be_told_apart_are_refused(overrides, way_out):
     config = scenario("warehouse_medium", **overrides)
     with pytest.raises(
-        ConfigError, match=r"clear of nest, obstacles and each other, got a square .* lower cache\.side_share"
+        ConfigError, match=rf"clear of nest, obstacles and each other, got a square of .* m; {way_out} or obstacles"
     ):
         static_cache_centres(config)
 
