@@ -25,7 +25,9 @@ _LENGTHS = ("n_robots", "horizon_s", "interval_s")
 _ARENA = ("width_m", "height_m", "nest_centre_m", "nest_size_m")
 _UNITS = {"_m": " m", "_s": " s", "_mps": " m/s"}
 _LONGEST = 40
-"""Characters of a value that words show whole (our choice: half a line); of longer ones they show a digest."""
+"""Characters of a list that words show whole (our choice: half a line); of longer ones they tell how many entries."""
+_MOST_BOXES = 3
+"""Boxes, places and the like that words show whole (our choice)."""
 
 
 def differences(config: ScenarioConfig) -> dict[str, Any]:
@@ -41,11 +43,15 @@ def differences(config: ScenarioConfig) -> dict[str, Any]:
     return {name: value for name, value in here.items() if name not in there or value != there[name]}
 
 
-def difference_words(config: ScenarioConfig) -> tuple[str, ...]:
+def difference_words(config: ScenarioConfig, *, digests: bool = True) -> tuple[str, ...]:
     """Return in words what differs from the preset, apart from the size of the swarm and the length of runs.
 
     Example: `("3 objects", "obstacles 10,4,11,12", "physics chipmunk")`. Empty for a scenario that no preset has the
     name of: what it is called is all that people know of it.
+
+    Args:
+        config: The scenario.
+        digests: Tell long lists apart by a digest, "7 obstacles (7d4d)"; needed where other scenarios stand beside.
     """
     base = preset_of(config)
     if base is None:
@@ -54,8 +60,8 @@ def difference_words(config: ScenarioConfig) -> tuple[str, ...]:
     words = _arena_words(config.arena, base.arena)
     for name, value in found.items():
         if name not in (*_LENGTHS, *_ARENA, *QUIRK_NAMES):
-            words.append(_WORDS[name](value) if name in _WORDS else _plain_words(name, value))
-    return (*words, *_quirk_words(config, base))
+            words.append(_WORDS[name](value) if name in _WORDS else _plain_words(name, value, digests))
+    return (*words, *_quirk_words(config, base, digests))
 
 
 def is_resized(config: ScenarioConfig) -> bool:
@@ -111,24 +117,27 @@ def _arena_words(arena: ArenaConfig, base: ArenaConfig) -> list[str]:
     return words
 
 
-def _quirk_words(config: ScenarioConfig, base: ScenarioConfig) -> tuple[str, ...]:
+def _quirk_words(config: ScenarioConfig, base: ScenarioConfig, digests: bool) -> tuple[str, ...]:
     if config.quirks == base.quirks:
         return ()
     named = [name for name, rules in RULES.items() if rules == config.quirks]
     if named:
         return (f"rules {named[0]}",)
     switched = [name for name in QUIRK_NAMES if getattr(config.quirks, name) != getattr(base.quirks, name)]
-    return (_plain_words("quirks", switched),)
+    return (_plain_words("quirks", switched, digests),)
 
 
-def _plain_words(name: str, value: Any) -> str:
+def _plain_words(name: str, value: Any, digests: bool) -> str:
     unit = next((ending for ending in _UNITS if name.endswith(ending)), "")
     what = name.removesuffix(unit).replace("_", " ")
+    entries = cast("Sequence[Any]", value) if isinstance(value, list | tuple) else ()
+    if _is_long(entries):
+        return f"{len(entries)} {what}" + (f" ({digest_of(value, 4)})" if digests else "")
     return f"{what} {_value_words(value)}{_UNITS.get(unit, '')}"
 
 
 def _value_words(value: Any) -> str:
-    """A value as --set takes it; of a long one, how many entries there are, and a digest that tells it from others."""
+    """A value as --set takes it."""
     if isinstance(value, bool):
         return "on" if value else "off"
     if isinstance(value, float):
@@ -136,9 +145,15 @@ def _value_words(value: Any) -> str:
     if not isinstance(value, list | tuple):
         return str(value)
     entries = cast("Sequence[Any]", value)
-    is_nested = any(isinstance(entry, tuple) for entry in entries)
-    text = ("+" if is_nested else ",").join(map(_value_words, entries))
-    return text if len(text) <= _LONGEST else f"({len(entries)}, {digest_of(value, 4)})"
+    return ("+" if _is_nested(entries) else ",").join(map(_value_words, entries))
+
+
+def _is_nested(entries: Sequence[Any]) -> bool:
+    return any(isinstance(entry, tuple) for entry in entries)
+
+
+def _is_long(entries: Sequence[Any]) -> bool:
+    return len(entries) > _MOST_BOXES if _is_nested(entries) else len(_value_words(entries)) > _LONGEST
 
 
 _WORDS: dict[str, Callable[[Any], str]] = {

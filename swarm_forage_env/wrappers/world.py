@@ -106,17 +106,22 @@ class World:
     @property
     def changes(self) -> tuple[str, ...]:
         """What differs from the preset, the engine where it is another one, and disturbances with their levels."""
-        return (*difference_words(self.scenario), *(config.in_words(self.scenario.dt_s) for config in self.wrappers))
+        return self._changes(digests=True)
+
+    def _changes(self, *, digests: bool) -> tuple[str, ...]:
+        words = difference_words(self.scenario, digests=digests)
+        return (*words, *(config.in_words(self.scenario.dt_s) for config in self.wrappers))
 
     def title(self, *facts: str) -> str:
         """Name the world for people: "warehouse_small: 50 robots, with 3 objects, throttle: robots lose 20 % ...".
 
-        Titles, tables and legends use this, so that no two worlds are called the same.
+        Titles use this, of what is about this world alone: it has no digests. Where several worlds stand beside each
+        other, `name` and `changes` tell them apart.
 
         Args:
             facts: What a title says of the runs, such as how many robots there are; changes among them appear once.
         """
-        changes = [words for words in self.changes if words not in facts]
+        changes = [words for words in self._changes(digests=False) if words not in facts]
         words = f"{self.place}: {', '.join(facts)}," if facts else self.place
         return f"{words} with {', '.join(changes)}" if changes else words.removesuffix(",")
 
