@@ -17,6 +17,7 @@ import numpy as np
 from arguments import whole
 
 from metrics.controllers import PAPER_POLICIES
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.runs.answer import Sheet
 from swarm_forage_env.runs.plan import Plan
@@ -158,7 +159,7 @@ def shares(asked: Sequence[PolicySpec], there: Sequence[World], jobs: int) -> Fl
     every = {policy.label: policy for policy in (*asked, *scripted)}
     if any(every[policy.label] != policy for policy in asked):
         raise SystemExit(f"Expected files of other names than {', '.join(PAPER_POLICIES)}, which are the yardstick.")
-    table = finished_runs(Plan.product(every.values(), there, (RUN_SEED,)), jobs=jobs)
+    table = finished_runs(Plan.product(every.values(), there, (RUN_SEED,)), jobs=jobs, progress=True)
     means = {
         label: np.array([record.performance.mean() for one in table.plan.of_policy(label) for record in table.of(one)])
         for label in every
@@ -182,16 +183,18 @@ def main() -> None:
     parser.add_argument("--horizon", type=float, default=4000.0, help="seconds of a run (default: 4000)")
     parser.add_argument("--jobs", type=whole(at_least=1), default=1, help="processes (default: 1)")
     words = parser.parse_args()
-    asked = policy_specs(words.policy.split(","))
-    of_kinds = [shares(asked, worlds(kind, words.draws, words.horizon), words.jobs) for kind in KINDS]
-    rows = [
-        (kind.__name__.replace("_", " "), *map(between, found)) for kind, found in zip(KINDS, of_kinds, strict=True)
-    ]
-    joined = np.concatenate(of_kinds, axis=1)
+    try:
+        asked = policy_specs(words.policy.split(","))
+        there = [world for kind in KINDS for world in worlds(kind, words.draws, words.horizon)]
+        found = shares(asked, there, words.jobs)  # all at once, so that one estimate is of all that is left
+    except ConfigError as error:
+        raise SystemExit(str(error)) from error
+    of_kinds = zip(KINDS, np.split(found, len(KINDS), axis=1), strict=True)
+    rows = [(kind.__name__.replace("_", " "), *map(between, own)) for kind, own in of_kinds]
     rows += [
-        (f"worlds with at least {AHEAD:g}", *(f"{np.count_nonzero(one >= AHEAD)} of {one.size}" for one in joined)),
-        ("better than all four", *(f"{np.count_nonzero(one > 1.0)} of {one.size}" for one in joined)),
-        ("median", *(f"{np.median(one):.2f}" for one in joined)),
+        (f"worlds with at least {AHEAD:g}", *(f"{np.count_nonzero(one >= AHEAD)} of {one.size}" for one in found)),
+        ("better than all four", *(f"{np.count_nonzero(one > 1.0)} of {one.size}" for one in found)),
+        ("median", *(f"{np.median(one):.2f}" for one in found)),
     ]
     title = f"Performance as a share of the best scripted controller, {words.horizon:,.0f} s, one run of each"
     print(Sheet(title=title, header=("worlds", *(policy.label for policy in asked)), rows=rows, notes=[]).text())

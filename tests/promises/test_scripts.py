@@ -270,7 +270,9 @@ def test_unseen_worlds_are_drawn_once_and_shares_are_of_the_best(run):
         assert unseen_worlds.worlds(kind, 2, 200.0) == more[:2]
         assert len({world.scenario for world in more}) > 1
     words = ("--policy", "dpo,oracle", "--draws", "1", "--horizon", "400")
-    title, header, *kinds, keeping_up, better, median = run("unseen_worlds", *words)[1].splitlines()
+    _, out, err = run("unseen_worlds", *words)
+    assert err.splitlines()[0] == "0/55 runs, an estimate follows when the first run ends"
+    title, header, *kinds, keeping_up, better, median = out.splitlines()
     assert title == "Performance as a share of the best scripted controller, 400 s, one run of each"
     assert header.split() == ["worlds", "dpo", "oracle"]
     assert len(kinds) == 11
@@ -278,6 +280,20 @@ def test_unseen_worlds_are_drawn_once_and_shares_are_of_the_best(run):
     assert re.search(r"(\d+) of 11  +11 of 11$", keeping_up)
     dpo, oracle = (float(word) for word in median.split()[1:])
     assert dpo <= 1.0 < oracle
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("--horizon", "100"), "Expected a horizon of a whole number of intervals of 200 s, got 100 s; choose a"),
+        (("--policy", "no_such_file.npz"), "no_such_file.npz: No such file or directory."),
+    ],
+)
+def test_what_cannot_be_run_in_unseen_worlds_is_told_in_one_line(run, words, told):
+    ends_with, out, _ = run("unseen_worlds", *words)
+    assert told in ends_with
+    assert "\n" not in ends_with
+    assert out == ""
 
 
 @pytest.mark.usefixtures("run")  # finds the modules beside the scripts
