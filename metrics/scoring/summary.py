@@ -120,10 +120,20 @@ class RunSummary(Answer):
             lines.append([*about, row.caches, str(row.n_runs), *numbers, *tail])
             empty = [""] * (len(about) + 1 + len(other))
             lines += [_part_line(part, empty, [""] * has_limit) for part in row.parts]
-        is_spread = any(row.n_runs > 1 for row in self.rows)
-        interval = f"± {LEVEL:.0%} t interval over seeds" if is_spread else "one seed, so no interval"
-        notes = [f"{interval}; interference: share of active robot time", *([ABOUT_LIMIT] if has_limit else [])]
+        notes = [f"{self._about_interval}; interference: share of active robot time"]
+        notes += [ABOUT_LIMIT] if has_limit else []
         return Sheet(title=self._title(n_worlds), header=header, rows=lines, notes=notes), failures
+
+    @property
+    def _about_interval(self) -> str:
+        """What stands behind ±; of few seeds why it is wide, because readers take it for a fault."""
+        most = max(row.n_runs for row in self.rows)
+        if most == 1:
+            return "one seed, so no interval"
+        interval = f"± {LEVEL:.0%} t interval over"
+        if most < FEWEST_RUNS:
+            return f"{interval} {most} seeds, wide because so few say little (make {FEWEST_RUNS} or more)"
+        return f"{interval} seeds"
 
     def _title(self, n_worlds: int) -> str:
         scenario = self.world.scenario

@@ -33,8 +33,9 @@ def test_run_shows_a_table_and_keeps_records_and_a_picture(command, painted):
     code, out, err = command(*RUN, "--seeds", "2")
     assert code == 0
     assert "warehouse_small: 3 robots, 20 objects, 4 s" in out
-    for word in ("random", "none", "deliveries", "per 1,000 s", "interference", "simulated s", "± 95% t interval"):
+    for word in ("random", "none", "deliveries", "per 1,000 s", "interference", "simulated s"):
         assert word in out
+    assert "± 95% t interval over 2 seeds, wide because so few say little (make 4 or more);" in out
     folder = Path("results/warehouse_small_3_robots_4_s_33b9a3")
     assert [record.seed for record in sorted(load(folder), key=lambda record: record.seed)] == [0, 1]
     assert (folder / "performance.png").read_bytes().startswith(b"\x89PNG")
@@ -46,7 +47,8 @@ def test_a_few_runs_are_drawn_without_bands(command, monkeypatch):
     command(*RUN, "--seeds", "2")
     (axes,) = figures[0].axes
     assert axes.get_xlabel() == "time [s] (fewer than 4 runs, too few for a band)"
-    command(*RUN, "--seeds", "4")
+    _, out, _ = command(*RUN, "--seeds", "4")
+    assert "± 95% t interval over seeds;" in out
     assert figures[1].axes[0].get_xlabel() == "time [s] (bands: 95% t interval over seeds)"
 
 
