@@ -187,6 +187,19 @@ class WorldOptions(PlaceOptions):
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
+class ArenaOptions:
+    """Options of a world of which it matters only how large it is and what robots see there."""
+
+    scenario: Scenario = "warehouse_small"
+    side: Side = None
+    settings: Settings = ()
+
+    def place(self) -> PlaceOptions:
+        """Return the options of the whole world."""
+        return PlaceOptions(scenario=self.scenario, side=self.side, settings=self.settings)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
 class PolicyOptions:
     """Which policies, in one of two ways."""
 

@@ -10,6 +10,7 @@ import typer
 from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, whole
 from swarm_forage_env.cli.options import (
     EXIT_FAILURE,
+    ArenaOptions,
     AsJson,
     DryRun,
     FirstSeed,
@@ -385,7 +386,7 @@ def dataset(
 
 def export(
     policies: PolicyOptions,
-    described: WorldOptions,
+    described: ArenaOptions,
     *,
     file: Annotated[Path, typer.Option("--file", metavar="FILE", help="File to write, .h (C99) or .onnx.")],
 ) -> None:
@@ -397,5 +398,5 @@ def export(
     from swarm_forage_env.cli.scenario_options import described_world
     from swarm_forage_env.training.export.exporting import export_policy
 
-    world, _ = described_world(described)
+    world, _ = described_world(described.place())
     typer.echo(f"wrote {export_policy(policies.one(), file, world.scenario)}")
