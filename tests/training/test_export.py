@@ -1,5 +1,6 @@
 """Networks as C headers and as ONNX: their outputs are those of the policy, and their words fit."""
 
+import re
 import shutil
 import subprocess
 import sys
@@ -11,7 +12,9 @@ import numpy as np
 import pytest
 
 from swarm_forage_env import ConfigError, export_policy, scenario
-from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.contract.policy import SwarmSpec
+from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
+from swarm_forage_env.policies.kernels.frames import take_frames
 from swarm_forage_env.policies.kernels.network import pick
 from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkError
 from swarm_forage_env.policies.pretrained import network_file
@@ -50,6 +53,24 @@ int main(void)
     return 0;
 }
 """
+FRAMES = """\
+#include <stdint.h>
+#include <stdio.h>
+
+int main(void)
+{
+    float s[SIZE], inputs[SIZE];
+    uint64_t i, n, m, f;
+    int c;
+    while (fread(&i, sizeof i, 1, stdin) && fread(&n, sizeof n, 1, stdin) && fread(s, sizeof s, 1, stdin)) {
+        for (c = 0; c < SIZE; c++)
+            inputs[c] = s[c];
+        FORMULAS
+        fwrite(inputs, sizeof inputs, 1, stdout);
+    }
+    return 0;
+}
+"""
 LARGE = 40
 """Rows of observations."""
 
@@ -71,6 +92,7 @@ NETWORKS = {
         "relu", (23, 20, 11), observation="compact", actions="discrete", automatic_gripper=False
     ),
     "commands": made_network("tanh", (111, 16, 8, 3)),
+    "all readings in frames": made_network("tanh", (111, 8, 11), actions="discrete", frame_decisions=50),
     "one layer, drives only": made_network("tanh", (23, 2), observation="compact", automatic_gripper=True),
 }
 
@@ -152,6 +174,7 @@ def test_the_words_say_what_goes_in_and_out():
         "every 1 s",
         "The gripper works by itself",
         "and in another one after 200 decisions",
+        "If f >= 4, the two wheel speeds of the action change places",
     ):
         assert words in text
     text = "\n".join(manual_of(NETWORKS["relu and gripper"], scenario("warehouse_small"), "net").lines)
@@ -159,6 +182,35 @@ def test_the_words_say_what_goes_in_and_out():
     assert "Choose the action with the largest output" in text
     text = "\n".join(manual_of(NETWORKS["commands"], scenario("warehouse_small"), "net").lines)
     assert "2  gripper command" in text
+
+
+@pytest.mark.parametrize("which", ["generalist", "all readings in frames"])
+def test_the_formulas_of_frames_do_what_runs_do(which, tmp_path):
+    seen, swarm = rows(NETWORKS[which]), SwarmSpec.of(scenario("warehouse_small", n_robots=LARGE))
+    frames = LearnerInterface(NETWORKS[which].about.interface, swarm).translation.frames
+    words = manual_of(NETWORKS[which], scenario("warehouse_small"), which).use
+    formulas = " ".join(line.strip() for line in words if line.startswith("    ")).replace("nothing more", "")
+    formulas = re.sub(r"f == (\d):(.*?)(?=f ==|$)", r"if (f == \1) {\2}", formulas)
+    program = FRAMES.replace("SIZE", str(seen.shape[1])).replace("FORMULAS", formulas)
+    taken = set()
+    for decision in (0, 49, 5000):
+        told = [np.array([i, decision], np.uint64).tobytes() + row.tobytes() for i, row in enumerate(seen)]
+        found = np.frombuffer(answer(tmp_path, "", program, b"".join(told)), np.float32).reshape(seen.shape)
+        view = seen.copy()
+        take_frames(view, decision, frames)
+        np.testing.assert_array_equal(found, view)
+        taken |= {*frames.taken}
+    assert taken == {*range(8)}
+
+
+@pytest.mark.parametrize("name", ["été-7", "7.1", "_a", "int", "a b", "..."])
+def test_any_name_of_a_policy_gives_a_header_that_compiles(name, tmp_path):
+    file = tmp_path / f"{name}.npz"
+    NETWORKS["one layer, drives only"].save(file)
+    export_policy(file, tmp_path / "net.h")
+    (identifier,) = re.findall(r"inline void (\w+)_forward", (tmp_path / "net.h").read_text())
+    program = PROGRAM.replace("NAME.h", "net.h")
+    assert answer(tmp_path, identifier, program, np.zeros(23, np.float32).tobytes())
 
 
 def test_names_become_identifiers_and_words_do_not_end_the_comment():

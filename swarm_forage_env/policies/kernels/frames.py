@@ -16,10 +16,10 @@ from swarm_forage_env.contract.types import ActionArray, IntArray, ObsArray
 N_FRAMES = 8
 N_UPRIGHT = 4
 """Frames before this one are turned only, the others are mirrored before."""
-_APART = 7
+APART = 7
 """Decisions by which robots change their frames one after the other."""
-_OF_ROBOT, _OF_PERIOD = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xD1B54A32D192ED03)
-_FIRST_FACTOR, _SECOND_FACTOR = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
+OF_ROBOT, OF_PERIOD = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xD1B54A32D192ED03)
+FIRST_FACTOR, SECOND_FACTOR = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
 _HALF, _HALF_BITS = np.uint64(0xFFFFFFFF), np.uint64(32)
 
 
@@ -58,10 +58,10 @@ def _product(a: np.uint64, b: np.uint64) -> np.uint64:
 @kernel
 def frame_of(robot: int, decision: int, length: int) -> int:
     """Return the frame of a robot in a decision, 0 to 7: the robot's number and the period, well mixed (SplitMix64)."""
-    period = np.uint64((decision + _APART * robot) // length)
-    mixed = _sum(_product(np.uint64(robot + 1), _OF_ROBOT), _product(period, _OF_PERIOD))
-    mixed = _product(mixed ^ (mixed >> np.uint64(30)), _FIRST_FACTOR)
-    mixed = _product(mixed ^ (mixed >> np.uint64(27)), _SECOND_FACTOR)
+    period = np.uint64((decision + APART * robot) // length)
+    mixed = _sum(_product(np.uint64(robot + 1), OF_ROBOT), _product(period, OF_PERIOD))
+    mixed = _product(mixed ^ (mixed >> np.uint64(30)), FIRST_FACTOR)
+    mixed = _product(mixed ^ (mixed >> np.uint64(27)), SECOND_FACTOR)
     return int((mixed ^ (mixed >> np.uint64(31))) >> np.uint64(61))
 
 

@@ -1,16 +1,35 @@
 """What a network takes and returns, in words: for whoever builds a robot or another simulator around it."""
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
+from textwrap import wrap
 
 import numpy as np
 
 from swarm_forage_env.contract.policy import COMMANDS, SwarmSpec
 from swarm_forage_env.policies.interface import GRIPS, MOTIONS, InterfaceConfig
+from swarm_forage_env.policies.kernels.frames import (
+    APART,
+    FIRST_FACTOR,
+    N_UPRIGHT,
+    OF_PERIOD,
+    OF_ROBOT,
+    SECOND_FACTOR,
+    Frames,
+)
 from swarm_forage_env.policies.kernels.learner import GRIP_COMMANDS, MOTION_WHEELS
 from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.robots import WHEEL_SCALE_MPS
+
+_WIDTH = 110
+"""Characters of a line of formulas."""
+_FRAMES = """
+Each robot sees the world in a frame f of its own, and in another one after {length:,} decisions, so that a swarm
+spreads. In frame f the world is mirrored (x becomes -x) if f >= {upright}, and then turned counter-clockwise by f % 4
+quarter turns. The frame of robot i in its decision n, both counted from 0, is, all in uint64_t,
+"""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -63,7 +82,10 @@ def manual_of(network: Network, scenario: ScenarioConfig, name: str) -> Manual:
             f"Arena: X = {arena.width_m:g} m, Y = {arena.height_m:g} m. All inputs lie in [-1, 1].",
         ),
         outputs=tuple(_numbered(about.samples, network) if is_discrete else _commands(network)),
-        use=tuple(_use(about.interface, every_s)),
+        use=(
+            *_use(about.interface, every_s),
+            *(_frame_lines(interface.translation.frames, is_discrete) if about.interface.frame_decisions else ()),
+        ),
     )
 
 
@@ -104,10 +126,21 @@ def _use(interface: InterfaceConfig, every_s: float) -> list[str]:
             "The gripper works by itself, in every tick: an empty robot grasps over an object or a cache, one with an "
             "object lets go in the nest."
         )
-    if interface.frame_decisions:
-        lines.append(
-            "In the simulator each robot sees the world turned by quarter turns or mirrored, in one of eight ways, and "
-            f"in another one after {interface.frame_decisions:,} decisions, so that a swarm spreads. Turn positions, "
-            "headings and, where the world is mirrored, left and right of inputs and wheels in the same way."
-        )
     return lines
+
+
+def _frame_lines(frames: Frames, is_discrete: bool) -> Iterator[str]:
+    """Return how a robot sees and acts in its frames, in formulas of C, from the columns that `take_frames` moves."""
+    yield from _FRAMES.format(length=frames.length, upright=N_UPRIGHT).splitlines()
+    yield f"    m = (i + 1) * {OF_ROBOT:#x}ull + (n + {APART} * i) / {frames.length} * {OF_PERIOD:#x}ull;"
+    yield f"    m = (m ^ (m >> 30)) * {FIRST_FACTOR:#x}ull;"
+    yield f"    m = (m ^ (m >> 27)) * {SECOND_FACTOR:#x}ull;"
+    yield "    f = (m ^ (m >> 31)) >> 61;"
+    yield "With s[c] for what the robot senses in the world as it is, set inputs[c] = s[c] for all c, then"
+    for frame, (source, sign) in enumerate(zip(frames.source.tolist(), frames.sign.tolist(), strict=True)):
+        moved = [c for c in range(len(source)) if (source[c], sign[c]) != (c, 1.0)]
+        moves = " ".join(f"inputs[{c}]={'-' if sign[c] < 0.0 else ''}s[{source[c]}];" for c in moved)
+        line = f"    f == {frame}: {moves or 'nothing more'}"
+        yield from wrap(line, _WIDTH, subsequent_indent=" " * 12, break_on_hyphens=False)
+    wheels = "the two wheel speeds of the action" if is_discrete else "outputs[0] and outputs[1]"
+    yield f"If f >= {N_UPRIGHT}, {wheels} change places before the robot drives: left is right in a mirror."
