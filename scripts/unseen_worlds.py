@@ -3,14 +3,17 @@
     python scripts/unseen_worlds.py                              generalist, the table of docs/generalist.md
     python scripts/unseen_worlds.py --policy a.npz,b.npz         other policies
     python scripts/unseen_worlds.py --draws 1                    a first look, at one world of each kind
+    python scripts/unseen_worlds.py --worlds docs/validation.toml    in worlds of a file, in which plans are chosen
 
 Eleven kinds of worlds, five drawn of each by the seed below: directions, shapes, numbers and disturbances that no
 shipped training plan has; long walls differ in place and length only. Nobody may choose a plan by them; run them once
-for a plan that is fixed.
+for a plan that is fixed. A file of worlds is like `evaluation` of a training plan; the yardstick there are CRW and DPO,
+because caches of others may stand in walls.
 """
 
 import argparse
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,12 +21,14 @@ from arguments import whole
 
 from metrics.controllers import PAPER_POLICIES
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.files import parse_toml
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.runs.answer import Sheet
 from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.policy_spec import PolicySpec, policy_specs
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.training.evaluations import finished_runs
+from swarm_forage_env.training.plan import EvaluationPlan
 from swarm_forage_env.wrappers.registry import wrappers_from_mapping
 from swarm_forage_env.wrappers.world import World
 
@@ -32,6 +37,8 @@ DRAWN_BY = 20_261_126
 RUN_SEED = 50_000
 AHEAD = 0.95
 """Share of the best scripted controller that counts as keeping up with it."""
+NEED_NO_CACHE = ("crw", "dpo")
+"""Controllers that can run wherever there are walls."""
 Drawn = tuple[str, dict[str, Any], dict[str, Any]]
 """Preset, fields and wrappers."""
 _SMALL_CACHES = {"side_share": 0.06}
@@ -150,22 +157,29 @@ def worlds(kind: Callable[[np.random.Generator], Drawn], n_draws: int, horizon_s
     ]
 
 
-def shares(asked: Sequence[PolicySpec], there: Sequence[World], jobs: int) -> FloatArray:
-    """Return performance as a share of the best scripted controller, (policies, worlds).
+def shares(
+    asked: Sequence[PolicySpec],
+    there: Sequence[World],
+    jobs: int,
+    *,
+    yardstick: Sequence[str] = PAPER_POLICIES,
+    seeds: Sequence[int] = (RUN_SEED,),
+) -> FloatArray:
+    """Return performance as a share of the best controller of the yardstick, (policies, worlds).
 
     Where no scripted controller brings anything home, it is 1 for a policy that does not, either, else infinite.
     """
-    scripted = policy_specs(list(PAPER_POLICIES))
+    scripted = policy_specs(list(yardstick))
     every = {policy.label: policy for policy in (*asked, *scripted)}
     if any(every[policy.label] != policy for policy in asked):
-        raise SystemExit(f"Expected files of other names than {', '.join(PAPER_POLICIES)}, which are the yardstick.")
-    table = finished_runs(Plan.product(every.values(), there, (RUN_SEED,)), jobs=jobs, progress=True)
-    means = {
-        label: np.array([record.performance.mean() for one in table.plan.of_policy(label) for record in table.of(one)])
-        for label in every
-    }
-    best = np.max([means[policy.label] for policy in scripted], axis=0)
-    own = np.array([means[policy.label] for policy in asked])
+        raise SystemExit(f"Expected files of other names than {', '.join(yardstick)}, which are the yardstick.")
+    table = finished_runs(Plan.product(every.values(), there, seeds), jobs=jobs, progress=True)
+
+    def means(policies: Sequence[PolicySpec]) -> FloatArray:
+        runs = [[table.of(one) for one in table.plan.of_policy(policy.label)] for policy in policies]
+        return np.array([[np.mean([one.performance.mean() for one in world]) for world in own] for own in runs])
+
+    best, own = means(scripted).max(axis=0), means(asked)
     return np.divide(own, best, out=np.where(own > 0.0, np.inf, 1.0), where=best > 0.0)
 
 
@@ -175,29 +189,69 @@ def between(found: FloatArray) -> str:
     return least if found.size == 1 else f"{least} to {largest}"
 
 
+def counts(found: FloatArray, rival: str) -> list[tuple[str, ...]]:
+    """Return the last rows of a table, of shares (policies, worlds)."""
+    return [
+        (f"worlds with at least {AHEAD:g}", *(f"{np.count_nonzero(one >= AHEAD)} of {one.size}" for one in found)),
+        (f"better than {rival}", *(f"{np.count_nonzero(one > 1.0)} of {one.size}" for one in found)),
+        ("median", *(f"{np.median(one):.2f}" for one in found)),
+    ]
+
+
+def in_drawn_worlds(asked: Sequence[PolicySpec], n_draws: int, horizon_s: float, jobs: int) -> Sheet:
+    """Return the table of worlds of all kinds."""
+    there = [world for kind in KINDS for world in worlds(kind, n_draws, horizon_s)]
+    found = shares(asked, there, jobs)  # all at once, so that one estimate is of all that is left
+    of_kinds = zip(KINDS, np.split(found, len(KINDS), axis=1), strict=True)
+    rows = [(kind.__name__.replace("_", " "), *map(between, own)) for kind, own in of_kinds]
+    return Sheet(
+        title=f"Performance as a share of the best scripted controller, {horizon_s:,.0f} s, one run of each",
+        header=("worlds", *(policy.label for policy in asked)),
+        rows=rows + counts(found, "all four"),
+    )
+
+
+def in_worlds_of(file: Path, asked: Sequence[PolicySpec], jobs: int) -> Sheet:
+    """Return the table of the worlds of a file, with the file's numbers of seconds and of runs."""
+    try:
+        plan = EvaluationPlan.from_mapping(parse_toml(file.read_text(encoding="utf-8")))
+    except (OSError, ValueError) as error:
+        raise ConfigError(f"Expected a file of worlds like docs/validation.toml, got {file}: {error}") from error
+    there = list(map(plan.timed, plan.worlds))
+    if not there:
+        raise ConfigError(f"Expected [[worlds]] in {file}, got none.")
+    found = shares(asked, there, jobs, yardstick=NEED_NO_CACHE, seeds=plan.seeds)
+    rows = [(world.name, *(f"{one:.2f}" for one in own)) for world, own in zip(there, found.T, strict=True)]
+    rival = " and ".join(NEED_NO_CACHE)
+    return Sheet(
+        title=f"Performance as a share of the better of {rival}, means of {len(plan.seeds)} runs",
+        header=("world", *(policy.label for policy in asked)),
+        rows=rows + counts(found, rival),
+    )
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--policy", default="generalist", help="names or files, separated by commas")
-    parser.add_argument("--draws", type=whole(at_least=1), default=5, help="worlds of each kind (default: 5)")
-    parser.add_argument("--horizon", type=float, default=4000.0, help="seconds of a run (default: 4000)")
+    parser.add_argument("--draws", type=whole(at_least=1), help="worlds of each kind (default: 5)")
+    parser.add_argument("--horizon", type=float, help="seconds of a run (default: 4000)")
+    parser.add_argument("--worlds", type=Path, help="file of other worlds, with its own seconds of a run")
     parser.add_argument("--jobs", type=whole(at_least=1), default=1, help="processes (default: 1)")
     words = parser.parse_args()
+    if words.worlds and (words.draws or words.horizon is not None):
+        parser.error("expected --worlds without --draws and --horizon, which are of worlds that are drawn")
     try:
         asked = policy_specs(words.policy.split(","))
-        there = [world for kind in KINDS for world in worlds(kind, words.draws, words.horizon)]
-        found = shares(asked, there, words.jobs)  # all at once, so that one estimate is of all that is left
+        if words.worlds:
+            sheet = in_worlds_of(words.worlds, asked, words.jobs)
+        else:
+            sheet = in_drawn_worlds(
+                asked, words.draws or 5, 4000.0 if words.horizon is None else words.horizon, words.jobs
+            )
     except ConfigError as error:
         raise SystemExit(str(error)) from error
-    of_kinds = zip(KINDS, np.split(found, len(KINDS), axis=1), strict=True)
-    rows = [(kind.__name__.replace("_", " "), *map(between, own)) for kind, own in of_kinds]
-    rows += [
-        (f"worlds with at least {AHEAD:g}", *(f"{np.count_nonzero(one >= AHEAD)} of {one.size}" for one in found)),
-        ("better than all four", *(f"{np.count_nonzero(one > 1.0)} of {one.size}" for one in found)),
-        ("median", *(f"{np.median(one):.2f}" for one in found)),
-    ]
-    title = f"Performance as a share of the best scripted controller, {words.horizon:,.0f} s, one run of each"
-    print(Sheet(title=title, header=("worlds", *(policy.label for policy in asked)), rows=rows, notes=[]).text())
+    print(sheet.text())
 
 
 if __name__ == "__main__":

@@ -53,6 +53,12 @@ LIKELIEST = (
     "change(net, about=change(net.about, samples=False)).save('likeliest.npz')"
 )
 """The same weights, with the likeliest action in the place of one that is drawn."""
+AS_LEARNT = (
+    "from swarm_forage_env.policies.network import Network; "
+    "from swarm_forage_env.policies.pretrained import network_file as file; "
+    "Network.load(file('generalist')).at_temperature(2.0).save('as_learnt.npz')"
+)
+"""The same weights, drawn as in training: the plan's temperature of 0.5 is taken back."""
 SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "run": ((f"swarm-forage run {','.join(FIVE)} --scenario warehouse_small --robots 50 --seeds 4",), FIVE),
     "medium": (
@@ -140,6 +146,15 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         for suffix, option in (("", ""), ("_short", " --horizon 1000"))
     },
     "unseen": ((f"python {ROOT}/scripts/unseen_worlds.py",), ()),
+    "validation": (
+        (
+            f'python -c "{AS_LEARNT}"',
+            f'python -c "{LIKELIEST}"',
+            f"python {ROOT}/scripts/unseen_worlds.py --worlds {ROOT}/docs/validation.toml "
+            "--policy generalist,as_learnt.npz,likeliest.npz",
+        ),
+        (),
+    ),
     "sizes": ((f"python {ROOT}/scripts/every_size.py",), ()),
     **{
         f"lesson_{size}": (

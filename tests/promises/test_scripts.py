@@ -261,6 +261,47 @@ def test_the_floor_near_the_nest_empties(run):
         assert begin_m < end_m
 
 
+WORLDS = """
+horizon_s = 400.0
+n_runs = 2
+[[worlds]]
+name = "ten robots"
+scenario = { preset = "warehouse_small", n_robots = 10, width_m = 12.0, physics = "compiled" }
+[[worlds]]
+name = "a wall"
+scenario = { preset = "classroom", obstacles = [[3.0, 1.5, 3.2, 4.5]], physics = "compiled" }
+"""
+
+
+@pytest.mark.compiled
+def test_policies_are_compared_in_the_worlds_of_a_file(run):
+    Path("mine.toml").write_text(WORLDS)
+    title, header, *rows = run("unseen_worlds", "--worlds", "mine.toml", "--policy", "dpo,oracle")[1].splitlines()
+    assert title == "Performance as a share of the better of crw and dpo, means of 2 runs"
+    assert header.split() == ["world", "dpo", "oracle"]
+    assert [row.split("  ")[0] for row in rows[:2]] == ["ten robots", "a wall"]
+    assert re.split("  +", rows[3]) == ["better than crw and dpo", "0 of 2", "2 of 2"]
+    for dpo, oracle in (row.split()[-2:] for row in rows[:2]):
+        assert float(dpo) <= 1.0 < float(oracle)
+
+
+@pytest.mark.parametrize(
+    ("text", "words", "told"),
+    [
+        (None, (), "Expected a file of worlds like docs/validation.toml, got mine.toml: .*No such file"),
+        ("horizon_s = 400.0", (), r"Expected \[\[worlds\]\] in mine.toml, got none"),
+        ("horizon = 400.0", (), "mine.toml: .*Did you mean"),
+        (WORLDS, ("--draws", "2"), "without --draws and --horizon"),
+    ],
+)
+def test_a_file_that_holds_no_worlds_is_refused_in_one_line(run, capsys, text, words, told):
+    if text is not None:
+        Path("mine.toml").write_text(text)
+    ends_with, out, err = run("unseen_worlds", "--worlds", "mine.toml", *words)
+    assert re.search(told, f"{ends_with}{err}")
+    assert out == ""
+
+
 @pytest.mark.compiled
 def test_unseen_worlds_are_drawn_once_and_shares_are_of_the_best(run):
     from scripts import unseen_worlds
