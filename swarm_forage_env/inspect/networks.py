@@ -85,6 +85,8 @@ def _training(plan: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         yield _name(scenario), f"n_robots {_table(scenario.get('robots')).get('n_robots', 'unknown')}"
         disturbances = plan.get("wrappers")
     yield "wrappers", ", ".join(_table(disturbances)) or "none"
+    if plan.get("temperature", 1.0) != 1.0:
+        yield "temperature", f"{in_words(plan['temperature'])}, in the weights of the last layer"
     yield "turned", str(plan.get("turned", False))
     for k, stage in enumerate(map(_table, _rows(plan.get("stages"))), start=1):
         own = "in worlds of its own" if "sampler" in stage else in_words(_table(stage.get("scenario")))

@@ -16,7 +16,7 @@ import numpy as np
 from gymnasium import spaces
 
 from swarm_forage_env._internal.archives import ArchiveError, open_arrays, read_array
-from swarm_forage_env._internal.fields import ConfigError, known_keys, one_of, switch, table
+from swarm_forage_env._internal.fields import ConfigError, known_keys, number, one_of, switch, table
 from swarm_forage_env._internal.files import parse_json, replacing
 from swarm_forage_env.contract.kernel_policy import KernelPolicy
 from swarm_forage_env.contract.policy import SwarmSpec
@@ -28,6 +28,8 @@ from swarm_forage_env.policies.learned import InterfacePolicy
 from swarm_forage_env.scenarios.config import CACHE_KINDS
 
 ACTIVATIONS = ("tanh", "relu")
+TEMPERATURES = (0.01, 100.0)
+"""Least and largest temperature; our choice: further out, actions are drawn as by the likeliest or by chance."""
 _MOST_BYTES = 2**28
 """Bytes that a network may have, in the file and unpacked; our choice: a network of ours has a thousandth of it."""
 _MOST_NUMBERS = 2**26
@@ -132,10 +134,22 @@ class Network:
     def at_temperature(self, temperature: float) -> "Network":
         """Return a network that draws discrete actions by probabilities to the power of 1 / temperature.
 
-        Its last layer is divided by the temperature: below 1, likely actions become likelier; the likeliest stays it.
+        Its last layer is divided by the temperature: below 1, likely actions become likelier. The likeliest action
+        stays the likeliest.
+
+        Raises:
+            NetworkError: a temperature out of `TEMPERATURES`, or a network that does not draw discrete actions.
         """
         if temperature == 1.0:
             return self
+        try:
+            number("temperature", temperature, at_least=TEMPERATURES[0], at_most=TEMPERATURES[1])
+        except ConfigError as error:
+            raise NetworkError(str(error)) from error
+        if self.about.interface.actions != "discrete" or not self.about.samples:
+            raise NetworkError(
+                "Expected a network that draws discrete actions, got one that takes the likeliest or the mean."
+            )
         divisor = np.float32(temperature)
         return dataclasses.replace(
             self,

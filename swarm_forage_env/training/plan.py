@@ -21,7 +21,7 @@ from swarm_forage_env._internal.fields import (
 from swarm_forage_env._internal.files import parse_json, parse_toml, replacing
 from swarm_forage_env.contract.policy import layout_for
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping, learner_layout
-from swarm_forage_env.policies.network import ACTIVATIONS
+from swarm_forage_env.policies.network import ACTIVATIONS, TEMPERATURES
 from swarm_forage_env.policies.pretrained import plan_file
 from swarm_forage_env.policies.registry import policy_class
 from swarm_forage_env.policies.turns import AS_DRAWN, check_turned
@@ -236,9 +236,9 @@ class TrainingPlan:
                 f"Expected samples only with discrete actions of {' or '.join(SAMPLING)}, which have probabilities, "
                 f"got {self.interface.actions} ones of {self.algorithm}."
             )
-        number("temperature", self.temperature, above=0.0)
+        number("temperature", self.temperature, at_least=TEMPERATURES[0], at_most=TEMPERATURES[1])
         if self.temperature != 1.0 and not self.samples:
-            raise ConfigError(f"Expected temperature only with samples = true, got {self.temperature} without.")
+            raise ConfigError(f"Expected temperature only with samples, got {self.temperature}; set samples = true.")
         whole("n_arenas", self.n_arenas, at_least=1, at_most=MOST_ARENAS)
         if not isinstance(self.hidden, tuple):  # pyright: ignore[reportUnnecessaryIsInstance] - files hold anything
             raise ConfigError(f"Expected hidden to be sizes of layers, for example [64, 64], got {self.hidden!r}.")

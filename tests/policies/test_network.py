@@ -93,6 +93,22 @@ def test_a_temperature_makes_likely_actions_likelier():
     assert network.at_temperature(1.0) is network
 
 
+@pytest.mark.parametrize(
+    ("changes", "temperature", "reason"),
+    [
+        ({}, 0.0, r"temperature to be a number in \[0.01, 100\], got 0"),
+        ({}, np.nan, "temperature"),
+        ({"samples": False}, 0.5, "draws discrete actions, got one that takes the likeliest"),
+        ({"interface": InterfaceConfig(actions="continuous")}, 0.5, "draws discrete actions"),
+    ],
+)
+def test_a_temperature_that_would_mean_nothing_is_refused(changes, temperature, reason):
+    about = NetworkAbout(**{"interface": InterfaceConfig(actions="discrete"), "samples": True, **changes})
+    network = Network((np.ones((1, 3), np.float32),), (np.zeros(3, np.float32),), about)
+    with pytest.raises(NetworkError, match=reason):
+        network.at_temperature(temperature)
+
+
 def test_what_is_next_to_impossible_is_never_a_fault():
     logits, room = np.array([-1e9, 0.0, -200.0, -np.inf], np.float32), np.zeros(4)
     assert [pick(logits, True, chance, room) for chance in (0.0, 0.5, np.nextafter(1.0, 0.0))] == [0, 1, 1]

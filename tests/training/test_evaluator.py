@@ -43,8 +43,16 @@ def network(*, stands: bool) -> Network:
 
 
 def test_a_network_is_run_and_kept_at_the_temperature_of_the_plan(tmp_path):
-    Evaluator(replace(PLAN, temperature=0.25), tmp_path, {}).evaluate(network(stands=True), 60)
-    assert Network.load(tmp_path / "policy.npz").biases[0][0] == 200.0
+    learnt = network(stands=False)
+    learnt.biases[0][0] = 1.0  # stands more often than not
+    sharp = learnt.at_temperature(0.25)
+    found = [
+        Evaluator(replace(PLAN, temperature=temperature), tmp_path / name, {}).evaluate(one, 60)
+        for name, one, temperature in (("plan", learnt, 0.25), ("network", sharp, 1.0), ("as_learnt", learnt, 1.0))
+    ]
+    told = [(one.performance, one.interference_fraction) for one in found]
+    assert told[0] == told[1] != told[2]
+    assert Network.load(tmp_path / "plan" / "policy.npz").biases[0][0] == 4.0
 
 
 def test_the_folder_becomes_that_of_a_training_and_holds_the_best_network(tmp_path):
