@@ -139,7 +139,7 @@ def _lines(name: str) -> Iterable[str]:
         return _scenario_lines(presets.scenario(name), _scenario_headline(name))
     if Path(name).suffix == FILE:
         world = read_world(name)
-        return _scenario_lines(world.scenario, world.title())
+        return _scenario_lines(world.scenario, world.title(digests=False))
     if name in policy_names():
         network = network_file(name)
         return [*_policy_lines(name), *([] if network is None else ["", *_file_lines(network)])]

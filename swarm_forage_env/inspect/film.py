@@ -79,7 +79,7 @@ def record_run(
     arena_view(scenario, size_px, theme)  # refuses a bad size or theme before the run starts
     policy, name, scenario = cast_policy(policy, scenario, caches, parameters)
     disturbed = tuple(wrappers)
-    title = World(scenario, disturbed).title(name, size_words(scenario))
+    title = World(scenario, disturbed).title(name, size_words(scenario), digests=False)
     stack = build_env(scenario, disturbed, reads=getattr(policy, "reads", None))
     n_samples = round(trail_s * fps / speedup) + 1
     check_file(path)
@@ -158,7 +158,7 @@ def picture_run(
             trails.add(run.forage_env.swarm)
     world = run.forage_env
     state = (world.swarm, world.objects, world.caches, world.events)
-    title = World(scenario, disturbed).title(name, size_words(scenario))
+    title = World(scenario, disturbed).title(name, size_words(scenario), digests=False)
     return write_picture(
         render_frame(scenario, *state, tick=world.tick, size_px=size_px, trails=trails, title=title, theme=theme), path
     )

@@ -178,7 +178,7 @@ def saliency(
     if not len(rows):
         raise ConfigError("Expected robots at work, got a run in which no robot decided anything; choose another seed.")
     found = saliency_of_rows(network, policy.interface.layout, rows, np.random.default_rng(spec.seed))
-    about = spec.world.title(counted(scenario.robots.n_robots, "robot"), f"seed {spec.seed}")
+    about = spec.world.title(counted(scenario.robots.n_robots, "robot"), f"seed {spec.seed}", digests=False)
     return replace(found, title=f"{Path(spec.policy).stem} in {about}")
 
 

@@ -69,7 +69,7 @@ class Watch(RunByHand):
         super().__init__(
             scenario, policy, seed=seed, speed=speed, caches=caches, parameters=parameters, wrappers=wrappers
         )
-        self._headline = World(self.scenario, self.given).title(self.name, size_words(self.scenario))
+        self._headline = World(self.scenario, self.given).title(self.name, size_words(self.scenario), digests=False)
         self._size_px, self._theme = size_px, theme
         self._view = arena_view(self.scenario, size_px, theme)
         self.robot: int | None = None

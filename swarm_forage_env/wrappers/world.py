@@ -112,16 +112,16 @@ class World:
         words = difference_words(self.scenario, digests=digests)
         return (*words, *(config.in_words(self.scenario.dt_s) for config in self.wrappers))
 
-    def title(self, *facts: str) -> str:
+    def title(self, *facts: str, digests: bool = True) -> str:
         """Name the world for people: "warehouse_small: 50 robots, with 3 objects, throttle: robots lose 20 % ...".
 
-        Titles use this, of what is about this world alone: it has no digests. Where several worlds stand beside each
-        other, `name` and `changes` tell them apart.
+        Titles, tables and legends use this, so that no two worlds are called the same.
 
         Args:
             facts: What a title says of the runs, such as how many robots there are; changes among them appear once.
+            digests: Tell long lists apart by digests; what is about this world alone does without.
         """
-        changes = [words for words in self._changes(digests=False) if words not in facts]
+        changes = [words for words in self._changes(digests=digests) if words not in facts]
         words = f"{self.place}: {', '.join(facts)}," if facts else self.place
         return f"{words} with {', '.join(changes)}" if changes else words.removesuffix(",")
 

@@ -65,11 +65,12 @@ def test_a_title_says_place_facts_and_changes_once():
     assert replace(changed, name="mine").title("400 s").startswith("mine (warehouse_small): 400 s, with 3 objects")
 
 
-def test_a_title_has_no_digest_and_names_beside_each_other_have():
+def test_worlds_beside_each_other_are_told_apart_by_digests():
     several = [tuple((x, y, x + 1.0, y + 0.2) for x in (8.0, 12.0, 16.0, 20.0)) for y in (2.0, 4.0)]
     first, second = (World(scenario("warehouse_small", obstacles=boxes)) for boxes in several)
-    assert first.title() == "warehouse_small with 4 obstacles"
-    assert first.name.startswith("warehouse_small, 50 robots, 4 obstacles (")
+    assert first.title(digests=False) == "warehouse_small with 4 obstacles"
+    assert first.title().startswith("warehouse_small with 4 obstacles (")
+    assert first.title() != second.title()
     assert first.name != second.name
 
 
