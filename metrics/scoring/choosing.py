@@ -135,7 +135,7 @@ class Candidate:
     policy: str
     evidence: tuple[Evidence, ...]
     failures: tuple[str, ...] = ()
-    """Runs that failed, one line each."""
+    """Why runs failed, a line per reason."""
 
     @property
     def performance(self) -> float:

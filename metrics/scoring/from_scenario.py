@@ -79,7 +79,7 @@ class ScenarioPrediction(Answer):
     runs: Mapping[int, MeasuredRuns]
     """Of the sizes that were run."""
     failures: tuple[str, ...] = ()
-    """Runs that failed, one line each."""
+    """Why runs failed, a line per reason."""
 
     def error(self, n_robots: int) -> float:
         """Return by what share predicted performance is above the mean of the runs; NaN without runs."""

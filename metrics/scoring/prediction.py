@@ -71,7 +71,7 @@ class PredictionTable(Answer):
     adds_up: bool = True
     """Whether a swarm has what its robots have together, as the laws expect."""
     failures: tuple[str, ...] = ()
-    """Runs that failed, one line each."""
+    """Why runs failed, a line per reason."""
 
     @property
     def predicted_sizes(self) -> tuple[int, ...]:

@@ -56,7 +56,7 @@ class ScoreTable(Answer):
     missing: Mapping[str, str] = field(default_factory=dict[str, str])
     """Measure -> why it could not be computed."""
     failures: tuple[str, ...] = ()
-    """Runs that failed, one line each."""
+    """Why runs failed, a line per reason."""
     settings: Mapping[str, Any] = field(default_factory=dict[str, Any])
     """How the runs were made: budget, length, seeds, folder."""
     band: bool = False

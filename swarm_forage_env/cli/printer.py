@@ -98,7 +98,7 @@ def _are_numbers(column: Sequence[str]) -> bool:
 
 
 FAILURES_SHOWN = 10
-"""Failed runs for which the command that makes them again is told; the folder has those of all runs."""
+"""Reasons of failures for which the command that makes the first run again is told; the folder has those of all."""
 
 
 @contextmanager
@@ -208,4 +208,4 @@ def _tell_of_records(table: "Table", store: "RunStore") -> None:
     for first, *_ in reasons[:FAILURES_SHOWN]:
         typer.echo(f"again, alone: swarm-forage rerun {store.failure_path(first.run_id)}", err=True)
     if len(reasons) > FAILURES_SHOWN:
-        typer.echo(f"and {len(reasons) - FAILURES_SHOWN} more", err=True)
+        typer.echo(f"and {len(reasons) - FAILURES_SHOWN} more reasons", err=True)

@@ -48,9 +48,10 @@ class RunFailure:
 
 def failed_alike(failures: Iterable[RunFailure]) -> tuple[tuple[RunFailure, ...], ...]:
     """Return runs that failed, those together that a policy failed in for one reason."""
-    found: dict[tuple[str, str], list[RunFailure]] = {}
+    found: dict[tuple[str, ...], list[RunFailure]] = {}
     for failure in failures:
-        found.setdefault((failure.spec.policy, failure.error), []).append(failure)
+        policy, given = failure.spec.policy, json.dumps(failure.spec.parameters, sort_keys=True)
+        found.setdefault((policy, given, failure.error), []).append(failure)
     return tuple(map(tuple, found.values()))
 
 

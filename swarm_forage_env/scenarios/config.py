@@ -371,7 +371,7 @@ class ScenarioConfig:
         raise ConfigError(
             f"Expected dynamic caches that fit into the arena of {self.arena.width_m:g} x {self.arena.height_m:g} m, "
             f"got a side of {self.cache_side_cells * CELL_M:.1f} m, which their centres also keep from the border; "
-            f"lower cache.side_share to {math.floor(1000 * most / longer) / 1000:g}, or choose a wider arena."
+            f"lower side_share to {math.floor(1000 * most / longer) / 1000:g}, or choose a wider arena."
         )
 
     @property

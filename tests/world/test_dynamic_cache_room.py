@@ -16,7 +16,7 @@ NARROW = {"width_m": 32.0, "nest_size_m": (3.2, 3.2), "start_margin_m": 0.5, "n_
 @pytest.mark.parametrize(("height_m", "fitting_share"), [(9.4, 0.193), (8.0, 0.162), (6.0, 0.125)])
 def test_arenas_too_narrow_for_dynamic_caches_are_refused_with_a_side_that_fits(height_m, fitting_share):
     arena = {**NARROW, "height_m": height_m, "nest_centre_m": (3.2, height_m / 2), "caches": "dynamic"}
-    with pytest.raises(ConfigError, match=f"lower cache.side_share to {fitting_share}, or"):
+    with pytest.raises(ConfigError, match=f"lower side_share to {fitting_share}, or"):
         scenario("warehouse_small", **arena)
     assert scenario("warehouse_small", **arena, side_share=fitting_share).cache_side_cells > 1
     assert scenario("warehouse_small", **{**arena, "caches": "none"}).arena.height_m == height_m
