@@ -398,5 +398,5 @@ def export(
     from swarm_forage_env.cli.scenario_options import described_world
     from swarm_forage_env.training.export.exporting import export_policy
 
-    world, _ = described_world(described.place())
+    world, _ = described_world(described.whole())
     typer.echo(f"wrote {export_policy(policies.one(), file, world.scenario)}")

@@ -10,9 +10,8 @@ from textwrap import wrap
 import numpy as np
 
 from swarm_forage_env.policies.network import Network
-from swarm_forage_env.training.export.manual import Manual
+from swarm_forage_env.training.export.manual import WIDTH, Manual
 
-_WIDTH = 110
 _TANH = """\
 /* tanh, at most 4e-7 of its value from the true one: Lambert's fraction at a quarter of x, then tanh 2y twice. */
 static inline float {name}_tanh(float x)
@@ -127,7 +126,7 @@ def _arrays(network: Network, name: str) -> Iterator[str]:
 
 def _array(name: str, values: np.ndarray, shape: str) -> str:
     numbers = ", ".join(f"{np.format_float_scientific(value)}f" for value in values.astype(np.float32).ravel())
-    rows = "\n".join(f"    {line}" for line in wrap(numbers, _WIDTH, break_on_hyphens=False))
+    rows = "\n".join(f"    {line}" for line in wrap(numbers, WIDTH, break_on_hyphens=False))
     return f"/* {shape} */\nstatic const float {name}[{values.size}] = {{\n{rows}\n}};\n"
 
 

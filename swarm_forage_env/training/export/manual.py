@@ -23,8 +23,8 @@ from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.robots import WHEEL_SCALE_MPS
 
-_WIDTH = 110
-"""Characters of a line of formulas."""
+WIDTH = 110
+"""Characters of a line of formulas or numbers."""
 _FRAMES = """
 Each robot sees the world in a frame f of its own, and in another one after {length:,} decisions, so that a swarm
 spreads. In frame f the world is mirrored (x becomes -x) if f >= {upright}, and then turned counter-clockwise by f % 4
@@ -141,6 +141,6 @@ def _frame_lines(frames: Frames, is_discrete: bool) -> Iterator[str]:
         moved = [c for c in range(len(source)) if (source[c], sign[c]) != (c, 1.0)]
         moves = " ".join(f"inputs[{c}]={'-' if sign[c] < 0.0 else ''}s[{source[c]}];" for c in moved)
         line = f"    f == {frame}: {moves or 'nothing more'}"
-        yield from wrap(line, _WIDTH, subsequent_indent=" " * 12, break_on_hyphens=False)
+        yield from wrap(line, WIDTH, subsequent_indent=" " * 12, break_on_hyphens=False)
     wheels = "the two wheel speeds of the action" if is_discrete else "outputs[0] and outputs[1]"
     yield f"If f >= {N_UPRIGHT}, {wheels} change places before the robot drives: left is right in a mirror."
