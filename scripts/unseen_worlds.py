@@ -3,12 +3,12 @@
     python scripts/unseen_worlds.py                              generalist, the table of docs/generalist.md
     python scripts/unseen_worlds.py --policy a.npz,b.npz         other policies
     python scripts/unseen_worlds.py --draws 1                    a first look, at one world of each kind
-    python scripts/unseen_worlds.py --worlds docs/validation.toml    in worlds of a file, in which plans are chosen
+    python scripts/unseen_worlds.py --worlds docs/validation.toml    in the worlds of a file
 
 Eleven kinds of worlds, five drawn of each by the seed below: directions, shapes, numbers and disturbances that no
 shipped training plan has; long walls differ in place and length only. Nobody may choose a plan by them; run them once
-for a plan that is fixed. A file of worlds is like `evaluation` of a training plan; the yardstick there are CRW and DPO,
-because caches of others may stand in walls.
+for a plan that is fixed. The worlds of a file are not unseen: docs/validation.toml has those in which plans are chosen.
+The yardstick there is the better of CRW and DPO, because caches of the other two may stand in walls.
 """
 
 import argparse
@@ -20,7 +20,7 @@ import numpy as np
 from arguments import whole
 
 from metrics.controllers import PAPER_POLICIES
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import ConfigError, known_keys
 from swarm_forage_env._internal.files import parse_toml
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.runs.answer import Sheet
@@ -39,6 +39,10 @@ AHEAD = 0.95
 """Share of the best scripted controller that counts as keeping up with it."""
 NEED_NO_CACHE = ("crw", "dpo")
 """Controllers that can run wherever there are walls."""
+_KEYS = ("horizon_s", "n_runs", "first_seed", "worlds")
+"""What a file of worlds may say."""
+_N_DRAWS = 5
+_HORIZON_S = 4000.0
 Drawn = tuple[str, dict[str, Any], dict[str, Any]]
 """Preset, fields and wrappers."""
 _SMALL_CACHES = {"side_share": 0.06}
@@ -214,8 +218,12 @@ def in_drawn_worlds(asked: Sequence[PolicySpec], n_draws: int, horizon_s: float,
 def in_worlds_of(file: Path, asked: Sequence[PolicySpec], jobs: int) -> Sheet:
     """Return the table of the worlds of a file, with the file's numbers of seconds and of runs."""
     try:
-        plan = EvaluationPlan.from_mapping(parse_toml(file.read_text(encoding="utf-8")))
-    except (OSError, ValueError) as error:
+        given = parse_toml(file.read_text(encoding="utf-8"))
+        known_keys(given, _KEYS, prefix="")
+        plan = EvaluationPlan.from_mapping(given)
+    except OSError as error:
+        raise ConfigError(f"Cannot read the file of worlds {file}: {error.strerror or error}.") from error
+    except ValueError as error:
         raise ConfigError(f"Expected a file of worlds like docs/validation.toml, got {file}: {error}") from error
     there = list(map(plan.timed, plan.worlds))
     if not there:
@@ -223,8 +231,9 @@ def in_worlds_of(file: Path, asked: Sequence[PolicySpec], jobs: int) -> Sheet:
     found = shares(asked, there, jobs, yardstick=NEED_NO_CACHE, seeds=plan.seeds)
     rows = [(world.name, *(f"{one:.2f}" for one in own)) for world, own in zip(there, found.T, strict=True)]
     rival = " and ".join(NEED_NO_CACHE)
+    lasting = "" if plan.horizon_s is None else f"{plan.horizon_s:,.0f} s, "
     return Sheet(
-        title=f"Performance as a share of the better of {rival}, means of {len(plan.seeds)} runs",
+        title=f"Performance as a share of the better of {rival}, {lasting}means of {len(plan.seeds)} runs",
         header=("world", *(policy.label for policy in asked)),
         rows=rows + counts(found, rival),
     )
@@ -234,8 +243,8 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--policy", default="generalist", help="names or files, separated by commas")
-    parser.add_argument("--draws", type=whole(at_least=1), help="worlds of each kind (default: 5)")
-    parser.add_argument("--horizon", type=float, help="seconds of a run (default: 4000)")
+    parser.add_argument("--draws", type=whole(at_least=1), help=f"worlds of each kind (default: {_N_DRAWS})")
+    parser.add_argument("--horizon", type=float, help=f"seconds of a run (default: {_HORIZON_S:g})")
     parser.add_argument("--worlds", type=Path, help="file of other worlds, with its own seconds of a run")
     parser.add_argument("--jobs", type=whole(at_least=1), default=1, help="processes (default: 1)")
     words = parser.parse_args()
@@ -246,9 +255,8 @@ def main() -> None:
         if words.worlds:
             sheet = in_worlds_of(words.worlds, asked, words.jobs)
         else:
-            sheet = in_drawn_worlds(
-                asked, words.draws or 5, 4000.0 if words.horizon is None else words.horizon, words.jobs
-            )
+            horizon_s = _HORIZON_S if words.horizon is None else words.horizon
+            sheet = in_drawn_worlds(asked, words.draws or _N_DRAWS, horizon_s, words.jobs)
     except ConfigError as error:
         raise SystemExit(str(error)) from error
     print(sheet.text())

@@ -56,9 +56,10 @@ LIKELIEST = (
 AS_LEARNT = (
     "from swarm_forage_env.policies.network import Network; "
     "from swarm_forage_env.policies.pretrained import network_file as file; "
-    "Network.load(file('generalist')).at_temperature(2.0).save('as_learnt.npz')"
+    "network = Network.load(file('generalist')); "
+    "network.at_temperature(1.0 / network.about.card['plan']['temperature']).save('as_learnt.npz')"
 )
-"""The same weights, drawn as in training: the plan's temperature of 0.5 is taken back."""
+"""The same weights, drawn as in training: the plan's temperature is taken back."""
 SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "run": ((f"swarm-forage run {','.join(FIVE)} --scenario warehouse_small --robots 50 --seeds 4",), FIVE),
     "medium": (
