@@ -154,9 +154,9 @@ def draw_trainings(
             axes.set_xlim(0, None)
             for end in stage_ends[:-1]:
                 axes.axvline(end / 1e6, color="black", linestyle=":", linewidth=1)
-        # Beside the axes: levels of others may lie anywhere in them.
+        # Beside the axes: levels of others may lie anywhere in them. Not at the top, where headlines may be wide.
         shown_once = {label: handle for handle, label in zip(*upper.get_legend_handles_labels(), strict=True)}
-        figure.legend([*shown_once.values()], [*shown_once], loc="outside right upper")
+        figure.legend([*shown_once.values()], [*shown_once], loc="outside right center")
 
 
 Box: TypeAlias = tuple[float, float, float, float]
