@@ -181,7 +181,8 @@ def shares(
 
     def means(policies: Sequence[PolicySpec]) -> FloatArray:
         runs = [[table.of(one) for one in table.plan.of_policy(policy.label)] for policy in policies]
-        return np.array([[np.mean([one.performance.mean() for one in world]) for world in own] for own in runs])
+        made = [[[one.performance.mean() for one in world] for world in own] for own in runs]
+        return np.array(made, np.float64).mean(axis=-1)
 
     best, own = means(scripted).max(axis=0), means(asked)
     return np.divide(own, best, out=np.where(own > 0.0, np.inf, 1.0), where=best > 0.0)
