@@ -3,11 +3,11 @@
     python scripts/unseen_worlds.py                              generalist, the table of docs/generalist.md
     python scripts/unseen_worlds.py --policy a.npz,b.npz         other policies
     python scripts/unseen_worlds.py --draws 1                    a first look, at one world of each kind
-    python scripts/unseen_worlds.py --worlds docs/validation.toml    in the worlds of a file
+    python scripts/unseen_worlds.py --worlds docs/benchmark/validation.toml    in the worlds of a file
 
 Eleven kinds of worlds, five drawn of each by the seed below: directions, shapes, numbers and disturbances that no
 shipped training plan has; long walls differ in place and length only. Nobody may choose a plan by them; run them once
-for a plan that is fixed. The worlds of a file are not unseen: docs/validation.toml has those in which plans are chosen.
+for a plan that is fixed. The worlds of a file are not unseen: docs/benchmark/validation.toml has those in which plans are chosen.
 The yardstick there is the better of CRW and DPO, because caches of the other two may stand in walls.
 """
 
@@ -225,7 +225,7 @@ def in_worlds_of(file: Path, asked: Sequence[PolicySpec], jobs: int) -> Sheet:
     except OSError as error:
         raise ConfigError(f"Cannot read the file of worlds {file}: {error.strerror or error}.") from error
     except ValueError as error:
-        raise ConfigError(f"Expected a file of worlds like docs/validation.toml, got {file}: {error}") from error
+        raise ConfigError(f"Expected a file of worlds like docs/benchmark/validation.toml, got {file}: {error}") from error
     there = list(map(plan.timed, plan.worlds))
     if not there:
         raise ConfigError(f"Expected [[worlds]] in {file}, got none.")

@@ -151,7 +151,7 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         (
             f'python -c "{AS_LEARNT}"',
             f'python -c "{LIKELIEST}"',
-            f"python {ROOT}/scripts/unseen_worlds.py --worlds {ROOT}/docs/validation.toml "
+            f"python {ROOT}/scripts/unseen_worlds.py --worlds {ROOT}/docs/benchmark/validation.toml "
             "--policy generalist,as_learnt.npz,likeliest.npz",
         ),
         (),

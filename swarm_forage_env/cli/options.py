@@ -187,21 +187,6 @@ class WorldOptions(PlaceOptions):
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class ArenaOptions:
-    """Options of a world of which only its size, which may depend on its robots, and what they see matter."""
-
-    scenario: Scenario = "warehouse_small"
-    side: Side = None
-    robots: Robots = None
-    density: Density = None
-    settings: Settings = ()
-
-    def whole(self) -> WorldOptions:
-        """Return the options of the whole world."""
-        return WorldOptions(**{field.name: getattr(self, field.name) for field in fields(self)})
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
 class PolicyOptions:
     """Which policies, in one of two ways."""
 

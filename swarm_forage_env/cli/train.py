@@ -10,7 +10,6 @@ import typer
 from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, whole
 from swarm_forage_env.cli.options import (
     EXIT_FAILURE,
-    ArenaOptions,
     AsJson,
     DryRun,
     FirstSeed,
@@ -386,7 +385,7 @@ def dataset(
 
 def export(
     policies: PolicyOptions,
-    described: ArenaOptions,
+    described: WorldOptions,
     *,
     file: Annotated[Path, typer.Option("--file", metavar="FILE", help="File to write, .h (C99) or .onnx.")],
 ) -> None:
@@ -398,5 +397,5 @@ def export(
     from swarm_forage_env.cli.scenario_options import described_world
     from swarm_forage_env.training.export.exporting import export_policy
 
-    world, _ = described_world(described.whole())
+    world, _ = described_world(described)
     typer.echo(f"wrote {export_policy(policies.one(), file, world.scenario)}")
