@@ -7,8 +7,8 @@
 
 Eleven kinds of worlds, five drawn of each by the seed below: directions, shapes, numbers and disturbances that no
 shipped training plan has; long walls differ in place and length only. Nobody may choose a plan by them; run them once
-for a plan that is fixed. The worlds of a file are not unseen: docs/benchmark/validation.toml has those in which plans are
-chosen. The yardstick there is the better of CRW and DPO, because caches of the other two may stand in walls.
+for a plan that is fixed. The worlds of a file are not unseen: docs/benchmark/validation.toml has those in which plans
+are chosen. The yardstick there is the better of CRW and DPO, because caches of the other two may stand in walls.
 """
 
 import argparse
