@@ -84,6 +84,11 @@ def test_it_tells_the_only_world():
     ]
 
 
+def test_it_tells_a_temperature_of_the_plan():
+    text = told(NetworkAbout(interface=FRAMED, card={"plan": {**ONE_WORLD, "temperature": 0.5}}))
+    assert ("temperature", "0.5, in the weights of the last layer") in section(text, "trained in")
+
+
 def test_a_list_of_tables_takes_a_line_for_each():
     worlds = [{"world": "one", "ratio": 1.23456789}, {"world": "two", "ratio": 2.0}]
     text = told(NetworkAbout(interface=FRAMED, card={"evaluation": {"steps": 5, "worlds": worlds}}))
