@@ -1,30 +1,33 @@
-"""RecurrentPPO of sb3-contrib: robots that remember by a network of their own, without the site memory of the package.
+"""RecurrentPPO of sb3-contrib: robots that remember by an LSTM, without the site memory of the package.
 
     pip install ".[train]" "torch==2.13.0" "sb3-contrib==2.9.2"  # in a checkout
-    python scripts/recurrent_ppo.py --plan docs/benchmark/plans/recurrent_ppo.toml --out recurrent_ppo.zip
-    swarm-forage --trust-models run crw,recurrent_ppo.zip
+    python scripts/recurrent_ppo.py --plan docs/benchmark/plans/recurrent_ppo.toml --out results/recurrent_ppo
+    swarm-forage run crw,results/recurrent_ppo/policy.npz
 
-It carries out a plan of `swarm-forage train`: its worlds, its stages, its options of PPO. The algorithm has a buffer of
-its own, so it would also learn from rows that stand for no robot. `UsedRows` leaves these out.
+It carries out a plan of `swarm-forage train`: its worlds, its stages, its options of PPO, its evaluations. The network
+that does best in these is kept; it runs without torch. The algorithm has a buffer of its own, so it would also learn
+from rows that stand for no robot. `UsedRows` leaves these out.
 """
 
-import argparse
-import dataclasses
-import time
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
-import torch
+from rivals import begin, told
 from sb3_contrib import RecurrentPPO
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecEnvWrapper
 
-from swarm_forage_env.training.plan import read_plan
+from swarm_forage_env.training.evaluator import Evaluator
+from swarm_forage_env.training.plan import Stage, TrainingPlan
 from swarm_forage_env.training.sb3 import SwarmVecEnv
-from swarm_forage_env.training.sb3.export import note_interface
+from swarm_forage_env.training.sb3.export import export_network
 from swarm_forage_env.training.sb3.training import training_seed
 
 MEMORY = {"lstm_hidden_size": 64, "shared_lstm": True, "enable_critic_lstm": False}
 """One memory for actor and critic: half the time of two."""
+LIBRARIES = {name: version(name) for name in ("torch", "stable-baselines3", "sb3-contrib")}
 
 
 class UsedRows(VecEnvWrapper):
@@ -58,34 +61,54 @@ class UsedRows(VecEnvWrapper):
         return np.asarray(obs)[self._used], rewards[self._used], dones[self._used], [infos[row] for row in self._used]
 
 
-def main() -> None:
-    """Carry the plan out stage by stage, and save the model with a note of its interface."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--plan", type=Path, required=True, help="plan of a training by PPO, as TOML")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--out", type=Path, default=Path("recurrent_ppo.zip"), help="where the trained model goes")
-    args = parser.parse_args()
-    torch.set_num_threads(1)
-    plan = dataclasses.replace(read_plan(args.plan), seed=args.seed)
+class Watch(BaseCallback):
+    """Has the network evaluated when that is due."""
+
+    def __init__(self, evaluator: Evaluator) -> None:
+        super().__init__()
+        self._evaluator = evaluator
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_start(self) -> None:
+        self.look(self.model)
+
+    def look(self, model: BaseAlgorithm) -> None:
+        """Evaluate the network as it is now, between two rollouts or at the end of a stage."""
+        done, plan = model.num_timesteps, self._evaluator.plan
+        if self._evaluator.is_due(done):
+            network = export_network(model, plan.interface, samples=plan.samples, caches=plan.scenario.caches)
+            print(told(self._evaluator.evaluate(network, done)), flush=True)
+
+
+def carry_out(plan: TrainingPlan, folder: Path) -> None:
+    """Collect, learn and evaluate, stage by stage."""
     if plan.algorithm != "ppo":
-        parser.error(f"Expected a plan of ppo in {args.plan}, got one of {plan.algorithm}.")
-    started, done, end = time.perf_counter(), 0, 0
+        raise SystemExit(f"Expected a plan of ppo, got one of {plan.algorithm}.")
+    watch = Watch(Evaluator(plan, folder, {"by": "scripts/recurrent_ppo.py", "versions": LIBRARIES}))
+    learnt: RecurrentPPO | None = None
+    end = 0
     for stage in plan.stages:
-        end += stage.steps
-        env = UsedRows(SwarmVecEnv(**plan.arenas_of(stage)), dict(stage.scenario))
-        options = {**plan.options, **stage.options, "seed": training_seed(plan.seed, done)}
-        if done:  # the same weights in other arenas
-            model = RecurrentPPO.load(args.out, env=env, device="cpu", **options)
-        else:
-            network = {"net_arch": list(plan.hidden), **MEMORY}
-            model = RecurrentPPO("MlpLstmPolicy", env, policy_kwargs=network, device="cpu", verbose=1, **options)
-            note_interface(model, plan.interface, caches=plan.scenario.caches)
-        model.learn(end - done, reset_num_timesteps=False)
-        done = model.num_timesteps
-        model.save(args.out)
-        env.close()
-        print(f"{done:,} decisions in {time.perf_counter() - started:,.0f} s, {args.out}")
+        model, end = model_of(plan, stage, learnt), end + stage.steps
+        model.learn(end - model.num_timesteps, reset_num_timesteps=False, callback=watch)
+        watch.look(model)
+        model.get_env().close()  # type: ignore[union-attr] - it has one
+        learnt = model
+
+
+def model_of(plan: TrainingPlan, stage: Stage, before: RecurrentPPO | None) -> RecurrentPPO:
+    """Return the model of a stage, with the weights and the decisions of the stage before."""
+    done = 0 if before is None else before.num_timesteps
+    env = UsedRows(SwarmVecEnv(**plan.arenas_of(stage)), dict(stage.scenario))
+    options = {**plan.options, **stage.options, "seed": training_seed(plan.seed, done)}
+    network = {"net_arch": list(plan.hidden), **MEMORY}
+    model = RecurrentPPO("MlpLstmPolicy", env, policy_kwargs=network, device="cpu", **options)
+    if before is not None:
+        model.set_parameters(before.get_parameters())  # type: ignore[arg-type] - its types forget dictionaries in it
+        model.num_timesteps = done
+    return model
 
 
 if __name__ == "__main__":
-    main()
+    begin(__doc__, "results/recurrent_ppo", carry_out)

@@ -10,9 +10,7 @@ column over all robots at work in its arena: as many numbers for eight robots as
 The network that does best in the plan's evaluations is kept.
 """
 
-import argparse
 import dataclasses
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +19,7 @@ import tensordict
 import torch
 import torchrl
 from gymnasium.spaces import flatdim
+from rivals import begin, told
 from tensordict import TensorDict
 from tensordict.nn import InteractionType, TensorDictModule
 from torch import nn
@@ -28,13 +27,11 @@ from torchrl.modules import MLP, ProbabilisticActor, ValueOperator
 from torchrl.objectives import ClipPPOLoss
 from torchrl.objectives.value.functional import generalized_advantage_estimate
 
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.policies.interface import LearnerInterface
 from swarm_forage_env.policies.network import Network, NetworkAbout
-from swarm_forage_env.training.evaluations import Evaluation
 from swarm_forage_env.training.evaluator import Evaluator
-from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
+from swarm_forage_env.training.plan import Stage, TrainingPlan
 from swarm_forage_env.views.gymnasium import SwarmVectorEnv
 
 OPTIONS = {"n_steps": 128, "batch_size": 4096, "n_epochs": 4, "learning_rate": 1e-3, "gamma": 0.99, "gae_lambda": 0.97,
@@ -182,13 +179,6 @@ def options_of(plan: TrainingPlan, stage: Stage) -> dict:
     return {**OPTIONS, **options}
 
 
-def told(evaluation: Evaluation) -> str:
-    """Return a line about an evaluation."""
-    speed = f"{evaluation.steps / max(evaluation.cpu_time_s, 0.1):,.0f} per s of a core"
-    reached = f"{evaluation.performance:.2f} of the baselines, interference {evaluation.interference_fraction:.3f}"
-    return f"{evaluation.steps:>11,} decisions, {speed}, {reached}"
-
-
 def carry_out(plan: TrainingPlan, folder: Path) -> None:
     """Collect, learn and evaluate, stage by stage; the best network is kept, and draws its actions."""
     plan = dataclasses.replace(plan, samples=True)
@@ -212,21 +202,6 @@ def carry_out(plan: TrainingPlan, folder: Path) -> None:
                 network = Network.from_state_dict(learner.body.state_dict(), about)
                 print(told(evaluator.evaluate(network, done)), flush=True)
         envs.close()
-
-
-def begin(description: str | None, out: str, carry_out: Callable[[TrainingPlan, Path], None]) -> None:
-    """Read the words of the command, and carry their plan out into the folder that they name."""
-    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--plan", type=Path, required=True, help="plan of a training, as TOML")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--out", type=Path, default=Path(out), help="folder of the training")
-    args = parser.parse_args()
-    torch.manual_seed(args.seed)
-    torch.set_num_threads(1)
-    try:
-        carry_out(dataclasses.replace(read_plan(args.plan), seed=args.seed), args.out)
-    except (ConfigError, OSError) as error:
-        parser.error(str(error))
 
 
 if __name__ == "__main__":

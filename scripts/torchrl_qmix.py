@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import torch
 from gymnasium.spaces import flatdim
+from rivals import begin, told
 from tensordict import TensorDict
 from tensordict.nn import TensorDictModule
 from torch import nn
@@ -26,7 +27,7 @@ from torchrl.modules import QValueModule, SafeSequential
 from torchrl.modules.models.multiagent import QMixer
 from torchrl.objectives import HardUpdate, ValueEstimators
 from torchrl.objectives.multiagent import QMixerLoss
-from torchrl_mappo import LIBRARIES, begin, perceptron, swarm_state, told
+from torchrl_mappo import LIBRARIES, perceptron, swarm_state
 
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ObsArray
@@ -177,7 +178,7 @@ class Training:
         return max(options["exploration_final_eps"], 1.0 - self.done / n_decisions)
 
     def _network(self) -> Network:
-        about = NetworkAbout(interface=self.plan.interface, caches=self.plan.scenario.caches)
+        about = NetworkAbout(interface=self.plan.interface, samples=self.plan.samples, caches=self.plan.scenario.caches)
         return Network.from_state_dict(self.learner.body.state_dict(), about)
 
 

@@ -132,7 +132,7 @@ def open_network_of(policy: str) -> Network:
 
     Raises:
         ConfigError: the policy is no network in a file.
-        NetworkError: the file holds none.
+        NetworkError: the file holds none, or one with a memory.
         OSError: the file cannot be read.
     """
     file = network_file(policy) or Path(policy)
@@ -143,7 +143,7 @@ def open_network_of(policy: str) -> Network:
             f"{policy!r}.{suggestion(policy, known)} Training leaves policy.npz beside a model; other policies have no "
             "network to look into."
         )
-    return Network.load(file)
+    return Network.load(file).perceptron()
 
 
 def saliency(

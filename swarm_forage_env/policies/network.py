@@ -1,7 +1,8 @@
 """Trained policies without torch: a small network in a file, evaluated by a kernel.
 
-A file is an `.npz` of plain arrays: the layers of the network ("weight_0", "bias_0", ...) and "about", the JSON text
-of `NetworkAbout`. Nothing in it is executed, so it is safe to open a file from an unknown source.
+A file is an `.npz` of plain arrays: the layers of the network ("weight_0", "bias_0", ...), those of its memory if it
+has one ("lstm_weight", "lstm_bias"), and "about", the JSON text of `NetworkAbout`. Nothing in it is executed, so it is
+safe to open a file from an unknown source.
 """
 
 import dataclasses
@@ -28,8 +29,9 @@ from swarm_forage_env.policies.learned import InterfacePolicy
 from swarm_forage_env.scenarios.config import CACHE_KINDS
 
 ACTIVATIONS = ("tanh", "relu")
-TEMPERATURES = (0.01, 100.0)
-"""Least and largest temperature; our choice: further out, actions are drawn as by the likeliest or by chance."""
+TEMPERATURES = (0.0001, 100.0)
+"""Least and largest temperature; our choice: further out, actions are drawn as by the likeliest or by chance. Values of
+actions (DQN) lie closer together than logits, and need a lower one."""
 _MOST_BYTES = 2**28
 """Bytes that a network may have, in the file and unpacked; our choice: a network of ours has a thousandth of it."""
 _MOST_NUMBERS = 2**26
@@ -90,14 +92,63 @@ class NetworkAbout:
 
 
 @dataclass(frozen=True, slots=True)
+class LSTM:
+    """A memory: one layer of n cells with gates for input, forgetting and output (Gers et al. 2000), d columns in.
+
+    In each decision, a cell keeps sigmoid(f) of what it kept and sigmoid(i) of tanh(g), and puts out sigmoid(o) of the
+    tanh of that; i, f, g and o are sums over what a robot sees and what its cells put out in the decision before.
+    """
+
+    weight: np.ndarray
+    """(d + n, 4 n) float32: rows for what is seen, then for what was put out; columns for i, f, g and o."""
+    bias: np.ndarray
+    """(4 n,) float32."""
+
+    def __post_init__(self) -> None:
+        shape, n_cells = self.weight.shape, self.bias.size // 4
+        fits = self.bias.shape == (4 * n_cells,) and len(shape) == 2 and shape[1] == 4 * n_cells
+        if not fits or not 0 < n_cells < shape[0]:
+            raise NetworkError(
+                "Expected an LSTM with weights (columns + cells, 4 x cells) and as many biases, got weights "
+                f"{shape} and biases {self.bias.shape}."
+            )
+
+    @property
+    def n_cells(self) -> int:
+        """How many cells a robot has."""
+        return len(self.bias) // 4
+
+    @classmethod
+    def from_state_dict(cls, state: Mapping[str, Any]) -> "LSTM | None":
+        """Take the one layer of a `torch.nn.LSTM` from the state dict of a module; None without one.
+
+        Raises:
+            NetworkError: several layers, or a layer without all of its parts.
+        """
+        parts = {
+            part: [_array(tensor) for name, tensor in state.items() if name.rpartition(".")[2].startswith(part)]
+            for part in ("weight_ih_l", "weight_hh_l", "bias_ih_l", "bias_hh_l")
+        }
+        found = {part: len(arrays) for part, arrays in parts.items()}
+        if not any(found.values()):
+            return None
+        if set(found.values()) != {1}:
+            raise NetworkError(f"Expected an LSTM with one layer, weights and biases, got {found}.")
+        seen, told, bias, again = (arrays[0] for arrays in parts.values())
+        return cls(np.ascontiguousarray(np.concatenate([seen, told], 1).T), bias + again)
+
+
+@dataclass(frozen=True, slots=True)
 class Network:
-    """Layers of a perceptron with one kind of activation, and what is needed besides the weights."""
+    """Layers of a perceptron with one kind of activation, a memory if it has one, and what is needed besides."""
 
     weights: tuple[np.ndarray, ...]
     """(in, out) float32 per layer."""
     biases: tuple[np.ndarray, ...]
     """(out,) float32 per layer."""
     about: NetworkAbout
+    lstm: LSTM | None = None
+    """Memory of each robot. What it puts out is what the first layer takes; without one, that is what a robot sees."""
 
     def __post_init__(self) -> None:
         sizes = [weight.shape for weight in self.weights]
@@ -107,13 +158,40 @@ class Network:
         )
         if not fits or any(left[1] != right[0] for left, right in itertools.pairwise(sizes)):
             raise NetworkError(f"Expected layers that follow on each other, got weights {sizes}.")
-        if not all(layer.dtype.kind == "f" and _is_finite(layer) for layer in (*self.weights, *self.biases)):
+        if self.lstm is not None and self.lstm.n_cells != len(self.weights[0]):
+            raise NetworkError(
+                f"Expected a first layer that takes what {self.lstm.n_cells} cells put out, got weights {sizes}."
+            )
+        parts = self._parts()
+        if not all(array.dtype.kind == "f" and _is_finite(array) for part in parts for array in part):
             raise NetworkError("Expected weights and biases that are finite numbers; did the training diverge?")
-        width = max(*(len(bias) for bias in self.biases), len(self.weights[0]))
-        if width * sum(len(weight) + 1 for weight in self.weights) > _MOST_NUMBERS:
+        if self._width() * sum(len(weight) + 1 for weight, _ in parts) > _MOST_NUMBERS:
             raise NetworkError(
                 f"Expected layers that take at most {_MOST_NUMBERS:,} numbers side by side, got {sizes}."
             )
+
+    @property
+    def n_columns(self) -> int:
+        """How many columns a robot sees."""
+        return len(self.weights[0]) if self.lstm is None else len(self.lstm.weight) - self.lstm.n_cells
+
+    @property
+    def n_cells(self) -> int:
+        """How many cells remember for a robot; 0 without a memory."""
+        return 0 if self.lstm is None else self.lstm.n_cells
+
+    def perceptron(self) -> "Network":
+        """Return the network itself where it has no memory, so that what it sees alone says what it does.
+
+        Raises:
+            NetworkError: it has a memory.
+        """
+        if self.lstm is not None:
+            raise NetworkError(
+                f"Expected a network without a memory, got one with {self.n_cells} cells of an LSTM: what it does "
+                "depends on what it saw before."
+            )
+        return self
 
     def outputs(self, rows: ObsArray) -> np.ndarray:
         """Return the last layer's values for observations (N, d), (N, m) float32, before any choice of actions.
@@ -121,14 +199,15 @@ class Network:
         A row has the same bits on every machine, and whatever other rows there are (`policies.kernels.network`).
 
         Raises:
-            NetworkError: rows of another number of columns than the network takes.
+            NetworkError: rows of another number of columns than the network takes, or it has a memory.
         """
-        if rows.ndim != 2 or rows.shape[1] != len(self.weights[0]):
-            raise NetworkError(
-                f"Expected observations (N, {len(self.weights[0])}), as the network takes, got {rows.shape}."
-            )
-        values = np.empty((len(rows), len(self.biases[-1])), np.float32)
-        forward(np.ascontiguousarray(rows, np.float32), self.layers(), np.ones(len(rows), np.bool_), values)
+        self.perceptron()
+        if rows.ndim != 2 or rows.shape[1] != self.n_columns:
+            raise NetworkError(f"Expected observations (N, {self.n_columns}), as the network takes, got {rows.shape}.")
+        n_rows = len(rows)
+        values, nothing = np.empty((n_rows, len(self.biases[-1])), np.float32), np.empty((n_rows, 0), np.float32)
+        rows = np.ascontiguousarray(rows, np.float32)
+        forward(rows, self.layers(), np.ones(n_rows, np.bool_), nothing, nothing, values)
         return values
 
     def at_temperature(self, temperature: float) -> "Network":
@@ -159,15 +238,16 @@ class Network:
 
     def layers(self) -> Layers:
         """Return the layers as kernels take them, with room of their own to work in."""
-        width = -(-max(*(len(bias) for bias in self.biases), len(self.weights[0])) // LANES) * LANES
-        numbers = np.zeros((sum(len(weight) + 1 for weight in self.weights), width), np.float32)
+        width = -(-self._width() // LANES) * LANES
+        numbers = np.zeros((sum(len(weight) + 1 for weight, _ in self._parts()), width), np.float32)
         row = 0
-        for weight, bias in zip(self.weights, self.biases, strict=True):
+        for weight, bias in self._parts():
             numbers[row, : len(bias)] = bias
             numbers[row + 1 : row + 1 + len(weight), : len(bias)] = weight
             row += len(weight) + 1
         sizes = np.array([len(self.weights[0]), *(len(bias) for bias in self.biases)], np.int32)
         return Layers(
+            n_cells=self.n_cells,
             sizes=sizes,
             numbers=numbers,
             is_tanh=self.about.activation == "tanh",
@@ -178,31 +258,41 @@ class Network:
             powers=np.zeros(len(self.biases[-1])),
         )
 
+    def _parts(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Return weights and biases of the memory, if there is one, and of all layers."""
+        memory = [] if self.lstm is None else [(self.lstm.weight, self.lstm.bias)]
+        return memory + list(zip(self.weights, self.biases, strict=True))
+
+    def _width(self) -> int:
+        """Return the largest number of columns that go into a part or come out of it."""
+        return max(size for weight, _ in self._parts() for size in weight.shape)
+
     @classmethod
     def from_state_dict(
         cls, state: Mapping[str, Any], about: NetworkAbout, *, n_outputs: int | None = None
     ) -> "Network":
-        """Take the layers of a perceptron from the state dict of a torch module.
+        """Take the layers of a perceptron, and of an LSTM before it, from the state dict of a torch module.
 
         Args:
             state: Tensors by name, in the order of the layers: (out, in) under names that end in "weight", (out,) under
-                names that end in "bias". Others are left out.
+                names that end in "bias", and those of one `torch.nn.LSTM`, if there is one. Others are left out.
             about: What is needed besides the weights.
             n_outputs: How many outputs are actions; default all. Some libraries add deviations after the means.
 
         Raises:
-            NetworkError: the layers do not follow on each other.
+            NetworkError: the layers do not follow on each other, or an LSTM has several.
         """
         parts = {end: [_array(tensor) for name, tensor in state.items() if name.endswith(end)] for end in _LAYER_PARTS}
         weights, biases = ([array.T for array in parts["weight"]], parts["bias"])
         if n_outputs is not None and weights and biases:
             weights[-1], biases[-1] = weights[-1][:, :n_outputs], biases[-1][:n_outputs]
-        return cls(tuple(map(np.ascontiguousarray, weights)), tuple(biases), about)
+        return cls(tuple(map(np.ascontiguousarray, weights)), tuple(biases), about, LSTM.from_state_dict(state))
 
     def save(self, path: str | Path) -> None:
         """Write the file; an existing one is replaced."""
         layers = {f"weight_{k}": weight for k, weight in enumerate(self.weights)}
         layers |= {f"bias_{k}": bias for k, bias in enumerate(self.biases)}
+        layers |= {} if self.lstm is None else {"lstm_weight": self.lstm.weight, "lstm_bias": self.lstm.bias}
         with replacing(Path(path)) as draft, draft.open("wb") as file:
             about = np.array(self.about.to_json())
             np.savez_compressed(file, about=about, **layers)  # type: ignore[arg-type] - no name of a layer is "allow_pickle"
@@ -220,7 +310,10 @@ class Network:
             n_layers = sum(name.startswith("weight_") for name in stored.namelist())
             weights = tuple(read_array(stored, f"weight_{k}") for k in range(n_layers))
             biases = tuple(read_array(stored, f"bias_{k}") for k in range(n_layers))
-            return cls(weights, biases, NetworkAbout.from_json(str(read_array(stored, "about"))))
+            about = NetworkAbout.from_json(str(read_array(stored, "about")))
+            if not any(name.startswith("lstm_") for name in stored.namelist()):
+                return cls(weights, biases, about)
+            return cls(weights, biases, about, LSTM(*(read_array(stored, f"lstm_{part}") for part in _LAYER_PARTS)))
         except (ArchiveError, NetworkError) as error:
             raise NetworkError(f"Expected {path} to hold a network: {error}") from error
 
@@ -257,9 +350,9 @@ class NetworkPolicy(KernelPolicy, InterfacePolicy):
             NetworkError: the network has another number of columns or actions than its interface.
         """
         self._bind(spec)
-        space, layers = self.interface.action_space, self._network.layers()
+        space, network, layers = self.interface.action_space, self._network, self._network.layers()
         n_actions = int(space.n) if isinstance(space, spaces.Discrete) else space.shape[0]
-        wanted, found = (self.interface.layout.size, n_actions), (int(layers.sizes[0]), int(layers.sizes[-1]))
+        wanted, found = (self.interface.layout.size, n_actions), (network.n_columns, len(network.biases[-1]))
         if wanted != found:
             raise NetworkError(
                 f"Expected a network from {wanted[0]} columns to {wanted[1]} actions, as its interface says, got one "
@@ -271,6 +364,8 @@ class NetworkPolicy(KernelPolicy, InterfacePolicy):
             outputs=np.zeros((n_robots, n_actions), np.float32),
             number=np.zeros(n_robots, np.int32),
             is_made=np.zeros(n_robots, np.bool_),
+            hidden=np.zeros((n_robots, network.n_cells), np.float32),
+            cell=np.zeros((n_robots, network.n_cells), np.float32),
         )
         n_draws = 1 if layers.samples and self.interface.translation.is_discrete else 0
         actions = np.zeros((n_robots, spec.action_size), np.float32)

@@ -213,7 +213,8 @@ class TrainingPlan:
     seed: int = 0
     samples: bool = False
     """Whether the policy that comes of it draws its discrete actions by their probabilities, as it did while it learnt
-    (PPO, A2C). Robots that always take the likeliest one may block each other for ever."""
+    (PPO, A2C), or by the exponentials of their values over the temperature (DQN). Robots that always take the likeliest
+    one may block each other for ever."""
     temperature: float = 1.0
     """How the policy that comes of it draws: by probabilities to the power of 1 / temperature, scaled to a sum
     of 1. Below 1, rare actions become rarer than they were while it learnt."""
@@ -231,14 +232,16 @@ class TrainingPlan:
         if self.interface.actions == unfit:
             raise ConfigError(f"Expected actions that {self.algorithm} can choose, got {unfit} ones.")
         switch("samples", self.samples)
-        if self.samples and (self.algorithm not in SAMPLING or self.interface.actions != "discrete"):
-            raise ConfigError(
-                f"Expected samples only with discrete actions of {' or '.join(SAMPLING)}, which have probabilities, "
-                f"got {self.interface.actions} ones of {self.algorithm}."
-            )
+        if self.samples and self.interface.actions != "discrete":
+            raise ConfigError(f"Expected samples only with discrete actions, got {self.interface.actions} ones.")
         number("temperature", self.temperature, at_least=TEMPERATURES[0], at_most=TEMPERATURES[1])
         if self.temperature != 1.0 and not self.samples:
             raise ConfigError(f"Expected temperature only with samples, got {self.temperature}; set samples = true.")
+        if self.temperature == 1.0 and self.samples and self.algorithm not in SAMPLING:
+            raise ConfigError(
+                f"Expected a temperature for samples of {self.algorithm}, whose actions have values and no "
+                "probabilities; set one that is small beside a reward, for example temperature = 0.005."
+            )
         whole("n_arenas", self.n_arenas, at_least=1, at_most=MOST_ARENAS)
         if not isinstance(self.hidden, tuple):  # pyright: ignore[reportUnnecessaryIsInstance] - files hold anything
             raise ConfigError(f"Expected hidden to be sizes of layers, for example [64, 64], got {self.hidden!r}.")

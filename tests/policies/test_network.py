@@ -12,8 +12,9 @@ from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.kernels.network import pick, power
 from swarm_forage_env.policies.learned import LearnedPolicy
-from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkError, NetworkPolicy
+from swarm_forage_env.policies.network import LSTM, Network, NetworkAbout, NetworkError, NetworkPolicy
 from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.training.export.exporting import export_policy
 from swarm_forage_env.views.pettingzoo import parallel_env
 from tests.reference import perceptron
 from tests.support.branches import pickled
@@ -96,7 +97,7 @@ def test_a_temperature_makes_likely_actions_likelier():
 @pytest.mark.parametrize(
     ("changes", "temperature", "reason"),
     [
-        ({}, 0.0, r"temperature to be a number in \[0.01, 100\], got 0"),
+        ({}, 0.0, r"temperature to be a number in \[0.0001, 100\], got 0"),
         ({}, np.nan, "temperature"),
         ({"samples": False}, 0.5, "draws discrete actions, got one that takes the likeliest"),
         ({"interface": InterfaceConfig(actions="continuous")}, 0.5, "draws discrete actions"),
@@ -300,6 +301,71 @@ def test_a_state_dict_without_all_of_its_layers_is_refused(lost):
     state = {name: array for name, array in state_dict().items() if name != lost}
     with pytest.raises(NetworkError, match="layers that follow on each other"):
         Network.from_state_dict(state, small_network().about)
+
+
+def remembering_network(**about) -> Network:
+    """Eight cells before one layer; it sees the compact view and numbers its actions."""
+    rng = np.random.default_rng(7)
+    lstm, layer = ((rng.normal(size=size), rng.normal(size=size[1])) for size in ((23 + 8, 32), (8, 6)))
+    interface = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True)
+    return Network((layer[0],), (layer[1],), NetworkAbout(interface=interface, **about), LSTM(*lstm))
+
+
+def test_a_file_keeps_the_memory_of_a_network(tmp_path):
+    network = remembering_network()
+    network.save(tmp_path / "network.npz")
+    again = Network.load(tmp_path / "network.npz")
+    assert again.lstm is not None
+    assert (again.n_columns, again.n_cells) == (23, 8)
+    np.testing.assert_array_equal(again.lstm.weight, network.lstm.weight, strict=True)
+    np.testing.assert_array_equal(again.lstm.bias, network.lstm.bias, strict=True)
+    with np.load(tmp_path / "network.npz") as stored:
+        parts = {name: array for name, array in stored.items() if name != "lstm_bias"}
+    np.savez(tmp_path / "half.npz", **parts)
+    with pytest.raises(NetworkError, match="has no part 'lstm_bias'"):
+        Network.load(tmp_path / "half.npz")
+
+
+def test_a_memory_that_fits_nothing_is_refused():
+    network = remembering_network()
+    for weight, bias in (((8, 32), 32), ((31, 32), 31), ((31, 28), 32), ((31,), 32), ((3, 0), 0)):
+        with pytest.raises(NetworkError, match=r"an LSTM with weights \(columns \+ cells, 4 x cells\)"):
+            LSTM(np.zeros(weight), np.zeros(bias))
+    with pytest.raises(NetworkError, match="a first layer that takes what 4 cells put out"):
+        Network(network.weights, network.biases, network.about, LSTM(np.zeros((27, 16)), np.zeros(16)))
+    with pytest.raises(NetworkError, match="finite numbers"):
+        Network(network.weights, network.biases, network.about, LSTM(np.full((31, 32), np.inf), np.zeros(32)))
+
+
+def test_what_a_network_with_a_memory_sees_does_not_say_what_it_does(tmp_path):
+    network = remembering_network()
+    with pytest.raises(NetworkError, match="without a memory, got one with 8 cells"):
+        network.outputs(np.zeros((2, 23), np.float32))
+    network.save(tmp_path / "network.npz")
+    with pytest.raises(NetworkError, match="without a memory"):
+        export_policy(tmp_path / "network.npz", tmp_path / "network.h")
+    assert small_network().perceptron().n_cells == 0
+
+
+def test_cells_are_those_of_torch():
+    torch = pytest.importorskip("torch")
+    module = torch.nn.ModuleDict({"lstm": torch.nn.LSTM(23, 8), "last": torch.nn.Linear(8, 6)})
+    about = remembering_network().about
+    network = Network.from_state_dict(module.state_dict(), about)
+    env = parallel_env("warehouse_small", n_robots=5, n_objects=20)
+    policy, state = NetworkPolicy(network), None
+    for seed in (3, 4):  # the second run begins without memory, too
+        policy.reset(env.swarm_spec, np.random.default_rng(0))
+        obs, state = env.reset_batch(seed), None
+        for _ in range(20):
+            obs, *_ = env.step_batch(policy.act(obs, env.active))
+            with torch.no_grad():
+                cells, state = module["lstm"](torch.from_numpy(policy.seen.copy())[None], state)
+                expected = module["last"](cells[0]).numpy()
+            np.testing.assert_allclose(policy._choice.outputs, expected, atol=1e-5)
+    several = torch.nn.ModuleDict({"lstm": torch.nn.LSTM(23, 8, num_layers=2), "last": torch.nn.Linear(8, 6)})
+    with pytest.raises(NetworkError, match=r"an LSTM with one layer, weights and biases, got .*'weight_ih_l': 2"):
+        Network.from_state_dict(several.state_dict(), about)
 
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, pickled])

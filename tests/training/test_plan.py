@@ -118,7 +118,7 @@ def test_a_plan_is_read_back_from_what_it_writes(plan, tmp_path):
         ("options = { learning_rate = 0.1 }", "options = 5", "stage.options to be a table"),
         ("horizon_s = 400.0", 'horizon_s = 400.0\nbaseline = "crv"', "Did you mean 'crw'"),
         ("n_arenas = 2", "n_arenas = 2\nsamples = 1", "samples to be"),
-        ("n_arenas = 2", "n_arenas = 2\ntemperature = 0.0", r"temperature to be a number in \[0.01, 100\], got 0"),
+        ("n_arenas = 2", "n_arenas = 2\ntemperature = 0.0", r"temperature to be a number in \[0.0001, 100\], got 0"),
         (
             "n_arenas = 2",
             "n_arenas = 2\ntemperature = 0.5",
@@ -127,7 +127,7 @@ def test_a_plan_is_read_back_from_what_it_writes(plan, tmp_path):
         (
             "n_arenas = 2",
             "n_arenas = 2\nsamples = true",
-            "only with discrete actions of ppo or a2c, .* got discrete ones of dqn",
+            "a temperature for samples of dqn, whose actions have values",
         ),
     ],
 )

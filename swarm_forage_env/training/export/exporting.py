@@ -32,7 +32,7 @@ def export_policy(policy: str | Path, file: str | Path, scenario: str | Scenario
 
     Raises:
         ConfigError: another ending, a policy that is no network, or a scenario without what it sees.
-        NetworkError: a file that holds no network, or one that does not fit its interface.
+        NetworkError: a file that holds no network, or one that has a memory or does not fit its interface.
         ImportError: the package onnx is missing, for ONNX.
         OSError: a file cannot be read or written.
     """

@@ -13,7 +13,7 @@ from torch import nn
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
 from swarm_forage_env.policies.model_files import MODEL_NOTE, describe_spaces
-from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkError
+from swarm_forage_env.policies.network import LSTM, Network, NetworkAbout, NetworkError
 from swarm_forage_env.scenarios.presets import scenario
 
 ACTIVATION_CLASSES: dict[str, type[nn.Module]] = {"tanh": nn.Tanh, "relu": nn.ReLU}
@@ -29,12 +29,13 @@ def export_network(
     caches: str = "none",
     card: dict[str, Any] | None = None,
 ) -> Network:
-    """Return the acting part of a PPO, A2C or DQN model with an `MlpPolicy`.
+    """Return the acting part of a PPO, A2C or DQN with an `MlpPolicy`, or of a RecurrentPPO with an `MlpLstmPolicy`.
 
     Args:
         model: The trained model.
         interface: What it saw and did in training, `SwarmVecEnv.interface.config`.
-        samples: Draw discrete actions by their probabilities (PPO, A2C) instead of taking the likeliest.
+        samples: Draw discrete actions by their probabilities (PPO, A2C) instead of taking the likeliest. Those of a DQN
+            need a temperature, see `Network.at_temperature`.
         caches: Kind of caches that it was trained with.
         card: How it came about, plain values.
 
@@ -61,7 +62,8 @@ def export_network(
         caches=caches,
         card=card or {},
     )
-    return Network(weights, biases, about)
+    memory = getattr(model.policy, "lstm_actor", None)
+    return Network(weights, biases, about, None if memory is None else LSTM.from_state_dict(memory.state_dict()))
 
 
 def note_interface(model: BaseAlgorithm, interface: InterfaceConfig, *, caches: str = "none") -> None:
@@ -116,7 +118,7 @@ def _acting_layers(model: BaseAlgorithm) -> list[nn.Module]:
     if isinstance(policy, DQNPolicy) and isinstance(policy.q_net.features_extractor, FlattenExtractor):
         return [*policy.q_net.q_net]
     raise NetworkError(
-        f"Expected a PPO, A2C or DQN model with an MlpPolicy, got {type(model).__name__} with "
+        f"Expected a PPO, A2C or DQN model with an MlpPolicy, or a RecurrentPPO, got {type(model).__name__} with "
         f"{type(policy).__name__}; run it from its zip file instead."
     )
 
