@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[2]
 EXAMPLE = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
 PAGES = {"agilerl": "agilerl", "benchmarl": "benchmarl", "rllib": "ray", "torchrl": "torchrl"}
 """Page in docs/bridges -> module that it needs."""
-CURVES = ("agilerl", "rllib")
+CURVES = ("agilerl", "benchmarl", "rllib")
 """Pages whose example is evaluated while it trains, and keeps the best network in a folder named like the page."""
 LENGTH = re.compile(r"^N_DECISIONS = [\d_]+", re.MULTILINE)
 """How long an example trains: minutes on the page, here until all of its code has run once."""
