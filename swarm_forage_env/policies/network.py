@@ -93,7 +93,7 @@ class NetworkAbout:
 
 @dataclass(frozen=True, slots=True)
 class LSTM:
-    """A memory: one layer of n cells with gates for input, forgetting and output (Gers et al. 2000), d columns in.
+    """A memory: one layer of n cells with gates for input, forgetting and output ([LSTM]), d columns in.
 
     In each decision, a cell keeps sigmoid(f) of what it kept and sigmoid(i) of tanh(g), and puts out sigmoid(o) of the
     tanh of that; i, f, g and o are sums over what a robot sees and what its cells put out in the decision before.
