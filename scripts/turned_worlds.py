@@ -8,15 +8,17 @@ without a compass has the same performance in all columns of a world, but for ch
 """
 
 import argparse
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from arguments import whole
 
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.contract.codes import Counter
-from swarm_forage_env.policies.network import Network
-from swarm_forage_env.policies.pretrained import network_file
+from swarm_forage_env.inspect.saliency import open_network_of
+from swarm_forage_env.policies.network import Network, NetworkError
 from swarm_forage_env.policies.registry import policy_label
 from swarm_forage_env.policies.turns import Turn
 from swarm_forage_env.runs.answer import Sheet
@@ -55,6 +57,19 @@ def performance(network: Network, config: ScenarioConfig, turn: Turn, seed: int)
     return 1000.0 * float(counters[counter]) / config.horizon_s
 
 
+def rows_of(policy: str, seeds: Sequence[int], horizon_s: float) -> Iterator[tuple[str, ...]]:
+    """Yield the row of a network in each world: means of runs with these seeds."""
+    network = open_network_of(policy)
+    for name, fields in WORLDS.items():
+        config = scenario(name, physics="compiled", horizon_s=horizon_s, **fields)
+        means = [
+            np.mean([performance(network, config, turn, _FIRST_SEED + seed) for seed in seeds])
+            for turn in TURNS.values()
+        ]
+        label = f"{policy_label(policy)}, {name}, {config.robots.n_robots} robots"
+        yield (label, *(f"{mean:.1f}" for mean in means))
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -62,17 +77,10 @@ def main() -> None:
     parser.add_argument("--seeds", type=whole(at_least=1), default=4, help="runs of each (default: 4)")
     parser.add_argument("--horizon", type=float, default=2000.0, help="seconds of a run (default: 2000)")
     words = parser.parse_args()
-    rows: list[tuple[str, ...]] = []
-    for policy in words.policy.split(","):
-        network = Network.load(network_file(policy) or policy)
-        for name, fields in WORLDS.items():
-            config = scenario(name, physics="compiled", horizon_s=words.horizon, **fields)
-            means = [
-                np.mean([performance(network, config, turn, _FIRST_SEED + k) for k in range(words.seeds)])
-                for turn in TURNS.values()
-            ]
-            label = f"{policy_label(policy)}, {name}, {config.robots.n_robots} robots"
-            rows.append((label, *(f"{mean:.1f}" for mean in means)))
+    try:
+        rows = [row for policy in words.policy.split(",") for row in rows_of(policy, range(words.seeds), words.horizon)]
+    except (ConfigError, NetworkError, OSError) as error:
+        raise SystemExit(str(error)) from error
     title = f"Performance per 1,000 s, means of {counted(words.seeds, 'run')} of {words.horizon:,.0f} s"
     print(Sheet(title=title, header=("network and world", *TURNS), rows=rows, notes=[]).text())
 

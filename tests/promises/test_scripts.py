@@ -4,7 +4,6 @@ import ast
 import importlib
 import re
 import sys
-from argparse import Namespace
 from dataclasses import replace
 from pathlib import Path
 
@@ -343,14 +342,32 @@ def test_a_policy_is_compared_with_the_best_in_every_size():
     from scripts import every_size
 
     (oracle,) = policy_specs(["oracle"])
-    world = World(scenario("warehouse_small", n_robots=4, horizon_s=600.0))
-    two = every_size.row(oracle, world, Namespace(seeds=2, jobs=1, horizon=600.0))
-    assert two[:2] == ("warehouse_small", "4")
+    worlds = [World(scenario("warehouse_small", n_robots=size, horizon_s=600.0)) for size in (4, 6)]
+    two, more = every_size.rows_of(oracle, worlds, range(2), 1)
+    assert (two[:2], more[:2]) == (("warehouse_small", "4"), ("warehouse_small", "6"))
     assert all(" ± " in told for told in two[3:5])
-    one = every_size.row(oracle, world, Namespace(seeds=1, jobs=1, horizon=600.0))
-    assert not any("±" in told or "nan" in told for told in one)
-    assert float(one[5]) == pytest.approx(float(one[4]) / float(one[3]), rel=0.1)
-    assert float(one[5]) > 1.0, "the oracle sees everything"
+    ((*_, performance, of_oracle, ratio, _),) = every_size.rows_of(oracle, worlds[:1], range(1), 1)
+    assert not any("±" in told or "nan" in told for told in (performance, of_oracle))
+    assert float(ratio) == pytest.approx(float(of_oracle) / float(performance), rel=0.1)
+    assert float(ratio) > 1.0, "the oracle sees everything"
+
+
+@pytest.mark.parametrize(
+    ("script", "words", "told"),
+    [
+        ("every_size", ("--policy", "dpo"), "another policy than crw, dpo, stochm, stochx, which are the yardstick"),
+        ("every_size", ("--policy", "dop"), "Did you mean 'dpo'"),
+        ("every_size", ("--horizon", "-1"), "horizon_s"),
+        ("turned_worlds", ("--policy", "dpo"), "Expected a network, that is the name of a shipped one"),
+        ("turned_worlds", ("--policy", "no_such_file.npz"), "no_such_file.npz"),
+        ("turned_worlds", ("--horizon", "-1"), "horizon_s"),
+    ],
+)
+def test_what_cannot_be_measured_is_told_in_one_line(run, script, words, told):
+    ends_with, out, _ = run(script, *words)
+    assert told in ends_with
+    assert "\n" not in ends_with
+    assert out == ""
 
 
 @pytest.mark.compiled
