@@ -9,11 +9,12 @@ that does best in these is kept; it runs without torch. The algorithm has a buff
 from rows that stand for no robot. `UsedRows` leaves these out.
 """
 
+import inspect
 from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
-from rivals import begin, told
+from rivals import begin, check_plan, told
 from sb3_contrib import RecurrentPPO
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
@@ -22,7 +23,7 @@ from stable_baselines3.common.vec_env import VecEnvWrapper
 from swarm_forage_env.training.evaluator import Evaluator
 from swarm_forage_env.training.plan import Stage, TrainingPlan
 from swarm_forage_env.training.sb3 import SwarmVecEnv
-from swarm_forage_env.training.sb3.export import export_network
+from swarm_forage_env.training.sb3.export import ACTIVATION_CLASSES, export_network
 from swarm_forage_env.training.sb3.training import training_seed
 
 MEMORY = {"lstm_hidden_size": 64, "shared_lstm": True, "enable_critic_lstm": False}
@@ -84,8 +85,7 @@ class Watch(BaseCallback):
 
 def carry_out(plan: TrainingPlan, folder: Path) -> None:
     """Collect, learn and evaluate, stage by stage."""
-    if plan.algorithm != "ppo":
-        raise SystemExit(f"Expected a plan of ppo, got one of {plan.algorithm}.")
+    check_plan(plan, "ppo", inspect.signature(RecurrentPPO).parameters, tuple(ACTIVATION_CLASSES))
     watch = Watch(Evaluator(plan, folder, {"by": "scripts/recurrent_ppo.py", "versions": LIBRARIES}))
     learnt: RecurrentPPO | None = None
     end = 0
@@ -102,7 +102,7 @@ def model_of(plan: TrainingPlan, stage: Stage, before: RecurrentPPO | None) -> R
     done = 0 if before is None else before.num_timesteps
     env = UsedRows(SwarmVecEnv(**plan.arenas_of(stage)), dict(stage.scenario))
     options = {**plan.options, **stage.options, "seed": training_seed(plan.seed, done)}
-    network = {"net_arch": list(plan.hidden), **MEMORY}
+    network = {"net_arch": list(plan.hidden), "activation_fn": ACTIVATION_CLASSES[plan.activation], **MEMORY}
     model = RecurrentPPO("MlpLstmPolicy", env, policy_kwargs=network, device="cpu", **options)
     if before is not None:
         model.set_parameters(before.get_parameters())  # type: ignore[arg-type] - its types forget dictionaries in it

@@ -2,14 +2,33 @@
 
 import argparse
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import torch
 
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.policies.network import NetworkError
 from swarm_forage_env.training.evaluations import Evaluation
 from swarm_forage_env.training.plan import TrainingPlan, read_plan
+
+
+def check_plan(
+    plan: TrainingPlan, algorithm: str, known: Iterable[str], activations: Sequence[str] = ("tanh",)
+) -> None:
+    """Refuse a plan that a script cannot carry out: of another algorithm, or with what it does not know.
+
+    Raises:
+        ConfigError: see above.
+    """
+    options = {name for stage in (plan, *plan.stages) for name in stage.options}
+    if plan.algorithm != algorithm or plan.interface.actions != "discrete" or plan.activation not in activations:
+        raise ConfigError(
+            f"Expected a plan of {algorithm} with discrete actions and {' or '.join(activations)}, got "
+            f"{plan.algorithm} with {plan.interface.actions} actions and {plan.activation}."
+        )
+    if not options <= set(known):
+        raise ConfigError(f"Expected options among {', '.join(known)}, got {', '.join(sorted(options))}.")
 
 
 def begin(description: str | None, out: str, carry_out: Callable[[TrainingPlan, Path], None]) -> None:
@@ -23,7 +42,7 @@ def begin(description: str | None, out: str, carry_out: Callable[[TrainingPlan, 
     torch.set_num_threads(1)
     try:
         carry_out(dataclasses.replace(read_plan(args.plan), seed=args.seed), args.out)
-    except (ConfigError, OSError) as error:
+    except (ConfigError, NetworkError, OSError) as error:
         parser.error(str(error))
 
 

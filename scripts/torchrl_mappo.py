@@ -19,7 +19,7 @@ import tensordict
 import torch
 import torchrl
 from gymnasium.spaces import flatdim
-from rivals import begin, told
+from rivals import begin, check_plan, told
 from tensordict import TensorDict
 from tensordict.nn import InteractionType, TensorDictModule
 from torch import nn
@@ -31,7 +31,7 @@ from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.policies.interface import LearnerInterface
 from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.training.evaluator import Evaluator
-from swarm_forage_env.training.plan import Stage, TrainingPlan
+from swarm_forage_env.training.plan import TrainingPlan
 from swarm_forage_env.views.gymnasium import SwarmVectorEnv
 
 OPTIONS = {"n_steps": 128, "batch_size": 4096, "n_epochs": 4, "learning_rate": 1e-3, "gamma": 0.99, "gae_lambda": 0.97,
@@ -168,21 +168,11 @@ def rollout(envs: SwarmVectorEnv, learner: Learner, obs: np.ndarray, active: np.
     return taught, obs, active
 
 
-def options_of(plan: TrainingPlan, stage: Stage) -> dict:
-    """Return the numbers of PPO in a stage; refuses a plan for another algorithm, and options that it does not know."""
-    options = {**plan.options, **stage.options}
-    if plan.algorithm != "ppo" or plan.interface.actions != "discrete" or not options.keys() <= OPTIONS.keys():
-        raise SystemExit(
-            f"Expected a plan of ppo with discrete actions and options among {', '.join(OPTIONS)}, got "
-            f"{plan.algorithm} with {plan.interface.actions} actions and {', '.join(options)}."
-        )
-    return {**OPTIONS, **options}
-
-
 def carry_out(plan: TrainingPlan, folder: Path) -> None:
     """Collect, learn and evaluate, stage by stage; the best network is kept, and draws its actions."""
     plan = dataclasses.replace(plan, samples=True)
-    options_of_stages = [options_of(plan, stage) for stage in plan.stages]
+    check_plan(plan, "ppo", OPTIONS)
+    options_of_stages = [{**OPTIONS, **plan.options, **stage.options} for stage in plan.stages]
     robot = LearnerInterface(plan.interface, SwarmSpec.of(plan.scenario))
     learner = Learner(flatdim(robot.observation_space), flatdim(robot.action_space), plan.hidden)
     evaluator = Evaluator(plan, folder, {"by": "scripts/torchrl_mappo.py", "versions": LIBRARIES})

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import torch
 from gymnasium.spaces import flatdim
-from rivals import begin, told
+from rivals import begin, check_plan, told
 from tensordict import TensorDict
 from tensordict.nn import TensorDictModule
 from torch import nn
@@ -34,7 +34,7 @@ from swarm_forage_env.contract.types import ObsArray
 from swarm_forage_env.policies.interface import LearnerInterface
 from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.training.evaluator import Evaluator
-from swarm_forage_env.training.plan import Stage, TrainingPlan
+from swarm_forage_env.training.plan import TrainingPlan
 from swarm_forage_env.views.gymnasium import SwarmVectorEnv
 
 OPTIONS = {"buffer_size": 20_000, "batch_size": 64, "learning_rate": 5e-4, "gamma": 0.99, "n_steps": 1,
@@ -130,23 +130,13 @@ def rollout(
     return batch.select("agents", "steps_to_next_obs", *kept), obs
 
 
-def options_of(plan: TrainingPlan, stage: Stage) -> dict:
-    """Return the numbers of QMIX in a stage; refuses plans for something else, and options that it does not know."""
-    options = {**plan.options, **stage.options}
-    if plan.algorithm != "dqn" or not options.keys() <= OPTIONS.keys():
-        raise SystemExit(
-            f"Expected a plan of dqn with options among {', '.join(OPTIONS)}, got {plan.algorithm} and "
-            f"{', '.join(options)}."
-        )
-    return {**OPTIONS, **options}
-
-
 class Training:
     """A training by a plan."""
 
     def __init__(self, plan: TrainingPlan, folder: Path) -> None:
         """Begin with values of zero, about, and an empty memory."""
-        self._options = [options_of(plan, stage) for stage in plan.stages]
+        check_plan(plan, "dqn", OPTIONS)
+        self._options = [{**OPTIONS, **plan.options, **stage.options} for stage in plan.stages]
         robot = LearnerInterface(plan.interface, SwarmSpec.of(plan.scenario))
         sizes = flatdim(robot.observation_space), flatdim(robot.action_space), plan.scenario.robots.n_robots
         self.plan, self.done = plan, 0

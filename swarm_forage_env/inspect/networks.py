@@ -21,9 +21,8 @@ def network_lines(file: Path, network: Network) -> Iterator[str]:
         network: What it holds. Its card is for readers: it may hold anything, and what is no plan is shown as it is.
     """
     about = network.about
-    cells = [] if network.lstm is None else [network.n_cells]
-    sizes = [network.n_columns, *cells, *(weight.shape[1] for weight in network.weights)]
-    memory = f", the first {network.n_cells} of them cells of an LSTM" if cells else ""
+    sizes = [len(network.weights[0]), *(weight.shape[1] for weight in network.weights)]
+    memory = f", after an LSTM of {network.n_cells} cells that sees {network.n_columns} columns" * bool(network.lstm)
     yield f"{file}: a network of {' x '.join(map(str, sizes))} units ({about.activation}){memory}"
     yield ""
     for name, value in dataclasses.asdict(about.interface).items():

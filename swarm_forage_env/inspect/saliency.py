@@ -57,7 +57,7 @@ class Saliency(Answer):
     commands, which lie in [-1, 1]. NaN where the group has no observation."""
     moved: dict[Group, FloatArray] | None
     """Group -> (S,) mean total variation distance between the probabilities of actions before and after, in [0, 1]; as
-    if outputs were logits, which they are in ppo and a2c. None for continuous actions."""
+    if outputs were logits, which they are in ppo and a2c, and in a dqn that draws. None for continuous actions."""
     title: str = ""
     """What it is about: policy and run."""
     in_frames: bool = False
@@ -143,7 +143,9 @@ def open_network_of(policy: str) -> Network:
             f"{policy!r}.{suggestion(policy, known)} Training leaves policy.npz beside a model; other policies have no "
             "network to look into."
         )
-    return Network.load(file).perceptron()
+    network = Network.load(file)
+    network.require_no_memory()
+    return network
 
 
 def saliency(

@@ -8,6 +8,7 @@ safe to open a file from an unknown source.
 import dataclasses
 import itertools
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -37,6 +38,10 @@ _MOST_BYTES = 2**28
 _MOST_NUMBERS = 2**26
 """Numbers of all layers where each is as wide as the widest, as kernels take them; our choice: 256 MiB."""
 _LAYER_PARTS = ("weight", "bias")
+_OWN_NAME = re.compile(r"(about|(weight|bias)_\d+|lstm_(weight|bias))\.npy")
+"""Arrays that a file may hold."""
+_MEMORY = "memory"
+"""Key of the description of a network with a memory, so that readers who know no memory refuse its file."""
 
 
 class NetworkError(ValueError):
@@ -51,8 +56,8 @@ class NetworkAbout:
     activation: str = "tanh"
     """Activation after every layer except the last."""
     samples: bool = False
-    """Whether discrete actions are drawn by their probabilities; if not, the most probable one is taken. Continuous
-    actions are always the mean."""
+    """Whether discrete actions are drawn by the softmax of the outputs; if not, the one with the largest output is
+    taken. Continuous actions are always the mean."""
     caches: str = "none"
     """Kind of caches that the policy was trained with; the default for its runs."""
     card: dict[str, Any] = field(default_factory=dict)
@@ -85,6 +90,8 @@ class NetworkAbout:
         if not isinstance(mapping, dict) or not isinstance(mapping.get("interface"), dict):
             raise NetworkError(f"Expected a description of a network with its interface, got {text[:80]!r}.")
         try:
+            if mapping.pop(_MEMORY, "lstm") != "lstm":
+                raise NetworkError(f"Expected a memory that is an LSTM in {text[:80]!r}.")
             known_keys(mapping, cls.__dataclass_fields__, "key about a network")
             return cls(**{**mapping, "interface": interface_from_mapping(mapping["interface"])})
         except ConfigError as error:
@@ -120,22 +127,27 @@ class LSTM:
 
     @classmethod
     def from_state_dict(cls, state: Mapping[str, Any]) -> "LSTM | None":
-        """Take the one layer of a `torch.nn.LSTM` from the state dict of a module; None without one.
+        """Take a `torch.nn.LSTM` of one layer, or an `LSTMCell`, from the state dict of a module; None without one.
 
         Raises:
-            NetworkError: several layers, or a layer without all of its parts.
+            NetworkError: several layers, both directions, projections, no biases, or cells of another kind.
         """
         parts = {
-            part: [_array(tensor) for name, tensor in state.items() if name.rpartition(".")[2].startswith(part)]
-            for part in ("weight_ih_l", "weight_hh_l", "bias_ih_l", "bias_hh_l")
+            name.rpartition(".")[2]: _array(tensor)
+            for name, tensor in state.items()
+            if name.rpartition(".")[2].startswith(("weight_ih", "weight_hh", "weight_hr", "bias_ih", "bias_hh"))
         }
-        found = {part: len(arrays) for part, arrays in parts.items()}
-        if not any(found.values()):
+        if not parts:
             return None
-        if set(found.values()) != {1}:
-            raise NetworkError(f"Expected an LSTM with one layer, weights and biases, got {found}.")
-        seen, told, bias, again = (arrays[0] for arrays in parts.values())
-        return cls(np.ascontiguousarray(np.concatenate([seen, told], 1).T), bias + again)
+        shapes = {name: array.shape for name, array in parts.items()}
+        if [name.removesuffix("_l0") for name in parts] == ["weight_ih", "weight_hh", "bias_ih", "bias_hh"]:
+            seen, before, bias, again = parts.values()
+            n_cells = before.shape[-1]
+            if before.shape == (4 * n_cells, n_cells) and len(seen) == 4 * n_cells:
+                return cls(np.ascontiguousarray(np.concatenate([seen, before], 1).T), bias + again)
+        raise NetworkError(
+            f"Expected an LSTM of one layer and one direction, with biases and without projections, got {shapes}."
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +179,8 @@ class Network:
             raise NetworkError("Expected weights and biases that are finite numbers; did the training diverge?")
         if self._width() * sum(len(weight) + 1 for weight, _ in parts) > _MOST_NUMBERS:
             raise NetworkError(
-                f"Expected layers that take at most {_MOST_NUMBERS:,} numbers side by side, got {sizes}."
+                f"Expected layers that take at most {_MOST_NUMBERS:,} numbers side by side, got "
+                f"{[weight.shape for weight, _ in parts]}."
             )
 
     @property
@@ -180,18 +193,17 @@ class Network:
         """How many cells remember for a robot; 0 without a memory."""
         return 0 if self.lstm is None else self.lstm.n_cells
 
-    def perceptron(self) -> "Network":
-        """Return the network itself where it has no memory, so that what it sees alone says what it does.
+    def require_no_memory(self) -> None:
+        """Refuse a network whose outputs depend on what it saw before.
 
         Raises:
             NetworkError: it has a memory.
         """
         if self.lstm is not None:
             raise NetworkError(
-                f"Expected a network without a memory, got one with {self.n_cells} cells of an LSTM: what it does "
-                "depends on what it saw before."
+                f"Expected a network without a memory, as export, saliency and outputs take it, got an LSTM of "
+                f"{self.n_cells} cells."
             )
-        return self
 
     def outputs(self, rows: ObsArray) -> np.ndarray:
         """Return the last layer's values for observations (N, d), (N, m) float32, before any choice of actions.
@@ -201,7 +213,7 @@ class Network:
         Raises:
             NetworkError: rows of another number of columns than the network takes, or it has a memory.
         """
-        self.perceptron()
+        self.require_no_memory()
         if rows.ndim != 2 or rows.shape[1] != self.n_columns:
             raise NetworkError(f"Expected observations (N, {self.n_columns}), as the network takes, got {rows.shape}.")
         n_rows = len(rows)
@@ -275,12 +287,13 @@ class Network:
 
         Args:
             state: Tensors by name, in the order of the layers: (out, in) under names that end in "weight", (out,) under
-                names that end in "bias", and those of one `torch.nn.LSTM`, if there is one. Others are left out.
+                names that end in "bias", and those of one `torch.nn.LSTM` that sees the observations themselves, if
+                there is one. Others are left out.
             about: What is needed besides the weights.
             n_outputs: How many outputs are actions; default all. Some libraries add deviations after the means.
 
         Raises:
-            NetworkError: the layers do not follow on each other, or an LSTM has several.
+            NetworkError: the layers do not follow on each other, or an LSTM is one that a file cannot hold.
         """
         parts = {end: [_array(tensor) for name, tensor in state.items() if name.endswith(end)] for end in _LAYER_PARTS}
         weights, biases = ([array.T for array in parts["weight"]], parts["bias"])
@@ -294,7 +307,8 @@ class Network:
         layers |= {f"bias_{k}": bias for k, bias in enumerate(self.biases)}
         layers |= {} if self.lstm is None else {"lstm_weight": self.lstm.weight, "lstm_bias": self.lstm.bias}
         with replacing(Path(path)) as draft, draft.open("wb") as file:
-            about = np.array(self.about.to_json())
+            said = json.loads(self.about.to_json()) | ({} if self.lstm is None else {_MEMORY: "lstm"})
+            about = np.array(json.dumps(said, sort_keys=True))
             np.savez_compressed(file, about=about, **layers)  # type: ignore[arg-type] - no name of a layer is "allow_pickle"
 
     @classmethod
@@ -310,10 +324,15 @@ class Network:
             n_layers = sum(name.startswith("weight_") for name in stored.namelist())
             weights = tuple(read_array(stored, f"weight_{k}") for k in range(n_layers))
             biases = tuple(read_array(stored, f"bias_{k}") for k in range(n_layers))
-            about = NetworkAbout.from_json(str(read_array(stored, "about")))
-            if not any(name.startswith("lstm_") for name in stored.namelist()):
-                return cls(weights, biases, about)
-            return cls(weights, biases, about, LSTM(*(read_array(stored, f"lstm_{part}") for part in _LAYER_PARTS)))
+            text = str(read_array(stored, "about"))
+            foreign = [name for name in stored.namelist() if not _OWN_NAME.fullmatch(name)]
+            if foreign:
+                raise NetworkError(f"Unknown parts: {', '.join(map(repr, foreign))}.")
+            about, remembers = NetworkAbout.from_json(text), _MEMORY in parse_json(text)
+            if remembers != any(name.startswith("lstm_") for name in stored.namelist()):
+                raise NetworkError("Its description and its parts do not agree on whether it has a memory.")
+            lstm = LSTM(*(read_array(stored, f"lstm_{part}") for part in _LAYER_PARTS)) if remembers else None
+            return cls(weights, biases, about, lstm)
         except (ArchiveError, NetworkError) as error:
             raise NetworkError(f"Expected {path} to hold a network: {error}") from error
 

@@ -217,7 +217,7 @@ class TrainingPlan:
     one may block each other for ever."""
     temperature: float = 1.0
     """How the policy that comes of it draws: by probabilities to the power of 1 / temperature, scaled to a sum
-    of 1. Below 1, rare actions become rarer than they were while it learnt."""
+    of 1. Below 1, rare actions become rarer than they were while it learnt. With values (DQN) it must be said."""
     sampler: ScenarioSampler | None = None
     """Draws the world of each episode; None = it is always `world`. Then `evaluation` has worlds."""
     turned: bool | None = None
@@ -240,7 +240,7 @@ class TrainingPlan:
         if self.temperature == 1.0 and self.samples and self.algorithm not in SAMPLING:
             raise ConfigError(
                 f"Expected a temperature for samples of {self.algorithm}, whose actions have values and no "
-                "probabilities; set one that is small beside a reward, for example temperature = 0.005."
+                "probabilities; write a plan with one that is small beside a reward, for example 0.005."
             )
         whole("n_arenas", self.n_arenas, at_least=1, at_most=MOST_ARENAS)
         if not isinstance(self.hidden, tuple):  # pyright: ignore[reportUnnecessaryIsInstance] - files hold anything

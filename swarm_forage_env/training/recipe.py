@@ -106,8 +106,8 @@ def recipe(
         evaluation: How the policy is judged meanwhile: an `EvaluationPlan`, or fields by name that differ from the
             recipe's (whole runs, as often as `EVALUATE_EVERY` and `EVALUATION_SHARE` allow).
         seed: Seed of everything.
-        samples: Whether the trained policy draws its actions, see `TrainingPlan.samples`; default where it can:
-            discrete actions of ppo and a2c.
+        samples: Whether the trained policy draws its actions, see `TrainingPlan.samples`; default where it
+            has probabilities: discrete actions of ppo and a2c.
         turned: Whether the learner sees each episode turned or mirrored, see `TrainingPlan.turned`; default with a
             sampler.
         overrides: Scenario fields by name; they go before the recipe's (`nest_progress=0.1`). `horizon_s` is the length
@@ -169,7 +169,7 @@ def _late_options(algorithm: str, given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _can_draw(algorithm: str, interface: InterfaceConfig) -> bool:
-    """Return whether a policy has probabilities to draw its actions by."""
+    """Return whether a policy has probabilities to draw its actions by, so that it needs no temperature."""
     return algorithm in SAMPLING and interface.actions == "discrete"
 
 

@@ -97,19 +97,21 @@ def test_a_recurrent_model_runs_with_its_memory(tmp_path):
     from sb3_contrib import RecurrentPPO
 
     from swarm_forage_env.training.sb3 import SwarmVecEnv
-    from swarm_forage_env.training.sb3.export import note_interface
+    from swarm_forage_env.training.sb3.export import export_network, note_interface
 
     config = InterfaceConfig(observation="compact", automatic_gripper=True, decision_ticks=2)
     env = SwarmVecEnv("warehouse_small", n_robots=3, n_objects=20, interface=config)
     model = RecurrentPPO("MlpLstmPolicy", env, n_steps=8, batch_size=24, seed=0, device="cpu")
     note_interface(model, config)
     model.save(tmp_path / "model.zip")
+    export_network(model, config).save(tmp_path / "network.npz")
 
     arena = parallel_env("warehouse_small", n_robots=3, n_objects=20)
     interface = LearnerInterface(config, arena.swarm_spec)
-    policy = load_policy(tmp_path / "model.zip")
+    policy, network = (load_policy(tmp_path / name) for name in ("model.zip", "network.npz"))
     for seed in (1, 2):  # the second run begins without memory, too
-        policy.reset(arena.swarm_spec, np.random.default_rng(0))
+        for one in (policy, network):
+            one.reset(arena.swarm_spec, np.random.default_rng(0))
         obs, state = arena.reset_batch(seed), None
         for tick in range(12):
             if tick % 2 == 0:
@@ -119,6 +121,7 @@ def test_a_recurrent_model_runs_with_its_memory(tmp_path):
                 )
             actions = policy.act(obs, arena.active)
             np.testing.assert_array_equal(actions, interface.command(choice, obs))
+            np.testing.assert_allclose(network.act(obs, arena.active), actions, atol=1e-5)
             obs, *_ = arena.step_batch(actions)
     assert np.any(choice != model.predict(seen, deterministic=True)[0])
 

@@ -1,11 +1,13 @@
 """The scripts behind entries of the benchmark carry out a plan, with libraries that `scripts/test_bridges` installs."""
 
+import importlib
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from swarm_forage_env import load_policy
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.training.evaluations import read_training
 from swarm_forage_env.training.plan import read_plan
@@ -16,7 +18,7 @@ ENTRIES = ROOT / "docs" / "benchmark"
 ELSEWHERE = ENTRIES / "plans" / "minute.toml"
 MIXED = "qmix"
 """The plan with one world, because a mixer takes one number of robots."""
-PLANS = sorted({*(ENTRIES / "plans").glob("*.toml")} - {ELSEWHERE})
+PLANS = sorted({*(ENTRIES / "plans").glob("*.toml")} - {ELSEWHERE, ENTRIES / "plans" / "qmix_classroom.toml"})
 
 
 @pytest.mark.parametrize("path", PLANS, ids=lambda path: path.stem)
@@ -46,6 +48,13 @@ def test_the_entry_of_a_plan_that_trains_elsewhere_says_so():
     assert ELSEWHERE.name in entry["training"]["command"]
 
 
+@pytest.fixture
+def mappo(monkeypatch):
+    require("torchrl", "torchrl")
+    monkeypatch.syspath_prepend(ROOT / "scripts")
+    return importlib.import_module("torchrl_mappo")
+
+
 def test_mappo_with_torchrl_carries_out_a_plan(tmp_path):
     require("torchrl", "torchrl")
     words = ["--plan", str(PLAN), "--seed", "3", "--out", "mappo"]
@@ -59,18 +68,15 @@ def test_mappo_with_torchrl_carries_out_a_plan(tmp_path):
     assert {"torch", "torchrl"} <= about.card["versions"].keys()
 
 
-def test_the_critic_of_mappo_with_torchrl_sees_robots_at_work_only():
-    require("torchrl", "torchrl")
+def test_the_critic_of_mappo_with_torchrl_sees_robots_at_work_only(mappo):
     import torch
-
-    from scripts.torchrl_mappo import swarm_rows
 
     obs = torch.tensor([[0.2, -0.5], [0.4, -0.1], [9.0, 9.0], [-0.3, -0.3], [9.0, 9.0], [9.0, 9.0]])
     active = torch.tensor([True, True, False, True, False, False])
-    rows = swarm_rows(obs, active, n_arenas=2)
+    rows = mappo.swarm_rows(obs, active, n_arenas=2)
     expected = [[0.3, -0.3, 0.4, -0.1]] * 3 + [[-0.3, -0.3, -0.3, -0.3]] * 3
     np.testing.assert_allclose(rows, expected, rtol=1e-6)
-    assert not swarm_rows(obs, torch.zeros(6, dtype=torch.bool), n_arenas=2).any()
+    assert not mappo.swarm_rows(obs, torch.zeros(6, dtype=torch.bool), n_arenas=2).any()
 
 
 class ThreeSteps:
@@ -96,20 +102,17 @@ class ThreeSteps:
         return self.seen[k + 1], self.rewards[k], self.terminated[k], self.truncated[k], infos
 
 
-def test_mappo_with_torchrl_values_what_would_have_followed_a_time_limit_and_nothing_after_death():
-    require("torchrl", "torchrl")
+def test_mappo_with_torchrl_values_what_would_have_followed_a_time_limit_and_nothing_after_death(mappo):
     import torch
 
-    from scripts.torchrl_mappo import OPTIONS, Learner, rollout, swarm_rows
-
-    envs, learner = ThreeSteps(), Learner(1, 2, (8,))
+    envs, learner = ThreeSteps(), mappo.Learner(1, 2, (8,))
 
     def value(rows, active):
         seen = torch.tensor(rows)
-        return learner.value(seen, swarm_rows(seen, torch.tensor(active), 1)).detach().numpy()[:, 0]
+        return learner.value(seen, mappo.swarm_rows(seen, torch.tensor(active), 1)).detach().numpy()[:, 0]
 
-    options = {**OPTIONS, "n_steps": 3, "gae_lambda": 0.0, "gamma": 0.9}
-    batch, obs, active = rollout(envs, learner, envs.seen[0], envs.active[0], options)
+    options = {**mappo.OPTIONS, "n_steps": 3, "gae_lambda": 0.0, "gamma": 0.9}
+    batch, obs, active = mappo.rollout(envs, learner, envs.seen[0], envs.active[0], options)
     ended = value([[0.5], [0.4]], [False, True])  # the swarm as it was, not as the next run begins
     expected = [
         1.0,  # died: nothing follows
@@ -123,15 +126,12 @@ def test_mappo_with_torchrl_values_what_would_have_followed_a_time_limit_and_not
     assert active.all()
 
 
-def test_mappo_with_torchrl_draws_its_actions_and_is_paid_for_doubt():
-    require("torchrl", "torchrl")
+def test_mappo_with_torchrl_draws_its_actions_and_is_paid_for_doubt(mappo):
     import torch
     from tensordict import TensorDict
 
-    from scripts.torchrl_mappo import OPTIONS, Learner
-
     torch.manual_seed(0)
-    learner = Learner(1, 4, (8,))
+    learner = mappo.Learner(1, 4, (8,))
     seen = TensorDict({"observation": torch.ones(200, 1), "swarm": torch.zeros(200, 2)}, [200])
     step = learner.actor(seen)
     assert len(step["action"].unique()) == 4
@@ -145,31 +145,37 @@ def test_mappo_with_torchrl_draws_its_actions_and_is_paid_for_doubt():
         return float(torch.distributions.Categorical(logits=logits).entropy().detach())
 
     before = doubt()
-    learner.update(batch, {**OPTIONS, "ent_coef": 1.0, "vf_coef": 0.0})
+    learner.update(batch, {**mappo.OPTIONS, "ent_coef": 1.0, "vf_coef": 0.0})
     assert doubt() > before
 
 
-def test_a_plan_for_another_algorithm_is_refused_by_mappo_with_torchrl():
-    require("torchrl", "torchrl")
-    from scripts.torchrl_mappo import options_of
-
+def test_a_plan_for_another_algorithm_is_refused_by_mappo_with_torchrl(mappo, tmp_path):
     plan = read_plan(PLANS[[path.stem for path in PLANS].index("dqn")])
-    with pytest.raises(SystemExit, match="got dqn"):
-        options_of(plan, plan.stages[0])
+    with pytest.raises(ConfigError, match=r"a plan of ppo .* got dqn"):
+        mappo.carry_out(plan, tmp_path)
+    plan = read_plan(PLAN)
+    with pytest.raises(ConfigError, match=r"options among n_steps, .* got batch_size, colour, learning_rate, n_steps"):
+        mappo.carry_out(replace(plan, options={**plan.options, "colour": 1}), tmp_path)
 
 
-def test_a_recurrent_rival_carries_out_a_plan(tmp_path, monkeypatch):
+def test_a_recurrent_rival_carries_out_a_plan(tmp_path):
     require("sb3_contrib", "sb3")
-    words = ["--plan", str(PLAN), "--out", "recurrent.zip"]
-    last = run([str(ROOT / "scripts" / "recurrent_ppo.py"), *words], tmp_path).splitlines()[-1]
-    assert last.startswith("960 decisions in ")  # 10 robots; two rows to spare are left out
-    check_runs(tmp_path / "recurrent.zip")
-    assert load_policy(tmp_path / "recurrent.zip")
+    (tmp_path / "plan.toml").write_text(PLAN.read_text().replace("hidden = [16]", 'hidden = [16]\nactivation = "relu"'))
+    words = ["--plan", "plan.toml", "--seed", "3", "--out", "recurrent"]
+    lines = run([str(ROOT / "scripts" / "recurrent_ppo.py"), *words], tmp_path).splitlines()
+    told = [int(line.split()[0].replace(",", "")) for line in lines if "decisions" in line]
+    training = read_training(tmp_path / "recurrent")
+    assert told == [one.steps for one in training.evaluations] == [640, 960]  # 10 robots; no rows to spare
+    check_runs(tmp_path / "recurrent" / "policy.npz")
+    network = Network.load(tmp_path / "recurrent" / "policy.npz")
+    assert (network.n_cells, network.about.activation, network.about.card["plan"]["seed"]) == (64, "relu", 3)
 
 
-def test_a_recurrent_rival_learns_from_rows_of_robots_only():
+def test_a_recurrent_rival_learns_from_rows_of_robots_only(monkeypatch):
     require("sb3_contrib", "sb3")
-    from scripts.recurrent_ppo import UsedRows
+    monkeypatch.syspath_prepend(ROOT / "scripts")
+    from recurrent_ppo import UsedRows
+
     from swarm_forage_env.training.sb3 import SwarmVecEnv
 
     plan = read_plan(PLAN)

@@ -5,6 +5,7 @@ import importlib
 import numpy as np
 import pytest
 
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.training.plan import read_plan
 from tests.bridges.test_pages import ROOT, check_runs, require, run
@@ -57,8 +58,8 @@ def test_qmix_refuses_worlds_of_several_numbers_of_robots_and_plans_of_others(qm
     with pytest.raises(SystemExit, match="fixed numbers of robots"):
         qmix.Training(plan, tmp_path / "out").carry_out()
     other = read_plan(PLAN_OF_PPO)
-    with pytest.raises(SystemExit, match="got ppo"):
-        qmix.options_of(other, other.stages[0])
+    with pytest.raises(ConfigError, match=r"a plan of dqn .* got ppo"):
+        qmix.Training(other, tmp_path / "other")
 
 
 def test_the_mixer_of_qmix_values_no_robot_less_where_its_own_value_is_higher(qmix):

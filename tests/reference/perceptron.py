@@ -67,7 +67,7 @@ class SlowNetwork:
         if lstm is not None:
             before = (np.zeros((self.n_robots, lstm.n_cells), np.float32),) * 2 if memory is None else memory
             after = remembered(lstm, rows, *before)
-            memory = tuple(np.where(here[:, None], new, old) for new, old in zip(after, before, strict=True))
+            memory = tuple(np.where(here[:, None], new, np.float32(0.0)) for new in after)
             rows = memory[0]
         return self._chosen(rows, here), memory
 

@@ -118,7 +118,8 @@ def test_policies_draw_their_actions_where_they_have_probabilities(algorithm, ac
     assert recipe(algorithm=algorithm, interface={"actions": actions}).samples is draws
     assert not recipe(algorithm=algorithm, interface={"actions": actions}, samples=False).samples
     if not draws:
-        with pytest.raises(ConfigError, match="samples only with discrete actions of ppo or a2c"):
+        reason = "a temperature for samples of dqn" if algorithm == "dqn" else "discrete actions, got continuous ones"
+        with pytest.raises(ConfigError, match=reason):
             recipe(algorithm=algorithm, interface={"actions": actions}, samples=True)
 
 

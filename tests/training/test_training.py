@@ -339,6 +339,15 @@ def test_a_policy_is_judged_and_kept_at_the_temperature_of_its_plan(tmp_path):
     np.testing.assert_array_equal(kept.weights[0], learnt.weights[0])
 
 
+def test_a_dqn_that_draws_does_so_by_its_values_over_the_temperature(tmp_path):
+    plan = tiny_plan(algorithm="dqn", samples=True, temperature=0.005, stages=(Stage(steps=128),), interface=NUMBERED,
+                     options={"buffer_size": 400, "learning_starts": 64, "batch_size": 16})  # fmt: skip
+    result = train(plan, tmp_path)
+    learnt, kept = export_network(result.model, plan.interface), Network.load(tmp_path / "policy.npz")
+    assert kept.about.samples
+    np.testing.assert_allclose(kept.weights[-1], 200.0 * learnt.weights[-1], rtol=1e-6)
+
+
 def test_the_last_checkpoint_holds_all_that_was_learnt(tmp_path):
     """Also where an evaluation is due with the last step of a stage."""
     evaluation = dataclasses.replace(tiny_plan().evaluation, every_steps=128)

@@ -67,9 +67,9 @@ class Choice(NamedTuple):
     is_made: BoolArray
     """(N,) whether the robot was in the world; others stand until the next decision."""
     hidden: ObsArray
-    """(N, cells) what the cells of each robot put out; zeros when a run begins."""
+    """(N, cells) what the cells of each robot put out: its hidden state. Zeros when a run begins."""
     cell: ObsArray
-    """(N, cells) what they keep; zeros when a run begins."""
+    """(N, cells) what they keep: its cell state. Zeros when a run begins."""
 
 
 @kernel
@@ -244,6 +244,9 @@ def decide(obs: ObsArray, draws: FloatArray, decision: int, t: Translation, laye
         choice.is_made[i] = obs[i, heading] != 0.0 or obs[i, heading + 1] != 0.0
         choice.outputs[i, :] = 0.0
         choice.number[i] = 0
+        if not choice.is_made[i]:  # who leaves the world forgets everything, as `remember_sites` has it
+            choice.hidden[i, :] = 0.0
+            choice.cell[i, :] = 0.0
     forward(choice.seen, layers, choice.is_made, choice.hidden, choice.cell, choice.outputs)
     for i in range(obs.shape[0]):
         outputs = choice.outputs[i]
