@@ -1,8 +1,8 @@
 """Pictures of runs, trainings, maps and networks. They need matplotlib (the optional extra "plots")."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import cycle, product, repeat
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
@@ -11,6 +11,7 @@ import numpy as np
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.rendering.figures import (
     COLOURS,
+    MARKERS,
     SCREEN,
     FigureStyle,
     Panel,
@@ -132,8 +133,11 @@ def draw_trainings(
     with saved_figure(path, (9.0, 5.0), title=title, style=style) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
         found = looks((*(trainings if mean is None else (mean.label,) * len(trainings)), *beside))
-        line: dict[str, Any] = {"marker": "o"} if mean is None else {"linewidth": 0.8, "alpha": 0.5}
-        for look, (steps, *curves) in zip(found, trainings.values(), strict=False):
+        # Five trainings have a colour twice, so each has a marker of its own.
+        lines: Iterator[dict[str, Any]] = ({"marker": marker} for marker in cycle(MARKERS))
+        if mean is not None:
+            lines = repeat({"linewidth": 0.8, "alpha": 0.5})
+        for look, line, (steps, *curves) in zip(found, lines, trainings.values(), strict=False):
             for axes, curve in zip((upper, lower), curves, strict=True):
                 shown = look.name if mean is None else f"each of {len(trainings)}"
                 axes.plot(np.asarray(steps) / 1e6, curve, color=look.colour, label=shown, clip_on=False, **line)
