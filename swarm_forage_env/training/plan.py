@@ -37,6 +37,7 @@ from swarm_forage_env.training.defaults import (
     EVALUATE_EVERY,
 )
 from swarm_forage_env.training.evaluation_worlds import CHOSEN_BY, COUNTED, EvaluationWorld, scenario_of, tuples
+from swarm_forage_env.training.options import check_options
 from swarm_forage_env.views.sampler import ScenarioSampler, columns_of
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import wrappers_from_mapping
@@ -52,26 +53,6 @@ MOST_ARENAS, MOST_LAYERS, MOST_UNITS = 10_000, 20, 10_000
 """Sizes of a training that are far beyond sense and still fit into the memory of a machine; our choice."""
 LEARNING = PolicySpec(label="policy", policy="policy")
 """The policy that is trained, in its evaluations."""
-_COUNTS = ("n_steps", "batch_size", "n_epochs", "buffer_size")
-_RANGES: dict[str, dict[str, float]] = {
-    "gamma": {"above": 0.0, "at_most": 1.0},
-    "gae_lambda": {"at_least": 0.0, "at_most": 1.0},
-    "tau": {"above": 0.0, "at_most": 1.0},
-    "learning_rate": {"above": 0.0},
-    "clip_range": {"above": 0.0},
-}
-"""Options of the algorithms that mean the same in all of them, and what they may be."""
-
-
-def _check_options(name: str, options: Any) -> None:
-    """Refuse values that stable-baselines3 accepts although no training can succeed with them."""
-    for key, value in table(name, options).items():
-        if key in _COUNTS:
-            whole(f"{name}.{key}", value, at_least=1)
-        if isinstance(value, int | float) and not isinstance(value, bool):
-            number(f"{name}.{key}", value)
-        if key in _RANGES:
-            number(f"{name}.{key}", value, **_RANGES[key])
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -90,7 +71,7 @@ class Stage:
     def __post_init__(self) -> None:
         whole("stage.steps", self.steps, at_least=1)
         table("stage.scenario", self.scenario)
-        _check_options("stage.options", self.options)
+        check_options("stage.options", self.options)
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the stage as plain values; `sampler` only where there is one."""
@@ -192,7 +173,8 @@ class TrainingPlan:
 
     Raises:
         ConfigError: an unknown algorithm or baseline, a performance that arenas do not count, sizes below 1, a stage
-            whose scenario cannot be or has another number of robots, or actions that the algorithm cannot choose.
+            whose scenario cannot be or has another number of robots, actions that the algorithm cannot choose, or a
+            memory that it cannot train.
     """
 
     world: World
@@ -206,6 +188,8 @@ class TrainingPlan:
     """Sizes of the hidden layers of actor and critic."""
     activation: str = DEFAULT_ACTIVATION
     """What hidden layers do to their sums: "tanh", or "relu", which takes less time."""
+    lstm: int = 0
+    """Cells of an LSTM before the hidden layers, by which each robot remembers what it saw (PPO); 0 = none."""
     options: Mapping[str, Any] = field(default_factory=dict, hash=False)
     """Arguments of the algorithm's class; what is not here keeps the library's default."""
     stages: tuple[Stage, ...] = (Stage(steps=DEFAULT_STEPS),)
@@ -250,10 +234,13 @@ class TrainingPlan:
         for size in self.hidden:
             whole("hidden", size, at_least=1, at_most=MOST_UNITS)
         one_of("activation", self.activation, ACTIVATIONS)
+        whole("lstm", self.lstm, at_least=0, at_most=MOST_UNITS)
+        if self.lstm and self.algorithm != "ppo":
+            raise ConfigError(f"Expected lstm only with ppo, got {self.algorithm}; leave it out, or train by ppo.")
         if not self.stages:
             raise ConfigError("Expected at least one stage, got none.")
         whole("seed", self.seed, at_least=0)
-        _check_options("options", self.options)
+        check_options("options", self.options)
         self._check_worlds()
         if self.turned is None:
             object.__setattr__(self, "turned", self.is_sampled)

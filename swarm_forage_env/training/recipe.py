@@ -72,6 +72,7 @@ def recipe(
     wrappers: Iterable[WrapperConfig | str] = (),
     hidden: tuple[int, ...] = DEFAULT_HIDDEN,
     activation: str = DEFAULT_ACTIVATION,
+    lstm: int = 0,
     options: Mapping[str, Any] | None = None,
     small_start: bool | None = None,
     evaluation: EvaluationPlan | Mapping[str, Any] | None = None,
@@ -100,6 +101,7 @@ def recipe(
             line ("population:death_per_tick=0.01").
         hidden: Sizes of the hidden layers.
         activation: What hidden layers do to their sums, see `TrainingPlan.activation`.
+        lstm: Cells of an LSTM by which each robot remembers, see `TrainingPlan.lstm`.
         options: Arguments of the algorithm that differ from `DEFAULT_OPTIONS` and, to the end, from `LATE_OPTIONS`.
         small_start: Spend the first third of the steps in a smaller arena; default where deliveries count, unless
             `recipes.toml` says otherwise.
@@ -144,6 +146,7 @@ def recipe(
         n_arenas=n_arenas,
         hidden=hidden,
         activation=activation,
+        lstm=lstm,
         options=_algorithm_options(
             algorithm, n_arenas * config.robots.n_robots, {**measured.options.get(algorithm, {}), **(options or {})}
         ),

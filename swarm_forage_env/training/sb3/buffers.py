@@ -10,7 +10,8 @@ from stable_baselines3.common.buffers import ReplayBuffer, RolloutBuffer
 from stable_baselines3.common.type_aliases import ReplayBufferSamples, RolloutBufferSamples
 from stable_baselines3.common.vec_env import VecNormalize
 
-_SAMPLES = ("observations", "actions", "values", "log_probs", "advantages", "returns")
+SAMPLES = ("observations", "actions", "values", "log_probs", "advantages", "returns")
+"""Arrays of a rollout that minibatches are taken from."""
 
 
 class EmptyRolloutError(ValueError):
@@ -70,11 +71,20 @@ class ActiveRolloutBuffer(RolloutBuffer):
                 f"{observation_space.shape}; take both numbers from the environment (env.interface)."
             )
         self._active_column = width - frame + active_column
+        self._newest = slice(width - frame, width)
         super().__init__(buffer_size, observation_space, action_space, device, gae_lambda, gamma, n_envs)
 
     def at_work(self, observations: np.ndarray) -> np.ndarray:
         """Return which rows of observations (.., columns) are of robots at work, (..) bool."""
         return observations[..., self._active_column] == 1.0
+
+    def present(self, observations: np.ndarray) -> np.ndarray:
+        """Return which rows of observations (.., columns) are of robots in the world, (..) bool; others are zeros."""
+        return np.any(observations[..., self._newest], axis=-1)
+
+    def to_ask(self, observations: np.ndarray) -> np.ndarray:
+        """Return for which rows of observations (.., columns) a network is asked for an action, (..) bool."""
+        return self.at_work(observations)
 
     def compute_returns_and_advantage(self, last_values: torch.Tensor, dones: np.ndarray) -> None:
         """Compute GAE(lambda) advantages and lambda returns, bridging steps of robots that are not at work.
@@ -123,7 +133,7 @@ class ActiveRolloutBuffer(RolloutBuffer):
             )
         if not self.generator_ready:
             taught = self.swap_and_flatten(self._is_active).ravel()
-            for name in _SAMPLES:
+            for name in SAMPLES:
                 setattr(self, name, self.swap_and_flatten(getattr(self, name))[taught])
             self.generator_ready = True
         n_samples = len(self.returns)

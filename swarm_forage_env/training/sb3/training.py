@@ -10,6 +10,7 @@ import inspect
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from importlib.metadata import version
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,6 @@ from typing import Any
 import numpy as np
 import stable_baselines3
 import torch
-from stable_baselines3 import A2C, DQN, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 from stable_baselines3.common.logger import HParam
@@ -55,16 +55,14 @@ from swarm_forage_env.training.evaluations import (
     write_evaluations,
 )
 from swarm_forage_env.training.plan import EXPORTABLE, LEARNING, Stage, TrainingPlan
-from swarm_forage_env.training.sb3.buffers import ActiveRolloutBuffer, EmptyRolloutError, PresentReplayBuffer
-from swarm_forage_env.training.sb3.export import ACTIVATION_CLASSES, export_network, note_interface
-from swarm_forage_env.training.sb3.ppo import SwarmPPO
+from swarm_forage_env.training.sb3.algorithms import ALGORITHM_CLASSES, arguments_of, class_of
+from swarm_forage_env.training.sb3.buffers import EmptyRolloutError
+from swarm_forage_env.training.sb3.export import export_network, note_interface
 from swarm_forage_env.views.stable_baselines3 import SwarmVecEnv
 
-ALGORITHM_CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": SwarmPPO, "a2c": A2C, "dqn": DQN, "sac": SAC}
-ON_POLICY = ("ppo", "a2c")
 _REPORT_EVERY_S = 1.0
-_TOLD = ("algorithm", "seed", "n_arenas", "hidden", "activation", "interface", "options", "stages", "scenario.reward",
-         "scenario.name", "scenario.robots.n_robots", "sampler")  # fmt: skip
+_TOLD = ("algorithm", "seed", "n_arenas", "hidden", "activation", "lstm", "interface", "options", "stages",
+         "scenario.reward", "scenario.name", "scenario.robots.n_robots", "sampler")  # fmt: skip
 """Settings of a plan that TensorBoard shows beside the evaluations, by name or by what their names begin with."""
 _NO_LINE = ("stdout", "log", "json", "csv")
 """Outputs of the library that hold numbers only."""
@@ -82,6 +80,9 @@ _ELSEWHERE = {
     "hidden": "hidden",
     "activation_fn": "activation",
     "activation": "activation",
+    "lstm_hidden_size": "lstm",
+    "n_lstm_layers": "lstm",
+    "lstm": "lstm",
 }
 """What people look for among the options -> the field of a plan that says it."""
 
@@ -132,6 +133,7 @@ def train(
             `resume` is False, `resume` is True and the folder holds no training run, or one by another plan, or broken
             files; another call that trains in the folder; a stage whose scenario cannot be built; or a training that
             diverged.
+        ImportError: the plan has an LSTM, and sb3-contrib is not installed.
     """
     check_plan(plan)
     if not 0 <= n_processes <= plan.n_arenas:
@@ -193,7 +195,9 @@ def check_plan(plan: TrainingPlan) -> None:
 
     Raises:
         ConfigError: see above.
+        ImportError: the plan has an LSTM, and sb3-contrib is not installed.
     """
+    class_of(plan)
     _check_options(plan)
     _check_baseline(plan)
 
@@ -247,7 +251,7 @@ def _checkpoint(plan: TrainingPlan, folder: Path, env: SwarmVecEnv) -> BaseAlgor
     trust.check(path)
     trust.tell(path)
     try:
-        return ALGORITHM_CLASSES[plan.algorithm].load(path, env=env, device="cpu")
+        return class_of(plan).load(path, env=env, device="cpu")
     except MODEL_FAULTS as error:
         reason = " ".join(str(error).split())
         raise ConfigError(f"Cannot open the checkpoint {path}: {reason}; train anew in another folder.") from error
@@ -256,22 +260,15 @@ def _checkpoint(plan: TrainingPlan, folder: Path, env: SwarmVecEnv) -> BaseAlgor
 def _prepared(plan: TrainingPlan, stage: Stage, folder: Path, env: SwarmVecEnv, done: int) -> BaseAlgorithm:
     """Return the model for a stage: a new one, or the checkpoint with the options of the stage."""
     env.set_options({"scenario": stage.scenario})
-    algorithm = ALGORITHM_CLASSES[plan.algorithm]
+    algorithm = class_of(plan)
     options: dict[str, Any] = {**plan.options, **stage.options}
     options["seed"] = training_seed(plan.seed, done)
     options["tensorboard_log"] = str(folder / "tensorboard") if importlib.util.find_spec("tensorboard") else None
-    buffer: dict[str, Any] = {"replay_buffer_class": PresentReplayBuffer}
-    if plan.algorithm in ON_POLICY:
-        buffer = {
-            "rollout_buffer_class": ActiveRolloutBuffer,
-            "rollout_buffer_kwargs": env.rollout_buffer_kwargs,
-        }
-    network = {"net_arch": list(plan.hidden), "activation_fn": ACTIVATION_CLASSES[plan.activation]}
     try:
         if (folder / MODEL_FILE).exists():
             model = algorithm.load(folder / MODEL_FILE, env=env, device="cpu", **options)
         else:
-            model = algorithm("MlpPolicy", env, device="cpu", policy_kwargs=network, **buffer, **options)
+            model = algorithm(env=env, device="cpu", **arguments_of(plan, env), **options)
     except (AssertionError, TypeError, ValueError) as error:  # how the library refuses values
         raise ConfigError(f"Cannot prepare {plan.algorithm} with its options: {error}") from error
     note_interface(model, plan.interface, caches=plan.scenario.caches)
@@ -294,8 +291,7 @@ def _changes(stage: Stage) -> str:
 
 def _learn(model: BaseAlgorithm, steps: int, callbacks: "_Together", where: str) -> None:
     try:
-        name = next(name for name, kind in ALGORITHM_CLASSES.items() if isinstance(model, kind))
-        model.learn(steps, callback=callbacks, reset_num_timesteps=False, tb_log_name=name)
+        model.learn(steps, callback=callbacks, reset_num_timesteps=False, tb_log_name=callbacks.watch.plan.algorithm)
     except KeyboardInterrupt:
         if not _has_diverged(model):
             callbacks.watch.keep(model)
@@ -320,7 +316,7 @@ class _Watch(BaseCallback):
 
     def __init__(self, plan: TrainingPlan, folder: Path, report: Report) -> None:
         super().__init__()
-        self._plan = plan
+        self.plan = plan
         self._folder = folder
         self._report = report
         self._started = Started.now()
@@ -357,24 +353,24 @@ class _Watch(BaseCallback):
 
     def lacks_evaluation(self, steps: int) -> bool:
         """Return whether an evaluation was due by so many decisions, and was not finished."""
-        return lacks_evaluation(self._plan, self.evaluations, steps)
+        return lacks_evaluation(self.plan, self.evaluations, steps)
 
     def _write_plan(self) -> None:
         self._folder.mkdir(parents=True, exist_ok=True)
-        self._plan.write(self._folder / PLAN_FILE)
+        self.plan.write(self._folder / PLAN_FILE)
 
     def _on_training_start(self) -> None:
         self._write_plan()  # not before arenas and model are known to be possible
         if self._next_evaluation > 0:
             return
-        self._next_evaluation = self.num_timesteps + self._plan.evaluation.every_steps
+        self._next_evaluation = self.num_timesteps + self.plan.evaluation.every_steps
         self._tell_settings()
         if self.lacks_evaluation(self.num_timesteps):
             self._evaluate()
 
     def _tell_settings(self) -> None:
         """Let TensorBoard show the settings beside the evaluations."""
-        told = {name: value for name, value in self._plan.settings().items() if name.startswith(_TOLD)}
+        told = {name: value for name, value in self.plan.settings().items() if name.startswith(_TOLD)}
         plain = {name: value if isinstance(value, int | float | str) else str(value) for name, value in told.items()}
         measures: dict[str, float] = {"evaluation/performance": 0.0, "evaluation/interference_fraction": 0.0}
         self.logger.record("settings", HParam(plain, measures), exclude=_NO_LINE)
@@ -384,7 +380,7 @@ class _Watch(BaseCallback):
             run = self.locals["infos"][row].get("run")
             if run is not None:
                 name = run["scenario"]
-                counted = run[self._counted.get(name, self._plan.scenario.performance)]
+                counted = run[self._counted.get(name, self.plan.scenario.performance)]
                 of_world = f"/{name}" if self._counted else ""
                 self.logger.record_mean(f"rollout/performance_per_1000_s{of_world}", 1000.0 * counted / run["seconds"])
         return True
@@ -409,7 +405,7 @@ class _Watch(BaseCallback):
 
     def _evaluate(self) -> None:
         """Keep a checkpoint, run the policy, and note how it did."""
-        self._next_evaluation = self.num_timesteps + self._plan.evaluation.every_steps
+        self._next_evaluation = self.num_timesteps + self.plan.evaluation.every_steps
         self.keep(self.model)
         evaluation = self._judged()
         for name in ("performance", "baseline", "interference_fraction"):
@@ -418,13 +414,13 @@ class _Watch(BaseCallback):
             self.logger.record(f"evaluation/ratio/{world.world}", world.ratio)
         self.evaluations.append(evaluation)
         # The network before the table: a table must not boast of a network that is not there.
-        if self._plan.algorithm in EXPORTABLE and chosen(self.evaluations) is evaluation:
+        if self.plan.algorithm in EXPORTABLE and chosen(self.evaluations) is evaluation:
             self._export(evaluation)
         write_evaluations(self._folder / EVALUATIONS_FILE, self.evaluations)
         self._report(evaluation)
 
     def _export(self, evaluation: Evaluation) -> None:
-        plan = self._plan
+        plan = self.plan
         card = {
             "plan": plan.to_mapping(),
             "evaluation": evaluation.to_mapping(),
@@ -432,20 +428,21 @@ class _Watch(BaseCallback):
                 **software_versions(),
                 "stable-baselines3": stable_baselines3.__version__,
                 "torch": str(torch.__version__),
+                **({"sb3-contrib": version("sb3-contrib")} if plan.lstm else {}),
             },
         }
         network = self._network(card)
         network.save(self._folder / POLICY_FILE)
 
     def _network(self, card: dict[str, Any] | None = None) -> Network:
-        plan = self._plan
+        plan = self.plan
         caches = plan.scenario.caches
         learnt = export_network(self.model, plan.interface, samples=plan.samples, caches=caches, card=card)
         return learnt.at_temperature(plan.temperature)
 
     def _judged(self) -> Evaluation:
         """Run the policy in the worlds of the evaluation, beside the baselines."""
-        plan = self._plan
+        plan = self.plan
         if not self._baselines:  # their runs are made once, by a resumed training, too
             self._baselines = baselines_of(plan)
         policy = replace(LEARNING, factory=self._policy)
@@ -453,9 +450,9 @@ class _Watch(BaseCallback):
 
     def _policy(self) -> Policy:
         """The policy as it is now; one that draws its actions does so by the chance of its run, not of the training."""
-        if self._plan.samples:
+        if self.plan.samples:
             return NetworkPolicy(self._network())
-        return LearnedPolicy(self._plan.interface, remember=deterministic_choice(self.model))
+        return LearnedPolicy(self.plan.interface, remember=deterministic_choice(self.model))
 
 
 class _Together(CallbackList):
