@@ -22,7 +22,7 @@ from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.presets import warehouse_small
 from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.sb3 import SwarmVecEnv
-from swarm_forage_env.training.sb3.recurrent import ActiveRecurrentBuffer, SwarmRecurrentPPO, _ends
+from swarm_forage_env.training.sb3.recurrent import ActiveRecurrentBuffer, SwarmRecurrentPPO, batch_ends
 from swarm_forage_env.training.sb3.training import train
 from swarm_forage_env.views.pettingzoo import parallel_env
 from swarm_forage_env.wrappers.world import World
@@ -163,7 +163,7 @@ def test_minibatches_are_the_sequences_of_a_slow_twin(seed, batch_size):
     ],
 )
 def test_minibatches_have_at_least_their_size(sizes, least, ends):
-    assert _ends(np.array(sizes), least) == ends
+    assert batch_ends(np.array(sizes), least) == ends
 
 
 @pytest.mark.parametrize("n_at_work", [0, 1])

@@ -60,7 +60,7 @@ class ActiveRecurrentBuffer(ActiveRolloutBuffer):
             self.generator_ready = True
         order = np.random.permutation(len(self._first))  # noqa: NPY002 - the generator that stable-baselines3 seeds
         start = 0
-        for end in _ends(self._n_taught[order], max(2, batch_size or n_samples)):
+        for end in batch_ends(self._n_taught[order], max(2, batch_size or n_samples)):
             yield self._minibatch(order[start:end])
             start = end
 
@@ -112,8 +112,13 @@ class ActiveRecurrentBuffer(ActiveRolloutBuffer):
         )
 
 
-def _ends(sizes: np.ndarray, least: int) -> list[int]:
-    """Return where groups of neighbours end that have `least` in all; the last one may have half of it."""
+def batch_ends(sizes: np.ndarray, least: int) -> list[int]:
+    """Return where minibatches of sequences in this order end, (batches,).
+
+    Args:
+        sizes: (sequences,) steps that teach.
+        least: How many a minibatch has at least. A rest of up to half of it belongs to the last one.
+    """
     ends: list[int] = []
     filled = 0
     for k, size in enumerate(sizes.tolist(), 1):
