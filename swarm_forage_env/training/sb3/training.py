@@ -449,8 +449,11 @@ class _Watch(BaseCallback):
         return evaluated(plan, policy, self._baselines, steps=self.num_timesteps, spent_s=self._spent)
 
     def _policy(self) -> Policy:
-        """The policy as it is now; one that draws its actions does so by the chance of its run, not of the training."""
-        if self.plan.samples:
+        """The policy as it is now, as its file will have it where it draws or remembers.
+
+        One that draws its actions does so by the chance of its run, not of the training.
+        """
+        if self.plan.samples or self.plan.lstm:
             return NetworkPolicy(self._network())
         return LearnedPolicy(self.plan.interface, remember=deterministic_choice(self.model))
 
