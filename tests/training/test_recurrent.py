@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-baselines3 and torch")
-pytest.importorskip("sb3_contrib", reason="needs sb3_contrib: the train extra")
+pytest.importorskip("sb3_contrib", reason="needs the train extra: sb3-contrib")
 
 import torch
 from gymnasium import spaces
