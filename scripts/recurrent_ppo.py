@@ -1,6 +1,6 @@
 """RecurrentPPO of sb3-contrib: robots that remember by an LSTM, without the site memory of the package.
 
-    pip install ".[train]" "torch==2.13.0" "sb3-contrib==2.9.2"  # in a checkout
+    pip install ".[train]" "torch==2.13.0"  # in a checkout
     python scripts/recurrent_ppo.py --plan docs/benchmark/plans/recurrent_ppo.toml --out results/recurrent_ppo
     swarm-forage run crw,results/recurrent_ppo/policy.npz
 
@@ -9,25 +9,24 @@ that does best in these is kept; it runs without torch. The algorithm has a buff
 from rows that stand for no robot. `UsedRows` leaves these out.
 """
 
-import inspect
 from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
-from rivals import begin, check_plan, told
+from rivals import begin, told
 from sb3_contrib import RecurrentPPO
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecEnvWrapper
 
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.training.evaluator import Evaluator
 from swarm_forage_env.training.plan import Stage, TrainingPlan
 from swarm_forage_env.training.sb3 import SwarmVecEnv
-from swarm_forage_env.training.sb3.export import ACTIVATION_CLASSES, export_network
-from swarm_forage_env.training.sb3.training import training_seed
+from swarm_forage_env.training.sb3.algorithms import arguments_of
+from swarm_forage_env.training.sb3.export import export_network
+from swarm_forage_env.training.sb3.training import check_plan, training_seed
 
-MEMORY = {"lstm_hidden_size": 64, "shared_lstm": True, "enable_critic_lstm": False}
-"""One memory for actor and critic: half the time of two."""
 LIBRARIES = {name: version(name) for name in ("torch", "stable-baselines3", "sb3-contrib")}
 
 
@@ -85,7 +84,9 @@ class Watch(BaseCallback):
 
 def carry_out(plan: TrainingPlan, folder: Path) -> None:
     """Collect, learn and evaluate, stage by stage."""
-    check_plan(plan, "ppo", inspect.signature(RecurrentPPO).parameters, tuple(ACTIVATION_CLASSES))
+    if not plan.lstm:
+        raise ConfigError("Expected a plan of ppo with lstm, the number of cells, got one without.")
+    check_plan(plan)
     watch = Watch(Evaluator(plan, folder, {"by": "scripts/recurrent_ppo.py", "versions": LIBRARIES}))
     learnt: RecurrentPPO | None = None
     end = 0
@@ -102,8 +103,8 @@ def model_of(plan: TrainingPlan, stage: Stage, before: RecurrentPPO | None) -> R
     done = 0 if before is None else before.num_timesteps
     env = UsedRows(SwarmVecEnv(**plan.arenas_of(stage)), dict(stage.scenario))
     options = {**plan.options, **stage.options, "seed": training_seed(plan.seed, done)}
-    network = {"net_arch": list(plan.hidden), "activation_fn": ACTIVATION_CLASSES[plan.activation], **MEMORY}
-    model = RecurrentPPO("MlpLstmPolicy", env, policy_kwargs=network, device="cpu", **options)
+    made_of = arguments_of(plan, env.venv)
+    model = RecurrentPPO(made_of["policy"], env, policy_kwargs=made_of["policy_kwargs"], device="cpu", **options)
     if before is not None:
         model.set_parameters(before.get_parameters())  # type: ignore[arg-type] - its types forget dictionaries in it
         model.num_timesteps = done

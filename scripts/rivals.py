@@ -2,7 +2,7 @@
 
 import argparse
 import dataclasses
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import torch
@@ -13,20 +13,18 @@ from swarm_forage_env.training.evaluations import Evaluation
 from swarm_forage_env.training.plan import TrainingPlan, read_plan
 
 
-def check_plan(
-    plan: TrainingPlan, algorithm: str, known: Iterable[str], activations: Sequence[str] = ("tanh",)
-) -> None:
-    """Refuse a plan that a script cannot carry out: of another algorithm, or with what it does not know.
+def check_plan(plan: TrainingPlan, algorithm: str, known: Iterable[str]) -> None:
+    """Refuse a plan that a script cannot carry out: of another algorithm or network, or with what it does not know.
 
     Raises:
         ConfigError: see above.
     """
     options = {name for stage in (plan, *plan.stages) for name in stage.options}
-    if plan.algorithm != algorithm or plan.interface.actions != "discrete" or plan.activation not in activations:
-        raise ConfigError(
-            f"Expected a plan of {algorithm} with discrete actions and {' or '.join(activations)}, got "
-            f"{plan.algorithm} with {plan.interface.actions} actions and {plan.activation}."
-        )
+    wanted = (algorithm, "discrete", "tanh", 0)
+    found = (plan.algorithm, plan.interface.actions, plan.activation, plan.lstm)
+    if found != wanted:
+        words = "a plan of {} with {} actions, {} and an LSTM of {} cells"
+        raise ConfigError(f"Expected {words.format(*wanted)}, got {words.format(*found)}.")
     if not options <= set(known):
         raise ConfigError(f"Expected options among {', '.join(known)}, got {', '.join(sorted(options))}.")
 

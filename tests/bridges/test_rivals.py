@@ -154,13 +154,17 @@ def test_a_plan_for_another_algorithm_is_refused_by_mappo_with_torchrl(mappo, tm
     with pytest.raises(ConfigError, match=r"a plan of ppo .* got dqn"):
         mappo.carry_out(plan, tmp_path)
     plan = read_plan(PLAN)
+    with pytest.raises(ConfigError, match=r"an LSTM of 0 cells, got .* an LSTM of 8 cells"):
+        mappo.carry_out(replace(plan, lstm=8), tmp_path)
     with pytest.raises(ConfigError, match=r"options among n_steps, .* got batch_size, colour, learning_rate, n_steps"):
         mappo.carry_out(replace(plan, options={**plan.options, "colour": 1}), tmp_path)
 
 
 def test_a_recurrent_rival_carries_out_a_plan(tmp_path):
     require("sb3_contrib", "sb3")
-    (tmp_path / "plan.toml").write_text(PLAN.read_text().replace("hidden = [16]", 'hidden = [16]\nactivation = "relu"'))
+    (tmp_path / "plan.toml").write_text(
+        PLAN.read_text().replace("hidden = [16]", 'hidden = [16]\nlstm = 8\nactivation = "relu"')
+    )
     words = ["--plan", "plan.toml", "--seed", "3", "--out", "recurrent"]
     lines = run([str(ROOT / "scripts" / "recurrent_ppo.py"), *words], tmp_path).splitlines()
     told = [int(line.split()[0].replace(",", "")) for line in lines if "decisions" in line]
@@ -168,7 +172,7 @@ def test_a_recurrent_rival_carries_out_a_plan(tmp_path):
     assert told == [one.steps for one in training.evaluations] == [640, 960]  # 10 robots; no rows to spare
     check_runs(tmp_path / "recurrent" / "policy.npz")
     network = Network.load(tmp_path / "recurrent" / "policy.npz")
-    assert (network.n_cells, network.about.activation, network.about.card["plan"]["seed"]) == (64, "relu", 3)
+    assert (network.n_cells, network.about.activation, network.about.card["plan"]["seed"]) == (8, "relu", 3)
 
 
 def test_a_recurrent_rival_learns_from_rows_of_robots_only(monkeypatch):
