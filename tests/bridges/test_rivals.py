@@ -151,7 +151,7 @@ def test_mappo_with_torchrl_draws_its_actions_and_is_paid_for_doubt(mappo):
 
 def test_a_plan_for_another_algorithm_is_refused_by_mappo_with_torchrl(mappo, tmp_path):
     plan = read_plan(PLANS[[path.stem for path in PLANS].index("dqn")])
-    with pytest.raises(ConfigError, match=r"a plan of ppo .* got dqn"):
+    with pytest.raises(ConfigError, match=r"a plan of ppo .* got a plan of dqn"):
         mappo.carry_out(plan, tmp_path)
     plan = read_plan(PLAN)
     with pytest.raises(ConfigError, match=r"an LSTM of 0 cells, got .* an LSTM of 8 cells"):

@@ -58,7 +58,7 @@ def test_qmix_refuses_worlds_of_several_numbers_of_robots_and_plans_of_others(qm
     with pytest.raises(SystemExit, match="fixed numbers of robots"):
         qmix.Training(plan, tmp_path / "out").carry_out()
     other = read_plan(PLAN_OF_PPO)
-    with pytest.raises(ConfigError, match=r"a plan of dqn .* got ppo"):
+    with pytest.raises(ConfigError, match=r"a plan of dqn .* got a plan of ppo"):
         qmix.Training(other, tmp_path / "other")
 
 

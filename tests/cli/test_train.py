@@ -72,7 +72,7 @@ def test_trains_shows_evaluations_and_goes_on(command, painted, monkeypatch):
 
 
 def test_a_network_with_a_memory_is_trained_and_goes_on(command):
-    pytest.importorskip("sb3_contrib", reason="needs sb3_contrib: the train extra")
+    pytest.importorskip("sb3_contrib", reason="needs the train extra: sb3-contrib")
     folder = Path("results/training/warehouse_small_ppo")
     assert command("train", *TINY, "--lstm", "6")[0] == 0
     code, out, _ = command("info", str(folder / "policy.npz"))
