@@ -34,7 +34,7 @@ def main() -> None:
         "MlpPolicy",
         env,
         **plan.options,  # n_steps, batch_size, learning_rate, ...
-        policy_kwargs={"net_arch": list(plan.hidden)},
+        policy_kwargs={"net_arch": list(plan.hidden), "activation_fn": torch.nn.ReLU},  # as plan.activation says
         rollout_buffer_class=ActiveRolloutBuffer,  # leaves out robots that are dead or in repair
         rollout_buffer_kwargs=env.rollout_buffer_kwargs,
         seed=training_seed(plan.seed, 0),

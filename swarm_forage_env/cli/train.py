@@ -30,6 +30,7 @@ from swarm_forage_env.training.defaults import (
     DEFAULT_HIDDEN,
     DEFAULT_STEPS,
     EVALUATE_EVERY,
+    FRAME_DECISIONS,
 )
 
 if TYPE_CHECKING:
@@ -78,7 +79,8 @@ class RecipeOptions:
         int | None,
         typer.Option(
             min=0,
-            help="Decisions for which each robot sees the world turned in a way of its own; 0: as it is; default 0.",
+            help="Decisions for which each robot sees the world turned in a way of its own; 0: as it is; "
+            f"default {FRAME_DECISIONS}, or 0 with messages or own sensors.",
         ),
     ] = None
     samples: Annotated[
@@ -231,10 +233,11 @@ def train(
 ) -> None:
     """Train one policy that every robot shares, and compare it with a scripted controller meanwhile.
 
-    Episodes last --horizon, by default 1,000 s or the length that was measured to be best. Rewards are fields of the
-    scenario. If deliveries count, they alone are too rare to learn from. The training then sets nest_progress=0.05 and
-    first_pickup=1, unless --set or the file of --scenario does, and begins in a smaller arena. plan.json holds all
-    choices. Ctrl-C keeps a checkpoint; swarm-forage --trust-models train --out FOLDER --resume continues.
+    Episodes last --horizon, by default 4,000 s, or as long as runs of the scenario if these are shorter. Rewards are
+    fields of the scenario. If deliveries count, they alone are too rare to learn from. The training then sets
+    nest_progress=0.05, first_pickup=1 and interference=-0.002, unless --set or the file of --scenario does, and begins
+    in a smaller arena. plan.json holds all choices. Ctrl-C keeps a checkpoint; swarm-forage --trust-models train --out
+    FOLDER --resume continues.
 
     With --seeds, it trains several seeds, draws them and their mean into curves.png after every evaluation, and shows a
     table at the end, as JSON with --json.

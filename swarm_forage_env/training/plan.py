@@ -30,7 +30,6 @@ from swarm_forage_env.runs.policy_spec import PolicySpec
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import scenario_of_same_size, with_overrides
 from swarm_forage_env.training.defaults import (
-    DEFAULT_ACTIVATION,
     DEFAULT_ARENAS,
     DEFAULT_HIDDEN,
     DEFAULT_STEPS,
@@ -186,8 +185,8 @@ class TrainingPlan:
     n_arenas: int = DEFAULT_ARENAS
     hidden: tuple[int, ...] = DEFAULT_HIDDEN
     """Sizes of the hidden layers of actor and critic."""
-    activation: str = DEFAULT_ACTIVATION
-    """What hidden layers do to their sums: "tanh", or "relu", which takes less time."""
+    activation: str = "tanh"
+    """What hidden layers do to their sums: "tanh" as in the library, or "relu", which takes less time."""
     lstm: int = 0
     """Cells of an LSTM before the hidden layers, by which each robot remembers what it saw (PPO); 0 = none."""
     options: Mapping[str, Any] = field(default_factory=dict, hash=False)

@@ -1,8 +1,8 @@
 """The recipe by which `swarm-forage train` makes its plans: defaults that were seen to learn, for Python, too.
 
 Deliveries are too rare to learn from them alone. Where they count, the recipe also rewards first pick-ups and the way
-home, and begins in a smaller arena. The last third of a training learns more slowly. `recipes.toml` holds what was
-measured to suit single scenarios better.
+home, makes it cost a little to be in the way of others, and begins in a smaller arena. The last third of a training
+learns more slowly. `recipes.toml` holds what was measured to suit single scenarios better.
 """
 
 import dataclasses
@@ -31,6 +31,7 @@ from swarm_forage_env.training.defaults import (
     EPISODE_S,
     EVALUATE_EVERY,
     EVALUATION_SHARE,
+    FRAME_DECISIONS,
 )
 from swarm_forage_env.training.evaluation_worlds import EvaluationWorld
 from swarm_forage_env.training.plan import LEARNING, SAMPLING, EvaluationPlan, Stage, TrainingPlan
@@ -44,7 +45,7 @@ DEFAULT_OPTIONS: dict[str, dict[str, Any]] = {
     "ppo": {
         "n_steps": 128,
         "batch_size": 3200,
-        "n_epochs": 4,
+        "n_epochs": 3,
         "gamma": 0.99,
         "gae_lambda": 0.98,
         "learning_rate": 0.001,
@@ -84,9 +85,9 @@ def recipe(
     """Return the plan of a training in a scenario, or in many.
 
     Args:
-        scenario: Name of a preset (default warehouse_small), which gets the recipe's length of episodes (`EPISODE_S`),
-            where deliveries count its rewards (`DEFAULT_REWARDS`), and what `recipes.toml` says; or a complete
-            configuration, which is taken as it is.
+        scenario: Name of a preset (default warehouse_small), which gets the recipe's length of episodes (`EPISODE_S`,
+            or that of its runs if they are shorter), where deliveries count its rewards (`DEFAULT_REWARDS`), and what
+            `recipes.toml` says; or a complete configuration, which is taken as it is.
         sampler: Draws the world of each episode, instead of `scenario`, `wrappers`, `small_start` and `overrides`; its
             worlds are taken as they are, with their rewards and horizons. Evaluations take place in the largest world
             of each name that it draws, unless `evaluation` has worlds.
@@ -96,7 +97,7 @@ def recipe(
             in all.
         interface: What a learner sees and does: an `InterfaceConfig`, or fields by name that differ from the
             recipe's (compact observations, discrete actions or for sac continuous ones, an automatic gripper,
-            `DECISION_TICKS`, site memory).
+            `DECISION_TICKS`, site memory, `FRAME_DECISIONS` unless robots have own sensors or send messages).
         wrappers: What disturbs the swarm, in training and in evaluations: configurations, or words as on the command
             line ("population:death_per_tick=0.01").
         hidden: Sizes of the hidden layers.
@@ -132,10 +133,10 @@ def recipe(
     config = _training_scenario(scenario, fields, measured)
     episodes: dict[str, Any] = {}
     if not isinstance(scenario, ScenarioConfig):
-        episodes = {"horizon_s": measured.episode_s}
+        episodes = {"horizon_s": min(EPISODE_S, config.horizon_s)}
     episodes |= {name: value for name, value in overrides.items() if name not in fields}
     with_overrides(config, **episodes)  # refuses an impossible length
-    chosen = chosen_interface(interface, _default_interface(algorithm))
+    chosen = chosen_interface(interface, _default_interface(algorithm, config))
     n_arenas = _default_arenas(config, sampler) if n_arenas is None else n_arenas
     if small_start is None:
         small_start = config.performance == "collected" and sampler is None and measured.small_start
@@ -180,8 +181,6 @@ def _can_draw(algorithm: str, interface: InterfaceConfig) -> bool:
 class Measured:
     """What was measured to suit a scenario better than the general recipe; see `recipes.toml`."""
 
-    episode_s: float = EPISODE_S
-    """Length of an episode, s."""
     rewards: Mapping[str, float] = field(default_factory=dict, hash=False)
     """Fields of `RewardConfig` by name."""
     options: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
@@ -238,13 +237,16 @@ def _largest_worlds(sampler: ScenarioSampler) -> tuple[EvaluationWorld, ...]:
     return tuple(EvaluationWorld(scenario=config) for config in largest.values())
 
 
-def _default_interface(algorithm: str) -> InterfaceConfig:
+def _default_interface(algorithm: str, scenario: ScenarioConfig) -> InterfaceConfig:
+    """Return the recipe's interface, without frames where these would not turn all that tells of directions."""
+    robots = scenario.robots
     return InterfaceConfig(
         observation="compact",
         actions="continuous" if algorithm == "sac" else "discrete",
         automatic_gripper=True,
         decision_ticks=DECISION_TICKS,
         site_memory=True,
+        frame_decisions=0 if robots.own_sensors or robots.message_size else FRAME_DECISIONS,
     )
 
 

@@ -21,13 +21,14 @@ def test_defaults_are_what_a_driver_needs():
     plan = recipe()
     assert plan.interface == InterfaceConfig(
         observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5, own_sensors=(),
-        site_memory=True,
+        site_memory=True, frame_decisions=200,
     )  # fmt: skip
+    assert plan.activation == "relu"
     assert (plan.algorithm, plan.n_arenas, plan.hidden, plan.seed) == ("ppo", 8, (64, 64), 0)
     assert plan.options == {
         "n_steps": 128,
         "batch_size": 3200,
-        "n_epochs": 4,
+        "n_epochs": 3,
         "gamma": 0.99,
         "gae_lambda": 0.98,
         "learning_rate": 0.001,
@@ -40,11 +41,11 @@ def test_defaults_are_what_a_driver_needs():
 
 def test_where_deliveries_count_the_way_to_them_is_rewarded_and_short_at_first():
     plan = recipe("warehouse_small")
-    assert plan.scenario == warehouse_small(nest_progress=0.05, first_pickup=1.0)
+    assert plan.scenario == warehouse_small(nest_progress=0.05, first_pickup=1.0, interference=-0.002)
     assert plan.stages == (
-        Stage(steps=1_666_666, scenario={**small_arena(plan.scenario), "horizon_s": 1000.0}),
-        Stage(steps=1_666_668, scenario={"horizon_s": 1000.0}),
-        Stage(steps=1_666_666, scenario={"horizon_s": 1000.0}, options=LATE_OPTIONS["ppo"]),
+        Stage(steps=1_666_666, scenario={**small_arena(plan.scenario), "horizon_s": 4000.0}),
+        Stage(steps=1_666_668, scenario={"horizon_s": 4000.0}),
+        Stage(steps=1_666_666, scenario={"horizon_s": 4000.0}, options=LATE_OPTIONS["ppo"]),
     )
     assert plan == recipe("warehouse_small", small_start=True, nest_progress=0.05, first_pickup=1.0)
 
@@ -60,14 +61,21 @@ def test_where_deliveries_do_not_count_the_scenario_says_the_rewards():
 @pytest.mark.parametrize(
     ("overrides", "expected"),
     [
-        ({"nest_progress": 0.0}, RewardConfig(nest_progress=0.0, first_pickup=1.0)),
-        ({"first_pickup": 0.5, "tick": -0.1}, RewardConfig(nest_progress=0.05, first_pickup=0.5, tick=-0.1)),
+        ({"nest_progress": 0.0}, RewardConfig(nest_progress=0.0, first_pickup=1.0, interference=-0.002)),
+        (
+            {"first_pickup": 0.5, "tick": -0.1, "interference": 0.0},
+            RewardConfig(nest_progress=0.05, first_pickup=0.5, tick=-0.1),
+        ),
         ({"reward": RewardConfig(delivery=3.0)}, RewardConfig(delivery=3.0)),
     ],
 )
 def test_rewards_that_are_given_go_before_those_of_the_recipe(overrides, expected):
     plan = recipe("warehouse_small", horizon_s=400.0, **overrides)
     assert plan.scenario.reward == expected
+
+
+def test_an_episode_is_not_longer_than_a_run():
+    assert {stage.scenario["horizon_s"] for stage in recipe("classroom").stages} == {scenario("classroom").horizon_s}
 
 
 def test_a_horizon_is_that_of_the_episodes_and_not_of_the_evaluations():
@@ -180,13 +188,22 @@ def test_a_complete_configuration_is_taken_as_it_is():
 def test_an_interface_is_given_whole_or_by_what_differs():
     assert recipe(interface={"decision_ticks": 2}).interface == InterfaceConfig(
         observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=2, own_sensors=(),
-        site_memory=True,
+        site_memory=True, frame_decisions=200,
     )  # fmt: skip
     assert not recipe(interface={"site_memory": False}).interface.site_memory
     numbered = InterfaceConfig(actions="discrete", own_sensors=())
     assert recipe(interface=numbered).interface is numbered
     with pytest.raises(ConfigError, match="Did you mean 'decision_ticks'"):
         recipe(interface={"decision_tick": 2})
+
+
+def test_robots_with_own_sensors_or_messages_see_the_world_as_it_is():
+    assert recipe(neighbours_seen=4).interface.frame_decisions == 200
+    assert recipe(message_size=2, interface={"actions": "continuous"}).interface.frame_decisions == 0
+    seen = recipe(own_sensors=("nest_distance",)).interface
+    assert (seen.own_sensors, seen.frame_decisions) == (("nest_distance",), 0)
+    with pytest.raises(ConfigError, match="say frame_decisions=0"):
+        recipe(own_sensors=("nest_distance",), interface={"frame_decisions": 200})
 
 
 def test_the_other_arguments_reach_the_plan():
