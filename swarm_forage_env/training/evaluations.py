@@ -15,6 +15,7 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import replacing
+from swarm_forage_env.policies.network import Network
 from swarm_forage_env.runs.plan import Condition, Plan
 from swarm_forage_env.runs.policy_spec import PolicySpec, policy_spec
 from swarm_forage_env.runs.runner import run_plan
@@ -255,6 +256,16 @@ def ratio_to(baseline: float, performance: float, seconds: float) -> float:
         seconds: Simulated seconds of all runs of one of them.
     """
     return performance / max(baseline, 1000.0 / seconds)
+
+
+def as_kept(network: Network, plan: TrainingPlan) -> Network:
+    """Return a network as the policy that comes of a plan: at its temperature, with the interface that it has in runs.
+
+    Raises:
+        NetworkError: the plan has a temperature, and the network does not draw discrete actions.
+    """
+    sharpened = network.at_temperature(plan.temperature)
+    return replace(sharpened, about=replace(sharpened.about, interface=plan.run_interface))
 
 
 def chosen(evaluations: Sequence[Evaluation]) -> Evaluation:

@@ -28,6 +28,7 @@ from swarm_forage_env.training.evaluations import (
     POLICY_FILE,
     Baselines,
     Evaluation,
+    as_kept,
     baselines_of,
     check_unused,
     chosen,
@@ -89,10 +90,10 @@ class Evaluator:
         return lacks_evaluation(self.plan, self.evaluations, steps)
 
     def evaluate(self, network: Network, steps: int) -> Evaluation:
-        """Run a network at the plan's temperature, and write its file if none did better.
+        """Run a network as the policy that comes of the plan, and write its file if none did better.
 
         Args:
-            network: It sees and acts as the plan says.
+            network: It sees and acts as the plan's interface says, by which it learns.
             steps: Decisions of single robots so far, more than at the last evaluation. They need not be due.
 
         Raises:
@@ -109,7 +110,7 @@ class Evaluator:
             )
         # Layers that do not fit are refused here, not in the middle of runs.
         NetworkPolicy(network).reset(SwarmSpec.of(plan.scenario), np.random.default_rng())
-        network = network.at_temperature(plan.temperature)
+        network = as_kept(network, plan)
         last = self.evaluations[-1].steps if self.evaluations else -1
         if steps <= last:
             raise ConfigError(f"Expected more decisions than at the last evaluation, {last}, got {steps}.")
@@ -118,6 +119,6 @@ class Evaluator:
         self.evaluations.append(evaluation)
         if chosen(self.evaluations) is evaluation:  # the network first: no table without it
             card = {**self._made_by, "plan": plan.to_mapping(), "evaluation": evaluation.to_mapping()}
-            replace(network, about=replace(about, card=card)).save(self._folder / POLICY_FILE)
+            replace(network, about=replace(network.about, card=card)).save(self._folder / POLICY_FILE)
         write_evaluations(self._folder / EVALUATIONS_FILE, self.evaluations)
         return evaluation

@@ -50,6 +50,8 @@ EXPORTABLE = ("ppo", "a2c", "dqn")
 """Those whose networks a file can hold."""
 MOST_ARENAS, MOST_LAYERS, MOST_UNITS = 10_000, 20, 10_000
 """Sizes of a training that are far beyond sense and still fit into the memory of a machine; our choice."""
+IN_RUNS = ("decision_ticks", "frame_decisions")
+"""Fields of an interface that may be others in runs than in training; the network has the same inputs and outputs."""
 LEARNING = PolicySpec(label="policy", policy="policy")
 """The policy that is trained, in its evaluations."""
 
@@ -201,6 +203,9 @@ class TrainingPlan:
     temperature: float = 1.0
     """How the policy that comes of it draws: by probabilities to the power of 1 / temperature, scaled to a sum
     of 1. Below 1, rare actions become rarer than they were while it learnt. With values (DQN) it must be said."""
+    in_runs: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    """Fields of the interface (`IN_RUNS`) in which the policy that comes of it differs from how it learnt. Robots that
+    decide more often than they learnt to get past each other more easily; training at their pace would take longer."""
     sampler: ScenarioSampler | None = None
     """Draws the world of each episode; None = it is always `world`. Then `evaluation` has worlds."""
     turned: bool | None = None
@@ -225,6 +230,8 @@ class TrainingPlan:
                 f"Expected a temperature for samples of {self.algorithm}, whose actions have values and no "
                 "probabilities; write a plan with one that is small beside a reward, for example 0.005."
             )
+        known_keys(table("in_runs", self.in_runs), IN_RUNS, prefix="in_runs.")
+        _ = self.run_interface  # refuses values that cannot be
         whole("n_arenas", self.n_arenas, at_least=1, at_most=MOST_ARENAS)
         if not isinstance(self.hidden, tuple):  # pyright: ignore[reportUnnecessaryIsInstance] - files hold anything
             raise ConfigError(f"Expected hidden to be sizes of layers, for example [64, 64], got {self.hidden!r}.")
@@ -318,6 +325,11 @@ class TrainingPlan:
     def wrappers(self) -> tuple[WrapperConfig, ...]:
         """What disturbs the swarm."""
         return self.world.wrappers
+
+    @property
+    def run_interface(self) -> InterfaceConfig:
+        """What the policy that comes of it sees and does."""
+        return dataclasses.replace(self.interface, **self.in_runs)
 
     @property
     def judging_worlds(self) -> tuple[World, ...]:
@@ -457,6 +469,7 @@ def named_plan(
     given: dict[str, Any] = {key: value for key, value in (("seed", seed), ("turned", turned)) if value is not None}
     if frame_decisions is not None:
         given["interface"] = dataclasses.replace(plan.interface, frame_decisions=frame_decisions)
+        given["in_runs"] = {key: value for key, value in plan.in_runs.items() if key != "frame_decisions"}
     return dataclasses.replace(plan, **given)
 
 

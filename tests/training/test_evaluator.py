@@ -55,6 +55,19 @@ def test_a_network_is_run_and_kept_at_the_temperature_of_the_plan(tmp_path):
     assert Network.load(tmp_path / "plan" / "policy.npz").biases[0][0] == 4.0
 
 
+def test_a_network_is_run_and_kept_with_the_interface_that_it_has_in_runs(tmp_path):
+    learnt, seen = network(stands=False), {"decision_ticks": 2, "frame_decisions": 7}
+    often = replace(learnt, about=replace(learnt.about, interface=replace(NUMBERED, **seen)))
+    evaluation = Evaluator(replace(PLAN, in_runs=seen), tmp_path / "plan", {}).evaluate(learnt, 60)
+    kept = Network.load(tmp_path / "plan" / "policy.npz")
+    assert kept.about.interface == replace(NUMBERED, **seen, own_sensors=())
+    as_asked = replace(PLAN, interface=often.about.interface)
+    same = Evaluator(as_asked, tmp_path / "asked", {}).evaluate(often, 60)
+    as_learnt = Evaluator(PLAN, tmp_path / "as_learnt", {}).evaluate(learnt, 60)
+    assert evaluation.performance == same.performance
+    assert evaluation.interference_fraction == same.interference_fraction != as_learnt.interference_fraction
+
+
 def test_the_folder_becomes_that_of_a_training_and_holds_the_best_network(tmp_path):
     evaluator = Evaluator(PLAN, tmp_path / "mine", {"by": "a test", "versions": {"learner": "1.0"}})
     moves, stands = network(stands=False), network(stands=True)

@@ -339,6 +339,18 @@ def test_a_policy_is_judged_and_kept_at_the_temperature_of_its_plan(tmp_path):
     np.testing.assert_array_equal(kept.weights[0], learnt.weights[0])
 
 
+def test_a_policy_learns_at_one_pace_and_is_judged_and_kept_at_another(tmp_path):
+    plan = tiny_plan(samples=True, in_runs={"decision_ticks": 1}, stages=(Stage(steps=128),))
+    result = train(plan, tmp_path / "often")
+    kept = Network.load(tmp_path / "often" / "policy.npz")
+    assert (kept.about.interface.decision_ticks, plan.interface.decision_ticks) == (1, 5)
+    slow = train(dataclasses.replace(plan, in_runs={}), tmp_path / "as_learnt")
+    assert same(weights(result.model), weights(slow.model))
+    assert result.evaluations[-1].interference_fraction != slow.evaluations[-1].interference_fraction
+    greedy = dataclasses.replace(plan, samples=False, stages=(Stage(steps=64),))
+    assert Network.load(train(greedy, tmp_path / "greedy").policy_file).about.interface.decision_ticks == 1
+
+
 def test_a_dqn_that_draws_does_so_by_its_values_over_the_temperature(tmp_path):
     plan = tiny_plan(algorithm="dqn", samples=True, temperature=0.005, stages=(Stage(steps=128),), interface=NUMBERED,
                      options={"buffer_size": 400, "learning_starts": 64, "batch_size": 16})  # fmt: skip

@@ -44,6 +44,7 @@ from swarm_forage_env.training.evaluations import (
     POLICY_FILE,
     Evaluation,
     TrainingStatus,
+    as_kept,
     baselines_of,
     check_unused,
     chosen,
@@ -438,7 +439,7 @@ class _Watch(BaseCallback):
         plan = self.plan
         caches = plan.scenario.caches
         learnt = export_network(self.model, plan.interface, samples=plan.samples, caches=caches, card=card)
-        return learnt.at_temperature(plan.temperature)
+        return as_kept(learnt, plan)
 
     def _judged(self) -> Evaluation:
         """Run the policy in the worlds of the evaluation, beside the baselines."""
@@ -455,7 +456,7 @@ class _Watch(BaseCallback):
         """
         if self.plan.samples or self.plan.lstm:
             return NetworkPolicy(self._network())
-        return LearnedPolicy(self.plan.interface, remember=deterministic_choice(self.model))
+        return LearnedPolicy(self.plan.run_interface, remember=deterministic_choice(self.model))
 
 
 class _Together(CallbackList):
