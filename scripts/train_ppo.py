@@ -16,7 +16,7 @@ import torch
 from swarm_forage_env.training.defaults import DEFAULT_STEPS
 from swarm_forage_env.training.recipe import recipe
 from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, SwarmPPO, SwarmVecEnv
-from swarm_forage_env.training.sb3.export import export_network, note_interface
+from swarm_forage_env.training.sb3.export import ACTIVATION_CLASSES, export_network, note_interface
 from swarm_forage_env.training.sb3.training import training_seed
 
 
@@ -34,7 +34,7 @@ def main() -> None:
         "MlpPolicy",
         env,
         **plan.options,  # n_steps, batch_size, learning_rate, ...
-        policy_kwargs={"net_arch": list(plan.hidden), "activation_fn": torch.nn.ReLU},  # as plan.activation says
+        policy_kwargs={"net_arch": list(plan.hidden), "activation_fn": ACTIVATION_CLASSES[plan.activation]},
         rollout_buffer_class=ActiveRolloutBuffer,  # leaves out robots that are dead or in repair
         rollout_buffer_kwargs=env.rollout_buffer_kwargs,
         seed=training_seed(plan.seed, 0),

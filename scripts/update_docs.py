@@ -102,6 +102,7 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         for seed in (0, 1)
         if (short, seed) != ("small", 0)  # that is "trained"
     },
+    "five": (("swarm-forage train --seeds 5 --jobs 2 --out results/training/five",), ()),
     "drawn": (
         (
             f'python -c "{LIKELIEST}"',

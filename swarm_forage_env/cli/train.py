@@ -80,7 +80,8 @@ class RecipeOptions:
         typer.Option(
             min=0,
             help="Decisions for which each robot sees the world turned in a way of its own; 0: as it is; "
-            f"default {FRAME_DECISIONS}, or 0 with messages or own sensors.",
+            f"default {FRAME_DECISIONS} (0 with messages or own sensors), or the plan's. With --plan it holds for "
+            "runs, too.",
         ),
     ] = None
     samples: Annotated[
@@ -201,8 +202,8 @@ def train(
     plan: Annotated[
         str | None,
         typer.Option(
-            help="TOML file with a training plan, or name of a shipped policy; replaces all options below but --seed "
-            "and --turned."
+            help="TOML file with a training plan, or name of a shipped policy; replaces all options below that "
+            "describe the training, but for --seed, --turned and --frame-decisions."
         ),
     ] = None,
     asked: RecipeOptions,

@@ -90,9 +90,9 @@ def _training(plan: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield "wrappers", ", ".join(_table(disturbances)) or "none"
     if plan.get("temperature", 1.0) != 1.0:
         yield "temperature", f"{in_words(plan['temperature'])}, in the weights of the last layer"
-    if plan.get("in_runs"):
-        learnt = _table(plan.get("interface"))
-        yield "decided by", in_words({name: learnt.get(name, "unknown") for name in _table(plan["in_runs"])})
+    learnt, in_runs = _table(plan.get("interface")), _table(plan.get("in_runs"))
+    if others := {name: learnt.get(name, "unknown") for name, value in in_runs.items() if learnt.get(name) != value}:
+        yield "learnt with", in_words(others)
     yield "turned", str(plan.get("turned", False))
     for k, stage in enumerate(map(_table, _rows(plan.get("stages"))), start=1):
         own = "in worlds of its own" if "sampler" in stage else in_words(_table(stage.get("scenario")))

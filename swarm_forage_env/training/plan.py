@@ -50,8 +50,8 @@ EXPORTABLE = ("ppo", "a2c", "dqn")
 """Those whose networks a file can hold."""
 MOST_ARENAS, MOST_LAYERS, MOST_UNITS = 10_000, 20, 10_000
 """Sizes of a training that are far beyond sense and still fit into the memory of a machine; our choice."""
-IN_RUNS = ("decision_ticks", "frame_decisions")
-"""Fields of an interface that may be others in runs than in training; the network has the same inputs and outputs."""
+IN_RUNS = {"decision_ticks": 1, "frame_decisions": 0}
+"""Fields of an interface that may be others in runs than in training, of the same network -> the least."""
 LEARNING = PolicySpec(label="policy", policy="policy")
 """The policy that is trained, in its evaluations."""
 
@@ -188,7 +188,8 @@ class TrainingPlan:
     hidden: tuple[int, ...] = DEFAULT_HIDDEN
     """Sizes of the hidden layers of actor and critic."""
     activation: str = "tanh"
-    """What hidden layers do to their sums: "tanh" as in the library, or "relu", which takes less time."""
+    """What hidden layers do to their sums: "tanh", which a plan without it always meant, or "relu", which takes less
+    time and is the recipe's."""
     lstm: int = 0
     """Cells of an LSTM before the hidden layers, by which each robot remembers what it saw (PPO); 0 = none."""
     options: Mapping[str, Any] = field(default_factory=dict, hash=False)
@@ -204,8 +205,8 @@ class TrainingPlan:
     """How the policy that comes of it draws: by probabilities to the power of 1 / temperature, scaled to a sum
     of 1. Below 1, rare actions become rarer than they were while it learnt. With values (DQN) it must be said."""
     in_runs: Mapping[str, Any] = field(default_factory=dict, hash=False)
-    """Fields of the interface (`IN_RUNS`) in which the policy that comes of it differs from how it learnt. Robots that
-    decide more often than they learnt to get past each other more easily; training at their pace would take longer."""
+    """Fields of the interface (`IN_RUNS`) that are others for the policy that comes of it than while it learns. A
+    training at the pace of runs would take longer. Frames count decisions, so another pace changes their seconds."""
     sampler: ScenarioSampler | None = None
     """Draws the world of each episode; None = it is always `world`. Then `evaluation` has worlds."""
     turned: bool | None = None
@@ -230,8 +231,7 @@ class TrainingPlan:
                 f"Expected a temperature for samples of {self.algorithm}, whose actions have values and no "
                 "probabilities; write a plan with one that is small beside a reward, for example 0.005."
             )
-        known_keys(table("in_runs", self.in_runs), IN_RUNS, prefix="in_runs.")
-        _ = self.run_interface  # refuses values that cannot be
+        self._check_in_runs()
         whole("n_arenas", self.n_arenas, at_least=1, at_most=MOST_ARENAS)
         if not isinstance(self.hidden, tuple):  # pyright: ignore[reportUnnecessaryIsInstance] - files hold anything
             raise ConfigError(f"Expected hidden to be sizes of layers, for example [64, 64], got {self.hidden!r}.")
@@ -254,6 +254,16 @@ class TrainingPlan:
         if self.turned:
             check_turned(self.interface.own_sensors or (), AS_DRAWN)
         self.judging(LEARNING)  # refuses horizons that cannot be
+
+    def _check_in_runs(self) -> None:
+        known_keys(table("in_runs", self.in_runs), IN_RUNS, prefix="in_runs.")
+        if self.in_runs and self.algorithm not in EXPORTABLE:
+            raise ConfigError(
+                f"Expected in_runs only with {', '.join(EXPORTABLE)}, got {self.algorithm}; leave it out."
+            )
+        for name, value in self.in_runs.items():
+            whole(f"in_runs.{name}", value, at_least=IN_RUNS[name])
+        _ = self.run_interface  # refuses frames of own sensors
 
     def arenas_of(self, stage: Stage) -> dict[str, Any]:
         """Return the arguments of the vector environments of a stage, such as `SwarmVecEnv`."""
@@ -373,12 +383,8 @@ class TrainingPlan:
             stages[last] = dataclasses.replace(stages[last], steps=max(stages[last].steps, self.stages[last].steps))
         begun = dataclasses.replace(self, stages=self.stages[: last + 1])
         before, now = (plan.settings() for plan in (dataclasses.replace(earlier, stages=tuple(stages)), begun))
-        missing = "nothing"
-        return tuple(
-            f"{name}: {before.get(name, missing)} before, {now.get(name, missing)} now"
-            for name in {**before, **now}
-            if before.get(name, missing) != now.get(name, missing)
-        )
+        pairs = {name: (before.get(name, "nothing"), now.get(name, "nothing")) for name in {**before, **now}}
+        return tuple(f"{name}: {was} before, {is_now} now" for name, (was, is_now) in pairs.items() if was != is_now)
 
     def longer(self, steps: int) -> "TrainingPlan":
         """Return the plan with a last stage that makes `steps` in all.

@@ -17,7 +17,7 @@ from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.cli import training_report
 from swarm_forage_env.cli.options import WorldOptions
 from swarm_forage_env.cli.train import RecipeOptions, train
-from swarm_forage_env.training.defaults import DEFAULT_REWARDS
+from swarm_forage_env.training.defaults import DEFAULT_REWARDS, EPISODE_S
 from swarm_forage_env.training.plan import EvaluationPlan, read_plan
 from swarm_forage_env.training.recipe import recipe
 
@@ -36,6 +36,7 @@ def test_help_tells_the_rewards_of_the_recipe():
     documented = inspect.getdoc(train)
     assert documented is not None
     assert all(f"{name}={value:g}" in documented for name, value in DEFAULT_REWARDS.items())
+    assert f"{EPISODE_S:,.0f} s" in documented
 
 
 @needs_training
@@ -252,7 +253,7 @@ def test_words_are_arguments_of_the_recipe(tmp_path):
         "evaluation_horizon": 200.0,
         "small_start": False,
         "hidden": "128,32",
-        "activation": "relu",
+        "activation": "tanh",
         "arguments": ("batch_size=8", "gamma=0.9"),
     }
     assert RecipeOptions(**options).plan(words) == recipe(
@@ -273,7 +274,7 @@ def test_words_are_arguments_of_the_recipe(tmp_path):
         evaluation=EvaluationPlan(every_steps=50, horizon_s=200.0),
         small_start=False,
         hidden=(128, 32),
-        activation="relu",
+        activation="tanh",
         options={"batch_size": 8, "gamma": 0.9},
         n_objects=60,
         n_robots=7,

@@ -92,9 +92,10 @@ def test_it_tells_the_only_world():
 
 
 def test_it_tells_how_a_network_learnt_to_decide_where_that_is_not_how_it_runs():
-    plan = {**ONE_WORLD, "interface": {"decision_ticks": 5}, "in_runs": {"decision_ticks": 2}}
+    in_runs = {"decision_ticks": 2, "frame_decisions": 200}
+    plan = {**ONE_WORLD, "interface": {"decision_ticks": 5, "frame_decisions": 200}, "in_runs": in_runs}
     text = told(NetworkAbout(interface=FRAMED, card={"plan": plan}))
-    assert ("decided by", "decision_ticks 5") in section(text, "trained in")
+    assert ("learnt with", "decision_ticks 5") in section(text, "trained in")
 
 
 def test_it_tells_a_temperature_of_the_plan():

@@ -120,7 +120,11 @@ def test_a_plan_is_read_back_from_what_it_writes(plan, tmp_path):
         ("n_arenas = 2", "n_arenas = 2\nsamples = 1", "samples to be"),
         ("n_arenas = 2", "n_arenas = 2\ntemperature = 0.0", r"temperature to be a number in \[0.0001, 100\], got 0"),
         ("n_arenas = 2", "n_arenas = 2\nin_runs = { site_memory = true }", "Unknown key .in_runs.site_memory"),
-        ("n_arenas = 2", "n_arenas = 2\nin_runs = { decision_ticks = 0 }", "decision_ticks to be a whole number >= 1"),
+        (
+            "n_arenas = 2",
+            "n_arenas = 2\nin_runs = { decision_ticks = 0 }",
+            "in_runs.decision_ticks to be a whole number >= 1",
+        ),
         ("n_arenas = 2", "n_arenas = 2\nin_runs = 5", "in_runs to be a table"),
         (
             "n_arenas = 2",

@@ -259,6 +259,10 @@ def test_drawn_worlds_are_turned_unless_the_plan_says_no(tmp_path):
     assert read_plan(plan).turned is True
     assert named_plan(str(plan), turned=False).turned is False
     assert named_plan(str(plan), frame_decisions=9).interface.frame_decisions == 9
+    both = "in_runs = { decision_ticks = 2, frame_decisions = 500 }\n"
+    plan.write_text(both + plan.read_text())
+    assert named_plan(str(plan)).run_interface.frame_decisions == 500
+    assert named_plan(str(plan), frame_decisions=9).run_interface.frame_decisions == 9
     plan.write_text(f"turned = false\n{text}")
     assert read_plan(plan).turned is False
 

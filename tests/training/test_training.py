@@ -21,8 +21,9 @@ from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterfac
 from swarm_forage_env.policies.model_files import ModelError, ModelPolicy
 from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.runs.policy_spec import policy_spec
 from swarm_forage_env.scenarios.presets import search_and_rescue, warehouse_small
-from swarm_forage_env.training.evaluations import read_evaluations, write_evaluations
+from swarm_forage_env.training.evaluations import finished_runs, means, read_evaluations, write_evaluations
 from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv, training
 from swarm_forage_env.training.sb3.export import export_network
@@ -145,7 +146,13 @@ def test_tensorboard_shows_the_settings(trained):
     (folder,) = (trained / "tensorboard").iterdir()
     events = event_accumulator.EventAccumulator(str(folder)).Reload()
     content = events.summary_metadata["_hparams_/session_start_info"].plugin_data.content
-    for name in (b"options.batch_size", b"interface.decision_ticks", b"stages[0].steps", b"scenario.robots.n_robots"):
+    for name in (
+        b"options.batch_size",
+        b"interface.decision_ticks",
+        b"temperature",
+        b"stages[0].steps",
+        b"scenario.robots.n_robots",
+    ):
         assert name in content
     assert "evaluation/performance" in events.Tags()["scalars"]
 
@@ -347,8 +354,16 @@ def test_a_policy_learns_at_one_pace_and_is_judged_and_kept_at_another(tmp_path)
     slow = train(dataclasses.replace(plan, in_runs={}), tmp_path / "as_learnt")
     assert same(weights(result.model), weights(slow.model))
     assert result.evaluations[-1].interference_fraction != slow.evaluations[-1].interference_fraction
-    greedy = dataclasses.replace(plan, samples=False, stages=(Stage(steps=64),))
-    assert Network.load(train(greedy, tmp_path / "greedy").policy_file).about.interface.decision_ticks == 1
+
+
+@pytest.mark.parametrize("lstm", [0, 4])
+def test_a_policy_that_does_not_draw_is_judged_as_its_file_runs(lstm, tmp_path):
+    plan = tiny_plan(in_runs={"decision_ticks": 1}, lstm=lstm, stages=(Stage(steps=64),))
+    result = train(plan, tmp_path)
+    runs = plan.judging(policy_spec(str(result.policy_file)))
+    (condition,) = runs.conditions
+    evaluation = result.evaluations[-1]
+    assert (evaluation.performance, evaluation.interference_fraction) == means(finished_runs(runs), condition)
 
 
 def test_a_dqn_that_draws_does_so_by_its_values_over_the_temperature(tmp_path):

@@ -63,7 +63,8 @@ from swarm_forage_env.views.stable_baselines3 import SwarmVecEnv
 
 _REPORT_EVERY_S = 1.0
 _TOLD = ("algorithm", "seed", "n_arenas", "hidden", "activation", "lstm", "interface", "options", "stages",
-         "scenario.reward", "scenario.name", "scenario.robots.n_robots", "sampler")  # fmt: skip
+         "samples", "temperature", "in_runs", "scenario.reward", "scenario.name", "scenario.robots.n_robots",
+         "sampler")  # fmt: skip
 """Settings of a plan that TensorBoard shows beside the evaluations, by name or by what their names begin with."""
 _NO_LINE = ("stdout", "log", "json", "csv")
 """Outputs of the library that hold numbers only."""
