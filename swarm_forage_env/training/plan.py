@@ -398,10 +398,10 @@ class TrainingPlan:
         last = dataclasses.replace(last, steps=last.steps + steps - self.total_steps)
         return dataclasses.replace(self, stages=(*self.stages[:-1], last))
 
-    def write(self, path: Path) -> None:
+    def write(self, path: str | Path) -> None:
         """Write the plan as JSON."""
         text = json.dumps(self.to_mapping(), indent=2) + "\n"
-        with replacing(path) as draft:
+        with replacing(Path(path)) as draft:
             draft.write_text(text, encoding="utf-8")
 
     @classmethod

@@ -75,8 +75,18 @@ def test_evaluations_are_whole_runs_of_the_scenario_under_seeds_of_their_own(pla
 
 
 def test_a_plan_is_read_back_from_what_it_writes(plan, tmp_path):
-    plan.write(tmp_path / "plan.json")
-    assert read_plan(tmp_path / "plan.json") == plan
+    for one in (plan, replace(plan, in_runs={"decision_ticks": 1, "frame_decisions": 9})):
+        one.write(str(tmp_path / "plan.json"))
+        assert read_plan(tmp_path / "plan.json") == one
+        assert one.differences(plan) == (() if one is plan else tuple(
+            f"in_runs.{name}: nothing before, {value} now" for name, value in one.in_runs.items()
+        ))  # fmt: skip
+
+
+def test_in_runs_needs_a_network_that_a_file_can_hold(plan):
+    sac = replace(plan, algorithm="sac", interface=replace(plan.interface, actions="continuous"), options={})
+    with pytest.raises(ConfigError, match="Expected in_runs only with ppo, a2c, dqn, got sac; leave it out"):
+        replace(sac, in_runs={"decision_ticks": 1})
 
 
 @pytest.mark.parametrize(
