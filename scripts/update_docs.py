@@ -54,12 +54,14 @@ LIKELIEST = (
 )
 """The same weights, with the likeliest action in the place of one that is drawn."""
 AS_LEARNT = (
+    "from dataclasses import replace as change; from swarm_forage_env.policies.interface import interface_from_mapping; "
     "from swarm_forage_env.policies.network import Network; "
     "from swarm_forage_env.policies.pretrained import network_file as file; "
-    "network = Network.load(file('generalist')); "
-    "network.at_temperature(1.0 / network.about.card['plan']['temperature']).save('as_learnt.npz')"
+    "net = Network.load(file('generalist')); plan = net.about.card['plan']; "
+    "net = change(net, about=change(net.about, interface=interface_from_mapping(plan['interface']))); "
+    "net.save('each_second.npz'); net.at_temperature(1.0 / plan['temperature']).save('as_learnt.npz')"
 )
-"""The same weights, drawn as in training: the plan's temperature is taken back."""
+"""The same weights, deciding as in training; and drawn as in training, too, with the plan's temperature taken back."""
 SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "run": ((f"swarm-forage run {','.join(FIVE)} --scenario warehouse_small --robots 50 --seeds 4",), FIVE),
     "medium": (
@@ -153,7 +155,7 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
             f'python -c "{AS_LEARNT}"',
             f'python -c "{LIKELIEST}"',
             f"python {ROOT}/scripts/unseen_worlds.py --worlds {ROOT}/docs/benchmark/validation.toml "
-            "--policy generalist,as_learnt.npz,likeliest.npz",
+            "--policy generalist,each_second.npz,as_learnt.npz,likeliest.npz",
         ),
         (),
     ),
