@@ -54,7 +54,8 @@ LIKELIEST = (
 )
 """The same weights, with the likeliest action in the place of one that is drawn."""
 AS_LEARNT = (
-    "from dataclasses import replace as change; from swarm_forage_env.policies.interface import interface_from_mapping; "
+    "from dataclasses import replace as change; "
+    "from swarm_forage_env.policies.interface import interface_from_mapping; "
     "from swarm_forage_env.policies.network import Network; "
     "from swarm_forage_env.policies.pretrained import network_file as file; "
     "net = Network.load(file('generalist')); plan = net.about.card['plan']; "
