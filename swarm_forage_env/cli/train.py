@@ -107,7 +107,8 @@ class RecipeOptions:
         bool | None,
         typer.Option(
             "--small-start/--no-small-start",
-            help="Whether to spend the first third in a smaller arena; default yes if deliveries count.",
+            help="Whether to spend the first third in a smaller arena; default yes if deliveries count and there are "
+            "steps enough.",
         ),
     ] = None
     turned: Annotated[

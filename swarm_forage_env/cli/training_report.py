@@ -19,11 +19,13 @@ from swarm_forage_env.runs.workers import processes_of
 from swarm_forage_env.training.curves import beside_baseline, place_of
 from swarm_forage_env.training.evaluation_worlds import ALL_WORLDS
 from swarm_forage_env.training.evaluations import (
+    EVALUATIONS_FILE,
     MODEL_FILE,
     PLAN_FILE,
     Evaluation,
     TrainingCurve,
     TrainingStatus,
+    read_evaluations,
 )
 from swarm_forage_env.training.plan import TrainingPlan
 from swarm_forage_env.training.seeds import TrainingFailure, is_finished, read_seeds, seed_folder
@@ -53,6 +55,7 @@ def run_training(
             report = _reporter(plan, bar, plan.total_steps)
             result = train(plan, folder, n_processes=n_processes, resume=resume, report=report, callbacks=added)
         except KeyboardInterrupt:
+            _draw(plan, read_evaluations(folder / EVALUATIONS_FILE), folder / PICTURE_FILE, console)
             words = _farewell(folder, is_kept=(folder / MODEL_FILE).exists())
             raise typer.Exit(complain(words, EXIT_INTERRUPTED)) from None
     if not result.steps:
@@ -143,7 +146,7 @@ def _farewell_of_seeds(plan: TrainingPlan, seeds: Sequence[int], folder: Path) -
 
 
 class _SeedsShown:
-    """Shows how several trainings go, as if they were one, and draws all evaluations whenever there is a new one.
+    """Shows how several trainings go, as if they were one, and draws whenever there is a new evaluation.
 
     Attributes:
         can_draw: Whether matplotlib is installed, as far as is known.
@@ -172,7 +175,7 @@ class _SeedsShown:
         self._note(seed, news)
         if isinstance(news, Evaluation):
             self._report(news, f"{seed:>6}")
-            self._draw()
+            self._draw(seed)
         else:
             self._report(self._together())
 
@@ -194,11 +197,14 @@ class _SeedsShown:
             episode_return=sum(known) / len(known) if known else math.nan,
         )
 
-    def _draw(self) -> None:
+    def _draw(self, seed: int) -> None:
+        """Draw all trainings, and the one that was evaluated alone."""
         if not self.can_draw:
             return
+        found = read_seeds(self._plan, self._folder, self._seeds, self._failures)
         try:
-            read_seeds(self._plan, self._folder, self._seeds, self._failures).draw(self._picture)
+            found.draw(self._picture)
+            beside_baseline(found.trainings[seed]).draw(seed_folder(self._folder, seed) / PICTURE_FILE)
         except ImportError as error:
             self._console.print(str(error))
             self.can_draw = False

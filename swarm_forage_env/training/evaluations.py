@@ -305,6 +305,12 @@ def read_training(folder: Path) -> TrainingCurve:
     if not (folder / PLAN_FILE).exists():
         raise ConfigError(f"Expected the folder of a training, got {folder} without {PLAN_FILE}.")
     evaluations = read_evaluations(folder / EVALUATIONS_FILE)
+    below = sorted(path.parent.name for path in folder.glob(f"*/{EVALUATIONS_FILE}"))
+    if not evaluations and below:
+        raise ConfigError(
+            f"Expected the folder of one training, got {folder} with several below it; name them: "
+            f"{' '.join(str(folder / name) for name in below)}."
+        )
     if not evaluations:
         raise ConfigError(f"Expected a training with evaluations, got {folder} without any in {EVALUATIONS_FILE}.")
     return TrainingCurve(

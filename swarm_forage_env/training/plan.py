@@ -19,10 +19,11 @@ from swarm_forage_env._internal.fields import (
     whole,
 )
 from swarm_forage_env._internal.files import parse_json, parse_toml, replacing
+from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.policy import layout_for
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping, learner_layout
 from swarm_forage_env.policies.network import ACTIVATIONS, TEMPERATURES
-from swarm_forage_env.policies.pretrained import plan_file
+from swarm_forage_env.policies.pretrained import plan_file, plan_names
 from swarm_forage_env.policies.registry import policy_class
 from swarm_forage_env.policies.turns import AS_DRAWN, check_turned
 from swarm_forage_env.runs.plan import Plan
@@ -263,6 +264,8 @@ class TrainingPlan:
             )
         for name, value in self.in_runs.items():
             whole(f"in_runs.{name}", value, at_least=IN_RUNS[name])
+        if self.in_runs.get("frame_decisions") and not self.interface.frame_decisions:
+            raise ConfigError("Expected in_runs.frame_decisions only of robots that learn in frames, too; set both.")
         _ = self.run_interface  # refuses frames of own sensors
 
     def arenas_of(self, stage: Stage) -> dict[str, Any]:
@@ -471,6 +474,11 @@ def named_plan(
         ConfigError: there is none, or it cannot be used.
     """
     shipped = plan_file(name)
+    if shipped is None and not Path(name).suffix and not Path(name).exists():
+        raise ConfigError(
+            f"Expected --plan as a file, or as a shipped policy ({', '.join(plan_names())}), got {name!r}."
+            f"{suggestion(name, plan_names())}"
+        )
     plan = read_plan(name if shipped is None else shipped)
     given: dict[str, Any] = {key: value for key, value in (("seed", seed), ("turned", turned)) if value is not None}
     if frame_decisions is not None:
@@ -498,5 +506,9 @@ def _leaves(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
 
 def _known(config_class: type, mapping: Mapping[str, Any], where: str, keys: Sequence[str] = ()) -> dict[str, Any]:
     table(where.rstrip(".") or "the plan", mapping)
-    known_keys(mapping, keys or [item.name for item in dataclasses.fields(config_class)], prefix=where)
+    known = keys or [item.name for item in dataclasses.fields(config_class)]
+    astray = next((key for key in mapping if where and key not in known and key in _keys()), None)
+    if astray is not None:  # a line after [evaluation] is part of it
+        raise ConfigError(f"Expected {astray!r} above the first [table] of the plan, got it in {where.rstrip('.')!r}.")
+    known_keys(mapping, known, prefix=where)
     return dict(mapping)

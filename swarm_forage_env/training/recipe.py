@@ -92,7 +92,8 @@ def recipe(
             worlds are taken as they are, with their rewards and horizons. Evaluations take place in the largest world
             of each name that it draws, unless `evaluation` has worlds.
         algorithm: One of `plan.ALGORITHMS`.
-        steps: Decisions of single robots in all stages, 1 or more; 1 or 2 make a single stage.
+        steps: Decisions of single robots in all stages, 1 or more; they make a single stage where a third of them is
+            less than a rollout (of ppo and a2c), which would be all of a stage.
         n_arenas: Arenas side by side; default `DEFAULT_ARENAS`, fewer of swarms that make more than `DEFAULT_ROBOTS`
             in all.
         interface: What a learner sees and does: an `InterfaceConfig`, or fields by name that differ from the
@@ -105,7 +106,7 @@ def recipe(
         lstm: Cells of an LSTM by which each robot remembers, see `TrainingPlan.lstm`.
         options: Arguments of the algorithm that differ from `DEFAULT_OPTIONS` and, to the end, from `LATE_OPTIONS`.
         small_start: Spend the first third of the steps in a smaller arena; default where deliveries count, unless
-            `recipes.toml` says otherwise.
+            `recipes.toml` says otherwise or there are few `steps`.
         evaluation: How the policy is judged meanwhile: an `EvaluationPlan`, or fields by name that differ from the
             recipe's (whole runs, as often as `EVALUATE_EVERY` and `EVALUATION_SHARE` allow).
         seed: Seed of everything.
@@ -138,8 +139,12 @@ def recipe(
     with_overrides(config, **episodes)  # refuses an impossible length
     chosen = chosen_interface(interface, _default_interface(algorithm, config))
     n_arenas = _default_arenas(config, sampler) if n_arenas is None else n_arenas
+    n_rows = n_arenas * config.robots.n_robots
+    chosen_options = _algorithm_options(algorithm, n_rows, {**measured.options.get(algorithm, {}), **(options or {})})
+    shortest = 1 if small_start else n_rows * _rollout_steps(algorithm, chosen_options)
     if small_start is None:
         small_start = config.performance == "collected" and sampler is None and measured.small_start
+    late = _late_options(algorithm, options or {})
     return TrainingPlan(
         world=World(config, wrapper_configs(wrappers)),
         algorithm=algorithm,
@@ -148,10 +153,8 @@ def recipe(
         hidden=hidden,
         activation=activation,
         lstm=lstm,
-        options=_algorithm_options(
-            algorithm, n_arenas * config.robots.n_robots, {**measured.options.get(algorithm, {}), **(options or {})}
-        ),
-        stages=_stages(config, steps, episodes, late=_late_options(algorithm, options or {}), small_start=small_start),
+        options=chosen_options,
+        stages=_stages(config, steps, episodes, late=late, small_start=small_start, shortest=shortest),
         evaluation=_evaluation(evaluation, config, chosen.decision_ticks, sampler),
         seed=seed,
         samples=_can_draw(algorithm, chosen) if samples is None else samples,
@@ -258,6 +261,12 @@ def _algorithm_options(algorithm: str, n_rows: int, given: Mapping[str, Any]) ->
     return chosen
 
 
+def _rollout_steps(algorithm: str, options: Mapping[str, Any]) -> int:
+    """Return how many decisions of each robot come before one update; of algorithms without rollouts one."""
+    n_steps = options.get("n_steps", 1)
+    return n_steps if algorithm in SAMPLING and isinstance(n_steps, int) else 1
+
+
 def _fitting_batch(n_samples: int, most: int) -> int:
     """Return the largest size from `most` down to half of it that divides `n_samples`, else `most`; or all of few."""
     if 1 < n_samples <= most:
@@ -272,16 +281,17 @@ def _stages(
     *,
     late: Mapping[str, Any],
     small_start: bool,
+    shortest: int,
 ) -> tuple[Stage, ...]:
     """Return a third of the steps in a smaller arena if asked for, and a third with the `late` options if any.
 
-    Stages without steps are left out: one or two steps are all in the middle.
+    Where a third is below the `shortest` stage, all steps are in the middle.
     """
-    small = {**_fitting_small_arena(scenario), **episodes} if small_start else {}
     third = steps // 3
+    if third < shortest:
+        return (Stage(steps=steps, scenario=episodes),)
+    small = {**_fitting_small_arena(scenario), **episodes} if small_start else {}
     middle = Stage(steps=steps - third * (small_start + bool(late)), scenario=episodes)
-    if not third:
-        return (middle,)
     first = (Stage(steps=third, scenario=small),) if small_start else ()
     last = (Stage(steps=third, scenario=episodes, options=late),) if late else ()
     return (*first, middle, *last)

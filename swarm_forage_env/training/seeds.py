@@ -4,7 +4,7 @@ A folder has the plan, and for each seed the folder of a training, `seed_0` and 
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -117,12 +117,16 @@ class SeedTrainings(Answer):
     def means(self) -> "dict[str, Summary]":
         """Return means over trainings with Student's 95 % interval, by fields of `KeptNetwork`; none where all failed.
 
-        Bounds are NaN for one training.
+        Bounds are NaN for one training; those of a share end at 0 and 1.
         """
         from metrics.statistics import aggregate  # late: see training.evaluations
 
         kept = self._finished()
-        return {name: aggregate([getattr(one, name) for one in kept]) for name, *_ in self._columns if kept}
+        found = {name: aggregate([getattr(one, name) for one in kept]) for name, *_ in self._columns if kept}
+        for name in found.keys() & {"interference_fraction"}:  # a share; min and max keep NaN where it comes first
+            of = found[name]
+            found[name] = replace(of, lower=max(of.lower, 0.0), upper=min(of.upper, 1.0))
+        return found
 
     def _finished(self) -> list[KeptNetwork]:
         """What is kept of trainings that did not fail."""

@@ -64,9 +64,14 @@ def test_what_curves_refuses(command):
     Path("new", EVALUATIONS_FILE).unlink()
     training("broken")
     Path("broken", EVALUATIONS_FILE).write_text("steps,wall_time_s\nten,1\n")
+    training("seeds")
+    Path("seeds", EVALUATIONS_FILE).unlink()
+    training("seeds/seed_1")
+    training("seeds/seed_0")
     for words, message in (
         (("empty",), "Expected the folder of a training, got empty without plan.json"),
         (("new",), "Expected a training with evaluations, got new"),
+        (("seeds",), "got seeds with several below it; name them: seeds/seed_0 seeds/seed_1."),
         (("broken",), "Cannot read the evaluations in broken/evaluations.csv"),
         (("first", "elsewhere"), "judged by the same runs, got first and elsewhere"),
         (("first", "--policy", "crv"), "Did you mean 'crw'"),

@@ -18,12 +18,13 @@ from swarm_forage_env.cli import training_report
 from swarm_forage_env.cli.options import WorldOptions
 from swarm_forage_env.cli.train import RecipeOptions, train
 from swarm_forage_env.training.defaults import DEFAULT_REWARDS, EPISODE_S
+from swarm_forage_env.training.evaluations import Evaluation, write_evaluations
 from swarm_forage_env.training.plan import EvaluationPlan, read_plan
 from swarm_forage_env.training.recipe import recipe
 
 TRUSTING = ("--trust-models", "train")
 TINY = ("--robots", "4", "--objects", "20", "--steps", "128", "--arenas", "2", "--arg", "n_steps=16", "--arg",
-        "batch_size=64", "--evaluate-every", "128", "--evaluation-horizon", "200")  # fmt: skip
+        "batch_size=64", "--small-start", "--evaluate-every", "128", "--evaluation-horizon", "200")  # fmt: skip
 
 
 needs_training = pytest.mark.skipif(
@@ -197,7 +198,11 @@ def test_ctrl_c_says_how_to_go_on(command, monkeypatch):
     folder = Path("results/training/warehouse_small_ppo")
     folder.mkdir(parents=True)
     (folder / "model.zip").touch()
+    done = Evaluation(steps=64, wall_time_s=1.0, performance=5.0, baseline=4.0, interference_fraction=0.1)
+    write_evaluations(folder / "evaluations.csv", [done])
     assert f"To go on: swarm-forage --trust-models train --out {folder} --resume" in command("train", *TINY)[2]
+    if find_spec("matplotlib"):
+        assert (folder / "training.png").read_bytes().startswith(b"\x89PNG")
 
 
 CALLBACK = """

@@ -68,7 +68,13 @@ def test_seeds_are_trained_drawn_and_told(command, calls, pictures, monkeypatch)
     code, out, err = command(*TINY, "--seeds", "2", *OUT)
     assert code == 0, err
     assert calls == [(0, False), (1, False)]
-    assert [names for _, names in pictures] == [["seed_0"], ["seed_0", "seed_1"], ["seed_0", "seed_1"]]
+    assert pictures == [
+        ("all/curves.png", ["seed_0"]),
+        ("all/seed_0/training.png", ["seed_0"]),
+        ("all/curves.png", ["seed_0", "seed_1"]),
+        ("all/seed_1/training.png", ["seed_1"]),
+        ("all/curves.png", ["seed_0", "seed_1"]),
+    ]
     assert err.startswith("256 decisions; a line about every minute says how many are done.\n")
     assert "64 of 256 decisions, mean return 2.00, about 3 s left" in err
     assert "192 of 256 decisions, mean return 2.50" in err
@@ -101,7 +107,7 @@ def test_the_same_command_with_resume_does_the_rest(command, calls, pictures):
     calls.clear()
     code, out, err = command(*TINY, "--seeds", "3", *OUT, "--resume", "--picture", "figure.svg")
     assert (code, calls) == (0, [(2, False)]), err
-    assert {path for path, _ in pictures[-2:]} == {"figure.svg"}
+    assert {path for path, _ in pictures[-3:]} == {"figure.svg", "all/seed_2/training.png"}
     assert command("train", "--seeds", "3", *OUT, "--resume", "--jobs", "1")[:2] == (
         0,
         out,

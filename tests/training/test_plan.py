@@ -8,7 +8,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.pretrained import plan_file
 from swarm_forage_env.scenarios.presets import warehouse_small
-from swarm_forage_env.training.plan import LEARNING, EvaluationPlan, Stage, TrainingPlan, read_plan
+from swarm_forage_env.training.plan import LEARNING, EvaluationPlan, Stage, TrainingPlan, named_plan, read_plan
 from swarm_forage_env.wrappers.world import World
 
 TOML = """
@@ -75,10 +75,11 @@ def test_evaluations_are_whole_runs_of_the_scenario_under_seeds_of_their_own(pla
 
 
 def test_a_plan_is_read_back_from_what_it_writes(plan, tmp_path):
-    for one in (plan, replace(plan, in_runs={"decision_ticks": 1, "frame_decisions": 9})):
+    framed = replace(plan, interface=replace(plan.interface, frame_decisions=5))
+    for one in (framed, replace(framed, in_runs={"decision_ticks": 1, "frame_decisions": 9})):
         one.write(str(tmp_path / "plan.json"))
         assert read_plan(tmp_path / "plan.json") == one
-        assert one.differences(plan) == (() if one is plan else tuple(
+        assert one.differences(framed) == (() if one is framed else tuple(
             f"in_runs.{name}: nothing before, {value} now" for name, value in one.in_runs.items()
         ))  # fmt: skip
 
@@ -136,6 +137,12 @@ def test_in_runs_needs_a_network_that_a_file_can_hold(plan):
             "in_runs.decision_ticks to be a whole number >= 1",
         ),
         ("n_arenas = 2", "n_arenas = 2\nin_runs = 5", "in_runs to be a table"),
+        ("n_arenas = 2", "n_arenas = 2\nin_runs = { frame_decisions = 5 }", "only of robots that learn in frames, too"),
+        (
+            "[evaluation]",
+            "[evaluation]\nsamples = true",
+            r"'samples' above the first \[table\] of the plan",
+        ),
         (
             "n_arenas = 2",
             "n_arenas = 2\ntemperature = 0.5",
@@ -161,6 +168,14 @@ def test_a_plan_has_stages_and_a_readable_file(tmp_path):
         TrainingPlan(world=World(warehouse_small()), stages=())
     with pytest.raises(ConfigError, match="Cannot read the plan"):
         read_plan(tmp_path / "nothing.toml")
+
+
+def test_a_shipped_plan_that_there_is_not_is_told_with_those_that_there_are():
+    assert named_plan("generalist").in_runs
+    with pytest.raises(
+        ConfigError, match=r"as a shipped policy \(generalist, .*got 'generalst'. Did you mean 'generalist'"
+    ):
+        named_plan("generalst")
 
 
 def test_performances_that_arenas_do_not_count_are_refused(plan):

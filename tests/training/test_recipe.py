@@ -1,6 +1,7 @@
 """The recipe for a training: its defaults, what overrides them, and the smaller arena it begins in."""
 
 import dataclasses
+import re
 import tomllib
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from swarm_forage_env.scenarios.config import PHYSICS_ENGINES, RewardConfig
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario, warehouse_small
 from swarm_forage_env.training.defaults import EVALUATE_EVERY
-from swarm_forage_env.training.plan import ALGORITHMS, EvaluationPlan, Stage
+from swarm_forage_env.training.plan import ALGORITHMS, EvaluationPlan, Stage, read_plan
 from swarm_forage_env.training.recipe import LATE_OPTIONS, Measured, recipe, small_arena
 
 
@@ -101,9 +102,31 @@ def test_the_last_third_learns_more_slowly_unless_people_say_how_fast():
     [(1, [1]), (2, [2]), (3, [1, 1, 1]), (4, [1, 2, 1]), (100, [33, 34, 33])],
 )
 def test_stages_have_all_steps_and_none_more(steps, stages):
-    assert [stage.steps for stage in recipe(steps=steps).stages] == stages
+    assert [stage.steps for stage in recipe(steps=steps, small_start=True).stages] == stages
     assert sum(stage.steps for stage in recipe(steps=steps, small_start=False).stages) == steps
     assert [stage.steps for stage in recipe(steps=steps, small_start=False, algorithm="dqn").stages] == [steps]
+
+
+def test_stages_shorter_than_a_rollout_are_left_out():
+    rollout = 128 * 8 * 50
+    assert [len(recipe(steps=steps).stages) for steps in (3 * rollout - 1, 3 * rollout)] == [1, 3]
+    assert recipe(steps=1000).stages[0].scenario == {"horizon_s": 4000.0}, "all of it in the whole arena"
+    assert len(recipe(steps=3 * 64 * 8 * 50, options={"n_steps": 64}).stages) == 3
+    assert len(recipe(steps=1000, small_start=True).stages) == 3, "what is asked for goes first"
+
+
+def test_the_page_shows_the_default_training_as_a_plan(tmp_path):
+    page = (Path(__file__).parents[2] / "docs/training.md").read_text(encoding="utf-8")
+    (tmp_path / "plan.toml").write_text(re.search(r"```toml\n(algorithm = .*?)```", page, re.DOTALL)[1])
+    shown, default = read_plan(tmp_path / "plan.toml"), recipe()
+    assert (shown.temperature, shown.in_runs) == (0.5, {"decision_ticks": 2, "frame_decisions": 500})
+    assert [stage.steps for stage in shown.stages] == pytest.approx([stage.steps for stage in default.stages], rel=0.05)
+    stages = [
+        dataclasses.replace(one, steps=other.steps) for one, other in zip(shown.stages, default.stages, strict=True)
+    ]
+    shown = dataclasses.replace(shown, temperature=1.0, in_runs={}, stages=tuple(stages))
+    settings = default.settings()
+    assert {name: value for name, value in shown.settings().items() if value != pytest.approx(settings[name])} == {}
 
 
 @pytest.mark.parametrize("steps", [0, -5, 2.5, True])

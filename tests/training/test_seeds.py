@@ -135,6 +135,9 @@ def test_what_cannot_begin_is_refused_before_anything_is_trained(tmp_path, monke
             train_seeds(PLAN, seeds, tmp_path)
     with pytest.raises(ConfigError, match="Unknown option 'gama'"):
         train_seeds(dataclasses.replace(PLAN, options={"gama": 0.9}), range(2), tmp_path)
+    replay = {"buffer_size": 400, "learning_starts": 128, "batch_size": 16}
+    with pytest.raises(ConfigError, match=r"more steps than the 128 after which dqn begins to learn .*, got 128"):
+        train_seeds(dataclasses.replace(PLAN, algorithm="dqn", options=replay), range(2), tmp_path)
     with pytest.raises(ConfigError, match="No module named 'nothing'"):
         train_seeds(PLAN, range(2), tmp_path, callbacks=["nothing:Mine"])
     assert not list(tmp_path.iterdir())
@@ -219,6 +222,16 @@ def test_the_table_has_what_is_kept_and_its_mean(tmp_path):
     assert mapping["means"]["ratio"]["mean"] == pytest.approx(2.6)
     assert mapping["trainings"][3]["cpu_time_s"] is None
     assert mapping["failures"] == {"3": "diverged"}
+
+
+def test_the_interval_of_a_share_ends_at_0(tmp_path):
+    for seed, share in enumerate((0.0, 0.0, 0.3)):
+        made(tmp_path, seed, {128: 10.0})
+        one = dataclasses.replace(evaluated(128, 10.0), interference_fraction=share)
+        write_evaluations(seed_folder(tmp_path, seed) / EVALUATIONS_FILE, [one])
+    of = read_seeds(PLAN, tmp_path, range(3)).means()["interference_fraction"]
+    assert (of.mean, of.lower) == (pytest.approx(0.1), 0.0)
+    assert of.upper == pytest.approx(aggregate([0.0, 0.0, 0.3]).upper)
 
 
 def test_one_training_has_a_mean_and_no_interval(tmp_path):

@@ -32,6 +32,11 @@ def network_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in _FOLDER.glob("*.npz")))
 
 
+def plan_names() -> tuple[str, ...]:
+    """Return the names of the shipped policies that have a training plan."""
+    return tuple(sorted(path.stem for path in _FOLDER.glob("*.toml")))
+
+
 def _shipped(file: str) -> Path | None:
     path = _FOLDER / file
     return path if path.is_file() else None

@@ -201,6 +201,7 @@ def check_plan(plan: TrainingPlan) -> None:
     """
     class_of(plan)
     _check_options(plan)
+    _check_learns(plan)
     _check_baseline(plan)
 
 
@@ -218,6 +219,19 @@ def _check_options(plan: TrainingPlan) -> None:
             if name in _OURS:
                 raise ConfigError(f"Expected options of {plan.algorithm} without {name!r}, which training sets itself.")
             raise ConfigError(f"Unknown option {name!r} of {plan.algorithm}.{suggestion(name, sorted(known))}")
+
+
+def _check_learns(plan: TrainingPlan) -> None:
+    """Refuse a training from replay that ends before it begins to learn."""
+    default = inspect.signature(ALGORITHM_CLASSES[plan.algorithm]).parameters.get("learning_starts")
+    if default is None:
+        return
+    starts = min({**plan.options, **stage.options}.get("learning_starts", default.default) for stage in plan.stages)
+    if plan.total_steps <= starts:
+        raise ConfigError(
+            f"Expected more steps than the {starts:,} after which {plan.algorithm} begins to learn (learning_starts), "
+            f"got {plan.total_steps:,}; give more, or a smaller learning_starts."
+        )
 
 
 def check_place(folder: Path, plan: TrainingPlan, *, resume: bool) -> None:
