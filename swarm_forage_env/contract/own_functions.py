@@ -35,7 +35,7 @@ OwnReward: TypeAlias = Callable[[Any], np.ndarray]
 
 
 class OwnFunctionError(ValueError):
-    """A function of the user that failed, or returned what no observation or reward can be."""
+    """A function of the user that cannot be loaded, failed, or returned what no observation or reward can be."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -157,6 +157,7 @@ def own_sensor(name: str) -> OwnSensor:
 
     Raises:
         ConfigError: there is none.
+        OwnFunctionError: its module cannot be imported.
     """
     if name in _SENSORS:
         return _SENSORS[name]
@@ -171,6 +172,7 @@ def own_reward(name: str) -> OwnReward:
 
     Raises:
         ConfigError: there is none.
+        OwnFunctionError: its module cannot be imported.
     """
     return _REWARDS[name] if name in _REWARDS else _load("reward", REWARD_ENTRY_POINTS, name, _REWARDS)
 
@@ -178,7 +180,12 @@ def own_reward(name: str) -> OwnReward:
 def _load(kind: str, group: str, name: str, local: dict[str, Any]) -> Any:
     for point in _installed(group):
         if point.name == name:
-            return point.load()
+            try:
+                return point.load()
+            except Exception as error:  # code of the user, which may raise anything
+                raise OwnFunctionError(
+                    f"Cannot load own {kind} {name!r} from {point.value}: {type(error).__name__}: {error}"
+                ) from error
     known = sorted({*local, *(point.name for point in _installed(group))})
     raise ConfigError(
         f"Unknown own {kind} {name!r}.{suggestion(name, known)} Known here: {', '.join(known) or 'none'}. "

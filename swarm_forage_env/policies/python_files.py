@@ -23,7 +23,7 @@ from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.model_files import checked_digest
 from swarm_forage_env.policies.registry import split_class
 
-_INSTALLED = frozenset({"site-packages", "dist-packages"})
+INSTALLED = frozenset({"site-packages", "dist-packages"})
 """Names of the folders into which packages are installed."""
 
 
@@ -135,7 +135,7 @@ def _check_neighbours(path: Path) -> None:
             if home == path.parent:
                 if beside.origin is not None and beside.origin.endswith(".py"):
                     to_read.append(Path(beside.origin))
-            elif not _INSTALLED.intersection(home.parts):
+            elif not INSTALLED.intersection(home.parts):
                 raise PythonFileError(
                     f"Expected {path} to import the module {name} that lies beside it, but this process has the one "
                     f"of {home}; rename one of the two, or run the policies in commands of their own."

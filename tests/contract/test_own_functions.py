@@ -3,6 +3,7 @@
 import copy
 import json
 from contextlib import nullcontext
+from importlib.metadata import EntryPoint
 from typing import Any
 
 import gymnasium
@@ -300,6 +301,15 @@ def test_installed_packages_offer_them(monkeypatch):
     monkeypatch.setattr(own, "_installed", lambda group: (Offered("offered", nest_distance),))
     with pytest.raises(ConfigError, match="to be an OwnSensor"):
         own.own_sensor("offered")
+
+
+def test_a_module_that_fails_is_told_with_its_name(monkeypatch):
+    broken = EntryPoint(name="mine", value="no_such_package_of_mine:MINE", group=own.SENSOR_ENTRY_POINTS)
+    monkeypatch.setattr(own, "_installed", lambda _: (broken,))
+    told = "Cannot load own {} 'mine' from no_such_package_of_mine:MINE: ModuleNotFoundError: No module named"
+    for kind, find in (("sensor", own.own_sensor), ("reward", own.own_reward)):
+        with pytest.raises(OwnFunctionError, match=told.format(kind)):
+            find("mine")
 
 
 def test_a_name_of_the_compact_view_is_taken_there():
