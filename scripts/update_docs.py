@@ -150,7 +150,10 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         )
         for suffix, option in (("", ""), ("_short", " --horizon 1000"))
     },
-    "unseen": ((f"python {ROOT}/scripts/unseen_worlds.py",), ()),
+    "unseen": (
+        (f'python -c "{AS_LEARNT}"', f"python {ROOT}/scripts/unseen_worlds.py --policy generalist,each_second.npz"),
+        (),
+    ),
     "validation": (
         (
             f'python -c "{AS_LEARNT}"',

@@ -171,7 +171,7 @@ def test_the_words_say_what_goes_in_and_out():
         "X = 48 m, Y = 48 m",
         "1  forward: wheels +0.10, +0.10 m/s",
         "Draw the action k",
-        "every 1 s",
+        "every 0.4 s",
         "The gripper works by itself",
         "and in another one after 200 decisions",
         "If f >= 4, the two wheel speeds of the action change places",
