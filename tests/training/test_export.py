@@ -173,7 +173,7 @@ def test_the_words_say_what_goes_in_and_out():
         "Draw the action k",
         "every 0.4 s",
         "The gripper works by itself",
-        "and in another one after 200 decisions",
+        "and in another one after 1,000 decisions",
         "If f >= 4, the two wheel speeds of the action change places",
     ):
         assert words in text
