@@ -9,6 +9,7 @@ from importlib import import_module
 from itertools import takewhile
 from typing import Any
 
+from swarm_forage_env._internal.faults import PACKAGES
 from swarm_forage_env.cli.commands import COMMANDS, Command
 
 _OPTIONS = {
@@ -16,8 +17,6 @@ _OPTIONS = {
     "--trust-models": "Open models (.zip) and Python files (.py) that\nother files name: runs code (SECURITY.md).",
     "--help": "Show this message and exit.",
 }
-PACKAGES = ("swarm_forage_env", "baselines", "metrics")
-"""What speaks to users: by subclasses of ValueError such as ConfigError and ModelError, by warnings and loggers."""
 _BY_WORDS = {command.words: command for group in COMMANDS.values() for command in group}
 
 

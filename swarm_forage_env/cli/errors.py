@@ -1,13 +1,12 @@
 """How a command ends that fails: an error becomes one line on stderr and an exit code, also one that nobody foresaw.
 
-An error that nobody foresaw is a fault of ours, or of a user's module: a callback, or a sensor of an installed package.
-Its traceback goes to a file, with the command and the versions. The line says where the file is, and whose fault it is.
+An error that nobody foresaw is a fault of ours, or of a file of the user, such as a callback. Its traceback goes to a
+file, with the command and the versions. The line says where the file is, and whose fault it is.
 """
 
 import os
 import shlex
 import sys
-import sysconfig
 import tempfile
 import traceback
 from collections.abc import Iterator, Sequence
@@ -17,15 +16,13 @@ from typing import Any
 
 import typer
 
-from swarm_forage_env.cli.app import PACKAGES
+from swarm_forage_env._internal.faults import PACKAGES, place_in_code_of_user
 from swarm_forage_env.cli.former_words import right_option
 from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_UNFORESEEN, EXIT_USAGE, complain
 from swarm_forage_env.cli.signals import EXIT_INTERRUPTED
 
 DEBUG_VARIABLE = "SWARM_FORAGE_DEBUG"
 """Environment variable; if it is set and not empty, an error that nobody foresaw shows its traceback at once."""
-_ROOT = Path(__file__).resolve().parents[2]
-"""Folder of our packages."""
 _WANTED = {
     "Input should be a valid integer": "a whole number",
     "Input should be a valid number": "a number",
@@ -70,7 +67,9 @@ def end(error: BaseException, words: Sequence[str] = ()) -> int:
 def _about_words(error: Any) -> str:
     """Return what is wrong with the words of a command, for typer, in the style of our other errors."""
     wrong = getattr(error, "option_name", "")
-    right = right_option(wrong, [word for option in error.ctx.command.params for word in option.opts]) if wrong else ""
+    context = error.ctx  # none where an option lacks its value
+    known = [] if context is None else [word for option in context.command.params for word in option.opts]
+    right = right_option(wrong, known)
     if right:
         return f"No such option: {wrong}; for this command it is {right}."
     said = next((theirs for theirs in _WANTED if error.message.startswith(theirs)), None)
@@ -97,7 +96,7 @@ def resumable(folder: Path) -> Iterator[None]:
 
 def _end_unforeseen(error: BaseException, words: Sequence[str]) -> int:
     summary = "".join(traceback.format_exception_only(error)).strip().splitlines()[-1]
-    place = _place_in_code_of_user(error)
+    place = place_in_code_of_user(error)
     try:
         kept = f"Details: {_report(error, words)}"
         kept += "." if place else "; please send this file to us."
@@ -106,23 +105,6 @@ def _end_unforeseen(error: BaseException, words: Sequence[str]) -> int:
     if place:
         return complain(f"Your code failed in {place}: {summary}. {kept}", EXIT_FAILURE)
     return complain(f"an error that should not happen: {summary}. {kept}", EXIT_UNFORESEEN)
-
-
-def _place_in_code_of_user(error: BaseException) -> str:
-    """Return the line of a user's file in which an error began; empty where the last code was ours.
-
-    Files of Python and of installed packages are neither: an error that numpy raises is that of whoever called numpy.
-    """
-    from swarm_forage_env.policies.python_files import INSTALLED
-
-    standard_library = Path(sysconfig.get_path("stdlib"))
-    for frame in reversed(traceback.extract_tb(error.__traceback__)):
-        file = Path(frame.filename)
-        if any(file.is_relative_to(_ROOT / package) for package in PACKAGES):
-            return ""
-        if file.is_file() and not file.is_relative_to(standard_library) and INSTALLED.isdisjoint(file.parts):
-            return f"{file}, line {frame.lineno}"
-    return ""
 
 
 def _report(error: BaseException, words: Sequence[str]) -> Path:

@@ -16,9 +16,9 @@ OPTIONS = {
     "--env": ("--scenario",),
     "--file": ("--picture", "--out"),
     "--format": ("--json",),
-    "--gamma": ("--arg",),
+    "--gamma": ("--arg gamma=NUMBER",),
     "--into": ("--file",),
-    "--learning-rate": ("--arg",),
+    "--learning-rate": ("--arg learning_rate=NUMBER",),
     "--model": ("--policy",),
     "--n-jobs": ("--jobs",),
     "--n-robots": ("--robots",),
@@ -36,7 +36,7 @@ OPTIONS = {
     "--seed": ("--seeds", "--first-seed"),
     "--seeds": ("--seed",),
     "--size": ("--robots",),
-    "--temperature": ("--plan",),
+    "--temperature": ("--plan FILE, with temperature = NUMBER in it",),
     "--workers": ("--jobs",),
     "--world": ("--scenario",),
     "--wrappers": ("--wrapper",),
@@ -44,7 +44,7 @@ OPTIONS = {
     "-n": ("--robots",),
     "-o": ("--file", "--picture", "--out"),
 }
-"""Option -> options that may be meant; the first of them that a command has is."""
+"""Option -> options that may be meant, some with what follows them; the first of them that a command has is."""
 
 COMMANDS = {
     "availability": "predict availability",
@@ -76,4 +76,4 @@ COMMANDS = {
 
 def right_option(word: str, known: Collection[str]) -> str:
     """Return the option of a command that a wrong one stands for; empty if none is known."""
-    return next((right for right in OPTIONS.get(word, ()) if right in known), "")
+    return next((right for right in OPTIONS.get(word, ()) if right.split()[0] in known), "")

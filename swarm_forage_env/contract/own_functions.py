@@ -19,6 +19,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from swarm_forage_env._internal.faults import in_words
 from swarm_forage_env._internal.fields import ConfigError, instance, text, whole
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.layout import BUILT_IN_SLICES, OPTIONAL_SLICES, LayoutRow
@@ -104,7 +105,7 @@ def called(function: Callable[[Any], Any], world: Any, what: str) -> np.ndarray:
     try:
         values = np.asarray(function(world))
     except Exception as error:
-        raise OwnFunctionError(f"The function of {what} failed with {type(error).__name__}: {error}") from error
+        raise OwnFunctionError(f"The function of {what} failed with {in_words(error)}") from error
     if values.dtype.kind not in "biuf":
         raise OwnFunctionError(f"Expected {what} to return real numbers, got an array of {values.dtype}.")
     return values
@@ -167,6 +168,11 @@ def own_sensor(name: str) -> OwnSensor:
     return found
 
 
+def is_own_sensor(name: str) -> bool:
+    """Return whether a sensor of that name is registered or installed; nothing is imported for it."""
+    return name in _SENSORS or name in {point.name for point in _installed(SENSOR_ENTRY_POINTS)}
+
+
 def own_reward(name: str) -> OwnReward:
     """Return the reward function of that name, registered or installed.
 
@@ -184,7 +190,7 @@ def _load(kind: str, group: str, name: str, local: dict[str, Any]) -> Any:
                 return point.load()
             except Exception as error:  # code of the user, which may raise anything
                 raise OwnFunctionError(
-                    f"Cannot load own {kind} {name!r} from {point.value}: {type(error).__name__}: {error}"
+                    f"Cannot load own {kind} {name!r} from {point.value}: {in_words(error)}"
                 ) from error
     known = sorted({*local, *(point.name for point in _installed(group))})
     raise ConfigError(

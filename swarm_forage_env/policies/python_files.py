@@ -17,14 +17,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from swarm_forage_env._internal.faults import INSTALLED
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.model_files import checked_digest
 from swarm_forage_env.policies.registry import split_class
-
-INSTALLED = frozenset({"site-packages", "dist-packages"})
-"""Names of the folders into which packages are installed."""
 
 
 class PythonFileError(ConfigError):

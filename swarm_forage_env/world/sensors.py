@@ -21,6 +21,7 @@ from swarm_forage_env.contract.layout import (
     NEIGHBOURS,
     ObservationLayout,
 )
+from swarm_forage_env.contract.own_functions import is_own_sensor
 from swarm_forage_env.contract.types import ObsArray
 from swarm_forage_env.scenarios.config import ArenaConfig, ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M
@@ -53,6 +54,11 @@ def read_slices(reads: Collection[str] | None, layout: ObservationLayout) -> tup
             raise ConfigError(
                 f"Expected a scenario with {what}, because the policy reads the slice {name!r}, got one without; give "
                 f"it {field}."
+            )
+        if name not in layout.names and is_own_sensor(name):
+            raise ConfigError(
+                f"Expected a scenario with the own sensor {name!r}, which the policy reads, got one without; give it "
+                f"own_sensors=({name!r},), on the command line --set own_sensors={name}."
             )
         known_name("entry of reads", name, (*layout.names, LIGHT_IF_CARRYING, MESSAGES_IF_ANY))
     plain = {LIGHT_IF_CARRYING: "light", MESSAGES_IF_ANY: MESSAGES}

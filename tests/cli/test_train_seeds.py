@@ -124,7 +124,7 @@ def test_a_training_that_fails_is_told_and_the_others_go_on(command, calls, pict
     code, out, err = command(*TINY, "--seeds", "5", *OUT)
     assert code == 1
     assert [seed for seed, _ in calls] == [0, 1, 2, 3, 4]
-    assert "Seed 3 failed: RuntimeError: the disk is gone\n" in err
+    assert f"Seed 3 failed: RuntimeError: the disk is gone ({__file__}, line " in err
     assert "Seed 3 failed and is not in the mean: RuntimeError: the disk is gone" in out
     again = "train --plan all/plan.json --seed 3 --out all/seed_3 --resume"
     assert err.endswith(f"again, alone: swarm-forage --trust-models {again}\n")

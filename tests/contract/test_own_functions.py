@@ -4,6 +4,7 @@ import copy
 import json
 from contextlib import nullcontext
 from importlib.metadata import EntryPoint
+from runpy import run_path
 from typing import Any
 
 import gymnasium
@@ -310,6 +311,23 @@ def test_a_module_that_fails_is_told_with_its_name(monkeypatch):
     for kind, find in (("sensor", own.own_sensor), ("reward", own.own_reward)):
         with pytest.raises(OwnFunctionError, match=told.format(kind)):
             find("mine")
+
+
+def test_a_policy_that_reads_a_sensor_says_what_the_scenario_lacks():
+    assert ForageEnv(scenario("warehouse_small", n_robots=2, own_sensors=("both",)), reads=("both",)).arena.reads == (
+        "both",
+    )
+    with pytest.raises(ConfigError, match=r"the own sensor 'both', which the policy reads, .*--set own_sensors=both"):
+        ForageEnv(scenario("warehouse_small", n_robots=2), reads=("both",))
+
+
+def test_a_function_that_fails_is_told_with_its_line(tmp_path):
+    (tmp_path / "mine.py").write_text("def late(world):\n    raise ValueError('too late')\n")
+    register_sensor("late", run_path(str(tmp_path / "mine.py"))["late"])
+    with pytest.raises(
+        OwnFunctionError, match=rf"sensor 'late' failed with ValueError: too late \({tmp_path}/mine.py, line 2\)"
+    ):
+        made(own_sensors=("late",)).reset(seed=1)
 
 
 def test_a_name_of_the_compact_view_is_taken_there():

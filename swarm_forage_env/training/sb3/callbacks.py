@@ -16,6 +16,7 @@ from typing import Any
 
 from stable_baselines3.common.callbacks import BaseCallback
 
+from swarm_forage_env._internal.faults import in_words
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.wording import suggestion
 
@@ -53,8 +54,7 @@ def _refusing(name: str) -> Iterator[None]:
     except ConfigError:
         raise
     except Exception as error:  # code of the user, which may raise anything
-        reason = " ".join(str(error).split()) or "no message"
-        raise ConfigError(f"Cannot make the callback {name!r}: {type(error).__name__}: {reason}") from error
+        raise ConfigError(f"Cannot make the callback {name!r}: {in_words(error)}") from error
 
 
 def _made(name: str) -> BaseCallback:

@@ -18,6 +18,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
+from swarm_forage_env._internal.faults import in_words
 from swarm_forage_env._internal.fields import ConfigError, as_whole, several
 from swarm_forage_env._internal.files import alone_in, check_folder
 from swarm_forage_env.policies import trust
@@ -143,8 +144,7 @@ def _train(job: _Job, report: _JobReport) -> None:
     try:
         train(job.plan, job.folder, resume=job.resume, report=report, callbacks=named_callbacks(job.callbacks))
     except Exception as error:  # noqa: BLE001 - whatever a training raises is its failure
-        reason = " ".join(str(error).split()) or "no message"
-        report(TrainingFailure(reason if isinstance(error, ConfigError) else f"{type(error).__name__}: {reason}"))
+        report(TrainingFailure(" ".join(str(error).split()) if isinstance(error, ConfigError) else in_words(error)))
 
 
 def _train_apart(todo: Sequence[_Job], n_processes: int, report: SeedReport) -> None:
