@@ -108,7 +108,7 @@ class RecipeOptions:
         typer.Option(
             "--small-start/--no-small-start",
             help="Whether to spend the first third in a smaller arena; default yes if deliveries count and there are "
-            "steps enough.",
+            "enough steps.",
         ),
     ] = None
     turned: Annotated[

@@ -202,14 +202,16 @@ class _SeedsShown:
         if not self.can_draw:
             return
         found = read_seeds(self._plan, self._folder, self._seeds, self._failures)
-        try:
-            found.draw(self._picture)
-            beside_baseline(found.trainings[seed]).draw(seed_folder(self._folder, seed) / PICTURE_FILE)
-        except ImportError as error:
-            self._console.print(str(error))
-            self.can_draw = False
-        except OSError as error:  # the next picture may find room
-            self._console.print(no_picture(self._picture, error))
+        alone = beside_baseline(found.trainings[seed]), seed_folder(self._folder, seed) / PICTURE_FILE
+        for what, path in ((found, self._picture), alone):
+            try:
+                what.draw(path)
+            except ImportError as error:
+                self._console.print(str(error))
+                self.can_draw = False
+                return
+            except OSError as error:  # the next picture may find room
+                self._console.print(no_picture(path, error))
 
 
 class _Reporter(Protocol):

@@ -28,6 +28,8 @@ def check_options(name: str, options: Any) -> None:
     for key, value in table(name, options).items():
         if key in _COUNTS:
             whole(f"{name}.{key}", value, at_least=1)
+        if key == "learning_starts":
+            whole(f"{name}.{key}", value, at_least=0)
         if isinstance(value, int | float) and not isinstance(value, bool):
             number(f"{name}.{key}", value)
         if key in _RANGES:

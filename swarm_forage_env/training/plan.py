@@ -53,6 +53,8 @@ MOST_ARENAS, MOST_LAYERS, MOST_UNITS = 10_000, 20, 10_000
 """Sizes of a training that are far beyond sense and still fit into the memory of a machine; our choice."""
 IN_RUNS = {"decision_ticks": 1, "frame_decisions": 0}
 """Fields of an interface that may be others in runs than in training, of the same network -> the least."""
+_OF_THE_WHOLE = ("algorithm", "n_arenas", "hidden", "activation", "lstm", "samples", "temperature", "in_runs", "turned")
+"""Keys of a plan that none of its tables has."""
 LEARNING = PolicySpec(label="policy", policy="policy")
 """The policy that is trained, in its evaluations."""
 
@@ -265,7 +267,10 @@ class TrainingPlan:
         for name, value in self.in_runs.items():
             whole(f"in_runs.{name}", value, at_least=IN_RUNS[name])
         if self.in_runs.get("frame_decisions") and not self.interface.frame_decisions:
-            raise ConfigError("Expected in_runs.frame_decisions only of robots that learn in frames, too; set both.")
+            raise ConfigError(
+                "Expected in_runs.frame_decisions only of robots that learn in frames, too; set "
+                "frame_decisions in the interface."
+            )
         _ = self.run_interface  # refuses frames of own sensors
 
     def arenas_of(self, stage: Stage) -> dict[str, Any]:
@@ -418,6 +423,7 @@ class TrainingPlan:
             ConfigError: unknown keys, or values that a plan cannot have.
         """
         values = _known(cls, mapping, "", _keys())
+        _check_places(values)
         if "sampler" in values:
             given = [name for name in ("scenario", "wrappers") if name in values]
             if given:
@@ -476,8 +482,8 @@ def named_plan(
     shipped = plan_file(name)
     if shipped is None and not Path(name).suffix and not Path(name).exists():
         raise ConfigError(
-            f"Expected --plan as a file, or as a shipped policy ({', '.join(plan_names())}), got {name!r}."
-            f"{suggestion(name, plan_names())}"
+            f"Expected --plan as a file, or as a shipped policy ({', '.join(plan_names())}), got {name!r}, which is "
+            f"neither.{suggestion(name, plan_names())}"
         )
     plan = read_plan(name if shipped is None else shipped)
     given: dict[str, Any] = {key: value for key, value in (("seed", seed), ("turned", turned)) if value is not None}
@@ -506,9 +512,18 @@ def _leaves(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
 
 def _known(config_class: type, mapping: Mapping[str, Any], where: str, keys: Sequence[str] = ()) -> dict[str, Any]:
     table(where.rstrip(".") or "the plan", mapping)
-    known = keys or [item.name for item in dataclasses.fields(config_class)]
-    astray = next((key for key in mapping if where and key not in known and key in _keys()), None)
-    if astray is not None:  # a line after [evaluation] is part of it
-        raise ConfigError(f"Expected {astray!r} above the first [table] of the plan, got it in {where.rstrip('.')!r}.")
-    known_keys(mapping, known, prefix=where)
+    known_keys(mapping, keys or [item.name for item in dataclasses.fields(config_class)], prefix=where)
     return dict(mapping)
+
+
+def _check_places(value: Any, where: str = "") -> None:
+    """Refuse a key of the plan itself in one of its tables: in TOML, a line below a [table] is part of it."""
+    if isinstance(value, Mapping):
+        astray = next((key for key in value if where and key in _OF_THE_WHOLE), None)
+        if astray is not None:
+            raise ConfigError(f"Expected {astray!r} above the first [table] of the plan, got it in {where!r}.")
+        for key, item in value.items():
+            _check_places(item, f"{where}.{key}" if where else str(key))
+    elif isinstance(value, list):
+        for item in value:
+            _check_places(item, where)

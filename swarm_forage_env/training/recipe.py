@@ -92,8 +92,8 @@ def recipe(
             worlds are taken as they are, with their rewards and horizons. Evaluations take place in the largest world
             of each name that it draws, unless `evaluation` has worlds.
         algorithm: One of `plan.ALGORITHMS`.
-        steps: Decisions of single robots in all stages, 1 or more; they make a single stage where a third of them is
-            less than a rollout (of ppo and a2c), which would be all of a stage.
+        steps: Decisions of single robots in all stages, 1 or more. There is a single stage where a third of them is
+            less than a rollout (of ppo and a2c), unless `small_start` is asked for.
         n_arenas: Arenas side by side; default `DEFAULT_ARENAS`, fewer of swarms that make more than `DEFAULT_ROBOTS`
             in all.
         interface: What a learner sees and does: an `InterfaceConfig`, or fields by name that differ from the

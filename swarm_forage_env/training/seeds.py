@@ -123,9 +123,13 @@ class SeedTrainings(Answer):
 
         kept = self._finished()
         found = {name: aggregate([getattr(one, name) for one in kept]) for name, *_ in self._columns if kept}
-        for name in found.keys() & {"interference_fraction"}:  # a share; min and max keep NaN where it comes first
-            of = found[name]
-            found[name] = replace(of, lower=max(of.lower, 0.0), upper=min(of.upper, 1.0))
+        share = found.get("interference_fraction")
+        if share is not None:  # Student's interval knows no bounds
+            found["interference_fraction"] = replace(
+                share,
+                lower=max(share.lower, 0.0),  # NaN comes first, so that it is kept
+                upper=min(share.upper, 1.0),
+            )
         return found
 
     def _finished(self) -> list[KeptNetwork]:
@@ -133,11 +137,15 @@ class SeedTrainings(Answer):
         return [one for one in self.kept() if one.seed not in self.failures]
 
     def command(self) -> str | None:
-        """Return the command that scores these networks as one entry of the benchmark; None where all failed."""
+        """Return the command that scores these networks as one entry of the benchmark.
+
+        None where all failed, or where they need sensors that no world of the benchmark has.
+        """
         from metrics.benchmark.running import entry_command  # late: see training.evaluations
 
         policies = [one.policy for one in self._finished()]
-        return entry_command(policies, self.folder.resolve().name) if policies else None
+        is_possible = policies and not self.plan.interface.own_sensors
+        return entry_command(policies, self.folder.resolve().name) if is_possible else None
 
     @property
     def _columns(self) -> tuple[_Column, ...]:

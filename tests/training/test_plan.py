@@ -113,6 +113,7 @@ def test_in_runs_needs_a_network_that_a_file_can_hold(plan):
         ("gamma = 0.9", "gamma = true", "options.gamma .* got True"),
         ("gamma = 0.9", "gae_lambda = 1.01", "options.gae_lambda"),
         ("gamma = 0.9", "tau = 0", "options.tau"),
+        ("gamma = 0.9", 'learning_starts = "many"', "options.learning_starts to be a whole number >= 0, got 'many'"),
         ("gamma = 0.9", "clip_range = 0", "options.clip_range"),
         ("gamma = 0.9", "batch_size = 0", "options.batch_size to be a whole number >= 1, got 0"),
         ("gamma = 0.9", "n_steps = 1.5", "options.n_steps to be a whole number"),
@@ -138,11 +139,15 @@ def test_in_runs_needs_a_network_that_a_file_can_hold(plan):
         ),
         ("n_arenas = 2", "n_arenas = 2\nin_runs = 5", "in_runs to be a table"),
         ("n_arenas = 2", "n_arenas = 2\nin_runs = { frame_decisions = 5 }", "only of robots that learn in frames, too"),
-        (
-            "[evaluation]",
-            "[evaluation]\nsamples = true",
-            r"'samples' above the first \[table\] of the plan",
+        *(
+            (
+                f"[{name}]",
+                f"[{name}]\nsamples = true",
+                rf"'samples' above the first \[table\] of the plan, got it in '{name}'",
+            )
+            for name in ("scenario", "interface", "options", "evaluation")
         ),
+        ("steps = 100", "steps = 100\ntemperature = 0.5", r"'temperature' above the first \[table\] .* in 'stages'"),
         (
             "n_arenas = 2",
             "n_arenas = 2\ntemperature = 0.5",
@@ -173,7 +178,8 @@ def test_a_plan_has_stages_and_a_readable_file(tmp_path):
 def test_a_shipped_plan_that_there_is_not_is_told_with_those_that_there_are():
     assert named_plan("generalist").in_runs
     with pytest.raises(
-        ConfigError, match=r"as a shipped policy \(generalist, .*got 'generalst'. Did you mean 'generalist'"
+        ConfigError,
+        match=r"as a shipped policy \(generalist, .*got 'generalst', which is neither. Did you mean 'generalist'",
     ):
         named_plan("generalst")
 

@@ -126,6 +126,7 @@ def test_the_page_shows_the_default_training_as_a_plan(tmp_path):
     ]
     shown = dataclasses.replace(shown, temperature=1.0, in_runs={}, stages=tuple(stages))
     settings = default.settings()
+    assert shown.settings().keys() == settings.keys()
     assert {name: value for name, value in shown.settings().items() if value != pytest.approx(settings[name])} == {}
 
 

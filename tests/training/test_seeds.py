@@ -14,6 +14,7 @@ import pytest
 pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-baselines3 and torch")
 
 from metrics.statistics import aggregate
+from swarm_forage_env import register_sensor
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.presets import warehouse_small
@@ -120,8 +121,9 @@ def test_a_training_that_fails_ends_no_other(tmp_path, monkeypatch):
     fake(monkeypatch, fails={1})
     told = []
     found = train_seeds(PLAN, range(3), tmp_path, jobs=1, report=lambda seed, news: told.append((seed, news)))
-    assert found.failures == {1: "MemoryError: too large"}
-    assert told[1] == (1, TrainingFailure("MemoryError: too large"))
+    assert [*found.failures] == [1]
+    assert found.failures[1].startswith(f"MemoryError: too large ({__file__}, line "), "this file is the user's"
+    assert told[1] == (1, TrainingFailure(found.failures[1]))
     assert [*found.trainings] == [0, 2]
 
 
@@ -138,6 +140,16 @@ def test_what_cannot_begin_is_refused_before_anything_is_trained(tmp_path, monke
     replay = {"buffer_size": 400, "learning_starts": 128, "batch_size": 16}
     with pytest.raises(ConfigError, match=r"more steps than the 128 after which dqn begins to learn .*, got 128"):
         train_seeds(dataclasses.replace(PLAN, algorithm="dqn", options=replay), range(2), tmp_path)
+    late = dataclasses.replace(
+        PLAN,
+        algorithm="dqn",
+        options=replay,
+        stages=tuple(
+            Stage(steps=steps, options={"learning_starts": starts}) for steps, starts in ((100, 500), (9, 150))
+        ),
+    )
+    with pytest.raises(ConfigError, match="more steps than the 150 after which"):
+        train_seeds(late, range(2), tmp_path)
     with pytest.raises(ConfigError, match="No module named 'nothing'"):
         train_seeds(PLAN, range(2), tmp_path, callbacks=["nothing:Mine"])
     assert not list(tmp_path.iterdir())
@@ -222,6 +234,15 @@ def test_the_table_has_what_is_kept_and_its_mean(tmp_path):
     assert mapping["means"]["ratio"]["mean"] == pytest.approx(2.6)
     assert mapping["trainings"][3]["cpu_time_s"] is None
     assert mapping["failures"] == {"3": "diverged"}
+
+
+def test_networks_with_sensors_that_the_benchmark_lacks_have_no_command_for_it(tmp_path):
+    register_sensor("mine", lambda world: world.swarm.active * 1.0)
+    world = World(warehouse_small(n_robots=4, n_objects=20, horizon_s=200.0, own_sensors=("mine",)))
+    plan = dataclasses.replace(PLAN, world=world, interface=InterfaceConfig(observation="compact", actions="discrete"))
+    made(tmp_path, 0, {128: 10.0}, plan)
+    assert read_seeds(plan, tmp_path, range(1)).command() is None
+    assert "benchmark" not in read_seeds(plan, tmp_path, range(1)).text()
 
 
 def test_the_interval_of_a_share_ends_at_0(tmp_path):

@@ -226,12 +226,16 @@ def _check_learns(plan: TrainingPlan) -> None:
     default = inspect.signature(ALGORITHM_CLASSES[plan.algorithm]).parameters.get("learning_starts")
     if default is None:
         return
-    starts = min({**plan.options, **stage.options}.get("learning_starts", default.default) for stage in plan.stages)
-    if plan.total_steps <= starts:
-        raise ConfigError(
-            f"Expected more steps than the {starts:,} after which {plan.algorithm} begins to learn (learning_starts), "
-            f"got {plan.total_steps:,}; give more, or a smaller learning_starts."
-        )
+    done = starts = 0
+    for stage in plan.stages:
+        done += stage.steps
+        starts = {**plan.options, **stage.options}.get("learning_starts", default.default)
+        if done > starts:
+            return
+    raise ConfigError(
+        f"Expected more steps than the {starts:,} after which {plan.algorithm} begins to learn (learning_starts), "
+        f"got {done:,}; give more, or a smaller learning_starts (--arg learning_starts=NUMBER)."
+    )
 
 
 def check_place(folder: Path, plan: TrainingPlan, *, resume: bool) -> None:
