@@ -104,11 +104,17 @@ class TrainingCurves(Answer):
             },
             mean=mean,
             beside=dict(self.beside),
-            stage_ends=np.cumsum([stage.steps for stage in plan.stages]).tolist() if is_one_plan else (),
+            stage_ends=self._stage_ends() if is_one_plan else (),
             title=f"trainings in {place_of(plan)}",
             ylabel=counted_in(plan),
             style=style,
         )
+
+    def _stage_ends(self) -> list[int]:
+        """Decisions at which stages ended, after a whole rollout and with an evaluation; as planned where none is."""
+        evaluated = [each.steps for each in self.trainings[0].evaluations]
+        planned = np.cumsum([stage.steps for stage in self.plan.stages]).tolist()
+        return [next((steps for steps in evaluated if steps >= end), end) for end in planned]
 
     def _mean(self) -> "MeanCurve | None":
         """The mean of those that are averaged, as far as all of them have come; None where there is none."""

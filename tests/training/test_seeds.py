@@ -288,6 +288,20 @@ def test_an_algorithm_without_network_file_keeps_its_last_model(tmp_path):
     assert (Path(kept.policy).name, kept.steps) == ("model.zip", 128)
 
 
+def test_dotted_lines_stand_where_stages_really_ended(tmp_path, monkeypatch):
+    pytest.importorskip("matplotlib")
+    figures = keep_figures(monkeypatch)
+    plan = dataclasses.replace(PLAN, stages=(Stage(steps=60), Stage(steps=60), Stage(steps=60)))
+    made(tmp_path, 0, {102: 10.0}, plan)  # rollouts of 51, so the first stage has two
+    read_seeds(plan, tmp_path, range(1)).draw(tmp_path / "one.png")
+    made(tmp_path, 1, {102: 10.0, 153: 20.0, 204: 30.0}, plan)
+    read_seeds(plan, tmp_path, [1]).draw(tmp_path / "two.png")
+    dotted = [
+        [line.get_xdata()[0] for line in figure.axes[0].lines if line.get_linestyle() == ":"] for figure in figures
+    ]
+    np.testing.assert_allclose(dotted, np.array([[102, 120], [102, 153]]) / 1e6)
+
+
 def test_the_mean_is_drawn_as_far_as_all_have_come(tmp_path, monkeypatch):
     pytest.importorskip("matplotlib")
     figures = keep_figures(monkeypatch)
