@@ -56,14 +56,17 @@ def test_a_network_is_run_and_kept_at_the_temperature_of_the_plan(tmp_path):
 
 
 def test_a_network_is_run_and_kept_with_the_interface_that_it_has_in_runs(tmp_path):
-    learnt, seen = network(stands=False), {"decision_ticks": 2, "frame_decisions": 7}
-    often = replace(learnt, about=replace(learnt.about, interface=replace(NUMBERED, **seen)))
-    evaluation = Evaluator(replace(PLAN, in_runs=seen), tmp_path / "plan", {}).evaluate(learnt, 60)
+    seen, framed = {"decision_ticks": 2, "frame_decisions": 7}, replace(NUMBERED, frame_decisions=3)
+    plan, unframed = replace(PLAN, interface=framed), network(stands=False)
+    learnt, often = (
+        replace(unframed, about=replace(unframed.about, interface=one)) for one in (framed, replace(framed, **seen))
+    )
+    evaluation = Evaluator(replace(plan, in_runs=seen), tmp_path / "plan", {}).evaluate(learnt, 60)
     kept = Network.load(tmp_path / "plan" / "policy.npz")
     assert kept.about.interface == replace(NUMBERED, **seen, own_sensors=())
-    as_asked = replace(PLAN, interface=often.about.interface)
+    as_asked = replace(plan, interface=often.about.interface)
     same = Evaluator(as_asked, tmp_path / "asked", {}).evaluate(often, 60)
-    as_learnt = Evaluator(PLAN, tmp_path / "as_learnt", {}).evaluate(learnt, 60)
+    as_learnt = Evaluator(plan, tmp_path / "as_learnt", {}).evaluate(learnt, 60)
     assert evaluation.performance == same.performance
     assert evaluation.interference_fraction == same.interference_fraction != as_learnt.interference_fraction
 

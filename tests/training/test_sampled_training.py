@@ -260,7 +260,7 @@ def test_drawn_worlds_are_turned_unless_the_plan_says_no(tmp_path):
     assert named_plan(str(plan), turned=False).turned is False
     assert named_plan(str(plan), frame_decisions=9).interface.frame_decisions == 9
     both = "in_runs = { decision_ticks = 2, frame_decisions = 500 }\n"
-    plan.write_text(both + plan.read_text())
+    plan.write_text(both + text.replace("[interface]", "[interface]\nframe_decisions = 200"))
     assert named_plan(str(plan)).run_interface.frame_decisions == 500
     assert named_plan(str(plan), frame_decisions=9).run_interface.frame_decisions == 9
     plan.write_text(f"turned = false\n{text}")
