@@ -523,7 +523,8 @@ def _check_places(value: Any, where: str = "") -> None:
         if astray is not None:
             raise ConfigError(f"Expected {astray!r} above the first [table] of the plan, got it in {where!r}.")
         for key, item in value.items():
-            _check_places(item, f"{where}.{key}" if where else str(key))
+            if key != "wrappers":  # those of others may call their fields as they like
+                _check_places(item, f"{where}.{key}" if where else str(key))
     elif isinstance(value, list):
         for item in value:
             _check_places(item, where)

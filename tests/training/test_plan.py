@@ -121,6 +121,7 @@ def test_in_runs_needs_a_network_that_a_file_can_hold(plan):
         ("learning_rate = 0.1", "learning_rate = inf", "stage.options.learning_rate"),
         ("[interface]", "[[interface]]", "interface to be a table"),
         ("sigma = 0.02", "sigma = -1.0", "sigma"),
+        ("sigma = 0.02", "sigma = 0.02\ntemperature = 1.0", "^(?!.*above the first).*temperature"),
         ("[options]", "[options", "plan.toml"),
         ("[options]", "[[options]]", "options to be a table"),
         ("n_arenas = 2", "n_arenas = 2\nseed = -1", "seed to be a whole number >= 0"),
