@@ -77,9 +77,9 @@ def test_a_run_of_a_data_set_is_the_run_of_that_seed(tmp_path):
 
 
 def generalist(folder, frame_decisions):
-    """The shipped policy with frames for so many decisions, as a file."""
+    """The shipped policy, deciding once a second, with frames for so many decisions, as a file."""
     network = Network.load(network_file("generalist"))
-    interface = replace(network.about.interface, frame_decisions=frame_decisions)
+    interface = replace(network.about.interface, decision_ticks=5, frame_decisions=frame_decisions)
     file = folder / f"frames_{frame_decisions}.npz"
     replace(network, about=replace(network.about, interface=interface)).save(file)
     return str(file)
