@@ -27,8 +27,9 @@ import swarm_forage_env  # registers the environments
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.training.evaluation_plan import EvaluationPlan
 from swarm_forage_env.training.evaluator import Evaluator
-from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan
+from swarm_forage_env.training.plan import Stage, TrainingPlan
 from swarm_forage_env.wrappers.world import World
 
 INTERFACE = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5)

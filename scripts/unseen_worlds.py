@@ -27,8 +27,8 @@ from swarm_forage_env.runs.answer import Sheet
 from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.policy_spec import PolicySpec, policy_specs
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.training.evaluation_plan import EvaluationPlan
 from swarm_forage_env.training.evaluations import finished_runs
-from swarm_forage_env.training.plan import EvaluationPlan
 from swarm_forage_env.wrappers.registry import wrappers_from_mapping
 from swarm_forage_env.wrappers.world import World
 

@@ -17,7 +17,7 @@ from swarm_forage_env.cli.signals import EXIT_INTERRUPTED
 from swarm_forage_env.runs.cost import duration
 from swarm_forage_env.runs.workers import processes_of
 from swarm_forage_env.training.curves import beside_baseline, place_of
-from swarm_forage_env.training.evaluation_worlds import ALL_WORLDS
+from swarm_forage_env.training.evaluation_plan import ALL_WORLDS
 from swarm_forage_env.training.evaluations import (
     EVALUATIONS_FILE,
     MODEL_FILE,

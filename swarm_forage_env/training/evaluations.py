@@ -20,8 +20,8 @@ from swarm_forage_env.runs.plan import Condition, Plan
 from swarm_forage_env.runs.policy_spec import PolicySpec, policy_spec
 from swarm_forage_env.runs.runner import run_plan
 from swarm_forage_env.runs.table import Table
-from swarm_forage_env.training.evaluation_worlds import ALL_WORLDS, BEST, CHOSEN_BY, EvaluationWorld
-from swarm_forage_env.training.plan import EvaluationPlan, TrainingPlan, read_plan
+from swarm_forage_env.training.evaluation_plan import ALL_WORLDS, BEST, CHOSEN_BY, EvaluationPlan, EvaluationWorld
+from swarm_forage_env.training.plan import TrainingPlan, read_plan
 from swarm_forage_env.wrappers.world import World
 
 
@@ -36,7 +36,7 @@ class WorldEvaluation:
     baseline: float
     """The same of the baseline."""
     ratio: float
-    """Performance over that of the baseline; see `evaluation_worlds`."""
+    """Performance over that of the baseline; see `evaluation_plan`."""
     interference_fraction: float
     """Mean fraction of active robots in interference."""
     baseline_policy: str
@@ -378,7 +378,7 @@ def write_evaluations(path: Path, evaluations: Sequence[Evaluation]) -> None:
     """Write all evaluations of a training, whole or not at all.
 
     Where there are several worlds, an evaluation has a row for each and one for "all" of them, in which performance is
-    the ratio that counts; see `evaluation_worlds`.
+    the ratio that counts; see `evaluation_plan`.
     """
     in_worlds = any(evaluation.worlds for evaluation in evaluations)
     with replacing(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:

@@ -2,20 +2,18 @@
 
 import dataclasses
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from swarm_forage_env._internal.fields import (
-    MOST_SEEDS,
     ConfigError,
     known_keys,
     number,
     one_of,
     switch,
     table,
-    text,
     whole,
 )
 from swarm_forage_env._internal.files import parse_json, parse_toml, replacing
@@ -24,19 +22,17 @@ from swarm_forage_env.contract.policy import layout_for
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping, learner_layout
 from swarm_forage_env.policies.network import ACTIVATIONS, TEMPERATURES
 from swarm_forage_env.policies.pretrained import plan_file, plan_names
-from swarm_forage_env.policies.registry import policy_class
 from swarm_forage_env.policies.turns import AS_DRAWN, check_turned
 from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.policy_spec import PolicySpec
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.overrides import scenario_of_same_size, with_overrides
+from swarm_forage_env.scenarios.overrides import scenario_of_same_size
 from swarm_forage_env.training.defaults import (
     DEFAULT_ARENAS,
     DEFAULT_HIDDEN,
     DEFAULT_STEPS,
-    EVALUATE_EVERY,
 )
-from swarm_forage_env.training.evaluation_worlds import CHOSEN_BY, COUNTED, EvaluationWorld, scenario_of, tuples
+from swarm_forage_env.training.evaluation_plan import COUNTED, EvaluationPlan, EvaluationWorld, scenario_of, tuples
 from swarm_forage_env.training.options import check_options
 from swarm_forage_env.views.sampler import ScenarioSampler, columns_of
 from swarm_forage_env.wrappers.base import WrapperConfig
@@ -85,89 +81,13 @@ class Stage:
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "Stage":
         """Build a stage from nested plain values; raises ConfigError where one cannot be."""
-        values = _known(cls, mapping, "stages.")
+        values = dict(table("stages", mapping))
+        known_keys(values, [item.name for item in dataclasses.fields(cls)], prefix="stages.")
         if "steps" not in values:
             raise ConfigError(f"Expected a stage with its steps, such as steps = 1_000_000, got {dict(mapping)}.")
         values["scenario"] = tuples(table("stages.scenario", values.get("scenario", {})))
         if "sampler" in values:
             values["sampler"] = ScenarioSampler.from_mapping(values["sampler"])
-        return cls(**values)
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class EvaluationPlan:
-    """How the policy is judged meanwhile: whole runs of the plan's scenario, beside a scripted controller.
-
-    With `worlds`, there are runs in each of them instead, beside its own baseline.
-    """
-
-    every_steps: int = EVALUATE_EVERY
-    """Decisions between two evaluations; there is one more at the end of each stage."""
-    horizon_s: float | None = None
-    """Length of a run, s; None = that of the plan's scenario. Jams build up, so that short runs promise too much."""
-    n_runs: int = 1
-    first_seed: int = 1_000_000
-    """Seeds are counted up from here, away from those of training."""
-    baseline: str = "crw"
-    """Controller to compare with, run once under the same seeds; worlds have their own."""
-    worlds: tuple[EvaluationWorld, ...] = ()
-    """Worlds to judge the policy in; none = the plan's scenario and wrappers."""
-    chosen_by: str = "mean"
-    """By which ratio to the baselines of all worlds the network is chosen: their "mean" or the "worst"."""
-
-    def __post_init__(self) -> None:
-        one_of("evaluation.chosen_by", self.chosen_by, CHOSEN_BY)
-        names = [world.name for world in self.worlds]
-        if len(set(names)) < len(names):
-            raise ConfigError(f"Expected evaluation.worlds with different names, got {', '.join(names)}; give names.")
-        whole("evaluation.every_steps", self.every_steps, at_least=1)
-        whole("evaluation.n_runs", self.n_runs, at_least=1, at_most=MOST_SEEDS)
-        whole("evaluation.first_seed", self.first_seed, at_least=0)
-        if self.horizon_s is not None:
-            number("evaluation.horizon_s", self.horizon_s, above=0.0)
-        text("evaluation.baseline", self.baseline)
-        try:
-            policy_class(self.baseline)
-        except ValueError as error:
-            raise ConfigError(f"Expected evaluation.baseline to be a controller: {error}") from error
-
-    @property
-    def seeds(self) -> tuple[int, ...]:
-        """Seeds of the runs in each world."""
-        return tuple(range(self.first_seed, self.first_seed + self.n_runs))
-
-    def runs(self, worlds: Iterable[World], *policies: PolicySpec) -> Plan:
-        """Return the runs of policies in worlds, of another horizon where the plan has one.
-
-        Raises:
-            ConfigError: a horizon that is not a whole number of recording intervals.
-        """
-        return Plan.product(policies, [self.timed(world) for world in worlds], self.seeds)
-
-    def timed(self, world: World) -> World:
-        """Return a world with runs as long as the plan says."""
-        if self.horizon_s is None:
-            return world
-        return dataclasses.replace(world, scenario=with_overrides(world.scenario, horizon_s=self.horizon_s))
-
-    def to_mapping(self) -> dict[str, Any]:
-        """Return the plan as plain values, with what is about worlds only where there are some."""
-        plain = {item.name: getattr(self, item.name) for item in dataclasses.fields(self)}
-        if not self.worlds:
-            return {name: value for name, value in plain.items() if name not in ("worlds", "chosen_by")}
-        return {**plain, "worlds": [world.to_mapping() for world in self.worlds]}
-
-    @classmethod
-    def from_mapping(cls, mapping: Mapping[str, Any]) -> "EvaluationPlan":
-        """Build a plan from nested plain values; raises ConfigError where one cannot be."""
-        values = _known(cls, table("evaluation", mapping), "evaluation.")
-        if "worlds" in values:
-            if not isinstance(values["worlds"], list):
-                raise ConfigError(
-                    "Expected evaluation.worlds to be a list of tables, [[evaluation.worlds]], got "
-                    f"{values['worlds']!r}."
-                )
-            values["worlds"] = tuple(EvaluationWorld.from_mapping(world) for world in values["worlds"])
         return cls(**values)
 
 
@@ -422,7 +342,8 @@ class TrainingPlan:
         Raises:
             ConfigError: unknown keys, or values that a plan cannot have.
         """
-        values = _known(cls, mapping, "", _keys())
+        values = dict(table("the plan", mapping))
+        known_keys(values, _keys())
         _check_places(values)
         if "sampler" in values:
             given = [name for name in ("scenario", "wrappers") if name in values]
@@ -508,12 +429,6 @@ def _leaves(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
             yield from _leaves(item, f"{name}[{k}]")
     else:
         yield name, value
-
-
-def _known(config_class: type, mapping: Mapping[str, Any], where: str, keys: Sequence[str] = ()) -> dict[str, Any]:
-    table(where.rstrip(".") or "the plan", mapping)
-    known_keys(mapping, keys or [item.name for item in dataclasses.fields(config_class)], prefix=where)
-    return dict(mapping)
 
 
 def _check_places(value: Any, where: str = "") -> None:

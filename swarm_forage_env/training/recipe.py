@@ -33,8 +33,8 @@ from swarm_forage_env.training.defaults import (
     EVALUATION_SHARE,
     FRAME_DECISIONS,
 )
-from swarm_forage_env.training.evaluation_worlds import EvaluationWorld
-from swarm_forage_env.training.plan import LEARNING, SAMPLING, EvaluationPlan, Stage, TrainingPlan
+from swarm_forage_env.training.evaluation_plan import EvaluationPlan, EvaluationWorld
+from swarm_forage_env.training.plan import LEARNING, SAMPLING, Stage, TrainingPlan
 from swarm_forage_env.views.plans import DEFAULT_SCENARIO
 from swarm_forage_env.views.sampler import ScenarioSampler
 from swarm_forage_env.wrappers.base import WrapperConfig

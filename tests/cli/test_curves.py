@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.training.evaluation_plan import EvaluationPlan
 from swarm_forage_env.training.evaluations import EVALUATIONS_FILE, PLAN_FILE, Evaluation, write_evaluations
-from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan
+from swarm_forage_env.training.plan import Stage, TrainingPlan
 from swarm_forage_env.wrappers.world import World
 
 PLAN = TrainingPlan(

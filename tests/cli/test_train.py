@@ -18,8 +18,9 @@ from swarm_forage_env.cli import training_report
 from swarm_forage_env.cli.options import WorldOptions
 from swarm_forage_env.cli.train import RecipeOptions, train
 from swarm_forage_env.training.defaults import DEFAULT_REWARDS, EPISODE_S
+from swarm_forage_env.training.evaluation_plan import EvaluationPlan
 from swarm_forage_env.training.evaluations import Evaluation, write_evaluations
-from swarm_forage_env.training.plan import EvaluationPlan, read_plan
+from swarm_forage_env.training.plan import read_plan
 from swarm_forage_env.training.recipe import recipe
 
 TRUSTING = ("--trust-models", "train")

@@ -13,10 +13,10 @@ from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkErro
 from swarm_forage_env.runs.policy_spec import policy_spec
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.scenarios.presets import warehouse_small
-from swarm_forage_env.training.evaluation_worlds import EvaluationWorld
+from swarm_forage_env.training.evaluation_plan import EvaluationPlan, EvaluationWorld
 from swarm_forage_env.training.evaluations import read_training
 from swarm_forage_env.training.evaluator import Evaluator
-from swarm_forage_env.training.plan import LEARNING, EvaluationPlan, Stage, TrainingPlan
+from swarm_forage_env.training.plan import LEARNING, Stage, TrainingPlan
 from swarm_forage_env.wrappers.world import World
 
 QUICK = {"n_robots": 10, "n_objects": 120, "width_m": 12.0, "height_m": 8.0, "nest_centre_m": (3.0, 4.0),

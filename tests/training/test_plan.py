@@ -8,7 +8,8 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.pretrained import plan_file
 from swarm_forage_env.scenarios.presets import warehouse_small
-from swarm_forage_env.training.plan import LEARNING, EvaluationPlan, Stage, TrainingPlan, named_plan, read_plan
+from swarm_forage_env.training.evaluation_plan import EvaluationPlan
+from swarm_forage_env.training.plan import LEARNING, Stage, TrainingPlan, named_plan, read_plan
 from swarm_forage_env.wrappers.world import World
 
 TOML = """

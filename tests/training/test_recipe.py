@@ -14,7 +14,8 @@ from swarm_forage_env.scenarios.config import PHYSICS_ENGINES, RewardConfig
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario, warehouse_small
 from swarm_forage_env.training.defaults import EVALUATE_EVERY
-from swarm_forage_env.training.plan import ALGORITHMS, EvaluationPlan, Stage, read_plan
+from swarm_forage_env.training.evaluation_plan import EvaluationPlan
+from swarm_forage_env.training.plan import ALGORITHMS, Stage, read_plan
 from swarm_forage_env.training.recipe import LATE_OPTIONS, Measured, recipe, small_arena
 
 

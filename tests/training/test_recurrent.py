@@ -20,7 +20,8 @@ from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterfac
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.presets import warehouse_small
-from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan, read_plan
+from swarm_forage_env.training.evaluation_plan import EvaluationPlan
+from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.sb3 import SwarmVecEnv
 from swarm_forage_env.training.sb3.recurrent import ActiveRecurrentBuffer, SwarmRecurrentPPO, batch_ends
 from swarm_forage_env.training.sb3.training import train

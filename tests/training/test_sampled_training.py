@@ -19,7 +19,7 @@ from swarm_forage_env.policies.turns import AS_IT_IS
 from swarm_forage_env.runs.table import Table
 from swarm_forage_env.scenarios.presets import warehouse_small
 from swarm_forage_env.training import evaluations
-from swarm_forage_env.training.evaluation_worlds import EvaluationWorld
+from swarm_forage_env.training.evaluation_plan import EvaluationPlan, EvaluationWorld
 from swarm_forage_env.training.evaluations import (
     Evaluation,
     baseline_runs,
@@ -28,7 +28,7 @@ from swarm_forage_env.training.evaluations import (
     ratio_to,
     read_evaluations,
 )
-from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan, named_plan, read_plan
+from swarm_forage_env.training.plan import Stage, TrainingPlan, named_plan, read_plan
 from swarm_forage_env.training.recipe import recipe
 from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv
 from swarm_forage_env.training.sb3.training import train

@@ -18,7 +18,7 @@ from swarm_forage_env import register_sensor
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.presets import warehouse_small
-from swarm_forage_env.training.evaluation_worlds import EvaluationWorld
+from swarm_forage_env.training.evaluation_plan import EvaluationPlan, EvaluationWorld
 from swarm_forage_env.training.evaluations import (
     EVALUATIONS_FILE,
     MODEL_FILE,
@@ -27,7 +27,7 @@ from swarm_forage_env.training.evaluations import (
     WorldEvaluation,
     write_evaluations,
 )
-from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan, read_plan
+from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.sb3 import seeds as module
 from swarm_forage_env.training.sb3.seeds import train_seeds
 from swarm_forage_env.training.sb3.training import train

@@ -23,8 +23,9 @@ from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.policy_spec import policy_spec
 from swarm_forage_env.scenarios.presets import search_and_rescue, warehouse_small
+from swarm_forage_env.training.evaluation_plan import EvaluationPlan
 from swarm_forage_env.training.evaluations import finished_runs, means, read_evaluations, write_evaluations
-from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan, read_plan
+from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv, training
 from swarm_forage_env.training.sb3.export import export_network
 from swarm_forage_env.training.sb3.training import train

@@ -36,7 +36,7 @@ from swarm_forage_env.runs.first_compilation import compile_world
 from swarm_forage_env.runs.run import Started
 from swarm_forage_env.runs.versions import software_versions
 from swarm_forage_env.runs.workers import available_cores
-from swarm_forage_env.training.evaluation_worlds import BEST
+from swarm_forage_env.training.evaluation_plan import BEST
 from swarm_forage_env.training.evaluations import (
     EVALUATIONS_FILE,
     MODEL_FILE,
