@@ -4,6 +4,7 @@ import math
 import shlex
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
@@ -31,6 +32,9 @@ from swarm_forage_env.training.plan import TrainingPlan
 from swarm_forage_env.training.seeds import TrainingFailure, is_finished, read_seeds, seed_folder
 
 PICTURE_FILE = "training.png"
+_TRAINED = "trained policy"
+"""Its label in the picture of a single training."""
+_NOTHING_TO_SEE = "{} scores 0 in runs of this length. Longer ones may say more (--evaluation-horizon)."
 LINE_EVERY_S = 60.0
 """Shortest time between two lines about the progress where stderr is no terminal, s."""
 
@@ -85,7 +89,7 @@ def _draw(plan: TrainingPlan, evaluations: Sequence[Evaluation], path: Path, con
     if not evaluations:
         return None
     try:
-        beside_baseline(TrainingCurve(label="trained policy", plan=plan, evaluations=tuple(evaluations))).draw(path)
+        beside_baseline(TrainingCurve(label=_TRAINED, plan=plan, evaluations=tuple(evaluations))).draw(path)
     except ImportError as error:
         console.print(str(error))
         return None
@@ -202,7 +206,8 @@ class _SeedsShown:
         if not self.can_draw:
             return
         found = read_seeds(self._plan, self._folder, self._seeds, self._failures)
-        alone = beside_baseline(found.trainings[seed]), seed_folder(self._folder, seed) / PICTURE_FILE
+        one = replace(found.trainings[seed], label=_TRAINED)
+        alone = beside_baseline(one), seed_folder(self._folder, seed) / PICTURE_FILE
         for what, path in ((found, self._picture), alone):
             try:
                 what.draw(path)
@@ -231,11 +236,13 @@ def _reporter(plan: TrainingPlan, bar: Progress, total: int, *, begun: int = 0, 
     def report(news: TrainingStatus | Evaluation, whose: str = "") -> None:
         nonlocal first_words, has_begun, told, told_at
         if bar.disable and not has_begun:
-            bar.console.print(f"{total:,} decisions; a line about every minute says how many are done.")
+            bar.console.print(f"At least {total:,} decisions; a line about every minute says how many are done.")
             has_begun = True
         if isinstance(news, Evaluation):
             for line in (*first_words, *_beside(whose, evaluation_lines(news))):
                 bar.console.print(line)
+            if first_words and not news.worlds and news.baseline == 0.0:
+                bar.console.print(_NOTHING_TO_SEE.format(plan.evaluation.baseline))
             first_words = []
         elif not bar.disable:
             bar.update(task, completed=news.steps, description=_returned(news))

@@ -105,7 +105,7 @@ class TrainingCurves(Answer):
             mean=mean,
             beside=dict(self.beside),
             stage_ends=self._stage_ends() if is_one_plan else (),
-            title=f"trainings in {place_of(plan)}",
+            title=f"{'training' if len(self.trainings) == 1 else 'trainings'} in {place_of(plan)}",
             ylabel=counted_in(plan),
             style=style,
         )
@@ -187,10 +187,10 @@ def read_trainings(folders: Sequence[str | Path]) -> tuple[TrainingCurve, ...]:
     if twice:
         raise ConfigError(f"Expected each training once, got {twice[0]} twice.")
     found = [read_training(path) for path in paths]
-    for one in found[1:]:
+    for path, one in zip(paths[1:], found[1:], strict=True):
         if _judged_by(one.plan) != _judged_by(found[0].plan):
             raise ConfigError(
-                f"Expected trainings that are judged by the same runs, got {found[0].label} and {one.label}, whose "
+                f"Expected trainings that are judged by the same runs, got {paths[0]} and {path}, whose "
                 "plans differ in scenario, wrappers or evaluation; draw them one by one."
             )
     counts = Counter(one.label for one in found)

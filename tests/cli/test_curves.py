@@ -60,6 +60,7 @@ def test_trainings_are_drawn_beside_others(command, monkeypatch):
 def test_what_curves_refuses(command):
     training("first")
     training("elsewhere", dataclasses.replace(PLAN, evaluation=EvaluationPlan(horizon_s=8.0)))
+    training("far/first", dataclasses.replace(PLAN, evaluation=EvaluationPlan(horizon_s=8.0)))
     Path("empty").mkdir()
     training("new")
     Path("new", EVALUATIONS_FILE).unlink()
@@ -75,6 +76,7 @@ def test_what_curves_refuses(command):
         (("seeds",), "got seeds with several below it; name them: seeds/seed_0 seeds/seed_1."),
         (("broken",), "Cannot read the evaluations in broken/evaluations.csv"),
         (("first", "elsewhere"), "judged by the same runs, got first and elsewhere"),
+        (("first", "far/first"), "judged by the same runs, got first and far/first"),
         (("first", "--policy", "crv"), "Did you mean 'crw'"),
     ):
         code, _, err = command("train", "curves", *words)

@@ -41,6 +41,16 @@ def test_help_tells_the_rewards_of_the_recipe():
     assert f"{EPISODE_S:,.0f} s" in documented
 
 
+@pytest.mark.parametrize(("baseline", "times"), [(0.0, 1), (20.0, 0)])
+def test_a_baseline_that_scores_nothing_is_told_once(baseline, times, capsys):
+    news = Evaluation(steps=64, wall_time_s=1.0, performance=0.0, baseline=baseline, interference_fraction=0.0)
+    with training_report._bar() as bar:
+        report = training_report._reporter(recipe("warehouse_small"), bar, 128)
+        report(news)
+        report(news)
+    assert capsys.readouterr().err.count("crw scores 0 in runs of this length. Longer ones may say more") == times
+
+
 @needs_training
 def test_trains_shows_evaluations_and_goes_on(command, painted, monkeypatch):
     monkeypatch.setattr(training_report, "LINE_EVERY_S", 0.0)
@@ -48,7 +58,7 @@ def test_trains_shows_evaluations_and_goes_on(command, painted, monkeypatch):
     code, _, err = command(*words)
     assert code == 0, err
     assert "Evaluated in 1 run of 200 s:" in err
-    assert err.count("128 decisions; a line about every minute says how many are done.") == 1
+    assert err.count("At least 128 decisions; a line about every minute says how many are done.") == 1
     assert re.search(r"^128 of 128 decisions, no episode has ended, about \d+ s left$", err, re.MULTILINE)
     folder = Path("results/training/warehouse_small_ppo")
     assert "decisions  per 1,000 s" in err

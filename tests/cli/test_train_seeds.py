@@ -70,12 +70,12 @@ def test_seeds_are_trained_drawn_and_told(command, calls, pictures, monkeypatch)
     assert calls == [(0, False), (1, False)]
     assert pictures == [
         ("all/curves.png", ["seed_0"]),
-        ("all/seed_0/training.png", ["seed_0"]),
+        ("all/seed_0/training.png", ["trained policy"]),
         ("all/curves.png", ["seed_0", "seed_1"]),
-        ("all/seed_1/training.png", ["seed_1"]),
+        ("all/seed_1/training.png", ["trained policy"]),
         ("all/curves.png", ["seed_0", "seed_1"]),
     ]
-    assert err.startswith("256 decisions; a line about every minute says how many are done.\n")
+    assert err.startswith("At least 256 decisions; a line about every minute says how many are done.\n")
     assert "64 of 256 decisions, mean return 2.00, about 3 s left" in err
     assert "192 of 256 decisions, mean return 2.50" in err
     assert re.search(r"^  seed +decisions +per 1,000 s", err, re.MULTILINE)
