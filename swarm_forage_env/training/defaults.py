@@ -3,7 +3,7 @@
 All are our choice: values that were seen to learn.
 """
 
-DEFAULT_STEPS = 5_000_000
+DEFAULT_STEPS = 3_400_000
 """Decisions of single robots in all stages."""
 DEFAULT_HIDDEN = (64, 64)
 """Sizes of the hidden layers."""

@@ -45,9 +45,9 @@ def test_where_deliveries_count_the_way_to_them_is_rewarded_and_short_at_first()
     plan = recipe("warehouse_small")
     assert plan.scenario == warehouse_small(nest_progress=0.05, first_pickup=1.0, interference=-0.002)
     assert plan.stages == (
-        Stage(steps=1_666_666, scenario={**small_arena(plan.scenario), "horizon_s": 4000.0}),
-        Stage(steps=1_666_668, scenario={"horizon_s": 4000.0}),
-        Stage(steps=1_666_666, scenario={"horizon_s": 4000.0}, options=LATE_OPTIONS["ppo"]),
+        Stage(steps=1_133_333, scenario={**small_arena(plan.scenario), "horizon_s": 4000.0}),
+        Stage(steps=1_133_334, scenario={"horizon_s": 4000.0}),
+        Stage(steps=1_133_333, scenario={"horizon_s": 4000.0}, options=LATE_OPTIONS["ppo"]),
     )
     assert plan == recipe("warehouse_small", small_start=True, nest_progress=0.05, first_pickup=1.0)
 
@@ -55,7 +55,7 @@ def test_where_deliveries_count_the_way_to_them_is_rewarded_and_short_at_first()
 def test_where_deliveries_do_not_count_the_scenario_says_the_rewards():
     plan = recipe("search_and_rescue", interference=0.0, delivery=0.0, nest_progress=0.0)
     assert plan.scenario == scenario("search_and_rescue")
-    assert [stage.steps for stage in plan.stages] == [3_333_334, 1_666_666]
+    assert [stage.steps for stage in plan.stages] == [2_266_667, 1_133_333]
     counting = recipe("search_and_rescue", performance="collected", side_m=64.0)
     assert counting.scenario.reward.nest_progress == 0.05
 
