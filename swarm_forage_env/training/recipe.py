@@ -29,6 +29,7 @@ from swarm_forage_env.training.defaults import (
     DEFAULT_ROBOTS,
     DEFAULT_STEPS,
     EPISODE_S,
+    JAMMING_S,
     EVALUATE_EVERY,
     EVALUATION_SHARE,
     FRAME_DECISIONS,
@@ -86,7 +87,7 @@ def recipe(
 
     Args:
         scenario: Name of a preset (default warehouse_small), which gets the recipe's length of episodes (`EPISODE_S`,
-            or that of its runs if they are shorter), where deliveries count its rewards (`DEFAULT_REWARDS`), and what
+            or that of its runs or of a third of the training if these are shorter), where deliveries count its rewards (`DEFAULT_REWARDS`), and what
             `recipes.toml` says; or a complete configuration, which is taken as it is.
         sampler: Draws the world of each episode, instead of `scenario`, `wrappers`, `small_start` and `overrides`; its
             worlds are taken as they are, with their rewards and horizons. Evaluations take place in the largest world
@@ -132,14 +133,14 @@ def recipe(
     measured = Measured() if isinstance(scenario, ScenarioConfig) else measured_recipe(scenario)
     fields = {name: value for name, value in overrides.items() if name != "horizon_s"}
     config = _training_scenario(scenario, fields, measured)
-    episodes: dict[str, Any] = {}
-    if not isinstance(scenario, ScenarioConfig):
-        episodes = {"horizon_s": min(EPISODE_S, config.horizon_s)}
-    episodes |= {name: value for name, value in overrides.items() if name not in fields}
-    with_overrides(config, **episodes)  # refuses an impossible length
     chosen = chosen_interface(interface, _default_interface(algorithm, config))
     n_arenas = _default_arenas(config, sampler) if n_arenas is None else n_arenas
     n_rows = n_arenas * config.robots.n_robots
+    episodes: dict[str, Any] = {}
+    if not isinstance(scenario, ScenarioConfig):
+        episodes = {"horizon_s": _episode_s(config, steps // 3 / n_rows * chosen.decision_ticks * config.dt_s)}
+    episodes |= {name: value for name, value in overrides.items() if name not in fields}
+    with_overrides(config, **episodes)  # refuses an impossible length
     chosen_options = _algorithm_options(algorithm, n_rows, {**measured.options.get(algorithm, {}), **(options or {})})
     shortest = 1 if small_start else n_rows * _rollout_steps(algorithm, chosen_options)
     if small_start is None:
@@ -259,6 +260,12 @@ def _algorithm_options(algorithm: str, n_rows: int, given: Mapping[str, Any]) ->
     if algorithm == "ppo" and "batch_size" not in given and isinstance(n_steps, int):
         chosen["batch_size"] = _fitting_batch(n_steps * n_rows, DEFAULT_OPTIONS["ppo"]["batch_size"])
     return chosen
+
+
+def _episode_s(scenario: ScenarioConfig, third_s: float) -> float:
+    """Return how long episodes last, so that one ends in each third of a training; not where thirds show no jam."""
+    ending_s = third_s // scenario.interval_s * scenario.interval_s
+    return min(EPISODE_S, scenario.horizon_s, ending_s if ending_s >= JAMMING_S else EPISODE_S)
 
 
 def _rollout_steps(algorithm: str, options: Mapping[str, Any]) -> int:
