@@ -235,11 +235,11 @@ def train(
 ) -> None:
     """Train one policy that every robot shares, and compare it with a scripted controller meanwhile.
 
-    Episodes last --horizon, by default 4,000 s, or as long as runs of the scenario if these are shorter. Rewards are
-    fields of the scenario. If deliveries count, they alone are too rare to learn from. The training then sets
-    nest_progress=0.05, first_pickup=1 and interference=-0.002, unless --set or the file of --scenario does, and begins
-    in a smaller arena. plan.json holds all choices. Ctrl-C keeps a checkpoint; swarm-forage --trust-models train --out
-    FOLDER --resume continues.
+    Episodes last --horizon, by default 4,000 s, or as long as runs of the scenario or a third of the training if these
+    are shorter. Rewards are fields of the scenario. If deliveries count, they alone are too rare to learn from. The
+    training then sets nest_progress=0.05, first_pickup=1 and interference=-0.002, unless --set or the file of
+    --scenario does, and begins in a smaller arena. plan.json holds all choices. Ctrl-C keeps a checkpoint; swarm-forage
+    --trust-models train --out FOLDER --resume continues.
 
     With --seeds, it trains several seeds, draws them and their mean into curves.png after every evaluation, and shows a
     table at the end, as JSON with --json.

@@ -34,7 +34,7 @@ from swarm_forage_env.training.seeds import TrainingFailure, is_finished, read_s
 PICTURE_FILE = "training.png"
 _TRAINED = "trained policy"
 """Its label in the picture of a single training."""
-_NOTHING_TO_SEE = "{} scores 0 in runs of this length. Longer ones may say more (--evaluation-horizon)."
+_NOTHING_TO_SEE = "{} scores 0 in such short runs. Longer ones say more (--evaluation-horizon, or that of the plan)."
 LINE_EVERY_S = 60.0
 """Shortest time between two lines about the progress where stderr is no terminal, s."""
 
@@ -230,6 +230,8 @@ def _reporter(plan: TrainingPlan, bar: Progress, total: int, *, begun: int = 0, 
     *first_words, names = heading(plan).splitlines()
     first_words += _beside(whose, [names])
     has_begun = False
+    shorter_s = plan.evaluation.horizon_s
+    is_short = not plan.evaluation.worlds and shorter_s is not None and shorter_s < plan.scenario.horizon_s
     told: TrainingStatus | None = None
     told_at = time.monotonic()
 
@@ -241,7 +243,7 @@ def _reporter(plan: TrainingPlan, bar: Progress, total: int, *, begun: int = 0, 
         if isinstance(news, Evaluation):
             for line in (*first_words, *_beside(whose, evaluation_lines(news))):
                 bar.console.print(line)
-            if first_words and not news.worlds and news.baseline == 0.0:
+            if first_words and is_short and news.baseline == 0.0:
                 bar.console.print(_NOTHING_TO_SEE.format(plan.evaluation.baseline))
             first_words = []
         elif not bar.disable:
@@ -298,4 +300,6 @@ def progress_line(total: int, now: TrainingStatus, before: TrainingStatus | None
     """Say how far a training of `total` decisions is, and how long it takes at the pace since the line before."""
     steps, seconds = (0, 0.0) if before is None else (before.steps, before.wall_time_s)
     left_s = (total - now.steps) * (now.wall_time_s - seconds) / max(1, now.steps - steps)
-    return f"{now.steps:,} of {total:,} decisions, {_returned(now)}, about {duration(max(0.0, left_s))} left"
+    return (
+        f"{min(now.steps, total):,} of {total:,} decisions, {_returned(now)}, about {duration(max(0.0, left_s))} left"
+    )

@@ -18,8 +18,8 @@ DEFAULT_REWARDS = {"first_pickup": 1.0, "nest_progress": 0.05, "interference": -
 """Rewards where deliveries count: deliveries alone are too rare to learn from. The whole way home is worth about one
 delivery. Each tick in the way of others costs a little."""
 EPISODE_S = 4000.0
-"""Length of an episode, s, at most. Jams build up slowly: with 1,000 s and no price for being in the way, two trainings of two
-ended in them."""
+"""Length of an episode, s, at most. Jams build up slowly: with 1,000 s and no price for being in the way, two
+trainings of two ended in them."""
 JAMMING_S = 1000.0
 """Shortest time in which the recipe lets an episode end, s; in less, jams hardly begin."""
 DECISION_TICKS = 5

@@ -2,6 +2,8 @@
 
 Deliveries of eight robots and of five hundred cannot be added up. So in each world the policy is compared with the
 baseline: the ratio of both performances. What counts is the mean of the ratios, or the worst of them.
+
+`scenario_of` and `tuples` read the tables of all parts of a training plan.
 """
 
 import dataclasses

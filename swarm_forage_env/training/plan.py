@@ -27,11 +27,7 @@ from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.policy_spec import PolicySpec
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import scenario_of_same_size
-from swarm_forage_env.training.defaults import (
-    DEFAULT_ARENAS,
-    DEFAULT_HIDDEN,
-    DEFAULT_STEPS,
-)
+from swarm_forage_env.training.defaults import DEFAULT_ARENAS, DEFAULT_HIDDEN, DEFAULT_STEPS
 from swarm_forage_env.training.evaluation_plan import COUNTED, EvaluationPlan, EvaluationWorld, scenario_of, tuples
 from swarm_forage_env.training.options import check_options
 from swarm_forage_env.views.sampler import ScenarioSampler, columns_of

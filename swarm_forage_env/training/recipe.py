@@ -29,10 +29,10 @@ from swarm_forage_env.training.defaults import (
     DEFAULT_ROBOTS,
     DEFAULT_STEPS,
     EPISODE_S,
-    JAMMING_S,
     EVALUATE_EVERY,
     EVALUATION_SHARE,
     FRAME_DECISIONS,
+    JAMMING_S,
 )
 from swarm_forage_env.training.evaluation_plan import EvaluationPlan, EvaluationWorld
 from swarm_forage_env.training.plan import LEARNING, SAMPLING, Stage, TrainingPlan
@@ -87,8 +87,8 @@ def recipe(
 
     Args:
         scenario: Name of a preset (default warehouse_small), which gets the recipe's length of episodes (`EPISODE_S`,
-            or that of its runs or of a third of the training if these are shorter), where deliveries count its rewards (`DEFAULT_REWARDS`), and what
-            `recipes.toml` says; or a complete configuration, which is taken as it is.
+            or that of its runs or of a third of the training if these are shorter), where deliveries count its rewards
+            (`DEFAULT_REWARDS`), and what `recipes.toml` says; or a complete configuration, which is taken as it is.
         sampler: Draws the world of each episode, instead of `scenario`, `wrappers`, `small_start` and `overrides`; its
             worlds are taken as they are, with their rewards and horizons. Evaluations take place in the largest world
             of each name that it draws, unless `evaluation` has worlds.

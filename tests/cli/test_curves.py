@@ -94,6 +94,16 @@ def drawn(monkeypatch):
     return pictures
 
 
+def test_a_picture_says_whether_it_shows_one_training_or_several(command, monkeypatch):
+    titles = []
+    monkeypatch.setattr("swarm_forage_env.rendering.plots.draw_trainings", lambda *_, title, **__: titles.append(title))
+    training("a")
+    training("b")
+    for folders in (("a",), ("a", "b")):
+        assert command("train", "curves", *folders, "--policy", "none")[0] == 0
+    assert [title.split(" in ")[0] for title in titles] == ["training", "trainings"]
+
+
 def test_trainings_in_folders_of_one_name_are_told_apart(command, monkeypatch):
     pictures = drawn(monkeypatch)
     training("a/ppo")

@@ -41,14 +41,14 @@ def test_help_tells_the_rewards_of_the_recipe():
     assert f"{EPISODE_S:,.0f} s" in documented
 
 
-@pytest.mark.parametrize(("baseline", "times"), [(0.0, 1), (20.0, 0)])
-def test_a_baseline_that_scores_nothing_is_told_once(baseline, times, capsys):
+@pytest.mark.parametrize(("baseline", "horizon_s", "times"), [(0.0, 200.0, 1), (20.0, 200.0, 0), (0.0, None, 0)])
+def test_a_baseline_that_scores_nothing_in_short_runs_is_told_once(baseline, horizon_s, times, capsys):
     news = Evaluation(steps=64, wall_time_s=1.0, performance=0.0, baseline=baseline, interference_fraction=0.0)
     with training_report._bar() as bar:
-        report = training_report._reporter(recipe("warehouse_small"), bar, 128)
+        report = training_report._reporter(recipe(evaluation={"horizon_s": horizon_s}), bar, 128)
         report(news)
         report(news)
-    assert capsys.readouterr().err.count("crw scores 0 in runs of this length. Longer ones may say more") == times
+    assert capsys.readouterr().err.count("crw scores 0 in such short runs. Longer ones say more") == times
 
 
 @needs_training

@@ -97,7 +97,8 @@ def test_code_blocks_are_closed_before_the_next_begins():
 
 
 def test_index_lists_every_page():
-    listed = set(re.findall(r"\]\((\w+\.md)\)", (ROOT / "docs/index.md").read_text()))
+    items = "".join(re.findall(r"^- .*$", (ROOT / "docs/index.md").read_text(), re.MULTILINE))  # as docs/conf.py reads
+    listed = set(re.findall(r"\]\((\w+\.md)\)", items))
     assert {page.name for page in (ROOT / "docs").glob("*.md")} - {"index.md"} == listed
 
 

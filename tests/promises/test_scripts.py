@@ -310,6 +310,7 @@ def test_unseen_worlds_are_drawn_once_and_shares_are_of_the_best(monkeypatch, ca
         more = unseen_worlds.worlds(kind, 5, 200.0)
         assert unseen_worlds.worlds(kind, 2, 200.0) == more[:2]
         assert len({world.scenario for world in more}) > 1
+        build_env(more[0].scenario, more[0].wrappers).reset_batch(0)
     assert len(unseen_worlds.KINDS) == 11
     monkeypatch.setattr(unseen_worlds, "KINDS", unseen_worlds.KINDS[:3])  # runs in all of them take minutes
     monkeypatch.setattr(sys, "argv", ["", "--policy", "dpo,oracle", "--draws", "1", "--horizon", "400"])

@@ -45,9 +45,9 @@ def test_where_deliveries_count_the_way_to_them_is_rewarded_and_short_at_first()
     plan = recipe("warehouse_small")
     assert plan.scenario == warehouse_small(nest_progress=0.05, first_pickup=1.0, interference=-0.002)
     assert plan.stages == (
-        Stage(steps=1_133_333, scenario={**small_arena(plan.scenario), "horizon_s": 4000.0}),
-        Stage(steps=1_133_334, scenario={"horizon_s": 4000.0}),
-        Stage(steps=1_133_333, scenario={"horizon_s": 4000.0}, options=LATE_OPTIONS["ppo"]),
+        Stage(steps=1_133_333, scenario={**small_arena(plan.scenario), "horizon_s": 2800.0}),
+        Stage(steps=1_133_334, scenario={"horizon_s": 2800.0}),
+        Stage(steps=1_133_333, scenario={"horizon_s": 2800.0}, options=LATE_OPTIONS["ppo"]),
     )
     assert plan == recipe("warehouse_small", small_start=True, nest_progress=0.05, first_pickup=1.0)
 
@@ -174,7 +174,7 @@ def test_what_was_measured_for_a_scenario_goes_before_the_general_recipe(name):
     plan = recipe(name)
     assert plan.scenario.reward.interference == -0.002
     assert plan.options["ent_coef"] == 0.01
-    assert {stage.scenario["horizon_s"] for stage in plan.stages} == {4000.0}
+    assert len({stage.scenario["horizon_s"] for stage in plan.stages}) == 1
     other = recipe(name, interference=-0.1, horizon_s=500.0, options={"ent_coef": 0.02})
     assert (other.scenario.reward.interference, other.options["ent_coef"]) == (-0.1, 0.02)
     assert {stage.scenario["horizon_s"] for stage in other.stages} == {500.0}
@@ -303,3 +303,18 @@ def test_a_small_start_refuses_places_of_objects_that_it_may_not_hold():
     with pytest.raises(ConfigError, match=r"object_positions_m .*--no-small-start"):
         recipe("warehouse_small", **places)
     assert len(recipe("warehouse_small", small_start=False, **places).stages) == 2
+
+
+@pytest.mark.parametrize(
+    ("steps", "episode_s"),
+    [
+        (3_400_000, 2800.0),  # 400 robots: 2,833 s in each third
+        (1_200_000, 1000.0),
+        (1_190_000, 4000.0),  # 991 s show no jam
+        (9_000_000, 4000.0),
+    ],
+)
+def test_an_episode_ends_in_each_third(steps, episode_s):
+    plan = recipe(steps=steps)
+    assert {stage.scenario["horizon_s"] for stage in plan.stages} == {episode_s}
+    assert recipe(steps=steps, horizon_s=3000.0).stages[0].scenario["horizon_s"] == 3000.0, "asked for"
