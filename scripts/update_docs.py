@@ -133,6 +133,7 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         (),
     ),
     "turned": ((f"python {ROOT}/scripts/turned_worlds.py",), ()),
+    "oracle_rows": ((f"python {ROOT}/scripts/oracle_rows.py",), ()),
     "wall": (
         (
             "swarm-forage run dpo,generalist --scenario warehouse_small --robots 20 --set n_objects=60 "

@@ -105,7 +105,7 @@ def page_block(standings: Sequence[Standing], protocol: Protocol, picture: str =
         "These commands repeat them:\n\n" + _commands(entries),
         "### Group by group\n\n" + _groups(ranked, protocol).markdown(),
         *([_COORDINATION + pairs_sheet(entries, protocol).markdown()] if protocol.pairs else []),
-        *([_MEASURES + _matched(entries).markdown()] if has_measures else []),
+        *([_MEASURES + matched(entries).markdown()] if has_measures else []),
         "### One against the other\n\nHow often a run of the row's entry is better than a run of the column's entry in "
         "the same world.\n\n" + _duels(entries, protocol).markdown(),
     ]
@@ -223,7 +223,12 @@ def _of_each(numbers: Iterable[str]) -> tuple[str]:
     return (", ".join(numbers) or "-",)
 
 
-def _matched(entries: Sequence[Entry]) -> Sheet:
+def matched(entries: Sequence[Entry]) -> Sheet:
+    """Return how many rows of each measure an entry is at least as good in as the best of the scripted controllers.
+
+    Args:
+        entries: Of one version, the scripted controllers among them.
+    """
     scripted = [entry for entry in entries if entry.name in PAPER_POLICIES]
     best: dict[tuple[str, str, str], float] = {}
     for entry in scripted:
