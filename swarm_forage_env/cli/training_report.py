@@ -80,7 +80,7 @@ def _bar() -> Progress:
 
 def _farewell(folder: Path, *, is_kept: bool) -> str:
     if is_kept:
-        return f"Stopped. To go on: swarm-forage --trust-models train --out {folder} --resume"
+        return f"Stopped. To go on: swarm-forage --trust-models train --out {shlex.quote(str(folder))} --resume"
     return "Stopped before there was anything to keep; the same command starts again."
 
 
