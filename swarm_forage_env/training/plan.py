@@ -317,9 +317,7 @@ class TrainingPlan:
             ConfigError: fewer steps than it has.
         """
         if steps < self.total_steps:
-            raise ConfigError(
-                f"Expected in all at least the {self.total_steps:,} steps of the plan, got {steps:,}."
-            )
+            raise ConfigError(f"Expected in all at least the {self.total_steps:,} steps of the plan, got {steps:,}.")
         last = self.stages[-1]
         last = dataclasses.replace(last, steps=last.steps + steps - self.total_steps)
         return dataclasses.replace(self, stages=(*self.stages[:-1], last))
