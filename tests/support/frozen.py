@@ -1,0 +1,139 @@
+"""What must not move: values of a score, answers of a verdict, arrays of a batch with deaths, and a training.
+
+`python -m tests.support.frozen` writes `tests/promises/frozen/*.json` anew. Do that only for a change that is meant to
+change results. All that these values take from the package is asked for here.
+"""
+
+import hashlib
+import json
+import re
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from metrics import ScoreForms, compare_policies, verdict
+from swarm_forage_env import scenario
+from swarm_forage_env.studies.ladders import Budget
+from swarm_forage_env.studies.study import Axis
+from swarm_forage_env.studies.study_file import load_study
+from swarm_forage_env.studies.study_folder import StudyFolder, run_study
+from swarm_forage_env.studies.study_table import gather_study
+from swarm_forage_env.views.gymnasium import SwarmVectorEnv
+from swarm_forage_env.wrappers.registry import parse_wrapper
+
+FOLDER = Path(__file__).parent.parent / "promises" / "frozen"
+MINUTE = Path(__file__).parent.parent.parent / "docs" / "benchmark" / "plans" / "minute.toml"
+FOUR = ("crw", "dpo", "stochm", "stochx")
+CROWDED = {
+    "n_robots": 12,
+    "n_objects": 120,
+    "width_m": 12.0,
+    "height_m": 8.0,
+    "nest_centre_m": (1.6, 4.0),
+    "nest_size_m": (1.6, 6.4),
+}
+"""A small and full warehouse, in which robots meet often and deliver within minutes."""
+
+
+def score_values() -> dict[str, dict[str, list[float]]]:
+    """Return policy -> measure, variant, level and form -> value of each seed; of all measures."""
+    budget = Budget(horizon_s=600.0, interval_s=60.0, n_seeds=2, n_sizes=3, n_levels=2)
+    world = scenario("warehouse_small", **CROWDED)
+    values: dict[str, dict[str, list[float]]] = {policy: {} for policy in FOUR}
+    for variant in ("corrected", "paper"):
+        found = compare_policies(
+            list(FOUR), world, budget=budget, forms=ScoreForms(variants=(variant,)), jobs=1, progress=False
+        )
+        for table in found.tables:
+            for score in table.scores:
+                key = f"{score.measure} {score.variant} {score.form} {score.criterion} {score.x:g}"
+                values[table.policy][key] = list(score.per_seed.values())
+                values[table.policy][f"{key} relative"] = list(score.relative_per_seed.values())
+    return values
+
+
+def verdict_answers() -> dict[str, str]:
+    """Return claim, rules and variant -> answers by intervals and by bands, of tiny runs over swarm sizes."""
+    small = replace(
+        load_study("S1a", "smoke", rules=("described", "program")),
+        axes=(Axis(name="population_size", values=(1, 2, 4, 8, 16, 32)),),
+        seeds=(0, 1, 2),
+        horizon_s=400.0,
+        interval_s=40.0,
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        made = StudyFolder(Path(folder))
+        run_study(small, made, jobs=1)
+        found = verdict(gather_study(made))
+    return {
+        f"{one.claim.name} {one.rules} {one.variant}": f"{one.verdict.answer}, by bands {one.verdict.by_bands}"
+        for one in found.judged
+        if one.variant in ("corrected", "paper")
+    }
+
+
+def batch_with_deaths() -> dict[str, Any]:
+    """Return digests and totals of what a vector environment tells in 300 steps in which robots die and fail."""
+    wrappers = [parse_wrapper("population:malfunction_per_tick=0.02,repair_per_tick=0.05,death_per_tick=0.004")]
+    env = SwarmVectorEnv(
+        "warehouse_small",
+        n_arenas=3,
+        wrappers=wrappers,
+        interface={"observation": "compact", "actions": "discrete", "automatic_gripper": True, "decision_ticks": 5},
+        **CROWDED,
+        horizon_s=200.0,
+        interval_s=40.0,
+    )
+    obs, _ = env.reset(seed=11)
+    chance = np.random.default_rng(5)
+    digest = hashlib.sha256(np.asarray(obs).tobytes())
+    rewards, n_terminated, n_truncated = 0.0, 0, 0
+    for _ in range(300):
+        actions = chance.integers(env.single_action_space.n, size=env.num_envs)
+        obs, reward, terminated, truncated, _ = env.step(actions)
+        for part in (obs, reward, terminated, truncated):
+            digest.update(np.asarray(part).tobytes())
+        rewards += float(reward.sum())
+        n_terminated += int(terminated.sum())
+        n_truncated += int(truncated.sum())
+    return {"digest": digest.hexdigest()[:16], "rewards": rewards, "terminated": n_terminated, "truncated": n_truncated}
+
+
+def training_weights() -> dict[str, float]:
+    """Return the norm of each layer after the first 20,000 decisions of the minute's plan; needs torch."""
+    from swarm_forage_env.policies.network import Network
+    from swarm_forage_env.training.plan import Stage, read_plan
+    from swarm_forage_env.training.sb3.training import train
+
+    plan = read_plan(MINUTE)
+    short = replace(
+        plan,
+        stages=(Stage(steps=20_000),),
+        options={**plan.options, "n_steps": 16},
+        evaluation=replace(plan.evaluation, horizon_s=200.0),
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        train(short, Path(folder))
+        network = Network.load(Path(folder) / "policy.npz")
+    layers = zip(network.weights, network.biases, strict=True)
+    return {
+        f"layer {n}": float(np.linalg.norm(weight) + np.linalg.norm(bias)) for n, (weight, bias) in enumerate(layers)
+    }
+
+
+FROZEN = {"score": score_values, "verdict": verdict_answers, "batch": batch_with_deaths, "training": training_weights}
+"""Name of a file -> what makes its values."""
+
+
+def stored(name: str) -> Any:
+    """Return the values of a file."""
+    return json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))
+
+
+if __name__ == "__main__":
+    for name, values in FROZEN.items():
+        text = re.sub(r"\n {3,}|\n  (?=\])", " ", json.dumps(values(), indent=1))
+        (FOLDER / f"{name}.json").write_text(f"{text}\n", encoding="utf-8")
