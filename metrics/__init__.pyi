@@ -17,23 +17,8 @@ from .scoring import Performance as Performance
 
 # what studies say
 from .scoring import verdict as verdict
-from .scoring import diff as diff
 from .scoring import plot as plot
-from .scoring import report as report
 from .scoring import StudyVerdict as StudyVerdict
-from .scoring import StudyDiff as StudyDiff
-from .scoring import StudyReport as StudyReport
-
-# decisions: larger swarms, and which policy
-from .scoring import predict_policy as predict_policy
-from .scoring import predict_curves as predict_curves
-from .scoring import predict_from_scenario as predict_from_scenario
-from .scoring import choose_policy as choose_policy
-from .scoring import ablate_quirks as ablate_quirks
-from .scoring import PredictionTable as PredictionTable
-from .scoring import Predictions as Predictions
-from .scoring import Choice as Choice
-from .scoring import Ablation as Ablation
 
 # interference
 from .interference import t_lost_fraction as t_lost_fraction
@@ -87,36 +72,14 @@ from .population import availability_curves as availability_curves
 from .population import ratio_for_availability as ratio_for_availability
 from .population import ratio_for_team as ratio_for_team
 
-# laws of swarm size, and prediction of larger swarms
-from .ladder import fit_ladder as fit_ladder
-from .ladder import Ladder as Ladder
-from .ladder import LawFit as LawFit
-from .prediction import predict_performance as predict_performance
-from .laws import fit_law as fit_law
-from .prediction import forward_error as forward_error
-from .laws import SizeLaw as SizeLaw
-from .prediction import SizePrediction as SizePrediction
-
-# mean-field model of foraging
-from .foraging_model import estimate_rates as estimate_rates
-from .foraging_model import mean_field as mean_field
-from .foraging_model import steady_state as steady_state
-from .foraging_model import ForagingRates as ForagingRates
-from .foraging_model import MeanField as MeanField
-from .foraging_model import SteadyState as SteadyState
+# the law of swarm sizes
+from .size_law import fit_law as fit_law
+from .size_law import SizeLaw as SizeLaw
 
 # how near to the limit
 from .scoring import limit_of as limit_of
 from .limits import foraging_limit as foraging_limit
 from .limits import ForagingLimit as ForagingLimit
-
-# foraging from the scenario alone
-from .random_search import search_curves as search_curves
-from .random_search import heading_diffusion as heading_diffusion
-from .random_search import seen_strip as seen_strip
-from .random_search import Walker as Walker
-from .random_search import SearchFloor as SearchFloor
-from .random_search import SearchCurves as SearchCurves
 
 # statistics
 from .statistics import normalize as normalize
@@ -128,13 +91,6 @@ from .distributions import interquartile_mean as interquartile_mean
 from .distributions import probability_of_improvement as probability_of_improvement
 from .significance import paired_tests as paired_tests
 
-# runs that break down
-from .breakdown import find_breakdowns as find_breakdowns
-from .breakdown import breakdown_probability as breakdown_probability
-from .breakdown import time_to_breakdown as time_to_breakdown
-from .breakdown import Breakdowns as Breakdowns
-from .breakdown import Survival as Survival
-
 # claims of the paper
 from .controllers import PAPER_POLICIES as PAPER_POLICIES
 from .claims import CLAIMS as CLAIMS
@@ -142,11 +98,6 @@ from .claims import check_claim as check_claim
 from .claims import Claim as Claim
 from .claims import Panel as Panel
 from .claims import Verdict as Verdict
-
-# measures of earlier papers
-from .earlier_papers import fractional_maintenance as fractional_maintenance
-from .earlier_papers import projective_performance as projective_performance
-from .earlier_papers import weighted_combination as weighted_combination
 
 # overview and errors
 from .catalog import METRICS as METRICS

@@ -71,7 +71,6 @@ METRICS: dict[str, Measure] = {
         higher_is_better=False,
         neutral=0.0,
         needs=("performance", "interference", "one robot"),
-        variants=("corrected", "sierra"),
     ),
     "spatial_emergence": Measure(
         function=spatial_emergence,
@@ -80,7 +79,7 @@ METRICS: dict[str, Measure] = {
         higher_is_better=True,
         neutral=0.0,
         needs=("performance", "interference", "one robot", "two sizes"),
-        variants=("corrected", "paper", "sierra"),
+        variants=("corrected", "paper"),
     ),
     "time_emergence": Measure(
         function=time_emergence,
@@ -97,7 +96,6 @@ METRICS: dict[str, Measure] = {
         higher_is_better=True,
         neutral=0.0,
         needs=("performance", "two sizes"),
-        variants=("corrected", "sierra"),
     ),
     "interference_gain": Measure(
         function=interference_gain,
@@ -122,7 +120,7 @@ METRICS: dict[str, Measure] = {
         higher_is_better=True,
         neutral=1.0,
         needs=("performance", "two sizes"),
-        variants=("corrected", "paper", "sierra"),
+        variants=("corrected", "paper"),
     ),
     "reactivity": Measure(
         function=reactivity,
@@ -133,7 +131,7 @@ METRICS: dict[str, Measure] = {
         lowest=0.0,
         is_distance=True,
         needs=("performance", "ideal run", "waveforms"),
-        variants=("corrected", "paper", "sierra"),
+        variants=("corrected", "paper"),
     ),
     "adaptability": Measure(
         function=adaptability,
@@ -144,7 +142,6 @@ METRICS: dict[str, Measure] = {
         lowest=0.0,
         is_distance=True,
         needs=("performance", "ideal run"),
-        variants=("corrected", "sierra"),
     ),
     "noise_robustness": Measure(
         function=noise_robustness,
@@ -155,7 +152,6 @@ METRICS: dict[str, Measure] = {
         lowest=0.0,
         is_distance=True,
         needs=("performance", "ideal run"),
-        variants=("corrected", "sierra"),
     ),
     "population_robustness": Measure(
         function=population_robustness,
@@ -164,7 +160,7 @@ METRICS: dict[str, Measure] = {
         higher_is_better=True,
         neutral=0.0,
         needs=("performance", "ideal run", "rates"),
-        variants=("corrected", "paper", "sierra"),
+        variants=("corrected", "paper"),
     ),
     "recorded_population_robustness": Measure(
         function=recorded_population_robustness,
@@ -192,7 +188,6 @@ METRICS: dict[str, Measure] = {
         neutral=None,
         lowest=0.0,
         needs=("performance",),
-        variants=("corrected", "sierra"),
     ),
     "raw_performance": Measure(
         function=raw_performance,
@@ -202,7 +197,6 @@ METRICS: dict[str, Measure] = {
         neutral=None,
         lowest=0.0,
         needs=("performance",),
-        variants=("corrected", "sierra"),
     ),
 }
 """Public function name -> what the measure is."""

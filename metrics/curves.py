@@ -17,8 +17,8 @@ from .checks import CurveError, check_option
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
 
-Variant: TypeAlias = Literal["paper", "corrected", "sierra"]
-"""`paper`: as printed; `corrected`: with the printing errors corrected; `sierra`: as the authors' program computed."""
+Variant: TypeAlias = Literal["paper", "corrected"]
+"""`paper`: as printed; `corrected`: with the printing errors corrected."""
 Form: TypeAlias = Literal["marginal", "interactive"]
 """With what a swarm size is compared: the next smaller size, or N robots that each work alone."""
 Reduction: TypeAlias = Literal["sum", "mean", "last", "total"]
@@ -140,16 +140,3 @@ def per_performance(value: FloatArray, perf: FloatArray, reduce: Reduction = "su
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         return value / reduce_intervals(perf, reduce, perf)
-
-
-def last_interval_only(reduce: Reduction) -> None:
-    """Check the reduction given to a measure whose `sierra` form reads only the last interval.
-
-    `sum` is the default of these measures, so it counts as "not chosen".
-
-    Raises:
-        ValueError: Another reduction was asked for.
-    """
-    check_option("reduce", reduce, Reduction)
-    if reduce not in ("sum", "last"):
-        raise ValueError(f"Expected reduce='last' in the sierra form, which reads the last interval, got {reduce!r}.")

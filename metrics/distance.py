@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Callable
-from typing import Any, Literal, TypeAlias, cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,12 +12,8 @@ from . import numba_settings  # noqa: F401  # pyright: ignore[reportUnusedImport
 # isort: split
 from numba import njit
 
-from .checks import CurveError, check_option
-from .curves import FloatArray, Variant, as_curve, as_curves, check_broadcast
-
-Ground: TypeAlias = Literal["value", "time_value"]
-"""Local cost: |x_i - y_j|, so that shifts in time cost nothing; or the same plus |clock_i - clock_j|."""
-
+from .checks import CurveError
+from .curves import FloatArray, as_curve, as_curves, check_broadcast
 
 MAX_CELLS = 1_000_000_000_000
 """Most cells of all warping tables of a call, pairs x n x m; at about 1.5 ns each they take half an hour (our choice:
@@ -32,28 +28,22 @@ def dtw(
     x: ArrayLike,
     y: ArrayLike,
     *,
-    ground: Ground = "value",
-    clock: ArrayLike | None = None,
     window: int | None = None,
     per_interval: bool = False,
 ) -> FloatArray:
     """Exact dynamic time warping distance between the curves x and y.
 
         D(0, 0) = 0,  D(i, 0) = D(0, j) = inf
-        D(i, j) = c(i, j) + min( D(i-1, j), D(i, j-1), D(i-1, j-1) )
+        D(i, j) = |x_i - y_j| + min( D(i-1, j), D(i, j-1), D(i-1, j-1) )
 
     Slopes are not weighted, and the sum is neither divided by the path length nor put under a root. The distance is
     symmetric, and 0 for identical curves. It is not a metric, because the triangle inequality does not hold. It grows
     with T, the sampling rate and the scale of the curves, so compare only curves of the same kind and length. The paper
-    cites the method but does not give the cost c. The authors' program adds the clock to the cost. The steps of the
-    clock are much larger than the values, so the published distances do not warp at all, and equal `aligned_l1`.
+    cites the method but does not give the cost; a shift in time costs nothing here.
 
     Args:
         x: Curve or curves, shape (..., T); negative values are fine.
         y: Curve or curves of any length; leading axes broadcast with those of x.
-        ground: `value` (the paper's stated intent) or `time_value` (the authors' program).
-        clock: For `time_value`, the sample times: the step between samples as one number, or shape (T,) shared by
-            curves of equal length. Default: sample numbers. `value` does not use it.
         window: Largest |i - j| of a path (Sakoe and Chiba band); None = no limit, as in the definition above.
         per_interval: Divide by the length of the longer curve.
 
@@ -61,15 +51,12 @@ def dtw(
         Distances, shape (...,), in the unit of the cost times samples. A pair with a NaN gives NaN. Lower is closer.
 
     Raises:
-        CurveError: A curve is missing, empty or infinite, leading axes do not broadcast, the clock does not fit, the
-            window lets no path through, or the tables have more than `MAX_CELLS` cells.
-        ValueError: Unknown ground cost.
+        CurveError: A curve is missing, empty or infinite, leading axes do not broadcast, the window lets no
+            path through, or the tables have more than `MAX_CELLS` cells.
     """
     x, y = as_curve("x", x, signed=True), as_curve("y", y, signed=True)
     check_broadcast((x, y), f"x {x.shape}, y {y.shape}")
-    check_option("ground", ground, Ground)
     n, m = int(x.shape[-1]), int(y.shape[-1])
-    clock_x, clock_y = _clocks(clock, n, m) if ground == "time_value" else (np.zeros(n), np.zeros(m))
     reach = max(n, m) if window is None else window
     if reach < abs(n - m):
         raise CurveError(f"Expected window >= |{n} - {m}| = {abs(n - m)} for these lengths, got {window}.")
@@ -80,9 +67,7 @@ def dtw(
     _check_cells(len(all_x), n, m, reach)
     diagonals: FloatArray = np.empty((3, n + 2))
     for pair in range(len(distances)):
-        distances[pair] = _warping_cost(
-            all_x[pair], all_y[pair, ::-1].copy(), clock_x, clock_y[::-1].copy(), reach, diagonals
-        )
+        distances[pair] = _warping_cost(all_x[pair], all_y[pair, ::-1].copy(), reach, diagonals)
     distances[np.isnan(all_x).any(axis=1) | np.isnan(all_y).any(axis=1)] = np.nan
     if per_interval:
         distances /= max(n, m)
@@ -90,7 +75,7 @@ def dtw(
 
 
 def aligned_l1(x: ArrayLike, y: ArrayLike) -> FloatArray:
-    """Distance without warping, sum_t |x_t - y_t|. The authors' program returns it for rates below one clock step.
+    """Distance without warping, sum_t |x_t - y_t|.
 
     Args:
         x: Curve or curves, shape (..., T).
@@ -106,19 +91,7 @@ def aligned_l1(x: ArrayLike, y: ArrayLike) -> FloatArray:
     return np.abs(x - y).sum(axis=-1)
 
 
-def curve_distance(x: FloatArray, y: FloatArray, variant: Variant, clock: ArrayLike | None) -> FloatArray:
-    """Distance that a variant of reactivity, adaptability and noise robustness uses between curves of equal length.
-
-    `paper` and `corrected` warp freely on values; `sierra` adds the clock to the cost.
-
-    Raises:
-        ValueError: Unknown variant, and as `dtw`.
-    """
-    check_option("variant", variant, Variant)
-    return dtw(x, y, ground="time_value" if variant == "sierra" else "value", clock=clock)
-
-
-def noise_floor(perf_ideal: ArrayLike, *, variant: Variant = "corrected", clock: ArrayLike | None = None) -> FloatArray:
+def noise_floor(perf_ideal: ArrayLike) -> FloatArray:
     """Distances between all pairs of ideal runs: what a perfect swarm would score by chance alone.
 
     Reactivity, adaptability and noise robustness compare single runs, which scatter independently, so they are above 0
@@ -127,8 +100,6 @@ def noise_floor(perf_ideal: ArrayLike, *, variant: Variant = "corrected", clock:
 
     Args:
         perf_ideal: P_ideal of all R >= 2 runs, shape (R, T).
-        variant: As in `adaptability`.
-        clock: As in `adaptability`.
 
     Returns:
         Distances, shape (R (R - 1) / 2,).
@@ -140,7 +111,7 @@ def noise_floor(perf_ideal: ArrayLike, *, variant: Variant = "corrected", clock:
     if runs.ndim != 2 or runs.shape[0] < 2:
         raise CurveError(f"Expected perf_ideal of at least two runs, shape (R, T), got {runs.shape}.")
     first, second = np.triu_indices(runs.shape[0], k=1)
-    return curve_distance(runs[first], runs[second], variant, clock)
+    return dtw(runs[first], runs[second])
 
 
 def _check_cells(n_pairs: int, n: int, m: int, reach: int) -> None:
@@ -156,22 +127,6 @@ def _check_cells(n_pairs: int, n: int, m: int, reach: int) -> None:
         )
     if n_cells > TOLD_CELLS:
         logging.getLogger("metrics").warning(told)
-
-
-def _clocks(clock: ArrayLike | None, n: int, m: int) -> tuple[FloatArray, FloatArray]:
-    """Sample times of curves with n and m samples."""
-    times = as_curve("clock", 1.0 if clock is None else clock, signed=True)
-    if np.isnan(times).any():
-        raise CurveError(f"Expected clock without NaN, got {times}.")
-    if clock is None or np.ndim(clock) == 0:
-        step = float(times[0])
-        return step * np.arange(n, dtype=np.float64), step * np.arange(m, dtype=np.float64)
-    if times.shape != (n,) or n != m:
-        raise CurveError(
-            "Expected clock as one step, or with shape (T,) for curves of equal length, "
-            f"got {times.shape} for lengths {n} and {m}."
-        )
-    return times, times
 
 
 def _njit(**options: bool) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
@@ -191,8 +146,6 @@ def _compiled(function: Callable[..., float]) -> Callable[..., float]:
 def _next_diagonal(
     x: FloatArray,
     y: FloatArray,
-    clock_x: FloatArray,
-    clock_y: FloatArray,
     diagonal: FloatArray,
     above: FloatArray,
     left: FloatArray,
@@ -200,7 +153,7 @@ def _next_diagonal(
 ) -> None:
     """Fill a diagonal of D, `now` (L,), from the costs and the three neighbours of each of its cells."""
     for t in range(now.shape[0]):
-        cost = abs(x[t] - y[t]) + abs(clock_x[t] - clock_y[t])
+        cost = abs(x[t] - y[t])
         least = above[t] if above[t] < left[t] else left[t]
         least = diagonal[t] if diagonal[t] < least else least
         now[t] = cost + least
@@ -210,8 +163,6 @@ def _next_diagonal(
 def _warping_cost(
     x: FloatArray,
     y: FloatArray,
-    clock_x: FloatArray,
-    clock_y: FloatArray,
     window: int,
     diagonals: FloatArray,
 ) -> float:
@@ -219,7 +170,7 @@ def _warping_cost(
 
     The table is filled diagonal by diagonal, k = i + j: cells of one diagonal do not depend on each other, so that the
     processor works out several at a time. `diagonals` (3, n + 2) is workspace for D on the diagonals k, k - 1 and
-    k - 2 by i; beside the cells of a diagonal stands infinity. The cost `value` is the case of clocks that stand still.
+    k - 2 by i; beside the cells of a diagonal stands infinity.
     """
     n, m = x.shape[0], y.shape[0]
     diagonals[:, :] = np.inf
@@ -232,8 +183,6 @@ def _warping_cost(
         _next_diagonal(
             x[low - 1 : high],
             y[first:last],
-            clock_x[low - 1 : high],
-            clock_y[first:last],
             earlier[low - 1 : high],
             before[low - 1 : high],
             before[low : high + 1],

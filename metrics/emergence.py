@@ -10,11 +10,10 @@ from .curves import (
     Variant,
     as_curves,
     as_interference,
-    last_interval_only,
     per_performance,
     reduce_intervals,
 )
-from .interference import InterferenceReading, fractional_loss, performance_lost
+from .interference import performance_lost
 
 
 def spatial_emergence(
@@ -29,8 +28,6 @@ def spatial_emergence(
     *,
     variant: Variant = "corrected",
     reduce: Reduction = "sum",
-    t_lost_as: InterferenceReading = "fraction",
-    n_reference: int = 1,
 ) -> FloatArray:
     """Spatial self-organisation E_S(N1, N2), Eq. (2): positive if the loss grows less than in proportion to the size.
 
@@ -50,22 +47,18 @@ def spatial_emergence(
         perf2: P(N2, t).
         t_lost2: Interference fraction of the larger swarm.
         n2: Larger size N2.
-        perf_one: P(1, t) of one robot alone. It may be None if N1 > 1, except for `sierra`.
+        perf_one: P(1, t) of one robot alone. It may be None if N1 > 1.
         t_lost_one: Interference fraction of one robot alone, or None as well.
         variant: `paper` is the equation as printed. `corrected` sets P_lost(1) to zero if N1 = 1, because this is the
-            loss to walls, which P_lost(N > 1) leaves out; otherwise independent robots would seem organised. `sierra`
-            uses fractional losses of the last interval, takes sizes in any order, and is 0 for N2 = 1; it makes
-            independent robots seem organised.
-        reduce: `sum` as in the paper, `mean` or `last`. `sierra` always reads the last interval.
-        t_lost_as: As in `performance_lost`.
-        n_reference: As in `performance_lost`.
+            loss to walls, which P_lost(N > 1) leaves out; otherwise independent robots would seem organised.
+        reduce: `sum` as in the paper, `mean` or `last`.
 
     Returns:
-        E_S, shape (...,), in the unit of `perf` (a pure number for `sierra`). Higher is better.
+        E_S, shape (...,), in the unit of `perf`. Higher is better.
 
     Raises:
-        CurveError: As in `performance_lost`, or n1 >= n2 outside `sierra`.
-        ValueError: Unknown variant, reading or reduction, or `sierra` with another reduction than the last interval.
+        CurveError: As in `performance_lost`, or n1 >= n2.
+        ValueError: Unknown variant or reduction.
 
     The paper introduces this equation as the task-based measure, but means the spatial one.
 
@@ -73,26 +66,16 @@ def spatial_emergence(
     positive although robots lose more time. So look at `time_emergence`, too.
     """
     n1, n2 = check_size("n1", n1), check_size("n2", n2)
-    if perf_one is None and t_lost_one is None and n1 > 1 and variant != "sierra":
+    if perf_one is None and t_lost_one is None and n1 > 1:
         perf_one = t_lost_one = np.zeros(np.shape(perf1)[-1:])  # their terms cancel, whatever they are
     perf1, t_lost1, perf2, t_lost2, perf_one, t_lost_one = as_curves(
         perf1=perf1, t_lost1=t_lost1, perf2=perf2, t_lost2=t_lost2, perf_one=perf_one, t_lost_one=t_lost_one
     )
     inputs = (perf1, t_lost1, perf2, t_lost2, perf_one, t_lost_one)
-    if variant == "sierra":
-        last_interval_only(reduce)
-        reduce = "last"
-        loss1 = fractional_loss(perf1, t_lost1, n1, perf_one, t_lost_one, variant=variant, n_reference=n_reference)
-        loss2 = fractional_loss(perf2, t_lost2, n2, perf_one, t_lost_one, variant=variant, n_reference=n_reference)
-        return reduce_intervals((n2 / n1 * loss1 - loss2) * (n2 > 1), reduce, *inputs)
     check_option("variant", variant, Variant)
     check_size_order(n1, n2)
-    lost1 = performance_lost(
-        perf1, t_lost1, n1, perf_one, t_lost_one, variant=variant, t_lost_as=t_lost_as, n_reference=n_reference
-    )
-    lost2 = performance_lost(
-        perf2, t_lost2, n2, perf_one, t_lost_one, variant=variant, t_lost_as=t_lost_as, n_reference=n_reference
-    )
+    lost1 = performance_lost(perf1, t_lost1, n1, perf_one, t_lost_one)
+    lost2 = performance_lost(perf2, t_lost2, n2, perf_one, t_lost_one)
     if variant == "corrected" and n1 == 1:
         lost1 = 0.0 * lost1
     return reduce_intervals(n2 / n1 * lost1 - lost2, reduce, *inputs)

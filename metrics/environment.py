@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from .checks import CurveError, check_option, check_wave
 from .curves import FloatArray, as_curve, as_waveforms
-from .distance import Ground, dtw
+from .distance import dtw
 
 WaveformKind: TypeAlias = Literal["constant", "sine", "square", "sawtooth"]
 ScalingModel: TypeAlias = Literal["paper", "linear", "reciprocal"]
@@ -125,25 +125,20 @@ def environment_scaling(
     return scaling[0] if scalars else scaling
 
 
-def environment_distance(
-    v: ArrayLike, i_ec: ArrayLike, *, ground: Ground = "value", clock: ArrayLike | None = None
-) -> float:
+def environment_distance(v: ArrayLike, i_ec: ArrayLike) -> float:
     """Distance of the applied from the ideal conditions, DTW(I_ec, V): the x axis of the flexibility figures.
 
     The authors round this distance to 4 decimals, and leave the ideal experiment, at 0, out of their figures. For a
-    constant I_ec, the distance is sum_t |V(t) - I_ec| with either ground cost.
+    constant I_ec, the distance is sum_t |V(t) - I_ec|.
 
     Args:
         v: Applied conditions V(t) at the recording instants, shape (T,); all of V, not its deviation.
         i_ec: Ideal conditions I_ec(t), shape (T,) or one number.
-        ground: As in `dtw`.
-        clock: As in `dtw`.
 
     Raises:
         CurveError: The signals are missing, infinite, of different length, or not one signal each.
-        ValueError: Unknown ground cost.
     """
     v, i_ec = as_waveforms(as_curve("v", v, signed=True).shape[-1], v=v, i_ec=i_ec)
     if v.ndim != 1 or i_ec.ndim != 1:
         raise CurveError(f"Expected one signal each, shape (T,), got v {v.shape} and i_ec {i_ec.shape}.")
-    return float(dtw(i_ec, v, ground=ground, clock=clock))
+    return float(dtw(i_ec, v))

@@ -5,8 +5,8 @@ Robustness to a changing population is in `population`.
 
 from numpy.typing import ArrayLike
 
-from .curves import FloatArray, Variant, as_curves, as_waveforms, check_broadcast, per_performance, reduce_intervals
-from .distance import curve_distance
+from .curves import FloatArray, as_curves, as_waveforms, check_broadcast, per_performance, reduce_intervals
+from .distance import dtw
 from .environment import ScalingModel, environment_scaling
 
 
@@ -17,8 +17,6 @@ def reactivity(
     i_ec: ArrayLike,
     *,
     model: ScalingModel = "linear",
-    variant: Variant = "corrected",
-    clock: ArrayLike | None = None,
     relative: bool = False,
 ) -> FloatArray:
     """Reactivity R(N), Eqs. (5) and (6): distance from a swarm whose performance changes just as the environment does.
@@ -35,9 +33,6 @@ def reactivity(
         v: Applied conditions V(t) at the same instants, shape (..., T) or one number.
         i_ec: Ideal conditions I_ec(t), likewise.
         model: How c_t is computed, see `environment_scaling`; the equation as printed needs model="paper".
-        variant: Which distance: exact DTW on values for `paper` and `corrected`. For `sierra`, the cost includes the
-            clock, as in the authors' program, so short delays count in full.
-        clock: For `sierra`, sample times as in `dtw` (the authors: ticks, steps of 1000). Default: interval numbers.
         relative: Divide by the summed P_ideal, see `metrics.curves.per_performance`.
 
     Returns:
@@ -53,7 +48,7 @@ def reactivity(
     shapes = f"perf_ideal {perf_ideal.shape}, perf {perf.shape}, v {v.shape}, i_ec {i_ec.shape}"
     check_broadcast((perf_ideal, perf, v, i_ec), shapes)
     perfectly_reactive = environment_scaling(v, i_ec, model=model) * perf_ideal
-    distance = curve_distance(perfectly_reactive, perf, variant, clock)
+    distance = dtw(perfectly_reactive, perf)
     return per_performance(distance, perf_ideal) if relative else distance
 
 
@@ -61,8 +56,6 @@ def adaptability(
     perf_ideal: ArrayLike,
     perf: ArrayLike,
     *,
-    variant: Variant = "corrected",
-    clock: ArrayLike | None = None,
     relative: bool = False,
 ) -> FloatArray:
     """Adaptability A(N), Eq. (7): distance from a swarm whose performance does not change at all.
@@ -75,8 +68,6 @@ def adaptability(
         perf_ideal: Performance under ideal conditions, same swarm size and controller, shape (..., T), objects per
             interval.
         perf: Performance P(N, t) under the applied conditions, same intervals.
-        variant: As in `reactivity`.
-        clock: As in `reactivity`.
         relative: As in `reactivity`.
 
     Returns:
@@ -84,10 +75,9 @@ def adaptability(
 
     Raises:
         CurveError: Curves are missing, negative, infinite or of different length.
-        ValueError: Unknown variant.
     """
     perf_ideal, perf = as_curves(perf_ideal=perf_ideal, perf=perf)
-    distance = curve_distance(perf_ideal, perf, variant, clock)
+    distance = dtw(perf_ideal, perf)
     return per_performance(distance, perf_ideal) if relative else distance
 
 
@@ -95,8 +85,6 @@ def noise_robustness(
     perf_ideal: ArrayLike,
     perf: ArrayLike,
     *,
-    variant: Variant = "corrected",
-    clock: ArrayLike | None = None,
     relative: bool = False,
 ) -> FloatArray:
     """Sensor and actuator noise robustness B_sa = DTW( P_ideal, P ), Eq. (8). Lower is better.
@@ -108,8 +96,6 @@ def noise_robustness(
     Args:
         perf_ideal: Performance without noise, shape (..., T), objects per interval.
         perf: Performance P(N, t) with noise, same intervals.
-        variant: Distance, as in `reactivity`.
-        clock: For `sierra`, sample times as in `dtw`; the authors used sample numbers, the default.
         relative: Divide by the summed P_ideal, see `metrics.curves.per_performance`.
 
     Returns:
@@ -117,10 +103,9 @@ def noise_robustness(
 
     Raises:
         CurveError: Curves are missing, negative, infinite or of different length.
-        ValueError: Unknown variant.
     """
     perf_ideal, perf = as_curves(perf_ideal=perf_ideal, perf=perf)
-    distance = curve_distance(perf_ideal, perf, variant, clock)
+    distance = dtw(perf_ideal, perf)
     return per_performance(distance, perf_ideal) if relative else distance
 
 

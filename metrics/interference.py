@@ -1,18 +1,10 @@
 """Interference: how much time and performance robots lose because they avoid each other. Eq. (1)."""
 
-from typing import Literal, TypeAlias
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .checks import CurveError, check_option, check_size
-from .curves import FloatArray, Variant, as_curves, as_interference
-
-InterferenceReading: TypeAlias = Literal["fraction", "count"]
-"""Whether t_lost in Eq. (1) is the fraction of robots that interfere (notation table) or their number (text)."""
-
-_SIERRA_DECIMALS = 8
-"""The authors' program rounds fractional losses to this many decimals."""
+from .checks import CurveError, check_size
+from .curves import FloatArray, as_curves, as_interference
 
 
 def t_lost_fraction(n_interfering: ArrayLike, n: int) -> FloatArray:
@@ -45,10 +37,6 @@ def performance_lost(
     n: int,
     perf_one: ArrayLike,
     t_lost_one: ArrayLike,
-    *,
-    variant: Variant = "corrected",
-    t_lost_as: InterferenceReading = "fraction",
-    n_reference: int = 1,
 ) -> FloatArray:
     """Performance lost to interference between robots, P_lost(N, t), Eq. (1).
 
@@ -59,38 +47,24 @@ def performance_lost(
 
     Args:
         perf: P(N, t), shape (..., T), objects per interval.
-        t_lost: Interference *fraction* of that swarm, in every variant, shape (..., T).
+        t_lost: Interference *fraction* of that swarm, shape (..., T).
         n: Swarm size N.
         perf_one: P(1, t) of one robot alone.
         t_lost_one: Interference fraction of one robot alone.
-        variant: `paper` and `corrected` are the same here. `sierra` is what the authors' program computed: 0 for the
-            first experiment, P(N) t_lost(N) - P(1) n_int(1) for the others (it subtracts the loss of one lone robot,
-            not of N), and +inf where P(N) = 0.
-        t_lost_as: `count` first multiplies the fractions by the swarm size, as the text of the paper says. Independent
-            robots then look worse in larger swarms. `sierra` has its own reading and refuses `count`.
-        n_reference: Number of robots in the reference run. Only `sierra` accepts a number other than 1: the authors'
-            program used its first experiment, which has 12 robots in search and rescue.
 
     Returns:
         P_lost, shape (..., T), in the unit of `perf`.
 
     Raises:
         CurveError: A curve is missing, negative, infinite or of another length; a fraction above 1; a size below 1.
-        ValueError: Unknown variant or reading, or a combination of them that has no meaning.
 
     The paper contradicts itself: t_lost is a number of robots in the text, but a fraction of time in the notation
     table. We use the fraction, because P_lost is then 0 for N robots that do not affect each other. The table also
     calls P_lost a fraction, but the equation gives a number of objects; `fractional_loss` computes the fraction.
     """
     n = check_size("n", n)
-    n_reference = check_size("n_reference", n_reference)
-    _check_reading(variant, t_lost_as, n_reference)
     perf, perf_one, t_lost, t_lost_one = as_curves(perf=perf, perf_one=perf_one, t_lost=t_lost, t_lost_one=t_lost_one)
     as_interference(t_lost=t_lost, t_lost_one=t_lost_one)
-    if variant == "sierra":
-        return _sierra_performance_lost(perf, t_lost, n, perf_one, n_reference * t_lost_one, n_reference)
-    if t_lost_as == "count":
-        t_lost = n * t_lost
     if n == 1:
         return perf * t_lost
     return perf * t_lost - n * (perf_one * t_lost_one)
@@ -141,41 +115,12 @@ def fractional_loss(
     n: int,
     perf_one: ArrayLike,
     t_lost_one: ArrayLike,
-    *,
-    variant: Variant = "corrected",
-    n_reference: int = 1,
 ) -> FloatArray:
     """Share of its performance that a swarm loses to interference, FL(N, t) = P_lost(N, t) / P(N, t).
 
-    Arguments, shapes and errors as in `performance_lost`. In the `sierra` form FL is 0 for the first experiment and 1
-    where P(N) = 0, rounded to 8 decimals; the others follow IEEE arithmetic (-inf or NaN where P(N) = 0).
+    Arguments, shapes and errors as in `performance_lost`; -inf or NaN where P(N) = 0.
     """
-    lost = performance_lost(perf, t_lost, n, perf_one, t_lost_one, variant=variant, n_reference=n_reference)
+    lost = performance_lost(perf, t_lost, n, perf_one, t_lost_one)
     (perf,) = as_curves(perf=perf)
     with np.errstate(divide="ignore", invalid="ignore"):
-        if variant != "sierra":
-            return lost / perf
-        if n == n_reference:
-            return lost
-        return np.where(perf == 0.0, 1.0, np.round(lost / perf, _SIERRA_DECIMALS))
-
-
-def _sierra_performance_lost(
-    perf: FloatArray, t_lost: FloatArray, n: int, perf_first: FloatArray, n_int_first: FloatArray, n_first: int
-) -> FloatArray:
-    if n == n_first:
-        return 0.0 * perf * t_lost  # keeps NaN and the shape
-    lost = perf * t_lost - perf_first * n_int_first
-    return np.where(perf == 0.0, np.inf, lost)
-
-
-def _check_reading(variant: Variant, t_lost_as: InterferenceReading, n_reference: int) -> None:
-    check_option("variant", variant, Variant)
-    check_option("t_lost_as", t_lost_as, InterferenceReading)
-    if variant == "sierra" and t_lost_as == "count":
-        raise ValueError("Expected t_lost_as='fraction' with variant='sierra', which converts to counts by itself.")
-    if variant != "sierra" and n_reference != 1:
-        raise CurveError(
-            f"Expected the run of one robot as reference, got n_reference = {n_reference}; "
-            "only variant='sierra' takes another first experiment in its place."
-        )
+        return lost / perf

@@ -25,13 +25,12 @@ from .curves import (
     as_curves,
     as_waveforms,
     check_broadcast,
-    last_interval_only,
     per_performance,
     reduce_intervals,
 )
-from .queues import PopulationRates, mean_away, queue_statistics, stationary_distribution
+from .queues import PopulationRates, mean_away, queue_statistics
 
-PopulationWeight: TypeAlias = Literal["paper", "sojourn", "transient", "stationary", "sierra"]
+PopulationWeight: TypeAlias = Literal["paper", "transient"]
 
 _SMALLEST_LOG, _LARGEST_LOG = math.log(5e-324), math.log(1.7976931348623157e308)
 """Logarithms of the smallest and largest double: the range of ratios that can be returned."""
@@ -57,13 +56,13 @@ def population_robustness(
 
     Args:
         perf: Performance with population dynamics, shape (..., T), objects per interval.
-        perf_ideal: Performance of the ideal swarm, same intervals. For `sierra`, of the lowest rate in the sweep.
+        perf_ideal: Performance of the ideal swarm, same intervals.
         rates: Population rates per tick.
         horizon: Run length in ticks, in the same unit as the rates.
-        n: Swarm size N; `transient` and `stationary` need it.
-        ideal_rates: Rates of the ideal swarm; None: no robot leaves. `sierra` needs them.
+        n: Swarm size N; `transient` needs it.
+        ideal_rates: Rates of the ideal swarm; None: no robot leaves.
         weight: See `population_weight`.
-        reduce: `sum` as in the paper, `mean` or `last`. `sierra` always reads the last interval.
+        reduce: `sum` as in the paper, `mean` or `last`.
         relative: Divide by the likewise reduced P_ideal, see `metrics.curves.per_performance`.
 
     Returns:
@@ -72,13 +71,10 @@ def population_robustness(
     Raises:
         CurveError: Curves are missing, negative, infinite or of different length, or n < 1.
         PopulationError: The weight does not exist for these rates.
-        ValueError: Unknown option, a missing n or ideal_rates, or `sierra` with another reduction.
+        ValueError: Unknown option, or a missing n.
     """
     perf, perf_ideal = as_curves(perf=perf, perf_ideal=perf_ideal)
     share = population_weight(rates, horizon=horizon, n=n, ideal_rates=ideal_rates, weight=weight)
-    if weight == "sierra":
-        last_interval_only(reduce)
-        reduce = "last"
     gain = reduce_intervals(perf - share * perf_ideal, reduce, perf, perf_ideal)
     return per_performance(gain, perf_ideal, reduce) if relative else gain
 
@@ -142,36 +138,21 @@ def population_weight(
     | weight     | time at work                                                                                 |
     |------------|----------------------------------------------------------------------------------------------|
     | paper      | T - [1 / (mu - lambda) + 1 / mu], Eq. (11) with the printed time, which counts service twice |
-    | sojourn    | T - 1 / (mu - lambda), the same without the double count                                     |
     | transient  | T (1 - m_T / N), the mean over the run, see `mean_away` (ours)                               |
-    | stationary | T (1 - L_N / N), in equilibrium, see `queue_statistics` (ours); 0 with deaths and no births  |
-    | sierra     | ideal time *away* over time away, where Eq. (12) has times at work                           |
 
-    The printed time away is the length of *one* absence. So `paper` and `sojourn` hold only if every robot is away
-    exactly once, and they are negative if 1 / (mu - lambda) exceeds T, as for the study's 200 robots. The authors'
-    program takes its experiment with the lowest rates as ideal. If all rates are k times these rates, its weight is k,
-    so B_pd falls with k, whatever the swarm does. This k, from 1 to 8, is the "population variance" on the x axis of
-    the scenario 1 figure.
+    The printed time away is the length of *one* absence. So `paper` holds only if every robot is away exactly once, and
+    is negative if that length exceeds T, as for the study's 200 robots.
 
     Returns:
-        The weight; 1 if no robot leaves either swarm. In [0, 1] for `transient` and `stationary` with ideal_rates None.
+        The weight; 1 if no robot leaves either swarm. In [0, 1] for `transient` with ideal_rates None.
 
     Raises:
         CurveError: n < 1.
-        PopulationError: The weight does not exist: rho >= 1 for `paper` and `sojourn`, a division by zero.
-        ValueError: Unknown weight, or a missing n or ideal_rates.
+        PopulationError: The weight does not exist: rho >= 1 for `paper`, a division by zero.
+        ValueError: Unknown weight, or a missing n.
     """
     check_option("weight", weight, PopulationWeight)
     check_horizon(horizon)
-    if weight == "sierra":
-        if ideal_rates is None:
-            raise ValueError("Expected ideal_rates with weight='sierra': the rates of its first experiment.")
-        away, ideal_away = _sierra_time_away(rates, horizon), _sierra_time_away(ideal_rates, horizon)
-        if away == 0.0:
-            raise PopulationError(
-                f"Expected returns with weight='sierra', got mu = 0 without deaths in {rates}; use weight='transient'."
-            )
-        return ideal_away / away
     at_work = _share_at_work(rates, horizon, n, weight)
     ideal_at_work = _share_at_work(ideal_rates or PopulationRates(), horizon, n, weight)
     if ideal_at_work == 0.0:
@@ -299,33 +280,14 @@ def _availability(n: int, n_min: int, log_q: float) -> float:
 def _share_at_work(rates: PopulationRates, horizon: float, n: int | None, weight: PopulationWeight) -> float:
     if rates.lam == 0.0:
         return 1.0
-    if weight in ("transient", "stationary"):
+    if weight == "transient":
         if n is None:
             raise ValueError(f"Expected the swarm size n with weight={weight!r}, got None.")
-        n = check_size("n", n)
-        if weight == "transient":
-            return 1.0 - mean_away(rates, n, horizon) / n
-        if rates.lambda_d > 0.0 and rates.mu_b == 0.0:  # repairs do not bring dead robots back
-            return 0.0
-        return float(stationary_distribution(rates, n) @ np.arange(n, -1.0, -1.0)) / n
+        return 1.0 - mean_away(rates, check_size("n", n), horizon) / n
     queue = queue_statistics(rates)
     if not queue.stable:
         raise PopulationError(
             f"Expected more returns than departures with weight={weight!r}, got rho = {queue.rho}: the time away is "
             "infinite; use weight='transient'."
         )
-    return 1.0 - (queue.time_printed if weight == "paper" else queue.time) / horizon
-
-
-def _sierra_time_away(rates: PopulationRates, horizon: float) -> float:
-    """Time away as the authors' program computes it, its special cases in its order."""
-    if rates.lambda_d > 0.0 and rates.mu_b == 0.0:
-        return horizon
-    if rates.mu == 0.0:
-        return 0.0
-    if rates.lam == 0.0 or rates.lam == rates.mu:
-        raise PopulationError(
-            f"Expected lambda > 0 and lambda != mu with weight='sierra', which divides by both, got {rates}; "
-            "use weight='transient'."
-        )
-    return 1.0 / (rates.mu - rates.lam)  # negative for lambda > mu, and used as it is
+    return 1.0 - queue.time_printed / horizon

@@ -11,7 +11,7 @@ from .curves import FloatArray, IntArray, Reduction, Variant, as_curves, reduce_
 ZeroPolicy: TypeAlias = Literal["nan", "skip"]
 """How an interval without performance enters a sum: with its IEEE value, NaN included, or not at all."""
 
-_DEFAULT_REDUCTION: dict[Variant, Reduction] = {"paper": "sum", "corrected": "total", "sierra": "last"}
+_DEFAULT_REDUCTION: dict[Variant, Reduction] = {"paper": "sum", "corrected": "total"}
 
 
 def scalability(
@@ -30,7 +30,6 @@ def scalability(
 
         corrected    C = 1 - (1/S - 1/r) / (1 - 1/r)         S of the performance summed over time
         paper        C = sum_t [ 1 - (S - 1/r) / (1 - 1/r) ]
-        sierra       as paper, last interval; 0 if P(N1) = 0 < P(N2)
 
     The paper names e, but prints the speedup where Karp and Flatt have its reciprocal. The printed value is -S times
     the corrected one, so it reverses the order of swarms: at r = 2, a linear gain (S = 2) gives 1 corrected and -2
@@ -38,15 +37,14 @@ def scalability(
     cooperative) fits the corrected form.
 
     The sizes must differ (r = 1 divides by zero) and be in order (otherwise a smaller swarm would score well for
-    delivering less). The authors' program accepts any two sizes: it returns 0 if N1 = N2 or N2 = 1, and the printed
-    form with r < 1 if the order is wrong.
+    delivering less).
 
     Args:
         perf1: P(N1, t), shape (..., T), objects per interval.
         n1: Smaller size N1, best the size next to N2 in the sweep.
         perf2: P(N2, t), same intervals.
         n2: Larger size N2.
-        variant: Which of the three above.
+        variant: Which of the two above.
         reduce: Overrides the reduction of the variant: `total` takes S of the summed curves, `sum`, `mean` and `last`
             take S in each interval.
         zero_policy: `skip` leaves out of `sum` or `mean` all intervals in which either swarm delivered nothing; report
@@ -92,12 +90,7 @@ def _as_printed(perf1: FloatArray, n1: int, perf2: FloatArray, n2: int) -> Float
     return 1.0 - (speedup - 1.0 / r) / (1.0 - 1.0 / r)
 
 
-def _as_programmed(perf1: FloatArray, n1: int, perf2: FloatArray, n2: int) -> FloatArray:
-    infinite_speedup = (perf1 == 0.0) & (perf2 > 0.0)
-    return np.where(infinite_speedup, 0.0, _as_printed(perf1, n1, perf2, n2))
-
-
-_THETA = {"corrected": _karp_flatt, "paper": _as_printed, "sierra": _as_programmed}
+_THETA = {"corrected": _karp_flatt, "paper": _as_printed}
 
 
 def _reduce_without_zeros(theta: FloatArray, perf1: FloatArray, perf2: FloatArray, reduce: Reduction) -> FloatArray:

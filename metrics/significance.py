@@ -38,28 +38,6 @@ def paired_p(differences: FloatArray) -> float:
     return 2.0 * float(stdtr(n_pairs - 1, -t))
 
 
-def pooled_p(differences: FloatArray) -> FloatArray:
-    """Two-sided p values that K mean differences are zero, with one scatter for all of them.
-
-    For a few runs of many variants that differ little, so that their differences scatter alike (our choice: two or
-    three pairs alone say too little of it).
-
-    Args:
-        differences: (K, R), a row per variant, a column per pair of runs.
-
-    Returns:
-        (K,) p values of Student's t with K (R - 1) degrees of freedom; NaN for fewer than two pairs or without scatter.
-    """
-    n_variants, n_pairs = differences.shape
-    if n_pairs < 2:
-        return np.full((n_variants,), math.nan)
-    variance = float(differences.var(axis=1, ddof=1).mean())
-    if not variance > 0.0:
-        return np.full((n_variants,), math.nan)
-    t = np.abs(differences.mean(axis=1)) / math.sqrt(variance / n_pairs)
-    return 2.0 * np.asarray(stdtr(n_variants * (n_pairs - 1), -t), dtype=np.float64)
-
-
 def holm(p_values: FloatArray) -> FloatArray:
     """Adjust p values of one family for testing many at once (Holm 1979); NaN values do not count and stay NaN.
 

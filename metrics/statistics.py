@@ -66,7 +66,7 @@ def normalize(theta: ArrayLike, *, distance: bool = False) -> FloatArray:
 
     Distances (reactivity, adaptability, noise robustness) change sign, -tanh(d / 2) in (-1, 0], so that higher is
     better everywhere. The authors apply it to the last-interval value of each run, and only on request: the published
-    figures show raw values. Their fourth form, `normalized`, is normalize(measure(..., variant="sierra")).
+    figures show raw values.
 
     The result depends on the unit: small rates such as 0.01 are nearly proportional to it, while counts and long
     distances all come close to 1.

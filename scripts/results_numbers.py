@@ -6,11 +6,11 @@
     results.N2_ties_described_relative              the same relative to performance
     results.S1a_raw_performance_described_crw_128   a mean of measures.csv: set, measure, rules, policy, value,
                                                     and values on other axes, such as _walk_probability_0
-    results.runs, .sets, .hours, .version, .code    what was run, and by what
+    results.runs, .sets, .hours, .version           what was run, and by what
     results.answers                                 how many claims have which answer, as a table
     results.contradicted, .supported, .split        claims with these answers under both rules, as tables
 
-Answers are ours, by intervals, with the corrected measures; `results_data.py` writes the files.
+Answers are ours, by intervals, with the corrected measures; `write_results.py` writes the files.
 """
 
 import csv
@@ -85,18 +85,16 @@ def _means(file: Path) -> Iterator[tuple[str, str]]:
         if line["form"] == "marginal":
             others = line["others"].split()
             place = (line["measure"], line["rules"], line["policy"], f"{float(line['value']):g}", *others)
-            yield "_".join([line["runs"].split()[0], *place]), number(float(line["mean"]))
+            yield "_".join([line["set"], *place]), number(float(line["mean"]))
 
 
 def _runs(file: Path) -> dict[str, str]:
     lines = _lines(file)
-    made = {name: sorted({line[name] for line in lines}) for name in ("swarm-forage-env", "code")}
     return {
         "runs": f"{sum(int(line['runs']) for line in lines):,}",
         "sets": f"{len(lines)}",
         "hours": f"{sum(float(line['hours'] or 0.0) for line in lines):.1f}",
-        "version": ", ".join(made["swarm-forage-env"]),
-        "code": ", ".join(made["code"]),
+        "version": ", ".join(sorted({line["version"] for line in lines})),
     }
 
 

@@ -7,9 +7,8 @@ from typing import Any, Literal, NamedTuple, TypeAlias, cast
 
 from ..controllers import PAPER_POLICIES
 from ..curves import Form
-from .looks import at_last_look
 from .outcomes import Answer, Outcome, all_of, most_of, without_scores
-from .panel import Panel, Rule
+from .panel import Panel, Rule, judged_together
 
 
 class PanelName(NamedTuple):
@@ -96,7 +95,7 @@ class Statement:
         absent = [name.words for name in self.panels if name not in panels]
         if absent:
             return without_scores(", ".join(absent))
-        seen = at_last_look([panels[name] for name in self.panels], self.policies)
+        seen = judged_together([panels[name] for name in self.panels], self.policies)
         for view in self.views:
             seen = [view(panel) for panel in seen]
         rules = {"rule": rule} if seen else {}  # what follows from formulas alone has no runs to compare

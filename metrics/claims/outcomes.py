@@ -14,8 +14,6 @@ Answer: TypeAlias = Literal["supported", "contradicted", "tie", "too vague", "un
 """`tie`: the claim says that there is a difference, but what it compares ties. `too vague`: its text does not say which
 runs would contradict it, so the rule does not look at runs. `undecided`: the runs leave it open. `no scores`: runs are
 missing, or a measure does not have a finite value."""
-DECIDED: tuple[Answer, ...] = ("supported", "contradicted", "tie")
-"""Answers that runs give."""
 BoolArray: TypeAlias = NDArray[np.bool_]
 
 

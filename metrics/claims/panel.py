@@ -1,6 +1,6 @@
 """A figure as numbers, and the two rules that compare the heights of two curves in it."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, TypeAlias
@@ -19,8 +19,6 @@ of means with Welch's t: the curves tie where two one-sided tests find the diffe
 (Schuirmann 1987), differ where its 95 % interval leaves out zero, and the question is open elsewhere."""
 Levels: TypeAlias = Literal["all", "low", "high"]
 """All levels of a panel, or its lower or upper half; the middle one of an odd number is in neither half."""
-Looks: TypeAlias = tuple[int, ...]
-"""Rising numbers of runs, after each of which the rules judge."""
 
 TIE = 0.1
 """Margin of a tie, as a share of the scale, for panels without margins (our choice: such curves look alike in a figure;
@@ -59,12 +57,10 @@ class Panel:
     """Policy -> scores without any disturbance, (R,). They are not a level; see `shapes.from_undisturbed`."""
     unit: float | None = None
     """Number by which the rules divide scores to get shares, for example 1 for scalability. None: `scale`."""
-    looks: Looks = ()
-    """Numbers of runs after which the rules judge (`looks`); empty: once, after all runs."""
-    reached: Mapping[str, int] = field(default_factory=dict[str, int])
-    """With several `looks`, policy -> the last one that its runs have reached; 0 before the first."""
+    n_runs_of: Mapping[str, int] = field(default_factory=dict[str, int])
+    """Policy -> how many first runs it has everywhere, where that differs between policies; see `judged_together`."""
     confidence: float = CONFIDENCE
-    """Confidence of intervals; with several `looks`, the confidence at each look."""
+    """Confidence of intervals."""
 
     def __post_init__(self) -> None:
         levels = np.asarray(self.levels, dtype=np.float64)
@@ -160,6 +156,30 @@ def of_equal_runs(first: Panel, second: Panel, policies: Iterable[str]) -> tuple
         for panel, runs in zip((first, second), complete, strict=True)
     )
     return a, b
+
+
+def judged_together(panels: Sequence[Panel], policies: Collection[str]) -> list[Panel]:
+    """Return panels with the first runs that some policies have in all of them, and with the highest confidence.
+
+    Policies and panels may have different numbers of runs; `n_runs_of` says how many.
+    """
+    several = [panel for panel in panels if panel.n_runs_of]
+    if not several:
+        return list(panels)
+    n_runs = min(panel.n_runs_of.get(name, 0) for panel in several for name in policies or panel.scores)
+    confidence = max(panel.confidence for panel in panels)
+    return [
+        replace(_with_runs(panel, n_runs) if panel.n_runs_of else panel, n_runs_of={}, confidence=confidence)
+        for panel in panels
+    ]
+
+
+def _with_runs(panel: Panel, n_runs: int) -> Panel:
+    def first(scores: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        return {name: values[..., :n_runs] for name, values in scores.items()}
+
+    undisturbed = None if panel.undisturbed is None else first(panel.undisturbed)
+    return replace(panel, scores=first(panel.scores), undisturbed=undisturbed)
 
 
 def mean_over_runs(values: FloatArray) -> FloatArray:

@@ -4,7 +4,7 @@ Of a changing population, a forecast too: what the queue model predicts, beside 
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -35,7 +35,7 @@ ENOUGH_SHARE = 0.1
 
 _WORDS = {THROTTLE: "throttle", HANDLING: "handling cost", NOISE: "sigma", POPULATION: "population"}
 """Criterion -> its word in `Score.at`."""
-_WEIGHTS: dict[Variant, PopulationWeight] = {"corrected": "transient", "paper": "paper", "sierra": "sierra"}
+_WEIGHTS: dict[Variant, PopulationWeight] = {"corrected": "transient", "paper": "paper"}
 FORECAST_TITLE = "Population: what the queueing model predicts for runs of this length, beside what the runs showed"
 FORECAST_HEADER = (
     "level",
@@ -81,51 +81,24 @@ def _reactivity(ideal: RunCurves, disturbed: RunCurves, *, variant: Variant) -> 
     disturbance = disturbed.criterion
     # Twice the ticks that handling takes halve the performance of a perfect swarm.
     corrected = "reciprocal" if disturbance == HANDLING else "linear"
-    measure = partial(
-        reactivity,
+    return reactivity(
+        ideal.performance,
+        disturbed.performance,
         v=_conditions(disturbed, disturbance, variant),
         i_ec=_conditions(ideal, disturbance, variant),
         model="paper" if variant == "paper" else corrected,
     )
-    return _on_clock(measure, ideal, disturbed, variant)
 
 
-def _adaptability(ideal: RunCurves, disturbed: RunCurves, *, variant: Variant) -> FloatArray:
-    return _on_clock(adaptability, ideal, disturbed, variant)
+_DISTANCES = ("reactivity", "adaptability", "noise_robustness")
 
 
-def _noise_robustness(ideal: RunCurves, disturbed: RunCurves, *, variant: Variant) -> FloatArray:
-    return _on_clock(noise_robustness, ideal, disturbed, variant)
-
-
-def _floor(ideal: RunCurves, variant: Variant) -> FloatArray:
-    def apart(perf: FloatArray, _: FloatArray, *, variant: Variant, clock: FloatArray | None = None) -> FloatArray:
-        return noise_floor(perf, variant=variant, clock=clock)
-
-    return _on_clock(apart, ideal, ideal, variant)
-
-
-def _on_clock(
-    distance: Callable[..., FloatArray], ideal: RunCurves, disturbed: RunCurves, variant: Variant
-) -> FloatArray:
-    """Return a distance in objects; in the program's form with rates and the clock in its cost, see `metrics.dtw`.
-
-    The program's curves are rates, which differ by far less than a step of the clock. The distance of rates times the
-    length of an interval is in objects again.
-    """
-    if variant != "sierra":
-        return distance(ideal.performance, disturbed.performance, variant=variant)
-    clock = np.atleast_2d(ideal.curves["t_end_s"])[0]
-    interval_s = float(clock[-1]) / clock.size
-    rates = (runs.performance / interval_s for runs in (ideal, disturbed))
-    return interval_s * distance(*rates, variant=variant, clock=clock)
-
-
-_DISTANCES: dict[str, Callable[..., FloatArray]] = {
-    "reactivity": _reactivity,
-    "adaptability": _adaptability,
-    "noise_robustness": _noise_robustness,
-}
+def _distance(name: str, variant: Variant) -> Values:
+    """Return what computes a distance from the reference runs and the disturbed ones."""
+    if name == "reactivity":
+        return partial(_reactivity, variant=variant)
+    formula = adaptability if name == "adaptability" else noise_robustness
+    return lambda ideal, disturbed: formula(ideal.performance, disturbed.performance)
 
 
 def _distance_scores(name: str, study: StudyCurves, variant: Variant, _: Form) -> Iterator[Score]:
@@ -133,21 +106,18 @@ def _distance_scores(name: str, study: StudyCurves, variant: Variant, _: Form) -
     levels = _levels(study, *(DISTURBANCES if criterion in DISTURBANCES else (criterion,)))
     if name == "reactivity" and any("adversity" not in e.curves and e.seeds for pair in levels for e in pair):
         raise Uncomputable("there is no column adversity for the reference run and every level")
-    if variant == "sierra" and study.horizon_s is None:
-        raise Uncomputable("there is no column t_end_s, the clock that this form has in its cost")
     for reference, level in levels:
         if name == "reactivity":
             _check_conditions(reference, level, variant)
-        floor = float(_floor(reference, variant).mean()) if len(reference.seeds) > 1 else None
+        floor = float(noise_floor(reference.performance).mean()) if len(reference.seeds) > 1 else None
         floors = _floor_per_seed(name, reference, variant)
         beside = _beside_distance(reference, level)
-        unit = "objects (DTW with clock)" if variant == "sierra" else "objects (DTW)"
         yield _score(
-            partial(_DISTANCES[name], variant=variant),
+            _distance(name, variant),
             (reference, level),
             measure=name,
             variant=variant,
-            unit=unit,
+            unit="objects (DTW)",
             beside=beside,
             floor=floor,
             floor_per_seed=floors,
@@ -160,8 +130,8 @@ def _floor_per_seed(name: str, reference: RunCurves, variant: Variant) -> dict[i
     if len(reference.seeds) < 2:
         return {}
     others = replace(reference, curves={name: np.roll(curve, -1, axis=0) for name, curve in reference.curves.items()})
-    found = _DISTANCES[name](reference, others, variant=variant)
-    return dict(zip(reference.seeds, found.tolist(), strict=True))
+    found = _distance(name, variant)(reference, others)
+    return dict(zip(reference.seeds, np.asarray(found).tolist(), strict=True))
 
 
 def _check_conditions(reference: RunCurves, level: RunCurves, variant: Variant) -> None:
@@ -193,8 +163,6 @@ def _population_scores(name: str, study: StudyCurves, variant: Variant, _: Form)
     levels = _levels(study, POPULATION)
     if horizon_s is None:
         raise Uncomputable("there is no column t_end_s, which gives the length of a run")
-    if variant == "sierra" and study.reference_value == 0.0:  # else the reference is that lowest level already
-        levels = _against_lowest_rate(levels)
     for reference, level in levels:
         try:
             weight = population_weight(
@@ -218,28 +186,14 @@ def _population_scores(name: str, study: StudyCurves, variant: Variant, _: Form)
                 weight=_WEIGHTS[variant],
             )
 
-        is_last = variant == "sierra"
         yield _score(
             values,
             (reference, level),
             measure=name,
             variant=variant,
-            unit="objects in the last interval" if is_last else f"objects in {horizon_s:,.0f} s",
+            unit=f"objects in {horizon_s:,.0f} s",
             beside={"weight": weight},
-            is_relative=not is_last,
         )
-
-
-def _against_lowest_rate(levels: Sequence[tuple[RunCurves, RunCurves]]) -> list[tuple[RunCurves, RunCurves]]:
-    """Return the levels with the lowest one of the same swarm size as reference, as the authors' program has it."""
-    lowest: dict[int, RunCurves] = {}
-    for _, level in levels:
-        lowest.setdefault(level.n_robots, level)
-        _rates(level)
-    pairs = [(lowest[level.n_robots], level) for _, level in levels if level is not lowest[level.n_robots]]
-    if not pairs:
-        raise Uncomputable("there is one level of population dynamics only, and this form compares with the lowest")
-    return pairs
 
 
 def _recorded_population(ideal: RunCurves, disturbed: RunCurves) -> FloatArray:

@@ -34,12 +34,12 @@ _OTHER_SWARMS = {"one robot", "two sizes", "rates", "robots at work"}
 """Input of measures that know how many robots made a performance, and expect it of as many others."""
 
 
-def _raw_performance(runs: RunCurves, *, variant: Variant) -> FloatArray:
-    return raw_performance(runs.performance, reduce="last" if variant == "sierra" else "sum")
+def _raw_performance(runs: RunCurves) -> FloatArray:
+    return raw_performance(runs.performance, reduce="sum")
 
 
-def _efficiency(runs: RunCurves, *, variant: Variant) -> FloatArray:
-    return efficiency(runs.performance, runs.n_robots, reduce="last" if variant == "sierra" else "sum")
+def _efficiency(runs: RunCurves) -> FloatArray:
+    return efficiency(runs.performance, runs.n_robots, reduce="sum")
 
 
 def _t_lost_fraction(runs: RunCurves) -> FloatArray:
@@ -53,17 +53,9 @@ def _cache_congestion(runs: RunCurves) -> FloatArray:
     return cache_congestion(near, lost, n_caches, floor=runs.floor_m2, reach=NEAR_CACHE_M)
 
 
-def _performance_lost(one: RunCurves, runs: RunCurves, *, variant: Variant) -> FloatArray:
-    lost = performance_lost(
-        runs.performance,
-        runs.interference,
-        runs.n_robots,
-        one.performance,
-        one.interference,
-        variant=variant,
-        n_reference=one.n_robots,
-    )
-    return lost[..., -1] if variant == "sierra" else lost.sum(axis=-1)
+def _performance_lost(one: RunCurves, runs: RunCurves) -> FloatArray:
+    lost = performance_lost(runs.performance, runs.interference, runs.n_robots, one.performance, one.interference)
+    return lost.sum(axis=-1)
 
 
 def _spatial_emergence(*swarms: RunCurves, variant: Variant) -> FloatArray:
@@ -80,7 +72,6 @@ def _spatial_emergence(*swarms: RunCurves, variant: Variant) -> FloatArray:
         None if one is None else one.performance,
         None if one is None else one.interference,
         variant=variant,
-        n_reference=1 if one is None else one.n_robots,
     )
 
 
@@ -88,9 +79,8 @@ def _time_emergence(few: RunCurves, many: RunCurves) -> FloatArray:
     return time_emergence(few.interference, few.n_robots, many.interference, many.n_robots)
 
 
-def _task_emergence(few: RunCurves, many: RunCurves, *, variant: Variant) -> FloatArray:
-    reduce = "last" if variant == "sierra" else "sum"
-    return task_emergence(few.performance, few.n_robots, many.performance, many.n_robots, reduce=reduce)
+def _task_emergence(few: RunCurves, many: RunCurves) -> FloatArray:
+    return task_emergence(few.performance, few.n_robots, many.performance, many.n_robots)
 
 
 def _gain(few: RunCurves, many: RunCurves, *, formula: Callable[..., FloatArray]) -> FloatArray:
@@ -112,9 +102,7 @@ class _SizeMeasure:
     """Computes it. Arguments: the runs of one robot if `from_one`, of the smaller swarm if `of_two_sizes`, and of the
     swarm itself; `variant` if the measure has more than one."""
     unit: str
-    """Unit of the value; {span} stands for the length of a run, or the last interval in the program's form."""
-    sierra_unit: str = ""
-    """Unit in the program's form, where it is another one."""
+    """Unit of the value; {span} stands for the length of a run."""
     from_one: bool = False
     one_drops_out: bool = False
     """Whether the marginal form has the run of one robot on both sides of a difference, and can do without it."""
@@ -149,12 +137,11 @@ BY_SIZE: dict[str, _SizeMeasure] = {
         from_one=True,
         columns=_LOST,
         is_gain=True,
-        weighted_in=("corrected", "paper", "sierra"),
+        weighted_in=("corrected", "paper"),
     ),
     "spatial_emergence": _SizeMeasure(
         values=_spatial_emergence,
         unit="objects {span}",
-        sierra_unit=SHARES,
         from_one=True,
         one_drops_out=True,
         of_two_sizes=True,
@@ -190,7 +177,7 @@ BY_SIZE: dict[str, _SizeMeasure] = {
 def _size_scores(name: str, study: StudyCurves, variant: Variant, form: Form) -> Iterator[Score]:
     measure = BY_SIZE[name]
     values = partial(measure.values, variant=variant) if len(METRICS[name].variants) > 1 else measure.values
-    sizes = _sizes(study, measure, variant, form)
+    sizes = _sizes(study, measure, form)
     one = sizes[0]
     for previous, larger in zip((None, *sizes), sizes, strict=False):
         if previous is None and (measure.from_one or measure.of_two_sizes):
@@ -201,7 +188,7 @@ def _size_scores(name: str, study: StudyCurves, variant: Variant, form: Form) ->
             smaller = one if form == "interactive" else previous
             experiments = (smaller, larger)
             at = f"N = {smaller.n_robots} to {larger.n_robots}"
-        if measure.from_one and not _without_one(measure, one, variant, form):
+        if measure.from_one and not _without_one(measure, one, form):
             experiments = (one, *experiments)
         falls = variant in measure.weighted_in and previous is not None and _falls(previous, larger)
         score = score_runs(
@@ -213,7 +200,7 @@ def _size_scores(name: str, study: StudyCurves, variant: Variant, form: Form) ->
             at=at,
             x=larger.n_robots,
             unit=_unit(name, study, variant),
-            compared_with=len(experiments) - 1 if measure.is_gain and variant != "sierra" else None,
+            compared_with=len(experiments) - 1 if measure.is_gain else None,
             is_doubtful=falls,
             remark=FALLING if falls else UPSIDE_DOWN if name == "scalability" and variant != "corrected" else "",
             order_matters=measure.order_matters,
@@ -224,10 +211,8 @@ def _size_scores(name: str, study: StudyCurves, variant: Variant, form: Form) ->
 
 def _unit(name: str, study: StudyCurves, variant: Variant) -> str:
     measure = BY_SIZE[name]
-    if name == "scalability" and variant != "corrected":
-        return "printed form, summed over intervals" if variant == "paper" else "printed form, last interval"
-    if variant == "sierra":
-        return measure.sierra_unit or measure.unit.format(span="in the last interval")
+    if name == "scalability" and variant == "paper":
+        return "printed form, summed over intervals"
     return measure.unit.format(span="per run" if study.horizon_s is None else f"in {study.horizon_s:,.0f} s")
 
 
@@ -247,7 +232,7 @@ def _per_robot(score: Score, smaller: RunCurves, larger: RunCurves) -> Score:
     return replace(score, beside={"per_robot": total / proportional})
 
 
-def _sizes(study: StudyCurves, measure: _SizeMeasure, variant: Variant, form: Form) -> tuple[RunCurves, ...]:
+def _sizes(study: StudyCurves, measure: _SizeMeasure, form: Form) -> tuple[RunCurves, ...]:
     sizes = study.sizes()
     if not sizes:
         raise Uncomputable(f"there are no runs with criterion {SIZE}")
@@ -258,18 +243,17 @@ def _sizes(study: StudyCurves, measure: _SizeMeasure, variant: Variant, form: Fo
     with_runs = [e for e in sizes if e.seeds]
     if "n_caches" in measure.columns and with_runs and not any(e.curves["n_caches"].any() for e in with_runs):
         raise Uncomputable("there is no cache in any run")
-    # The authors' program takes its first experiment for the run of one robot, whatever its size.
-    needs_one = (measure.from_one or form == "interactive") and not _without_one(measure, sizes[0], variant, form)
-    if needs_one and smallest != 1 and variant != "sierra":
+    needs_one = (measure.from_one or form == "interactive") and not _without_one(measure, sizes[0], form)
+    if needs_one and smallest != 1:
         raise Uncomputable(f"there is no reference run of one robot, the smallest swarm has {smallest}")
     if len(sizes) < 2 and (measure.from_one or measure.of_two_sizes):
         raise Uncomputable(f"there is one swarm size only, N = {smallest}")
     return sizes
 
 
-def _without_one(measure: _SizeMeasure, smallest: RunCurves, variant: Variant, form: Form) -> bool:
+def _without_one(measure: _SizeMeasure, smallest: RunCurves, form: Form) -> bool:
     """Whether a measure is computed without a run of one robot: there is none, and it drops out."""
-    return measure.one_drops_out and smallest.n_robots != 1 and form == "marginal" and variant != "sierra"
+    return measure.one_drops_out and smallest.n_robots != 1 and form == "marginal"
 
 
 _SCORES: dict[str, Callable[[str, StudyCurves, Variant, Form], Iterator[Score]]] = {

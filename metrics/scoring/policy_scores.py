@@ -93,7 +93,7 @@ class ScoreQuestion(Question[Comparison]):
 
     def _beside_limit(self, score: Score, policy: str) -> Score:
         """Return the performance of a swarm size with its share of the limit; other scores as they are."""
-        if score.measure != "raw_performance" or score.variant == "sierra" or self.performance is not None:
+        if score.measure != "raw_performance" or self.performance is not None:
             return score
         sizes = [self.plan.specs_of(one)[0].world for one in self.plan.of_policy(policy) if one.world.criterion == SIZE]
         world = next(each for each in sizes if each.n_robots == score.x)

@@ -24,7 +24,6 @@ from swarm_forage_env.studies.study import value_words
 from swarm_forage_env.wrappers.world import SIZE, UNDISTURBED, World
 
 from ..checks import CurveError
-from ..claims.looks import last_look
 from ..curves import FloatArray
 from ..queues import PopulationRates
 
@@ -368,8 +367,8 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
     """Return the lines of a study, in the order of its conditions.
 
     Args:
-        table: From `swarm_forage_env.read_study`. Failed and missing runs count as planned and lost. Of a study that is
-            looked at several times, lines have the runs up to their last look.
+        table: From `swarm_forage_env.read_study`. Failed and missing runs count as planned and lost. Of a study that
+            was judged several times, lines have the first runs that all of their conditions have.
         performance: What P(N, t) is, by a name as in `score_policy`; default that of the scenario.
 
     Raises:
@@ -388,7 +387,7 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
         runs = [(spec.world(place), _place_curves(table, place, performance)) for place in places]
         n_planned = len(spec.seeds)
         if spec.looks:
-            n_planned = runs_looked_at(spec, [seeds for _, (seeds, _) in runs])
+            n_planned = _n_first_runs(spec, [seeds for _, (seeds, _) in runs])
             runs = [(world, _first(curves, n_planned)) for world, curves in runs]
         lines.append(
             StudyLine(
@@ -410,11 +409,10 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
     return tuple(lines)
 
 
-def runs_looked_at(spec: "StudySpec", done: "Iterable[Collection[int]]") -> int:
-    """Return after how many runs the conditions of a line were looked at last, from the seeds that each has done."""
+def _n_first_runs(spec: "StudySpec", done: "Iterable[Collection[int]]") -> int:
+    """Return how many first seeds all conditions of a line have done, given the seeds that each has done."""
     everywhere = set(spec.seeds).intersection(*done)
-    leading = len(list(takewhile(everywhere.__contains__, sorted(spec.seeds))))
-    return last_look(spec.looks, leading)
+    return len(list(takewhile(everywhere.__contains__, sorted(spec.seeds))))
 
 
 def _first(curves: Curves, n_runs: int) -> Curves:

@@ -112,7 +112,7 @@ class ScoreForms:
 
 
 def label_of(measure: str, variant: Variant, form: Form) -> str:
-    """Return the name of a measure with what differs from the usual form: "spatial_emergence, interactive, sierra"."""
+    """Return the name of a measure with what differs from the usual form: "spatial_emergence, interactive, paper"."""
     words = (measure, "interactive" if form == "interactive" else "", "" if variant == "corrected" else variant)
     return ", ".join(word for word in words if word)
 

@@ -1,35 +1,25 @@
-"""The table of a study in numbers: one measure of all policies over the last axis, pairs of policies, spread of runs.
+"""The table of a study in numbers: one measure of all policies over the last axis.
 
 A panel has the scores of every run. It is drawn as it is, and the claims of the paper are held against it.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from swarm_forage_env.wrappers.world import SIZE
-
-from ..breakdown import breakdown_probability, find_breakdowns, time_to_breakdown
 from ..catalog import METRICS
 from ..checks import CurveError
 from ..claims import Panel, PanelName
 from ..claims.checking import DISTANCES
-from ..claims.panel import TIE, Looks
+from ..claims.panel import CONFIDENCE, TIE
 from ..curves import FloatArray, Form, Variant
-from ..distributions import interquartile_mean, probability_of_improvement
-from ..significance import SIGNIFICANT, holm, paired_p
-from ..statistics import Estimate
 from .measures import SHARES, score_study
-from .run_curves import THROTTLE, RunCurves, StudyCurves, StudyLine, study_lines
+from .run_curves import THROTTLE, StudyCurves, StudyLine, study_lines
 from .scores import DISTURBANCES, MEASURE_CRITERIA, Score, ScoreForms, label_of
 
 if TYPE_CHECKING:
-    import polars as pl
-
     from swarm_forage_env.studies.study import Value
     from swarm_forage_env.studies.study_table import StudyTable
 
@@ -66,15 +56,8 @@ _EXPERIMENTS: dict[tuple[Any, ...], str] = {
     ("S2d", 320): "S2d 320",
 }
 """Name of a set, and value on its first axis where it has two -> experiment that claims speak of."""
-_SEED = 1
-"""Fixed, so that the same runs give the same table."""
 TIE_OF_FRACTIONS = 0.02
 """Largest difference of fractions that is a tie (our choice)."""
-ENOUGH = 20.0
-"""What the reference must achieve in a window: with fewer objects, breakdowns are chance (`find_breakdowns`)."""
-LEAST_WINDOW = 5
-"""Intervals: deliveries come in bursts, and a single poor interval at the end of a run is no breakdown."""
-
 
 _ByLevel: TypeAlias = Mapping[str, Mapping[float, Mapping[int, float]]]
 """Policy -> level -> seed -> value."""
@@ -120,10 +103,10 @@ class StudyPanel:
     """For distances, policy -> distances between undisturbed runs, (R,)."""
     departures: FloatArray | None = None
     """Of a changing population, robots that die or fail per 1,000 s at each level, (L,)."""
-    looks: Looks = ()
-    """Of the study: after how many runs it is looked at; empty if once."""
-    reached: Mapping[str, int] = field(default_factory=dict[str, int])
-    """Policy -> the last look that its runs have reached."""
+    n_runs_of: Mapping[str, int] = field(default_factory=dict[str, int])
+    """As in `Panel`."""
+    confidence: float = CONFIDENCE
+    """As in `Panel`."""
 
     @property
     def drawn_at(self) -> FloatArray:
@@ -165,7 +148,7 @@ class StudyPanel:
         """
         measure, n_levels = METRICS[self.measure], len(self.levels)
         total = self.compared_with
-        panel = Panel(levels=self.levels, scores=self.scores, looks=self.looks, reached=self.reached)
+        panel = Panel(levels=self.levels, scores=self.scores, n_runs_of=self.n_runs_of, confidence=self.confidence)
         if self.measure == "scalability":
             return replace(panel, margins=np.full(n_levels, TIE), unit=1.0)
         if np.isfinite((measure.lowest, measure.highest)).all():
@@ -218,8 +201,10 @@ def study_panels(
     missing: dict[tuple[str, str], str] = {}
     is_scored = bool(table.spec.axes) and table.spec.axes[-1].is_criterion
     for together in lines.values() if is_scored else ():
-        looked = {line.policy: len(line.curves.experiments[0].seeds) for line in together}
-        about = {"looks": table.spec.looks, "reached": looked if table.spec.looks else {}}
+        about: dict[str, Any] = {}
+        if table.spec.looks:  # each look is wrong in its share of 5 % (Bonferroni)
+            about["n_runs_of"] = {line.policy: len(line.curves.experiments[0].seeds) for line in together}
+            about["confidence"] = 1.0 - (1.0 - CONFIDENCE) / len(table.spec.looks)
         for variant in variants:
             for measure, form in _measures_in(measures, variant, together[0].curves):
                 scored = {line.policy: _scores(line.curves, measure, variant, form) for line in together}
@@ -370,142 +355,6 @@ def _performance_panels(table: "StudyTable", groups: Sequence[Sequence[StudyLine
     return panels
 
 
-def policy_pairs(panels: Sequence[StudyPanel]) -> "pl.DataFrame":
-    """Return one row per panel and pair of policies.
-
-    Args:
-        panels: Of one measure, variant and rules, as in `StudyFigure.panels`.
-
-    Returns:
-        Columns: the place of the panel; `first`, `second`, two policies; `p_better`, the probability that a run of the
-        first does better than one of the second, mean over the levels, with its 95 % bootstrap interval `lower`,
-        `upper`; `n_levels`, levels at which both have runs; `first_better`, `second_better`, at how many of them the
-        paired t test finds that policy better, after Holm's correction over all pairs and levels of the panel.
-    """
-    import polars as pl
-
-    rows: list[dict[str, Any]] = []
-    for panel in panels:
-        pairs = list(combinations(panel.scores, 2))
-        differences = [panel.scores[first] - panel.scores[second] for first, second in pairs]
-        if not pairs:  # a single policy
-            continue
-        p_values = holm(np.array([_p(level) for difference in differences for level in difference]))
-        adjusted = p_values.reshape(len(pairs), -1)
-        for (first, second), difference, of_pair in zip(pairs, differences, adjusted, strict=True):
-            gains = difference if panel.higher_is_better else -difference
-            means = np.array([_mean(level) for level in gains])
-            is_sure = of_pair <= SIGNIFICANT
-            better = _probability(panel, first, second)
-            rows.append(
-                {
-                    "rules": panel.rules,
-                    **panel.others,
-                    "first": first,
-                    "second": second,
-                    "p_better": better.value,
-                    "lower": better.lower,
-                    "upper": better.upper,
-                    "n_levels": int(np.isfinite(means).sum()),
-                    "first_better": int((is_sure & (means > 0.0)).sum()),
-                    "second_better": int((is_sure & (means < 0.0)).sum()),
-                }
-            )
-    return pl.DataFrame(rows, infer_schema_length=None).fill_nan(None)
-
-
-def _p(differences: FloatArray) -> float:
-    return paired_p(differences[np.isfinite(differences)])
-
-
 def _mean(values: FloatArray) -> float:
     known = values[np.isfinite(values)]
     return float(known.mean()) if known.size else np.nan
-
-
-def _probability(panel: StudyPanel, first: str, second: str) -> Estimate:
-    """Over the levels at which both have a score."""
-    a, b = panel.scores[first], panel.scores[second]
-    shared = [k for k in range(len(panel.x)) if np.isfinite(a[k]).any() and np.isfinite(b[k]).any()]
-    if not shared:
-        return Estimate(value=np.nan, lower=np.nan, upper=np.nan, n_runs=0)
-    known = ([scores[k][np.isfinite(scores[k])] for k in shared] for scores in (a, b))
-    return probability_of_improvement(*known, higher_is_better=panel.higher_is_better, seed=_SEED)
-
-
-def place_distributions(table: "StudyTable") -> "pl.DataFrame":
-    """Return one row per condition of a study: spread of its runs, breakdown probability and time to breakdown.
-
-    Performance is summed over a run where it is a total, else its mean. Breakdowns are judged against the best swarm
-    where sizes vary, in conditions of that size or larger, and else against the reference of the study; where there is
-    none, or it achieves less than `ENOUGH` in half of a run, they are empty.
-
-    Args:
-        table: From `swarm_forage_env.read_study`.
-
-    Returns:
-        Columns: the place of the condition; `n_runs`; `mean`, `lowest`, `highest`; `interquartile_mean` with its 95 %
-        interval `iqm_lower`, `iqm_upper`; `broken`, the probability of a breakdown, with Wilson's interval
-        `broken_lower`, `broken_upper`; `half_broken_s`, the time by which half of the runs broke down, infinite where
-        fewer did. Empty where nothing can be said.
-    """
-    import polars as pl
-
-    rows: list[dict[str, Any]] = []
-    for line in study_lines(table):
-        for at, (place, runs) in enumerate(zip(line.places, line.curves.experiments, strict=True)):
-            values = dict(zip((axis.name for axis in table.spec.axes), place.values, strict=True))
-            where = {"rules": line.rules, "policy": line.policy, **values}
-            reference = _reference(table, line, at)
-            rows.append({**where, **_spread(line, runs), **_breakdowns(table, line, runs, reference)})
-    return pl.DataFrame(rows, infer_schema_length=None).fill_nan(None)
-
-
-def _totals(line: StudyLine, runs: RunCurves) -> FloatArray:
-    return runs.performance.sum(axis=-1) if line.curves.read_as.is_total else runs.performance.mean(axis=-1)
-
-
-def _spread(line: StudyLine, runs: RunCurves) -> dict[str, float | int]:
-    """Numbers about the runs of a condition."""
-    names = ("mean", "lowest", "highest", "interquartile_mean", "iqm_lower", "iqm_upper")
-    if not runs.seeds:
-        return {"n_runs": 0, **dict.fromkeys(names, math.nan)}
-    totals = _totals(line, runs)
-    middle = interquartile_mean(totals, seed=_SEED)
-    numbers = (totals.mean(), totals.min(), totals.max(), middle.value, middle.lower, middle.upper)
-    return {"n_runs": len(runs.seeds), **dict(zip(names, map(float, numbers), strict=True))}
-
-
-def _reference(table: "StudyTable", line: StudyLine, at: int) -> RunCurves | None:
-    """The runs that those of a condition are held against; None if they cannot have broken down, or nobody can tell."""
-    experiments, place = line.curves.experiments, line.places[at]
-    if table.spec.axes and table.spec.axes[-1].name == SIZE:
-        known = [runs for runs in experiments if runs.seeds]
-        best = max(known, key=lambda runs: float(_totals(line, runs).mean()), default=None)
-        return best if best is not None and experiments[at].n_robots >= best.n_robots else None
-    reference = table.spec.reference_of(place)
-    return None if reference is None else experiments[line.places.index(reference)]
-
-
-def _breakdowns(table: "StudyTable", line: StudyLine, runs: RunCurves, reference: RunCurves | None) -> dict[str, float]:
-    if reference is None or not runs.seeds or not reference.seeds:
-        return _numbers(math.nan, math.nan, math.nan, math.nan)
-    level = reference.performance.mean(axis=0)
-    half = max(1, level.size // 2)
-    # Deliveries grow in the course of a run or fade: the window must hold enough where there is least, but the start.
-    per_interval = float(level[-half:].mean()) if line.curves.read_as.is_total else ENOUGH
-    window = max(LEAST_WINDOW, math.ceil(ENOUGH / per_interval)) if per_interval > 0.0 else math.inf  # NaN: no window
-    if window > half:
-        return _numbers(math.nan, math.nan, math.nan, math.nan)
-    try:
-        found = find_breakdowns(
-            runs.performance, reference.performance, window=int(window), interval_s=table.spec.interval_s
-        )
-        share, time = breakdown_probability(found), time_to_breakdown(found).median.value
-    except CurveError:  # NaN in all runs: nothing can be judged
-        return _numbers(math.nan, math.nan, math.nan, math.nan)
-    return _numbers(share.value, share.lower, share.upper, time)
-
-
-def _numbers(share: float, lower: float, upper: float, half_s: float) -> dict[str, float]:
-    return {"broken": share, "broken_lower": lower, "broken_upper": upper, "half_broken_s": half_s}

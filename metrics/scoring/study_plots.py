@@ -1,7 +1,7 @@
-"""Figures of a study, drawn and as files: measures with every run a dot, and models. They need the extra "plots"."""
+"""Figures of a study, drawn and as files: measures with every run a dot. They need the extra "plots"."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
@@ -11,22 +11,18 @@ import numpy as np
 from swarm_forage_env._internal.fields import known_name
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.wording import number
-from swarm_forage_env.inspect.study_maps import snapshot
 from swarm_forage_env.rendering.figures import (
     FORMATS,
     SCREEN,
     FigureStyle,
     Look,
     Panel,
-    heat_map,
     log_height,
     looks,
-    policy_words,
     saved_panels,
     signed_log_height,
     size_axis,
 )
-from swarm_forage_env.studies.study import StudySpec
 from swarm_forage_env.wrappers.world import SIZE
 
 from ..catalog import METRICS
@@ -36,9 +32,7 @@ from ..curves import FloatArray, Variant
 from ..statistics import Summary, aggregate
 from .plots import FEWEST_RUNS, X_LABELS
 from .scores import label_of, words_of
-from .study_models import model_figures
-from .study_numbers import StudyPanel, StudyPanels, place_distributions, policy_pairs, study_panels
-from .theory import theory_of
+from .study_numbers import StudyPanel, StudyPanels, study_panels
 
 if TYPE_CHECKING:
     import polars as pl
@@ -64,7 +58,6 @@ WIDE = 10.0
 """Where the largest loss is so many times the middle one, most of a linear axis is for a few swarms (our choice)."""
 Height: TypeAlias = Literal["linear", "log", "signed log"]
 """Scale of a y axis: "signed log" is linear from -1 to 1 and logarithmic beyond."""
-Draw: TypeAlias = Callable[[Sequence[Path], FigureStyle], None]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -90,15 +83,6 @@ class StudyFigure:
         measure = words_of(label_of(first.measure, "corrected", first.form))
         words = f"{measure} ({arrow} is better), rules {first.rules}"
         return f"{first.study}: {words}" + ("" if first.variant == "corrected" else f", measure {first.variant}")
-
-    @property
-    def has_map(self) -> bool:
-        """Whether it varies two numbers, so that a heat map shows it whole."""
-        others = [tuple(panel.others.values()) for panel in self.panels]
-        numbers = all(len(place) == 1 and not isinstance(place[0], str | bool) for place in others)
-        return (
-            numbers and len(others) > 1 and all(panel.x.tolist() == self.panels[0].x.tolist() for panel in self.panels)
-        )
 
     @property
     def height(self) -> Height:
@@ -180,42 +164,6 @@ def caption(figure: StudyFigure, band: Band) -> str:
     floor += "\nheight: logarithmic beyond ±1" if figure.height == "signed log" else ""
     lacking = f"\nno bar: conditions with fewer than {FEWEST_RUNS} runs, which tell too little"
     return f"bars: {_BANDS[band]}; dots: runs{floor}" + (lacking if any(0 < n < FEWEST_RUNS for n in n_runs) else "")
-
-
-def draw_map(figure: StudyFigure, paths: Sequence[Path], *, style: FigureStyle = SCREEN) -> None:
-    """Draw the means of a figure as heat maps, one per policy, into picture files.
-
-    Args:
-        figure: One that `has_map`.
-        paths: Files to write; as in `saved_figure`, whose errors this has.
-        style: Of the figure.
-    """
-    first = figure.panels[0]
-    means = {
-        policy: np.array([[s.mean for s in _summaries(panel.scores[policy])] for panel in figure.panels])
-        for policy in first.scores
-    }
-    known = np.concatenate([values[np.isfinite(values)] for values in means.values()])
-    low, high = float(known.min()), float(known.max())
-    ((axis, _),) = first.others.items()
-    panel_in = 1.0 + 0.55 * len(first.x), 1.0 + 0.4 * len(figure.panels)
-    with saved_panels(paths, len(means), panel_in, title=f"{figure.title}\nmeans of runs", style=style) as places:
-        images = [
-            heat_map(place, values, _in_cell, origin="lower", vmin=low, vmax=high)
-            for values, place in zip(means.values(), places, strict=True)
-        ]
-        for policy, place in zip(means, places, strict=True):
-            place.set_title(policy_words(policy))
-            place.set_xticks(range(len(first.x)), [number(value) for value in first.drawn_at], rotation=45)
-            place.set_xlabel(_x_label(first))
-            place.set_yticks(range(len(figure.panels)), [panel.words[axis] for panel in figure.panels])
-            place.set_ylabel(axis.replace("_", " "))
-        places[0].figure.colorbar(images[0], ax=places, label=first.unit)
-
-
-def _in_cell(value: float) -> str:
-    """Return a number with about three digits: cells of a narrow figure have room for no more."""
-    return number(round(value)) if abs(value) >= 100.0 else number(float(f"{value:.3g}"))
 
 
 def _draw_panel(place: Panel, panel: StudyPanel, band: Band, height: Height) -> None:
@@ -384,7 +332,7 @@ def plot(
     formats: Sequence[str] = ("svg", "png"),
     style: FigureStyle = SCREEN,
 ) -> PlottedStudy:
-    """Draw the figures of a study, with tables in CSV: each measure over what is varied, and models.
+    """Draw the figures of a study, with tables in CSV: each measure over what is varied.
 
     Args:
         table: From `swarm_forage_env.read_study`.
@@ -396,7 +344,7 @@ def plot(
 
     Raises:
         ValueError: the study gives nothing to draw, or an unknown band, format or variant.
-        ImportError: matplotlib or Pillow is not installed.
+        ImportError: matplotlib is not installed.
     """
     checked_band(band)
     for name in formats:
@@ -405,13 +353,6 @@ def plot(
     figures = figures_of(scored, table.spec.name)
     drawing = _Drawing(Path(folder), tuple(f".{name}" for name in formats), style)
     files = [file for figure in figures for file in drawing.measure(figure, band)]
-    for model in model_figures(table):
-        tables = {f"{model.name}.csv": model.to_frame(), f"{model.name}_facts.csv": model.facts()}
-        files += drawing.files(model.name, model.draw, tables)
-    for sketch in theory_of(table.spec):
-        files += drawing.files(sketch.name, sketch.draw, {f"{sketch.name}.csv": sketch.numbers})
-    files.append(snapshot_written(table.spec, drawing.folder / f"{table.spec.name}_snapshot.png"))
-    files.append(drawing.table(f"{table.spec.name}_conditions.csv", place_distributions(table)))
     missing = tuple(f"no figure of {measure}, {variant}: {why}" for (measure, variant), why in scored.missing.items())
     return PlottedStudy(files=tuple(files), missing=missing)
 
@@ -440,44 +381,12 @@ class _Drawing:
     endings: tuple[str, ...]
     style: FigureStyle
 
-    def files(self, name: str, draw: Draw, tables: "Mapping[str, pl.DataFrame]") -> list[Path]:
-        """Draw a figure, and write the tables behind it beside it, by the names of their files; returns all files."""
-        pictures = [self.folder / f"{name}{ending}" for ending in self.endings]
-        draw(pictures, self.style)
-        return [*pictures, *(self.table(file, frame) for file, frame in tables.items())]
-
-    def table(self, name: str, frame: "pl.DataFrame") -> Path:
-        """Write a table, whole or not at all; returns its file."""
-        with replacing(self.folder / name) as draft:
-            draft.write_text(frame.write_csv(), encoding="utf-8", newline="")
-        return self.folder / name
-
     def measure(self, figure: StudyFigure, band: Band) -> Iterator[Path]:
-        """Draw a figure and its heat maps, with its numbers and its pairs of policies; yields all files."""
-        for name, draw in drawn_by(figure, band).items():
-            yield from self.files(name, draw, {f"{name}.csv": figure.to_frame()})
-        pairs = policy_pairs(figure.panels)
-        if len(pairs):
-            yield self.table(f"{figure.name}_pairs.csv", pairs)
-
-
-def drawn_by(figure: StudyFigure, band: Band) -> dict[str, Draw]:
-    """Return name -> what draws it, of the curves of a figure and of its heat maps, if it has them."""
-    draws: dict[str, Draw] = {figure.name: lambda paths, style: draw_figure(figure, paths, band=band, style=style)}
-    if figure.has_map:
-        draws[f"{figure.name}_map"] = lambda paths, style: draw_map(figure, paths, style=style)
-    return draws
-
-
-def snapshot_written(spec: StudySpec, file: Path) -> Path:
-    """Draw the arena of a study, as it is when a run begins, into a picture file; returns the file.
-
-    Raises:
-        ImportError: Pillow is not installed.
-    """
-    picture = snapshot(spec)
-    from PIL import Image  # after the frame, which says what to install without it
-
-    with replacing(file, ending=file.suffix) as draft:
-        Image.fromarray(picture).save(draft, optimize=True)
-    return file
+        """Draw a figure, and write its numbers beside it, whole or not at all; yields all files."""
+        pictures = [self.folder / f"{figure.name}{ending}" for ending in self.endings]
+        draw_figure(figure, pictures, band=band, style=self.style)
+        yield from pictures
+        table = self.folder / f"{figure.name}.csv"
+        with replacing(table) as draft:
+            draft.write_text(figure.to_frame().write_csv(), encoding="utf-8", newline="")
+        yield table

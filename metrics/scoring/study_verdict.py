@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from swarm_forage_env.studies.study import StudySpec
     from swarm_forage_env.studies.study_table import StudyTable
 
-VARIANTS: tuple[Variant, ...] = ("corrected", "paper", "sierra")
+VARIANTS: tuple[Variant, ...] = ("corrected", "paper")
 ANSWERS: tuple[ClaimAnswer, ...] = get_args(ClaimAnswer)
 WAITS = "waits"
 """What stands in place of an answer for which runs are missing."""
@@ -249,8 +249,8 @@ class StudyVerdict(Answer):
         for looks in dict.fromkeys(spec.looks for spec in several):
             names = ", ".join(spec.name for spec in several if spec.looks == looks)
             remarks.append(
-                f"{names}: looked at after {', '.join(map(str, looks))} runs until claims are decided; intervals are "
-                "wider, so that all looks together are wrong once in twenty"
+                f"{names}: judged after {', '.join(map(str, looks))} runs, and stopped where claims were decided; "
+                "intervals are wider, so that all looks together are wrong once in twenty"
             )
         return tuple(remarks)
 
@@ -355,7 +355,7 @@ def verdict(*tables: "StudyTable", tell: Callable[[str], None] | None = None) ->
     """
     refused = [why for table in tables if (why := why_no_claims(table.spec))]
     if refused:
-        raise CurveError(f"{refused[0]} 'swarm-forage study plot' and 'report' take any study.")
+        raise CurveError(f"{refused[0]} 'swarm-forage study plot' takes any study.")
     return verdict_of(tables, scored_studies(tables, tell=tell))
 
 

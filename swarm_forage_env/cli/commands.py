@@ -31,9 +31,6 @@ COMMANDS: dict[str, tuple[Command, ...]] = {
     "Score and decide": (
         Command("score", "Score policies by all measures.", "questions:score"),
         Command("compare", "Score several policies side by side.", "questions:score"),
-        Command("predict", "Predict larger swarms from smaller ones.", "questions:predict"),
-        Command("predict availability", "Show how likely it is that enough robots work.", "questions:availability"),
-        Command("choose", "Rank policies by the constraints they meet.", "questions:choose"),
     ),
     "Train": (
         Command("train", "Train one policy that every robot shares.", "train:train"),
@@ -44,16 +41,10 @@ COMMANDS: dict[str, tuple[Command, ...]] = {
     "Studies and benchmark": (
         Command("study", "Run the paper's experiments, or your own."),
         Command("study list", "List the experiment sets of the paper.", "study:list_studies"),
-        Command("study show", "Show what a study varies, and its budgets.", "study:show"),
         Command("study run", "Make the missing runs of a study, and pack it.", "study:run"),
         Command("study status", "Show which runs of a study are done.", "study:status"),
-        Command("study pack", "Put all runs of a study into one file.", "study:pack"),
-        Command("study unpack", "Unpack studies into folders, to continue them.", "study:unpack"),
         Command("study verdict", "Test the claims of the paper with runs.", "study:verdict"),
         Command("study plot", "Draw the figures of a study.", "study:plot"),
-        Command("study report", "Write one page about studies.", "study:report"),
-        Command("study diff", "Show which conditions of two studies differ.", "study:diff"),
-        Command("ablate", "Switch one quirk of the rules at a time.", "questions:ablate"),
         Command("benchmark", "Score policies in a fixed set of worlds.", "benchmark:run"),
         Command("benchmark worlds", "List the worlds of the benchmark.", "benchmark:worlds"),
         Command("benchmark show", "Show the scores of entries.", "benchmark:show"),

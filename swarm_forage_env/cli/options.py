@@ -89,7 +89,7 @@ Variants = Annotated[
     str,
     typer.Option(
         "--variant",
-        help="Forms of equations: corrected, paper (as printed), sierra (the authors' program); separated by commas.",
+        help="Forms of equations: corrected, paper (as printed); separated by commas.",
     ),
 ]
 Forms = Annotated[

@@ -1,19 +1,16 @@
-"""The commands `run`, `score`, `compare`, `predict`, `choose` and `ablate`: questions about policies."""
+"""The commands `run`, `plot`, `score` and `compare`: questions about policies."""
 
-import json
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from metrics.controllers import PAPER_POLICIES
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.options import (
     OF_RUNS,
     AllPanels,
-    AsJson,
     Band,
     Budget,
     Curves,
@@ -23,7 +20,6 @@ from swarm_forage_env.cli.options import (
     Measures,
     Performance,
     Picture,
-    PlaceOptions,
     PolicyOptions,
     RunOptions,
     ScoreSeeds,
@@ -198,220 +194,3 @@ def score_forms(variants: str, forms: str, *, band: bool = False, all_panels: bo
     words: dict[str, Any] = {"variants": split_names(variants), "forms": split_names(forms)}
     with refusing():
         return ScoreForms(**words, band=band, all_panels=all_panels)
-
-
-_CURVES_OF_PREDICT = ("curves", "fit", "hold", "performance", "picture", "as_json")
-"""Options of `predict` that go with --curves."""
-
-
-def predict(
-    context: typer.Context,
-    policies: PolicyOptions,
-    described: PlaceOptions,
-    options: RunOptions,
-    curves: Curves = None,
-    fit: Annotated[
-        str | None,
-        typer.Option(
-            help="Swarm sizes to fit, four or more; default 1,2,4,8,16,32 (search_and_rescue: 12,51,115,204,320), or "
-            "those of the file."
-        ),
-    ] = None,
-    hold: Annotated[
-        str | None,
-        typer.Option(help="Larger sizes that test the prediction: run, or read from the file, but not fitted."),
-    ] = None,
-    seeds: Annotated[int, typer.Option(min=2, help="Runs per size.")] = 4,
-    from_scenario: Annotated[
-        bool,
-        typer.Option(
-            "--from-scenario",
-            help="Predict performance, time lost, E_S, E_T and C for the sizes of --fit and --hold, from arena, "
-            "objects and walk alone. Fits nothing and runs only --hold. For policies that search at random, like crw.",
-        ),
-    ] = False,
-    picture: Picture = None,
-) -> None:
-    """Predict the performance of larger swarms from smaller ones, with intervals, and the critical size.
-
-    Fits a law to small swarms and predicts twice and four times the largest of them. At the critical size, performance
-    is largest. The command also runs the sizes of --hold and compares them with the prediction. It does not repeat runs
-    that the folder already holds.
-    """
-    from metrics.scoring.from_scenario import predict_from_scenario, scenario_question
-    from metrics.scoring.prediction import Predictions, predict_curves, prediction_question
-    from swarm_forage_env.cli.printer import ask_and_show, refusing, show
-    from swarm_forage_env.cli.scenario_options import default_folder, described_world, split_numbers
-
-    fitted = None if fit is None else split_numbers("--fit", fit, int)
-    held = () if hold is None else split_numbers("--hold", hold, int)
-    if curves is not None:
-        refuse_others(context, "--curves", _CURVES_OF_PREDICT, OF_RUNS)
-        with refusing():
-            tables = predict_curves(curves, fit=fitted, hold=held, performance=described.performance)
-        show(Predictions(tables=tables), picture, as_json=options.as_json)
-        return
-    if any(word.partition("=")[0] == "n_robots" for word in described.settings):
-        raise typer.BadParameter("Expected no --set n_robots=..., because sizes are varied; use --fit and --hold.")
-    world, caches = described_world(described)
-    names = policies.names()
-    if from_scenario and not held:
-        with refusing():
-            found = predict_from_scenario(names, world, fitted, caches=caches)
-        show(found, picture, as_json=options.as_json)
-        return
-    with refusing():
-        question = (
-            scenario_question(names, world, fitted, hold=held, seeds=seeds, caches=caches)
-            if from_scenario
-            else prediction_question(names, world, fit=fitted, hold=held, seeds=seeds, caches=caches)
-        )
-    folder = options.out or default_folder(world)
-    file = picture or _picture(folder, "from_scenario" if from_scenario else "prediction", world)
-    ask_and_show(question, folder, options, picture=file)
-
-
-def availability(
-    robots: Annotated[str, typer.Option("--robots", help="Swarm sizes, separated by commas.")] = "50,200",
-    teams: Annotated[
-        str, typer.Option("--teams", help="Mean teams M: numbers of robots at work on average.")
-    ] = "5,10,20",
-    needed: Annotated[str, typer.Option("--needed", help="Numbers of robots needed, in the table.")] = "1,5,10,20,40",
-    picture: Picture = None,
-    as_json: AsJson = False,
-) -> None:
-    """Show how likely it is that enough robots are at work, for each number needed.
-
-    The command computes this in equilibrium, without runs.
-    """
-    from metrics.scoring.theory import availability as computed
-    from swarm_forage_env.cli.printer import notes
-    from swarm_forage_env.cli.scenario_options import split_numbers
-    from swarm_forage_env.rendering.figures import check_picture
-
-    sizes = split_numbers("--robots", robots, int)
-    means = split_numbers("--teams", teams, float)
-    demands = split_numbers("--needed", needed, int)
-    if picture is not None:
-        check_picture(picture)
-    try:
-        found = computed(sizes, means, demands)
-    except ValueError as error:  # a size or a team that cannot be
-        raise ConfigError(str(error)) from error
-    told = {**found.to_mapping(), "picture": None if picture is None else str(picture)}
-    typer.echo(json.dumps(told) if as_json else found.text())
-    if picture is not None:
-        found.draw(picture)
-        notes().print(f"picture {picture}")
-
-
-def choose(
-    policies: PolicyOptions,
-    described: WorldOptions,
-    options: RunOptions,
-    deliver: Annotated[
-        float,
-        typer.Option(
-            help="Total performance that an undisturbed run must reach: objects, or what --performance counts."
-        ),
-    ],
-    keep: Annotated[
-        float, typer.Option(help="Share of --deliver that a run must still reach under each disturbance.")
-    ] = 1.0,
-    failures: Annotated[
-        float | None,
-        typer.Option(
-            metavar="RATE",
-            help="Malfunctions per tick (0.2 s) in the whole swarm; 0.001 in the study. Robots stop and are repaired "
-            "one after the other, a little faster than they fail (docs/deciding.md).",
-        ),
-    ] = None,
-    deaths: Annotated[
-        float | None,
-        typer.Option(metavar="COUNT", help="Expected deaths in a run, at random times; dead robots do not come back."),
-    ] = None,
-    noise: Annotated[
-        float | None,
-        typer.Option(metavar="SIGMA", help="Standard deviation of noise on all sensors and wheels."),
-    ] = None,
-    seeds: Annotated[int, typer.Option(min=2, help="Runs per policy and condition.")] = 4,
-) -> None:
-    """Rank policies by the constraints that they meet: how much they deliver, also under failures, deaths and noise.
-
-    Each policy runs undisturbed and under each disturbance alone. A policy meets a constraint if the whole 95 %
-    interval of its mean performance reaches the demand. The command does not repeat runs that the folder already holds.
-    """
-    from metrics.scoring.choosing import choice_question
-    from swarm_forage_env.cli.printer import ask_and_show, refusing
-    from swarm_forage_env.cli.scenario_options import default_folder, described_world
-
-    world, caches = described_world(described)
-    with refusing():
-        question = choice_question(
-            policies.names(),
-            world,
-            deliver=deliver,
-            keep=keep,
-            failures=failures,
-            deaths=deaths,
-            noise=noise,
-            seeds=seeds,
-            caches=caches,
-        )
-    ask_and_show(question, options.out or default_folder(world), options)
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class SeveralPlaces(PlaceOptions):
-    """Options of worlds that differ in scenario and size."""
-
-    scenario: Annotated[
-        str,
-        typer.Option("--scenario", metavar="NAME|FILE.toml", help="One or more presets or files, separated by commas."),
-    ] = "warehouse_small,warehouse_medium"
-    robots: Annotated[str, typer.Option("--robots", help="One or more swarm sizes, separated by commas.")] = "32,256"
-
-    def places(self) -> list[WorldOptions]:
-        """Return the options of each world."""
-        from swarm_forage_env.cli.scenario_options import split_names, split_numbers
-
-        common = {field.name: getattr(self, field.name) for field in fields(PlaceOptions)}
-        return [
-            WorldOptions(**{**common, "scenario": name}, robots=size)
-            for name in split_names(self.scenario)
-            for size in split_numbers("--robots", self.robots, int)
-        ]
-
-
-def ablate(
-    policies: PolicyOptions,
-    described: SeveralPlaces,
-    options: RunOptions,
-    quirks: Annotated[
-        str,
-        typer.Option("--quirks", help="Quirks to switch, separated by commas; all; or none, for the two rules only."),
-    ] = "all",
-    seeds: Annotated[int, typer.Option(min=2, help="Runs per policy, size and switched quirk.")] = 3,
-) -> None:
-    """Switch one quirk at a time and show what it changes: on in the described rules, off in the authors' program.
-
-    The tables are Markdown. Records go to a folder, so after an interruption, just enter the command again.
-    """
-    from metrics.scoring.ablation import ablation_question
-    from swarm_forage_env._internal.fields import MOST_SEEDS, whole
-    from swarm_forage_env.cli.printer import ask_and_show, refusing
-    from swarm_forage_env.cli.scenario_options import described_world, split_names
-    from swarm_forage_env.scenarios.quirks import QUIRK_NAMES
-
-    whole("--seeds", seeds, at_least=2, at_most=MOST_SEEDS)
-    every = {"all": QUIRK_NAMES, "none": ()}
-    with refusing():
-        question = ablation_question(
-            [described_world(place)[0] for place in described.places()],
-            policies.names(",".join(PAPER_POLICIES)),
-            quirks=every[quirks] if quirks in every else split_names(quirks),
-            seeds=seeds,
-            caches=described.caches,
-        )
-    folder = options.out or Path("results", "ablation")
-    ask_and_show(question, folder, options, as_markdown=True)

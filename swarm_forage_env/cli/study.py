@@ -25,18 +25,6 @@ Seeds = Annotated[int | None, typer.Option("--seeds", min=1, help="Runs per cond
 Rules = Annotated[
     str, typer.Option("--rules", help="described, program (the authors'), both, or file: what the file says.")
 ]
-UntilDecided = Annotated[
-    bool,
-    typer.Option(
-        "--until-decided",
-        help="Judge the paper's claims again and again, and make the runs that decide most in the least time "
-        "(docs/studies.md). --budget is then paper by default, and --seeds sets the most runs per condition; "
-        "default as the folders have it, else 192.",
-    ),
-]
-Hours = Annotated[
-    float | None, typer.Option("--hours", min=0.0, help="With --until-decided: for how many hours of wall time.")
-]
 Cluster = Annotated[
     str | None,
     typer.Option(
@@ -57,21 +45,6 @@ def list_studies(
     print_answer(paper_sets(budget), as_json=as_json)
 
 
-def show(
-    name: Name, budget: Budget = None, seeds: Seeds = None, rules: Rules = "file", as_json: AsJson = False
-) -> None:
-    """Show what a study varies, and how many runs each of its budgets makes."""
-    from swarm_forage_env.cli.printer import show as print_answer
-    from swarm_forage_env.studies.description import describe
-    from swarm_forage_env.studies.study_file import budget_names
-
-    print_answer(describe(_chosen(name, budget, seeds, rules)), as_json=as_json)
-    if as_json:
-        return
-    others = [other for other in budget_names(name) if other != budget]
-    typer.echo(f"\nBudgets: {', '.join(budget_names(name))}" + ("" if budget or len(others) < 2 else "; see --budget"))
-
-
 def run(
     names: Annotated[
         list[str], typer.Argument(metavar="NAME|FILE...", help="Sets of the paper (S1a to S2d), or study files.")
@@ -86,8 +59,6 @@ def run(
     ] = None,
     seeds: Seeds = None,
     rules: Rules = "file",
-    until_decided: UntilDecided = False,
-    hours: Hours = None,
     shard: Annotated[
         str, typer.Option("--shard", metavar="I/N", help="Make only the I-th of N equal parts of the runs.")
     ] = "1/1",
@@ -101,27 +72,18 @@ def run(
     """
     from swarm_forage_env.runs.cluster import cluster_executor
     from swarm_forage_env.runs.workers import WorkerError
-    from swarm_forage_env.studies.study_file import PAPER
     from swarm_forage_env.studies.study_folder import StudyFolder, parse_shard
 
-    if until_decided:
-        specs = [_chosen(name, budget or PAPER, None, rules) for name in names]
-    else:
-        specs = [_chosen(name, budget, seeds, rules) for name in names]
+    specs = [_chosen(name, budget, seeds, rules) for name in names]
     part = parse_shard(shard)
     places = [_folder(spec, out, is_one=len(specs) == 1) for spec in specs]
     studies = [(spec, StudyFolder(place)) for spec, place in zip(specs, places, strict=True)]
-    _check_until_decided(until_decided, hours, part, dry_run)
-    if dry_run and not until_decided:
+    if dry_run:
         typer.echo("\n\n".join(str(_summary(spec, folder, part, jobs)) for spec, folder in studies))
         return
     try:
-        with nullcontext() if cluster is None or dry_run else cluster_executor(cluster, jobs) as executor:
-            if until_decided:
-                _run_until_decided(studies, seeds, 0.0 if dry_run else hours or 0.0, jobs, executor)
-                n_failed = 0
-            else:
-                n_failed = sum(_run_all(spec, folder, part, jobs, executor) for spec, folder in studies)
+        with nullcontext() if cluster is None else cluster_executor(cluster, jobs) as executor:
+            n_failed = sum(_run_all(spec, folder, part, jobs, executor) for spec, folder in studies)
     except (KeyboardInterrupt, WorkerError) as error:
         kept = ", ".join(str(folder.folder) for _, folder in studies)
         why, code = (
@@ -138,17 +100,6 @@ def _folder(spec: "StudySpec", out: Path | None, *, is_one: bool) -> Path:
     return Path("results", "studies", own) if out is None else out if is_one else out / own
 
 
-def _check_until_decided(until_decided: bool, hours: float | None, part: tuple[int, int], dry_run: bool) -> None:
-    from swarm_forage_env._internal.fields import ConfigError
-
-    if hours is not None and not until_decided:
-        raise ConfigError("Expected --hours with --until-decided only.")
-    if until_decided and hours is None and not dry_run:
-        raise ConfigError("Expected --hours with --until-decided, such as --hours 6.")
-    if until_decided and part != (1, 1):
-        raise ConfigError("Expected no --shard with --until-decided: which runs come next depends on all others.")
-
-
 def _run_all(
     spec: "StudySpec", folder: "StudyFolder", part: tuple[int, int], jobs: int | None, executor: "Executor | None"
 ) -> int:
@@ -157,37 +108,13 @@ def _run_all(
     from swarm_forage_env.runs.store import FAILED
     from swarm_forage_env.studies.description import StudyOutcome
     from swarm_forage_env.studies.study_folder import run_study
+    from swarm_forage_env.studies.study_table import pack_study
 
     state = run_study(spec, folder, part=part, jobs=jobs, executor=executor, progress=True)
     if part == (1, 1):
-        notes().print(f"packed into {_pack(folder.folder, None)}")
+        notes().print(f"packed into {pack_study(folder, tell=notes().print)}")
     typer.echo(StudyOutcome(outcomes=state, folder=folder))
     return state.count(FAILED)
-
-
-def _run_until_decided(
-    studies: "list[tuple[StudySpec, StudyFolder]]",
-    seeds: int | None,
-    hours: float,
-    jobs: int | None,
-    executor: "Executor | None",
-) -> None:
-    from metrics.claims.looks import looks_up_to
-    from metrics.scoring import run_until_decided
-    from swarm_forage_env.cli.printer import notes
-
-    outlook = run_until_decided(
-        studies,
-        hours=hours,
-        looks=looks_up_to(seeds) if seeds else None,
-        jobs=jobs,
-        executor=executor,
-        progress=True,
-        tell=notes().print,
-    )
-    for _, folder in studies if hours > 0.0 else ():
-        notes().print(f"packed into {_pack(folder.folder, None)}")
-    typer.echo(outlook)
 
 
 def _summary(spec: "StudySpec", folder: "StudyFolder", part: tuple[int, int], jobs: int | None) -> "PlanSummary":
@@ -211,38 +138,6 @@ def status(place: Place, as_json: AsJson = False) -> None:
     print_answer(found, as_json=as_json)
     if not found.is_complete:
         raise typer.Exit(EXIT_FAILURE)
-
-
-def pack(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a study.")],
-    file: Annotated[Path | None, typer.Option("--file", help="Packed study; default DIR/NAME.parquet.")] = None,
-) -> None:
-    """Put all runs of a study into one file, with everything that its folder knows about them."""
-    typer.echo(f"packed into {_pack(folder, file)}")
-
-
-def unpack(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Packed studies.")],
-    out: Annotated[
-        Path, typer.Option("--out", help="Parent of the folders of the studies, which are called NAME_BUDGET.")
-    ] = Path("results/studies"),
-) -> None:
-    """Put the runs of packed studies into folders, so that study run can continue them."""
-    from swarm_forage_env._internal.wording import counted
-    from swarm_forage_env.studies.study_folder import StudyFolder
-    from swarm_forage_env.studies.study_table import read_study, unpack_study
-
-    for table in [read_study(file) for file in files]:  # all of them are read before anything is written
-        folder = StudyFolder(_folder(table.spec, out, is_one=False))
-        typer.echo(f"{counted(unpack_study(table, folder), 'run')} of {table.spec.name} added to {folder.folder}")
-
-
-def _pack(folder: Path, chosen: Path | None) -> Path:
-    from swarm_forage_env.cli.printer import notes
-    from swarm_forage_env.studies.study_folder import StudyFolder
-    from swarm_forage_env.studies.study_table import pack_study
-
-    return pack_study(StudyFolder(folder), chosen, tell=notes().print)
 
 
 def _read(place: Path) -> "StudyTable":
@@ -319,13 +214,7 @@ def plot(
     variants: Variants = "corrected",
     formats: Annotated[str, typer.Option("--format", help="svg, png, pdf; separated by commas.")] = "svg,png",
 ) -> None:
-    """Draw the figures of a study, with their numbers as CSV tables: each measure over what the study varies.
-
-    Figures also show models: laws and a mean field if swarm sizes vary, the queue if robots leave and come back. Files
-    called theory_... need no runs: availability curves and sketches of the measures. NAME_snapshot.png shows the arena
-    at the start of a run. NAME_conditions.csv says how runs of each condition spread and how many broke down,
-    ..._pairs.csv how often one policy is better than another.
-    """
+    """Draw the figures of a study, with their numbers as CSV tables: each measure over what the study varies."""
     from metrics import plot as plot_study
     from swarm_forage_env.cli.questions import score_forms
     from swarm_forage_env.cli.scenario_options import split_names
@@ -344,54 +233,3 @@ def plot(
         typer.echo(file)
     for line in plotted.missing:
         typer.echo(line, err=True)
-
-
-_PAGE_FORMS = (".html", ".md", ".txt", ".csv", ".json")
-
-
-def report(
-    places: Places,
-    file: Annotated[
-        Path,
-        typer.Option("--file", help="File to write: the page (.html), or only its tables (.md, .txt, .csv, .json)."),
-    ] = Path("report.html"),
-    band: Band = False,
-) -> None:
-    """Write one page about studies: verdicts on the paper's claims, figures, numbers, settings and versions."""
-    from metrics import report as report_of
-    from swarm_forage_env._internal.fields import ConfigError
-    from swarm_forage_env._internal.files import check_file
-    from swarm_forage_env.cli.printer import notes
-
-    if file.suffix not in _PAGE_FORMS:
-        raise ConfigError(f"Expected --file as a file ending in {', '.join(_PAGE_FORMS)}, got {str(file)!r}.")
-    tables = [_read(place) for place in places]
-    check_file(file)
-    report_of(*tables, band="sd" if band else "ci", tell=notes().print).write(file)
-    notes().print(f"written {file}")
-
-
-def diff(
-    first: Annotated[Path, typer.Argument(metavar="A", help="Folder of a study, or its packed file.")],
-    second: Annotated[Path, typer.Argument(metavar="B", help="Folder or packed file of the other study.")],
-    columns: Annotated[
-        str | None,
-        typer.Option(
-            "--columns", help="Recorded columns to test, separated by commas; see 'swarm-forage list columns'."
-        ),
-    ] = None,
-    as_json: AsJson = False,
-) -> None:
-    """Show which conditions of two studies differ beyond chance.
-
-    Exit code 0 if no condition differs; 1 if one does or may, or if one lacks finished runs in A or in B.
-    """
-    from metrics import diff as diff_of
-    from metrics.scoring.study_diff import COLUMNS
-    from swarm_forage_env.cli.printer import show as print_answer
-
-    names = COLUMNS if columns is None else tuple(name.strip() for name in columns.split(","))
-    found = diff_of(_read(first), _read(second), names)
-    print_answer(found, as_json=as_json)
-    if found.differs:
-        raise typer.Exit(EXIT_FAILURE)

@@ -13,11 +13,9 @@ from swarm_forage_env._internal.fields import ConfigError, number
 from swarm_forage_env._internal.files import as_file_name, replacing
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.inspect.replay.capture import record_replay
-from swarm_forage_env.inspect.replay.files import read_replays
 from swarm_forage_env.inspect.replay.frames import Replay, Status
 from swarm_forage_env.policies.registry import policy_label
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
-from swarm_forage_env.runs.record import RunRecord
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.workers import Tell, map_runs
 from swarm_forage_env.scenarios.floor import CELL_M
@@ -61,7 +59,7 @@ class FloorMaps:
         Raises:
             ConfigError: arenas of other proportions, or another number of squares.
         """
-        if not (same_proportions(self.size_m, other.size_m) and self._grid == other._grid):
+        if not (_same_proportions(self.size_m, other.size_m) and self._grid == other._grid):
             mine, theirs = ((maps.size_m, maps.side_m) for maps in (self, other))
             raise ConfigError(
                 "Expected maps of arenas of one shape with as many squares, got sizes and sides of "
@@ -179,20 +177,6 @@ class ComparedMaps:
         draw_maps(picture, shown, columns, own_scales=own_scales, style=style)
 
 
-def maps_of_page(page: str | Path, *, side_m: float = 2 * CELL_M) -> ComparedMaps:
-    """Return maps of all runs of a replay page.
-
-    Args:
-        page: A file that `swarm-forage replay` has written.
-        side_m: As in `floor_maps`.
-
-    Raises:
-        ReplayError: it is none.
-        ConfigError: see `floor_maps`.
-    """
-    return ComparedMaps(maps=tuple(floor_maps(replay, side_m=side_m) for replay in read_replays(Path(page))))
-
-
 def maps_of_runs(
     specs: Sequence[RunSpec],
     *,
@@ -213,41 +197,15 @@ def maps_of_runs(
         ValueError: a policy that is not installed, or refuses its file.
     """
     made: dict[str, list[FloorMaps]] = {}
-    found = map_runs(partial(map_run, side_m, None), specs, jobs=jobs, advance=advance)
-    for spec, (maps, _) in zip(specs, found, strict=True):
+    found = map_runs(partial(_map_run, side_m), specs, jobs=jobs, advance=advance)
+    for spec, maps in zip(specs, found, strict=True):
         made.setdefault(policy_label(spec.policy), []).append(maps)
-    return ComparedMaps(maps=tuple(mean_maps(maps, label) for label, maps in made.items()))
+    return ComparedMaps(maps=tuple(_mean_maps(maps, label) for label, maps in made.items()))
 
 
-def maps_of_record(
-    record: RunRecord, *, side_m: float = 2 * CELL_M, advance: Callable[[float], None] | None = None
-) -> tuple[ComparedMaps, bool]:
-    """Make the run of a record again, which holds no positions.
-
-    Returns:
-        Its maps, and whether it came out the same.
-
-    Raises:
-        ConfigError: see `floor_maps`.
-        ValueError: a policy that is not installed, or refuses its file.
-    """
-    ((maps, again),) = map_runs(partial(map_run, side_m, None), [RunSpec.from_json(record.spec)], advance=advance)
-    return ComparedMaps(maps=(maps,)), again.same_columns(record)
-
-
-def map_run(side_m: float, in_width_m: float | None, spec: RunSpec, tell: Tell | None) -> tuple[FloorMaps, RunRecord]:
-    """Make a run, for `runs.workers.map_runs`, and return its maps and its record.
-
-    Args:
-        side_m: Side of a square.
-        in_width_m: Width of the arena in which it is so long, elsewhere in proportion; None = everywhere.
-        spec: The run.
-        tell: Called after every frame.
-    """
-    replay, record = record_replay(spec, progress=tell)
-    assert record is not None, "whole runs have records"
-    side_m = side_m if in_width_m is None else side_m * spec.scenario.arena.width_m / in_width_m
-    return floor_maps(replay, side_m=side_m), record
+def _map_run(side_m: float, spec: RunSpec, tell: Tell | None) -> FloorMaps:
+    """Make a run, for `runs.workers.map_runs`, and return its maps; `tell` is called after every frame."""
+    return floor_maps(record_replay(spec, progress=tell)[0], side_m=side_m)
 
 
 def _sides(side_m: float, n: int, extent_m: float) -> FloatArray:
@@ -255,12 +213,12 @@ def _sides(side_m: float, n: int, extent_m: float) -> FloatArray:
     return np.append(np.full(n - 1, side_m), min(side_m, extent_m - (n - 1) * side_m))
 
 
-def mean_maps(maps: Sequence[FloorMaps], label: str) -> FloorMaps:
+def _mean_maps(maps: Sequence[FloorMaps], label: str) -> FloorMaps:
     """Return the mean of maps of several runs of one experiment, under another label."""
     arrays = {name: np.mean([one.arrays[name] for one in maps], axis=0) for name in MEANINGS}
     return replace(maps[0], label=label, arrays=arrays)
 
 
-def same_proportions(size_m: tuple[float, float], other_m: tuple[float, float]) -> bool:
+def _same_proportions(size_m: tuple[float, float], other_m: tuple[float, float]) -> bool:
     """Return whether two floors differ by a scale at most."""
     return math.isclose(size_m[0] * other_m[1], size_m[1] * other_m[0], rel_tol=1e-6)

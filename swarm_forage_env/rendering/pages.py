@@ -1,18 +1,15 @@
-"""The replay page, the report page and the page to play with, each one HTML file that loads nothing from elsewhere.
+"""The replay page and the page to play with, each one HTML file that loads nothing from elsewhere.
 
 The replay page is made of a style sheet, scripts and data, and gives the data back. Its parts lie in `replay_page`.
-Data are a header in JSON and one block of bytes per run, in base64. The report page on studies is made of a template,
-a style sheet, a script and plain values. Its parts lie in `report_page`. It needs Jinja2 (the optional extra "plots"),
-which is imported when a page is built. The page to play with draws with the scripts and the style sheet of the replay
-page; what it has beside them lies in `play_page`.
+Data are a header in JSON and one block of bytes per run, in base64. The page to play with draws with the scripts and
+the style sheet of the replay page; what it has beside them lies in `play_page`.
 """
 
 import base64
 import html
 import json
 import re
-from collections.abc import Mapping
-from functools import cache, partial
+from functools import cache
 from importlib import resources
 from string import Template
 from typing import Any
@@ -97,45 +94,6 @@ def build_play_page() -> str:
     return Template(_part("play_page", "index.html")).substitute(
         style=_part("replay_page", "replay.css") + _part("play_page", "play.css"), script="\n".join([*shared, *own])
     )
-
-
-def build_report(values: Mapping[str, Any]) -> str:
-    """Return the report page as text.
-
-    Args:
-        values: What `report_page/report.html` names; a name that is missing is an error, and all texts are escaped.
-
-    Raises:
-        ImportError: Jinja2 is not installed.
-    """
-    from jinja2 import Environment, FunctionLoader, StrictUndefined
-
-    pages = Environment(
-        loader=FunctionLoader(partial(_part, "report_page")),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    pages.filters["shown"] = shown
-    return pages.get_template("report.html").render(values) + "\n"
-
-
-def shown(cell: Any) -> str:
-    """Return a cell of a table as readers see it: about four digits, no exponent where digits do, a dash for nothing.
-
-    shown(1492.625), shown(0.0128571)  # ("1,493", "0.01286")
-    """
-    if cell is None:
-        return "-"
-    if not isinstance(cell, float):
-        return f"{cell:,}" if isinstance(cell, int) and not isinstance(cell, bool) else str(cell)
-    return f"{cell:,.0f}" if 1e3 <= abs(cell) < 1e7 else f"{cell:.4g}"
-
-
-def picture_address(content: bytes, kind: str = "image/svg+xml") -> str:
-    """Return a picture as an address that holds all of it."""
-    return f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"
 
 
 @cache

@@ -272,14 +272,6 @@ def _too_large(run_id: str, why: ParquetError) -> RecordError:
     return RecordError(f"Cannot store run {run_id}: {why}; choose longer intervals (interval_s).")
 
 
-def is_record(path: str | os.PathLike[str]) -> bool:
-    """Return whether a Parquet file says that it holds a run."""
-    try:
-        return set(_FILE_KEYS) <= open_parquet(Path(path), MOST_BYTES).stamp.keys()
-    except (OSError, ParquetError):
-        return False
-
-
 _DTYPES: dict[Any, type] = {
     str: str,
     int: int,

@@ -8,58 +8,10 @@ from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.runner import Outcomes
 from swarm_forage_env.runs.store import DONE, FAILED, MISSING, STATES
-from swarm_forage_env.studies.study import StudySpec, value_words
+from swarm_forage_env.studies.study import StudySpec
 from swarm_forage_env.studies.study_file import PAPER, left_out, left_out_words, load_study, set_names
 from swarm_forage_env.studies.study_folder import StudyFolder
 from swarm_forage_env.studies.study_table import LOSS_COLUMNS, StudyTable
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class StudyDescription(Answer):
-    """A study in words."""
-
-    spec: StudySpec
-
-    def sheets(self) -> Sequence[Sheet]:
-        """Return one row per fact."""
-        spec = self.spec
-        words = [value_words(axis.values) for axis in spec.axes]
-        axes = [f"{axis.name}: {', '.join(of.values())}" for axis, of in zip(spec.axes, words, strict=True)]
-        if spec.reference is not None:
-            axes[-1] += f" (reference {words[-1][spec.reference]})"
-        settings = ", ".join(f"{name} = {value}" for name, value in spec.settings.items())
-        runs = f"{spec.n_runs:,} in {counted(len(spec.places), 'condition')}, {spec.robot_ticks:.3g} robot-ticks"
-        rows = [
-            ("study", f"{spec.name}: {spec.title}" if spec.title else spec.name),
-            ("scenario", spec.scenario + (f", {settings}" if settings else "")),
-            *(("wrapper", config.name) for config in spec.wrappers),
-            ("policies", ", ".join(policy.label for policy in spec.policies)),
-            *(("axis", axis) for axis in axes),
-            ("rules", ", ".join(spec.rules)),
-            ("budget", f"{spec.budget}: {counted(len(spec.seeds), 'seed')}, {spec.horizon_s:,g} s"),
-            ("runs", runs),
-            ("identity", spec.study_id),
-        ]
-        absent = left_out_words(spec)
-        rows += [("left out", f"of the paper's values: {absent}")] if absent else []
-        return (Sheet(rows=rows),)
-
-    def to_mapping(self) -> dict[str, Any]:
-        """Return the study, its numbers of conditions and runs, and the paper's values that it leaves out."""
-        spec = self.spec
-        return {
-            "study": spec.to_mapping(),
-            "study_id": spec.study_id,
-            "n_conditions": len(spec.places),
-            "n_runs": spec.n_runs,
-            "robot_ticks": spec.robot_ticks,
-            "left_out": {axis: list(values) for axis, values in left_out(spec).items()},
-        }
-
-
-def describe(spec: StudySpec) -> StudyDescription:
-    """Say what a study varies, and how many runs it makes."""
-    return StudyDescription(spec=spec)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -91,7 +43,7 @@ class PaperSets(Answer):
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the sets by name."""
-        return {"budget": self.budget, "sets": {spec.name: describe(spec).to_mapping() for spec in self.specs}}
+        return {"budget": self.budget, "sets": {spec.name: _about(spec) for spec in self.specs}}
 
 
 def paper_sets(budget: str = PAPER) -> PaperSets:
@@ -101,6 +53,17 @@ def paper_sets(budget: str = PAPER) -> PaperSets:
         ConfigError: the sets do not have this budget.
     """
     return PaperSets(budget=budget, specs=tuple(load_study(name, budget, rules=("described",)) for name in set_names()))
+
+
+def _about(spec: StudySpec) -> dict[str, Any]:
+    return {
+        "study": spec.to_mapping(),
+        "study_id": spec.study_id,
+        "n_conditions": len(spec.places),
+        "n_runs": spec.n_runs,
+        "robot_ticks": spec.robot_ticks,
+        "left_out": {axis: list(values) for axis, values in left_out(spec).items()},
+    }
 
 
 def _numbers(specs: Sequence[StudySpec]) -> tuple[str, str, str]:

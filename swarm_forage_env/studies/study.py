@@ -195,8 +195,8 @@ class StudySpec:
     file: str = field(default="", compare=False)
     """Path of the study file as the user gave it; empty for the paper's sets, and for studies made in Python."""
     looks: tuple[int, ...] = ()
-    """Numbers of runs of a condition after which the claims are judged while runs continue; empty: once, at the end.
-    Every judgement uses the same first runs, and corrects for several looks."""
+    """Numbers of runs of a condition after which claims were judged, and conditions left as they were where all was
+    decided; empty: once, at the end. Judgements correct for several looks."""
 
     def __post_init__(self) -> None:
         check_file_name("name of a study", self.name)

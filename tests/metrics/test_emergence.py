@@ -43,10 +43,6 @@ def test_crowding_swarm(variant):
     assert task_emergence([1.8], 2, [3.2], 4) == pytest.approx(-0.4, abs=1e-9)
 
 
-def test_crowding_swarm_with_counts():
-    assert spatial(2, 4, t_lost_as="count") == pytest.approx(-2.4, abs=1e-9)
-
-
 def test_corrected_form_drops_the_loss_of_a_lone_robot_only_where_it_stands_alone():
     assert spatial(1, 4) == pytest.approx(-0.56, abs=1e-9)
     assert spatial(1, 4, variant="paper") == pytest.approx(4 * 0.1 - 0.56, abs=1e-9)
@@ -62,38 +58,10 @@ def test_one_robot_drops_out_between_larger_swarms(variant):
     assert without == pytest.approx(50 / 12 * (3.0 + 5.0) - (27.0 + 17.5))
 
 
-@pytest.mark.parametrize(("n1", "variant"), [(1, "paper"), (1, "corrected"), (12, "sierra")])
+@pytest.mark.parametrize(("n1", "variant"), [(1, "paper"), (1, "corrected")])
 def test_elsewhere_one_robot_is_needed(n1, variant):
     with pytest.raises(CurveError, match="perf_one"):
         spatial_emergence([1.0], [0.1], n1, [2.0], [0.1], 50, None, None, variant=variant)
-
-
-def test_program_finds_organisation_where_the_print_finds_none():
-    assert spatial(2, 4, variant="sierra") == pytest.approx(2 * 0.14444444 - 0.26875, abs=1e-15)
-    assert spatial(2, 4, variant="sierra") == pytest.approx(0.02013888, abs=1e-9)
-    assert spatial(1, 4, variant="sierra") == pytest.approx(-0.26875, abs=1e-9)  # the interactive form
-
-
-@pytest.mark.parametrize(("n1", "n2"), [(1, 2), (2, 4), (16, 64)])
-def test_programs_value_for_independent_robots(n1, n2):
-    fraction = 0.3
-    expected = fraction * ((n2 / n1) * (1 - 1 / n1) - (1 - 1 / n2))
-    assert independent(n1, n2, fraction, variant="sierra") == pytest.approx(expected, abs=1e-7)
-
-
-def test_program_takes_any_order_and_is_zero_for_one_robot():
-    assert spatial(4, 2, variant="sierra") == pytest.approx(0.5 * 0.26875 - 0.14444444, abs=1e-12)
-    assert spatial(4, 4, variant="sierra") == 0.0
-    assert spatial(4, 1, variant="sierra") == 0.0
-
-
-def test_program_reads_the_last_interval():
-    first, last = ([9.0, 1.8], [0.9, 0.2]), ([1.0, 3.2], [0.0, 0.3])
-    for options in ({}, {"reduce": "last"}):
-        value = spatial_emergence(*first, 2, *last, 4, [7.0, 1.0], [0.7, 0.1], variant="sierra", **options)
-        assert value == spatial(2, 4, variant="sierra")
-    with pytest.raises(ValueError, match="last interval"):
-        spatial_emergence(*first, 2, *last, 4, [7.0, 1.0], [0.7, 0.1], variant="sierra", reduce="mean")
 
 
 def test_a_nan_in_an_early_interval_spoils_the_last_value_too():

@@ -89,7 +89,6 @@ def test_signals_on_different_intervals_are_refused():
         environment_distance(np.ones((2, 3)), 0.1)
 
 
-@pytest.mark.parametrize("ground", ["value", "time_value"])
 @pytest.mark.parametrize(
     ("kind", "frequency", "amplitudes", "published"),
     [
@@ -97,10 +96,10 @@ def test_signals_on_different_intervals_are_refused():
         ("sine", 2e-5, [0.15, 0.20, 0.25, 0.30, 0.35, 0.40, 0.45], [5.04, 7.18, 9.44, 11.76, 14.13, 16.52, 18.92]),
     ],
 )
-def test_x_axis_of_the_flexibility_figures(kind, frequency, amplitudes, published, ground):
+def test_x_axis_of_the_flexibility_figures(kind, frequency, amplitudes, published):
     for amplitude, expected in zip(amplitudes, published, strict=True):
         applied = waveform(kind, INTERVAL_ENDS, frequency=frequency, amplitude=amplitude, offset=amplitude)
-        distance = environment_distance(applied, 0.1, ground=ground)
+        distance = environment_distance(applied, 0.1)
         assert isinstance(distance, float)
         assert distance == pytest.approx(expected, abs=0.005)
         assert distance == pytest.approx(np.abs(applied - 0.1).sum(), abs=1e-9)

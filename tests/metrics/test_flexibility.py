@@ -11,11 +11,10 @@ ONE_SAMPLE_LATE = [1.0, 1.0, 0.5, 0.5]
 IN_TIME = [1.0, 0.5, 0.5, 1.0]
 
 
-@pytest.mark.parametrize(("variant", "expected"), [("corrected", 0.5), ("paper", 0.5), ("sierra", 1.0)])
-def test_a_swarm_that_reacts_late(variant, expected):
-    assert reactivity(IDEAL, ONE_SAMPLE_LATE, THROTTLE, 0.0, variant=variant) == pytest.approx(expected, abs=1e-9)
-    assert adaptability(IDEAL, ONE_SAMPLE_LATE, variant=variant) == pytest.approx(1.0, abs=1e-9)
-    assert noise_robustness(IDEAL, ONE_SAMPLE_LATE, variant=variant) == pytest.approx(1.0, abs=1e-9)
+def test_a_swarm_that_reacts_late():
+    assert reactivity(IDEAL, ONE_SAMPLE_LATE, THROTTLE, 0.0) == pytest.approx(0.5, abs=1e-9)
+    assert adaptability(IDEAL, ONE_SAMPLE_LATE) == pytest.approx(1.0, abs=1e-9)
+    assert noise_robustness(IDEAL, ONE_SAMPLE_LATE) == pytest.approx(1.0, abs=1e-9)
 
 
 def test_perfect_swarms():
@@ -36,7 +35,7 @@ def test_relative_distances_are_shares_of_the_ideal_performance():
 
 def test_the_printed_factor_rewards_gaining_from_adversity():
     observed = [5.0, 5.0]
-    assert reactivity([1.0, 1.0], observed, 0.5, 0.1, model="paper", variant="paper") == pytest.approx(0.0, abs=1e-12)
+    assert reactivity([1.0, 1.0], observed, 0.5, 0.1, model="paper") == pytest.approx(0.0, abs=1e-12)
     assert reactivity([1.0, 1.0], observed, 0.5, 0.1) == pytest.approx(2 * 4.4, abs=1e-12)
     with pytest.raises(CurveError, match="model='linear'"):
         reactivity([1.0, 1.0], observed, 0.5, 0.0, model="paper")
@@ -50,15 +49,6 @@ def test_without_deviation_reactivity_is_adaptability():
     rng = np.random.default_rng(2)
     ideal, observed, waves = rng.random((3, 6, 20))
     assert np.array_equal(reactivity(ideal, observed, waves, waves), adaptability(ideal, observed))
-
-
-@pytest.mark.parametrize("measure", [adaptability, noise_robustness])
-def test_clock_of_the_programs_form(measure):
-    early, late = [0.0, 0.0, 1.0, 1.0], [0.0, 1.0, 1.0, 1.0]
-    assert measure(early, late, variant="sierra") == 1.0
-    assert measure(early, late, variant="sierra", clock=[1000, 2000, 3000, 4000]) == 1.0
-    assert measure(early, late, variant="sierra", clock=0.1) == pytest.approx(0.2, abs=1e-12)
-    assert measure(early, late, clock=0.1) == 0.0  # time costs nothing in the corrected form
 
 
 def test_one_waveform_serves_all_runs():

@@ -26,58 +26,18 @@ def test_independent_robots_lose_nothing():
     assert performance_lost([1, 1], [0.1, 0.1], 1, [1, 1], [0.1, 0.1]) == pytest.approx([0.1, 0.1], abs=1e-12)
 
 
-@pytest.mark.parametrize("variant", ["paper", "corrected"])
 @pytest.mark.parametrize(("n", "expected"), [(1, 0.1), (2, 0.16), (4, 0.56)])
-def test_crowding_swarm(variant, n, expected):
-    assert lost(n, variant=variant) == pytest.approx([expected], abs=1e-9)
-
-
-@pytest.mark.parametrize(("n", "expected"), [(1, 0.1), (2, 0.52), (4, 3.44)])
-def test_counts_in_place_of_fractions_blow_up_with_size(n, expected):
-    assert lost(n, t_lost_as="count") == pytest.approx([expected], abs=1e-9)
-
-
-@pytest.mark.parametrize(("n", "expected"), [(1, 0.0), (2, 0.26), (4, 0.86)])
-def test_program_takes_off_one_lone_robot_instead_of_n(n, expected):
-    assert lost(n, variant="sierra") == pytest.approx([expected], abs=1e-9)
-
-
-@pytest.mark.parametrize(("n", "expected"), [(1, 0.0), (2, 0.14444444), (4, 0.26875)])
-def test_programs_fractional_loss_is_rounded_to_eight_decimals(n, expected):
-    perf, fraction = CROWDING[n]
-    assert fractional_loss([perf], [fraction], n, [1.0], [0.1], variant="sierra") == [expected]
+def test_crowding_swarm(n, expected):
+    assert lost(n) == pytest.approx([expected], abs=1e-9)
 
 
 def test_fractional_loss_is_loss_over_performance():
     assert fractional_loss([1.8], [0.2], 2, [1.0], [0.1]) == pytest.approx([0.16 / 1.8], abs=1e-12)
 
 
-def test_programs_first_experiment_need_not_be_one_robot():
-    # 12 robots, half of them interfering: n_int = 6; the loss of the first experiment itself is zero.
-    assert performance_lost([2.0], [0.5], 12, [2.0], [0.5], variant="sierra", n_reference=12) == [0.0]
-    value = performance_lost([4.0], [0.5], 51, [2.0], [0.5], variant="sierra", n_reference=12)
-    assert value == pytest.approx([4.0 * 0.5 - 2.0 * 6.0], abs=1e-12)
-    with pytest.raises(CurveError, match="one robot as reference"):
-        performance_lost([4.0], [0.5], 51, [2.0], [0.5], n_reference=12)
-
-
-def test_independent_robots_show_a_fractional_loss_in_the_program():
-    fraction = 0.3
-    for n in (2, 8, 64):
-        value = fractional_loss([n], [fraction], n, [1.0], [fraction], variant="sierra")
-        assert value == pytest.approx([fraction * (1 - 1 / n)], abs=1e-8)
-
-
 def test_no_performance():
     assert performance_lost([0.0], [0.5], 2, [1.0], [0.1]) == pytest.approx([-0.2], abs=1e-12)
-    assert performance_lost([0.0], [0.5], 2, [1.0], [0.1], variant="sierra") == [np.inf]
-    assert fractional_loss([0.0], [0.5], 2, [1.0], [0.1], variant="sierra") == [1.0]
     assert fractional_loss([0.0], [0.5], 2, [1.0], [0.1]) == [-np.inf]
-
-
-def test_the_program_has_its_own_reading_of_counts():
-    with pytest.raises(ValueError, match="converts to counts"):
-        lost(2, variant="sierra", t_lost_as="count")
 
 
 FLOOR = {"floor": 100.0 * np.pi, "reach": 2.0}

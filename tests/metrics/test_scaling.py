@@ -31,21 +31,19 @@ def test_uneven_intervals():
     assert scalability(perf1, 4, perf2, 8, reduce="last") == pytest.approx(0.0, abs=1e-9)
     assert scalability(perf1, 4, perf2, 8, variant="paper", reduce="total") == pytest.approx(-0.5, abs=1e-9)
     assert scalability(perf1, 4, perf2, 8) == pytest.approx(0.4, abs=1e-9)
-    assert scalability(perf1, 4, perf2, 8, variant="sierra") == pytest.approx(0.0, abs=1e-9)
-    assert scalability(perf1, 4, perf2, 8, variant="sierra", reduce="sum") == pytest.approx(-2.0, abs=1e-9)
 
 
 @pytest.mark.parametrize(
-    ("perf1", "perf2", "paper", "sierra", "corrected"),
-    [(0.0, 1.0, -INF, 0.0, 4 / 3), (0.0, 0.0, NAN, NAN, NAN), (1.0, 0.0, 4 / 3, 4 / 3, -INF)],
+    ("perf1", "perf2", "paper", "corrected"),
+    [(0.0, 1.0, -INF, 4 / 3), (0.0, 0.0, NAN, NAN), (1.0, 0.0, 4 / 3, -INF)],
 )
-def test_swarms_without_performance(perf1, perf2, paper, sierra, corrected):
-    for variant, expected in (("paper", paper), ("sierra", sierra), ("corrected", corrected)):
+def test_swarms_without_performance(perf1, perf2, paper, corrected):
+    for variant, expected in (("paper", paper), ("corrected", corrected)):
         value = scalability([perf1], 1, [perf2], 4, variant=variant)
         assert value == pytest.approx(expected, abs=1e-12, nan_ok=True), variant
 
 
-@pytest.mark.parametrize("variant", ["corrected", "paper", "sierra"])
+@pytest.mark.parametrize("variant", ["corrected", "paper"])
 @pytest.mark.parametrize(("n1", "n2"), [(4, 4), (8, 4), (8, 1)])
 def test_sizes_that_are_equal_or_in_the_wrong_order_are_refused_in_every_form(variant, n1, n2):
     with pytest.raises(CurveError, match=f"n1 < n2, got n1 = {n1} and n2 = {n2}"):
