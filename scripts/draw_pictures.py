@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from metrics.scoring.theory import theory_figures
 from PIL import Image
 
-from metrics.scoring.theory import theory_figures
 from swarm_forage_env import load_policy, plan_run, scenario
 from swarm_forage_env.inspect.film import record_run
 from swarm_forage_env.inspect.watch import Watch

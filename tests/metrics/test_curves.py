@@ -117,21 +117,16 @@ def test_more_interfering_robots_than_robots_are_refused():
 @pytest.mark.parametrize(
     "call",
     [
-        lambda: metrics.performance_lost([1.0], [0.1], 2, [1.0], [0.1], variant="printed"),
-        lambda: metrics.performance_lost([1.0], [0.1], 2, [1.0], [0.1], t_lost_as="percent"),
         lambda: metrics.spatial_emergence([1.0], [0.1], 2, [1.0], [0.1], 4, [1.0], [0.1], variant="printed"),
         lambda: metrics.scalability([1.0], 1, [1.0], 2, variant="printed"),
         lambda: metrics.scalability([1.0], 1, [1.0], 2, reduce="median"),
         lambda: metrics.scalability([1.0], 1, [1.0], 2, zero_policy="drop"),
         lambda: metrics.task_emergence([1.0], 1, [1.0], 2, reduce="median"),
-        lambda: metrics.dtw([1.0], [1.0], ground="time"),
         lambda: metrics.waveform("triangle", [0]),
         lambda: metrics.environment_scaling(0.5, 0.1, model="printed"),
-        lambda: metrics.adaptability([1.0], [1.0], variant="printed"),
         lambda: metrics.population_weight(metrics.PopulationRates(), horizon=10, weight="equilibrium"),
         lambda: metrics.aggregate([1.0], method="two_sigma"),
         lambda: metrics.bootstrap_measure(metrics.raw_performance, [[1.0]], order="per_curve"),
-        lambda: metrics.projective_performance([1.0], 1, [1.0], 2, direction="up"),
     ],
 )
 def test_unknown_options_are_refused_with_the_known_ones(call):

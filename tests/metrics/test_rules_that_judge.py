@@ -2,7 +2,7 @@
 
 import pytest
 
-from scripts.judge_rules import RULES, answers, share
+from tests.support.judged_rules import RULES, answers, share
 
 N_WORLDS = 60
 MOST_WRONG = 7 / N_WORLDS

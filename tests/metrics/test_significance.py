@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from metrics import CurveError, paired_tests
-from metrics.significance import holm, paired_p, pooled_p
+from metrics.significance import holm, paired_p
 
 NAN = math.nan
 
@@ -31,18 +31,6 @@ def test_holms_example_by_hand():
     np.testing.assert_allclose(holm(np.array([0.04, 0.01, NAN, 0.03])), [0.06, 0.03, NAN, 0.06])
     np.testing.assert_allclose(holm(np.array([0.9, 0.8])), [1.0, 1.0])
     assert holm(np.empty(0)).size == 0
-
-
-def test_the_pooled_test_by_hand():
-    # Variances 2 and 8, mean 5; means 3 and 1; t = 3 / sqrt(5 / 2) and 1 / sqrt(5 / 2) with 2 degrees of freedom.
-    found = pooled_p(np.array([[2.0, 4.0], [-1.0, 3.0]]))
-    expected = [2 * stats.t.sf(mean / math.sqrt(2.5), 2) for mean in (3.0, 1.0)]
-    np.testing.assert_allclose(found, expected)
-
-
-@pytest.mark.parametrize("differences", [[[1.0], [2.0]], [[1.0, 1.0], [2.0, 2.0]]], ids=["one pair", "no scatter"])
-def test_without_scatter_there_is_no_pooled_test(differences):
-    assert np.isnan(pooled_p(np.array(differences))).all()
 
 
 def test_levels_are_tested_together():

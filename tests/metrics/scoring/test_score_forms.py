@@ -21,15 +21,9 @@ SIZES = (
 ONE, TWO = np.array([[1.0, 2.0], [2.0, 1.0]]), np.array([[3.0, 5.0], [2.0, 6.0]])
 F1, F2 = np.full((2, 2), 0.1), np.full((2, 2), 0.2)
 BY_HAND = {
-    "raw_performance, sierra": lambda: [5.0, 6.0],
-    "efficiency, sierra": lambda: [2.5, 3.0],
     "t_lost_fraction": lambda: [0.2, 0.2],
-    "performance_lost, sierra": lambda: [5.0 * 0.2 - 2.0 * 0.1, 6.0 * 0.2 - 1.0 * 0.1],
     "spatial_emergence, paper": lambda: metrics.spatial_emergence(ONE, F1, 1, TWO, F2, 2, ONE, F1, variant="paper"),
-    "spatial_emergence, sierra": lambda: metrics.spatial_emergence(ONE, F1, 1, TWO, F2, 2, ONE, F1, variant="sierra"),
-    "task_emergence, sierra": lambda: [5.0 - 2 * 2.0, 6.0 - 2 * 1.0],
     "scalability, paper": lambda: [2 * (1 - 3.0) + 2 * (1 - 2.5), 2 * (1 - 1.0) + 2 * (1 - 6.0)],
-    "scalability, sierra": lambda: [2 * (1 - 2.5), 2 * (1 - 6.0)],
 }
 
 
@@ -40,7 +34,6 @@ def test_variants_of_measures_of_size_by_hand(label):
     assert found[-1].label == label
     np.testing.assert_allclose(list(found[-1].per_seed.values()), BY_HAND[label]())
     assert ("reverses the order" in found[-1].note) == (measure == "scalability")
-    assert variant != "sierra" or found[-1].relative is None
 
 
 def test_pseudo_values_by_hand():
@@ -55,7 +48,7 @@ def test_pseudo_values_by_hand():
 
 
 def test_a_measure_without_the_asked_forms_is_scored_once():
-    found = scored(*SIZES, measures=["time_emergence"], variants=("paper", "corrected", "sierra"))
+    found = scored(*SIZES, measures=["time_emergence"], variants=("paper", "corrected"))
     assert [score.label for score in found] == ["time_emergence"]
 
 
@@ -72,28 +65,6 @@ def test_unknown_variants_and_forms_are_refused(options, message):
         ScoreForms(**options)
 
 
-def test_variants_of_distances_by_hand():
-    """In the program's form the curves are rates on a clock of 100 s, so nothing is shifted in time."""
-    reactivity, printed, programmed, _, adaptability = scored(
-        *throttled(), measures=["reactivity", "adaptability"], variants=("corrected", "paper", "sierra")
-    )
-    assert [s.label for s in (printed, programmed, adaptability)] == [
-        "reactivity, paper",
-        "reactivity, sierra",
-        "adaptability, sierra",
-    ]
-    paper = metrics.reactivity(IDEAL, SLOWED, SIGNAL, 0.1, model="paper")
-    np.testing.assert_allclose(list(printed.per_seed.values()), paper)
-    followed = (1 - (np.array(SIGNAL) - 0.1)) * np.array(IDEAL)
-    np.testing.assert_allclose(list(programmed.per_seed.values()), metrics.aligned_l1(followed, SLOWED))
-    np.testing.assert_allclose(list(adaptability.per_seed.values()), metrics.aligned_l1(IDEAL, SLOWED))
-    first, second = np.triu_indices(3, k=1)
-    unwarped = metrics.aligned_l1(np.array(IDEAL)[first], np.array(IDEAL)[second])
-    assert adaptability.noise_floor == pytest.approx(unwarped.mean())
-    assert reactivity.unit == "objects (DTW)"
-    assert adaptability.unit == "objects (DTW with clock)"
-
-
 def test_the_printed_reactivity_does_not_exist_under_perfect_conditions():
     common = {"criterion": "throttle", "t_end_s": CLOCK}
     parts = (
@@ -101,18 +72,9 @@ def test_the_printed_reactivity_does_not_exist_under_perfect_conditions():
         rows(9, SLOWED, criterion_value=0.3, adversity=SIGNAL, **common),
     )
     (study,) = study_curves(table(*parts))
-    found, missing = score_study(study, ["reactivity"], ScoreForms(variants=("paper", "sierra")))
-    assert [score.variant for score in found] == ["sierra"]
+    found, missing = score_study(study, ["reactivity"], ScoreForms(variants=("paper",)))
+    assert found == ()
     assert missing == {"reactivity, paper": "the printed form divides by the ideal conditions, which are 0 here"}
-
-
-def test_the_programs_distances_need_a_clock():
-    common = {"criterion": "noise"}
-    parts = (rows(9, IDEAL, criterion_value=0.0, **common), rows(9, SLOWED, criterion_value=0.3, **common))
-    (study,) = study_curves(table(*parts))
-    assert (
-        "no column t_end_s" in score_study(study, None, ScoreForms(variants=("sierra",)))[1]["noise_robustness, sierra"]
-    )
 
 
 def test_floors_are_told_relative_to_performance():
@@ -183,25 +145,19 @@ def test_recorded_robots_have_to_be_there():
 
 
 def test_variants_of_population_robustness_by_hand():
-    first, second, programmed = scored(*failing(), measures=["population_robustness"], variants=("paper", "sierra"))
+    first, second = scored(*failing(), measures=["population_robustness"], variants=("paper",))
     rates = PopulationRates(lambda_bd=0.02, mu_bd=0.03)
     expected = metrics.population_robustness(SLOWED, IDEAL, rates, horizon=400.0, weight="paper")
     np.testing.assert_allclose(list(first.per_seed.values()), expected)
     assert second.beside["weight"] == pytest.approx((400 - (1 / 0.02 + 1 / 0.06)) / 400)
-    assert programmed.at == "population 2"  # against the lowest rate, whose time away is twice as long
-    assert programmed.beside["weight"] == pytest.approx(2.0)
-    last = np.array(SLOWED)[:, -1]
-    np.testing.assert_allclose(list(programmed.per_seed.values()), last - 2.0 * last)
-    assert (programmed.unit, programmed.relative) == ("objects in the last interval", None)
 
 
 def test_forms_of_population_robustness_that_do_not_exist_say_why():
     reference, level, _ = failing()
     (study,) = study_curves(table(reference, [{**row, "repairs_per_s": 0.01} for row in level]))
-    found, missing = score_study(study, ["population_robustness"], ScoreForms(variants=("paper", "sierra")))
+    found, missing = score_study(study, ["population_robustness"], ScoreForms(variants=("paper",)))
     assert found == ()
     assert "more returns than departures" in missing["population_robustness, paper"]
-    assert "one level of population dynamics only" in missing["population_robustness, sierra"]
 
 
 def test_bands_are_shown_on_request_and_always_in_json():

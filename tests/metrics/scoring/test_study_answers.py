@@ -1,14 +1,13 @@
 """What studies say, asked in Python: verdicts, reports and states as tables in every form."""
 
-import json
 from dataclasses import replace
 
 import pytest
 
-from metrics import CLAIMS, CurveError, report, verdict
+from metrics import CLAIMS, CurveError, verdict
 from metrics.claims import INTUITIONS
 from metrics.claims.checking import READINGS
-from swarm_forage_env.studies.description import describe, paper_sets, status
+from swarm_forage_env.studies.description import paper_sets, status
 from swarm_forage_env.studies.study import Axis
 from tests.support.made_tables import made_study, made_table
 
@@ -77,21 +76,8 @@ def test_a_study_under_the_same_rules_twice_is_refused():
 
 def test_a_verdict_needs_one_of_the_papers_sets():
     other = made_table(made_study("mine"), lambda place: 1.0)
-    with pytest.raises(CurveError, match="'swarm-forage study plot' and 'report' take any study"):
+    with pytest.raises(CurveError, match="'swarm-forage study plot' takes any study"):
         verdict(other)
-
-
-def test_a_report_has_its_tables_in_every_form(tmp_path):
-    pytest.importorskip("matplotlib")
-    found = report(table_of())
-    titles = [sheet.title for sheet in found.sheets()]
-    assert titles[:2] == ["claims", "intuitions"]
-    assert titles[-3:] == ["what it took", "versions", "make the runs again"]
-    for ending in ("md", "txt", "csv", "json"):
-        found.write(tmp_path / f"report.{ending}")
-    assert "**claims**" in (tmp_path / "report.md").read_text()
-    tables = json.loads((tmp_path / "report.json").read_text())["tables"]
-    assert tables[0]["header"][:2] == ["name", "text"]
 
 
 def test_a_status_tells_what_is_missing():
@@ -106,4 +92,3 @@ def test_a_status_tells_what_is_missing():
 def test_sets_and_studies_are_described():
     sets = paper_sets("reduced").to_mapping()["sets"]
     assert sets["S2a"]["left_out"]["walk_probability"] == ["0.026"]
-    assert describe(made_study()).to_mapping()["n_conditions"] == len(made_study().places)

@@ -56,10 +56,10 @@ def test_the_lowest_rates_may_be_the_reference(made):
     assert [(reference.value, level.value) for reference, level in pairs] == [(1.0, 2.0), (1.0, 4.0)]
     assert all(reference.rates.lambda_bd == pytest.approx(0.005) for reference, _ in pairs), "0.001 per tick of 0.2 s"
     scores, _ = score_study(
-        line.curves, ["population_robustness"], ScoreForms(variants=("corrected", "sierra"), forms=("marginal",))
+        line.curves, ["population_robustness"], ScoreForms(variants=("corrected",), forms=("marginal",))
     )
     assert [(score.variant, score.x) for score in scores] == [
-        ("corrected", 2.0), ("corrected", 4.0), ("sierra", 2.0), ("sierra", 4.0)]  # fmt: skip
+        ("corrected", 2.0), ("corrected", 4.0)]  # fmt: skip
 
 
 def test_lost_runs_are_counted_and_another_performance_is_read(made, tmp_path):

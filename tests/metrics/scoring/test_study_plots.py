@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from metrics.scoring import study_panels
-from metrics.scoring.study_plots import caption, draw_figure, draw_map, limit_height, study_figures
+from metrics.scoring.study_plots import caption, draw_figure, limit_height, study_figures
 from metrics.statistics import aggregate
 from swarm_forage_env.studies.study import Axis
 from tests.support.made_tables import FOUR, made_study, made_table
@@ -75,7 +75,6 @@ def test_many_dots_are_an_image_in_vector_pictures(tmp_path):
 
 def test_one_level_is_drawn(tmp_path):
     figure = figures(Axis(name="population_size", values=(2,)))[0]
-    assert not figure.has_map
     draw_figure(figure, [tmp_path / "one.svg"])
     assert "2" in words_in(tmp_path / "one.svg")
 
@@ -198,22 +197,11 @@ def test_rates_of_a_population_are_shown_as_events(tmp_path):
     assert "departures λ, robots per 1,000 s" in words_in(tmp_path / "rates.svg")
 
 
-def test_two_axes_give_a_panel_per_value_and_a_map(tmp_path):
+def test_two_axes_give_a_panel_per_value(tmp_path):
     figure = figures(WALKING, SIZES, name="S2a")[0]
     assert [panel.others for panel in figure.panels] == [{"walk_probability": 0.0}, {"walk_probability": 0.3}]
     draw_figure(figure, [tmp_path / "panels.svg"])
     assert "walk probability 0.3" in words_in(tmp_path / "panels.svg")
-    assert figure.has_map
-    draw_map(figure, [tmp_path / "map.svg"])
-    mean = np.mean(figure.panels[1].scores["stochx"][2])
-    assert {"CRW", "STOCHX", "walk probability", f"{mean:.3g}"} <= {*words_in(tmp_path / "map.svg")}
-
-
-def test_words_on_the_first_axis_have_no_map():
-    caches = Axis(name="caches", values=("none", "static"))
-    figure = figures(caches, SIZES, settings={"n_objects": 60})[0]
-    assert len(figure.panels) == 2
-    assert not figure.has_map
 
 
 def test_a_study_over_a_field_shows_performance():

@@ -292,15 +292,6 @@ def test_where_performance_falls_spatial_emergence_is_marked_and_noted():
     assert "spatial_emergence, N = 2 to 4: performance is lower than that of the next smaller swarm" in shown
 
 
-def test_the_programs_form_is_not_weighted_with_performance_and_has_no_mark():
-    forms = ("corrected", "paper", "sierra")
-    found = [score for score in scored(*COLLAPSE, measures=["spatial_emergence"], variants=forms) if score.x == 4]
-    # The program compares shares of performance: 2 * 0.2 - 0.6 = -0.2, which is no organisation.
-    assert [score.summary.mean for score in found] == pytest.approx([2.24, 2.24, -0.2])
-    assert [score.is_doubtful for score in found] == [True, True, False]
-    assert found[2].note == ""
-
-
 def test_robot_time_and_the_parts_of_task_emergence_are_scored_beside_it():
     found = scored(*COLLAPSE, measures=["time_emergence", "task_emergence", "interference_gain", "undisturbed_gain"])
     values = {score.measure: score.summary.mean for score in found if score.x == 4}
@@ -363,11 +354,3 @@ def test_the_marginal_form_of_spatial_emergence_needs_no_run_of_one_robot():
     (with_one,) = (score for score in scored(*COLLAPSE, measures=["spatial_emergence"]) if score.x == 4)
     assert found[0].summary.mean == pytest.approx(with_one.summary.mean)
     assert set(missing) == {"spatial_emergence, interactive", "spatial_emergence, interactive, paper"}
-
-
-def test_the_programs_form_takes_the_first_size_for_one_robot():
-    (score,) = scored(*COLLAPSE[1:], measures=["spatial_emergence"], variants=("sierra",), forms=("interactive",))
-    few, many = ([8.0], [0.2]), ([1.6], [0.6])
-    expected = metrics.spatial_emergence(*few, 2, *many, 4, *few, variant="sierra", n_reference=2)
-    assert score.summary.mean == pytest.approx(float(expected))
-    assert (score.label, score.unit) == ("spatial_emergence, interactive, sierra", "share of performance")
