@@ -137,7 +137,7 @@ def vector_env(ticks: int, *, n_arenas: int = 1, **fields: Any) -> Measure:
 
         import swarm_forage_env  # noqa: F401 - registers the environments
 
-        envs: Any = gymnasium.make_vec(f"swarm_forage/{SMALL}-v2", n_arenas=n_arenas, physics=engine, **fields)
+        envs: Any = gymnasium.make_vec(f"swarm_forage/{SMALL}-v0", n_arenas=n_arenas, physics=engine, **fields)
         envs.reset(seed=0)
         drawn = np.random.default_rng(0).uniform(-1, 1, (100, envs.num_envs, 3)).astype(np.float32)
         n_ticks = round(ticks * effort)

@@ -170,7 +170,7 @@ def main() -> None:
     except swarm_forage_env.ConfigError as error:
         raise SystemExit(str(error)) from error
     arenas = {"n_arenas": args.n_arenas, "n_robots": args.n_robots, "interface": INTERFACE, **EPISODE}
-    envs = gymnasium.make_vec("swarm_forage/warehouse_small-v2", **arenas)
+    envs = gymnasium.make_vec("swarm_forage/warehouse_small-v0", **arenas)
     agent = Agent(flatdim(envs.single_observation_space), flatdim(envs.single_action_space))
     optimizer = torch.optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
     steps, until, spent_s = 0, 0, 0.0

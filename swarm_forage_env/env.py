@@ -41,7 +41,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - PettingZoo types it as an attribute of instances
-        "name": "swarm_forage_v2",
+        "name": "swarm_forage_v0",
         "render_modes": ["rgb_array", "human"],
         "render_fps": 5,
         "is_parallelizable": True,

@@ -27,7 +27,7 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
     `SwarmVectorEnv` is faster.
     """
 
-    metadata: dict[str, Any] = {**ForageEnv.metadata, "name": "swarm_forage_learner_v1"}  # noqa: RUF012 - as PettingZoo
+    metadata: dict[str, Any] = {**ForageEnv.metadata, "name": "swarm_forage_learner_v0"}  # noqa: RUF012 - as PettingZoo
 
     @constructor_takes(plan_arena)
     def __init__(self, *args: Any, **options: Any) -> None:

@@ -82,7 +82,7 @@ class ArenaPlan:
 DEFAULT_SCENARIO = "warehouse_small"
 """The world of environments that are told nothing about it."""
 SAMPLED = "sampled"
-"""Stands for the scenario in the id swarm_forage/sampled-v2, whose worlds a sampler draws."""
+"""Stands for the scenario in the id swarm_forage/sampled-v0, whose worlds a sampler draws."""
 
 
 def plan_arena(
@@ -121,7 +121,7 @@ def plan_arena(
     if sampler is None:
         if scenario == SAMPLED:
             raise ConfigError(
-                "Expected a sampler for swarm_forage/sampled-v2, got none; give sampler=ScenarioSampler(...)."
+                "Expected a sampler for swarm_forage/sampled-v0, got none; give sampler=ScenarioSampler(...)."
             )
         config = chosen_scenario(scenario or DEFAULT_SCENARIO, overrides)
     else:
@@ -130,7 +130,7 @@ def plan_arena(
         if given:
             raise ConfigError(
                 f"Expected either a sampler, which decides on the worlds, or {', '.join(given)}; got both. Write it "
-                "into the sampler, where all worlds can share it. By id, make swarm_forage/sampled-v2."
+                "into the sampler, where all worlds can share it. By id, make swarm_forage/sampled-v0."
             )
         config = sampler.largest
     chosen = chosen_interface(interface).for_scenario(config)

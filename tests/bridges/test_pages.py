@@ -148,7 +148,7 @@ def test_torchrl_takes_the_vector_environments():
     import gymnasium
     from torchrl.envs import GymWrapper
 
-    envs = gymnasium.make_vec("swarm_forage/warehouse_small-v2", n_arenas=2, n_robots=3, n_objects=20, max_cycles=5)
+    envs = gymnasium.make_vec("swarm_forage/warehouse_small-v0", n_arenas=2, n_robots=3, n_objects=20, max_cycles=5)
     assert GymWrapper(envs).rollout(3)["next", "reward"].shape == (6, 3, 1)
 
 

@@ -381,7 +381,7 @@ def test_info_shows_every_field_space_and_slice_of_a_scenario(command, name):
     assert code == 0
     words = out.split()
     assert set(field_sections()) <= set(words)
-    assert command("info", f"swarm_forage/{name}-v2")[1] == out, "by its environment id"
+    assert command("info", f"swarm_forage/{name}-v0")[1] == out, "by its environment id"
     for part in ("Box(-1.0, 1.0, (111,), float32)", "Box(-1.0, 1.0, (3,), float32)", "los_cache", "proximity"):
         assert part in out
 

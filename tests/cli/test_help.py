@@ -10,7 +10,7 @@ from swarm_forage_env.cli.app import loaded
 from swarm_forage_env.cli.commands import COMMANDS
 
 ALL = [command for group in COMMANDS.values() for command in group]
-HEAVY = ("numpy", "polars", "typer", "rich", "gymnasium", "pettingzoo", "swarm_forage_env.scenarios")
+HEAVY = ("numba", "polars", "typer", "rich", "swarm_forage_env.world")
 COLUMNS = 80
 
 

@@ -107,7 +107,7 @@ def test_copies_go_on_alike():
 def test_learners_see_them_through_every_view(observation):
     fields: dict[str, Any] = {"n_robots": 6, "own_sensors": ("both",), "interface": {"observation": observation}}
     dicts = parallel_env("warehouse_small", **fields)
-    rows = gymnasium.make_vec("swarm_forage/warehouse_small-v2", **fields)
+    rows = gymnasium.make_vec("swarm_forage/warehouse_small-v0", **fields)
     per_agent = np.stack(list(dicts.reset(seed=3)[0].values()))
     np.testing.assert_array_equal(per_agent, rows.reset(seed=3)[0])
     assert per_agent.shape[1] == {"full": 113, "compact": 25}[observation]

@@ -7,7 +7,6 @@ from gymnasium import spaces
 from pettingzoo.test import api_test, max_cycles_test, parallel_api_test, parallel_seed_test, seed_test, state_test
 from pettingzoo.utils.env import AECEnv
 
-import swarm_forage_env
 from swarm_forage_env import SCENARIO_NAMES
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.policy import ActionError
@@ -60,11 +59,11 @@ with_ids = pytest.mark.skipif(not hasattr(pettingzoo, "make"), reason="needs Pet
 @with_ids
 @pytest.mark.parametrize("name", SCENARIO_NAMES)
 def test_environments_are_made_by_id(name):
-    parallel = pettingzoo.make("parallel", f"swarm_forage/{name}-v2", caches="dynamic", **SMALL)
+    parallel = pettingzoo.make("parallel", f"swarm_forage/{name}-v0", caches="dynamic", **SMALL)
     assert isinstance(parallel.unwrapped, ForageEnv)
     assert parallel.unwrapped.scenario.name == name
     assert parallel.unwrapped.scenario.caches == "dynamic"
-    turns = pettingzoo.make("aec", f"swarm_forage/{name}-v2", **SMALL)
+    turns = pettingzoo.make("aec", f"swarm_forage/{name}-v0", **SMALL)
     assert isinstance(turns, AECEnv)
     assert turns.unwrapped.scenario.name == name
     assert len(turns.possible_agents) == 5
@@ -72,9 +71,9 @@ def test_environments_are_made_by_id(name):
 
 def test_metadata_names_a_versioned_environment():
     world = parallel_env(**SMALL)
-    assert world.metadata["name"] == "swarm_forage_v2"
+    assert world.metadata["name"] == "swarm_forage_v0"
     assert world.metadata["is_parallelizable"]
-    assert str(env(**SMALL)) == "swarm_forage_v2"
+    assert str(env(**SMALL)) == "swarm_forage_v0"
 
 
 # Spaces and agents
@@ -389,10 +388,5 @@ def test_one_factory_makes_all_forms():
 @with_ids
 def test_an_id_makes_what_the_factory_makes():
     throttle = "throttle:waveform=constant,amplitude=0.1"
-    by_id = pettingzoo.make("parallel", "swarm_forage/warehouse_small-v2", wrappers=[throttle], **SMALL)
+    by_id = pettingzoo.make("parallel", "swarm_forage/warehouse_small-v0", wrappers=[throttle], **SMALL)
     assert isinstance(by_id, Throttle)
-
-
-def test_an_older_pettingzoo_has_no_ids(monkeypatch):
-    monkeypatch.delattr(pettingzoo, "register", raising=False)
-    swarm_forage_env._register_with_pettingzoo()

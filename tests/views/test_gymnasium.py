@@ -16,12 +16,12 @@ from swarm_forage_env.views.pettingzoo import parallel_env
 
 @pytest.mark.parametrize("name", SCENARIO_NAMES)
 def test_passes_the_checker_of_gymnasium(name):
-    check_env(gymnasium.make(f"swarm_forage/{name}-v2").unwrapped, skip_render_check=True)
+    check_env(gymnasium.make(f"swarm_forage/{name}-v0").unwrapped, skip_render_check=True)
 
 
 @pytest.mark.parametrize("name", SCENARIO_NAMES)
 def test_is_made_by_its_id(name):
-    env = gymnasium.make(f"swarm_forage/{name}-v2", max_cycles=2)
+    env = gymnasium.make(f"swarm_forage/{name}-v0", max_cycles=2)
     obs, info = env.reset(seed=1)
     n_robots = env.unwrapped.forage_env.scenario.robots.n_robots
     assert env.unwrapped.forage_env.scenario.name == name
@@ -74,7 +74,7 @@ INTERFACES = {
 
 @pytest.mark.parametrize("interface", INTERFACES.values(), ids=INTERFACES)
 def test_passes_the_checker_with_an_interface(interface):
-    env = gymnasium.make("swarm_forage/warehouse_small-v2", interface=interface, n_robots=4)
+    env = gymnasium.make("swarm_forage/warehouse_small-v0", interface=interface, n_robots=4)
     check_env(env.unwrapped, skip_render_check=True)
 
 

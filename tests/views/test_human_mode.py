@@ -66,7 +66,7 @@ def test_a_window_that_the_user_closes_stays_closed(display):
 
 
 def test_the_joint_view_and_learners_have_a_window(display):
-    with gymnasium.make("swarm_forage/warehouse_small-v2", n_robots=5, render_mode="human") as env:
+    with gymnasium.make("swarm_forage/warehouse_small-v0", n_robots=5, render_mode="human") as env:
         env.reset(seed=1)
         assert display.get_init()
         env.step(env.action_space.sample())

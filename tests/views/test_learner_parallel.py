@@ -125,7 +125,7 @@ def test_actions_that_would_have_to_be_stretched_or_cut_are_refused(interface, a
 
 
 def test_an_interface_is_asked_for_by_id():
-    env_id, options = "swarm_forage/warehouse_small-v2", {"n_robots": 3, "max_cycles": 9}
+    env_id, options = "swarm_forage/warehouse_small-v0", {"n_robots": 3, "max_cycles": 9}
     parallel = pettingzoo.make("parallel", env_id, interface=INTERFACES["numbered"], **options)
     assert isinstance(parallel.unwrapped, ParallelLearnerEnv)
     assert parallel.action_space("robot_0") == spaces.Discrete(11)
@@ -135,7 +135,7 @@ def test_an_interface_is_asked_for_by_id():
 
 
 def test_what_disturbs_the_swarm_is_asked_for_by_id_with_or_without_an_interface():
-    env_id, words = "swarm_forage/warehouse_small-v2", ["sensor_noise:sigma=0.1"]
+    env_id, words = "swarm_forage/warehouse_small-v0", ["sensor_noise:sigma=0.1"]
     plain = pettingzoo.make("parallel", env_id, n_robots=3, wrappers=words)
     assert isinstance(plain, SensorNoise)
     learner = pettingzoo.make("parallel", env_id, n_robots=3, wrappers=words, interface={})

@@ -192,7 +192,7 @@ def test_a_snapshot_of_a_drawn_world_needs_a_sampler():
 
 
 def test_the_central_view_is_padded():
-    env = gymnasium.make("swarm_forage/sampled-v2", sampler=WORLDS, interface=COMPACT).unwrapped
+    env = gymnasium.make("swarm_forage/sampled-v0", sampler=WORLDS, interface=COMPACT).unwrapped
     assert isinstance(env, JointForageEnv)
     obs, info = env.reset(seed=3)
     n_robots = sizes([3])[0]
@@ -205,7 +205,7 @@ def test_the_central_view_is_padded():
 
 
 def test_vector_environments_of_gymnasium_have_spare_rows():
-    envs = gymnasium.make_vec("swarm_forage/sampled-v2", num_envs=12, sampler=WORLDS, interface=COMPACT)
+    envs = gymnasium.make_vec("swarm_forage/sampled-v0", num_envs=12, sampler=WORLDS, interface=COMPACT)
     assert isinstance(envs, SwarmVectorEnv)
     obs, infos = envs.reset(seed=[3, 5])
     expected = np.arange(6) < np.array(sizes([3, 5]))[:, None]
@@ -219,6 +219,6 @@ def test_a_sampler_decides_alone():
     with pytest.raises(ConfigError, match=r"either a sampler.* or wrappers"):
         SwarmVectorEnv(sampler=WORLDS, wrappers=["sensor_noise:sigma=0.1"])
     with pytest.raises(ConfigError, match="Expected a sampler for"):
-        pettingzoo.make("parallel", "swarm_forage/sampled-v2")
+        pettingzoo.make("parallel", "swarm_forage/sampled-v0")
     with pytest.raises(ConfigError, match="ScenarioSampler"):
         parallel_env(sampler={"worlds": []})

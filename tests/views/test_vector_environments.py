@@ -28,7 +28,7 @@ INTERFACES = (
 @pytest.mark.parametrize("interface", INTERFACES, ids=["full", "driven", "numbered"])
 @pytest.mark.parametrize("name", swarm_forage_env.SCENARIO_NAMES)
 def test_make_vec_gives_one_sub_environment_per_robot(name, interface):
-    env_id = f"swarm_forage/{name}-v2"
+    env_id = f"swarm_forage/{name}-v0"
     envs = gymnasium.make_vec(env_id, num_envs=12, n_robots=6, interface=interface, max_cycles=9)
     assert envs.num_envs == 12
     assert envs.metadata["autoreset_mode"] == envs.autoreset_mode == AutoresetMode.SAME_STEP
@@ -47,7 +47,7 @@ def test_make_vec_gives_one_sub_environment_per_robot(name, interface):
 
 
 def test_the_number_of_sub_environments_is_a_whole_number_of_swarms():
-    env_id = "swarm_forage/warehouse_small-v2"
+    env_id = "swarm_forage/warehouse_small-v0"
     assert gymnasium.make_vec(env_id).num_envs == 50
     assert gymnasium.make_vec(env_id, n_arenas=2, n_robots=4).num_envs == 8
     assert gymnasium.make_vec(env_id, num_envs=8, n_arenas=2, n_robots=4).n_arenas == 2
@@ -62,7 +62,7 @@ def test_the_number_of_sub_environments_is_a_whole_number_of_swarms():
 
 def test_make_vec_takes_what_disturbs_the_swarm_under_a_name_of_its_own():
     noise, slip = parse_wrapper("sensor_noise:sigma=0.1"), parse_wrapper("actuator_noise:sigma=0.1")
-    envs = gymnasium.make_vec("swarm_forage/warehouse_small-v2", n_robots=4, swarm_wrappers=[noise])
+    envs = gymnasium.make_vec("swarm_forage/warehouse_small-v0", n_robots=4, swarm_wrappers=[noise])
     clean = SwarmVectorEnv(n_robots=4)
     assert not np.array_equal(envs.reset(seed=0)[0], clean.reset(seed=0)[0])
     both = SwarmVectorEnv(n_robots=4, wrappers=[slip, noise])
@@ -80,7 +80,7 @@ def test_words_of_the_command_line_and_plain_values_are_taken_everywhere():
         envs = SwarmVectorEnv(**choices, wrappers=wrappers)
         joint = JointForageEnv(**choices, wrappers=iter(wrappers))
         parallel = ParallelLearnerEnv(**choices, wrappers=wrappers)
-        made = gymnasium.make_vec("swarm_forage/warehouse_small-v2", **choices, swarm_wrappers=wrappers)
+        made = gymnasium.make_vec("swarm_forage/warehouse_small-v0", **choices, swarm_wrappers=wrappers)
         assert envs.single_action_space == parallel.action_space("robot_0") == made.single_action_space
         rows, _ = parallel.reset(seed=0)
         seen += [envs.reset(seed=0)[0], joint.reset(seed=0)[0], np.stack(list(rows.values())), made.reset(seed=0)[0]]
@@ -126,7 +126,7 @@ def test_numbers_that_are_not_whole_are_no_actions():
 
 
 def test_other_vectorizers_take_the_joint_view():
-    envs = gymnasium.make_vec("swarm_forage/warehouse_small-v2", num_envs=2, vectorization_mode="sync", n_robots=3)
+    envs = gymnasium.make_vec("swarm_forage/warehouse_small-v0", num_envs=2, vectorization_mode="sync", n_robots=3)
     obs, _ = envs.reset(seed=0)
     assert obs.shape[:2] == (2, 3)
 

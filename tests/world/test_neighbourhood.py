@@ -184,8 +184,8 @@ def test_arenas_together_are_what_they_are_alone(observation, wrappers):
 def test_learners_see_and_say_them_through_every_view(observation):
     fields: dict[str, Any] = {**SMALL, **BOTH, "interface": {"observation": observation}}
     dicts = parallel_env("warehouse_small", **fields)
-    rows = gymnasium.make_vec("swarm_forage/warehouse_small-v2", **fields)
-    joint = gymnasium.make("swarm_forage/warehouse_small-v2", **fields)
+    rows = gymnasium.make_vec("swarm_forage/warehouse_small-v0", **fields)
+    joint = gymnasium.make("swarm_forage/warehouse_small-v0", **fields)
     size = {"full": 111, "compact": 23}[observation] + 12 + 3
     assert dicts.action_space("robot_0").shape == rows.single_action_space.shape == (5,)
     assert joint.action_space.shape == (N_ROBOTS, 5)

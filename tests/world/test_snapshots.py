@@ -235,7 +235,7 @@ def test_snapshots_of_other_versions_are_refused(monkeypatch):
     snapshot = env.snapshot()
     monkeypatch.setattr("swarm_forage_env.env.package_version", lambda: "9.0")
     with pytest.raises(
-        SnapshotError, match=r"version is swarm_forage_v2 of \S+ there and swarm_forage_v2 of 9\.0 here"
+        SnapshotError, match=r"version is swarm_forage_v0 of \S+ there and swarm_forage_v0 of 9\.0 here"
     ):
         env.restore(snapshot)
 

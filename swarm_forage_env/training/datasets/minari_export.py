@@ -128,7 +128,7 @@ def export_minari(folder: str | Path, dataset_id: str, **about: Any) -> "MinariD
         }
         episodes.append(EpisodeBuffer(id=number, seed=run.seed, infos={"active": steps.active}, **arrays))
     env_spec = EnvSpec(
-        f"swarm_forage/{spec.scenario.name}-v2",
+        f"swarm_forage/{spec.scenario.name}-v0",
         entry_point=f"{__name__}:{recorded_env.__name__}",
         kwargs={"spec": spec.to_mapping(), "interface": asdict(dataset.card.interface)},
     )
