@@ -58,7 +58,7 @@ def _named(words: Sequence[str]) -> Command:
     below, first = _below(words[0]), _BY_WORDS[words[0]]
     if below and words[1:] and not words[1].startswith("-"):
         if not first.place:
-            _check_known(f"command of {words[0]}:", words[1:2], below, f"{words[0]} ")
+            _check_known(f"command of {words[0]}:", words[1:2], below)
         return below.get(words[1], first)
     return first
 
@@ -68,16 +68,11 @@ def _below(word: str) -> dict[str, Command]:
     return {name.split()[1]: command for name, command in _BY_WORDS.items() if name.startswith(f"{word} ")}
 
 
-def _check_known(what: str, words: Iterable[str], known: Iterable[str], before: str = "") -> None:
-    """Refuse a word that is not known, and say which one is right; `before` stands before it."""
+def _check_known(what: str, words: Iterable[str], known: Iterable[str]) -> None:
+    """Refuse a word that is not known, and say which one may be meant."""
     for word in words:
         if word not in known:
             from swarm_forage_env._internal.wording import suggestion
-            from swarm_forage_env.cli.former_words import COMMANDS as FORMER
-
-            right = FORMER.get(f"{before}{word}")
-            if right is not None:
-                raise WrongWordsError(f"No such {what} {word!r}; it is 'swarm-forage {right}'.")
 
             raise WrongWordsError(f"No such {what} {word!r}.{suggestion(word, known)}")
 

@@ -17,7 +17,6 @@ from typing import Any
 import typer
 
 from swarm_forage_env._internal.faults import PACKAGES, place_in_code_of_user
-from swarm_forage_env.cli.former_words import right_option
 from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_UNFORESEEN, EXIT_USAGE, complain
 from swarm_forage_env.cli.signals import EXIT_INTERRUPTED
 
@@ -66,12 +65,6 @@ def end(error: BaseException, words: Sequence[str] = ()) -> int:
 
 def _about_words(error: Any) -> str:
     """Return what is wrong with the words of a command, for typer, in the style of our other errors."""
-    wrong = getattr(error, "option_name", "")
-    context = error.ctx  # none where an option lacks its value
-    known = [] if context is None else [word for option in context.command.params for word in option.opts]
-    right = right_option(wrong, known)
-    if right:
-        return f"No such option: {wrong}; for this command it is {right}."
     said = next((theirs for theirs in _WANTED if error.message.startswith(theirs)), None)
     if said is None:
         help_text = getattr(getattr(error, "param", None), "help", "") if not error.message else ""  # a missing option

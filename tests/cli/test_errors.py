@@ -87,12 +87,9 @@ def test_the_debug_variable_shows_the_traceback(command, monkeypatch):
             ("run", "--horizon", "long"),
             "Expected --horizon to be a number, got 'long'. It is: Simulated seconds",
         ),
-        (("study", "run", "S1a", "--workers", "2"), "No such option: --workers; for this command it is --jobs."),
         (("list", "--jobs", "2"), "No such option: --jobs"),
         (("train", "--plan"), "Option '--plan' requires an argument."),
         (("run", "crw", "--seeds"), "Option '--seeds' requires an argument."),
-        (("train", "--gamma", "0.9"), "No such option: --gamma; for this command it is --arg gamma=NUMBER."),
-        (("train", "--temperature", "0.5"), "No such option: --temperature; for this command it is --plan FILE, with"),
     ],
 )
 def test_wrong_words_are_told_as_other_errors_are(command, words, told):

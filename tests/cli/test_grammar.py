@@ -1,4 +1,4 @@
-"""One word means one thing in all commands: which options they have, and what is said of former and wrong words."""
+"""One word means one thing in all commands: which options they have."""
 
 import inspect
 from dataclasses import dataclass
@@ -10,8 +10,6 @@ import typer
 
 from swarm_forage_env.cli.app import loaded
 from swarm_forage_env.cli.commands import COMMANDS
-from swarm_forage_env.cli.former_words import COMMANDS as FORMER
-from swarm_forage_env.cli.former_words import OPTIONS, right_option
 from swarm_forage_env.cli.options import spread
 
 ONE_RUN = ("record", "replay", "watch", "saliency")
@@ -87,33 +85,6 @@ def test_an_option_takes_a_value_in_all_commands_or_in_none():
             for word in option.opts:
                 found.setdefault(word, set()).add(bool(getattr(option, "is_flag", False)))
     assert [word for word, flags in found.items() if len(flags) > 1] == []
-
-
-@pytest.mark.parametrize("word", OPTIONS)
-def test_a_former_option_is_answered_where_a_command_has_the_right_one(command, word):
-    answered = 0
-    for words, one in ALL.items():
-        known = {option for param in one.params for option in param.opts}
-        right = right_option(word, known)
-        if not right or word in known:
-            continue
-        answered += 1
-        if answered == 1:
-            code, out, err = command(*words.split(), word, "x")
-            assert (code, out) == (2, "")
-            assert err == f"swarm-forage: No such option: {word}; for this command it is {right}.\n"
-    assert answered, f"no command answers {word}"
-
-
-@pytest.mark.parametrize("words", FORMER)
-def test_a_former_command_is_answered(command, words):
-    code, out, err = command(*words.split())
-    assert (code, out) == (2, "")
-    *_, word = words.split()
-    assert err.startswith("swarm-forage: No such command")
-    assert err.endswith(f"{word!r}; it is 'swarm-forage {FORMER[words]}'.\n")
-    assert FORMER[words] in ALL or FORMER[words].split()[0] == "list"
-    assert words not in ALL
 
 
 def test_a_folder_is_no_file(command):

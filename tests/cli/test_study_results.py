@@ -167,7 +167,6 @@ def test_what_a_report_refuses(ran, monkeypatch):
     for words, message in (
         (("done", "--file", "report.htm"), "ending in .html, .md, .txt, .csv, .json, got 'report.htm'"),
         (("done", "done"), "Expected each study once under the same rules, got S1a (described)"),
-        (("done", "--out", "report.html"), "No such option: --out; for this command it is --file."),
     ):
         code, _, err = ran("study", "report", *words)
         assert code == 2
