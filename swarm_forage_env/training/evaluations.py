@@ -5,7 +5,6 @@ for all. They are readable without the library that trained.
 """
 
 import csv
-import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
@@ -60,19 +59,16 @@ class Evaluation:
     """The same of the baseline."""
     interference_fraction: float
     """Mean fraction of active robots in interference."""
+    cpu_time_s: float
+    """Processor time spent on the training, s, counted on like `wall_time_s`, without that of further processes."""
     worlds: tuple[WorldEvaluation, ...] = ()
     """How it did in each of several worlds; none where there is only that of the plan."""
-    cpu_time_s: float = math.nan
-    """Processor time spent on the training, s, counted on like `wall_time_s`, but for further processes of its arenas;
-    NaN where a training of an earlier day did not tell it."""
 
     def to_mapping(self) -> dict[str, Any]:
-        """Return the evaluation as plain values, with `worlds` and `cpu_time_s` only where they are known."""
+        """Return the evaluation as plain values, with `worlds` only where there are several."""
         plain = asdict(self)
         if not self.worlds:
             del plain["worlds"]
-        if math.isnan(self.cpu_time_s):
-            del plain["cpu_time_s"]
         return plain
 
 
@@ -239,8 +235,8 @@ def evaluated(
         performance=performance,
         baseline=1.0 if plan.evaluation.worlds else worlds[0].baseline,
         interference_fraction=interference,
-        worlds=worlds if plan.evaluation.worlds else (),
         cpu_time_s=round(cpu_time_s, 1),
+        worlds=worlds if plan.evaluation.worlds else (),
     )
 
 

@@ -67,7 +67,7 @@ class KeptNetwork:
     interference_fraction: float
     """Mean fraction of active robots in interference."""
     cpu_time_s: float
-    """Processor time of the whole training, s; NaN where it is not known."""
+    """Processor time of the whole training, s."""
 
 
 def kept_network(training: TrainingCurve, folder: Path) -> KeptNetwork:
@@ -164,7 +164,7 @@ class SeedTrainings(Answer):
                 str(one.seed),
                 f"{one.steps:,}",
                 *(column.text(getattr(one, column.name)) for column in columns),
-                "-" if plain(one.cpu_time_s) is None else duration(one.cpu_time_s),
+                duration(one.cpu_time_s),
             )
             for one in self.kept()
         ]
@@ -195,7 +195,7 @@ class SeedTrainings(Answer):
             "algorithm": self.plan.algorithm,
             "place": place_of(self.plan),
             "performance": counted_in(self.plan),
-            "trainings": [asdict(one) | {"cpu_time_s": plain(one.cpu_time_s)} for one in self.kept()],
+            "trainings": [asdict(one) for one in self.kept()],
             "means": {
                 name: {"mean": of.mean, "lower": plain(of.lower), "upper": plain(of.upper), "n": of.n_used}
                 for name, of in self.means().items()

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from swarm_forage_env._internal.fields import ConfigError, as_tuples, instance, number, table, text
+from swarm_forage_env._internal.fields import ConfigError, as_tuples, instance, known_keys, number, table, text
 from swarm_forage_env._internal.files import as_file_name, parse_toml
 from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -194,8 +194,6 @@ def _check_places(tables: Mapping[str, Any]) -> None:
 def describe_file(file: str | Path) -> WorldDescription:
     """Read a file of a world, and look at no names and values of scenario fields.
 
-    The fields may also stand in a table `scenario`, and wrappers in tables of their own, `[sensor_noise]`.
-
     Raises:
         ConfigError: not readable, no TOML, or tables that no wrapper has or refuses; names the file.
     """
@@ -203,11 +201,11 @@ def describe_file(file: str | Path) -> WorldDescription:
     try:
         tables = parse_toml(path.read_text(encoding="utf-8"))
         _check_places(tables)
-        preset, fields = tables.pop("scenario", _PRESET), tables.pop("set", {})
-        if not isinstance(preset, str):
-            preset, fields = _PRESET, {**table("scenario", preset), **table("set", fields)}
-        wrappers = wrappers_from_mapping({**table("wrappers", tables.pop("wrappers", {})), **tables})
-        given = {name: as_tuples(value) for name, value in table("set", fields).items()}
+        known_keys(tables, ("scenario", "set", "wrappers"), "key of a world")
+        preset = tables.get("scenario", _PRESET)
+        text("scenario", preset)
+        wrappers = wrappers_from_mapping(table("wrappers", tables.get("wrappers", {})))
+        given = {name: as_tuples(value) for name, value in table("set", tables.get("set", {})).items()}
     except OSError as error:
         raise ConfigError(f"Cannot use {path}: {error.strerror or error}.") from error
     except ValueError as error:

@@ -25,7 +25,9 @@ def training(folder: str, plan: TrainingPlan = PLAN, *, best: float = 40.0) -> N
     Path(folder).mkdir(parents=True)
     plan.write(Path(folder, PLAN_FILE))
     rows = [
-        Evaluation(steps=steps, wall_time_s=1.0, performance=per, baseline=5.0, interference_fraction=0.25)
+        Evaluation(
+            steps=steps, wall_time_s=1.0, cpu_time_s=1.0, performance=per, baseline=5.0, interference_fraction=0.25
+        )
         for steps, per in ((10, 0.0), (20, best), (30, best / 2))
     ]
     write_evaluations(Path(folder, EVALUATIONS_FILE), rows)

@@ -43,7 +43,9 @@ def test_help_tells_the_rewards_of_the_recipe():
 
 @pytest.mark.parametrize(("baseline", "horizon_s", "times"), [(0.0, 200.0, 1), (20.0, 200.0, 0), (0.0, None, 0)])
 def test_a_baseline_that_scores_nothing_in_short_runs_is_told_once(baseline, horizon_s, times, capsys):
-    news = Evaluation(steps=64, wall_time_s=1.0, performance=0.0, baseline=baseline, interference_fraction=0.0)
+    news = Evaluation(
+        steps=64, wall_time_s=1.0, cpu_time_s=1.0, performance=0.0, baseline=baseline, interference_fraction=0.0
+    )
     with training_report._bar() as bar:
         report = training_report._reporter(recipe(evaluation={"horizon_s": horizon_s}), bar, 128)
         report(news)
@@ -209,7 +211,9 @@ def test_ctrl_c_says_how_to_go_on(command, monkeypatch):
     folder = Path("results/training/warehouse_small_ppo")
     folder.mkdir(parents=True)
     (folder / "model.zip").touch()
-    done = Evaluation(steps=64, wall_time_s=1.0, performance=5.0, baseline=4.0, interference_fraction=0.1)
+    done = Evaluation(
+        steps=64, wall_time_s=1.0, cpu_time_s=1.0, performance=5.0, baseline=4.0, interference_fraction=0.1
+    )
     write_evaluations(folder / "evaluations.csv", [done])
     assert f"To go on: swarm-forage --trust-models train --out {folder} --resume" in command("train", *TINY)[2]
     if find_spec("matplotlib"):
@@ -245,7 +249,7 @@ def test_the_plan_of_the_command_is_the_recipe(name):
 
 def test_words_are_arguments_of_the_recipe(tmp_path):
     path = tmp_path / "world.toml"
-    path.write_text("[scenario]\nn_robots = 7\nnest_progress = 0.0\n[sensor_noise]\nsigma = 0.01\n")
+    path.write_text("[set]\nn_robots = 7\nnest_progress = 0.0\n[wrappers.sensor_noise]\nsigma = 0.01\n")
     words = WorldOptions(
         scenario=str(path),
         objects=60,
@@ -304,7 +308,7 @@ def test_words_are_arguments_of_the_recipe(tmp_path):
 @pytest.mark.parametrize("by_file", [True, False])
 def test_what_people_set_goes_before_the_recipe(tmp_path, by_file):
     path = tmp_path / "world.toml"
-    path.write_text("[scenario]\nnest_progress = 0.0\nhorizon_s = 400.0\n" if by_file else "")
+    path.write_text("[set]\nnest_progress = 0.0\nhorizon_s = 400.0\n" if by_file else "")
     settings = () if by_file else ("nest_progress=0.0", "horizon_s=400")
     plan = RecipeOptions().plan(WorldOptions(scenario=str(path), settings=settings))
     assert (plan.scenario.reward.nest_progress, plan.scenario.reward.first_pickup) == (0.0, 1.0)
@@ -322,14 +326,14 @@ def test_small_runs_come_without_warnings(command, recwarn):
 @pytest.mark.parametrize("name", ["seed", "steps", "scenario", "n_robts"])
 def test_a_file_sets_fields_of_the_scenario_and_no_arguments_of_the_recipe(tmp_path, name):
     path = tmp_path / "world.toml"
-    path.write_text(f"[scenario]\n{name} = 3\n")
+    path.write_text(f"[set]\n{name} = 3\n")
     with pytest.raises(ConfigError, match=f"Unknown scenario field '{name}'"):
         RecipeOptions().plan(WorldOptions(scenario=str(path)))
 
 
 def test_a_wrapper_option_goes_before_the_same_wrapper_in_the_file(tmp_path):
     path = tmp_path / "world.toml"
-    path.write_text("[sensor_noise]\nsigma = 0.01\n")
+    path.write_text("[wrappers.sensor_noise]\nsigma = 0.01\n")
     words = WorldOptions(scenario=str(path), wrappers=("sensor_noise:sigma=0.02",))
     (config,) = RecipeOptions().plan(words).wrappers
     assert config.to_mapping()["sigma"] == 0.02

@@ -43,7 +43,12 @@ def calls(monkeypatch):
         if plan.seed == 3:
             raise RuntimeError("the disk\nis gone")
         made = Evaluation(
-            steps=140, wall_time_s=2.0, performance=4.0 + plan.seed, baseline=10.0, interference_fraction=0.1
+            steps=140,
+            wall_time_s=2.0,
+            performance=4.0 + plan.seed,
+            baseline=10.0,
+            interference_fraction=0.1,
+            cpu_time_s=1.0,
         )
         write_evaluations(folder / EVALUATIONS_FILE, [made])
         report(made)

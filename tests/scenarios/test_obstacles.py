@@ -71,7 +71,7 @@ def test_obstacles_come_from_the_command_line_and_from_files(tmp_path):
         with pytest.raises(ConfigError, match=r"Expected obstacles to be boxes such as 10,4,11,12 or"):
             parse_setting(word)
     file = tmp_path / "world.toml"
-    file.write_text("[scenario]\nobstacles = [[14.0, 4.0, 14.4, 12.0], [18.0, 7.5, 19.0, 8.5]]\n")
+    file.write_text("[set]\nobstacles = [[14.0, 4.0, 14.4, 12.0], [18.0, 7.5, 19.0, 8.5]]\n")
     assert describe_file(file).fields == {"obstacles": (WALL, PILLAR)}
 
 

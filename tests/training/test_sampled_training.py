@@ -144,13 +144,24 @@ def test_plans_without_worlds_write_what_they_always_wrote():
     assert "sampler" not in mapping
     assert list(mapping["evaluation"]) == ["every_steps", "horizon_s", "n_runs", "first_seed", "baseline"]
     assert list(mapping["stages"][0]) == ["steps", "scenario", "options"]
-    plain = Evaluation(steps=1, wall_time_s=1.0, performance=1.0, baseline=1.0, interference_fraction=0.0)
-    assert list(plain.to_mapping()) == ["steps", "wall_time_s", "performance", "baseline", "interference_fraction"]
+    plain = Evaluation(
+        steps=1, wall_time_s=1.0, cpu_time_s=1.0, performance=1.0, baseline=1.0, interference_fraction=0.0
+    )
+    assert list(plain.to_mapping()) == [
+        "steps",
+        "wall_time_s",
+        "performance",
+        "baseline",
+        "interference_fraction",
+        "cpu_time_s",
+    ]
 
 
 def test_of_equal_evaluations_the_latest_is_chosen():
     first, again, worse = (
-        Evaluation(steps=steps, wall_time_s=1.0, performance=reached, baseline=1.0, interference_fraction=0.0)
+        Evaluation(
+            steps=steps, wall_time_s=1.0, cpu_time_s=1.0, performance=reached, baseline=1.0, interference_fraction=0.0
+        )
         for steps, reached in ((1, 5.0), (2, 5.0), (3, 4.0))
     )
     assert chosen([first, again, worse]) is again
