@@ -10,18 +10,16 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from metrics.laws import ALL_LAWS
 
 from metrics import verdict
 from metrics.claims import CLAIMS, INTUITIONS
-from metrics.laws import ALL_LAWS
 from metrics.scoring.study_numbers import FIGURE_MEASURES
 from scripts import results_data
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.policy_spec import policy_specs
-from swarm_forage_env.runs.run import LiveRun, build_env, run_one
-from swarm_forage_env.runs.spec import plan_run
-from swarm_forage_env.runs.store import RunStore
+from swarm_forage_env.runs.run import LiveRun, build_env
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.studies.study import Axis
 from swarm_forage_env.studies.study_file import load_study, set_names
@@ -45,18 +43,6 @@ def test_two_engines_are_compared(run):
         "1 of 1 cases have the same numbers in both engines.",
         "In 0 of the 0 rows that differ, the interval of the difference leaves out zero.",
     ]
-
-
-def test_two_versions_are_drawn_beside_each_other(run):
-    pytest.importorskip("matplotlib", reason="needs the plots extra: matplotlib")
-    store = RunStore("runs/warehouse_small")
-    for robots in (2, 4):
-        world = scenario("warehouse_small", n_robots=robots, horizon_s=4.0, interval_s=4.0)
-        store.write(run_one(plan_run(world, "crw")))
-    code, out, _ = run("compare_versions", "runs", "runs", "picture.png")
-    assert code == 0
-    assert "| 4 | 0.0 → 0.0 |" in out
-    assert Path("picture.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_results_say_which_sets_and_conditions_they_are_of(run):

@@ -237,7 +237,8 @@ def _scenario(random: Random, folder: Path) -> Path:
     head = random.choice(("[set]\n", 'scenario = "warehouse_small"\n[set]\n'))
     text = f"{head}n_robots = 3\nn_objects = 20\nnest_size_m = [2.0, 4.0]\nphysics_substeps = [0.2, 0.8]\n"
     text += '[wrappers.throttle]\nwaveform = "square"\namplitude = 0.2\nperiod_s = 500.0\n'
-    text += "[wrappers.sensor_noise]\nsigma = 0.1\n[wrappers.sensor_noise.sigmas]\nposition = 0.1\n[wrappers.population]\ndeath_per_tick = 0.1\n"
+    text += "[wrappers.sensor_noise]\nsigma = 0.1\n[wrappers.sensor_noise.sigmas]\nposition = 0.1\n"
+    text += "[wrappers.population]\ndeath_per_tick = 0.1\n"
     return _written(random, folder, ".toml", _broken_lines(random, text))
 
 
