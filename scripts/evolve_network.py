@@ -178,7 +178,7 @@ def evolving_plan(words: argparse.Namespace) -> TrainingPlan:
             f"docs/benchmark/plans/ippo.toml, got {plan.interface.actions} actions or a stage without a sampler."
         )
     stages = tuple(replace(stage, options={}) for stage in plan.stages)  # they are those of gradients
-    return replace(plan, hidden=(words.hidden,), activation="tanh", lstm=0, options={}, stages=stages, samples=True)
+    return replace(plan, hidden=(words.hidden,), activation="tanh", options={}, stages=stages, samples=True)
 
 
 def main() -> None:

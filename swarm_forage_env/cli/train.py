@@ -124,12 +124,6 @@ class RecipeOptions:
         str | None,
         typer.Option(help=f"What hidden layers do to their sums, tanh or relu; default {DEFAULT_ACTIVATION}."),
     ] = None
-    lstm: Annotated[
-        int | None,
-        typer.Option(
-            min=0, help="Cells of an LSTM by which each robot remembers what it saw (ppo); 0: none; default 0."
-        ),
-    ] = None
     arguments: Annotated[
         tuple[str, ...],
         typer.Option("--arg", metavar="KEY=NUMBER", help="Set an argument of the algorithm; may be repeated."),
@@ -155,7 +149,7 @@ class RecipeOptions:
             wrappers=world.wrappers,
             options=dict(map(_argument, self.arguments)),
             evaluation=_given({"every_steps": self.evaluate_every, "horizon_s": self.evaluation_horizon}),
-            **self._chosen("algorithm", "steps", "small_start", "seed", "samples", "turned", "activation", "lstm"),
+            **self._chosen("algorithm", "steps", "small_start", "seed", "samples", "turned", "activation"),
             **_given({"n_arenas": self.arenas, "hidden": None if self.hidden is None else _layers(self.hidden)}),
             **world.fields,
         )

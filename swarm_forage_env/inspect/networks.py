@@ -22,10 +22,7 @@ def network_lines(file: Path, network: Network) -> Iterator[str]:
     """
     about = network.about
     sizes = [len(network.weights[0]), *(weight.shape[1] for weight in network.weights)]
-    memory = ""
-    if network.lstm is not None:
-        memory = f", after an LSTM of {network.n_cells} cells that sees {network.n_columns} columns"
-    yield f"{file}: a network of {' x '.join(map(str, sizes))} units ({about.activation}){memory}"
+    yield f"{file}: a network of {' x '.join(map(str, sizes))} units ({about.activation})"
     yield ""
     for name, value in dataclasses.asdict(about.interface).items():
         yield f"  {name:<20}{'none' if value in (None, ()) else in_words(value)}"

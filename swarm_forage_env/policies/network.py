@@ -1,8 +1,7 @@
 """Trained policies without torch: a small network in a file, evaluated by a kernel.
 
-A file is an `.npz` of plain arrays: the layers of the network ("weight_0", "bias_0", ...), those of its memory if it
-has one ("lstm_weight", "lstm_bias"), and "about", the JSON text of `NetworkAbout`. Nothing in it is executed, so it is
-safe to open a file from an unknown source.
+A file is an `.npz` of plain arrays: the layers of the network ("weight_0", "bias_0", ...) and "about", the JSON text of
+`NetworkAbout`. Nothing in it is executed, so it is safe to open a file from an unknown source.
 """
 
 import dataclasses
@@ -38,10 +37,8 @@ _MOST_BYTES = 2**28
 _MOST_NUMBERS = 2**26
 """Numbers of all layers where each is as wide as the widest, as kernels take them; our choice: 256 MiB."""
 _LAYER_PARTS = ("weight", "bias")
-_OWN_NAME = re.compile(r"(about|(weight|bias)_\d+|lstm_(weight|bias))\.npy")
+_OWN_NAME = re.compile(r"(about|(weight|bias)_\d+)\.npy")
 """Arrays that a file may hold."""
-_MEMORY = "memory"
-"""Key of the description of a network with a memory, so that readers who know no memory refuse its file."""
 
 
 class NetworkError(ValueError):
@@ -90,8 +87,6 @@ class NetworkAbout:
         if not isinstance(mapping, dict) or not isinstance(mapping.get("interface"), dict):
             raise NetworkError(f"Expected a description of a network with its interface, got {text[:80]!r}.")
         try:
-            if mapping.pop(_MEMORY, "lstm") != "lstm":
-                raise NetworkError(f"Expected a memory that is an LSTM in {text[:80]!r}.")
             known_keys(mapping, cls.__dataclass_fields__, "key about a network")
             return cls(**{**mapping, "interface": interface_from_mapping(mapping["interface"])})
         except ConfigError as error:
@@ -99,68 +94,14 @@ class NetworkAbout:
 
 
 @dataclass(frozen=True, slots=True)
-class LSTM:
-    """A memory: one layer of n cells with gates for input, forgetting and output ([LSTM]), d columns in.
-
-    In each decision, a cell keeps sigmoid(f) of what it kept and sigmoid(i) of tanh(g), and puts out sigmoid(o) of the
-    tanh of that; i, f, g and o are sums over what a robot sees and what its cells put out in the decision before.
-    """
-
-    weight: np.ndarray
-    """(d + n, 4 n) float32: rows for what is seen, then for what was put out; columns for i, f, g and o."""
-    bias: np.ndarray
-    """(4 n,) float32."""
-
-    def __post_init__(self) -> None:
-        shape, n_cells = self.weight.shape, self.bias.size // 4
-        fits = self.bias.shape == (4 * n_cells,) and len(shape) == 2 and shape[1] == 4 * n_cells
-        if not fits or not 0 < n_cells < shape[0]:
-            raise NetworkError(
-                "Expected an LSTM with weights (columns + cells, 4 x cells) and as many biases, got weights "
-                f"{shape} and biases {self.bias.shape}."
-            )
-
-    @property
-    def n_cells(self) -> int:
-        """How many cells a robot has."""
-        return len(self.bias) // 4
-
-    @classmethod
-    def from_state_dict(cls, state: Mapping[str, Any]) -> "LSTM | None":
-        """Take a `torch.nn.LSTM` of one layer, or an `LSTMCell`, from the state dict of a module; None without one.
-
-        Raises:
-            NetworkError: several layers, both directions, projections, no biases, or cells of another kind.
-        """
-        parts = {
-            name.rpartition(".")[2]: _array(tensor)
-            for name, tensor in state.items()
-            if name.rpartition(".")[2].startswith(("weight_ih", "weight_hh", "weight_hr", "bias_ih", "bias_hh"))
-        }
-        if not parts:
-            return None
-        shapes = {name: array.shape for name, array in parts.items()}
-        if [name.removesuffix("_l0") for name in parts] == ["weight_ih", "weight_hh", "bias_ih", "bias_hh"]:
-            seen, before, bias, again = parts.values()
-            n_cells = before.shape[-1]
-            if before.shape == (4 * n_cells, n_cells) and len(seen) == 4 * n_cells:
-                return cls(np.ascontiguousarray(np.concatenate([seen, before], 1).T), bias + again)
-        raise NetworkError(
-            f"Expected an LSTM of one layer and one direction, with biases and without projections, got {shapes}."
-        )
-
-
-@dataclass(frozen=True, slots=True)
 class Network:
-    """Layers of a perceptron with one kind of activation, a memory if it has one, and what is needed besides."""
+    """Layers of a perceptron with one kind of activation, and what is needed besides."""
 
     weights: tuple[np.ndarray, ...]
     """(in, out) float32 per layer."""
     biases: tuple[np.ndarray, ...]
     """(out,) float32 per layer."""
     about: NetworkAbout
-    lstm: LSTM | None = None
-    """Memory of each robot. What it puts out is what the first layer takes; without one, that is what a robot sees."""
 
     def __post_init__(self) -> None:
         sizes = [weight.shape for weight in self.weights]
@@ -170,40 +111,17 @@ class Network:
         )
         if not fits or any(left[1] != right[0] for left, right in itertools.pairwise(sizes)):
             raise NetworkError(f"Expected layers that follow on each other, got weights {sizes}.")
-        if self.lstm is not None and self.lstm.n_cells != len(self.weights[0]):
-            raise NetworkError(
-                f"Expected a first layer that takes what {self.lstm.n_cells} cells put out, got weights {sizes}."
-            )
-        parts = self._parts()
-        if not all(array.dtype.kind == "f" and _is_finite(array) for part in parts for array in part):
+        if not all(array.dtype.kind == "f" and _is_finite(array) for array in (*self.weights, *self.biases)):
             raise NetworkError("Expected weights and biases that are finite numbers; did the training diverge?")
-        if self._width() * sum(len(weight) + 1 for weight, _ in parts) > _MOST_NUMBERS:
+        if self._width() * sum(len(weight) + 1 for weight in self.weights) > _MOST_NUMBERS:
             raise NetworkError(
-                f"Expected layers that take at most {_MOST_NUMBERS:,} numbers side by side, got "
-                f"{[weight.shape for weight, _ in parts]}."
+                f"Expected layers that take at most {_MOST_NUMBERS:,} numbers side by side, got {sizes}."
             )
 
     @property
     def n_columns(self) -> int:
         """How many columns a robot sees."""
-        return len(self.weights[0]) if self.lstm is None else len(self.lstm.weight) - self.lstm.n_cells
-
-    @property
-    def n_cells(self) -> int:
-        """How many cells remember for a robot; 0 without a memory."""
-        return 0 if self.lstm is None else self.lstm.n_cells
-
-    def require_no_memory(self) -> None:
-        """Refuse a network whose outputs depend on what it saw before.
-
-        Raises:
-            NetworkError: it has a memory.
-        """
-        if self.lstm is not None:
-            raise NetworkError(
-                f"Expected a network without a memory, as export, saliency and outputs take it, got an LSTM of "
-                f"{self.n_cells} cells."
-            )
+        return len(self.weights[0])
 
     def outputs(self, rows: ObsArray) -> np.ndarray:
         """Return the last layer's values for observations (N, d), (N, m) float32, before any choice of actions.
@@ -211,15 +129,13 @@ class Network:
         A row has the same bits on every machine, and whatever other rows there are (`policies.kernels.network`).
 
         Raises:
-            NetworkError: rows of another number of columns than the network takes, or it has a memory.
+            NetworkError: rows of another number of columns than the network takes.
         """
-        self.require_no_memory()
         if rows.ndim != 2 or rows.shape[1] != self.n_columns:
             raise NetworkError(f"Expected observations (N, {self.n_columns}), as the network takes, got {rows.shape}.")
         n_rows = len(rows)
-        values, nothing = np.empty((n_rows, len(self.biases[-1])), np.float32), np.empty((n_rows, 0), np.float32)
-        rows = np.ascontiguousarray(rows, np.float32)
-        forward(rows, self.layers(), np.ones(n_rows, np.bool_), nothing, nothing, values)
+        values = np.empty((n_rows, len(self.biases[-1])), np.float32)
+        forward(np.ascontiguousarray(rows, np.float32), self.layers(), np.ones(n_rows, np.bool_), values)
         return values
 
     def at_temperature(self, temperature: float) -> "Network":
@@ -251,15 +167,14 @@ class Network:
     def layers(self) -> Layers:
         """Return the layers as kernels take them, with room of their own to work in."""
         width = -(-self._width() // LANES) * LANES
-        numbers = np.zeros((sum(len(weight) + 1 for weight, _ in self._parts()), width), np.float32)
+        numbers = np.zeros((sum(len(weight) + 1 for weight in self.weights), width), np.float32)
         row = 0
-        for weight, bias in self._parts():
+        for weight, bias in zip(self.weights, self.biases, strict=True):
             numbers[row, : len(bias)] = bias
             numbers[row + 1 : row + 1 + len(weight), : len(bias)] = weight
             row += len(weight) + 1
         sizes = np.array([len(self.weights[0]), *(len(bias) for bias in self.biases)], np.int32)
         return Layers(
-            n_cells=self.n_cells,
             sizes=sizes,
             numbers=numbers,
             is_tanh=self.about.activation == "tanh",
@@ -270,46 +185,37 @@ class Network:
             powers=np.zeros(len(self.biases[-1])),
         )
 
-    def _parts(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Return weights and biases of the memory, if there is one, and of all layers."""
-        memory = [] if self.lstm is None else [(self.lstm.weight, self.lstm.bias)]
-        return memory + list(zip(self.weights, self.biases, strict=True))
-
     def _width(self) -> int:
-        """Return the largest number of columns that go into a part or come out of it."""
-        return max(size for weight, _ in self._parts() for size in weight.shape)
+        """Return the largest number of columns that go into a layer or come out of it."""
+        return max(size for weight in self.weights for size in weight.shape)
 
     @classmethod
     def from_state_dict(
         cls, state: Mapping[str, Any], about: NetworkAbout, *, n_outputs: int | None = None
     ) -> "Network":
-        """Take the layers of a perceptron, and of an LSTM before it, from the state dict of a torch module.
+        """Take the layers of a perceptron from the state dict of a torch module.
 
         Args:
             state: Tensors by name, in the order of the layers: (out, in) under names that end in "weight", (out,) under
-                names that end in "bias", and those of one `torch.nn.LSTM` that sees the observations themselves, if
-                there is one. Others are left out.
+                names that end in "bias". Others are left out.
             about: What is needed besides the weights.
             n_outputs: How many outputs are actions; default all. Some libraries add deviations after the means.
 
         Raises:
-            NetworkError: the layers do not follow on each other, or an LSTM is one that a file cannot hold.
+            NetworkError: the layers do not follow on each other.
         """
         parts = {end: [_array(tensor) for name, tensor in state.items() if name.endswith(end)] for end in _LAYER_PARTS}
         weights, biases = ([array.T for array in parts["weight"]], parts["bias"])
         if n_outputs is not None and weights and biases:
             weights[-1], biases[-1] = weights[-1][:, :n_outputs], biases[-1][:n_outputs]
-        return cls(tuple(map(np.ascontiguousarray, weights)), tuple(biases), about, LSTM.from_state_dict(state))
+        return cls(tuple(map(np.ascontiguousarray, weights)), tuple(biases), about)
 
     def save(self, path: str | Path) -> None:
         """Write the file; an existing one is replaced."""
         layers = {f"weight_{k}": weight for k, weight in enumerate(self.weights)}
         layers |= {f"bias_{k}": bias for k, bias in enumerate(self.biases)}
-        layers |= {} if self.lstm is None else {"lstm_weight": self.lstm.weight, "lstm_bias": self.lstm.bias}
         with replacing(Path(path)) as draft, draft.open("wb") as file:
-            said = json.loads(self.about.to_json()) | ({} if self.lstm is None else {_MEMORY: "lstm"})
-            about = np.array(json.dumps(said, sort_keys=True))
-            np.savez_compressed(file, about=about, **layers)  # type: ignore[arg-type] - no name of a layer is "allow_pickle"
+            np.savez_compressed(file, about=np.array(self.about.to_json()), **layers)  # type: ignore[arg-type] - no name of a layer is "allow_pickle"
 
     @classmethod
     def load(cls, path: str | Path) -> "Network":
@@ -328,11 +234,7 @@ class Network:
             foreign = [name for name in stored.namelist() if not _OWN_NAME.fullmatch(name)]
             if foreign:
                 raise NetworkError(f"Unknown parts: {', '.join(map(repr, foreign))}.")
-            about, remembers = NetworkAbout.from_json(text), _MEMORY in parse_json(text)
-            if remembers != any(name.startswith("lstm_") for name in stored.namelist()):
-                raise NetworkError("Its description and its parts do not agree on whether it has a memory.")
-            lstm = LSTM(*(read_array(stored, f"lstm_{part}") for part in _LAYER_PARTS)) if remembers else None
-            return cls(weights, biases, about, lstm)
+            return cls(weights, biases, NetworkAbout.from_json(text))
         except (ArchiveError, NetworkError) as error:
             raise NetworkError(f"Expected {path} to hold a network: {error}") from error
 
@@ -383,8 +285,6 @@ class NetworkPolicy(KernelPolicy, InterfacePolicy):
             outputs=np.zeros((n_robots, n_actions), np.float32),
             number=np.zeros(n_robots, np.int32),
             is_made=np.zeros(n_robots, np.bool_),
-            hidden=np.zeros((n_robots, network.n_cells), np.float32),
-            cell=np.zeros((n_robots, network.n_cells), np.float32),
         )
         n_draws = 1 if layers.samples and self.interface.translation.is_discrete else 0
         actions = np.zeros((n_robots, spec.action_size), np.float32)

@@ -45,7 +45,7 @@ MOST_ARENAS, MOST_LAYERS, MOST_UNITS = 10_000, 20, 10_000
 """Sizes of a training that are far beyond sense and still fit into the memory of a machine; our choice."""
 IN_RUNS = {"decision_ticks": 1, "frame_decisions": 0}
 """Fields of an interface that may be others in runs than in training, of the same network -> the least."""
-_OF_THE_WHOLE = ("algorithm", "n_arenas", "hidden", "activation", "lstm", "samples", "temperature", "in_runs", "turned")
+_OF_THE_WHOLE = ("algorithm", "n_arenas", "hidden", "activation", "samples", "temperature", "in_runs", "turned")
 """Keys of a plan that none of its tables has."""
 LEARNING = PolicySpec(label="policy", policy="policy")
 """The policy that is trained, in its evaluations."""
@@ -93,8 +93,7 @@ class TrainingPlan:
 
     Raises:
         ConfigError: an unknown algorithm or baseline, a performance that arenas do not count, sizes below 1, a stage
-            whose scenario cannot be or has another number of robots, actions that the algorithm cannot choose, or a
-            memory that it cannot train.
+            whose scenario cannot be or has another number of robots, or actions that the algorithm cannot choose.
     """
 
     world: World
@@ -109,8 +108,6 @@ class TrainingPlan:
     activation: str = "tanh"
     """What hidden layers do to their sums: "tanh", which a plan without it always meant, or "relu", which takes less
     time and is the recipe's."""
-    lstm: int = 0
-    """Cells of an LSTM before the hidden layers, by which each robot remembers what it saw (PPO); 0 = none."""
     options: Mapping[str, Any] = field(default_factory=dict, hash=False)
     """Arguments of the algorithm's class; what is not here keeps the library's default."""
     stages: tuple[Stage, ...] = (Stage(steps=DEFAULT_STEPS),)
@@ -159,9 +156,6 @@ class TrainingPlan:
         for size in self.hidden:
             whole("hidden", size, at_least=1, at_most=MOST_UNITS)
         one_of("activation", self.activation, ACTIVATIONS)
-        whole("lstm", self.lstm, at_least=0, at_most=MOST_UNITS)
-        if self.lstm and self.algorithm != "ppo":
-            raise ConfigError(f"Expected lstm only with ppo, got {self.algorithm}; leave it out, or train by ppo.")
         if not self.stages:
             raise ConfigError("Expected at least one stage, got none.")
         whole("seed", self.seed, at_least=0)

@@ -74,7 +74,6 @@ def recipe(
     wrappers: Iterable[WrapperConfig | str] = (),
     hidden: tuple[int, ...] = DEFAULT_HIDDEN,
     activation: str = DEFAULT_ACTIVATION,
-    lstm: int = 0,
     options: Mapping[str, Any] | None = None,
     small_start: bool | None = None,
     evaluation: EvaluationPlan | Mapping[str, Any] | None = None,
@@ -104,7 +103,6 @@ def recipe(
             line ("population:death_per_tick=0.01").
         hidden: Sizes of the hidden layers.
         activation: What hidden layers do to their sums, see `TrainingPlan.activation`.
-        lstm: Cells of an LSTM by which each robot remembers, see `TrainingPlan.lstm`.
         options: Arguments of the algorithm that differ from `DEFAULT_OPTIONS` and, to the end, from `LATE_OPTIONS`.
         small_start: Spend the first third of the steps in a smaller arena; default where deliveries count, unless
             `recipes.toml` says otherwise or there are few `steps`.
@@ -153,7 +151,6 @@ def recipe(
         n_arenas=n_arenas,
         hidden=hidden,
         activation=activation,
-        lstm=lstm,
         options=chosen_options,
         stages=_stages(config, steps, episodes, late=late, small_start=small_start, shortest=shortest),
         evaluation=_evaluation(evaluation, config, chosen.decision_ticks, sampler),

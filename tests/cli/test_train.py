@@ -86,23 +86,6 @@ def test_trains_shows_evaluations_and_goes_on(command, painted, monkeypatch):
     assert len(json.loads(out)["runs"]) == 2
 
 
-def test_a_network_with_a_memory_is_trained_and_goes_on(command):
-    pytest.importorskip("sb3_contrib", reason="needs the train extra: sb3-contrib")
-    folder = Path("results/training/warehouse_small_ppo")
-    assert command("train", *TINY, "--lstm", "6")[0] == 0
-    code, out, _ = command("info", str(folder / "policy.npz"))
-    assert code == 0
-    assert "after an LSTM of 6 cells" in out
-    code, _, err = command(*TRUSTING, "--out", str(folder), "--resume", "--steps", "256")
-    assert code == 0, err
-    assert read_plan(folder / "plan.json").lstm == 6
-    both = f"{folder / 'policy.npz'},{folder / 'model.zip'}"
-    code, out, _ = command("run", "--policy", both, "--robots", "3", "--objects", "20", "--horizon", "4", "--set",
-                           "interval_s=2", "--jobs", "1", "--json")  # fmt: skip
-    assert code == 0
-    assert len(json.loads(out)["runs"]) == 2
-
-
 @needs_training
 def test_a_training_is_resumed_by_its_folder_alone(command):
     code, _, err = command("train", "--resume", "--out", "a")
@@ -166,7 +149,6 @@ def test_without_the_training_library_the_message_says_what_to_install(command, 
         (("--objects", "800"), "(small_start) of 12.8 x 16.0 m: Expected at most 392 objects"),
         (NARROW, "(small_start) of 4.8 x 16.0 m: Expected an arena larger than"),
         (("--algo", "dqn", "--actions", "continuous"), "dqn can choose"),
-        (("--algo", "dqn", "--lstm", "8"), "lstm only with ppo, got dqn"),
         (("--arg", "gamma=much"), "key=number"),
         pytest.param(("--arg", "gama=0.9"), "Did you mean 'gamma'", marks=needs_training),
         (("--horizon", "0"), "horizon_s"),

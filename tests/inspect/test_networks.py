@@ -8,7 +8,7 @@ import pytest
 
 from swarm_forage_env.inspect.networks import in_words, network_lines
 from swarm_forage_env.policies.interface import InterfaceConfig
-from swarm_forage_env.policies.network import LSTM, Network, NetworkAbout
+from swarm_forage_env.policies.network import Network, NetworkAbout
 
 FRAMED = InterfaceConfig(observation="compact", actions="discrete", decision_ticks=5, frame_decisions=200)
 SAMPLED = {
@@ -47,13 +47,6 @@ def test_every_field_of_the_interface_and_the_layers_are_told():
     fields = dict(line.split(maxsplit=1) for line in text.splitlines()[2:])
     assert set(InterfaceConfig.__dataclass_fields__) <= set(fields)
     assert (fields["decision_ticks"], fields["frame_decisions"], fields["neighbours_seen"]) == ("5", "200", "none")
-
-
-def test_a_memory_is_told():
-    lstm = LSTM(np.zeros((3 + 4, 16)), np.zeros(16))
-    network = Network((np.zeros((4, 2)),), (np.zeros(2),), NetworkAbout(interface=FRAMED), lstm)
-    first = next(network_lines(Path("mine.npz"), network))
-    assert first == "mine.npz: a network of 4 x 2 units (tanh), after an LSTM of 4 cells that sees 3 columns"
 
 
 @pytest.mark.parametrize(

@@ -12,9 +12,8 @@ from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.kernels.network import pick, power
 from swarm_forage_env.policies.learned import LearnedPolicy
-from swarm_forage_env.policies.network import LSTM, Network, NetworkAbout, NetworkError, NetworkPolicy
+from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkError, NetworkPolicy
 from swarm_forage_env.policies.registry import load_policy
-from swarm_forage_env.training.export.exporting import export_policy
 from swarm_forage_env.views.pettingzoo import parallel_env
 from tests.reference import perceptron
 from tests.support.branches import pickled
@@ -303,121 +302,12 @@ def test_a_state_dict_without_all_of_its_layers_is_refused(lost):
         Network.from_state_dict(state, small_network().about)
 
 
-def remembering_network(**about) -> Network:
-    """Eight cells before one layer; it sees the compact view and numbers its actions."""
-    rng = np.random.default_rng(7)
-    lstm, layer = ((rng.normal(size=size), rng.normal(size=size[1])) for size in ((23 + 8, 32), (8, 6)))
-    interface = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True)
-    return Network((layer[0],), (layer[1],), NetworkAbout(interface=interface, **about), LSTM(*lstm))
-
-
-def test_a_file_keeps_the_memory_of_a_network(tmp_path):
-    network = remembering_network()
-    network.save(tmp_path / "network.npz")
-    again = Network.load(tmp_path / "network.npz")
-    assert again.lstm is not None
-    assert (again.n_columns, again.n_cells) == (23, 8)
-    np.testing.assert_array_equal(again.lstm.weight, network.lstm.weight, strict=True)
-    np.testing.assert_array_equal(again.lstm.bias, network.lstm.bias, strict=True)
-    with np.load(tmp_path / "network.npz") as stored:
-        parts = {name: array for name, array in stored.items() if name != "lstm_bias"}
-    np.savez(tmp_path / "half.npz", **parts)
-    with pytest.raises(NetworkError, match="has no part 'lstm_bias'"):
-        Network.load(tmp_path / "half.npz")
-    np.savez(tmp_path / "without.npz", **{name: array for name, array in parts.items() if name != "lstm_weight"})
-    with pytest.raises(NetworkError, match="do not agree on whether it has a memory"):
-        Network.load(tmp_path / "without.npz")
-    np.savez(tmp_path / "more.npz", gru_weight=np.zeros(1), **parts)
-    with pytest.raises(NetworkError, match=r"Unknown parts: 'gru_weight\.npy'"):
-        Network.load(tmp_path / "more.npz")
-    about = json.loads(str(parts["about"]))
-    assert about["memory"] == "lstm", "a key that earlier versions refuse"
-    np.savez(tmp_path / "other.npz", **parts | {"about": np.array(json.dumps(about | {"memory": "gru"}))})
-    with pytest.raises(NetworkError, match="a memory that is an LSTM"):
-        Network.load(tmp_path / "other.npz")
-
-
-def test_a_memory_that_fits_nothing_is_refused():
-    network = remembering_network()
-    for weight, bias in (((8, 32), 32), ((31, 32), 31), ((31, 28), 32), ((31,), 32), ((3, 0), 0)):
-        with pytest.raises(NetworkError, match=r"an LSTM with weights \(columns \+ cells, 4 x cells\)"):
-            LSTM(np.zeros(weight), np.zeros(bias))
-    with pytest.raises(NetworkError, match="a first layer that takes what 4 cells put out"):
-        Network(network.weights, network.biases, network.about, LSTM(np.zeros((27, 16)), np.zeros(16)))
-    with pytest.raises(NetworkError, match="finite numbers"):
-        Network(network.weights, network.biases, network.about, LSTM(np.full((31, 32), np.inf), np.zeros(32)))
-
-
-def test_what_a_network_with_a_memory_sees_does_not_say_what_it_does(tmp_path):
-    network = remembering_network()
-    with pytest.raises(NetworkError, match=r"without a memory, .* got an LSTM of 8 cells"):
-        network.outputs(np.zeros((2, 23), np.float32))
-    network.save(tmp_path / "network.npz")
-    with pytest.raises(NetworkError, match="without a memory"):
-        export_policy(tmp_path / "network.npz", tmp_path / "network.h")
-    small_network().require_no_memory()
-
-
-def test_cells_are_those_of_torch():
-    torch = pytest.importorskip("torch")
-    module = torch.nn.ModuleDict({"lstm": torch.nn.LSTM(23, 8), "last": torch.nn.Linear(8, 2)})
-    about = NetworkAbout(interface=InterfaceConfig(observation="compact", automatic_gripper=True))
-    policy = NetworkPolicy(Network.from_state_dict(module.state_dict(), about))
-    env = parallel_env("warehouse_small", n_robots=5, n_objects=20)
-    for seed in (3, 4):
-        policy.reset(env.swarm_spec, np.random.default_rng(0))
-        obs, state = env.reset_batch(seed), None  # the second run begins without memory, too
-        for _ in range(20):
-            obs, *_ = env.step_batch(policy.act(obs, env.active))
-            with torch.no_grad():
-                cells, state = module["lstm"](torch.from_numpy(policy.seen.copy())[None], state)
-                expected = module["last"](cells[0]).numpy()
-            np.testing.assert_allclose(policy.chosen, expected.clip(-1.0, 1.0), atol=1e-5)
-    cell = torch.nn.ModuleDict({"lstm": torch.nn.LSTMCell(23, 8), "last": torch.nn.Linear(8, 2)})
-    assert Network.from_state_dict(cell.state_dict(), about).n_cells == 8
-
-
-@pytest.mark.parametrize(
-    ("kind", "options"),
-    [
-        ("LSTM", {"num_layers": 2}),
-        ("LSTM", {"bidirectional": True}),
-        ("LSTM", {"proj_size": 4}),
-        ("LSTM", {"bias": False}),
-        ("GRU", {}),
-        ("GRUCell", {}),
-        ("RNN", {}),
-    ],
-)
-def test_cells_that_a_file_cannot_hold_are_refused(kind, options):
-    torch = pytest.importorskip("torch")
-    module = torch.nn.ModuleDict({"cells": getattr(torch.nn, kind)(23, 8, **options), "last": torch.nn.Linear(8, 6)})
-    with pytest.raises(NetworkError, match="an LSTM of one layer and one direction, with biases and without proj"):
-        Network.from_state_dict(module.state_dict(), small_network().about)
-
-
-def test_who_leaves_the_world_forgets():
-    env = parallel_env("warehouse_small", n_robots=3, n_objects=20)
-    policy, obs = NetworkPolicy(remembering_network()), env.reset_batch(3)
-    away, alike = obs.copy(), np.tile(obs[:1], (3, 1))
-    away[1] = 0.0
-    policy.reset(env.swarm_spec, np.random.default_rng(0))
-    chosen = []
-    for rows in (alike, away, alike):
-        policy.act(rows, env.active)
-        chosen.append(policy._choice.outputs.copy())
-    assert chosen[2][1].tobytes() == chosen[0][1].tobytes(), "as in its first decision"
-    assert chosen[2][2].tobytes() != chosen[0][2].tobytes()
-
-
-@pytest.mark.parametrize("remembers", [False, True])
 @pytest.mark.parametrize("copied", [copy.deepcopy, pickled])
-def test_a_copy_continues_as_the_original_does(copied, remembers):
+def test_a_copy_continues_as_the_original_does(copied):
     """Between two decisions, with actions that are drawn."""
     env = parallel_env("warehouse_small", n_robots=6, n_objects=20)
     interface = InterfaceConfig(observation="compact", actions="discrete", decision_ticks=3)
-    forgetful = compact_network(11, np.random.default_rng(1), interface=interface, samples=True)
-    policy = NetworkPolicy(remembering_network(samples=True) if remembers else forgetful)
+    policy = NetworkPolicy(compact_network(11, np.random.default_rng(1), interface=interface, samples=True))
     policy.reset(env.swarm_spec, np.random.default_rng(2))
     obs = env.reset_batch(3)
     for _ in range(4):

@@ -9,7 +9,7 @@ from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.policies.learned import LearnedPolicy
-from swarm_forage_env.policies.network import LSTM, Network, NetworkAbout, NetworkPolicy
+from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkPolicy
 from swarm_forage_env.scenarios.presets import scenario
 from tests.reference.perceptron import SlowNetwork
 from tests.support.busy import change_population
@@ -19,19 +19,14 @@ DISCRETE = {"actions": "discrete", "automatic_gripper": True}
 COMPACT = {"observation": "compact", "decision_ticks": 3, "site_memory": True}
 
 
-def random_network(interface: InterfaceConfig, env: ForageEnv, n_cells: int = 0, **about) -> Network:
-    """One with layers of 5 and 13, behind so many cells, that wants to do everything now and then."""
+def random_network(interface: InterfaceConfig, env: ForageEnv, **about) -> Network:
+    """One with layers of 5 and 13 that wants to do everything now and then."""
     shape, rng = LearnerInterface(interface, env.swarm_spec), np.random.default_rng(3)
     space = shape.action_space
     sizes = [shape.layout.size, 5, 13, int(space.n) if hasattr(space, "n") else space.shape[0]]
-    lstm = None
-    if n_cells:
-        size = sizes[0] + n_cells, 4 * n_cells
-        lstm = LSTM(rng.normal(size=size).astype(np.float32), rng.normal(size=size[1]).astype(np.float32))
-        sizes[0] = n_cells
     weights = tuple(rng.normal(size=size).astype(np.float32) for size in itertools.pairwise(sizes))
     biases = tuple(rng.normal(size=size).astype(np.float32) for size in sizes[1:])
-    return Network(weights, biases, NetworkAbout(interface=interface, **about), lstm)
+    return Network(weights, biases, NetworkAbout(interface=interface, **about))
 
 
 @pytest.mark.parametrize(
@@ -46,9 +41,6 @@ def random_network(interface: InterfaceConfig, env: ForageEnv, n_cells: int = 0,
         ({"automatic_gripper": True, "neighbours_seen": 2}, {"activation": "relu"}, {"neighbours_seen": 2}),
         ({"observation": "compact", "message_size": 2}, {}, {"message_size": 2}),
         ({"automatic_gripper": True}, {}, {"message_size": 2}),
-        (DISCRETE | COMPACT, {"n_cells": 7, "samples": True}, {}),
-        ({"decision_ticks": 2}, {"n_cells": 1, "activation": "relu"}, {}),
-        (DISCRETE | {"observation": "compact"}, {"n_cells": 16}, {}),
     ],
 )
 def test_a_network_acts_as_its_slow_twin(choices, about, fields):
@@ -56,7 +48,7 @@ def test_a_network_acts_as_its_slow_twin(choices, about, fields):
     interface = InterfaceConfig(**choices)
     network = random_network(interface, env, **about)
     policy, spec, crowd = NetworkPolicy(network), env.swarm_spec, np.random.default_rng(5)
-    twin = LearnedPolicy(interface, remember=SlowNetwork(network, N_ROBOTS, stream_rng(2, Stream.POLICY)))
+    twin = LearnedPolicy(interface, choose=SlowNetwork(network, N_ROBOTS, stream_rng(2, Stream.POLICY)))
     for one in (policy, twin):
         one.reset(spec, stream_rng(2, Stream.POLICY))
     obs = env.reset_batch(2)

@@ -1,11 +1,10 @@
 """A network as numpy writes it, with sums and tanh in the order that `policies.kernels.network` promises."""
 
 import math
-from typing import Any
 
 import numpy as np
 
-from swarm_forage_env.policies.network import LSTM, Network
+from swarm_forage_env.policies.network import Network
 
 
 def outputs(weights: list[np.ndarray], biases: list[np.ndarray], rows: np.ndarray, activation: str) -> np.ndarray:
@@ -24,15 +23,6 @@ def summed(value: np.ndarray, weight: np.ndarray, bias: np.ndarray) -> np.ndarra
     for k in range(weight.shape[0]):
         total = total + value[:, k : k + 1] * weight[k]
     return total
-
-
-def remembered(lstm: LSTM, rows: np.ndarray, hidden: np.ndarray, cell: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What the cells of an LSTM put out, and what they keep, (N, n) each; a sigmoid is half of 1 + tanh at half."""
-    gates = np.split(summed(np.concatenate([rows, hidden], 1), lstm.weight, lstm.bias), 4, axis=1)
-    half = np.float32(0.5)
-    taken, kept, shown = (half + half * tanh(half * gates[gate]) for gate in (0, 1, 3))
-    cell = kept * cell + taken * tanh(gates[2])
-    return tanh(cell) * shown, cell
 
 
 def tanh(value: np.ndarray) -> np.ndarray:
@@ -54,24 +44,15 @@ def probabilities(logits: np.ndarray) -> list[float]:
 
 
 class SlowNetwork:
-    """A network as a controller of `LearnedPolicy` with memory, with the draws of a policy that had the generator."""
+    """A network as a controller of `LearnedPolicy`, with the draws of a policy that had the generator."""
 
     def __init__(self, network: Network, n_robots: int, rng: np.random.Generator) -> None:
         """Take the network, and the generator that belongs to nobody else."""
         self.network, self.n_robots, self.rng = network, n_robots, rng
 
-    def __call__(self, rows: np.ndarray, memory: Any, _rng: np.random.Generator) -> tuple[np.ndarray, Any]:
-        """Return the actions of a decision, and the memory; robots that are away, whose rows are zeros, do nothing."""
+    def __call__(self, rows: np.ndarray, _rng: np.random.Generator) -> np.ndarray:
+        """Return the actions of a decision; robots that are away, whose rows are zeros, do nothing."""
         here = rows.any(axis=1)
-        lstm = self.network.lstm
-        if lstm is not None:
-            before = (np.zeros((self.n_robots, lstm.n_cells), np.float32),) * 2 if memory is None else memory
-            after = remembered(lstm, rows, *before)
-            memory = tuple(np.where(here[:, None], new, np.float32(0.0)) for new in after)
-            rows = memory[0]
-        return self._chosen(rows, here), memory
-
-    def _chosen(self, rows: np.ndarray, here: np.ndarray) -> np.ndarray:
         network, about = self.network, self.network.about
         values = outputs(list(network.weights), list(network.biases), rows, about.activation)
         if about.interface.actions != "discrete":

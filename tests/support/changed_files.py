@@ -343,23 +343,11 @@ def _small_network() -> dict[str, np.ndarray]:
     return {**_arrays(FILES / "network.npz"), "weight_0": layer, "bias_0": layer[0]}
 
 
-@cache
-def _with_memory() -> dict[str, np.ndarray]:
-    """The same behind two cells."""
-    parts, lstm = _small_network(), np.linspace(-1.0, 1.0, 113 * 8, dtype=np.float32).reshape(113, 8)
-    about = np.array(json.dumps(json.loads(str(parts["about"])) | {"memory": "lstm"}))
-    return {**parts, "weight_0": parts["weight_0"][:2], "lstm_weight": lstm, "lstm_bias": lstm[0], "about": about}
-
-
 def _network(random: Random, folder: Path) -> Path:
-    """A small one, with a memory or without, or the one that comes with the package, which takes longer."""
+    """A small one, or the one that comes with the package, which takes longer."""
     file, shipped = folder / "network.npz", network_file("ppo_warehouse_small")
     assert shipped is not None
-    file.write_bytes(
-        other_arrays(
-            random, random.choice([_small_network, _with_memory])() if random.random() < 0.8 else _arrays(shipped)
-        )
-    )
+    file.write_bytes(other_arrays(random, _small_network() if random.random() < 0.8 else _arrays(shipped)))
     return file
 
 

@@ -357,9 +357,8 @@ def test_a_policy_learns_at_one_pace_and_is_judged_and_kept_at_another(tmp_path)
     assert result.evaluations[-1].interference_fraction != slow.evaluations[-1].interference_fraction
 
 
-@pytest.mark.parametrize("lstm", [0, 4])
-def test_a_policy_that_does_not_draw_is_judged_as_its_file_runs(lstm, tmp_path):
-    plan = tiny_plan(in_runs={"decision_ticks": 1}, lstm=lstm, stages=(Stage(steps=64),))
+def test_a_policy_that_does_not_draw_is_judged_as_its_file_runs(tmp_path):
+    plan = tiny_plan(in_runs={"decision_ticks": 1}, stages=(Stage(steps=64),))
     result = train(plan, tmp_path)
     runs = plan.judging(policy_spec(str(result.policy_file)))
     (condition,) = runs.conditions

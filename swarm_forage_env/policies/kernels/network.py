@@ -32,15 +32,12 @@ _LEAST_POWER = -64.0
 
 
 class Layers(NamedTuple):
-    """A perceptron, the cells of an LSTM before it if it has a memory, and room to work in."""
+    """A perceptron, and room to work in."""
 
-    n_cells: int
-    """Cells of each robot; 0 for a perceptron alone."""
     sizes: IntArray
-    """(layers + 1,) columns into the first layer of the perceptron, and outputs of each."""
+    """(layers + 1,) columns into the first layer, and outputs of each."""
     numbers: ObsArray
-    """(rows, width) float32: of the cells, then of each layer, its biases and its weights (columns, outputs), padded
-    with zeros."""
+    """(rows, width) float32: of each layer, its biases and its weights (columns, outputs), padded with zeros."""
     is_tanh: bool
     """Activation after every layer but the last; else relu."""
     samples: bool
@@ -56,7 +53,7 @@ class Layers(NamedTuple):
 
 
 class Choice(NamedTuple):
-    """What robots saw and chose in the last decision, and what they keep for the next one."""
+    """What robots saw and chose in the last decision."""
 
     seen: ObsArray
     """(N, d)."""
@@ -66,10 +63,6 @@ class Choice(NamedTuple):
     """(N,) of discrete actions."""
     is_made: BoolArray
     """(N,) whether the robot was in the world; others stand until the next decision."""
-    hidden: ObsArray
-    """(N, cells) what the cells of each robot put out: its hidden state. Zeros when a run begins."""
-    cell: ObsArray
-    """(N, cells) what they keep: its cell state. Zeros when a run begins."""
 
 
 @kernel
@@ -103,42 +96,10 @@ def _activate(values: ObsArray, n: int, is_tanh: bool) -> None:
 
 
 @kernel
-def _remember(layers: Layers, n_columns: int, n_taken: int, hidden: ObsArray, cell: ObsArray) -> None:
-    """Take the rows in `before`, of `n_columns`, through the cells of their robots; `before` is what these put out.
-
-    A sigmoid is half of 1 + tanh at half the number.
-    """
-    x, gates, n, half = layers.before, layers.after, layers.n_cells, np.float32(0.5)
-    for k in range(n_taken):
-        for c in range(n):
-            x[k, n_columns + c] = hidden[layers.places[k], c]
-    for first in range(0, 4 * n, LANES):
-        add_products(x, layers.numbers, 0, n_columns + n, first, gates)
-    for k in range(n_taken):
-        i = layers.places[k]
-        for c in range(n):
-            gates[k, c] *= half
-            gates[k, n + c] *= half
-            gates[k, 3 * n + c] *= half
-        _tanh(gates[k], 4 * n)
-        for c in range(n):
-            takes, keeps = half + half * gates[k, c], half + half * gates[k, n + c]
-            cell[i, c] = keeps * cell[i, c] + takes * gates[k, 2 * n + c]
-            x[k, c] = cell[i, c]
-        _tanh(x[k], n)
-        for c in range(n):
-            x[k, c] *= half + half * gates[k, 3 * n + c]
-            hidden[i, c] = x[k, c]
-
-
-@kernel
-def _through(layers: Layers, n_taken: int, outputs: ObsArray, at: int) -> None:
-    """Take the rows in `before` through the perceptron, and write what comes out to the first `n_taken` of `places`.
-
-    Its numbers begin in row `at`.
-    """
+def _through(layers: Layers, n_taken: int, outputs: ObsArray) -> None:
+    """Take the rows in `before` through the perceptron, and write what comes out to the first `n_taken` of `places`."""
     sizes, x, y = layers.sizes, layers.before, layers.after
-    last = sizes.shape[0] - 2
+    at, last = 0, sizes.shape[0] - 2
     for layer in range(last + 1):
         for first in range(0, sizes[layer + 1], LANES):
             add_products(x, layers.numbers, at, sizes[layer], first, y)
@@ -152,10 +113,8 @@ def _through(layers: Layers, n_taken: int, outputs: ObsArray, at: int) -> None:
 
 
 @kernel
-def forward(
-    rows: ObsArray, layers: Layers, wanted: BoolArray, hidden: ObsArray, cell: ObsArray, outputs: ObsArray
-) -> None:
-    """Write the last layer's values (N, m) for those rows (N, d) that are wanted; cells, as in `Choice`, move on."""
+def forward(rows: ObsArray, layers: Layers, wanted: BoolArray, outputs: ObsArray) -> None:
+    """Write the last layer's values (N, m) for those rows (N, d) that are wanted."""
     places, before = layers.places, layers.before
     n_rows, n_columns, n_taken = wanted.shape[0], rows.shape[1], 0
     for i in range(n_rows):
@@ -165,11 +124,7 @@ def forward(
             places[n_taken] = i
             n_taken += 1
         if n_taken == ROWS or (n_taken > 0 and i == n_rows - 1):
-            if layers.n_cells > 0:
-                _remember(layers, n_columns, n_taken, hidden, cell)
-                _through(layers, n_taken, outputs, 1 + n_columns + layers.n_cells)
-            else:
-                _through(layers, n_taken, outputs, 0)
+            _through(layers, n_taken, outputs)
             n_taken = 0
 
 
@@ -244,10 +199,7 @@ def decide(obs: ObsArray, draws: FloatArray, decision: int, t: Translation, laye
         choice.is_made[i] = obs[i, heading] != 0.0 or obs[i, heading + 1] != 0.0
         choice.outputs[i, :] = 0.0
         choice.number[i] = 0
-        if not choice.is_made[i]:  # who leaves the world forgets everything, as `remember_sites` has it
-            choice.hidden[i, :] = 0.0
-            choice.cell[i, :] = 0.0
-    forward(choice.seen, layers, choice.is_made, choice.hidden, choice.cell, choice.outputs)
+    forward(choice.seen, layers, choice.is_made, choice.outputs)
     for i in range(obs.shape[0]):
         outputs = choice.outputs[i]
         if not t.is_discrete:

@@ -82,10 +82,6 @@ class ActiveRolloutBuffer(RolloutBuffer):
         """Return which rows of observations (.., columns) are of robots in the world, (..) bool; others are zeros."""
         return np.any(observations[..., self._newest], axis=-1)
 
-    def to_ask(self, observations: np.ndarray) -> np.ndarray:
-        """Return for which rows of observations (.., columns) a network is asked for an action, (..) bool."""
-        return self.at_work(observations)
-
     def compute_returns_and_advantage(self, last_values: torch.Tensor, dones: np.ndarray) -> None:
         """Compute GAE(lambda) advantages and lambda returns, bridging steps of robots that are not at work.
 

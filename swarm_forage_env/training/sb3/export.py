@@ -13,7 +13,7 @@ from torch import nn
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
 from swarm_forage_env.policies.model_files import MODEL_NOTE, describe_spaces
-from swarm_forage_env.policies.network import LSTM, Network, NetworkAbout, NetworkError
+from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkError
 from swarm_forage_env.scenarios.presets import scenario
 
 ACTIVATION_CLASSES: dict[str, type[nn.Module]] = {"tanh": nn.Tanh, "relu": nn.ReLU}
@@ -29,7 +29,7 @@ def export_network(
     caches: str = "none",
     card: dict[str, Any] | None = None,
 ) -> Network:
-    """Return the acting part of a PPO, A2C or DQN with an `MlpPolicy`, or of a RecurrentPPO with an `MlpLstmPolicy`.
+    """Return the acting part of a PPO, A2C or DQN with an `MlpPolicy`.
 
     Args:
         model: The trained model.
@@ -62,8 +62,7 @@ def export_network(
         caches=caches,
         card=card or {},
     )
-    memory = getattr(model.policy, "lstm_actor", None)
-    return Network(weights, biases, about, None if memory is None else LSTM.from_state_dict(memory.state_dict()))
+    return Network(weights, biases, about)
 
 
 def note_interface(model: BaseAlgorithm, interface: InterfaceConfig, *, caches: str = "none") -> None:
@@ -113,12 +112,14 @@ def _check_spaces(model: BaseAlgorithm, interface: InterfaceConfig) -> None:
 
 def _acting_layers(model: BaseAlgorithm) -> list[nn.Module]:
     policy = model.policy
-    if isinstance(policy, ActorCriticPolicy) and isinstance(policy.features_extractor, FlattenExtractor):
+    is_recurrent = hasattr(policy, "lstm_actor")
+    is_flat = isinstance(policy, ActorCriticPolicy) and isinstance(policy.features_extractor, FlattenExtractor)
+    if is_flat and not is_recurrent:
         return [*policy.mlp_extractor.policy_net, policy.action_net]
     if isinstance(policy, DQNPolicy) and isinstance(policy.q_net.features_extractor, FlattenExtractor):
         return [*policy.q_net.q_net]
     raise NetworkError(
-        f"Expected a PPO, A2C or DQN model with an MlpPolicy, or a RecurrentPPO, got {type(model).__name__} with "
+        f"Expected a PPO, A2C or DQN model with an MlpPolicy, got {type(model).__name__} with "
         f"{type(policy).__name__}; run it from its zip file instead."
     )
 

@@ -10,7 +10,6 @@ import inspect
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from importlib.metadata import version
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -56,13 +55,13 @@ from swarm_forage_env.training.evaluations import (
     write_evaluations,
 )
 from swarm_forage_env.training.plan import EXPORTABLE, LEARNING, Stage, TrainingPlan
-from swarm_forage_env.training.sb3.algorithms import ALGORITHM_CLASSES, arguments_of, class_of
+from swarm_forage_env.training.sb3.algorithms import ALGORITHM_CLASSES, arguments_of
 from swarm_forage_env.training.sb3.buffers import EmptyRolloutError
 from swarm_forage_env.training.sb3.export import export_network, note_interface
 from swarm_forage_env.views.stable_baselines3 import SwarmVecEnv
 
 _REPORT_EVERY_S = 1.0
-_TOLD = ("algorithm", "seed", "n_arenas", "hidden", "activation", "lstm", "interface", "options", "stages",
+_TOLD = ("algorithm", "seed", "n_arenas", "hidden", "activation", "interface", "options", "stages",
          "samples", "temperature", "in_runs", "scenario.reward", "scenario.name", "scenario.robots.n_robots",
          "sampler")  # fmt: skip
 """Settings of a plan that TensorBoard shows beside the evaluations, by name or by what their names begin with."""
@@ -82,9 +81,6 @@ _ELSEWHERE = {
     "hidden": "hidden",
     "activation_fn": "activation",
     "activation": "activation",
-    "lstm_hidden_size": "lstm",
-    "n_lstm_layers": "lstm",
-    "lstm": "lstm",
 }
 """What people look for among the options -> the field of a plan that says it."""
 
@@ -135,7 +131,6 @@ def train(
             `resume` is False, `resume` is True and the folder holds no training run, or one by another plan, or broken
             files; another call that trains in the folder; a stage whose scenario cannot be built; or a training that
             diverged.
-        ImportError: the plan has an LSTM, and sb3-contrib is not installed.
     """
     check_plan(plan)
     if not 0 <= n_processes <= plan.n_arenas:
@@ -197,9 +192,7 @@ def check_plan(plan: TrainingPlan) -> None:
 
     Raises:
         ConfigError: see above.
-        ImportError: the plan has an LSTM, and sb3-contrib is not installed.
     """
-    class_of(plan)
     _check_options(plan)
     _check_learns(plan)
     _check_baseline(plan)
@@ -271,7 +264,7 @@ def _checkpoint(plan: TrainingPlan, folder: Path, env: SwarmVecEnv) -> BaseAlgor
     trust.check(path)
     trust.tell(path)
     try:
-        return class_of(plan).load(path, env=env, device="cpu")
+        return ALGORITHM_CLASSES[plan.algorithm].load(path, env=env, device="cpu")
     except MODEL_FAULTS as error:
         reason = " ".join(str(error).split())
         raise ConfigError(f"Cannot open the checkpoint {path}: {reason}; train anew in another folder.") from error
@@ -280,7 +273,7 @@ def _checkpoint(plan: TrainingPlan, folder: Path, env: SwarmVecEnv) -> BaseAlgor
 def _prepared(plan: TrainingPlan, stage: Stage, folder: Path, env: SwarmVecEnv, done: int) -> BaseAlgorithm:
     """Return the model for a stage: a new one, or the checkpoint with the options of the stage."""
     env.set_options({"scenario": stage.scenario})
-    algorithm = class_of(plan)
+    algorithm = ALGORITHM_CLASSES[plan.algorithm]
     options: dict[str, Any] = {**plan.options, **stage.options}
     options["seed"] = training_seed(plan.seed, done)
     options["tensorboard_log"] = str(folder / "tensorboard") if importlib.util.find_spec("tensorboard") else None
@@ -448,7 +441,6 @@ class _Watch(BaseCallback):
                 **software_versions(),
                 "stable-baselines3": stable_baselines3.__version__,
                 "torch": str(torch.__version__),
-                **({"sb3-contrib": version("sb3-contrib")} if plan.lstm else {}),
             },
         }
         network = self._network(card)
@@ -469,11 +461,11 @@ class _Watch(BaseCallback):
         return evaluated(plan, policy, self._baselines, steps=self.num_timesteps, spent_s=self._spent)
 
     def _policy(self) -> Policy:
-        """The policy as it is now, as its file will have it where it draws or remembers.
+        """The policy as it is now, as its file will have it where it draws.
 
         One that draws its actions does so by the chance of its run, not of the training.
         """
-        if self.plan.samples or self.plan.lstm:
+        if self.plan.samples:
             return NetworkPolicy(self._network())
         return LearnedPolicy(self.plan.run_interface, remember=deterministic_choice(self.model))
 
