@@ -184,29 +184,6 @@ def frame(engine: str, effort: float) -> float:
     return median_ms(lambda _: env.render(), max(4, round(40 * effort)))
 
 
-def window(engine: str, effort: float) -> float:
-    """A tick and its picture in a window without a display; a robot is chosen, with its beams and memory."""
-    os.environ["SDL_VIDEODRIVER"] = "dummy"
-    from swarm_forage_env import scenario
-    from swarm_forage_env.inspect.watch import Watch
-    from swarm_forage_env.rendering.window import Pressed, Window
-
-    shown = Window()
-    watch = Watch(scenario(MEDIUM, physics=engine, caches="dynamic"), "stochx", speed=6.0)
-    watch.handle(Pressed("tab"))
-    for _ in range(round(600 * effort)):  # robots spread, and remember something
-        watch.step()
-
-    def show(_: int) -> None:
-        watch.advance(1.0 / 30.0)
-        shown.show(watch.scene())
-        shown.events()
-
-    milliseconds = median_ms(show, max(4, round(60 * effort)))
-    shown.close()
-    return milliseconds
-
-
 def import_seconds(_engine: str, _effort: float) -> float:
     """Processor time of the import in a new process."""
     program = "import time; t = time.process_time(); import swarm_forage_env; print(time.process_time() - t)"
@@ -287,7 +264,6 @@ CASES = {
     "vec-8x50": Case("vector environment, eight arenas", vector_env(500, n_arenas=8), STEP),
     "ppo-50": Case("PPO of stable-baselines3, one arena", learning, STEP, beside="vec-50"),
     "frame-819": Case("frame of 900 pixels", frame, "ms", "16"),
-    "window-200": Case("picture of the window, STOCHX", window, "ms", "33"),
     "import": Case("import of the package", import_seconds, "s", "0.2"),
     "first-run": Case("first run after installation", first_run, "s", "12", once=True),
     "memory-16384": Case("most memory of a run", most_memory("crw-16384"), "GiB", "2", once=True),

@@ -1,27 +1,23 @@
-"""Draw the pictures of robots at work, README's film, the window, and theory.
+"""Draw the pictures of robots at work, README's film, and theory.
 
     python scripts/draw_pictures.py [FILE ...] [--out FOLDER]    default all of them, docs/images
 
-Robots have trails of 40 s. The window needs no display. Theory is self-organisation over sizes, an example of
+Robots have trails of 40 s. Theory is self-organisation over sizes, an example of
 flexibility and the task graph: no run is needed, and `swarm-forage study plot` and `report` draw the same figures.
 Needs the extras render and plots.
 """
 
 import argparse
-import os
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from metrics.scoring.theory import theory_figures
 from PIL import Image
 
 from swarm_forage_env import load_policy, plan_run, scenario
 from swarm_forage_env.inspect.film import record_run
-from swarm_forage_env.inspect.watch import Watch
 from swarm_forage_env.rendering.figures import SCREEN
 from swarm_forage_env.rendering.frame import Trails, render_frame
-from swarm_forage_env.rendering.window import Pressed, Window
 from swarm_forage_env.runs.run import LiveRun, build_env
 
 IMAGES = Path(__file__).resolve().parent.parent / "docs" / "images"
@@ -39,11 +35,8 @@ FIELDS: dict[str, dict[str, Any]] = {
 """File -> scenario fields that are not those of the preset."""
 FILM = "small.gif"
 """The trained policy in the small warehouse: a hundred pictures of 300 s, half a megabyte."""
-WINDOWS = {"window.png": "dark", "window_light.png": "light"}
-"""File -> theme of the window."""
 THEORY = ("self_organisation.png", "flexibility.png", "task_graph.png")
 """Those of theory that pages show; `swarm-forage predict availability` draws the other one."""
-WINDOW_S = 600.0
 TRAIL_S = 40.0
 SAMPLE_S = 1.0
 
@@ -84,33 +77,10 @@ def film(file: Path) -> None:
     print(file)
 
 
-def draw_window(file: Path, theme: str) -> None:
-    """Watch DPO with seed 0 until a robot near objects meets another one; raise the throttle and choose the robot."""
-    import pygame
-
-    os.environ["SDL_VIDEODRIVER"] = "dummy"
-    window, watch = Window(), Watch(scenario("warehouse_small"), "dpo", theme=theme)
-    world, interesting = watch.world, np.zeros(0, np.bool_)
-    while not interesting.any():
-        watch.step()
-        near_objects = world.arena.obs[:, world.layout["los_object"]].any(axis=1)
-        interesting = world.events.interfering & near_objects & (world.tick * world.scenario.dt_s >= WINDOW_S)
-    watch.robot = int(np.flatnonzero(interesting)[0])
-    for key in ("t", "t", "space"):
-        watch.handle(Pressed(key))
-    window.show(watch.scene())
-    screen = pygame.display.get_surface()
-    assert screen is not None, "a window was shown"
-    pixels = pygame.surfarray.array3d(screen).swapaxes(0, 1)
-    Image.fromarray(pixels).save(file, optimize=True)
-    window.close()
-    print(file)
-
-
 def main() -> None:
     """Draw what was asked for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    known = (*PICTURES, FILM, *WINDOWS, *THEORY)
+    known = (*PICTURES, FILM, *THEORY)
     parser.add_argument("files", nargs="*", metavar="FILE", help=f"default all: {', '.join(known)}")
     parser.add_argument("--out", type=Path, default=IMAGES, metavar="FOLDER", help="where they go")
     arguments = parser.parse_args()
@@ -122,8 +92,6 @@ def main() -> None:
             draw(arguments.out / name, *PICTURES[name])
         elif name == FILM:
             film(arguments.out / name)
-        elif name in WINDOWS:
-            draw_window(arguments.out / name, WINDOWS[name])
     for figure in theory_figures():
         name = f"{figure.kind}.png"
         if name in THEORY and name in (arguments.files or known):

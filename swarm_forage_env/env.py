@@ -507,7 +507,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         picture = render_frame(self.scenario, self.swarm, self.objects, self.caches, self.events, tick=self.tick)
         if self._window is None:
             return picture
-        self._window.show_picture(picture, title=self.scenario.name.replace("_", " "))
+        self._window.show(picture, title=self.scenario.name.replace("_", " "))
         return None
 
     def close(self) -> None:

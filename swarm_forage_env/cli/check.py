@@ -1,56 +1,28 @@
 """The commands `check` and `rerun`: do policies keep the rules, and is a stored run still the same?"""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from swarm_forage_env._internal.wording import printable
-from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, FirstSeed, Jobs, PolicyOptions, WorldOptions, complain
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, PolicyOptions, Seed, WorldOptions, complain
 
 
-def check(
-    policies: PolicyOptions,
-    described: WorldOptions,
-    seeds: Annotated[int, typer.Option("--seeds", min=1, help="Runs per policy.")] = 1,
-    first_seed: FirstSeed = 0,
-    window: Annotated[
-        float, typer.Option("--window", help="Simulated seconds in which every robot should move away.")
-    ] = 600.0,
-    moved: Annotated[float, typer.Option("--moved", help="How far it should move, in m.")] = 0.05,
-    jobs: Jobs = None,
-    as_json: AsJson = False,
-) -> None:
-    """Check that policies keep the rules, and find stuck robots; exit code 1 if something is wrong.
+def check(policies: PolicyOptions, described: WorldOptions, seed: Seed = 0) -> None:
+    """Check that policies keep the rules; exit code 1 at the first that breaks one.
 
-    swarm_forage_env.checks.check_policy lists the rules. A stuck robot is active and has hardly moved for minutes,
-    although no rule makes it wait.
+    swarm_forage_env.checks.check_policy lists the rules.
     """
-    from swarm_forage_env.cli.scenario_options import plan_runs
-    from swarm_forage_env.inspect.stuck import find_stuck_in
-
-    specs = plan_runs(described, policies.names("crw"), n_seeds=seeds, first_seed=first_seed)
-    _check_rules(specs)
-    found = find_stuck_in(specs, window_s=window, moved_m=moved, jobs=jobs)
-    typer.echo(found.json() if as_json else printable(found.text()))
-    if found.found:
-        raise typer.Exit(EXIT_FAILURE)
-
-
-def _check_rules(specs: "Sequence[RunSpec]") -> None:
-    """Check each policy once, in its world without wrappers; the first fault ends the command."""
     from swarm_forage_env.checks import CheckError, check_policy
+    from swarm_forage_env.cli.scenario_options import plan_runs
 
-    for spec in {spec.policy: spec for spec in specs}.values():
+    for spec in plan_runs(described, policies.names("crw"), n_seeds=1, first_seed=seed):
         try:
             check_policy(spec.policy, spec.scenario, seed=spec.seed)
         except CheckError as error:
             raise typer.Exit(complain(f"{spec.policy} breaks a rule: {error}", EXIT_FAILURE)) from None
+        typer.echo(f"{printable(spec.policy)} keeps the rules")
 
 
 def rerun(

@@ -21,12 +21,10 @@ COMMANDS: dict[str, tuple[Command, ...]] = {
     "Run and look": (
         Command("run", "Run policies in a scenario and compare them.", "questions:run"),
         Command("plot", "Draw stored runs anew.", "questions:plot"),
-        Command("watch", "Watch a run in a window.", "look:watch"),
         Command("play", "Steer and disturb a run in the browser.", "play:play"),
         Command("record", "Film a run, or draw it at one time.", "look:record"),
         Command("replay", "Write runs as one HTML page that plays them.", "replay:replay"),
         Command("maps", "Draw maps of where things happened.", "maps:maps"),
-        Command("saliency", "Show what a trained network looks at.", "look:saliency"),
     ),
     "Score and decide": (
         Command("score", "Score policies by all measures.", "questions:score"),
@@ -56,7 +54,7 @@ COMMANDS: dict[str, tuple[Command, ...]] = {
         Command("info", "Describe a scenario or a policy.", "look:info"),
     ),
     "Checks": (
-        Command("check", "Check policies, and find stuck robots.", "check:check"),
+        Command("check", "Check that policies keep the rules.", "check:check"),
         Command("rerun", "Repeat a stored run, and compare.", "check:rerun"),
     ),
 }

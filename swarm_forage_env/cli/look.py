@@ -1,4 +1,4 @@
-"""The commands that show what is there, one run, or a network: `list`, `info`, `watch`, `record`, `saliency`."""
+"""The commands that show what is there, or one run: `list`, `info`, `record`."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -6,8 +6,8 @@ from typing import Annotated, Any
 import typer
 
 from swarm_forage_env._internal.wording import printable
-from swarm_forage_env.cli.options import AsJson, Picture, PolicyOptions, Seed, WorldOptions, no_picture
-from swarm_forage_env.cli.printer import notes, progress_bar, width_of_terminal
+from swarm_forage_env.cli.options import AsJson, PolicyOptions, Seed, WorldOptions
+from swarm_forage_env.cli.printer import progress_bar, width_of_terminal
 
 
 def list_everything(
@@ -33,50 +33,6 @@ def info(
     found = describe(name)
     text = found.json() if as_json else found.text(width=width_of_terminal())
     typer.echo(printable(text))  # a file may hold anything
-
-
-def watch(
-    policies: PolicyOptions,
-    described: WorldOptions,
-    speed: Annotated[
-        float, typer.Option(help="Simulated seconds per second at the start; arrow keys change it.")
-    ] = 10.0,
-    size: Annotated[int, typer.Option(help="Longer side of the arena in pixels.")] = 900,
-    theme: Annotated[str, typer.Option(help="dark or light.")] = "dark",
-    seed: Seed = 0,
-) -> None:
-    """Watch a run in a window: pause, follow a robot, raise noise, kill robots.
-
-    The window shows the keys. It needs a display; without one, use record or replay.
-    """
-    from swarm_forage_env.cli.scenario_options import described_world
-    from swarm_forage_env.inspect.watch import Watch
-    from swarm_forage_env.policies.model_files import ModelError
-    from swarm_forage_env.policies.network import NetworkError
-    from swarm_forage_env.policies.registry import policy_class
-    from swarm_forage_env.rendering.view import RenderError
-
-    policy = policies.one()
-    world, asked_caches = described_world(described)
-    try:
-        policy_class(policy)
-    except ValueError as error:  # an unknown name is a mistake in the words; a ValueError of the run is not
-        raise typer.BadParameter(str(error)) from error
-    try:
-        watched = Watch(
-            world.scenario,
-            policy,
-            seed=seed,
-            speed=speed,
-            size_px=size,
-            theme=theme,
-            caches=asked_caches,
-            wrappers=world.wrappers,
-        )
-        watched.show()
-    except (RenderError, ModelError, NetworkError) as error:
-        raise typer.BadParameter(str(error)) from error
-    typer.echo(watched.summary())
 
 
 def record(
@@ -137,41 +93,3 @@ def _refuse_unknown(policy: str) -> None:
         policy_class(policy)
     except ValueError as error:  # an unknown name is a mistake in the words; a ValueError of the run is not
         raise typer.BadParameter(str(error)) from error
-
-
-def saliency(
-    policies: PolicyOptions,
-    described: WorldOptions,
-    picture: Picture = None,
-    seconds: Annotated[float | None, typer.Option(help="Simulated seconds to look at; default the whole run.")] = None,
-    seed: Seed = 0,
-    as_json: AsJson = False,
-) -> None:
-    """Show what a trained network looks at.
-
-    For example, give a robot the light readings of another robot: how often does it then decide otherwise? The command
-    does this for each part of what robots see. The policy is a shipped network, or the .npz file of a training. Where
-    robots have frames of their own, position, heading and directions are in these frames, as the network sees them.
-    """
-    from swarm_forage_env.cli.scenario_options import described_world, plan_runs
-    from swarm_forage_env.inspect.saliency import open_network_of
-    from swarm_forage_env.inspect.saliency import saliency as measured
-    from swarm_forage_env.rendering.figures import check_picture
-
-    policy = policies.one()
-    network = open_network_of(policy)
-    (spec,) = plan_runs(described, (policy,), n_seeds=1, first_seed=seed)
-    world, _ = described_world(described)
-    file = picture or Path("results", f"{world.file_name}_{Path(policy).stem}.saliency.png")
-    check_picture(file)
-    found = measured(network, spec, seconds=seconds)
-    typer.echo(found.json() if as_json else printable(found.text()))
-    try:
-        found.draw(file)
-    except ImportError as error:
-        notes().print(str(error))
-        return
-    except OSError as error:  # the table is worth more than its picture
-        notes().print(no_picture(file, error))
-        return
-    notes().print(f"picture {file}")

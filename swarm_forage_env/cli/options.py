@@ -1,6 +1,6 @@
 """What several commands share: options, alone and in groups, exit codes, complaints; light, so that help is quick.
 
-    def watch(policies: PolicyOptions, described: WorldOptions, speed: ...) -> None:
+    def record(policies: PolicyOptions, described: WorldOptions, speedup: ...) -> None:
 
 A parameter of a command is an option, or a class of options that describe one thing. The command line shows
 `--scenario`, `--robots` and the rest where `described` stands, and the function gets them as one object.

@@ -244,9 +244,9 @@ class Policy(Protocol):
     """Controls every robot at once. An instance drives one run; its memory is created by `reset`.
 
     Optional attributes: `task`, an (N,) int8 array of `Task` codes; `describe_robot(row) -> str`, what one robot is
-    doing, for people (`inspect.stuck` shows it); `describe_robots() -> RobotStates`, the same of all robots as arrays
+    doing, for people (`inspect.play` shows it); `describe_robots() -> RobotStates`, the same of all robots as arrays
     (`inspect.replay` keeps it); `describe_memories() -> Memories`, where all robots remember things (`inspect.replay`
-    keeps it, and the window shows those of one); `part_rows`, slices of rows that the record tells apart, set by
+    keeps it, and `inspect.play` shows those of one); `part_rows`, slices of rows that the record tells apart, set by
     `reset` (of mixed swarms, whose runs are counted tick by tick);
     `see_world(env)`, called by runs after `reset` with the `ForageEnv`, which a policy may read and must not change: a
     policy that has it is a yardstick and no contestant, so that `check_policy` and the benchmark refuse it;

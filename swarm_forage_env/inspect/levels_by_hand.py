@@ -1,4 +1,4 @@
-"""Levels of adversity that a person changes while a run goes on: which there are, and what a step changes."""
+"""Levels of adversity that a person changes while a run goes on: and which there are."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -33,25 +33,24 @@ class LevelKind:
     wrapper: type[SwarmWrapper]
     field: str
     """Of the wrapper's configuration: a number or a `Waveform`, whose amplitude is the level."""
-    step: float
     lowest: float
     per_1000_s: bool = False
     """Whether people give it per 1,000 s, where the field has it per tick."""
 
 
 LEVELS = {
-    "t": LevelKind("throttle", Throttle, "waveform", 0.05, 0.0),
-    "s": LevelKind("sensor noise", SensorNoise, "sigma", 0.01, 0.0),
-    "w": LevelKind("wheel noise", ActuatorNoise, "sigma", 0.01, 0.0),
-    "h": LevelKind("handling ticks", HandlingCost, "waveform", 10.0, IDEAL_COST),
+    "t": LevelKind("throttle", Throttle, "waveform", 0.0),
+    "s": LevelKind("sensor noise", SensorNoise, "sigma", 0.0),
+    "w": LevelKind("wheel noise", ActuatorNoise, "sigma", 0.0),
+    "h": LevelKind("handling ticks", HandlingCost, "waveform", IDEAL_COST),
 }
-"""Key -> level. The steps are our choice, of the size of those between the paper's levels."""
+"""Key -> level."""
 RATES = {
-    "failures": LevelKind("failures per 1,000 s", PopulationDynamics, "malfunction_per_tick", 0.5, 0.0, True),
-    "repairs": LevelKind("repairs per 1,000 s", PopulationDynamics, "repair_per_tick", 0.5, 0.0, True),
-    "deaths": LevelKind("deaths per 1,000 s", PopulationDynamics, "death_per_tick", 0.5, 0.0, True),
+    "failures": LevelKind("failures per 1,000 s", PopulationDynamics, "malfunction_per_tick", 0.0, True),
+    "repairs": LevelKind("repairs per 1,000 s", PopulationDynamics, "repair_per_tick", 0.0, True),
+    "deaths": LevelKind("deaths per 1,000 s", PopulationDynamics, "death_per_tick", 0.0, True),
 }
-"""Name -> rate of the whole swarm. The window has no keys for them."""
+"""Name -> rate of the whole swarm."""
 MOST_CHANGES = 20
 """Changes that are told in one line; our choice: more than anybody reads."""
 _KINDS = {**LEVELS, **RATES}
@@ -103,20 +102,6 @@ class Levels:
         if isinstance(value, Waveform):
             return None if value.kind == "table" else value.amplitude
         return round(value * self._per_1000_s, 9) if kind.per_1000_s else value
-
-    def change(self, key: str, *, up: bool) -> str:
-        """Change a level by one step; returns one line about what has become of it."""
-        kind, now = _KINDS[key], self.level(key)
-        if now is None:
-            return f"{kind.name} follows a table, which has no amplitude to change"
-        # Rounding keeps 0.05 + 0.05 + 0.05 at 0.15.
-        wanted = max(kind.lowest, round(now + (kind.step if up else -kind.step), 9))
-        if wanted == now:
-            return f"{kind.name} is {now:g}, the lowest level"
-        try:
-            return self.set(key, wanted)
-        except ConfigError:
-            return f"{kind.name} is {now:g}, the highest level"
 
     def set(self, key: str, wanted: float) -> str:
         """Change a level to a value; returns one line about it.

@@ -1,4 +1,4 @@
-"""A run that a person looks at and disturbs while it goes on; the window and the page to play with drive it.
+"""A run that a person looks at and disturbs while it goes on; the page to play with drives it.
 
 Looking changes nothing: until a level is changed or a robot killed by hand, the run is the one that `run_one` makes.
 """

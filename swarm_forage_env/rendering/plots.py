@@ -10,7 +10,6 @@ import numpy as np
 
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.rendering.figures import (
-    COLOURS,
     MARKERS,
     SCREEN,
     FigureStyle,
@@ -269,35 +268,3 @@ def _map_top(arrays: Sequence[FloatArray]) -> float:
     """Return the end of the scale of maps: few squares hold most; the last percent would hide all others."""
     values = np.abs(np.concatenate([array.ravel() for array in arrays]))
     return float(np.quantile(values[values > 0], 0.99)) if values.any() else 1.0
-
-
-def draw_saliency(
-    path: str | Path,
-    slices: Sequence[str],
-    bars: Mapping[str, FloatArray],
-    *,
-    title: str,
-    xlabel: str,
-    style: FigureStyle = SCREEN,
-) -> None:
-    """Draw what a network looks at: a group of bars per slice of its observations, the longest on top.
-
-    Args:
-        path: File to write; as in `saved_figure`, whose errors this has.
-        slices: (S,) names.
-        bars: Name of a group of robots -> (S,) lengths.
-        title: Headline.
-        xlabel: What the lengths are.
-        style: Of the figure.
-    """
-    order = np.argsort(np.max([*bars.values()], axis=0), kind="stable")
-    height = 0.8 / len(bars)
-    with saved_figure(path, (7.0, 1.2 + 0.42 * len(slices)), title=title, style=style) as figure:
-        axes = figure.subplots()
-        for index, (group, lengths) in enumerate(bars.items()):
-            places = np.arange(len(slices)) + (0.5 * (len(bars) - 1) - index) * height
-            axes.barh(places, lengths[order], height, color=COLOURS[index], label=f"{group} robots")
-        axes.set_yticks(np.arange(len(slices)), [slices[row].replace("_", " ") for row in map(int, order)])
-        axes.set(xlabel=xlabel, xlim=(0, None))
-        axes.grid(visible=False, axis="y")
-        axes.legend(loc="lower right")

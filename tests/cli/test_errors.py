@@ -148,7 +148,7 @@ def test_a_missing_word_is_explained_and_our_own_words_have_no_prefix(command):
     code, _, err = command("choose", "crw")
     assert code == 2
     assert err.startswith("swarm-forage: Missing option '--deliver'. It is: Total performance")
-    assert command("saliency")[2].startswith("swarm-forage: Expected a policy")
+    assert command("export", "--file", "net.h")[2].startswith("swarm-forage: Expected a policy")
 
 
 def test_a_policy_that_cannot_run_at_all_is_told_once_with_the_reason_and_what_to_do(command):

@@ -12,7 +12,7 @@ from swarm_forage_env.cli.app import loaded
 from swarm_forage_env.cli.commands import COMMANDS
 from swarm_forage_env.cli.options import spread
 
-ONE_RUN = ("record", "replay", "watch", "saliency")
+ONE_RUN = ("record", "replay")
 """Commands that look into one run, or into one of each policy."""
 
 
@@ -54,9 +54,7 @@ def test_whatever_makes_runs_says_where_how_many_and_in_what_form(words):
     assert {"--jobs", "--seeds", "--out", "--json", "--dry-run", "--policy"} <= options_of(words)
 
 
-@pytest.mark.parametrize(
-    "words", ["list", "info", "check", "rerun", "saliency", "predict availability", "benchmark show"]
-)
+@pytest.mark.parametrize("words", ["list", "info", "rerun", "predict availability", "benchmark show"])
 def test_what_is_printed_is_there_as_json_too(words):
     assert "--json" in options_of(words)
 

@@ -77,7 +77,7 @@ CASES = {
     "run_plan.txt": f"{RUN} --first-seed 7 --dry-run",
     "run_plan.json": f"{RUN} --first-seed 7 --dry-run --json",
     "rerun.txt": "rerun record.parquet",
-    "check.txt": f"check crw --window 40 --moved 1.5 {SMALL} --robots 6 {SECONDS}",
+    "check.txt": f"check crw,dpo {SMALL} --robots 6 {SECONDS}",
     "score.txt": SCORE,
     "score.json": f"{SCORE} --json",
     "score_forms.txt": f"{SCORE} {FORMS}",

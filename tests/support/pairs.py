@@ -46,7 +46,6 @@ WRITERS: dict[str, tuple[str, ...]] = {
     "train": kills.COMMANDS["train"].words,
     "study plot": ("study", "plot", "done", "--out", "out"),
     "study verdict": ("study", "verdict", str(OF_PAPER), "--file", "out/verdict.json"),
-    "saliency": ("saliency", "ppo_warehouse_small", *TINY[1:], "--seconds", "10", "--picture", "out/saliency.png"),
     "plot": ("plot", "there/runs", "--picture", "out/performance.png"),
     "train curves": ("train", "curves", "training", "--policy", "none", "--picture", "out/curves.png"),
     "benchmark page": ("benchmark", "page", str(ENTRY), "--file", "out/page.md", "--picture", "out/board.png"),
