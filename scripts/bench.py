@@ -3,10 +3,6 @@
     scripts/bench                             all cases; some minutes
     scripts/bench crw-200 dpo-200 --quick     some, in shorter measurements
     scripts/bench --against 860cf6a           in turn with another revision, or the folder of a checkout, as ratios
-    scripts/bench --peers ../peers            other packages beside ours; each is installed into a folder of that one
-    scripts/bench --phases                    what the phases of a tick take, for the scripted controllers
-    scripts/bench --phases stochx generalist  the same for these policies
-    scripts/bench --phases crw --robots 200 131072   and for swarms of these sizes
 
 Times are processor time on one core, where nothing else is said. A value is the median of the rounds. A ratio is that
 of one round, so that what else the machine does counts as little as possible; the table has the median, and the
@@ -25,20 +21,13 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import IO
 
-from arguments import whole
 from bench_cases import CASES
-from bench_peers import PEERS
 from rich.console import Console
 
 ROOT = Path(__file__).resolve().parents[1]
-CASES_FILE, PEERS_FILE, PHASES_FILE = (
-    Path(__file__).with_name(f"bench_{name}.py") for name in ("cases", "peers", "phases")
-)
-CONTROLLERS = ("crw", "dpo", "stochm", "stochx")
+CASES_FILE = Path(__file__).with_name("bench_cases.py")
 ALONE = {
     **dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"),
-    "JAX_PLATFORMS": "cpu",
-    "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false",
 }
 """One thread per library."""
 
@@ -113,18 +102,6 @@ def started(folder: Path, open_things: ExitStack) -> Subject:
     return open_things.enter_context(Subject(sys.executable, own if own.is_file() else CASES_FILE, folder))
 
 
-def installed(peer: str, folder: Path) -> Path:
-    """Return the Python of a virtual environment that holds a package; raises BenchError."""
-    home = folder.resolve() / PEERS[peer].folder
-    python = home / "bin" / "python"
-    pip = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *PEERS[peer].requirements]
-    for command in ([] if python.exists() else [[sys.executable, "-m", "venv", str(home)]]) + [pip]:
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        if done.returncode:
-            raise BenchError(f"{peer}: {(done.stderr or done.stdout or 'not installed').strip().splitlines()[-1]}")
-    return python
-
-
 Values = list[float]
 """Of one case, round by round."""
 
@@ -166,17 +143,6 @@ def rows_of_cases(names: Sequence[str], found: dict[str, list[Values]], *, again
     return rows
 
 
-def rows_of_peers(names: Sequence[str], found: dict[str, list[Values]]) -> Rows:
-    """Return the table of other packages."""
-    rows = [["task of the other", "version", "ns per agent-step", "ours", "ns per agent-step", "other : ours"]]
-    for name in names:
-        peer, values = PEERS[name], found.get(name, [])
-        ours, other = [short(statistics.median(own)) for own in values] or ["-", "-"]
-        version = peer.requirements[0].partition("==")[2]
-        rows.append([peer.about, version, other, peer.ours, ours, ratio(values[1], values[0]) if values else "-"])
-    return rows
-
-
 def markdown(rows: Rows) -> str:
     """Return a table in Markdown, padded."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
@@ -185,39 +151,19 @@ def markdown(rows: Rows) -> str:
     return "\n".join([lines[0], f"|{'|'.join('-' * (width + 2) for width in widths)}|", *lines[1:]])
 
 
-def chosen_cases(given: argparse.Namespace, parser: argparse.ArgumentParser) -> list[str]:
-    """Return the names of the cases to measure; unknown ones end in a message."""
-    known = list(PEERS if given.peers else CASES)
-    for name in given.cases:
-        if name not in known:
-            parser.error(f"expected some of {', '.join(known)}, got {name!r}")
-    return given.cases or known
-
-
 def main() -> int:
     """Measure the cases and print the table; returns the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("cases", nargs="*", metavar="CASE", help=f"default all of: {', '.join(CASES)}")
     parser.add_argument("--against", metavar="REVISION", help="another revision, or the folder of a checkout")
-    parser.add_argument("--peers", type=Path, metavar="FOLDER", help=f"other packages: {', '.join(PEERS)}")
-    parser.add_argument("--phases", action="store_true", help="phases of a tick; CASE is then the name of a policy")
-    parser.add_argument(
-        "--robots",
-        nargs="+",
-        type=whole(at_least=1),
-        default=[200],
-        metavar="N",
-        help="sizes for --phases, default 200",
-    )
     parser.add_argument("--physics", choices=("compiled", "chipmunk"), default="compiled", help="default compiled")
     parser.add_argument("--quick", action="store_true", help="three short rounds instead of seven whole ones")
     given = parser.parse_args()
     rounds, effort = (3, 0.2) if given.quick else (7, 1.0)
-    if given.phases:
-        command = [sys.executable, PHASES_FILE, str(effort), ",".join(given.cases or CONTROLLERS)]
-        command.append(",".join(map(str, given.robots)))
-        return subprocess.run(command, env=alone(ROOT), check=False).returncode
-    names = chosen_cases(given, parser)
+    names = given.cases or list(CASES)
+    for name in names:
+        if name not in CASES:
+            parser.error(f"expected some of {', '.join(CASES)}, got {name!r}")
     found: dict[str, list[Values]] = {}
     failed: list[str] = []
     progress = Console(stderr=True)
@@ -232,22 +178,13 @@ def main() -> int:
             for name in names:
                 try:
                     sides = [(subject, name) for subject in subjects]
-                    if given.peers:
-                        python = installed(name, given.peers)
-                        other = open_things.enter_context(Subject(python, PEERS_FILE, ROOT / "scripts"))
-                        sides = [(subjects[0], PEERS[name].ours), (other, name)]
-                    once = name in CASES and CASES[name].once
-                    found[name] = measured(sides, given.physics, 1 if once else rounds, effort)
+                    found[name] = measured(sides, given.physics, 1 if CASES[name].once else rounds, effort)
                     progress.print(name, *(short(statistics.median(values)) for values in found[name]), style="dim")
                 except BenchError as error:
                     failed.append(str(error))
         except KeyboardInterrupt:
             progress.print("Interrupted; these cases are done:")
-    print(
-        markdown(
-            rows_of_peers(names, found) if given.peers else rows_of_cases(names, found, against=bool(given.against))
-        )
-    )
+    print(markdown(rows_of_cases(names, found, against=bool(given.against))))
     if failed:
         print("\n".join(failed), file=sys.stderr)
     return 1 if failed else 0

@@ -76,13 +76,6 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ),
         ("crw", "policy"),
     ),
-    "cleanrl": (
-        (
-            f"python {ROOT}/scripts/cleanrl_ppo.py --out results/cleanrl_ppo",
-            "swarm-forage run crw,results/cleanrl_ppo/policy.npz --seeds 4",
-        ),
-        ("crw", "policy"),
-    ),
     **{
         f"generalist_{short}": (
             (f"swarm-forage run {','.join(WITH_ALL)} --scenario {name} --seeds 4",),
@@ -113,7 +106,6 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ),
         ("generalist", "likeliest"),
     ),
-    "stochx_program": ((f"python {ROOT}/scripts/stochx_beside_program.py",), ()),
     "from_scenario": ((f"python {ROOT}/scripts/from_scenario.py",), ()),
     "emptying": ((f"python {ROOT}/scripts/emptying_floor.py",), ("crw", "dpo")),
     "cpfa_evolved": (
@@ -124,15 +116,6 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ),
         (),
     ),
-    "dpo_front": (
-        (
-            f"python {ROOT}/scripts/evolve_controller.py dpo wander_speed_mps=0.03:0.1 wander_max_change_deg=1:20:log "
-            "arrival_speed_mps=0.03:0.1 recovery_s=0:10 evaporation_per_tick=0.000001:0.01:log --generations 8 "
-            f"--population 10 --horizon 2000 --front {ROOT}/docs/images/front_dpo.png",
-        ),
-        (),
-    ),
-    "turned": ((f"python {ROOT}/scripts/turned_worlds.py",), ()),
     "oracle_rows": ((f"python {ROOT}/scripts/oracle_rows.py",), ()),
     "wall": (
         (
@@ -164,7 +147,6 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ),
         (),
     ),
-    "sizes": ((f"python {ROOT}/scripts/every_size.py",), ()),
     **{
         f"lesson_{size}": (
             (f"swarm-forage run crw,dpo --scenario classroom --robots {size} --seeds 4",),

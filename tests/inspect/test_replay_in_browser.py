@@ -2,14 +2,12 @@
 
 import dataclasses
 import os
-import re
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from scripts.replay_in_browser import measure
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.inspect.replay.capture import record_replay
 from swarm_forage_env.inspect.replay.files import write_replays
@@ -382,16 +380,6 @@ def test_dead_robots_and_those_in_repair_are_told_and_explained(page, replays, d
     choose(desktop, replay, frame, broken)
     assert told(desktop) == "in repair"
     assert desktop.complaints == []
-
-
-def test_size_and_speed_of_a_page_are_measured(tmp_path, capsys):
-    chromium()
-    measure(tmp_path, 3, 4)
-    told = capsys.readouterr().out
-    assert told.startswith("3 robots, 5 frames: 0.0")
-    rate, took = (float(found) for found in re.findall(r"(\d+\.\d+) (?:bytes per robot|ms of processor time)", told))
-    assert rate > 0.0
-    assert 0.0 < took < 1000.0
 
 
 def told(browser: Browser) -> str:

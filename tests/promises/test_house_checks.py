@@ -85,7 +85,7 @@ def run_tests(folder: Path, source: str, *options: str) -> subprocess.CompletedP
 
 
 PASSES = "def test_passes(): pass\n"
-NAMED = "def test_named(): pytest.skip('needs ray: scripts/test_bridges')\n"
+NAMED = "def test_named(): pytest.skip('needs ray, see docs/libraries.md')\n"
 UNNAMED = "def test_unnamed(): pytest.skip('no time')\n"
 
 
@@ -98,7 +98,7 @@ def test_a_skip_without_a_name_fails_and_is_listed(tmp_path, monkeypatch, spread
     assert done.returncode == pytest.ExitCode.TESTS_FAILED, done.stdout
     assert sorted((tmp_path / "list").read_text().split()) == ["test_all_of_it.py", "test_it.py::test_unnamed"]
     assert "skipped, which --no-skips forbids: test_it.py::test_unnamed: no time" in done.stdout
-    assert "skipped, and named: 1 x needs ray: scripts/test_bridges" in done.stdout
+    assert "skipped, and named: 1 x needs ray, see docs/libraries.md" in done.stdout
 
 
 @pytest.mark.parametrize(("source", "options"), [(PASSES + NAMED, ["--no-skips"]), (PASSES + UNNAMED, [])])

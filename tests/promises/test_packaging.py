@@ -158,5 +158,5 @@ def test_scripts_that_install_torch_pin_it():
         for line in path.read_text().splitlines()
         if re.search(r"pip3?\"? install.*(torch|\btrain\b|agilerl|benchmarl|\bray\b|packages)", line)
     ]
-    assert len(commands) > 8, "README, .ci/run, scripts/test_bridges and pages"
+    assert len(commands) > 3, "README, .ci/run and pages"
     assert [line for line in commands if "torch==2.13.0" not in line] == []

@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-
 from metrics.random_search import SearchFloor, Walker
 
 

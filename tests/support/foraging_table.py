@@ -1,8 +1,8 @@
 """The table of a study whose runs do what the mean-field model says; nothing is run."""
 
 import polars as pl
-
 from metrics.foraging_model import ForagingRates, mean_field
+
 from swarm_forage_env.runs.policy_spec import PolicySpec
 from swarm_forage_env.studies.study import Axis
 from swarm_forage_env.studies.study_table import StudyTable
