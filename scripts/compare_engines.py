@@ -21,7 +21,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from arguments import whole
 from scipy.spatial import KDTree
 
 from baselines.dpo import DPOPolicy
@@ -220,7 +219,7 @@ def listed(text: str) -> list[str]:
 
 def numbers(text: str) -> list[int]:
     """Whole numbers separated by commas."""
-    return [whole(at_least=1)(word) for word in listed(text)]
+    return [int(word) for word in listed(text)]
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -229,9 +228,7 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--scenario", type=listed, default=["warehouse_small"], help="presets, separated by commas")
     parser.add_argument("--policy", type=listed, default=["crw", "dpo"], help="policies, separated by commas")
     parser.add_argument("--robots", type=numbers, default=[16, 64], help="numbers of robots, separated by commas")
-    parser.add_argument(
-        "--seeds", type=whole(at_least=2), default=4, help="runs of a case, for an interval two or more"
-    )
+    parser.add_argument("--seeds", type=int, default=4, help="runs of a case, for an interval two or more")
     parser.add_argument("--all", action="store_true", help="print rows with the same numbers in both engines, too")
     parser.add_argument("--horizon", type=float, default=2_000.0, help="length of a run in s")
     parser.add_argument("--check", action="store_true", help="the fixed cases; fail if runs part")

@@ -1,265 +1,119 @@
-"""Count the house: what a reader has to know, as numbers.
+"""Count the house, room by room: lines and files of source and tests, words of docs, commands, options, public names.
 
     scripts/count                     this checkout
-    scripts/count ../before .         two checkouts side by side, then each folder by folder
+    scripts/count ../before .         two checkouts side by side
 
-Python source is what lies in the packages, with stubs, and in scripts/, without tests. A line of code is one that is
-not blank and holds more than a comment or a docstring. An arrow is an import, wherever in a file it stands: from one
-file to another, or from one folder to another, each pair counted once. Only commands and options, without hidden ones,
-need the package to be imported, by this interpreter: where that fails they are a dash.
+A room is what one question is answered by; the rooms stand in their order, those that import from others first. Lines
+are lines of files, comments and blank ones included. Data, packed runs and shipped networks are not counted.
+Commands, options and public names need the package to be imported, by this interpreter: where that fails they are "-".
 """
 
 import argparse
-import ast
-import io
 import os
+import re
 import subprocess
 import sys
-import tokenize
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator
 from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
 
-PACKAGES = ("swarm_forage_env", "baselines", "metrics")
-LONG, SHORT = (500, 300), (100, 50)
-"""Lengths of files, in lines: over and under so many."""
-COMMANDS = """
-def walk(command):
-    for each in getattr(command, "commands", {}).values():
-        if not each.hidden:
-            yield from walk(each) if hasattr(each, "commands") else [each]
-try:
-    from swarm_forage_env.cli.commands import COMMANDS
-except ImportError:  # an earlier checkout
-    import typer
-    from swarm_forage_env.cli.app import app
-    commands = list(walk(typer.main.get_command(app)))
-else:
-    from swarm_forage_env.cli.app import loaded
-    commands = [loaded(each) for group in COMMANDS.values() for each in group if each.place]
-shown = [one for command in commands for one in command.params if not getattr(one, "hidden", False)]
-words = [option.opts[0] for option in shown]
-options = [word for word in words if word.startswith("-") and word != "--help"]
-print(len(commands), len(words), len(options), len(set(options)))
+PACKAGE = "swarm_forage_env"
+ROOMS = {
+    "cli": (f"{PACKAGE}/cli",),
+    "metrics/scoring": ("metrics/scoring",),
+    "metrics/benchmark": ("metrics/benchmark",),
+    "training": (f"{PACKAGE}/training",),
+    "inspect, rendering": (f"{PACKAGE}/inspect", f"{PACKAGE}/rendering"),
+    "studies, checks": (f"{PACKAGE}/studies", f"{PACKAGE}/checks"),
+    "runs": (f"{PACKAGE}/runs",),
+    "views": (f"{PACKAGE}/views",),
+    "wrappers, env.py, __init__": (
+        f"{PACKAGE}/wrappers",
+        f"{PACKAGE}/env.py",
+        f"{PACKAGE}/__init__.py",
+        f"{PACKAGE}/__init__.pyi",
+    ),
+    "policies": (f"{PACKAGE}/policies",),
+    "baselines": ("baselines",),
+    "world": (f"{PACKAGE}/world",),
+    "contract, scenarios, _internal": tuple(f"{PACKAGE}/{name}" for name in ("contract", "scenarios", "_internal")),
+    "metrics (formulas, claims)": ("metrics",),
+    "scripts, .ci/run": ("scripts", ".ci/run"),
+}
+"""Room -> its places; a file belongs to the first room that has it, and what no room has is "elsewhere"."""
+PAGES = "pages (js, css, html)"
+SURFACE = """
+from swarm_forage_env.cli.app import loaded
+from swarm_forage_env.cli.commands import COMMANDS
+import metrics, swarm_forage_env
+commands = [loaded(each) for group in COMMANDS.values() for each in group if each.place]
+shown = [one.opts[0] for each in commands for one in each.params if not getattr(one, "hidden", False)]
+options = [word for word in shown if word.startswith("-") and word != "--help"]
+print(len(commands), len(options), len(set(options)), len(swarm_forage_env.__all__) + len(metrics.__all__))
 """
-"""Prints how many commands, parameters, options and distinct names of options --help shows."""
-NO_CODE = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
+SURFACE_NAMES = ("commands", "options", "distinct names of options", "public names of the two packages")
 
 
-@dataclass(frozen=True)
-class SourceFile:
-    """What one file of Python holds."""
-
-    path: Path
-    """From the root of the checkout."""
-    lines: int
-    code: int
-    classes: int
-    dataclasses: int
-    functions: int
-    imports: frozenset[str]
-    """Dotted names that it imports, those of single objects included."""
-
-    @property
-    def module(self) -> str:
-        """Its dotted name; that of a folder for an `__init__.py`."""
-        return ".".join(self.path.with_suffix("").parts).removesuffix(".__init__")
-
-    @property
-    def folder(self) -> str:
-        """The folder it belongs to in the tables: two levels of the packages, one of all else."""
-        parts = self.path.parts[:-1]
-        return "/".join(parts[:2] if parts[0] in PACKAGES else parts[:1])
+def tracked(root: Path) -> list[str]:
+    """Return the files of a checkout that git knows and that are there."""
+    listed = subprocess.run(["git", "-C", str(root), "ls-files"], capture_output=True, text=True, check=True).stdout
+    return [name for name in listed.splitlines() if (root / name).is_file()]
 
 
-def read(path: Path, root: Path) -> SourceFile:
-    """Count one file."""
-    source = path.read_text(encoding="utf-8")
-    tree = ast.parse(source)
-    nodes = list(ast.walk(tree))
-    classes = [node for node in nodes if isinstance(node, ast.ClassDef)]
-    place = path.relative_to(root)
-    return SourceFile(
-        path=place,
-        lines=len(source.splitlines()),
-        code=len(_lines_of_code(source, nodes)),
-        classes=len(classes),
-        dataclasses=sum(any("dataclass" in ast.unparse(mark) for mark in node.decorator_list) for node in classes),
-        functions=sum(isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) for node in nodes),
-        imports=frozenset(_imports(nodes, place)),
-    )
+def room_of(name: str) -> str | None:
+    """Return the room of a file of source; None for all other files."""
+    if name.startswith(f"{PACKAGE}/") and name.endswith((".js", ".css", ".html")):
+        return PAGES
+    is_script = name == ".ci/run" or (name.startswith("scripts/") and "." not in Path(name).name)
+    top = name.partition("/")[0]
+    if not is_script and not (name.endswith((".py", ".pyi")) and top in (PACKAGE, "baselines", "metrics", "scripts")):
+        return None
+    places = ((room, place) for room, those in ROOMS.items() for place in those)
+    return next((room for room, place in places if name == place or name.startswith(f"{place}/")), "elsewhere")
 
 
-def _lines_of_code(source: str, nodes: list[ast.AST]) -> set[int]:
-    texts: set[int] = set()
-    for node in nodes:
-        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
-            texts.update(range(node.lineno, (node.end_lineno or node.lineno) + 1))
-    lines: set[int] = set()
-    for token in tokenize.generate_tokens(io.StringIO(source).readline):
-        if token.type not in NO_CODE:
-            lines.update(range(token.start[0], token.end[0] + 1))
-    return lines - texts
+def lines_and_files(root: Path, names: list[str]) -> str:
+    """Return how many lines so many files have, in words."""
+    n_lines = sum(len((root / name).read_text(encoding="utf-8").splitlines()) for name in names)
+    return f"{n_lines:,} in {len(names)}"
 
 
-def _imports(nodes: list[ast.AST], place: Path) -> Iterator[str]:
-    """Yield dotted names, relative ones made whole."""
-    for node in nodes:
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            above = [".".join(place.parts[: len(place.parts) - node.level])] if node.level else []
-            start = ".".join([*above, *([node.module] if node.module else [])])
-            yield from (f"{start}.{alias.name}" for alias in node.names)
-
-
-@dataclass
-class House:
-    """All counted files of a checkout."""
-
-    root: Path
-    files: list[SourceFile] = field(default_factory=list)
-    tests: list[SourceFile] = field(default_factory=list)
-
-    @classmethod
-    def of(cls, root: Path) -> "House":
-        """Read a checkout.
-
-        Raises:
-            FileNotFoundError: the folder holds no such package.
-        """
-        if not (root / "swarm_forage_env" / "__init__.py").is_file():
-            raise FileNotFoundError(f"Expected the folder of a checkout of this project, got {root}.")
-        files = [
-            [read(path, root) for path in _python_files(root, names)] for names in ((*PACKAGES, "scripts"), ["tests"])
-        ]
-        return cls(root, *files)
-
-    def arrows(self) -> set[tuple[str, str]]:
-        """Return the pairs of modules of which the first imports the second."""
-        modules = {file.module for file in self.files}
-        found: set[tuple[str, str]] = set()
-        for file in self.files:
-            for name in file.imports:
-                target = name if name in modules else name.rpartition(".")[0]
-                if target in modules and target != file.module:
-                    found.add((file.module, target))
-        return found
-
-    def arrows_of_folders(self) -> set[tuple[str, str]]:
-        """Return the pairs of folders of which the first imports something of the second."""
-        folders = {file.module: file.folder for file in self.files}
-        pairs = {(folders[start], folders[end]) for start, end in self.arrows()}
-        return {(start, end) for start, end in pairs if start != end}
-
-    def lines_of_shell(self) -> int:
-        """Return the lines of the scripts that are not Python."""
-        texts = [
-            path.read_text(encoding="utf-8")
-            for path in [*self.root.glob("scripts/*"), self.root / ".ci/run"]
-            if path.is_file()
-        ]
-        return sum(len(text.splitlines()) for text in texts if text.startswith("#!/usr/bin/env bash"))
-
-    def commands(self) -> list[str]:
-        """Return the numbers of commands, parameters, options and names of options, as they are printed."""
-        environment = {**os.environ, "PYTHONPATH": str(self.root), "PYTHONDONTWRITEBYTECODE": "1"}
-        run = subprocess.run(
-            [sys.executable, "-c", COMMANDS],
-            cwd=self.root,
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        return run.stdout.split() if run.returncode == 0 else ["-"] * 4
-
-
-def _python_files(root: Path, folders: tuple[str, ...] | list[str]) -> list[Path]:
-    return [
-        path for folder in folders for path in sorted((root / folder).rglob("*.py*")) if path.suffix in (".py", ".pyi")
-    ]
-
-
-def totals(house: House) -> Mapping[str, str]:
-    """Return what is counted over the whole house, by name."""
-    files, between = house.files, house.arrows()
-    folders = {file.module: file.folder for file in files}
-    across = sum(folders[start] != folders[end] for start, end in between)
-    commands, parameters, options, names = house.commands()
-    return {
-        "files": f"{len(files):,}",
-        "lines": f"{sum(file.lines for file in files):,}",
-        "lines of code": f"{sum(file.code for file in files):,}",
-        "lines, packages alone": f"{sum(file.lines for file in files if file.folder != 'scripts'):,}",
-        "classes": f"{sum(file.classes for file in files):,}",
-        "of these dataclasses": f"{sum(file.dataclasses for file in files):,}",
-        "functions and methods": f"{sum(file.functions for file in files):,}",
-        "arrows between folders": f"{len(house.arrows_of_folders()):,}",
-        "arrows between files": f"{len(between):,}",
-        "of these across folders": f"{across:,}",
-        "commands": commands,
-        "their arguments and options": parameters,
-        "options alone": options,
-        "distinct names of options": names,
-        **{f"files over {length} lines": str(sum(file.lines > length for file in files)) for length in LONG},
-        **{f"files under {length} lines": str(sum(file.lines < length for file in files)) for length in SHORT},
-        "shell scripts: lines": f"{house.lines_of_shell():,}",
-        "tests: files": f"{len(house.tests):,}",
-        "tests: lines": f"{sum(file.lines for file in house.tests):,}",
-    }
-
-
-def by_folder(house: House) -> Table:
-    """Return the table of folders, one row each."""
-    table = Table(title=str(house.root))
-    for heading in (
-        "folder",
-        "files",
-        "lines",
-        "code",
-        "classes",
-        "dataclasses",
-        "functions",
-        "imports of",
-        "imported by",
-    ):
-        table.add_column(heading, justify="left" if heading == "folder" else "right")
-    arrows = house.arrows_of_folders()
-    for folder in sorted({file.folder for file in house.files}):
-        own = [file for file in house.files if file.folder == folder]
-        sums = (
-            sum(getattr(file, name) for file in own)
-            for name in ("lines", "code", "classes", "dataclasses", "functions")
-        )
-        ends = sum(start == folder for start, _ in arrows), sum(end == folder for _, end in arrows)
-        table.add_row(folder, *(f"{number:,}" for number in (len(own), *sums, *ends)))
-    return table
+def counted(root: Path) -> Iterator[tuple[str, str]]:
+    """Yield what is counted of a checkout, as names and numbers."""
+    names = tracked(root)
+    rooms: dict[str, list[str]] = {room: [] for room in (*ROOMS, PAGES, "elsewhere")}
+    for name in names:
+        if room := room_of(name):
+            rooms[room].append(name)
+    for room, own in rooms.items():
+        yield room, lines_and_files(root, own)
+    yield "all source", lines_and_files(root, [name for own in rooms.values() for name in own])
+    yield "tests", lines_and_files(root, [name for name in names if re.fullmatch(r"tests/.*\.py", name)])
+    pages = [name for name in names if re.fullmatch(r"(docs|paper)/.*\.md|[^/]+\.md", name)]
+    n_words = sum(len((root / name).read_text(encoding="utf-8").split()) for name in pages)
+    yield "docs and root pages, words", f"{n_words:,} in {len(pages)}"
+    environment = {**os.environ, "PYTHONPATH": str(root), "PYTHONDONTWRITEBYTECODE": "1"}
+    ask = subprocess.run([sys.executable, "-c", SURFACE], cwd=root, env=environment, capture_output=True, check=False)
+    found = ask.stdout.decode().split() if ask.returncode == 0 else ["-"] * len(SURFACE_NAMES)
+    yield from zip(SURFACE_NAMES, found, strict=True)
 
 
 def main() -> None:
-    """Print the totals of all folders side by side, then each folder by folder."""
+    """Print the table, a column for each checkout."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     here = Path(__file__).resolve().parent.parent
     parser.add_argument("folders", nargs="*", type=Path, default=[here], metavar="FOLDER", help="default this checkout")
-    try:
-        houses = [House.of(folder.resolve()) for folder in parser.parse_args().folders]
-    except FileNotFoundError as error:
-        parser.error(str(error))
-    table = Table()
-    table.add_column("")
-    for house in houses:
-        table.add_column(house.root.name, justify="right")
-    counted = [totals(house) for house in houses]
-    for name in counted[0]:
-        table.add_row(name, *(own[name] for own in counted))
-    console = Console(width=140)
-    console.print(table)
-    for house in houses:
-        console.print(by_folder(house))
+    folders = [folder.resolve() for folder in parser.parse_args().folders]
+    for folder in folders:
+        if not (folder / PACKAGE / "__init__.py").is_file():
+            parser.error(f"expected the folder of a checkout of this project, got {folder}")
+    table = Table("room: lines in files", *(folder.name for folder in folders))
+    columns = [dict(counted(folder)) for folder in folders]
+    for name in columns[0]:
+        table.add_row(name, *(column[name] for column in columns))
+    Console().print(table)
 
 
 if __name__ == "__main__":

@@ -25,7 +25,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from arguments import whole
 
 from metrics import aggregate
 from metrics.benchmark import load_protocol
@@ -259,12 +258,12 @@ def main() -> None:
     parser.add_argument(
         "ranges", nargs="+", type=read_range, metavar="name=low:high[:log][@start]", help="what evolves"
     )
-    parser.add_argument("--generations", type=whole(at_least=1), default=20, help="default: 20")
-    parser.add_argument("--population", type=whole(at_least=4), default=8, help="sets of a generation (default: 8)")
-    parser.add_argument("--seed", type=whole(at_least=0), default=0, help="default: 0")
+    parser.add_argument("--generations", type=int, default=20, help="default: 20")
+    parser.add_argument("--population", type=int, default=8, help="sets of a generation (default: 8)")
+    parser.add_argument("--seed", type=int, default=0, help="default: 0")
     parser.add_argument("--horizon", type=float, default=4000.0, help="seconds of a run (default: 4000)")
-    parser.add_argument("--judging", type=whole(at_least=2), default=4, help="runs behind the table (default: 4)")
-    parser.add_argument("--jobs", type=whole(at_least=1), default=1, help="processes (default: 1)")
+    parser.add_argument("--judging", type=int, default=4, help="runs behind the table (default: 4)")
+    parser.add_argument("--jobs", type=int, default=1, help="processes (default: 1)")
     parser.add_argument("--front", type=Path, metavar="PICTURE", help="trade performance against interference")
     words = parser.parse_args()
     numbers: Any = getattr(load_policy(words.policy), "parameters", None)

@@ -22,7 +22,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from arguments import whole
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.policy import SwarmSpec
@@ -186,11 +185,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--plan", type=Path, required=True, help="plan of a training, as TOML")
     parser.add_argument("--out", type=Path, required=True, help="folder of the trainings")
-    parser.add_argument("--seed", type=whole(at_least=0), default=0, help="of the first training (default: 0)")
-    parser.add_argument("--seeds", type=whole(at_least=1), default=1, help="trainings (default: 1)")
-    parser.add_argument("--hidden", type=whole(at_least=1), default=8, help="units of the hidden layer (default: 8)")
-    parser.add_argument("--population", type=whole(at_least=4), default=48, help="networks at once (default: 48)")
-    parser.add_argument("--n-steps", type=whole(at_least=1), default=128, help="decisions of a robot (default: 128)")
+    parser.add_argument("--seed", type=int, default=0, help="of the first training (default: 0)")
+    parser.add_argument("--seeds", type=int, default=1, help="trainings (default: 1)")
+    parser.add_argument("--hidden", type=int, default=8, help="units of the hidden layer (default: 8)")
+    parser.add_argument("--population", type=int, default=48, help="networks at once (default: 48)")
+    parser.add_argument("--n-steps", type=int, default=128, help="decisions of a robot (default: 128)")
     words = parser.parse_args()
     try:
         for module in ("cma", "matplotlib"):  # one is needed at the end

@@ -48,7 +48,6 @@ from random import Random
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from scripts.arguments import whole
 
 PAGE = Path(__file__).resolve().parent.parent / "docs/promises.md"
 BLOCK = re.compile(r"(<!-- table by scripts/fuzz -->\n).*?(<!-- end of table -->)", re.DOTALL)
@@ -196,8 +195,8 @@ def main(words: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("kind", choices=KINDS, help="what is tried")
     parser.add_argument("--minutes", type=float, default=30.0, help="how long; default 30")
-    parser.add_argument("--first", type=whole(at_least=0), default=0, help="number of the first case; default 0")
-    parser.add_argument("--count", type=whole(at_least=1), default=None, help="cases; default as many as fit")
+    parser.add_argument("--first", type=int, default=0, help="number of the first case; default 0")
+    parser.add_argument("--count", type=int, default=None, help="cases; default as many as fit")
     parser.add_argument("--format", default="", help="of files: take only those of this format")
     parser.add_argument("--note", action="store_true", help="write the figures into docs/promises.md")
     given = parser.parse_args(words)

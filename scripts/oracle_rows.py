@@ -10,8 +10,6 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from arguments import whole
-
 from metrics.benchmark.entry import Entry, read_entry
 from metrics.benchmark.page import matched
 from metrics.benchmark.protocol import Protocol, load_protocol
@@ -41,7 +39,7 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, help="folder for runs")
-    parser.add_argument("--jobs", type=whole(at_least=1), help="processes (default: one per core)")
+    parser.add_argument("--jobs", type=int, help="processes (default: one per core)")
     words = parser.parse_args()
     protocol = load_protocol()
     plan = Plan.product(policy_specs(["oracle"]), [each.world for each in protocol.worlds], protocol.seeds)

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from arguments import whole
 
 from metrics.controllers import PAPER_POLICIES
 from swarm_forage_env._internal.fields import ConfigError, known_keys
@@ -244,10 +243,10 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--policy", default="generalist", help="names or files, separated by commas")
-    parser.add_argument("--draws", type=whole(at_least=1), help=f"worlds of each kind (default: {_N_DRAWS})")
+    parser.add_argument("--draws", type=int, help=f"worlds of each kind (default: {_N_DRAWS})")
     parser.add_argument("--horizon", type=float, help=f"seconds of a run (default: {_HORIZON_S:g})")
     parser.add_argument("--worlds", type=Path, help="file of other worlds, with its own seconds of a run")
-    parser.add_argument("--jobs", type=whole(at_least=1), default=1, help="processes (default: 1)")
+    parser.add_argument("--jobs", type=int, default=1, help="processes (default: 1)")
     words = parser.parse_args()
     if words.worlds and (words.draws or words.horizon is not None):
         parser.error("expected --worlds without --draws and --horizon, which are of worlds that are drawn")

@@ -55,9 +55,10 @@ def test_python_examples_run_with_their_extras(page, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("file", sorted((ROOT / "docs/examples").glob("*.py")), ids=lambda file: file.name)
-def test_files_of_examples_stand_in_a_page(file):
-    shown = f"```python\n{file.read_text()}```\n"
-    assert [page.name for page in PAGES if shown in page.read_text()] != [], f"{file}: no page shows it as it is"
+def test_files_of_examples_stand_in_a_page_or_are_linked_from_one(file):
+    shown, linked = f"```python\n{file.read_text()}```\n", f"](examples/{file.name})"
+    texts = [page.read_text() for page in PAGES]
+    assert any(shown in text or linked in text for text in texts), f"{file}: no page shows it as it is, or links to it"
 
 
 @pytest.mark.parametrize("name", ["run", "tests"])
