@@ -6,10 +6,8 @@
 
 commands   malformed words and files. A command may end with an exit code that is documented and with one line on
            stderr; a traceback, another exit code or one that takes too long is a fault. Nothing is run, only begun.
-files      valid files of every format, changed by field or by byte. Most go to the reader of their format: it returns
-           or raises an error that it documents, takes little memory, and writes nothing, not even a word on stderr.
-           Every 200th goes to a command, as above, which writes into the current folder alone. A case that ends the
-           process is a fault, and another process goes on. --format takes files of one format, such as packed.
+files      small files of every format with other bytes, or cut off. The reader of the format returns or raises an
+           error that it documents. A case that ends the process is a fault, and another process goes on.
 worlds     scenarios, wrappers, actions, wrong calls and snapshots. Walls, objects, observations, rewards, agents and
            records are looked at after every tick, and each run is made twice.
 kills      run, score, compare, train and study run: killed at a random moment and given again, until what they
@@ -72,8 +70,6 @@ class Campaign:
 
     kind: str
     first: int
-    chosen: str = ""
-    """The one format of files; empty for all."""
     n_cases: int = 0
     n_faults: int = 0
     figures: Counter[str] = field(default_factory=Counter)
@@ -83,11 +79,6 @@ class Campaign:
         """Handle Ctrl-C. A command that is tried may turn it into an exit code of its own, so it is noted, too."""
         self.is_stopped = True
         raise KeyboardInterrupt
-
-    @property
-    def options(self) -> str:
-        """Further words of its command."""
-        return f" --format {self.chosen}" if self.chosen else ""
 
     @property
     def number(self) -> int:
@@ -107,7 +98,7 @@ class Campaign:
         self.n_cases += 1
         if fault:
             self.n_faults += 1
-            words = f"scripts/fuzz {self.kind} --first {number} --count 1{self.options}"
+            words = f"scripts/fuzz {self.kind} --first {number} --count 1"
             print(f"--- {words}\n{fault}", flush=True)
 
     def told(self) -> str:
@@ -148,16 +139,16 @@ def one_kill(number: int, folder: Path) -> tuple[Counter[str], str]:
     return seen.figures, seen.fault
 
 
-def one_file(number: int, folder: Path, chosen: str = "") -> tuple[Counter[str], str]:
+def one_file(number: int, folder: Path) -> tuple[Counter[str], str]:
     """Give a changed file to what reads it; returns figures, and the fault or nothing."""
-    from tests.support.changed_files import EVERY, drawn_format, give
+    from tests.support.changed_files import READERS, give
 
     random = Random(number)
-    drawn = drawn_format(random)
+    name = random.choice(tuple(READERS))
     signal.setitimer(signal.ITIMER_PROF, LIMIT_S)
-    outcome, fault = give(random, folder, chosen or drawn, to_a_command=number % EVERY == 0)
+    outcome, fault = give(random, folder, name)
     signal.setitimer(signal.ITIMER_PROF, 0.0)
-    return Counter({outcome: 1, f"of {chosen or drawn}": 1}), fault
+    return Counter({outcome: 1, f"of {name}": 1}), f"{name}\n{fault}" if fault else ""
 
 
 def one_pair(number: int, folder: Path) -> tuple[Counter[str], str]:
@@ -197,14 +188,11 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--minutes", type=float, default=30.0, help="how long; default 30")
     parser.add_argument("--first", type=int, default=0, help="number of the first case; default 0")
     parser.add_argument("--count", type=int, default=None, help="cases; default as many as fit")
-    parser.add_argument("--format", default="", help="of files: take only those of this format")
     parser.add_argument("--note", action="store_true", help="write the figures into docs/promises.md")
     given = parser.parse_args(words)
     if find_spec("pytest") is None:
         parser.error("expected pytest, with which cases are checked: pip install -e '.[test]'")
-    if given.format:
-        _check_format(parser, given)
-    campaign = Campaign(given.kind, given.first, given.format)
+    campaign = Campaign(given.kind, given.first)
     with _listening(campaign) as folder, suppress(KeyboardInterrupt):
         ends = time.monotonic() + 60.0 * given.minutes
         (_go_on_elsewhere if given.kind in OF_STRANGERS else _go_on)(campaign, folder, ends, given.count)
@@ -214,13 +202,6 @@ def main(words: Sequence[str] | None = None) -> int:
     if given.note:
         note(campaign)
     return 1 if campaign.n_faults else 0
-
-
-def _check_format(parser: argparse.ArgumentParser, given: argparse.Namespace) -> None:
-    from tests.support.changed_files import FORMATS
-
-    if given.kind != "files" or given.format not in FORMATS:
-        parser.error(f"expected --format with files alone, one of {', '.join(FORMATS)}, got {given.format!r}")
 
 
 @contextmanager
@@ -249,7 +230,7 @@ def _go_on_elsewhere(campaign: Campaign, folder: Path, ends: float, count: int |
     """Try one case after the other in another process; where a case ends it, a further one goes on behind that."""
     while campaign.goes_on(ends, count):
         receiver, sender = get_context("spawn").Pipe(duplex=False)
-        about = (campaign.kind, campaign.chosen, campaign.number, folder, sender)
+        about = (campaign.kind, campaign.number, folder, sender)
         process = get_context("spawn").Process(target=_make_cases, args=about, daemon=True)
         process.start()
         sender.close()
@@ -268,7 +249,7 @@ def _go_on_elsewhere(campaign: Campaign, folder: Path, ends: float, count: int |
             process.join()
 
 
-def _make_cases(kind: str, chosen: str, first: int, folder: Path, sender: Connection) -> None:
+def _make_cases(kind: str, first: int, folder: Path, sender: Connection) -> None:
     """Make cases within bounds, and send what came of each; their stderr goes to a file."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started this process hears it, and ends it
     signal.signal(signal.SIGPROF, _too_long)
@@ -277,7 +258,7 @@ def _make_cases(kind: str, chosen: str, first: int, folder: Path, sender: Connec
     os.chdir(folder)
     with suppress(BrokenPipeError):
         for number in numbers_from(first):
-            sender.send(one_file(number, folder, chosen) if chosen else KINDS[kind](number, folder))
+            sender.send(KINDS[kind](number, folder))
 
 
 def note(campaign: Campaign) -> None:
@@ -289,7 +270,7 @@ def note(campaign: Campaign) -> None:
     cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in found[0].splitlines()]
     rows = {line[0]: line[1:] for line in cells if line[0] in KINDS}
     whole = _joined(campaign, rows.get(campaign.kind))
-    command = f"`scripts/fuzz {whole.kind} --first {whole.first} --count {whole.n_cases}{whole.options}`"
+    command = f"`scripts/fuzz {whole.kind} --first {whole.first} --count {whole.n_cases}`"
     today = f"{datetime.now(UTC):%Y-%m-%d}"
     rows[whole.kind] = [f"{whole.n_cases:,}", f"{whole.n_faults:,}", whole.told(), today, command]
     lines = [HEADINGS, ["---"] * len(HEADINGS), *([kind, *rows[kind]] for kind in KINDS if kind in rows)]
@@ -299,15 +280,15 @@ def note(campaign: Campaign) -> None:
 
 def _joined(campaign: Campaign, row: Sequence[str] | None) -> Campaign:
     """Return a campaign with what its row in the page has, where it goes on behind that; else the campaign."""
-    found = re.search(r"--first (\d+) --count (\d+)(.*)`", row[-1]) if row else None
-    if row is None or found is None or found[3] != campaign.options:
+    found = re.search(r"--first (\d+) --count (\d+)`", row[-1]) if row else None
+    if row is None or found is None:
         return campaign
     first, n_cases = int(found[1]), int(found[2])
     if first + n_cases != campaign.first:
         return campaign
     n_faults, told = int(row[1].replace(",", "")), re.findall(r"(\d[\d,]*) (.+?)(?:, (?=\d)|$)", row[2])
     figures = Counter({name: int(number.replace(",", "")) for number, name in told})
-    joined = Campaign(campaign.kind, first, campaign.chosen, n_cases, n_faults, figures)
+    joined = Campaign(campaign.kind, first, n_cases, n_faults, figures)
     joined.n_cases += campaign.n_cases
     joined.n_faults += campaign.n_faults
     joined.figures += campaign.figures

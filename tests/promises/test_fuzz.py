@@ -82,7 +82,7 @@ def test_figures_of_a_campaign_that_goes_on_are_added(page, monkeypatch):
     )
 
 
-def end_of_a_process(kind, chosen, first, folder, sender):
+def end_of_a_process(kind, first, folder, sender):
     """Cases of which every second one ends the process, but for the last, which says nothing."""
     (folder / fuzz.ERRORS).write_text("out of memory")
     sender.send((Counter(fine=1), ""))
@@ -113,16 +113,9 @@ def test_a_page_without_the_marks_is_told(page):
 
 def test_every_kind_of_case_runs(capsys):
     assert fuzz.main(["commands", "--count", "1"]) == 0
-    assert fuzz.main(["files", "--count", "3", "--format", "entry"]) == 0
+    assert fuzz.main(["files", "--count", "3"]) == 0
     assert fuzz.main(["worlds", "--count", "1"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("1 commands, 0 faults; 1 ended with exit code ")
     assert lines[1].startswith("3 files, 0 faults; ")
     assert "ticks" in lines[2]
-
-
-@pytest.mark.parametrize("words", [["files", "--format", "pictures"], ["worlds", "--format", "entry"]])
-def test_a_format_is_one_of_files(words, capsys):
-    with pytest.raises(SystemExit):
-        fuzz.main(words)
-    assert "expected --format with files alone" in capsys.readouterr().err

@@ -25,9 +25,9 @@ from swarm_forage_env.studies.study_folder import StudyFolder, run_study
 from swarm_forage_env.studies.study_table import pack_study, read_study
 from tests.support.console import answer
 from tests.support.entries import TINY
+from tests.support.small_files import small_file
 from tests.support.tiny_study import RANDOM, tiny_study
 
-FILES = Path(__file__).parent.parent / "files"
 SMALL = ("--robots", "2", "--objects", "10", "--horizon", "4", "--set", "interval_s=2")
 SPEC = plan_run(scenario("warehouse_small", n_robots=2, n_objects=10, horizon_s=4.0, interval_s=2.0), "random")
 STUDY = tiny_study(policies=(RANDOM,), axes=(), reference=None)
@@ -120,17 +120,17 @@ def test_the_file_of_a_study_has_the_runs_of_whoever_packs_last(tmp_path, monkey
 
 
 def replays(file: Path, label: str) -> None:
-    (replay,) = read_replays(FILES / "replay_3.html")
+    (replay,) = read_replays(small_file("replay.html"))
     write_replays(file, replace(replay, label=label))
 
 
 def maps(file: Path, label: str) -> None:
-    (replay,) = read_replays(FILES / "replay_3.html")
+    (replay,) = read_replays(small_file("replay.html"))
     replace(floor_maps(replay), n_robots=len(label)).write(file)
 
 
 def entry(file: Path, label: str) -> None:
-    replace(read_entry(FILES / "entry.json", load_protocol(TINY)), name=label).write(file)
+    replace(read_entry(small_file("entry.json"), load_protocol(TINY)), name=label).write(file)
 
 
 WRITERS = {

@@ -5,7 +5,6 @@ import os
 import struct
 import tracemalloc
 from io import BytesIO
-from pathlib import Path
 
 import polars as pl
 import pytest
@@ -14,8 +13,9 @@ from swarm_forage_env.runs import parquet
 from swarm_forage_env.runs.parquet import ParquetError, check_texts, open_parquet, parse_parquet
 from swarm_forage_env.runs.record import RecordError, RunRecord, is_record
 from tests.support.forged import forge_record
+from tests.support.small_files import small_file
 
-SOURCE = Path(__file__).parents[1] / "files" / "record.parquet"
+SOURCE = small_file("record.parquet")
 
 
 def test_what_polars_writes_is_read(tmp_path):

@@ -24,10 +24,9 @@ from zlib import crc32
 from swarm_forage_env.policies.pretrained import network_file
 from tests.support import kills
 from tests.support.kills import Killed
+from tests.support.small_files import small_file
 
-FILES = Path(__file__).parents[1] / "files"
 ROOT = Path(__file__).parents[2]
-PACKED = Path(__file__).parent / "blessed_noise.parquet"
 OF_PAPER = ROOT / "docs/results/S1a.parquet"
 ENTRY = ROOT / "metrics/benchmark/scripted/crw.json"
 TINY = ("random", *kills.SMALL, "--horizon", "40", "--set", "interval_s=20")
@@ -36,8 +35,8 @@ WRITERS: dict[str, tuple[str, ...]] = {
     "score": kills.COMMANDS["score"].words,
     "study run": kills.COMMANDS["study"].words,
     "study pack": ("study", "pack", "there", "--file", "out/packed.parquet"),
-    "study unpack": ("study", "unpack", str(PACKED), "--out", "out"),
-    "study report": ("study", "report", str(PACKED), "--file", "out/report.html"),
+    "study unpack": ("study", "unpack", str(small_file("packed.parquet")), "--out", "out"),
+    "study report": ("study", "report", str(small_file("packed.parquet")), "--file", "out/report.html"),
     "replay": ("replay", *TINY, "--file", "out/page.html"),
     "maps": ("maps", *TINY, "--picture", "out/maps.png"),
     "record": ("record", *TINY[:-4], "--seconds", "10", "--size", "240", "--file", "out/film.gif"),
@@ -66,8 +65,8 @@ READERS: dict[str, tuple[str, ...]] = {
     "list": ("list",),
     "info": ("info", "crw"),
     "study show": ("study", "show", "S1a"),
-    "study status": ("study", "status", str(PACKED)),
-    "benchmark show": ("benchmark", "show", str(FILES / "entry.json")),
+    "study status": ("study", "status", str(small_file("packed.parquet"))),
+    "benchmark show": ("benchmark", "show", str(small_file("entry.json"))),
     "predict availability": ("predict", "availability"),
 }
 """Commands that write nothing."""
@@ -177,14 +176,14 @@ def _furnish(place: Path, words: tuple[str, ...], folder: Path) -> None:
     from swarm_forage_env.studies.study_table import read_study, unpack_study
 
     kills._furnish(place)
-    unpack_study(read_study(PACKED), StudyFolder(place / "there"))
+    unpack_study(read_study(small_file("packed.parquet")), StudyFolder(place / "there"))
     if "done" in words:
         _alone(WRITERS["study run"], folder)
         shutil.copytree(_place_alone(WRITERS["study run"], folder) / "out", place / "done")
     if "training" in words:
         (place / "training").mkdir()
         for name in ("plan.json", "evaluations.csv"):
-            shutil.copy(FILES / name, place / "training")
+            shutil.copy(small_file(name), place / "training")
     if "out/page.md" in words:
         (place / "out").mkdir()
         shutil.copy(ROOT / "docs/benchmark.md", place / "out/page.md")

@@ -298,7 +298,6 @@ def with_nan(array):
     return array
 
 
-@pytest.mark.parametrize("has_digests", [True, False])
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -317,30 +316,11 @@ def with_nan(array):
         (lambda arrays: arrays.update(more=np.zeros(10**7)), "bytes, but at most"),
     ],
 )
-def test_a_chunk_of_other_arrays_is_refused(copied, change, message, has_digests):
+def test_a_chunk_of_other_arrays_is_refused(copied, change, message):
     changed_chunk(copied, change)
-    if not has_digests:
-        of_version_1(copied)
     with pytest.raises(DatasetError, match=message) as refused:
         TrajectoryDataset(copied).steps(3)
     assert chunk_file(copied, 3, 0).name in str(refused.value)
-
-
-def of_version_1(folder):
-    card = json.loads((folder / "dataset.json").read_text())
-    (folder / "dataset.json").write_text(json.dumps(card | {"schema_version": 1}))
-    for seed in (3, 4):
-        summary = json.loads(summary_file(folder, seed).read_text())
-        del summary["digests"]
-        summary_file(folder, seed).write_text(json.dumps(summary))
-
-
-def test_a_chunk_of_another_run_is_refused(copied):
-    shutil.copyfile(chunk_file(copied, 4, 0), chunk_file(copied, 3, 0))
-    with pytest.raises(DatasetError, match=r"Expected .*seed_000003_0000.npz as it was recorded, got other numbers"):
-        TrajectoryDataset(copied).steps(3)
-    of_version_1(copied)
-    assert len(TrajectoryDataset(copied).steps(3)), "a data set of an earlier day is read without digests"
 
 
 def test_actions_that_nobody_could_choose_are_refused(tmp_path):
@@ -370,7 +350,6 @@ def test_actions_that_nobody_could_choose_are_refused(tmp_path):
         ("seed_000003.json", {"chunks": [0]}, r"Expected chunks\[0\] to be a whole number >= 1"),
         ("seed_000003.json", {"chunks": [10**9]}, "Expected at most 100 decisions in the chunks"),
         ("seed_000003.json", {"chunks": "x"}, "Expected chunks to be a list"),
-        ("seed_000003.json", {"digests": []}, "Expected a digest for each chunk"),
         ("seed_000003.json", {"truncated": 1}, "Expected truncated to be True or False"),
         ("seed_000003.json", {"collected": -1}, "Expected collected to be a whole number >= 0"),
         ("seed_000003.json", {"colour": 1}, "Unknown key 'colour'"),

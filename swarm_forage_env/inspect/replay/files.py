@@ -33,8 +33,6 @@ from swarm_forage_env.wrappers.recorder import TOTALS
 FORMAT = "swarm_forage_env replay"
 FORMAT_VERSION = 4
 """Raised whenever an array or a field is new, or changes its name, type or meaning."""
-READ_VERSIONS = (2, 3, 4)
-"""Versions that `read_replays` reads; 2 is without `memory_events`, 3 knows one nest."""
 _ARRAYS = {
     "position": "u2",
     "heading": "u1",
@@ -137,10 +135,10 @@ def _headline(replays: Sequence[Replay]) -> str:
 def _check_version(header: dict[str, Any]) -> None:
     if header.get("format") != FORMAT:
         raise PageError("it is no replay page of swarm_forage_env")
-    if header.get("version") not in READ_VERSIONS:
+    if header.get("version") != FORMAT_VERSION:
         raise PageError(
             f"it has version {shown(header.get('version'))} of the format, this version of swarm_forage_env reads "
-            f"{' to '.join(map(str, (READ_VERSIONS[0], READ_VERSIONS[-1])))}; read it with the version that wrote it"
+            f"{FORMAT_VERSION}; read it with the version that wrote it"
         )
 
 

@@ -16,10 +16,9 @@ row, and the first row of the next chunk.
     truncated     (n, N) bool, robots that could have gone on when the run ended
     active        (n + 1, N) bool, robots at work when the observation was made; others do not act
 
-Types are exact, and numbers are finite. The summary has a digest of each chunk, by which one of another run is noticed.
+Types are exact, and numbers are finite.
 """
 
-import hashlib
 import json
 import math
 from collections.abc import Mapping
@@ -38,10 +37,8 @@ from swarm_forage_env.contract.policy import COMMANDS
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.runs.spec import RunSpec
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 1
 """Version of the folder; raised whenever an array or a field is new, or changes its name, type or meaning."""
-READ_VERSIONS = (1, 2)
-"""Versions that are read; 1 is without digests of chunks."""
 CARD_FILE = "dataset.json"
 ARRAYS = ("observations", "actions", "rewards", "terminated", "truncated", "active")
 
@@ -108,10 +105,10 @@ class Card:
         file = folder / CARD_FILE
         values = read_json(file, DatasetError)
         version = values.get("schema_version") if isinstance(values, dict) else None
-        if version is not None and version not in READ_VERSIONS:
+        if version is not None and version != SCHEMA_VERSION:
             raise DatasetError(
-                f"Expected a data set of schema version {' or '.join(map(str, READ_VERSIONS))} in {folder}, got "
-                f"{shown(version)}; read it with the version that wrote it."
+                f"Expected a data set of schema version {SCHEMA_VERSION} in {folder}, got {shown(version)}; "
+                "read it with the version that wrote it."
             )
         try:
             card: Card = typed(cls, {**table("a card", values), "schema_version": version}, "")
@@ -134,8 +131,6 @@ class RunSummary:
     """Objects delivered."""
     first_picked: Count
     """Objects picked up for the first time."""
-    digests: tuple[str, ...] = ()
-    """Of each chunk, see `chunk_digest`; none in data sets of version 1."""
 
     def write(self, folder: Path) -> None:
         """Write the summary, whole or not at all."""
@@ -160,8 +155,6 @@ class RunSummary:
             raise DatasetError(
                 f"Expected at most {card.n_decisions:,} decisions in the chunks of {file}, got {sum(summary.chunks):,}."
             )
-        if len(summary.digests) != (0 if card.schema_version == 1 else len(summary.chunks)):
-            raise DatasetError(f"Expected a digest for each chunk in {file}, got {len(summary.digests)}.")
         return summary
 
 
@@ -192,13 +185,3 @@ def chunk_kinds(card: Card, n_decisions: int | None = None) -> dict[str, Kind]:
         "truncated": (np.bool_, each),
         "active": (np.bool_, longer),
     }
-
-
-def chunk_digest(arrays: Mapping[str, np.ndarray]) -> str:
-    """Return a hash of all that a chunk holds: names, types, shapes and numbers of `ARRAYS`."""
-    state = hashlib.blake2b(digest_size=16)
-    for name in ARRAYS:
-        array = arrays[name]
-        state.update(f"{name} {array.dtype.str} {array.shape} ".encode())
-        state.update(np.ascontiguousarray(array).data)
-    return state.hexdigest()

@@ -35,7 +35,6 @@ from swarm_forage_env.training.datasets.layout import (
     Card,
     DatasetError,
     RunSummary,
-    chunk_digest,
     chunk_file,
     summary_file,
 )
@@ -294,8 +293,8 @@ class _Chunk:
     def is_full(self) -> bool:
         return self.length == len(self.rewards)
 
-    def write(self, file: Path, *, compress: bool) -> str:
-        """Write what is there and go on with the last observation as the first; returns the digest."""
+    def write(self, file: Path, *, compress: bool) -> None:
+        """Write what is there and go on with the last observation as the first."""
         n = self.length
         arrays: dict[str, Any] = {
             name: getattr(self, name)[:n] for name in ("actions", "rewards", "terminated", "truncated")
@@ -303,12 +302,10 @@ class _Chunk:
         arrays |= {name: getattr(self, name)[: n + 1] for name in ("observations", "active")}
         with replacing(file, ending=".tmp") as draft, draft.open("wb") as opened:
             (np.savez_compressed if compress else np.savez)(opened, **arrays)
-        digest = chunk_digest(arrays)
         self.observations[0], self.active[0] = self.observations[n], self.active[n]
         self.rewards[:] = 0.0
         self.terminated[:] = self.truncated[:] = False
         self.length = 0
-        return digest
 
 
 def _record_run(plan: DatasetPlan, seed: int, folder: Path, tell: Callable[[int], object]) -> RunSummary:
@@ -321,7 +318,7 @@ def _record_run(plan: DatasetPlan, seed: int, folder: Path, tell: Callable[[int]
     interface, chunk = LearnerInterface(config, world.swarm_spec), _Chunk(plan)
     interface.observe(obs, chunk.observations[0], decision=0)
     chunk.active[0] = world.active
-    lengths, digests = list[int](), list[str]()
+    lengths: list[int] = []
     gone, over = np.zeros(len(world.active), np.bool_), False
     while not over:
         row, truncated, dead = chunk.length, False, gone
@@ -345,7 +342,7 @@ def _record_run(plan: DatasetPlan, seed: int, folder: Path, tell: Callable[[int]
         chunk.length += 1
         if chunk.is_full or over:
             lengths.append(chunk.length)
-            digests.append(chunk.write(chunk_file(folder, seed, len(lengths) - 1), compress=plan.compress))
+            chunk.write(chunk_file(folder, seed, len(lengths) - 1), compress=plan.compress)
             tell(sum(lengths))
     env.close()
     counters = world.events.counters
@@ -355,7 +352,6 @@ def _record_run(plan: DatasetPlan, seed: int, folder: Path, tell: Callable[[int]
         chunks=tuple(lengths),
         collected=int(counters[Counter.COLLECTED]),
         first_picked=int(counters[Counter.FIRST_PICKED]),
-        digests=tuple(digests),
     )
 
 

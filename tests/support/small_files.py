@@ -1,0 +1,104 @@
+"""One small file of each format, made once in a process and removed at its end."""
+
+import atexit
+import shutil
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from metrics.benchmark import load_protocol
+from swarm_forage_env.inspect.replay.capture import record_replay
+from swarm_forage_env.inspect.replay.files import write_replays
+from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.policies.network import Network, NetworkAbout
+from swarm_forage_env.policies.pretrained import plan_file
+from swarm_forage_env.runs.run import run_one
+from swarm_forage_env.runs.spec import plan_run
+from swarm_forage_env.runs.store import RunFailure, RunStore
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.studies.study_folder import StudyFolder, run_study
+from swarm_forage_env.studies.study_table import pack_study
+from swarm_forage_env.training.datasets.recording import plan_dataset, record_dataset
+from swarm_forage_env.training.evaluations import Evaluation, write_evaluations
+from swarm_forage_env.training.plan import read_plan
+from tests.support.entries import TINY, made_up_entry
+from tests.support.tiny_study import tiny_study
+
+SPEC = plan_run(scenario("warehouse_small", n_robots=2, n_objects=10, horizon_s=4.0, interval_s=2.0), "dpo", seed=1)
+
+
+def _record(file: Path) -> None:
+    run_one(SPEC).write(file)
+
+
+def _failure(file: Path) -> None:
+    store = RunStore(file.parent / "of_failures")
+    store.write_failure(RunFailure(spec=SPEC, error="ValueError: too warm", traceback="ValueError: too warm"))
+    shutil.move(store.failure_path(SPEC.run_id), file)
+
+
+def _packed(file: Path) -> None:
+    folder = StudyFolder(file.parent / "of_study")
+    run_study(tiny_study(axes=(), reference=None), folder, jobs=1)
+    pack_study(folder, file)
+
+
+def _replay(file: Path) -> None:
+    write_replays(file, record_replay(SPEC, frame_s=1.0)[0])
+
+
+def _dataset(folder: Path) -> None:
+    record_dataset(plan_dataset(SPEC, (1,)), folder)
+
+
+def _entry(file: Path) -> None:
+    made_up_entry(load_protocol(TINY), "mine", lambda k: 10.0 * k).write(file)
+
+
+def _network(file: Path) -> None:
+    interface = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True)
+    weights = np.linspace(-1.0, 1.0, 12, dtype=np.float32).reshape(4, 3)
+    Network((weights,), (weights[0],), NetworkAbout(interface=interface)).save(file)
+
+
+def _plan(file: Path) -> None:
+    shipped = plan_file("ppo_warehouse_small")
+    assert shipped is not None
+    read_plan(shipped).write(file)
+
+
+def _evaluations(file: Path) -> None:
+    numbers = {"performance": 1.5, "baseline": 2.0, "interference_fraction": 0.1}
+    write_evaluations(file, [Evaluation(steps=384, wall_time_s=28.0, cpu_time_s=28.0, **numbers)])
+
+
+MAKERS: dict[str, Callable[[Path], None]] = {
+    "record.parquet": _record,
+    "packed.parquet": _packed,
+    "failure.json": _failure,
+    "replay.html": _replay,
+    "dataset": _dataset,
+    "entry.json": _entry,
+    "network.npz": _network,
+    "plan.json": _plan,
+    "evaluations.csv": _evaluations,
+}
+"""Name of a file, or of the folder of a data set -> what writes it. The entry is one of `entries.TINY`."""
+
+
+@cache
+def small_file(name: str) -> Path:
+    """Return the file of that name; whoever changes it works on a copy."""
+    file = _folder() / name
+    MAKERS[name](file)
+    return file
+
+
+@cache
+def _folder() -> Path:
+    folder = Path(tempfile.mkdtemp())
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
