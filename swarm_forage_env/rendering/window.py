@@ -43,7 +43,8 @@ class Window:
         self._open((width, height))
         pygame.display.set_caption(title)
         shown = pygame.image.frombuffer(np.ascontiguousarray(picture), (width, height), "RGB")
-        self._surface.blit(shown, (0, 0))
+        surface: Any = self._surface  # opened above
+        surface.blit(shown, (0, 0))
         pygame.display.flip()
 
     def close(self) -> None:
