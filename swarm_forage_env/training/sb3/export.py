@@ -112,9 +112,11 @@ def _check_spaces(model: BaseAlgorithm, interface: InterfaceConfig) -> None:
 
 def _acting_layers(model: BaseAlgorithm) -> list[nn.Module]:
     policy = model.policy
-    remembers = getattr(policy, "lstm_actor", None) is not None  # RecurrentPPO of sb3-contrib
-    is_perceptron = isinstance(policy, ActorCriticPolicy) and not remembers
-    if is_perceptron and isinstance(policy.features_extractor, FlattenExtractor):
+    if (
+        isinstance(policy, ActorCriticPolicy)
+        and isinstance(policy.features_extractor, FlattenExtractor)
+        and getattr(policy, "lstm_actor", None) is None  # as RecurrentPPO of sb3-contrib has it
+    ):
         return [*policy.mlp_extractor.policy_net, policy.action_net]
     if isinstance(policy, DQNPolicy) and isinstance(policy.q_net.features_extractor, FlattenExtractor):
         return [*policy.q_net.q_net]
