@@ -1,11 +1,11 @@
-"""Entries side by side: what each is worth, as a table, a figure, and the page of the benchmark.
+"""Entries side by side: what each is worth, as a table and a figure.
 
-board = board_of([read_entry("mine.json", protocol)], protocol)
+board = board_of([read_entry("mine.json")])
 print(board)
-board.write_page("docs/benchmark.md", "docs/images/benchmark.png")
+board.draw("board.png")
 """
 
-import os
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,8 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env._internal.croissant import CROISSANT_FILE
-from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.wording import plain
 from swarm_forage_env.rendering.figures import (
     COLOURS,
@@ -33,8 +31,7 @@ from ..controllers import PAPER_POLICIES
 from ..distributions import performance_profile
 from ..statistics import Estimate
 from .entry import Entry
-from .page import board_sheet, details_page, page_block, share, sorted_standings, with_block
-from .protocol import USUAL, BenchmarkError, Protocol, load_protocol
+from .protocol import BenchmarkError, Protocol, load_protocol
 from .standing import Reference, Standing, reference_of, scripted_entries, shares_of, standing_of
 
 _MOST_SHADE = 2.0
@@ -66,28 +63,6 @@ class Board(Answer):
         """Draw scores, and shares in each world; see `draw_benchmark`."""
         draw_benchmark(self.standings, self.reference, self.protocol, path, style=style)
 
-    def write_page(self, page: str | Path, picture: str | Path) -> tuple[Path, ...]:
-        """Write the generated part of a page, its figure, and the page of details beside it.
-
-        Returns:
-            What was written.
-
-        Raises:
-            BenchmarkError: a page without the marks.
-            OSError: the page cannot be read, or a file cannot be written.
-        """
-        page, picture = Path(page), Path(picture)
-        before = page.read_text(encoding="utf-8")
-        link = Path(os.path.relpath(picture, page.parent)).as_posix()
-        details = page.with_name(f"{page.stem}_in_detail{page.suffix}")
-        text = with_block(before, page_block(self.standings, self.protocol, link, details.name), str(page))
-        in_detail = details_page(self.standings, self.reference, self.protocol, page.name)
-        self.draw(picture)
-        for file, content in ((details, in_detail), (page, text)):
-            with replacing(file) as draft:
-                draft.write_text(content, encoding="utf-8")
-        return page, details, picture
-
 
 def board_of(entries: Sequence[Entry], protocol: Protocol | None = None) -> Board:
     """Return what entries are worth, and with them the scripted controllers.
@@ -97,13 +72,13 @@ def board_of(entries: Sequence[Entry], protocol: Protocol | None = None) -> Boar
 
     Args:
         entries: Entries of one protocol.
-        protocol: Default: the full protocol of their version.
+        protocol: What they are entries of; default that of the package.
 
     Raises:
-        BenchmarkError: entries of two versions, two with one name, or another policy under the name of a scripted
+        BenchmarkError: two entries with one name, or another policy under the name of a scripted
             controller.
     """
-    full = protocol_of(entries)
+    full = load_protocol()
     scripted = scripted_entries(full)
     reference = reference_of(scripted, full)
     digests = {entry.digest for entry in scripted}
@@ -123,35 +98,64 @@ def board_of(entries: Sequence[Entry], protocol: Protocol | None = None) -> Boar
     return Board(standings=tuple(sorted_standings(standings)), reference=reference, protocol=full)
 
 
-def protocol_of(entries: Sequence[Entry]) -> Protocol:
-    """Return the full protocol of entries; of the usual version if there are none.
-
-    Raises:
-        BenchmarkError: entries of two versions.
-    """
-    version = entries[0].version if entries else USUAL
-    for entry in entries:
-        if entry.version != version:
-            raise BenchmarkError(
-                f"Expected entries of one version of the benchmark, got {entry.name!r} of version {entry.version} "
-                f"beside {entries[0].name!r} of version {version}; show each version by itself."
-            )
-    return load_protocol(version=version)
+def sorted_standings(standings: Sequence[Standing]) -> list[Standing]:
+    """Return standings, the highest score first."""
+    return sorted(standings, key=lambda standing: (-standing.score.value, standing.entry.name))
 
 
-def entry_files(given: Sequence[Path]) -> list[Path]:
-    """Return entry files; a folder stands for the entry files in it, sorted by name."""
-    return [file for path in given for file in (_entries_in(path) if path.is_dir() else [path])]
+def board_sheet(standings: Sequence[Standing]) -> Sheet:
+    """Return one row per entry."""
+    header = (
+        "entry",
+        "track",
+        "score",
+        "better than the best scripted",
+        "worlds won",
+        "gap",
+        "calm",
+        "disturbed",
+        "training worlds",
+        "interference",
+    )
+    rows = [
+        (
+            standing.entry.name,
+            standing.entry.training.track,
+            bounded(standing.score),
+            percent_of(standing.improvement.value),
+            f"{standing.n_won} of {standing.n_worlds}",
+            share(standing.gap),
+            share(standing.calm),
+            share(standing.disturbed),
+            share(standing.training),
+            percent_of(standing.interference, 1),
+        )
+        for standing in standings
+    ]
+    return Sheet(header=header, rows=rows)
 
 
-def _entries_in(folder: Path) -> list[Path]:
-    return sorted(file for file in folder.glob("*.json") if file.name != CROISSANT_FILE)
+def bounded(estimate: Estimate) -> str:
+    """Return a score with its interval, "0.87 (0.80 to 0.93)"."""
+    if math.isnan(estimate.lower):
+        return share(estimate.value)
+    return f"{share(estimate.value)} ({share(estimate.lower)} to {share(estimate.upper)})"
+
+
+def share(value: float) -> str:
+    """Return a share of the best scripted controller, with two decimals; a dash where there is none."""
+    return "-" if math.isnan(value) else f"{value:.2f}"
+
+
+def percent_of(value: float, decimals: int = 0) -> str:
+    """Return a share in percent, with so many decimals."""
+    return "-" if math.isnan(value) else f"{100.0 * value:.{decimals}f} %"
 
 
 def _mapping(standing: Standing) -> dict[str, Any]:
     return {
         "name": standing.entry.name,
-        **({"track": standing.entry.training.track} if standing.entry.training.track else {}),
+        "track": standing.entry.training.track,
         "score": _bounds(standing.score),
         "improvement": _bounds(standing.improvement),
         "optimality_gap": plain(standing.gap),

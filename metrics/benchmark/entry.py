@@ -1,34 +1,45 @@
-"""An entry of the benchmark: one JSON file with every number that the page needs.
+"""An entry of the benchmark: one JSON file with every number that its score needs.
 
-    entry = read_entry("dpo.json")
-    entry.performance("two sources, 8 robots")  # per 1,000 s, (policies, seeds)
+    entry = run_benchmark(["dpo"], name="mine")
+    entry.write("mine.json")
+    read_entry("mine.json").performance("corridor, long")  # per 1,000 s, (policies, seeds)
 
-`read_entry` accepts a file only if it is whole: it follows a known version of the protocol, has every run of every
-world, and its digest matches. This finds mistakes, such as a broken copy or a slip of the hand. It does not find fraud:
-anyone who alters numbers can also write a new digest. To be sure of an entry, run its command again.
+`read_entry` accepts a file only if it is whole: it follows the protocol, has every run of every world, and its digest
+matches. This finds mistakes, such as a broken copy or a slip of the hand. It does not find fraud: anyone who alters
+numbers can also write a new digest. To be sure of an entry, verify it.
 """
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+import os
+import shlex
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import number, whole
+from swarm_forage_env._internal.fields import text, whole
 from swarm_forage_env._internal.files import read_json, replacing
 from swarm_forage_env._internal.typed import Amount, Count, Name, Within, typed
+from swarm_forage_env.contract.policy import sees_world
+from swarm_forage_env.policies.registry import file_of, is_policy_file, policy_class, policy_label
+from swarm_forage_env.runs.plan import Plan
+from swarm_forage_env.runs.policy_spec import policy_specs
+from swarm_forage_env.runs.record import RunRecord
+from swarm_forage_env.runs.spec import identity_of
+from swarm_forage_env.runs.table import Table
+from swarm_forage_env.runs.versions import software_versions
 
+from ..controllers import PAPER_POLICIES
 from ..curves import FloatArray
-from .protocol import OPEN, BenchmarkError, Protocol, known_versions, load_protocol, protocol_versions
+from ..scoring.question import Question, ask
+from .protocol import OPEN, BenchmarkError, Protocol, load_protocol
 
-_WITHOUT_TRACKS = "leave out --track and --decisions, or say --version 2 or 3"
 TRAINED_IN = ("given", "other", "nothing", "unknown")
 """Where a policy was trained: in the training worlds only, also elsewhere, not at all, or the author does not say."""
-Rows: TypeAlias = tuple[tuple[float | None, ...], ...]
-"""(policies, seeds); None where a run has no such value."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,25 +49,15 @@ class Training:
     worlds: str = "unknown"
     """One of `TRAINED_IN`."""
     command: str = ""
-    library: str = ""
-    core_hours: Amount | None = None
-    """Core-hours of all its trainings together."""
-    track: str = ""
-    """One of the protocol's tracks, or `OPEN`; empty if the protocol has no tracks."""
+    track: str = OPEN
+    """One of the protocol's tracks, or `OPEN`."""
     decisions: Count | None = None
     """Decisions of its longest training, counted over all robots."""
 
     def __post_init__(self) -> None:
         if self.worlds not in TRAINED_IN:
             raise BenchmarkError(f"Expected training worlds to be one of {', '.join(TRAINED_IN)}, got {self.worlds!r}.")
-        if self.core_hours is not None:
-            number("core-hours of training", self.core_hours, at_least=0.0)
         whole("decisions of a training", self.decisions, at_least=0, or_none=True)
-
-    def to_mapping(self) -> dict[str, Any]:
-        """Return it as plain values; entries of version 1 have neither track nor decisions."""
-        told = asdict(self)
-        return told if self.track else {key: told[key] for key in told if key not in ("track", "decisions")}
 
     def check_track(self, protocol: Protocol, n_policies: int) -> None:
         """Refuse a training that does not fit its track.
@@ -69,17 +70,10 @@ class Training:
             BenchmarkError: an unknown track; or one with a budget for policies that trained elsewhere, too long or too
                 seldom, or whose author does not say so.
         """
-        tracks = (*protocol.tracks, OPEN) if protocol.tracks else ("",)
-        if self.track not in tracks:
-            if not protocol.tracks:
-                raise BenchmarkError(f"Expected no track for {protocol.name}, got {self.track!r}; {_WITHOUT_TRACKS}.")
+        if self.track not in (*protocol.tracks, OPEN):
             raise BenchmarkError(
-                f"Expected a track of the benchmark, {protocol.name} ({', '.join(tracks)}), got {self.track!r}; choose "
-                "one with --track."
-            )
-        if self.decisions is not None and not self.track:
-            raise BenchmarkError(
-                f"Expected no decisions for {protocol.name}, got {self.decisions:,}; {_WITHOUT_TRACKS}."
+                f"Expected a track of the benchmark ({', '.join((*protocol.tracks, OPEN))}), got {self.track!r}; "
+                "choose one with --track."
             )
         budget = protocol.tracks.get(self.track)
         if budget is None:
@@ -109,34 +103,13 @@ class EntryPolicy:
     name: str
     """Name for people, see `swarm_forage_env.policies.registry.policy_label`; for a file without folder and ending."""
     digest: str = ""
-    """Hash of the content of its file, or for a mixed swarm of all its files, joined by +. Empty without a file."""
+    """Hash of the content of its file; empty without a file."""
     training_seed: Count | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
-class EntryMeasure:
-    """One measure of swarm engineering at one level, for all policies and seeds."""
-
-    group: str
-    label: str
-    at: str
-    """The level in words."""
-    n_robots: tuple[Annotated[int, Within(at_least=1)], ...]
-    unit: str
-    higher_is_better: bool
-    values: Rows
-    relative: Rows = ()
-    """`values` divided by the performance that they are compared with; empty for measures that are relative already."""
-
-    @property
-    def key(self) -> tuple[str, str, str]:
-        """What it measures: equal keys of two entries can be compared."""
-        return self.group, self.label, self.at
-
-
-@dataclass(frozen=True, kw_only=True)
 class WorldRuns:
-    """The runs of a world in an entry file; each array has shape (policies, seeds)."""
+    """The runs of a world; each array has shape (policies, seeds)."""
 
     performance: tuple[tuple[Amount, ...], ...]
     """Per 1,000 s."""
@@ -145,57 +118,29 @@ class WorldRuns:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Edition:
-    """The edition of the benchmark that an entry file belongs to."""
+class Entry:
+    """What an entry file holds, its digest aside."""
 
-    version: int
-    identity: str
-    quick: bool
-
-
-@dataclass(frozen=True, kw_only=True)
-class EntryFile:
-    """The content of an entry file; the schema of entries follows from this class."""
-
-    benchmark: Edition
+    protocol: str
+    """Identity of the protocol, see `Protocol.identity`."""
     name: Name
     command: str
-    training: Training
+    """What makes it again."""
     policies: Annotated[tuple[EntryPolicy, ...], Within(at_least=1)]
-    core_hours: Amount | None
-    versions: Mapping[str, str]
     runs: Mapping[str, WorldRuns]
     """World -> its runs."""
-    measures: tuple[EntryMeasure, ...]
-    digest: str
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Entry:
-    """What an entry file holds."""
-
-    version: int
-    identity: str
-    """Identity of the protocol, see `Protocol.identity`."""
-    is_quick: bool
-    name: str
-    command: str
-    policies: tuple[EntryPolicy, ...]
-    runs: Mapping[str, Mapping[str, Sequence[Sequence[float]]]]
-    """World -> "performance" (per 1,000 s) and "interference" (share of robot time), (policies, seeds) each."""
-    measures: tuple[EntryMeasure, ...] = ()
     training: Training = field(default_factory=Training)
-    core_hours: float | None = 0.0
+    core_hours: Amount | None = None
     """Core-hours that the runs of the entry took, as far as their records say; None if no record says it."""
     versions: Mapping[str, str] = field(default_factory=dict[str, str])
 
     def performance(self, world: str) -> FloatArray:
         """Return the performance of all runs of a world, per 1,000 s, (policies, seeds)."""
-        return np.asarray(self.runs[world]["performance"], dtype=np.float64)
+        return np.asarray(self.runs[world].performance, dtype=np.float64)
 
     def interference(self, world: str) -> FloatArray:
         """Return the share of robot time lost to interference, (policies, seeds)."""
-        return np.asarray(self.runs[world]["interference"], dtype=np.float64)
+        return np.asarray(self.runs[world].interference, dtype=np.float64)
 
     @property
     def is_scripted(self) -> bool:
@@ -210,29 +155,18 @@ class Entry:
     @property
     def digest(self) -> str:
         """Hash of everything that the entry holds."""
-        return self.to_mapping()["digest"]
-
-    def to_mapping(self) -> dict[str, Any]:
-        """Return the entry as plain values, its digest last."""
-        content: dict[str, Any] = {
-            "benchmark": {"version": self.version, "identity": self.identity, "quick": self.is_quick},
-            "name": self.name,
-            "command": self.command,
-            "training": self.training.to_mapping(),
-            "policies": [asdict(policy) for policy in self.policies],
-            "core_hours": self.core_hours,
-            "versions": dict(self.versions),
-            "runs": {
-                world: {name: _lists(rows) for name, rows in of_world.items()} for world, of_world in self.runs.items()
-            },
-            "measures": [asdict(measure) for measure in self.measures],
-        }
-        return {**content, "digest": _digest(content)}
+        return identity_of(json.loads(json.dumps(asdict(self))))
 
     def write(self, path: str | Path) -> None:
-        """Write the entry to a file, whole or not at all."""
+        """Write the entry to a file, whole or not at all: a line per world, so that people can compare them."""
+        content: dict[str, Any] = {**asdict(self), "digest": self.digest}
+        runs = ",\n".join(f"  {json.dumps(name)}: {json.dumps(rows)}" for name, rows in content["runs"].items())
+        lines = [
+            f' "runs": {{\n{runs}\n }}' if key == "runs" else f" {json.dumps(key)}: {json.dumps(value)}"
+            for key, value in content.items()
+        ]
         with replacing(Path(path)) as draft:
-            draft.write_text(_text(self.to_mapping()), encoding="utf-8")
+            draft.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
 
     def check(self, protocol: Protocol, where: str) -> None:
         """Refuse an entry of another protocol, or one that lacks runs.
@@ -244,40 +178,29 @@ class Entry:
         Raises:
             BenchmarkError: see above.
         """
-        if self.version != protocol.version:
+        if self.protocol != protocol.identity:
             raise BenchmarkError(
-                f"Expected an entry of version {protocol.version} of the benchmark, got one of version {self.version} "
-                f"in {where}; run swarm-forage benchmark again."
-            )
-        if self.identity != protocol.identity:
-            told = "a quick look, which is no entry" if self.is_quick else "other worlds or seeds"
-            raise BenchmarkError(
-                f"Expected an entry of the benchmark, {protocol.name}, got {told} in {where}; run swarm-forage "
-                "benchmark again, without --quick and with this version of the package."
+                f"Expected an entry of this benchmark, got one of other worlds or seeds in {where}; run swarm-forage "
+                "benchmark again."
             )
         digests = [policy.digest for policy in self.policies if policy.digest]
         if self.training.track in protocol.tracks and len({*digests}) < len(digests):
             raise BenchmarkError(f"Expected different trainings in {where}, got one file twice.")
-        worlds = [world.name for world in protocol.worlds]
-        for world in worlds:
-            if world not in self.runs:
-                raise BenchmarkError(f"Expected runs of the world {world!r} in {where}, found none.")
-        for world, of_world in self.runs.items():
-            if world not in worlds:
-                raise BenchmarkError(f"Expected runs of the worlds of the benchmark in {where}, got {world!r}, too.")
-            for name, rows in of_world.items():
-                self._check_rows(f"{name} in the world {world!r} of {where}", rows, protocol)
-        self.training.check_track(protocol, len(self.policies))
-        for measure in self.measures:
-            for name in ("values", "relative") if measure.relative else ("values",):
-                self._check_rows(f"{name} of {', '.join(measure.key)} in {where}", getattr(measure, name), protocol)
-
-    def _check_rows(self, where: str, rows: Sequence[Sequence[Any]], protocol: Protocol) -> None:
-        if [len(row) for row in rows] != [len(protocol.seeds)] * len(self.policies):
+        worlds = {world.name for world in protocol.worlds}
+        if worlds != {*self.runs}:
+            odd = sorted(worlds.symmetric_difference(self.runs))
             raise BenchmarkError(
-                f"Expected {where} as lists of numbers, one for each of {len(self.policies)} policies and "
-                f"{len(protocol.seeds)} seeds."
+                f"Expected runs of all {len(worlds)} worlds in {where} and of no other; see {odd[0]!r}."
             )
+        self.training.check_track(protocol, len(self.policies))
+        shape = (len(self.policies), len(protocol.seeds))
+        for world, runs in self.runs.items():
+            for name, rows in vars(runs).items():
+                if {len(row) for row in rows} != {shape[1]} or len(rows) != shape[0]:
+                    raise BenchmarkError(
+                        f"Expected {name} in the world {world!r} of {where} as lists of numbers, one for each of "
+                        f"{shape[0]} policies and {shape[1]} seeds."
+                    )
 
 
 def read_entry(path: str | Path, protocol: Protocol | None = None) -> Entry:
@@ -285,23 +208,19 @@ def read_entry(path: str | Path, protocol: Protocol | None = None) -> Entry:
 
     Args:
         path: The file.
-        protocol: What it must be an entry of; default that of the version which it names.
+        protocol: What it must be an entry of; default that of the package.
 
     Raises:
         BenchmarkError: the file cannot be read, its entry of the protocol is not whole, or its digest does not match.
     """
-    content = read_json(Path(path), BenchmarkError)
+    content = dict(read_json(Path(path), BenchmarkError))
+    digest = content.pop("digest", None)
     try:
-        stored: EntryFile = typed(EntryFile, content, "")
+        entry: Entry = typed(Entry, content, "")
     except ValueError as error:
         raise BenchmarkError(f"Cannot use the entry {path}: {error}") from error
-    entry = _entry(stored)
-    if protocol is None and entry.version not in protocol_versions():
-        raise BenchmarkError(
-            f"Expected an entry of version {known_versions()} of the benchmark, got {entry.version} in {path}."
-        )
-    entry.check(protocol or load_protocol(version=entry.version), str(path))
-    if entry.digest != stored.digest:
+    entry.check(protocol or load_protocol(), str(path))
+    if entry.digest != digest:
         raise BenchmarkError(
             f"Expected the numbers of {path} as swarm-forage benchmark wrote them, got others: the digest does not "
             "fit. Make the entry again."
@@ -309,53 +228,167 @@ def read_entry(path: str | Path, protocol: Protocol | None = None) -> Entry:
     return entry
 
 
-def _entry(stored: EntryFile) -> Entry:
-    about = stored.benchmark
-    return Entry(
-        version=about.version,
-        identity=about.identity,
-        is_quick=about.quick,
-        name=stored.name,
-        command=stored.command,
-        training=stored.training,
-        policies=stored.policies,
-        core_hours=stored.core_hours,
-        versions=stored.versions,
-        runs={world: vars(runs) for world, runs in stored.runs.items()},
-        measures=stored.measures,
-    )
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BenchmarkQuestion(Question[Entry]):
+    """Runs of some policies in all worlds of a protocol; several are training seeds of one method, and one entry."""
+
+    name: str
+    """Name of the entry in tables."""
+    protocol: Protocol
+    training: Training = field(default_factory=Training)
+
+    def answer(self, table: Table) -> Entry:
+        """Return the entry.
+
+        Raises:
+            BenchmarkError: runs failed.
+        """
+        check_finished(table)
+        policies = [policy.policy for policy in self.plan.policies]
+        return Entry(
+            protocol=self.protocol.identity,
+            name=self.name,
+            command=entry_command(policies, self.name, training=self.training),
+            policies=tuple(
+                EntryPolicy(name=policy_label(policy), digest=digest, training_seed=seed)
+                for policy in policies
+                for digest, seed in [policy_origin(policy)]
+            ),
+            runs=_runs(self.protocol, table),
+            training=self.training,
+            core_hours=_core_hours(table.records.values()),
+            versions={package: version for package, version in software_versions().items() if version},
+        )
 
 
-def _lists(rows: Sequence[Sequence[float]]) -> list[list[float]]:
-    return [list(row) for row in rows]
+def check_finished(table: Table) -> None:
+    """Refuse a table in which runs are missing.
+
+    Raises:
+        BenchmarkError: runs failed.
+    """
+    if table.failures:
+        first = next(iter(table.failures.values()))
+        raise BenchmarkError(
+            f"Expected all {len(table.plan.specs)} runs to finish, {len(table.failures)} failed; the first, "
+            f"{first.spec.describe()}: {first.error}"
+        )
 
 
-def _digest(content: Mapping[str, Any]) -> str:
-    from swarm_forage_env.runs.spec import identity_of
+def benchmark_question(
+    policies: Sequence[str], *, name: str, protocol: Protocol | None = None, training: Training | None = None
+) -> BenchmarkQuestion:
+    """Return what `run_benchmark` asks; arguments and errors as there."""
+    text("the name of an entry", name)
+    chosen, told = protocol or load_protocol(), training or Training()
+    if name in PAPER_POLICIES and (tuple(policies) != (name,) or chosen.is_quick):
+        raise BenchmarkError(
+            f"Expected another name than {name!r}, which is that of an entry that comes with the package; choose one "
+            "with --name."
+        )
+    if not chosen.is_quick:
+        told.check_track(chosen, len(policies))
+    specs = policy_specs(policies)
+    omniscient = [spec.label for spec in specs if sees_world(policy_class(spec.policy))]
+    if omniscient:
+        raise BenchmarkError(
+            f"Expected policies that decide by what robots observe, got {omniscient[0]}, which reads the world. It is "
+            "a yardstick and no contestant: swarm-forage run puts it beside others."
+        )
+    plan = Plan.product(specs, [each.world for each in chosen.worlds], chosen.seeds)
+    return BenchmarkQuestion(plan=plan, name=name, protocol=chosen, training=told)
 
-    return identity_of(json.loads(json.dumps(content)))
+
+def run_benchmark(
+    policies: Sequence[str],
+    *,
+    name: str,
+    protocol: Protocol | None = None,
+    training: Training | None = None,
+    out: str | Path | None = None,
+    jobs: int | None = None,
+    executor: Executor | None = None,
+    progress: bool = True,
+) -> Entry:
+    """Run policies in all worlds of a protocol and return the entry.
+
+    Args:
+        policies: Registered names or policy files; several are training seeds of one method, and one entry.
+        name: Name of the entry in tables.
+        protocol: Default that of the package.
+        training: How the policies were made.
+        out: Folder for run records. Runs that it already holds are not repeated, so you can repeat an interrupted call.
+        jobs: Processes; default one per core.
+        executor: Runs the work instead, for example Dask's `client.get_executor()`.
+        progress: Show progress and an estimate on stderr.
+
+    Raises:
+        BenchmarkError: runs failed, the name is that of a scripted controller, or the training does not fit its track.
+        ConfigError: a name without characters, or with some that no terminal shows.
+        ValueError: an unknown policy, or a file that cannot be opened.
+        swarm_forage_env.runs.runner.RunsInterrupted: Ctrl-C; finished runs are in `out`.
+    """
+    question = benchmark_question(policies, name=name, protocol=protocol, training=training)
+    return ask(question, out=out, jobs=jobs, executor=executor, progress=progress)
 
 
-def _text(content: Mapping[str, Any]) -> str:
-    """JSON with one line per world and measure: files that people can compare line by line."""
-    lines: list[str] = []
-    for key, value in content.items():
-        if key == "runs":
-            inner = ",\n".join(f"  {json.dumps(name)}: {json.dumps(rows)}" for name, rows in value.items())
-            lines.append(f' "runs": {{\n{inner}\n }}')
-        elif key == "measures":
-            inner = ",\n".join(f"  {json.dumps(measure)}" for measure in value)
-            lines.append(f' "measures": [\n{inner}\n ]')
-        else:
-            lines.append(f" {json.dumps(key)}: {json.dumps(value)}")
-    return "{\n" + ",\n".join(lines) + "\n}\n"
+def entry_command(policies: Sequence[str], name: str, *, training: Training | None = None) -> str:
+    """Return what makes an entry again from the current folder: policies as given, but files without whole paths.
+
+    What a training was is among the words only where its track asks for it.
+    """
+    words = [word for policy in policies for word in ("--policy", _from_here(policy))]
+    budget: list[str] = []
+    if training is not None and training.track != OPEN:
+        budget = ["--trained-in", training.worlds, "--track", training.track, "--decisions", str(training.decisions)]
+    return shlex.join(["swarm-forage", "benchmark", *words, "--name", name, *budget])
+
+
+def _from_here(policy: str) -> str:
+    """A policy with the path of its file from the current folder, where the whole path was given."""
+    file = file_of(policy)
+    if not (is_policy_file(policy) and Path(file).is_absolute()):
+        return policy
+    return Path(os.path.relpath(file)).as_posix() + policy.removeprefix(file)
+
+
+def policy_origin(policy: str) -> tuple[str, int | None]:
+    """Return the digest of a policy's file, and the seed of its training as far as the file tells it."""
+    from swarm_forage_env.policies.model_files import file_digest
+    from swarm_forage_env.policies.network import Network
+    from swarm_forage_env.policies.pretrained import network_file
+
+    file = Path(file_of(policy)) if is_policy_file(policy) else network_file(policy)
+    if file is None:
+        return "", None
+    card: dict[str, Any] = Network.load(file).about.card if file.suffix == ".npz" else {}
+    plan: Any = card.get("plan")
+    seed = dict[str, Any](plan).get("seed") if isinstance(plan, dict) else None  # pyright: ignore[reportUnknownArgumentType] - a card holds anything
+    return file_digest(file), seed if isinstance(seed, int) else None
+
+
+def _core_hours(records: Iterable[RunRecord]) -> float | None:
+    """What runs took, of those whose records tell it; three digits, as time is never the same twice."""
+    known = [record.cpu_time_s for record in records if math.isfinite(record.cpu_time_s)]
+    return float(f"{sum(known) / 3600.0:.3g}") if known else None
+
+
+def _runs(protocol: Protocol, table: Table) -> dict[str, WorldRuns]:
+    """World -> performance and interference of all policies and seeds."""
+
+    def of_all(world: str, value: Callable[[RunRecord], float]) -> tuple[tuple[float, ...], ...]:
+        conditions = [condition for condition in table.plan.conditions if condition.world.name == world]
+        return tuple(tuple(six_digits(value(record)) for record in table.of(one)) for one in conditions)
+
+    return {
+        world.name: WorldRuns(
+            performance=of_all(world.name, lambda record: record.rate_per_1000_s("performance")),
+            interference=of_all(world.name, lambda record: float(record.interference_fraction.mean())),
+        )
+        for world in protocol.worlds
+    }
 
 
 def six_digits(value: float) -> float:
     """Return a number as entry files hold it: further digits would only make files longer."""
     return float(f"{value:.6g}")
-
-
-def rounded(value: float) -> float | None:
-    """Return a number with six digits, None for NaN and infinity."""
-    return six_digits(value) if math.isfinite(value) else None

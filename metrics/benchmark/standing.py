@@ -19,8 +19,8 @@ from ..controllers import PAPER_POLICIES
 from ..curves import FloatArray
 from ..distributions import N_RESAMPLES, interquartile_mean, optimality_gap, probability_of_improvement
 from ..statistics import Estimate, aggregate
-from .entry import Entry, EntryMeasure, read_entry
-from .protocol import BenchmarkError, Protocol, ProtocolWorld, folder_of
+from .entry import Entry, read_entry
+from .protocol import BenchmarkError, Protocol, ProtocolWorld, scripted_folder
 
 _SEED = 1
 """Seed of the bootstrap; fixed, so that the same entries give the same page."""
@@ -70,11 +70,6 @@ class Standing:
     """Number of held-out worlds that each policy wins, where there are several."""
 
 
-def scripted_folder(version: int) -> Path:
-    """Return where the entries of the scripted controllers in a version of the benchmark are."""
-    return folder_of(version, Path(__file__).parent / "scripted")
-
-
 def scripted_entries(protocol: Protocol, folder: Path | None = None) -> tuple[Entry, ...]:
     """Return the entries of the scripted controllers, which come with the package.
 
@@ -85,7 +80,7 @@ def scripted_entries(protocol: Protocol, folder: Path | None = None) -> tuple[En
     Raises:
         BenchmarkError: one is missing, or belongs to another protocol.
     """
-    place = folder or scripted_folder(protocol.version)
+    place = folder or scripted_folder()
     return tuple(read_entry(place / f"{name}.json", protocol) for name in PAPER_POLICIES)
 
 
@@ -153,7 +148,7 @@ def standing_of(entry: Entry, reference: Reference, protocol: Protocol) -> Stand
         calm=middle(lambda world: world.counts and not world.is_disturbed),
         disturbed=middle(lambda world: world.counts and world.is_disturbed),
         training=middle(lambda world: not world.is_held_out),
-        groups={group.name: middle(lambda world, of=group.name: world.group == of) for group in protocol.groups},
+        groups={group: middle(lambda world, of=group: world.group == of) for group in protocol.groups},
         interference=float(np.mean([entry.interference(world.name).mean() for world in counting])),
         by_policy=tuple(each.value for each in by_policy),
         won_by_policy=tuple(won) if len(won) > 1 else (),
@@ -190,31 +185,6 @@ def _within_0_and_1(estimate: Estimate) -> Estimate:
 def shares_of(entry: Entry, world: ProtocolWorld, reference: Reference) -> FloatArray:
     """Return the performance of an entry's runs over the best scripted mean in a world, (policies, seeds)."""
     return entry.performance(world.name) / reference.mean(world.name)
-
-
-def improvements(entries: Sequence[Entry], protocol: Protocol) -> FloatArray:
-    """Return how probably a run of one entry is better than one of another in the same world, mean over worlds.
-
-    Returns:
-        (E, E): row over column; 0.5 on the diagonal.
-    """
-    runs = [[entry.performance(world.name).ravel() for world in protocol.scored] for entry in entries]
-    return np.array(
-        [
-            [0.5 if a is b else probability_of_improvement(a, b, seed=_SEED, n_resamples=1).value for b in runs]
-            for a in runs
-        ]
-    )
-
-
-def measure_mean(measure: EntryMeasure) -> float:
-    """Return the mean of a measure over policies and seeds, relative to performance where it is an amount.
-
-    NaN where no run has a value.
-    """
-    rows = measure.relative or measure.values
-    known = [value for row in rows for value in row if value is not None]
-    return float(np.mean(known)) if known else float("nan")
 
 
 def _judged(protocol: Protocol) -> tuple[ProtocolWorld, ...]:

@@ -98,7 +98,11 @@ def _distance(name: str, variant: Variant) -> Values:
     if name == "reactivity":
         return partial(_reactivity, variant=variant)
     formula = adaptability if name == "adaptability" else noise_robustness
-    return lambda ideal, disturbed: formula(ideal.performance, disturbed.performance)
+
+    def distance(ideal: RunCurves, disturbed: RunCurves) -> FloatArray:
+        return formula(ideal.performance, disturbed.performance)
+
+    return distance
 
 
 def _distance_scores(name: str, study: StudyCurves, variant: Variant, _: Form) -> Iterator[Score]:

@@ -44,10 +44,8 @@ COMMANDS: dict[str, tuple[Command, ...]] = {
         Command("study verdict", "Test the claims of the paper with runs.", "study:verdict"),
         Command("study plot", "Draw the figures of a study.", "study:plot"),
         Command("benchmark", "Score policies in a fixed set of worlds.", "benchmark:run"),
-        Command("benchmark worlds", "List the worlds of the benchmark.", "benchmark:worlds"),
         Command("benchmark show", "Show the scores of entries.", "benchmark:show"),
         Command("benchmark verify", "Make runs of an entry again and compare.", "benchmark:verify"),
-        Command("benchmark page", "Write the page that compares entries.", "benchmark:page"),
     ),
     "Look up": (
         Command("list", "List scenarios, policies, wrappers or columns.", "look:list_everything"),

@@ -141,7 +141,7 @@ class SeedTrainings(Answer):
 
         None where all failed, or where they need sensors that no world of the benchmark has.
         """
-        from metrics.benchmark.running import entry_command  # late: see training.evaluations
+        from metrics.benchmark.entry import entry_command  # late: see training.evaluations
 
         policies = [one.policy for one in self._finished()]
         is_possible = policies and not self.plan.interface.own_sensors

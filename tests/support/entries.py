@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from metrics.benchmark import Entry, Protocol, Training
-from metrics.benchmark.entry import EntryMeasure, EntryPolicy
+from metrics.benchmark.entry import EntryPolicy, WorldRuns
 
 TINY = Path(__file__).with_name("tiny_benchmark.toml")
 """Two worlds of three or four robots in a small room; see the file."""
@@ -17,33 +17,21 @@ def made_up_entry(
     """Return an entry whose performance in the k-th world is `performance(k)`, one more per policy, two per seed."""
     n_seeds = len(protocol.seeds)
     runs = {
-        world.name: {
-            "performance": [[performance(k) + j + 2.0 * s for s in range(n_seeds)] for j in range(n_policies)],
-            "interference": [[0.1] * n_seeds for _ in range(n_policies)],
-        }
+        world.name: WorldRuns(
+            performance=tuple(tuple(performance(k) + j + 2.0 * s for s in range(n_seeds)) for j in range(n_policies)),
+            interference=((0.1,) * n_seeds,) * n_policies,
+        )
         for k, world in enumerate(protocol.worlds)
     }
-    measure = EntryMeasure(
-        group="room",
-        label="scalability",
-        at="N = 2 to 4",
-        n_robots=(2, 4),
-        unit="1 = linear",
-        higher_is_better=True,
-        values=tuple((0.5, None) for _ in range(n_policies)),
-    )
     given: dict[str, Any] = {
         "command": f"swarm-forage benchmark --policy {name}",
         "training": Training(worlds="nothing"),
-        "measures": (measure,),
         "core_hours": 0.25,
         "versions": {"numpy": "2.0"},
         **fields,
     }
     return Entry(
-        version=protocol.version,
-        identity=protocol.identity,
-        is_quick=protocol.is_quick,
+        protocol=protocol.identity,
         name=name,
         policies=tuple(EntryPolicy(name=f"{name}_{k}.npz", training_seed=k) for k in range(n_policies)),
         runs=runs,

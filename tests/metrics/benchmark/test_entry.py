@@ -33,79 +33,13 @@ def altered(file, change):
 def test_what_is_written_is_read_back(protocol, file):
     entry = made_up_entry(protocol, "one", lambda k: 10.0 + k, n_policies=2)
     found = read_entry(file, protocol)
-    assert found.to_mapping() == entry.to_mapping()
+    assert found == entry
     np.testing.assert_array_equal(found.performance("training: here"), [[10.0, 12.0], [11.0, 13.0]])
 
 
 def test_a_file_has_one_line_per_world_so_that_changes_can_be_read(protocol, file):
     lines = file.read_text().splitlines()
-    assert sum(line.startswith('  "room, ') for line in lines) == 8
-
-
-def set_version(content):
-    content["benchmark"]["version"] = 2
-
-
-def set_identity(content):
-    content["benchmark"]["identity"] = "0" * 16
-
-
-def drop_world(content):
-    del content["runs"]["room, 2 robots"]
-
-
-def drop_seed(content):
-    content["runs"]["room, 2 robots"]["performance"] = [[1.0], [1.0]]
-
-
-def set_negative(content):
-    content["runs"]["room, 2 robots"]["performance"][0][0] = -1.0
-
-
-def set_text(content):
-    content["runs"]["room, 2 robots"]["performance"] = "many"
-
-
-def raise_performance(content):
-    content["runs"]["room, 2 robots"]["performance"][0][0] += 1.0
-
-
-def rename_measure(content):
-    content["measures"][0]["label"] = "beauty"
-
-
-def drop_key(content):
-    del content["measures"]
-
-
-def set_training(content):
-    content["training"]["worlds"] = "everywhere"
-
-
-def add_field(content):
-    content["policies"][0]["colour"] = "red"
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (set_version, "Expected an entry of version 1 of the benchmark, got one of version 2"),
-        (set_identity, "got other worlds or seeds"),
-        (drop_world, "Expected runs of the world 'room, 2 robots'"),
-        (drop_seed, "for each of 2 policies and 2 seeds"),
-        (set_negative, r"performance\[0\]\[0\] to be a finite number >= 0"),
-        (set_text, "performance to be a list"),
-        (raise_performance, "the digest does not fit"),
-        (rename_measure, "the digest does not fit"),
-        (drop_key, "Missing key 'measures'"),
-        (set_training, "Expected training worlds to be one of given, other"),
-        (add_field, "colour"),
-    ],
-)
-def test_a_file_that_is_no_whole_entry_is_refused(change, message, protocol, file):
-    with pytest.raises(BenchmarkError, match=message) as refused:
-        read_entry(altered(file, change), protocol)
-    assert str(file) in str(refused.value)
+    assert sum(line.startswith('  "room, ') for line in lines) == 6
 
 
 def put(*path_and_value):
@@ -122,34 +56,22 @@ def put(*path_and_value):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
+        (put("protocol", "0" * 16), "got one of other worlds or seeds"),
         (put("name", 5), "Expected name to be a non-empty text"),
-        (put("name", None), "Expected name to be a non-empty text"),
-        (put("name", []), "Expected name to be a non-empty text"),
         (put("name", "\x1b[31m"), "Expected name to be a non-empty text without control characters"),
-        (put("name", "\ud800"), "Expected texts that can be written as UTF-8"),
-        (put("command", 5), "Expected command to be a text"),
-        (put("core_hours", "x"), "Expected core_hours to be a finite number >= 0"),
         (put("core_hours", -1), "Expected core_hours to be a finite number >= 0"),
         (put("runs", "x"), "Expected runs to be a table"),
-        (put("runs", "room, 2 robots", 5), "Expected runs.room, 2 robots to be a table"),
-        (put("runs", "room, 2 robots", "performance", 0, 0, "x"), r"performance\[0\]\[0\] to be a finite number >= 0"),
+        (put("runs", "room, 2 robots", "performance", 0, 0, -1.0), r"performance\[0\]\[0\] to be a finite number >= 0"),
+        (put("runs", "room, 2 robots", "performance", [[1.0], [1.0]]), "for each of 2 policies and 2 seeds"),
         (put("runs", "room, 2 robots", "beauty", [[1.0, 1.0]] * 2), "Unknown key .*beauty"),
-        (put("runs", "mars", {"performance": [[1.0, 1.0]] * 2, "interference": [[0.1, 0.1]] * 2}), "got 'mars', too"),
+        (put("runs", "mars", {"performance": [[1.0, 1.0]] * 2, "interference": [[0.1, 0.1]] * 2}), "see 'mars'"),
         (put("runs", "room, 2 robots", "interference", 0, 0, 1.5), r"interference.* to be a number in \[0, 1\]"),
-        (put("measures", 0, "values", [["x", 1.0], [1.0, 1.0]]), r"values\[0\]\[0\] to be a finite number"),
-        (put("measures", 0, "values", [[1.0], [1.0, 1.0]]), "one for each of 2 policies and 2 seeds"),
-        (put("measures", 0, "relative", [[1.0]]), "one for each of 2 policies and 2 seeds"),
-        (put("measures", 0, "n_robots", ["x"]), r"n_robots\[0\] to be a whole number >= 1"),
-        (put("measures", 0, "higher_is_better", 1), "higher_is_better to be True or False"),
         (put("policies", []), "Expected policies to have at least 1"),
-        (put("policies", 0, "training_seed", -1), "training_seed to be a whole number >= 0"),
+        (put("policies", 0, "colour", "red"), "colour"),
+        (put("training", "worlds", "everywhere"), "Expected training worlds to be one of given, other"),
         (put("versions", {"numpy": 2}), "versions.numpy to be a text"),
-        (put("benchmark", []), "Expected benchmark to be a table"),
-        (put("benchmark", "quick", "no"), "benchmark.quick to be True or False"),
-        (put("benchmark", "version", None), "benchmark.version to be a whole number"),
-        (put("training", "core_hours", "x"), "training.core_hours to be a finite number >= 0"),
     ],
-)  # fmt: skip
+)
 def test_an_entry_from_a_stranger_is_refused_by_the_name_of_the_field(change, message, protocol, file):
     content = json.loads(file.read_text())
     change(content)
@@ -163,8 +85,15 @@ def test_an_entry_from_a_stranger_is_refused_by_the_name_of_the_field(change, me
 def test_a_quick_look_is_no_entry(protocol, tmp_path):
     quick = load_protocol(TINY, quick=True)
     made_up_entry(quick, "one", lambda k: 1.0).write(tmp_path / "quick.json")
-    with pytest.raises(BenchmarkError, match="a quick look, which is no entry"):
+    with pytest.raises(BenchmarkError, match="got one of other worlds or seeds"):
         read_entry(tmp_path / "quick.json", protocol)
+
+
+def test_altered_numbers_and_missing_worlds_are_found(protocol, file):
+    with pytest.raises(BenchmarkError, match="the digest does not fit"):
+        read_entry(altered(file, put("runs", "room, 2 robots", "performance", 0, 0, 77.0)), protocol)
+    with pytest.raises(BenchmarkError, match="see 'room, 2 robots'"):
+        read_entry(altered(file, lambda content: content["runs"].pop("room, 2 robots")), protocol)
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{", '{"name": 1}'])
@@ -182,7 +111,5 @@ def test_a_missing_file_is_named(protocol, tmp_path):
 def test_what_no_file_may_say_is_refused_before_any_run():
     with pytest.raises(BenchmarkError, match="got 'mars'"):
         Training(worlds="mars")
-    with pytest.raises(ConfigError, match="Expected core-hours of training"):
-        Training(core_hours=float("nan"))
     with pytest.raises(ConfigError, match="Expected the name of an entry to be a non-empty text"):
         benchmark_question(["crw"], name="\x1b[31m")

@@ -1,15 +1,21 @@
-"""The protocol of the benchmark: what its file says is what is run, and a version never changes."""
+"""The protocol of the benchmark: what its file says is what is run, and entries hold for it alone."""
+
+import itertools
+import tomllib
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
-from metrics.benchmark import BenchmarkError, load_protocol
+from metrics.benchmark import BenchmarkError, Training, load_protocol
 from swarm_forage_env import plan_run, scenario
+from swarm_forage_env._internal.fields import as_tuples
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policies import pretrained
 from tests.support.entries import TINY
-from tests.support.foraging import NEAR
 
-IDENTITY_OF_VERSION_1 = "8c641b8515a43882"
-"""A change of worlds, seeds or lengths is another version: entries of this one must stay comparable."""
+PLAN = Path(pretrained.__file__).with_name("generalist.toml")
+IN_10M = Training(worlds="given", track="10M", decisions=10_000_000)
 
 
 @pytest.fixture(scope="module")
@@ -17,66 +23,99 @@ def protocol():
     return load_protocol()
 
 
-def test_version_1_never_changes(protocol):
-    assert (protocol.version, protocol.identity) == (1, IDENTITY_OF_VERSION_1)
+def test_it_has_three_worlds_or_more_of_eight_kinds(protocol):
+    assert len(protocol.scored) == 27
+    kinds = [world.group for world in protocol.scored]
+    assert {*kinds} == {*protocol.groups}
+    assert len(protocol.groups) == 8
+    assert min(kinds.count(kind) for kind in kinds) >= 3
 
 
 def test_held_out_worlds_differ_from_those_to_train_in(protocol):
     given = [world for world in protocol.worlds if not world.is_held_out]
     assert len(given) == 3
     assert not any(world.counts for world in given)
-    same = [
-        world.name
-        for world in protocol.scored
-        if not world.is_disturbed and any(world.world.scenario == known.world.scenario for known in given)
-    ]
-    assert same == []
+    known = [world.world.scenario for world in given]
+    assert [world.name for world in protocol.scored if world.world.scenario in known] == []
 
 
-@pytest.mark.parametrize("policy", ["stochm", "stochx"])
-def test_controllers_with_caches_fit_into_every_world(protocol, policy):
-    """Those are the worlds that can refuse a controller: caches need room."""
-    calm = {world.group: world.world for world in protocol.worlds if not world.is_disturbed}
-    assert len(calm) > 5
-    for world in calm.values():
-        ForageEnv(plan_run(world, policy).scenario)
+def test_a_source_of_boxes_lies_on_all_their_cells(protocol):
+    """The small warehouse turned by half: 16 x 56 cells, as many as the source of the preset has."""
+    turned = next(each.world.scenario for each in protocol.worlds if each.name.endswith("mirrored, source in the west"))
+    ((x_low, y_low, x_high, y_high),) = scenario("warehouse_small").source_cells
+    nx, ny = turned.arena.n_cells
+    wanted = {(nx - 1 - x, ny - 1 - y) for x in range(x_low, x_high) for y in range(y_low, y_high)}
+    assert {box[:2] for box in turned.source_cells} == wanted
+    assert turned.arena.nest_box_m == pytest.approx((27.2, 1.6, 30.4, 14.4))
 
 
-def test_the_protocol_has_what_it_promises(protocol):
-    """Sizes from 8 to 512, every kind of placement, all disturbances."""
-    sizes = [world.world.n_robots for world in protocol.scored]
-    assert (min(sizes), max(sizes)) == (8, 512)
-    placements = {world.world.scenario.objects.placement for world in protocol.scored}
-    assert placements == {scenario(name).objects.placement for name in NEAR}
-    disturbances = {config.name for world in protocol.scored for config in world.world.wrappers}
-    assert disturbances == {"throttle", "handling_cost", "sensor_noise", "actuator_noise", "population"}
-    rates = [config for world in protocol.scored for config in world.world.wrappers if config.name == "population"]
-    assert any(config.repair_per_tick > 0.0 for config in rates)
-    assert any(config.death_per_tick > 0.0 for config in rates)
-    assert {world.world.scenario.physics for world in protocol.worlds} == {"compiled"}
+@pytest.mark.parametrize("policy", ["crw", "stochm", "stochx"])
+def test_controllers_with_and_without_caches_fit_into_every_calm_world(protocol, policy):
+    for world in protocol.scored:
+        if not world.is_disturbed:
+            ForageEnv(plan_run(world.world, policy).scenario).reset(seed=protocol.seeds[0])
 
 
-def test_a_swarm_of_one_and_ideal_throttles_are_references_only():
-    protocol = load_protocol(TINY)
-    names = {world.name: world.counts for world in protocol.worlds}
-    assert names == {
+def test_an_entry_in_a_track_has_five_trainings_within_its_budget(protocol):
+    IN_10M.check_track(protocol, 5)
+    replace(IN_10M, track="40M", decisions=40_000_000).check_track(protocol, 5)
+    Training(worlds="other", track="open", decisions=10**12).check_track(protocol, 1)
+
+
+@pytest.mark.parametrize(
+    ("fields", "n_policies", "message"),
+    [
+        ({"decisions": 10_000_001}, 5, "at most 10,000,000 decisions of a training for the track 10M, got 10,000,001"),
+        ({"decisions": None}, 5, "got none; say how many with --decisions"),
+        ({"worlds": "other"}, 5, "got 'other'; say --trained-in given, or choose --track open"),
+        ({}, 4, "Expected 5 trainings for the track 10M, got 4"),
+        ({"track": "20M"}, 5, r"Expected a track .*\(10M, 40M, open\), got '20M'"),
+    ],
+)
+def test_a_training_that_does_not_fit_its_track_is_refused(protocol, fields, n_policies, message):
+    with pytest.raises(BenchmarkError, match=message):
+        replace(IN_10M, **fields).check_track(protocol, n_policies)
+
+
+def test_no_world_has_an_arena_in_which_the_shipped_generalist_was_trained_or_evaluated(protocol):
+    plan = tomllib.loads(PLAN.read_text())
+    parts = (plan["sampler"], *(stage["sampler"] for stage in plan["stages"] if "sampler" in stage), plan["evaluation"])
+    drawn = [world["scenario"] for part in parts for world in part["worlds"]]
+    arenas = {
+        scenario(fields["preset"], **variant | {"n_robots": n_robots}).arena
+        for fields in drawn
+        for variant in variants(fields)
+        for n_robots in bounds(fields["n_robots"])
+    }
+    assert len(arenas) > 20
+    assert not [world.name for world in protocol.scored if world.world.scenario.arena in arenas]
+
+
+def bounds(value):
+    return value["uniform"] if isinstance(value, dict) else [value]
+
+
+def variants(fields):
+    """Fields of a sampled world as a scenario takes them, once for each choice; those within bounds are left out."""
+    choices = {
+        name: value["choice"] if isinstance(value, dict) else [value]
+        for name, value in fields.items()
+        if name != "preset" and not (isinstance(value, dict) and "uniform" in value)
+    }
+    for picked in itertools.product(*choices.values()):
+        yield dict(zip(choices, map(as_tuples, picked), strict=True))
+
+
+def test_a_swarm_of_one_does_not_count():
+    assert {world.name: world.counts for world in load_protocol(TINY).worlds} == {
         "training: here": False,
+        "room, source below": True,
         "room, 1 robot": False,
         "room, 2 robots": True,
         "room, 4 robots": True,
-        "room, throttle 0": False,
-        "room, throttle 0.4": True,
-        "room, noise 0.01": True,
-        "room, failures 4": True,
+        "room, slow": True,
         "room, noisy wheels": True,
     }
-
-
-def test_one_run_serves_as_a_size_and_as_the_undisturbed_swarm():
-    (group,) = load_protocol(TINY).groups
-    roles = [(world, role.criterion) for world, role in group.roles]
-    assert ("room, 4 robots", "population_size") in roles
-    assert ("room, 4 robots", "none") in roles
 
 
 def test_quick_is_shorter_and_another_identity():
@@ -95,7 +134,7 @@ def test_quick_is_shorter_and_another_identity():
         ('name = "room"', 'name = "room"\nlevel = {}', "group.level"),
         ('"noisy wheels" = { actuator_noise', '"noisy wheels" = { wheel_noise', "wheel_noise"),
         ('"noisy wheels"', '"2 robots"', "2 robots"),
-        ("version = 1", "version =", "line"),
+        ("trainings = 2", "trainings =", "line"),
     ],
 )
 def test_a_file_that_describes_no_protocol_is_refused(old, new, message, tmp_path):

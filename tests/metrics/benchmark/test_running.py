@@ -1,24 +1,19 @@
-"""From policies to an entry, in a tiny protocol: the runs, and the measures that they allow."""
+"""From policies to an entry, in a tiny protocol."""
 
 import math
-import shutil
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from metrics.benchmark import BenchmarkError, Training, benchmark_question, load_protocol, read_entry, run_benchmark
+from metrics.benchmark.entry import entry_command
 from metrics.scoring import ask
-from metrics.scoring.scores import MEASURE_CRITERIA, ON_REQUEST
 from swarm_forage_env import run_one
-from swarm_forage_env.policies.model_files import file_digest
-from swarm_forage_env.policies.pretrained import network_file
 from swarm_forage_env.policies.registry import RandomPolicy
 from swarm_forage_env.runs import workers
-from swarm_forage_env.runs.record import RunRecord
-from tests.support.entries import TINY
-
-FROM_RATES_ALONE = {"availability"}
-"""Measures that say the same of every policy, and are in no entry."""
+from tests.support.entries import TINY, made_up_entry
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +29,7 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def entry(protocol, folder):
     policies = ("crw", "ppo_warehouse_small")
-    training = Training(worlds="given", library="a library", core_hours=1.5)
+    training = Training(worlds="given", command="a command")
     return run_benchmark(
         policies, name="both", protocol=protocol, training=training, out=folder, jobs=1, progress=False
     )
@@ -50,18 +45,11 @@ def test_an_entry_has_the_runs_of_all_policies(entry, protocol):
     assert entry.performance("room, noisy wheels").shape == (2, 2)
 
 
-def test_an_entry_has_every_measure(entry):
-    assert {measure.label for measure in entry.measures} == MEASURE_CRITERIA.keys() - FROM_RATES_ALONE - {*ON_REQUEST}
-    emergence = next(measure for measure in entry.measures if measure.label == "spatial_emergence")
-    assert (emergence.group, emergence.at) == ("room", "N = 1 to 2")
-    assert [len(row) for row in (*emergence.values, *emergence.relative)] == [2, 2, 2, 2]
-
-
 def test_an_entry_tells_how_it_was_made(entry):
     crw, ppo = entry.policies
     assert (crw.name, crw.digest, crw.training_seed) == ("crw", "", None)
     assert (ppo.name, len(ppo.digest), ppo.training_seed) == ("ppo_warehouse_small", 16, 0)
-    assert entry.training.core_hours == 1.5
+    assert entry.training.command == "a command"
     assert entry.core_hours >= 0.0
     assert not math.isnan(entry.core_hours)
     assert entry.versions["swarm-forage-env"]
@@ -73,20 +61,13 @@ def test_stored_runs_give_the_same_entry(entry, protocol, folder, tmp_path):
         name="both",
         protocol=protocol,
         training=entry.training,
-        training_seeds=(3, 4),
         out=folder,
         jobs=1,
         progress=False,
     )
     assert again.runs == entry.runs
-    assert [policy.training_seed for policy in again.policies] == [3, 4]
     again.write(tmp_path / "entry.json")
     assert read_entry(tmp_path / "entry.json", protocol).runs == entry.runs
-
-
-def test_training_seeds_are_one_per_policy(protocol):
-    with pytest.raises(BenchmarkError, match="got 1 for 2 policies"):
-        run_benchmark(["crw", "dpo"], name="two", protocol=protocol, training_seeds=(1,))
 
 
 def test_an_unknown_policy_is_refused(protocol):
@@ -124,11 +105,32 @@ def test_no_entry_is_made_of_failed_runs(tmp_path, monkeypatch):
     assert len(list(tmp_path.glob("*.parquet"))) == n_runs - 1
 
 
-def test_an_entry_of_a_mixed_swarm_keeps_its_name_and_the_digest_of_its_file(tmp_path, monkeypatch):
-    monkeypatch.setattr(RunRecord, "cpu_time_s", math.nan)  # as of records that do not tell it
-    net = shutil.copy(network_file("ppo_warehouse_small"), tmp_path / "net.npz")
-    quick = load_protocol(TINY, quick=True)
-    made = run_benchmark([f"mixed:{net}=50%,crw=rest"], name="both", protocol=quick, jobs=1, progress=False)
-    (told,) = made.policies
-    assert (told.name, told.digest) == ("mixed:net=0.5,crw=rest", file_digest(net))
-    assert made.core_hours is None
+def test_an_entry_names_its_track(protocol):
+    question = benchmark_question(["crw"], name="one", protocol=protocol)
+    assert question.training.track == "open"
+    in_short = Training(worlds="given", track="short", decisions=100)
+    with pytest.raises(BenchmarkError, match="Expected 2 trainings"):
+        benchmark_question(["crw"], name="one", protocol=protocol, training=in_short)
+    assert entry_command(["crw", "dpo"], "two", training=in_short) == (
+        "swarm-forage benchmark --policy crw --policy dpo --name two --trained-in given --track short --decisions 100"
+    )
+
+
+def test_a_file_with_its_whole_path_is_told_from_the_current_folder(tmp_path, monkeypatch):
+    """Another machine has other folders; words about the interface go on to fit."""
+    monkeypatch.chdir(tmp_path)
+    given = ("runs/a.npz", f"{tmp_path}/runs/a.npz", f"{tmp_path}/m.zip:decision_ticks=5", "dpo")
+    words = entry_command(given, "x").split()
+    told = [word for before, word in pairwise(words) if before == "--policy"]
+    assert told == ["runs/a.npz", "runs/a.npz", "m.zip:decision_ticks=5", "dpo"]
+
+
+def test_one_network_in_two_files_is_no_two_trainings(protocol, tmp_path):
+    in_short = Training(worlds="given", track="short", decisions=100)
+    entry = made_up_entry(protocol, "copies", lambda k: 10.0, n_policies=2, training=in_short)
+    for digests in ("ab", "aa"):
+        policies = tuple(replace(one, digest=mark) for one, mark in zip(entry.policies, digests, strict=True))
+        replace(entry, policies=policies).write(tmp_path / f"{digests}.json")
+    assert read_entry(tmp_path / "ab.json", protocol).name == "copies"
+    with pytest.raises(BenchmarkError, match=r"Expected different trainings in .*aa\.json, got one file twice"):
+        read_entry(tmp_path / "aa.json", protocol)
