@@ -28,6 +28,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from metrics.benchmark import board_of, read_entry
 from scripts.results_numbers import results_fields
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -53,16 +54,6 @@ LIKELIEST = (
     "change(net, about=change(net.about, samples=False)).save('likeliest.npz')"
 )
 """The same weights, with the likeliest action in the place of one that is drawn."""
-AS_LEARNT = (
-    "from dataclasses import replace as change; "
-    "from swarm_forage_env.policies.interface import interface_from_mapping; "
-    "from swarm_forage_env.policies.network import Network; "
-    "from swarm_forage_env.policies.pretrained import network_file as file; "
-    "net = Network.load(file('generalist')); plan = net.about.card['plan']; "
-    "net = change(net, about=change(net.about, interface=interface_from_mapping(plan['interface']))); "
-    "net.save('each_second.npz'); net.at_temperature(1.0 / plan['temperature']).save('as_learnt.npz')"
-)
-"""The same weights, deciding as in training; and drawn as in training, too, with the plan's temperature taken back."""
 SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "run": ((f"swarm-forage run {','.join(FIVE)} --scenario warehouse_small --robots 50 --seeds 4",), FIVE),
     "medium": (
@@ -106,8 +97,6 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ),
         ("generalist", "likeliest"),
     ),
-    "from_scenario": ((f"python {ROOT}/scripts/from_scenario.py",), ()),
-    "emptying": ((f"python {ROOT}/scripts/emptying_floor.py",), ("crw", "dpo")),
     "cpfa_evolved": (
         (
             f"python {ROOT}/scripts/evolve_controller.py cpfa search_per_tick=0.001:0.5:log@0.05 "
@@ -116,7 +105,6 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ),
         (),
     ),
-    "oracle_rows": ((f"python {ROOT}/scripts/oracle_rows.py",), ()),
     "wall": (
         (
             "swarm-forage run dpo,generalist --scenario warehouse_small --robots 20 --set n_objects=60 "
@@ -134,19 +122,6 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         )
         for suffix, option in (("", ""), ("_short", " --horizon 1000"))
     },
-    "unseen": (
-        (f'python -c "{AS_LEARNT}"', f"python {ROOT}/scripts/unseen_worlds.py --policy generalist,each_second.npz"),
-        (),
-    ),
-    "validation": (
-        (
-            f'python -c "{AS_LEARNT}"',
-            f'python -c "{LIKELIEST}"',
-            f"python {ROOT}/scripts/unseen_worlds.py --worlds {ROOT}/docs/benchmark/validation.toml "
-            "--policy generalist,each_second.npz,as_learnt.npz,likeliest.npz",
-        ),
-        (),
-    ),
     **{
         f"lesson_{size}": (
             (f"swarm-forage run crw,dpo --scenario classroom --robots {size} --seeds 4",),
@@ -233,8 +208,9 @@ def compare(printed: str, stored: dict[str, Any]) -> int:
 
 
 def known(store: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Return the store with the fields of docs/results."""
-    return {**store, "results": results_fields(RESULTS)}
+    """Return the store with the fields of docs/results, and the table of the benchmark."""
+    board = board_of([read_entry(file) for file in sorted((ROOT / "docs/benchmark").glob("*.json"))])
+    return {**store, "results": results_fields(RESULTS), "benchmark": {"board": board.markdown().strip()}}
 
 
 def written(text: str, store: dict[str, dict[str, Any]]) -> str:
