@@ -8,11 +8,12 @@ import pytest
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.inspect.play import session as playing
-from swarm_forage_env.inspect.play.session import SLIDERS, PlaySession, Setting, wall_of
+from swarm_forage_env.inspect.play.levels import LEVELS
+from swarm_forage_env.inspect.play.run import SPEEDS
+from swarm_forage_env.inspect.play.session import PlaySession, Setting, wall_of
 from swarm_forage_env.inspect.replay.capture import record_replay
 from swarm_forage_env.inspect.replay.files import read_replays
 from swarm_forage_env.inspect.replay.frames import ReplayError, Status
-from swarm_forage_env.inspect.run_by_hand import SPEEDS
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import scenario
@@ -40,7 +41,7 @@ class Clock:
 @pytest.fixture(autouse=True)
 def patient(monkeypatch):
     """Ticks take long while they are compiled."""
-    monkeypatch.setattr("swarm_forage_env.inspect.run_by_hand.LONGEST_S", 1000.0)
+    monkeypatch.setattr("swarm_forage_env.inspect.play.run.LONGEST_S", 1000.0)
 
 
 def session_of(policy="crw", wrappers=(), *, seed=3, world=SMALL):
@@ -333,6 +334,6 @@ def test_the_replay_of_a_run_that_nobody_touched_is_that_of_its_specification():
 
 def test_every_slider_reaches_its_end():
     session, _ = session_of("random")
-    for name, slider in SLIDERS.items():
+    for name, slider in LEVELS.items():
         session.carry_out({"do": "level", "name": name, "value": slider.most})
-    assert session.frame()["levels"] == {name: slider.most for name, slider in SLIDERS.items()}
+    assert session.frame()["levels"] == {name: slider.most for name, slider in LEVELS.items()}

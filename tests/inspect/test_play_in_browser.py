@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from swarm_forage_env.inspect.play.session import SLIDERS, PlaySession, Setting
+from swarm_forage_env.inspect.play.levels import LEVELS
+from swarm_forage_env.inspect.play.session import PlaySession, Setting
 from swarm_forage_env.inspect.replay.files import read_replays
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.world import World
@@ -80,10 +81,10 @@ def test_it_plays_pauses_and_steps(request, kind, session):
 
 def test_sliders_change_the_run_that_goes_on(desktop, session):
     opened(desktop, session)
-    for name, slider in SLIDERS.items():
+    for name, slider in LEVELS.items():
         move_slider(desktop, f"level-{name}", slider.most)
     desktop.wait_for("document.getElementById('changes').textContent.includes('deaths per 1,000 s 20')")
-    assert session.frame()["levels"] == {name: slider.most for name, slider in SLIDERS.items()}
+    assert session.frame()["levels"] == {name: slider.most for name, slider in LEVELS.items()}
     assert session.frame()["run"] == 1
     settled(desktop)
 

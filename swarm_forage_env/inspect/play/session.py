@@ -18,11 +18,10 @@ from swarm_forage_env._internal.fields import ConfigError, known_name, number, t
 from swarm_forage_env._internal.files import as_file_name
 from swarm_forage_env._internal.typed import Count, typed
 from swarm_forage_env.contract.codes import Counter
-from swarm_forage_env.inspect.levels_by_hand import LEVELS, RATES
-from swarm_forage_env.inspect.play.captured import CapturedRun
+from swarm_forage_env.inspect.play.levels import LEVELS
+from swarm_forage_env.inspect.play.run import SPEEDS, RunByHand
 from swarm_forage_env.inspect.replay.capture import caches_now, objects_now, status_now
 from swarm_forage_env.inspect.replay.files import counted_performance, geometry, kind_counts, page_of, task_names
-from swarm_forage_env.inspect.run_by_hand import SPEEDS
 from swarm_forage_env.policies.registry import policy_label, policy_names
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -44,28 +43,6 @@ WALL_M = 0.4
 """What a wall that was drawn thinner than `MIN_SIDE_M` becomes; our choice: it is seen, and a robot goes round it."""
 MOST_ROBOTS = 4
 """The slider ends at so many times the robots of the scenario; our choice: crowded, but there is room."""
-
-
-@dataclass(frozen=True, slots=True)
-class Slider:
-    """A level that the page has a slider for."""
-
-    level: str
-    """Key of `LEVELS` or `RATES`."""
-    most: float
-    step: float
-
-
-SLIDERS = {
-    "sensor_noise": Slider("s", 0.1, 0.005),
-    "wheel_noise": Slider("w", 0.5, 0.01),
-    "throttle": Slider("t", 0.9, 0.05),
-    "failures": Slider("failures", 20.0, 0.5),
-    "repairs": Slider("repairs", 20.0, 0.5),
-    "deaths": Slider("deaths", 20.0, 0.5),
-}
-"""Name in commands -> slider. Where they end is our choice: by then, every policy of ours has lost most of its
-deliveries."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -107,7 +84,7 @@ class PlaySession:
     def _begin(self, setting: Setting) -> None:
         """Start a run; if it cannot be, all stays as it is."""
         spec = plan_run(setting.world, setting.policy, caches=setting.caches, seed=setting.seed)
-        run = CapturedRun(spec)
+        run = RunByHand(spec)
         if self._serial:
             run.speed, run.paused = self.run.speed, self.run.paused
         self.setting, self.run = setting, run
@@ -169,7 +146,7 @@ class PlaySession:
         run, counters = self.run, self.run.world.events.counters
         time_s = run.world.tick * run.scenario.dt_s
         active = int(counters[Counter.ACTIVE])
-        levels = {name: run.levels.level(slider.level) for name, slider in SLIDERS.items()}
+        levels = {name: run.levels.level(name) for name in LEVELS}
         return {
             "run": self._serial,
             "time_s": round(time_s, 3),
@@ -219,7 +196,7 @@ class PlaySession:
         """Return what stays the same during a run."""
         run, here = self.run, self.run.scenario
         return {
-            "disturbances": [config.in_words(here.dt_s) for config in run.given],
+            "disturbances": [config.in_words(here.dt_s) for config in run.spec.wrappers],
             "place": self.setting.world.place,
             "scenarios": list(dict.fromkeys((*PRESETS, here.name))),
             "policies": list(self._policies),
@@ -227,8 +204,7 @@ class PlaySession:
             "most_robots": most_robots(here),
             "speeds": list(SPEEDS),
             "sliders": [
-                {"name": name, "title": (LEVELS | RATES)[one.level].name, "most": one.most, "step": one.step}
-                for name, one in SLIDERS.items()
+                {"name": name, "title": one.title, "most": one.most, "step": one.step} for name, one in LEVELS.items()
             ],
             "header": {
                 "label": policy_label(self.setting.policy),
@@ -317,8 +293,8 @@ class PlaySession:
         return ""
 
     def _set_level(self, asked: "_Level") -> str:
-        known_name("level", asked.name, SLIDERS)
-        return self.run.levels.set(SLIDERS[asked.name].level, asked.value)
+        known_name("level", asked.name, LEVELS)
+        return self.run.levels.set(asked.name, asked.value)
 
     def _kill(self, asked: "_Robot") -> str:
         self._check_robot(asked.robot)

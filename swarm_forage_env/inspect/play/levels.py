@@ -7,53 +7,51 @@ from typing import Any
 from swarm_forage_env._internal.fields import ConfigError, number
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
-from swarm_forage_env.wrappers.handling import IDEAL_COST, HandlingCost, HandlingCostConfig
+from swarm_forage_env.wrappers.handling import IDEAL_COST, HandlingCostConfig
 from swarm_forage_env.wrappers.noise import ActuatorNoise, ActuatorNoiseConfig, SensorNoise, SensorNoiseConfig
 from swarm_forage_env.wrappers.population import PopulationConfig, PopulationDynamics
 from swarm_forage_env.wrappers.throttle import Throttle, ThrottleConfig
 from swarm_forage_env.wrappers.waveform import Waveform
 
-_NOTHING = Waveform(kind="constant", amplitude=0.0)
 _IDLE: tuple[WrapperConfig, ...] = (
     SensorNoiseConfig(),
     PopulationConfig(),
-    ThrottleConfig(waveform=_NOTHING),
+    ThrottleConfig(waveform=Waveform(kind="constant", amplitude=0.0)),
     ActuatorNoiseConfig(sigma=0.0),
-    HandlingCostConfig(waveform=Waveform(kind="constant", amplitude=IDEAL_COST)),
 )
 """One of each kind, which changes nothing until somebody raises its level."""
+STILL = {ThrottleConfig.name: 0.0, HandlingCostConfig.name: IDEAL_COST}
+"""Wrapper with a waveform -> what this is while it changes nothing."""
 
 
 @dataclass(frozen=True, slots=True)
 class LevelKind:
-    """A level that can be changed."""
+    """A level that can be changed, from 0 on; the page has a slider for it."""
 
-    name: str
+    title: str
     """For people."""
     wrapper: type[SwarmWrapper]
     field: str
     """Of the wrapper's configuration: a number or a `Waveform`, whose amplitude is the level."""
-    lowest: float
+    most: float
+    """Where the slider ends."""
+    step: float
     per_1000_s: bool = False
     """Whether people give it per 1,000 s, where the field has it per tick."""
 
 
 LEVELS = {
-    "t": LevelKind("throttle", Throttle, "waveform", 0.0),
-    "s": LevelKind("sensor noise", SensorNoise, "sigma", 0.0),
-    "w": LevelKind("wheel noise", ActuatorNoise, "sigma", 0.0),
-    "h": LevelKind("handling ticks", HandlingCost, "waveform", IDEAL_COST),
+    "sensor_noise": LevelKind("sensor noise", SensorNoise, "sigma", 0.1, 0.005),
+    "wheel_noise": LevelKind("wheel noise", ActuatorNoise, "sigma", 0.5, 0.01),
+    "throttle": LevelKind("throttle", Throttle, "waveform", 0.9, 0.05),
+    "failures": LevelKind("failures per 1,000 s", PopulationDynamics, "malfunction_per_tick", 20.0, 0.5, True),
+    "repairs": LevelKind("repairs per 1,000 s", PopulationDynamics, "repair_per_tick", 20.0, 0.5, True),
+    "deaths": LevelKind("deaths per 1,000 s", PopulationDynamics, "death_per_tick", 20.0, 0.5, True),
 }
-"""Key -> level."""
-RATES = {
-    "failures": LevelKind("failures per 1,000 s", PopulationDynamics, "malfunction_per_tick", 0.0, True),
-    "repairs": LevelKind("repairs per 1,000 s", PopulationDynamics, "repair_per_tick", 0.0, True),
-    "deaths": LevelKind("deaths per 1,000 s", PopulationDynamics, "death_per_tick", 0.0, True),
-}
-"""Name -> rate of the whole swarm."""
+"""Name in commands -> level. Where sliders end is our choice: by then, every policy of ours has lost most of its
+deliveries."""
 MOST_CHANGES = 20
 """Changes that are told in one line; our choice: more than anybody reads."""
-_KINDS = {**LEVELS, **RATES}
 
 
 def with_idle(wrappers: Iterable[WrapperConfig]) -> tuple[WrapperConfig, ...]:
@@ -95,33 +93,33 @@ class Levels:
         """What disturbs the swarm now, as a run could have it from its start; without what changes nothing."""
         return tuple(one.made_from for one in self._wrappers.values() if one.made_from not in _IDLE)
 
-    def level(self, key: str) -> float | None:
+    def level(self, name: str) -> float | None:
         """Return the level now; None for a table of values, which has no amplitude."""
-        kind = _KINDS[key]
+        kind = LEVELS[name]
         value = getattr(self._wrappers[kind.wrapper].made_from, kind.field)
         if isinstance(value, Waveform):
             return None if value.kind == "table" else value.amplitude
         return round(value * self._per_1000_s, 9) if kind.per_1000_s else value
 
-    def set(self, key: str, wanted: float) -> str:
+    def set(self, name: str, wanted: float) -> str:
         """Change a level to a value; returns one line about it.
 
         Raises:
             ConfigError: the level cannot be that, or it follows a table; it stays what it was.
         """
-        kind, wrapper = _KINDS[key], self._wrappers[_KINDS[key].wrapper]
-        number(kind.name, wanted, at_least=kind.lowest)
-        if self.level(key) is None:
-            raise ConfigError(f"Expected {kind.name} with an amplitude, got a table of values; it stays as it is.")
-        if wanted == self.level(key):
-            return f"{kind.name} is {wanted:g}"
+        kind, wrapper = LEVELS[name], self._wrappers[LEVELS[name].wrapper]
+        number(kind.title, wanted, at_least=0.0)
+        if self.level(name) is None:
+            raise ConfigError(f"Expected {kind.title} with an amplitude, got a table of values; it stays as it is.")
+        if wanted == self.level(name):
+            return f"{kind.title} is {wanted:g}"
         value = getattr(wrapper.made_from, kind.field)
         changed = wanted / self._per_1000_s if kind.per_1000_s else wanted
         if isinstance(value, Waveform):
             changed = replace(value, amplitude=wanted)
         wrapper.reconfigure(replace(wrapper.made_from, **{kind.field: changed}))
-        self._note(kind.name, f"{kind.name} {wanted:g}")
-        return f"{kind.name} is {wanted:g}"
+        self._note(kind.title, f"{kind.title} {wanted:g}")
+        return f"{kind.title} is {wanted:g}"
 
     def kill(self, robot: int) -> str:
         """Let a robot die; returns one line about it."""
@@ -146,7 +144,7 @@ class Levels:
 
     def signals(self, tick: int) -> dict[str, float]:
         """Return what the waveforms of time are at a tick, by name of the wrapper; see `Replay.signals`."""
-        waves = [self._wrappers[kind].made_from for kind in (Throttle, HandlingCost)]
+        waves = [one.made_from for one in self._wrappers.values() if one.made_from.name in STILL]
         return {one.name: one.waveform.signal(self._dt_s)(tick) for one in waves}
 
     def _note(self, same: str, change: str) -> None:

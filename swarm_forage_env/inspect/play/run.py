@@ -1,19 +1,21 @@
-"""A run that a person looks at and disturbs while it goes on; the page to play with drives it.
+"""A run that a person looks at and disturbs while it goes on, and that can be saved as a replay at any time.
 
 Looking changes nothing: until a level is changed or a robot killed by hand, the run is the one that `run_one` makes.
 """
 
 import time
-from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from collections.abc import Callable
+
+import numpy as np
 
 from swarm_forage_env.contract.codes import Counter, Task
-from swarm_forage_env.contract.policy import Memories, Policy, RememberedPlaces
+from swarm_forage_env.contract.policy import Memories, RememberedPlaces
 from swarm_forage_env.inspect.film import cast_policy
-from swarm_forage_env.inspect.levels_by_hand import Levels, with_idle
+from swarm_forage_env.inspect.play.levels import STILL, Levels, with_idle
+from swarm_forage_env.inspect.replay.capture import Capture, ticks_between_frames
+from swarm_forage_env.inspect.replay.frames import Replay, position_step_m
 from swarm_forage_env.runs.run import LiveRun, build_env
-from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.wrappers.base import WrapperConfig
+from swarm_forage_env.runs.spec import RunSpec
 
 SPEEDS = (0.2, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)
 """Simulated seconds per second; our choice."""
@@ -25,56 +27,43 @@ SHOWN_SLICES = ("proximity", "los_cell", "los_object", "los_cache")
 
 
 class RunByHand:
-    """A run, and what somebody does to it.
+    """A run, what somebody does to it, and its frames.
 
     Attributes:
+        spec: The run, as it was started.
+        policy: The policy; only read it.
         name: Name of the policy, for people.
         scenario: The scenario, with the caches that the policy asks for.
         run: The run; it goes on by `advance` and `step` only.
         world: Its environment; only read it.
         levels: What can be changed by hand.
+        capture: Its frames.
+        step_m: Metres per step of places in the frames.
         paused: Whether the clock stands still.
         speed: Simulated seconds per second.
-        seed: Seed of the run.
     """
 
-    def __init__(
-        self,
-        scenario: ScenarioConfig,
-        policy: str | Policy,
-        *,
-        seed: int = 0,
-        speed: float = 10.0,
-        caches: str | None = None,
-        parameters: Mapping[str, Any] | None = None,
-        wrappers: Iterable[WrapperConfig] = (),
-    ) -> None:
-        """Start the run.
-
-        Args:
-            scenario: The scenario.
-            policy: Name of an installed policy, path of a policy file, or a fresh policy object.
-            seed: Seed of the run.
-            speed: Simulated seconds per second, above 0.
-            caches: As in `inspect.film.record_run`.
-            parameters: Keyword arguments of a policy that is given by name or path.
-            wrappers: Configurations of noise, throttling and population dynamics, in any order.
+    def __init__(self, spec: RunSpec) -> None:
+        """Start a run.
 
         Raises:
-            ConfigError: `parameters` with a policy object, or values that do not fit together.
             ValueError: unknown policy name, or a policy file that cannot be opened or does not fit the scenario.
         """
-        self.policy, self.name, self.scenario = cast_policy(policy, scenario, caches, parameters)
-        self.given = tuple(wrappers)
+        self.spec, here = spec, spec.scenario
+        self.policy, self.name, self.scenario = cast_policy(spec.policy, here, here.caches, spec.parameters)
         reads = getattr(self.policy, "reads", None)
         stack = build_env(
-            self.scenario, with_idle(self.given), reads=None if reads is None else tuple({*reads, *SHOWN_SLICES})
+            self.scenario, with_idle(spec.wrappers), reads=None if reads is None else tuple({*reads, *SHOWN_SLICES})
         )
         self.levels = Levels(stack)
-        self.run = LiveRun(stack, self.policy, seed)
+        self.run = LiveRun(stack, self.policy, spec.seed)
         self.world = self.run.forage_env
-        self.seed, self.speed, self.paused = seed, speed, False
+        self.speed, self.paused = 10.0, False
         self._owed_ticks = 0.0
+        end = here.horizon_ticks
+        self.capture = Capture(self.run, self.policy, end_tick=end, frame_ticks=ticks_between_frames(here, end))
+        self.step_m = position_step_m(here)
+        self._signals = [self.levels.signals(0)]
 
     def advance(self, seconds: float) -> None:
         """Let the run go on for what is due after `seconds` of the viewer's time; less if it takes too long."""
@@ -90,7 +79,9 @@ class RunByHand:
 
     def step(self) -> None:
         """Let the run go on for one tick, if it is not over."""
-        self.run.advance(to_tick=self.world.tick + 1)
+        self.capture.advance()
+        if len(self.capture.ticks) > len(self._signals):
+            self._signals.append(self.levels.signals(self.world.tick))
 
     def remembered_places(self, robot: int) -> RememberedPlaces | None:
         """Return where a robot remembers things, None where the policy does not tell."""
@@ -115,3 +106,15 @@ class RunByHand:
     def changes_in_words(self, before: str) -> str:
         """Return what was changed by hand behind some words, or nothing where nothing was."""
         return f"{before}{self.levels.changes_in_words}" if self.levels.changes else ""
+
+    def replay(self) -> Replay:
+        """Return the run up to its last frame; its label says what was changed by hand.
+
+        Raises:
+            ReplayError: the run has not gone on for one frame.
+        """
+        waves = {name: np.array([one[name] for one in self._signals], np.float32) for name in self._signals[0]}
+        signals = {name: values for name, values in waves.items() if (values > STILL[name]).any()}
+        return self.capture.replay(
+            self.spec, signals=signals, label=f"{self.name}{self.changes_in_words(', changed by hand: ')}"
+        )
