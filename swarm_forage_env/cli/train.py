@@ -11,7 +11,6 @@ from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, whole
 from swarm_forage_env.cli.options import (
     EXIT_FAILURE,
     AsJson,
-    DryRun,
     FirstSeed,
     Jobs,
     Picture,
@@ -322,7 +321,7 @@ def curves(
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class RecordedOptions:
-    """What a data set holds of a run; names as in `plan_dataset`."""
+    """What a data set holds of a run; names as in `record_dataset`."""
 
     observation: Annotated[
         str | None,
@@ -335,7 +334,6 @@ class RecordedOptions:
             help="Whether to record two places that robots remember; default as a learned policy sees them, or no.",
         ),
     ] = None
-    compress: Annotated[bool, typer.Option("--compress", help="Write smaller files, which takes longer.")] = False
 
 
 def dataset(
@@ -350,7 +348,6 @@ def dataset(
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="Folder; default results/datasets/SCENARIO_POLICY.")] = None,
     jobs: Jobs = None,
-    dry_run: DryRun = False,
 ) -> None:
     """Record what robots see and do, for offline reinforcement learning and imitation.
 
@@ -358,32 +355,29 @@ def dataset(
     folder already holds, so after an interruption, just enter it again.
     """
     from swarm_forage_env._internal.files import as_file_name
+    from swarm_forage_env._internal.wording import counted
     from swarm_forage_env.cli.printer import progress_bar
     from swarm_forage_env.cli.scenario_options import described_world, plan_runs
     from swarm_forage_env.policies.registry import policy_label
-    from swarm_forage_env.training.datasets.recording import plan_dataset, record_dataset
+    from swarm_forage_env.training.datasets import record_dataset
 
     spec = plan_runs(described, (policies.one("dpo"),), n_seeds=1, first_seed=first_seed)[0]
-    plan = plan_dataset(spec, range(first_seed, first_seed + seeds), **asdict(recorded))
     world, _ = described_world(described)
     folder = out or Path("results", "datasets", as_file_name(f"{world.file_name}_{policy_label(spec.policy)}"))
-    typer.echo(plan.describe(folder).text())
-    if dry_run:
-        return
     if minari is not None:
-        from swarm_forage_env.training.datasets.minari_export import check_minari
+        from swarm_forage_env.training.minari_export import check_minari
 
         check_minari(minari)  # before hours of work
     try:
-        with progress_bar("decisions") as progress:
-            runs = record_dataset(plan, folder, jobs=jobs, progress=progress)
+        with progress_bar("runs", seeds * spec.robot_ticks) as advance:
+            chosen = range(first_seed, first_seed + seeds)
+            n_new = record_dataset(spec, chosen, folder, jobs=jobs, advance=advance, **asdict(recorded))
     except KeyboardInterrupt:
         words = f"Interrupted. Finished runs are kept in {folder}; the same command does the rest."
         raise typer.Exit(complain(words, EXIT_INTERRUPTED)) from None
-    delivered = sum(run.collected for run in runs)
-    typer.echo(f"wrote {folder}: {sum(sum(run.chunks) for run in runs):,} decisions, {delivered:,} objects delivered")
+    typer.echo(f"{counted(n_new, 'run')} recorded in {folder}, {seeds - n_new} there before")
     if minari is not None:
-        from swarm_forage_env.training.datasets.minari_export import export_minari
+        from swarm_forage_env.training.minari_export import export_minari
 
         typer.echo(f"wrote the Minari data set {export_minari(folder, minari).spec.dataset_id}")
 

@@ -27,7 +27,6 @@ from swarm_forage_env import (
 from swarm_forage_env.contract import own_functions as own
 from swarm_forage_env.contract.own_functions import OwnFunctionError
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
-from swarm_forage_env.training.datasets.recording import plan_dataset
 from swarm_forage_env.training.plan import TrainingPlan
 from swarm_forage_env.views.gymnasium import SwarmVectorEnv
 from swarm_forage_env.wrappers.base import wrap_in_order
@@ -383,7 +382,3 @@ def test_a_plan_of_a_training_says_them():
     assert TrainingPlan.from_mapping(json.loads(json.dumps(plan.to_mapping()))) == plan
 
 
-@pytest.mark.parametrize(("policy", "shown"), [("ppo_warehouse_small", False), ("crw", True)])
-def test_a_data_set_shows_own_sensors_unless_a_learned_policy_saw_none(policy, shown):
-    world = scenario("warehouse_small", n_robots=6, own_sensors=("both",))
-    assert ("both" in plan_dataset(plan_run(world, policy), [1]).card.columns) == shown

@@ -21,7 +21,7 @@ from swarm_forage_env.runs.store import RunFailure, RunStore
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.studies.study_folder import StudyFolder, run_study
 from swarm_forage_env.studies.study_table import pack_study
-from swarm_forage_env.training.datasets.recording import plan_dataset, record_dataset
+from swarm_forage_env.training.datasets import record_dataset
 from swarm_forage_env.training.evaluations import Evaluation, write_evaluations
 from swarm_forage_env.training.plan import read_plan
 from tests.support.entries import TINY, made_up_entry
@@ -51,7 +51,7 @@ def _replay(file: Path) -> None:
 
 
 def _dataset(folder: Path) -> None:
-    record_dataset(plan_dataset(SPEC, (1,)), folder)
+    record_dataset(SPEC, (1,), folder)
 
 
 def _entry(file: Path) -> None:

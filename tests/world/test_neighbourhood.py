@@ -12,8 +12,7 @@ from swarm_forage_env.checks import check_policy
 from swarm_forage_env.contract.policy import ActionError, SwarmSpec
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
 from swarm_forage_env.policies.registry import from_callable
-from swarm_forage_env.training.datasets.layout import chunk_file
-from swarm_forage_env.training.datasets.recording import plan_dataset, record_dataset
+from swarm_forage_env.training.datasets import Dataset, record_dataset
 from swarm_forage_env.views.arenas import ArenaBatch
 from swarm_forage_env.views.plans import plan_arena
 from tests.reference import neighbourhood
@@ -253,24 +252,14 @@ def test_an_interface_can_be_said_in_words():
 
 def test_a_data_set_has_the_columns_of_messages(tmp_path):
     world = scenario("warehouse_small", **SMALL | BOTH, horizon_s=2.0, interval_s=2.0)
-    for policy, size in (("random", 5), ("ppo_warehouse_small", None)):
-        plan = plan_dataset(plan_run(world, policy), [3])
-        record_dataset(plan, tmp_path / policy)
-        with np.load(chunk_file(tmp_path / policy, 3, 0)) as chunk:
-            assert chunk["actions"].shape[2:] == (() if size is None else (size,))
-            assert chunk["observations"].shape[2] == len(plan.card.columns)
-            assert "messages" in plan.card.columns or size is None
+    record_dataset(plan_run(world, "random"), [3], tmp_path)
+    dataset = Dataset(tmp_path)
+    (run,) = dataset.runs()
+    assert run.actions.shape[2:] == (5,)
+    assert run.observations.shape[2] == len(dataset.columns)
+    assert "messages" in dataset.columns
 
 
-def test_a_data_set_of_a_trained_policy_has_the_columns_that_it_saw():
-    spec = plan_run(scenario("warehouse_small", **SMALL | BOTH), "ppo_warehouse_small")
-    policy = load_policy("ppo_warehouse_small")
-    policy.reset(SwarmSpec.of(spec.scenario), np.random.default_rng(0))
-    seen = plan_dataset(spec, [3]).card
-    assert seen.columns == tuple(part.name for part in policy.interface.layout for _ in range(part.size))
-    told = seen.interface
-    assert (told.neighbours_seen, told.message_size, told.own_sensors) == (0, 0, ())
-    assert "neighbours" in plan_dataset(spec, [3], observation="full").card.columns, "as was asked for"
 
 
 def test_a_learner_without_messages_passes_no_actions_on():

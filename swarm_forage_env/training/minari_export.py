@@ -20,8 +20,7 @@ from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.policies.interface import LearnerInterface, interface_from_mapping
 from swarm_forage_env.runs.spec import RunSpec
-from swarm_forage_env.training.datasets.layout import DatasetError
-from swarm_forage_env.training.datasets.reading import TrajectoryDataset
+from swarm_forage_env.training.datasets import Dataset, DatasetError
 from swarm_forage_env.views.gymnasium import JointForageEnv
 
 if TYPE_CHECKING:
@@ -107,34 +106,33 @@ def export_minari(folder: str | Path, dataset_id: str, **about: Any) -> "MinariD
         from minari.data_collector import EpisodeBuffer
     except ImportError as error:
         raise ImportError(f"A Minari data set needs minari: {install_command('minari')}.") from error
-    dataset = TrajectoryDataset(folder)
-    if not dataset.runs:
-        raise DatasetError(f"Expected a run in {folder} that is whole, found none; record it to its end.")
-    spec = dataset.card.spec
+    dataset = Dataset(folder)
+    if not dataset.files:
+        raise DatasetError(f"Expected a run in {folder}, found none; record it to its end.")
+    spec = dataset.spec
     n_robots = spec.scenario.robots.n_robots
-    interface = LearnerInterface(dataset.card.interface, SwarmSpec.of(spec.scenario))
+    interface = LearnerInterface(dataset.interface, SwarmSpec.of(spec.scenario))
     episodes: list[EpisodeBuffer] = []
-    for number, run in enumerate(dataset.runs):
-        steps = dataset.steps(run.seed)
+    runs = list(dataset.runs())
+    for number, steps in enumerate(runs):
         ended = np.zeros(len(steps), np.bool_)
         ended[-1] = True
-        all_dead = bool(steps.terminated.any(axis=0).all())
         arrays: dict[str, Any] = {  # it takes arrays, but declares lists
             "observations": steps.observations,
             "actions": steps.actions,
             "rewards": steps.rewards.sum(axis=1),
-            "terminations": ended & all_dead,
-            "truncations": ended & run.truncated,
+            "terminations": ended & bool(steps.terminated.any(axis=0).all()),
+            "truncations": ended & bool(steps.truncated[-1].any()),
         }
-        episodes.append(EpisodeBuffer(id=number, seed=run.seed, infos={"active": steps.active}, **arrays))
+        episodes.append(EpisodeBuffer(id=number, seed=steps.seed, infos={"active": steps.active}, **arrays))
     env_spec = EnvSpec(
         f"swarm_forage/{spec.scenario.name}-v0",
         entry_point=f"{__name__}:{recorded_env.__name__}",
-        kwargs={"spec": spec.to_mapping(), "interface": asdict(dataset.card.interface)},
+        kwargs={"spec": spec.to_mapping(), "interface": asdict(dataset.interface)},
     )
     told: dict[str, Any] = {
         "env": env_spec,
-        **_reference_scores(env_spec, [run.seed for run in dataset.runs], [np.sum(one.rewards) for one in episodes]),
+        **_reference_scores(env_spec, [run.seed for run in runs], [np.sum(one.rewards) for one in episodes]),
         "algorithm_name": spec.policy,
         "description": f"{spec.world.name}, policy {spec.policy}",
         "observation_space": batch_space(interface.observation_space, n_robots),

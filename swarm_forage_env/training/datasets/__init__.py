@@ -1,1 +1,0 @@
-"""Trajectories of policies as files: for offline reinforcement learning and imitation."""
