@@ -2,9 +2,9 @@
 
 import dataclasses
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, TypeVar, get_origin
+from typing import Any, get_origin
 
 from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, whole
 from swarm_forage_env._internal.wording import suggestion
@@ -17,7 +17,6 @@ from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.world import FILE, World, WorldDescription, describe_file
 
 _FIELD = re.compile(r"[a-z_]+=[^/\\]*")
-_Number = TypeVar("_Number", int, float)
 
 _EXAMPLES = {
     "further_nests": "boxes such as 20,4,24,12 (x low, y low, x high, y high in m)",
@@ -57,19 +56,6 @@ def _pieces(text: str) -> Iterator[str]:
         if piece:
             yield piece
         left = left[len(piece) + 1 :]
-
-
-def split_numbers(option: str, text: str, kind: Callable[[str], _Number]) -> tuple[_Number, ...]:
-    """Turn numbers separated by commas into numbers, int or float as `kind` says.
-
-    Raises:
-        ConfigError: one is no such number, or there is none.
-    """
-    try:
-        return tuple(kind(word) for word in split_names(text))
-    except ValueError as error:
-        whole = "whole numbers" if kind is int else "numbers"
-        raise ConfigError(f"Expected {option} as {whole} separated by commas, such as 5,20, got {text!r}.") from error
 
 
 def described_world(options: PlaceOptions) -> tuple[World, str | None]:

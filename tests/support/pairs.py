@@ -28,15 +28,11 @@ from tests.support.small_files import small_file
 
 ROOT = Path(__file__).parents[2]
 OF_PAPER = ROOT / "docs/results/S1a.parquet"
-ENTRY = ROOT / "metrics/benchmark/scripted/crw.json"
 TINY = ("random", *kills.SMALL, "--horizon", "40", "--set", "interval_s=20")
 WRITERS: dict[str, tuple[str, ...]] = {
     "run": kills.COMMANDS["run"].words,
     "score": kills.COMMANDS["score"].words,
     "study run": kills.COMMANDS["study"].words,
-    "study pack": ("study", "pack", "there", "--file", "out/packed.parquet"),
-    "study unpack": ("study", "unpack", str(small_file("packed.parquet")), "--out", "out"),
-    "study report": ("study", "report", str(small_file("packed.parquet")), "--file", "out/report.html"),
     "replay": ("replay", *TINY, "--file", "out/page.html"),
     "maps": ("maps", *TINY, "--picture", "out/maps.png"),
     "record": ("record", *TINY[:-4], "--seconds", "10", "--size", "240", "--file", "out/film.gif"),
@@ -47,34 +43,27 @@ WRITERS: dict[str, tuple[str, ...]] = {
     "study verdict": ("study", "verdict", str(OF_PAPER), "--file", "out/verdict.json"),
     "plot": ("plot", "there/runs", "--picture", "out/performance.png"),
     "train curves": ("train", "curves", "training", "--policy", "none", "--picture", "out/curves.png"),
-    "benchmark page": ("benchmark", "page", str(ENTRY), "--file", "out/page.md", "--picture", "out/board.png"),
 }
 """Command that writes into the folder "out" -> its words."""
 FEWER = ("run", "--policy", "random", "--horizon", "40", "--seeds", "2", "--jobs", "1", *kills.SMALL, "--set",
          "interval_s=20", "--out", "out", "--json")  # fmt: skip
-PACK_OUT = ("study", "pack", "out")
-"""Leaves nothing where nobody runs the study meanwhile."""
 MIXED: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "run and fewer runs": (WRITERS["run"], FEWER),
-    "study run and study pack": (WRITERS["study run"], PACK_OUT),
-    "study report and replay": (WRITERS["study report"], (*WRITERS["replay"][:-1], "out/report.html")),
     "maps and plot": (WRITERS["maps"], (*WRITERS["plot"][:-1], "out/maps.png")),
 }
 """Two commands that write the same folder or file -> their words."""
 READERS: dict[str, tuple[str, ...]] = {
     "list": ("list",),
     "info": ("info", "crw"),
-    "study show": ("study", "show", "S1a"),
     "study status": ("study", "status", str(small_file("packed.parquet"))),
     "benchmark show": ("benchmark", "show", str(small_file("entry.json"))),
-    "predict availability": ("predict", "availability"),
 }
 """Commands that write nothing."""
 READ_BACK = (".parquet", ".csv", ".json", ".npz")
 COMPARED = (*READ_BACK, ".h", ".md")
 """Endings of files that are equal whenever they are made."""
-REFUSED = re.compile(r"Expected to be the only one that writes to|Expected the folder of a study, got out without")
-"""What one of two may say; the second if the other one has only begun."""
+REFUSED = re.compile(r"Expected to be the only one that writes to")
+"""What one of two may say."""
 ENDS_WITH = {".html": b"</html>\n", ".png": b"IEND\xaeB`\x82", ".gif": b";", ".svg": b"</svg>\n"}
 """What a whole file ends with."""
 LATEST_S = 3.0
@@ -93,7 +82,7 @@ def pair(random: Random, folder: Path, names: tuple[str, ...]) -> Killed:
     """Give one of these commands twice at once, or two of `MIXED`; `folder` holds what each leaves alone."""
     name, after_s = random.choice(names), random.choice((0.0, random.uniform(0.0, LATEST_S)))
     both = MIXED.get(name) or (WRITERS[name],) * 2
-    allowed = [_alone(words, folder) for words in dict.fromkeys(both) if words != PACK_OUT]
+    allowed = [_alone(words, folder) for words in dict.fromkeys(both)]
     place = folder / "pair"
     shutil.rmtree(place, ignore_errors=True)
     _furnish(place, both[0], folder)
@@ -184,9 +173,6 @@ def _furnish(place: Path, words: tuple[str, ...], folder: Path) -> None:
         (place / "training").mkdir()
         for name in ("plan.json", "evaluations.csv"):
             shutil.copy(small_file(name), place / "training")
-    if "out/page.md" in words:
-        (place / "out").mkdir()
-        shutil.copy(ROOT / "docs/benchmark.md", place / "out/page.md")
 
 
 def _place_alone(words: tuple[str, ...], folder: Path) -> Path:
