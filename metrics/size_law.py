@@ -81,7 +81,8 @@ def fit_law(sizes: Sequence[float], values: ArrayLike) -> SizeLaw:
     at, roots = np.repeat(n, runs.shape[1]), np.sqrt(runs).ravel()
     start = (float((roots**2 / at).max()), 0.01, 1e-4)
     lowest = (1e-12, 0.0, 0.0)
-    fitted = curve_fit(_root, at, roots, p0=start, bounds=(lowest, np.inf))  # pyright: ignore[reportUnknownVariableType]
+    bounds = lowest, np.inf
+    fitted = curve_fit(_root, at, roots, p0=start, bounds=bounds)  # pyright: ignore[reportUnknownVariableType] - scipy
     best, covariance = cast("tuple[FloatArray, FloatArray]", fitted)
     drawn = np.random.default_rng(0).multivariate_normal(best, covariance, _DRAWS).clip(lowest)
     return SizeLaw(a=float(best[0]), contention=float(best[1]), coherency=float(best[2]), drawn=drawn)

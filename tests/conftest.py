@@ -17,7 +17,7 @@ settings.load_profile("reproducible")
 MAY_BE_SKIPPED = {
     r"fingerprints of \w+ say nothing on \w+": "made on another kind of machine",
     r"needs a browser: .*": "chromium comes with the operating system, not from a package registry",
-    r"needs (agilerl|benchmarl|optuna|ray|sb3_contrib|torchrl), see docs/libraries.md": "each library wants versions of its own",
+    r"needs (agilerl|benchmarl|optuna|ray|sb3_contrib|torchrl), see docs/libraries.md": "each wants its own versions",
     r"needs a C compiler: .*": "it comes with the operating system, not from a package registry",
     r"could not import 'onnx(runtime)?': .*": "its wheels come later than a new Python does",
 }

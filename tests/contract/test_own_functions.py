@@ -380,5 +380,3 @@ def test_a_plan_of_a_training_says_them():
     plan = TrainingPlan(world=World(scenario("warehouse_small", own_sensors=("both",))))
     assert plan.interface.own_sensors == ("both",)
     assert TrainingPlan.from_mapping(json.loads(json.dumps(plan.to_mapping()))) == plan
-
-

@@ -6,6 +6,8 @@ import shutil
 import numpy as np
 import polars as pl
 import pytest
+from swarm_forage_env.training.datasets.layout import DatasetError
+from swarm_forage_env.training.datasets.reading import TrajectoryDataset
 
 from metrics.benchmark import BenchmarkError, load_protocol, read_entry
 from swarm_forage_env._internal.fields import ConfigError
@@ -15,8 +17,6 @@ from swarm_forage_env.policies.network import Network, NetworkError
 from swarm_forage_env.runs.record import SCHEMA_VERSION, RecordError, RunRecord
 from swarm_forage_env.runs.store import read_failure
 from swarm_forage_env.training.datasets import layout
-from swarm_forage_env.training.datasets.layout import DatasetError
-from swarm_forage_env.training.datasets.reading import TrajectoryDataset
 from swarm_forage_env.training.evaluations import read_evaluations
 from swarm_forage_env.training.plan import read_plan
 from tests.support.entries import TINY

@@ -184,8 +184,9 @@ def test_readme_tells_of_the_minute_what_its_entry_says():
     median = sorted(standing.won_by_policy)[2]
     assert median >= 20
     words = " ".join((root / "README.md").read_text(encoding="utf-8").split())
+    n_worlds = len(protocol.scored)
     assert (
-        f"of five such trainings, the median beats all four of the paper's controllers in {median} of {len(protocol.scored)}"
+        f"of five such trainings, the median beats all four of the paper's controllers in {median} of {n_worlds}"
         in words
     )
     assert f", and the worst in {min(standing.won_by_policy)}. " in words
