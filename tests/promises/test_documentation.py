@@ -163,14 +163,12 @@ def test_a_block_is_written_from_the_store():
 
 
 def test_answers_and_means_are_those_beside_the_results(tmp_path):
-    (tmp_path / "runs.csv").write_text(
-        "set,runs,swarm-forage-env,code,hours\nS1a,1200,0.1.0,abc,0.26\nS1b,40,0.1.0,abc,\n"
-    )
+    (tmp_path / "runs.csv").write_text("set,runs,version,hours\nS1a,1200,0.1.0,0.26\nS1b,40,0.1.0,\n")
     (tmp_path / "measures.csv").write_text(
-        "runs,measure,form,rules,others,policy,value,mean\n"
-        "S1a 12345678,raw_performance,marginal,described,,crw,128.0,456.375\n"
-        "S2a 12345678,raw_performance,marginal,described,walk_probability 0,crw,128.0,1\n"
-        "S1a 12345678,spatial_emergence,interactive,described,,crw,4.0,1\n"
+        "set,measure,form,rules,others,policy,value,mean\n"
+        "S1a,raw_performance,marginal,described,,crw,128.0,456.375\n"
+        "S2a,raw_performance,marginal,described,walk_probability 0,crw,128.0,1\n"
+        "S1a,spatial_emergence,interactive,described,,crw,4.0,1\n"
     )
     (tmp_path / "verdicts.csv").write_text(
         "claim,rules,measures,sense,answer,why\nV1,,,,supported,\n"
@@ -198,7 +196,7 @@ def test_answers_and_means_are_those_beside_the_results(tmp_path):
         "E1_ties_program": "4 of 5",
     }
     assert found["S1a_raw_performance_described_crw_128"] == "456.4"
-    assert (found["runs"], found["sets"], found["hours"], found["code"]) == ("1,240", "2", "0.3", "abc")
+    assert (found["runs"], found["sets"], found["hours"], found["version"]) == ("1,240", "2", "0.3", "0.1.0")
     assert found["contradicted"] == "None."
     assert found["split"].splitlines()[2].endswith("| contradicted | supported |")
     assert found["answers"].splitlines()[2].startswith("| described | 1 | 1 | 0 | 0 | 0 |")
