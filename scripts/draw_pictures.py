@@ -1,22 +1,18 @@
-"""Draw the pictures of robots at work, README's film, and theory.
+"""Draw the pictures of robots at work and README's film.
 
     python scripts/draw_pictures.py [FILE ...] [--out FOLDER]    default all of them, docs/images
 
-Robots have trails of 40 s. Theory is self-organisation over sizes, an example of
-flexibility and the task graph: no run is needed, and `swarm-forage study plot` and `report` draw the same figures.
-Needs the extras render and plots.
+Robots have trails of 40 s. Needs the extra render.
 """
 
 import argparse
 from pathlib import Path
 from typing import Any
 
-from metrics.scoring.theory import theory_figures
 from PIL import Image
 
 from swarm_forage_env import load_policy, plan_run, scenario
 from swarm_forage_env.inspect.film import record_run
-from swarm_forage_env.rendering.figures import SCREEN
 from swarm_forage_env.rendering.frame import Trails, render_frame
 from swarm_forage_env.runs.run import LiveRun, build_env
 
@@ -35,8 +31,6 @@ FIELDS: dict[str, dict[str, Any]] = {
 """File -> scenario fields that are not those of the preset."""
 FILM = "small.gif"
 """The trained policy in the small warehouse: a hundred pictures of 300 s, half a megabyte."""
-THEORY = ("self_organisation.png", "flexibility.png", "task_graph.png")
-"""Those of theory that pages show; `swarm-forage predict availability` draws the other one."""
 TRAIL_S = 40.0
 SAMPLE_S = 1.0
 
@@ -80,7 +74,7 @@ def film(file: Path) -> None:
 def main() -> None:
     """Draw what was asked for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    known = (*PICTURES, FILM, *THEORY)
+    known = (*PICTURES, FILM)
     parser.add_argument("files", nargs="*", metavar="FILE", help=f"default all: {', '.join(known)}")
     parser.add_argument("--out", type=Path, default=IMAGES, metavar="FOLDER", help="where they go")
     arguments = parser.parse_args()
@@ -92,10 +86,6 @@ def main() -> None:
             draw(arguments.out / name, *PICTURES[name])
         elif name == FILM:
             film(arguments.out / name)
-    for figure in theory_figures():
-        name = f"{figure.kind}.png"
-        if name in THEORY and name in (arguments.files or known):
-            figure.draw([arguments.out / name], SCREEN)
 
 
 if __name__ == "__main__":
