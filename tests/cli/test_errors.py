@@ -124,7 +124,7 @@ def test_names_are_shown_as_they_are_in_tables_and_pictures(command, tmp_path):
 
 
 def test_a_terminal_that_knows_ascii_alone_shows_the_rest_as_escapes():
-    words = [sys.executable, "-m", "swarm_forage_env.cli", "predict", "availability", "--robots", "5", "--teams", "2"]
+    words = [sys.executable, "-m", "swarm_forage_env.cli", "info", "warehouse_small"]
     told = {**os.environ, "PYTHONIOENCODING": "ascii", "LANG": "C", "LC_ALL": "C"}
     ended = subprocess.run(words, env=told, capture_output=True, timeout=120, check=False)
     assert ended.returncode == 0, ended.stderr
@@ -145,9 +145,9 @@ def test_the_guard_is_around_every_command(command, monkeypatch, tmp_path):
 
 
 def test_a_missing_word_is_explained_and_our_own_words_have_no_prefix(command):
-    code, _, err = command("choose", "crw")
+    code, _, err = command("export", "generalist")
     assert code == 2
-    assert err.startswith("swarm-forage: Missing option '--deliver'. It is: Total performance")
+    assert err.startswith("swarm-forage: Missing option '--file'. It is: File to write")
     assert command("export", "--file", "net.h")[2].startswith("swarm-forage: Expected a policy")
 
 

@@ -30,7 +30,6 @@ FILMED = ("--policy", "random", "--robots", "3")
         RUN,
         ("score", "--policy", "random", "--budget", "quick", "--jobs", "1"),
         ("compare", "--policy", "random,crw", "--budget", "quick", "--jobs", "1"),
-        ("ablate", "--policy", "random", "--seeds", "2", "--jobs", "1"),
         ("study", "run", "S1a", "--budget", "smoke", "--jobs", "1"),
         ("record", *FILMED),
         ("replay", "random", "--robots", "3"),
@@ -97,7 +96,7 @@ def test_results_are_shown_even_if_their_picture_cannot_be_written(command, monk
     assert f"No picture {picture}: No space left on device." in " ".join(err.split())
 
 
-@pytest.mark.parametrize("words", [("run", "random"), ("score", "random"), ("predict", "random")])
+@pytest.mark.parametrize("words", [("run", "random"), ("score", "random")])
 def test_a_picture_of_an_unknown_kind_is_told_before_anything_is_run(command, monkeypatch, words):
     monkeypatch.setattr(ForageEnv, "reset_batch", lambda *_, **__: pytest.fail("a run was started"))
     told = "swarm-forage: Expected a picture file that ends in .png, .svg, .pdf, got 'wrong.gif'.\n"

@@ -29,7 +29,7 @@ MAKE_RUNS = [words for words in WITH_SCENARIO if "--dry-run" in options_of(words
 
 
 def test_commands_that_have_a_scenario_are_those_that_we_mean():
-    assert {"run", "score", "compare", "predict", "choose", "ablate"} <= {*MAKE_RUNS}
+    assert {"run", "score", "compare"} <= {*MAKE_RUNS}
     assert {*ONE_RUN, "train", "dataset"} <= {*WITH_SCENARIO}
 
 
@@ -54,7 +54,7 @@ def test_whatever_makes_runs_says_where_how_many_and_in_what_form(words):
     assert {"--jobs", "--seeds", "--out", "--json", "--dry-run", "--policy"} <= options_of(words)
 
 
-@pytest.mark.parametrize("words", ["list", "info", "rerun", "predict availability", "benchmark show"])
+@pytest.mark.parametrize("words", ["list", "info", "rerun", "benchmark show"])
 def test_what_is_printed_is_there_as_json_too(words):
     assert "--json" in options_of(words)
 

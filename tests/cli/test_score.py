@@ -76,16 +76,16 @@ def test_sizes_keep_a_density_if_asked(command):
 
 
 def test_variants_forms_and_bands_can_be_chosen(command):
-    words = ("--measures", "spatial_emergence,scalability", "--variant", "corrected,sierra")
+    words = ("--measures", "spatial_emergence,scalability", "--variant", "corrected,paper")
     code, out, _ = command(*SCORE, *words, "--form", "marginal,interactive", "--band")
     assert code == 0
-    for word in ("mean ± 2 sd", "spatial_emergence, interactive, sierra", "scalability, interactive", "N = 1 to 3"):
+    for word in ("mean ± 2 sd", "spatial_emergence, interactive, paper", "scalability, interactive", "N = 1 to 3"):
         assert word in out
     _, out, _ = command(*COMPARE, *words, "--json")
     answer = json.loads(out)
-    labels = {"spatial_emergence", "spatial_emergence, sierra", "scalability", "scalability, sierra"}
+    labels = {"spatial_emergence", "spatial_emergence, paper", "scalability", "scalability, paper"}
     assert {difference["label"] for difference in answer["differences"]} == labels
-    assert {score["variant"] for score in answer["tables"][0]["scores"]} == {"corrected", "sierra"}
+    assert {score["variant"] for score in answer["tables"][0]["scores"]} == {"corrected", "paper"}
     _, out, _ = command(*COMPARE, *words, "--band")
     assert "In square brackets: mean minus and plus two standard deviations" in out
 
