@@ -7,7 +7,7 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import ObjectStatus
-from swarm_forage_env.inspect.maps import MEANINGS, floor_maps, mean_maps
+from swarm_forage_env.inspect.maps import MEANINGS, floor_maps
 from swarm_forage_env.inspect.replay.frames import Replay, Status
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.presets import scenario
@@ -103,13 +103,9 @@ def test_arenas_of_one_shape_are_compared_at_corresponding_places(replay):
         narrow.minus(mine)
 
 
-def test_means_and_shares_of_robots(replay):
+def test_shares_of_robots(replay):
     mine = floor_maps(replay)
     assert np.array_equal(mine.per_robot().arrays["density"], mine.arrays["density"] / 2)
-    nothing = dataclasses.replace(mine, arrays={name: 0 * array for name, array in mine.arrays.items()})
-    both = mean_maps((mine, nothing), "both")
-    assert both.label == "both"
-    assert np.array_equal(both.arrays["drops"], mine.arrays["drops"] / 2)
 
 
 def test_arrays_go_to_a_file(replay, tmp_path):

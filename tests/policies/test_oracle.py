@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from metrics.benchmark import benchmark_question
 from metrics.benchmark.protocol import BenchmarkError
-from metrics.benchmark.running import benchmark_question
 from swarm_forage_env import CheckError, check_determinism, check_policy, scenario
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Grip, ObjectStatus
