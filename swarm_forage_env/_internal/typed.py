@@ -12,7 +12,7 @@
 
 A table becomes a dataclass or a mapping, a list a tuple. Everything else is refused by the name of its field, and so is
 a field that nobody knows or that is missing without a default. Numbers stay as they are: 1 does not become 1.0, so that
-digests fit. The bounds stand in the type, from which `scripts/write_schemas.py` makes the published schemas, too.
+digests fit. The bounds stand in the type.
 """
 
 import dataclasses

@@ -345,7 +345,7 @@ def repairs_per_tick(malfunction_per_tick: float, n_robots: int) -> float:
     """Return the repair rate at which an unlimited queue holds `AWAY_SHARE` of the swarm, in equilibrium.
 
     rho / (1 - rho) = AWAY_SHARE * N with rho = malfunctions / repairs. A swarm cannot lose more robots than it has, so
-    fewer robots are away in its own equilibrium (docs/deciding.md).
+    fewer robots are away in its own equilibrium.
     """
     return malfunction_per_tick * (1.0 + 1.0 / (AWAY_SHARE * n_robots))
 
