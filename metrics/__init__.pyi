@@ -22,7 +22,6 @@ from .scoring import StudyVerdict as StudyVerdict
 
 # interference
 from .interference import t_lost_fraction as t_lost_fraction
-from .interference import cache_congestion as cache_congestion
 from .interference import performance_lost as performance_lost
 from .interference import fractional_loss as fractional_loss
 

@@ -8,7 +8,7 @@ from typing import Any, Literal, TypeAlias
 from .curves import Variant
 from .emergence import interference_gain, spatial_emergence, task_emergence, time_emergence, undisturbed_gain
 from .flexibility import adaptability, noise_robustness, reactivity
-from .interference import cache_congestion, performance_lost, t_lost_fraction
+from .interference import performance_lost, t_lost_fraction
 from .population import availability, population_robustness, recorded_population_robustness
 from .scaling import efficiency, raw_performance, scalability
 
@@ -51,16 +51,6 @@ METRICS: dict[str, Measure] = {
         higher_is_better=False,
         neutral=0.0,
         lowest=0.0,
-        highest=1.0,
-        needs=("interference",),
-    ),
-    "cache_congestion": Measure(
-        function=cache_congestion,
-        symbol="K(N)",
-        equation="ours, time lost near caches beyond their share of the floor",
-        higher_is_better=False,
-        neutral=0.0,
-        lowest=-1.0,
         highest=1.0,
         needs=("interference",),
     ),

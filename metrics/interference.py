@@ -70,45 +70,6 @@ def performance_lost(
     return perf * t_lost - n * (perf_one * t_lost_one)
 
 
-def cache_congestion(
-    lost_near: ArrayLike, lost: ArrayLike, n_caches: ArrayLike, *, floor: float, reach: float
-) -> FloatArray:
-    """Share of the time lost that robots lose near caches, beyond the caches' share of the floor, K(N).
-
-        K = sum_t [lost_near(t) - s(t) lost(t)] / sum_t lost(t),    s(t) = min(1, n_caches(t) pi reach^2 / floor)
-
-    K is 0 if interference is spread evenly over the floor, and at most 1. Lower is better. K tends to be too small:
-    discs that overlap or reach beyond a wall cover less than s, and robots also avoid walls, which are far from caches.
-
-    Args:
-        lost_near: Robot-ticks in interference within `reach` of the centre of a cache, shape (..., T).
-        lost: Robot-ticks in interference, shape (..., T).
-        n_caches: Caches, mean over the ticks of each interval, shape (..., T).
-        floor: Area in which robots move, square metres.
-        reach: Radius of the disc around the centre of a cache that counts as near it, metres.
-
-    Returns:
-        K, shape (...), in [-1, 1]; NaN for runs without interference, and for runs without a cache.
-
-    Raises:
-        CurveError: A curve is missing, negative, infinite or of another length; more time lost near caches than in all;
-            a floor or a reach that is not positive.
-
-    Source: ours. The paper expects congestion near caches, but does not measure it. We compare with an even spread over
-    the floor.
-    """
-    lost_near, lost, n_caches = as_curves(lost_near=lost_near, lost=lost, n_caches=n_caches)
-    for name, value in (("floor", floor), ("reach", reach)):
-        if not 0.0 < value < np.inf:
-            raise CurveError(f"Expected a positive {name}, got {value}.")
-    if (lost_near > lost).any():
-        raise CurveError("Expected lost_near <= lost in every interval, got more time lost near caches than in all.")
-    share = np.minimum(1.0, n_caches * np.pi * reach**2 / floor)
-    total = np.where(n_caches.sum(axis=-1) > 0.0, lost.sum(axis=-1), 0.0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(total > 0.0, (lost_near - share * lost).sum(axis=-1) / total, np.nan)
-
-
 def fractional_loss(
     perf: ArrayLike,
     t_lost: ArrayLike,

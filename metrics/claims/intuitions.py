@@ -2,13 +2,11 @@
 
 The paper has two tables of intuitions, one per scenario. Their words are vague: "modest", "moderate", "low". Here each
 is a comparison with the other algorithms. "High" means better than all three others. "Low" means worse than CRW and
-STOCHX, and for one of these two worse than both others. "Modest" lies between. This is our choice. Congestion near
-caches is compared with interference that is spread evenly over the floor, not with another algorithm.
+STOCHX, and for one of these two worse than both others. "Modest" lies between. This is our choice.
 """
 
 from .checking import Claim, Place, Statement
-from .predicates import is_higher, is_not_higher, stays_alike
-from .shapes import ZERO, with_zero
+from .predicates import is_not_higher, stays_alike
 from .statements import E_T, SIMPLE, STEADY, UNSTEADY, A, C, D, N, P, R, best_of, better, spatial, states
 
 _SPATIAL = (spatial("S1a"), spatial("S1b"))
@@ -118,15 +116,6 @@ _WRITTEN: tuple[tuple[int, str, str, tuple[Statement, ...]], ...] = (
         "STOCHX",
         "Modest robustness to deaths and modest flexibility: worse than CRW, better than DPO.",
         _between((*_POPULATION_2, *_FLEXIBLE_2), "crw", "stochx", "dpo"),
-    ),
-    (
-        1,
-        "STOCHM",
-        "Congested near its caches: more interference within 2 m of them than their share of the floor explains.",
-        tuple(
-            states(is_higher, (experiment, "cache_congestion"), views=(with_zero,), upper=("stochm",), lower=(ZERO,))
-            for experiment in ("S1a", "S1b")
-        ),
     ),
 )
 

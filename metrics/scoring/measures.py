@@ -5,17 +5,16 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-from swarm_forage_env.scenarios.floor import NEAR_CACHE_M
 from swarm_forage_env.wrappers.world import SIZE
 
 from ..catalog import METRICS
 from ..curves import FloatArray, Form, Variant
 from ..emergence import interference_gain, spatial_emergence, task_emergence, time_emergence, undisturbed_gain
-from ..interference import cache_congestion, performance_lost
+from ..interference import performance_lost
 from ..scaling import efficiency, raw_performance, scalability
 from .by_adversity import BY_ADVERSITY
-from .run_curves import NEAR_CACHES, RunCurves, StudyCurves, common_runs
-from .scores import NOTHING_ACHIEVED, Score, ScoreForms, Uncomputable, Values, check_measures, label_of, score_runs
+from .run_curves import RunCurves, StudyCurves, common_runs
+from .scores import Score, ScoreForms, Uncomputable, Values, check_measures, label_of, score_runs
 
 FALLING = (
     "performance is lower than that of the next smaller swarm, and it weights the time lost, so that a collapse counts "
@@ -44,13 +43,6 @@ def _efficiency(runs: RunCurves) -> FloatArray:
 
 def _t_lost_fraction(runs: RunCurves) -> FloatArray:
     return runs.interference.mean(axis=-1)
-
-
-def _cache_congestion(runs: RunCurves) -> FloatArray:
-    if runs.floor_m2 is None:
-        raise Uncomputable("there is no size of the floor")
-    lost, near, n_caches = (runs.curves[name] for name in NEAR_CACHES)
-    return cache_congestion(near, lost, n_caches, floor=runs.floor_m2, reach=NEAR_CACHE_M)
 
 
 def _performance_lost(one: RunCurves, runs: RunCurves) -> FloatArray:
@@ -117,20 +109,12 @@ class _SizeMeasure:
     """Variants that weight the time lost with the performance achieved, which misleads where performance falls."""
     order_matters: bool = False
     """As in `score_runs`."""
-    undefined: str = NOTHING_ACHIEVED
-    """As in `score_runs`."""
 
 
 BY_SIZE: dict[str, _SizeMeasure] = {
     "raw_performance": _SizeMeasure(values=_raw_performance, unit="objects {span}"),
     "efficiency": _SizeMeasure(values=_efficiency, unit="objects per robot {span}"),
     "t_lost_fraction": _SizeMeasure(values=_t_lost_fraction, unit="share of robot time", columns=_LOST),
-    "cache_congestion": _SizeMeasure(
-        values=_cache_congestion,
-        unit="share of interference",
-        columns=NEAR_CACHES,
-        undefined="which have no interference or no cache",
-    ),
     "performance_lost": _SizeMeasure(
         values=_performance_lost,
         unit="objects {span}",
@@ -204,7 +188,6 @@ def _size_scores(name: str, study: StudyCurves, variant: Variant, form: Form) ->
             is_doubtful=falls,
             remark=FALLING if falls else UPSIDE_DOWN if name == "scalability" and variant != "corrected" else "",
             order_matters=measure.order_matters,
-            undefined=measure.undefined,
         )
         yield _per_robot(score, *experiments) if measure.is_part and variant == "corrected" else score
 

@@ -75,9 +75,6 @@ INTERVAL_COLUMNS = tuple(
     if column.kind in ("amount", "fraction", "number") and name not in ("criterion_value", *RATE_COLUMNS.values())
 )
 """Columns with one value per interval."""
-NEAR_CACHES = ("interference_ticks", "interference_ticks_near_caches", "n_caches")
-"""Further columns of records, which tables of curves from elsewhere lack: they do not tell the floor either."""
-RECORDED_COLUMNS = (*INTERVAL_COLUMNS, *NEAR_CACHES)
 
 PerformanceLike: TypeAlias = str | Performance | Callable[[Any], ArrayLike]
 """A recorded column by name ("n_carrying", "1/interference_fraction"), or a function as in `Performance`."""
@@ -159,8 +156,6 @@ class RunCurves:
     """Column -> values, (R, T); only columns that the table has."""
     rates: PopulationRates | None = None
     """Rates of change of the population, per second."""
-    floor_m2: float | None = None
-    """Area of the arena in square metres; None where it is not known."""
     n_planned: int | None = None
     """How many runs were planned; None = as many as there are."""
 
@@ -284,9 +279,8 @@ def curves_in_worlds(
                 value=world.value,
                 n_robots=world.n_robots,
                 seeds=seeds,
-                curves={name: curve for name, curve in columns.items() if name in RECORDED_COLUMNS},
+                curves={name: curve for name, curve in columns.items() if name in INTERVAL_COLUMNS},
                 rates=rates_of(world),
-                floor_m2=world.scenario.arena.width_m * world.scenario.arena.height_m,
                 n_planned=n_planned,
             )
             for world, (seeds, columns) in runs
@@ -317,7 +311,7 @@ def policy_curves(table: Table, policy: str, performance: Performance | None = N
 def _curves(table: Table, condition: Condition, performance: Performance | None) -> Curves:
     """The runs of a condition, with the performance that is asked for."""
     records = table.of(condition)
-    seeds, columns = table.curves(condition, *RECORDED_COLUMNS)
+    seeds, columns = table.curves(condition, *INTERVAL_COLUMNS)
     checked: list[FloatArray] = []
     for record in records:
         where = f"run {record.run_id}"
@@ -422,7 +416,7 @@ def _first(curves: Curves, n_runs: int) -> Curves:
 
 def _place_curves(table: "StudyTable", place: "Place", performance: str | None) -> Curves:
     """The finished runs of a condition of a study, with the performance that is asked for."""
-    seeds, columns = table.curves(place, *{*RECORDED_COLUMNS, *PERFORMANCE_COLUMNS})
+    seeds, columns = table.curves(place, *{*INTERVAL_COLUMNS, *PERFORMANCE_COLUMNS})
     if performance is not None and seeds:
         columns["performance"] = performance_curve(performance, columns)
     return seeds, columns

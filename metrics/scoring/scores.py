@@ -23,7 +23,6 @@ MEASURE_CRITERIA: dict[str, str] = {
     "raw_performance": SIZE,
     "efficiency": SIZE,
     "t_lost_fraction": SIZE,
-    "cache_congestion": SIZE,
     "performance_lost": SIZE,
     "spatial_emergence": SIZE,
     "time_emergence": SIZE,
@@ -39,8 +38,6 @@ MEASURE_CRITERIA: dict[str, str] = {
     "availability": POPULATION,
 }
 """Measure -> what has to be varied for it. The order is that of score tables."""
-ON_REQUEST = ("cache_congestion",)
-"""Measures that are scored where they are named only: most policies have no caches."""
 PICTURED = (
     "raw_performance",
     "t_lost_fraction",
@@ -65,7 +62,6 @@ BAND = "mean ± 2 sd"
 """Heading of the column that `Score.cells` adds for the authors' bands."""
 DOUBTFUL = "?"
 """Mark of a value that misleads; its note says why."""
-NOTHING_ACHIEVED = "in which neither swarm achieved anything"
 _BOOTSTRAP_SEED = 1
 """Fixed, so that the same runs give the same table."""
 Values: TypeAlias = Callable[..., ArrayLike]
@@ -124,13 +120,13 @@ def words_of(label: str) -> str:
 
 
 def check_measures(measures: Sequence[str] | None) -> tuple[str, ...]:
-    """Return measures in the order of tables, each once; None = all but those `ON_REQUEST`.
+    """Return measures in the order of tables, each once; None = all.
 
     Raises:
         CurveError: an unknown name, or none at all.
     """
     if measures is None:
-        return tuple(name for name in MEASURE_CRITERIA if name not in ON_REQUEST)
+        return tuple(MEASURE_CRITERIA)
     _check_words("measure", measures, tuple(MEASURE_CRITERIA))
     return tuple(name for name in MEASURE_CRITERIA if name in measures)
 
@@ -325,7 +321,6 @@ def score_runs(
     floor: float | None = None,
     order_matters: bool = False,
     remark: str = "",
-    undefined: str = NOTHING_ACHIEVED,
     **told: Any,
 ) -> Score:
     """Return the score of experiments, with one value per run that all of them have.
@@ -337,7 +332,6 @@ def score_runs(
         floor: Noise floor, for distances.
         order_matters: Whether to add the measure of the mean curves, which differs from the mean of the measures.
         remark: What to know before reading the value, whatever the runs are.
-        undefined: What runs without a value have in common.
         told: Fields of `Score` that no run tells: measure, level, unit and others.
     """
     paired = common_runs(*experiments)
@@ -367,7 +361,7 @@ def score_runs(
             name: dict(zip(seeds, found.tolist(), strict=True))
             for name, found in zip(_OF_MEANS, of_means, strict=False)
         },
-        note="; ".join(filter(None, (remark, _note(per_run, n_lost, relative, undefined)))),
+        note="; ".join(filter(None, (remark, _note(per_run, n_lost, relative)))),
         **told,
     )
 
@@ -414,13 +408,13 @@ def _pseudo(of_all: FloatArray, without: FloatArray) -> FloatArray:
         return of_all + (without.size - 1) * (without.mean() - without)
 
 
-def _note(per_run: FloatArray, n_lost: int, relative: FloatArray | None, undefined: str) -> str:
+def _note(per_run: FloatArray, n_lost: int, relative: FloatArray | None) -> str:
     notes: list[str] = []
     n_nan, n_infinite = int(np.isnan(per_run).sum()), int(np.isinf(per_run).sum())
     if n_lost:
         notes.append(f"{n_lost} of {len(per_run) + n_lost} runs failed or have no partner of the same seed")
     if n_nan:
-        notes.append(f"undefined in {n_nan} of {len(per_run)} runs, {undefined}")
+        notes.append(f"undefined in {n_nan} of {len(per_run)} runs, in which neither swarm achieved anything")
     if n_infinite:
         notes.append(f"infinite in {n_infinite} of {len(per_run)} runs, in which one swarm achieved nothing")
     if relative is not None and (n_idle := int(np.isnan(relative).sum())):

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 FIGURE_MEASURES = (
     "raw_performance",
-    "cache_congestion",
     "spatial_emergence",
     "task_emergence",
     "scalability",
@@ -35,8 +34,7 @@ FIGURE_MEASURES = (
     "population_robustness",
     "recorded_population_robustness",
 )
-"""Measures that the paper's figures show, population robustness with the robots that were at work, and congestion near
-caches, which the paper has in words."""
+"""Measures that the paper's figures show, and population robustness with the robots that were at work."""
 FIGURE_FORMS: dict[str, tuple[Form, ...]] = {"spatial_emergence": ("interactive", "marginal")}
 """Measure -> forms that the figures show, where it is not the marginal one alone: in the warehouses a swarm is held
 beside as many robots that work alone, in search and rescue, where no robot works alone, beside the next smaller swarm.

@@ -1,4 +1,4 @@
-"""The commands of studies: what is there, run, interrupt, status, pack."""
+"""The commands of studies: what is there, run, interrupt, status."""
 
 import json
 import re
@@ -53,18 +53,6 @@ def test_what_a_budget_leaves_out_is_listed(command):
     words = " ".join(out.split())
     assert re.search(r"S2a walk_probability 0\.026; population_size .*460, 627, 819", words)
     assert command("study", "list", "--budget", "quick")[0] == 2
-    assert "of the paper's values: noise 0.00" in " ".join(
-        command("study", "show", "S1e", "--budget", "reduced")[1].split()
-    )
-
-
-def test_a_study_is_shown(written):
-    code, out, _ = written("study", "show", "S1g", "--budget", "smoke", "--rules", "program")
-    assert code == 0
-    assert "axis      population_dynamics: 1, 4, 8 (reference 1)" in out
-    assert "rules     program" in out
-    assert "runs      24 in 12 conditions, 6e+06 robot-ticks" in out
-    assert "Budgets: tiny, paper" in written("study", "show", "mine.toml")[1]
 
 
 def test_a_study_runs_and_is_packed(written):
@@ -81,7 +69,7 @@ def test_a_study_runs_and_is_packed(written):
     assert code == 0
 
 
-def test_shards_are_not_packed_until_asked(written):
+def test_shards_are_not_packed_until_all_runs_are_asked_for(written):
     code, out, err = written(*RUN, "--shard", "1/2", "--rules", "described", "--out", "here")
     assert code == 0
     assert "packed" not in err
@@ -90,23 +78,13 @@ def test_shards_are_not_packed_until_asked(written):
     assert out.splitlines()[0] == "mine, budget tiny: 2 of 4 runs done, 2 missing"
     assert out.splitlines()[1] == "0 of 2 conditions complete"
     assert re.search(r"^described +random +2 +1 +0 +1$", out, re.MULTILINE)
-    code, out, _ = written("study", "pack", "here", "--file", "there/packed.parquet")
-    assert code == 0
-    assert read_study("there/packed.parquet").spec.name == "mine"
-    code, out, _ = written("study", "status", "there/packed.parquet", "--json")
+    code, out, _ = written("study", "status", "here", "--json")
     assert code == 1
     assert [place["n_missing"] for place in json.loads(out)["conditions"]] == [1, 1]
-
-
-def test_a_packed_study_goes_on(written):
-    written(*RUN, "--shard", "1/2", "--rules", "described", "--out", "here")
-    written("study", "pack", "here", "--file", "half.parquet")
-    code, out, _ = written("study", "unpack", "half.parquet", "--out", "there")
-    assert (code, out) == (0, "2 runs of mine added to there/mine_tiny\n")
-    code, _, err = written(*RUN, "--rules", "described", "--out", "there/mine_tiny")
+    code, _, err = written(*RUN, "--rules", "described", "--out", "here")
     assert code == 0
     assert "2 of 4 runs are stored already" in err, "the other half alone is made"
-    assert written("study", "unpack", "half.parquet", "--out", "there")[1].startswith("0 runs of mine")
+    assert read_study("here/mine.parquet").spec.name == "mine"
 
 
 def test_several_studies_have_a_folder_around_theirs(written):
@@ -118,28 +96,6 @@ def test_several_studies_have_a_folder_around_theirs(written):
     assert out.splitlines() == ["4 of 4 runs done, in all/mine_tiny", "The study in this folder has 8 runs in all."]
     plans = written("study", "run", "mine.toml", "other.toml", "--jobs", "1", "--out", "all", "--dry-run")[1]
     assert plans.count("8 runs, 0 to do") == 2
-
-
-def test_what_is_not_decided_is_told_before_any_run(command):
-    code, out, _ = command("study", "run", "S1a", "S1b", "--until-decided", "--dry-run", "--rules", "described")
-    assert code == 0
-    assert out.startswith("before claims are judged, 4 runs of each condition are made\n")
-    assert "S1b crw, dpo, stochm, stochx" in out
-    assert "not decided yet" not in out
-    assert '"never"' not in out
-    assert not Path("results").exists()
-
-
-def test_claims_are_decided_by_runs_as_long_as_the_papers(command, monkeypatch):
-    budgets = []
-
-    def run(studies, **_):
-        budgets.extend(spec.budget for spec, _ in studies)
-
-    monkeypatch.setattr("metrics.scoring.run_until_decided", run)
-    for words in ((), ("--budget", "smoke")):
-        command("study", "run", "S1a", "--until-decided", "--dry-run", *words)
-    assert budgets == ["paper", "smoke"]
 
 
 def test_failures_are_told_with_the_command_that_makes_them_again(written, monkeypatch):
@@ -190,12 +146,8 @@ def test_an_interrupt_keeps_what_is_done(written, monkeypatch):
         (("run", "mine.toml", "--budget", "tini"), "Did you mean 'tiny'?"),
         (("run", "mine.toml", "--rules", "progam"), "Did you mean 'program'?"),
         (("run", "mine.toml", "--shard", "3/2"), "the shard to be a whole number from 1 to 2"),
-        (("run", "mine.toml", "--hours", "1"), "Expected --hours with --until-decided only"),
-        (("run", "S1a", "--until-decided"), "such as --hours 6"),
-        (("run", "S1a", "--until-decided", "--hours", "1", "--shard", "1/2"), "Expected no --shard"),
-        (("run", "mine.toml", "--until-decided", "--hours", "1"), "Expected studies of the paper's sets"),
         (("status", "nowhere"), "No such file"),
-        (("pack", "."), "without study.json"),
+        (("verdict", "."), "without study.json"),
     ],
 )
 def test_what_is_refused(written, words, message):

@@ -192,13 +192,13 @@ Path("owned").touch()
 def test_a_typed_python_file_is_run_and_one_in_a_study_only_on_trust(command):
     Path("mine.py").write_text(OWNING)
     Path("study.toml").write_text('name = "s"\nscenario = "warehouse_small"\npolicies = ["mine.py:Mine"]\n')
-    code, _, err = command("study", "show", "study.toml")
+    code, _, err = command("study", "run", "study.toml")
     assert (code, Path("owned").exists()) == (2, False)
     assert "which you did not name yourself" in err
     code, out, err = command("info", "mine.py")
     assert (code, Path("owned").exists()) == (0, False), "info only reads it"
     assert "classes  Mine" in out
-    code, out, err = command("--trust-models", "study", "show", "study.toml")
+    code, out, err = command("--trust-models", "study", "run", "study.toml", "--dry-run")
     assert (code, Path("owned").exists()) == (0, True), err
     assert "Mine" in out
     Path("owned").unlink()

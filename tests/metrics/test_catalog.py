@@ -35,7 +35,6 @@ def test_distances_are_best_at_zero():
 
 INDEPENDENT = {
     "t_lost_fraction": lambda f: f([0.0], 4),
-    "cache_congestion": lambda f: f([1.0], [10.0], [1.0], floor=10.0 * math.pi, reach=1.0),
     "performance_lost": lambda f: f([4.0], [0.1], 4, [1.0], [0.1]),
     "spatial_emergence": lambda f: f([2.0], [0.1], 2, [4.0], [0.1], 4, [1.0], [0.1]),
     "time_emergence": lambda f: f([0.1], 2, [0.1], 4),

@@ -52,7 +52,6 @@ SIZE_MEASURES = [
 ]
 NOT_LISTED = {
     "t_lost_fraction": "an input of the others, not a comparison",
-    "cache_congestion": "no performance; its laws are with its worked example",
     "performance_lost": "an input of spatial_emergence; its laws are there",
     "availability": "no curves; its laws are below",
     "efficiency": "one curve, no comparison",

@@ -20,7 +20,6 @@ import polars as pl
 TICK_S = 0.2
 REPAIRS = {50: 0.001022222, 200: 0.001005556}
 """Robots -> lowest repair rate of the study per tick; malfunctions are 0.001. A level multiplies both."""
-FLOORS_M2 = {"warehouse_small": 32.0 * 16.0, "warehouse_medium": 48.0 * 48.0}
 CLOSE = 2e-5
 """Relative difference that the six printed digits allow."""
 
@@ -56,15 +55,6 @@ def performance(rows: pl.DataFrame) -> np.ndarray:
     return curves(rows, "performance").sum(axis=1)
 
 
-def cache_congestion(rows: pl.DataFrame, scenario: str, size: float) -> np.ndarray:
-    """Time lost near caches beyond their share of the floor, which grows with the swarm in search and rescue."""
-    floor = FLOORS_M2.get(scenario) or (16.0 * max(1, round((size / 12.8) ** 0.5))) ** 2
-    lost, n_caches = curves(rows, "interference_ticks"), curves(rows, "n_caches")
-    even = lost * np.minimum(1.0, n_caches * math.pi * 2.0**2 / floor)  # within 2 m
-    beyond = (curves(rows, "interference_ticks_near_caches") - even).sum(axis=1)
-    return np.where(n_caches.any(axis=1), beyond / lost.sum(axis=1), np.nan)
-
-
 def spatial_emergence(few: pl.DataFrame, many: pl.DataFrame, ratio: float) -> np.ndarray:
     """Eq. (2): loss of the smaller swarm in proportion, less that of the larger. Of one robot it is lost to walls."""
     lost = [(curves(of, "performance") * curves(of, "interference_fraction")).sum(axis=1) for of in (few, many)]
@@ -75,8 +65,6 @@ def over_sizes(line: Line, study: dict) -> Measured:
     """Measures of a policy over swarm sizes; those of two sizes stand at the larger."""
     for size, rows in line.items():
         yield "raw_performance", "marginal", size, performance(rows)
-        if not rows["interference_ticks_near_caches"].null_count():
-            yield "cache_congestion", "marginal", size, cache_congestion(rows, study["scenario"], size)
     for smaller, size in pairwise(line):
         (few, many), ratio = paired(line[smaller], line[size]), size / smaller
         yield "task_emergence", "marginal", size, performance(many) - ratio * performance(few)  # Eq. (3)
@@ -149,7 +137,7 @@ def measured(file: Path) -> Iterator[tuple[tuple, np.ndarray]]:
         where = " ".join(f"{name} {value:g}" for name, value in zip(others, values, strict=True))
         measures = over_sizes if last == "population_size" else over_levels
         for measure, form, value, of_runs in measures(line, study):
-            key = (f"{study['name']} {stamp['digest'][:8]}", measure, form, rules, where, policy, float(f"{value:.6g}"))
+            key = (study["name"], measure, form, rules, where, policy, float(f"{value:.6g}"))
             if np.isfinite(of_runs).any():
                 yield key, of_runs[np.isfinite(of_runs)]
 
@@ -180,7 +168,7 @@ def main(folder: Path) -> int:
     printed = pl.read_csv(folder / "measures.csv", infer_schema_length=None).with_columns(
         pl.col("others").fill_null(""), pl.col("mean", "lower", "upper", "sd").fill_null(math.nan)
     )
-    keys = ("runs", "measure", "form", "rules", "others", "policy", "value")
+    keys = ("set", "measure", "form", "rules", "others", "policy", "value")
     rows = printed.rows_by_key(keys, named=True, unique=True)
     n_right, wrong = 0, []
     for key, values in (found for file in sorted(folder.glob("*.parquet")) for found in measured(file)):

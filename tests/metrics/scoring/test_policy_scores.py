@@ -11,7 +11,6 @@ import pytest
 import metrics
 from metrics import CurveError, compare_policies, score_policy
 from metrics.scoring import ask, score_question
-from metrics.scoring.scores import ON_REQUEST
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import registry as policy_module
 from swarm_forage_env.runs import workers
@@ -65,7 +64,7 @@ def table():
 
 
 def test_every_measure_has_rows_with_all_that_is_needed_to_read_them(table):
-    assert {score.measure for score in table.scores} == set(metrics.METRICS) - {*ON_REQUEST}
+    assert {score.measure for score in table.scores} == set(metrics.METRICS)
     assert (table.policy, table.scenario, table.missing, table.failures) == (
         "random",
         "warehouse_small with 20 objects",
