@@ -77,8 +77,8 @@ from .size_law import SizeLaw as SizeLaw
 
 # how near to the limit
 from .scoring import limit_of as limit_of
-from .limits import foraging_limit as foraging_limit
-from .limits import ForagingLimit as ForagingLimit
+from .scoring import foraging_limit as foraging_limit
+from .scoring import ForagingLimit as ForagingLimit
 
 # statistics
 from .statistics import normalize as normalize

@@ -2,6 +2,7 @@
 
 from swarm_forage_env.scenarios.performance import Performance
 
+from .limits import ForagingLimit, foraging_limit, limit_of
 from .plots import draw_scores
 from .policy_scores import ScoreQuestion, compare_policies, score_curves, score_policy, score_question
 from .question import Question, ask
@@ -12,7 +13,6 @@ from .study_numbers import StudyPanel, StudyPanels, study_panels
 from .study_plots import PlottedStudy, StudyFigure, draw_figure, plot, study_figures
 from .study_verdict import Judged, StudyVerdict, Waiting, judge_claims, verdict
 from .summary import RunQuestion, RunSummary, run_question, summarize_runs
-from .world_limits import limit_of
 
 __all__ = [
     "score_policy",
@@ -20,6 +20,8 @@ __all__ = [
     "score_curves",
     "compare_tables",
     "limit_of",
+    "foraging_limit",
+    "ForagingLimit",
     "ask",
     "run_question",
     "summarize_runs",

@@ -16,12 +16,12 @@ from swarm_forage_env.wrappers.world import SIZE, World, WorldLike, world_of
 from ..checks import CurveError, chosen_seeds
 from .by_adversity import forecast_population
 from .curves_file import read_curves
+from .limits import share_of_limit
 from .measures import score_study
 from .question import Question, ask
 from .run_curves import THROTTLE, PerformanceLike, own_performance, policy_curves
 from .score_tables import Comparison, ScoreTable, side_by_side
 from .scores import Score, ScoreForms, check_measures, criteria_of
-from .world_limits import share_of_limit
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env._internal.wording import counted, plain
+from swarm_forage_env._internal.wording import counted, percent, plain
 from swarm_forage_env.policies.mixture import is_mixture, part_sizes
 from swarm_forage_env.policies.registry import part_labels
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
@@ -30,10 +30,10 @@ from swarm_forage_env.wrappers.world import World, WorldLike, world_of
 
 from ..checks import chosen_seeds
 from ..statistics import Summary, aggregate
+from .limits import ABOUT_LIMIT, share_of_limit
 from .plots import FEWEST_RUNS
 from .question import Question
 from .scores import bounds
-from .world_limits import ABOUT_LIMIT, share_of_limit, share_text
 
 LEVEL = 0.95
 """Confidence level of all intervals."""
@@ -115,7 +115,7 @@ class RunSummary(Answer):
             numbers = [spread_text(row.performance)] if other else []
             numbers += [spread_text(row.deliveries_per_1000_s)]
             numbers += [spread_text(row.deliveries_per_robot_per_1000_s)] if is_mixed else []
-            numbers += [share_text(row.share_of_limit)] if has_limit else []
+            numbers += ["-" if row.share_of_limit is None else percent(row.share_of_limit)] if has_limit else []
             tail = [f"{row.interference_fraction:.3f}", f"{row.simulated_s_per_wall_s:,.0f}"]
             lines.append([*about, row.caches, str(row.n_runs), *numbers, *tail])
             empty = [""] * (len(about) + 1 + len(other))
