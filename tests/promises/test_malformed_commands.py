@@ -33,8 +33,6 @@ def test_any_command_ends_in_one_line(random, tmp_path, monkeypatch):
         "train --hidden 1000000000",
         "run --seeds 1000000000 --dry-run",
         "score --policy crw --seeds 1000000000 --dry-run",
-        "ablate --seeds 1000000000 --dry-run",
-        "predict --policy crw --seeds 1000000000 --dry-run",
         "study show S1a --seeds 1000000000",
         "run --horizon 1e308 --dry-run",
         "run --set width_m=1e308 --dry-run",
