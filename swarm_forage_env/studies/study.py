@@ -32,7 +32,7 @@ from swarm_forage_env.runs.policy_spec import PolicySpec
 from swarm_forage_env.runs.spec import RunSpec, identity_of, wrappers_from_list, wrappers_to_list
 from swarm_forage_env.scenarios.overrides import field_sections, field_types, parse_tuple
 from swarm_forage_env.scenarios.presets import scenario, scenario_names
-from swarm_forage_env.scenarios.quirks import RULES
+from swarm_forage_env.scenarios.quirks import QUIRK_NAMES, RULES, Quirks
 from swarm_forage_env.scenarios.robots import words_of_kind
 from swarm_forage_env.studies.ladders import CRITERIA, swarms_of_sizes, wrappers_at
 from swarm_forage_env.wrappers.registry import wrapper_config_class
@@ -60,7 +60,10 @@ _STORED = {"rules": "readings"}
 MOST_CONDITIONS = 100_000
 """Largest number of rules times policies times values of all axes; our choice: 400 times that of the largest set."""
 NOTHING = "none"
-"""Name of the empty list on an axis of lists."""
+"""Name of the empty list on an axis of lists, and of no switched quirk."""
+QUIRK = "quirk"
+"""Axis of an ablation: its values are `NOTHING` and names of quirks, each of which is switched alone: on under the
+described rules, off under the program's."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -73,7 +76,8 @@ class Axis:
 
     name: str
     """A criterion (`ladders.CRITERIA`), a scenario field, a field of a wrapper ("sensor_noise.sigma",
-    "throttle.waveform.amplitude"), or `SHARE`, which policies like "mixed:ppo=share,crw=rest" have."""
+    "throttle.waveform.amplitude"), `QUIRK`, which switches one quirk of the rules at a time, or `SHARE`, which policies
+    like "mixed:ppo=share,crw=rest" have."""
     values: tuple[Value, ...]
     """Numbers, texts or truth values. For a field that holds a list, texts with its entries between commas
     (`list_word`)."""
@@ -83,10 +87,13 @@ class Axis:
         if dot:
             wrapper_config_class(wrapper)  # refuses unknown names; the field is checked with its values
         else:
-            allowed = (*CRITERIA, SHARE, *(name for name in SCENARIO_FIELDS if name not in OF_THE_STUDY))
-            shown_by = f"{', '.join(CRITERIA)}, {SHARE}, and the fields that swarm-forage info warehouse_small lists"
+            allowed = (*CRITERIA, QUIRK, SHARE, *(name for name in SCENARIO_FIELDS if name not in OF_THE_STUDY))
+            others = ", ".join((*CRITERIA, QUIRK, SHARE))
+            shown_by = f"{others}, and the fields that swarm-forage info warehouse_small lists"
             known_name("axis", self.name, allowed, all_by=shown_by)
         several(f"the values of axis {self.name}", self.values, "values")
+        for value in self.values if self.name == QUIRK else ():
+            known_name("quirk", value, (NOTHING, *QUIRK_NAMES))
         kinds = {_kind(value) for value in self.values}
         if len(kinds) > 1 or "" in kinds or len(set(self.values)) < len(self.values):
             raise ConfigError(
@@ -229,6 +236,9 @@ class StudySpec:
             raise ConfigError(f"Expected looks as rising numbers of runs, got {list(self.looks)}.")
         if {SIZE, "n_robots"} <= {axis.name for axis in self.axes}:
             raise ConfigError(f"Expected one axis for the swarm size, got {SIZE} and n_robots.")
+        names = {*self.settings, *(axis.name for axis in self.axes)}
+        if QUIRK in names and names & {*QUIRK_NAMES}:
+            raise ConfigError(f"Expected quirks from one place, got the axis {QUIRK} and a quirk of its own.")
         if self.reference is not None and (not self.axes or self.reference not in self.axes[-1].values):
             raise ConfigError(f"Expected the reference among the values of the last axis, got {self.reference!r}.")
         if any(axis.name == SHARE for axis in self.axes):
@@ -411,7 +421,7 @@ class StudySpec:
                 name: _field_value(name, value) for name, value in here.items() if name in SCENARIO_FIELDS
             }
             density = None if at is None else overrides.pop("density", None)
-            world = scenario(self.scenario, quirks=RULES[RULES_NAMES[rules]], **overrides)
+            world = scenario(self.scenario, quirks=_switched(RULES[RULES_NAMES[rules]], here.get(QUIRK)), **overrides)
             if at is None:
                 yield values, world
                 continue
@@ -456,6 +466,14 @@ def _short(value: Value) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _switched(quirks: Quirks, name: str | None) -> Quirks:
+    """Return the quirks with one of them the other way round; `NOTHING` and None switch none."""
+    if name is None or name == NOTHING:
+        return quirks
+    changes: dict[str, Any] = {name: not getattr(quirks, name)}
+    return replace(quirks, **changes)
 
 
 def _with_value(mapping: Mapping[str, Any], path: Sequence[str], value: Value) -> dict[str, Any]:

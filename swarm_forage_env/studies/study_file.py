@@ -13,8 +13,8 @@
     death_per_tick = 0.0001
 
     [[axis]]                               # any number; the last one is plotted along x
-    criterion = "noise"                    # or field = "n_objects", "sensor_noise.sigma" or "share" (mixed swarms)
-    values = [0.01, 0.02, 0.03]            # default for a criterion: the paper's values
+    criterion = "noise"                    # or "quirk", or field = "n_objects", "sensor_noise.sigma" or "share"
+    values = [0.01, 0.02, 0.03]            # default for a criterion: the paper's values; for "quirk": none, and each
     reference = 0.0                        # only on the last axis; default see `load_study`
 
     [budget.smoke]                         # all keys are optional; default: as in the paper
@@ -38,9 +38,12 @@ from swarm_forage_env.policies.mixture import Part, is_mixture, mixture_of, mixt
 from swarm_forage_env.policies.registry import is_policy_file
 from swarm_forage_env.runs.policy_spec import PolicySpec, policy_spec
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.scenarios.quirks import QUIRK_NAMES
 from swarm_forage_env.studies.ladders import BUDGETS, CRITERIA, spread, study_values
 from swarm_forage_env.studies.study import (
+    NOTHING,
     POLICY_KEYS,
+    QUIRK,
     Axis,
     StudySpec,
     Value,
@@ -101,7 +104,8 @@ def load_study(
     """Read a study file and return the study with one of its budgets.
 
     The reference is on the last axis. Default: for swarm sizes, one robot if it is among the sizes, else the smallest
-    size; for other criteria 0, the ideal conditions; for a field, none. Every budget runs the reference.
+    size; for quirks "none", the rules as they are; for other criteria 0, the ideal conditions; for a field, none. Every
+    budget runs the reference.
 
     Args:
         name: Name of one of the paper's sets, or path of a file.
@@ -279,11 +283,13 @@ def _axis_name(entry: Mapping[str, Any]) -> str:
     if len(names) != 1 or not isinstance(names[0], str):
         raise ConfigError(f"Expected either criterion or field of an axis, as a text, got {dict(entry)!r}.")
     if "criterion" in entry:
-        known_name("criterion", names[0], CRITERIA)
+        known_name("criterion", names[0], (*CRITERIA, QUIRK))
     return names[0]
 
 
 def _of_paper(content: Mapping[str, Any], settings: Mapping[str, Any], name: str) -> list[Value]:
+    if name == QUIRK:
+        return [NOTHING, *QUIRK_NAMES]
     if name not in CRITERIA:
         raise ConfigError(f"Missing key 'values' of axis {name}; only criteria have values of their own.")
     return list(study_values(scenario(content["scenario"], **settings), name))
@@ -292,6 +298,8 @@ def _of_paper(content: Mapping[str, Any], settings: Mapping[str, Any], name: str
 def _usual_reference(name: str, values: Sequence[Value]) -> Value | None:
     if name == SIZE:
         return min(values)
+    if name == QUIRK:
+        return NOTHING
     return 0.0 if name in CRITERIA else None
 
 

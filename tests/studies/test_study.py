@@ -161,6 +161,17 @@ def test_fields_of_wrappers_and_switches_of_the_scenario_are_axes_too():
     assert last.wrappers == (SensorNoiseConfig(sigma=0.01, sigmas={"position": 0.1}),)
 
 
+def test_a_quirk_is_switched_alone_on_in_the_description_and_off_in_the_program():
+    spec = study(Axis(name="quirk", values=("none", "explore_double_start")), rules=("described", "program"))
+    found = {place: spec.world(place).scenario.quirks for place in spec.places}
+    assert found == {
+        Place("described", "crw", ("none",)): Quirks(),
+        Place("described", "crw", ("explore_double_start",)): Quirks(explore_double_start=True),
+        Place("program", "crw", ("none",)): AUTHORS_PROGRAM,
+        Place("program", "crw", ("explore_double_start",)): replace(AUTHORS_PROGRAM, explore_double_start=False),
+    }
+
+
 def test_two_adversities_in_one_run_are_labelled_by_the_last():
     spec = study(Axis(name="throttle", values=(0.2,)), Axis(name="noise", values=(0.0, 0.02)))
     calm, noisy = (spec.world(place) for place in spec.places)
@@ -211,6 +222,9 @@ def test_nonsense_is_refused(changes, message):
         ([("horizon_s", (400.0,))], "Unknown axis"),
         ([("sensor_nois.sigma", (0.1,))], "Did you mean 'sensor_noise'"),
         ([("sensor_noise.sigm", (0.1,))], "Did you mean 'sigma'"),
+        ([("quirk", ("explore_double_strat",))], "Unknown quirk.* Did you mean 'explore_double_start'"),
+        ([("quirk", (True,))], "Unknown quirk"),
+        ([("quirk", ("none",)), ("scattered_sites", (True,))], "Expected quirks from one place"),
         ([("noise", ())], "one or more values"),
         ([("noise", (0.1, 0.1))], "Expected different numbers"),
         ([("noise", (0.1, "much"))], "Expected different numbers"),

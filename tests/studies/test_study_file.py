@@ -8,6 +8,7 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import pretrained
+from swarm_forage_env.scenarios.quirks import QUIRK_NAMES
 from swarm_forage_env.scenarios.robots import RobotKind
 from swarm_forage_env.studies import study_file
 from swarm_forage_env.studies.ladders import BUDGETS
@@ -138,6 +139,14 @@ def test_the_budget_of_the_paper_is_always_there(written):
     assert (len(spec.seeds), spec.horizon_s) == (192, 10_000.0)
     assert spec.axes[-1].values == (0.0, 0.01, 0.02, 0.03, 0.04)
     assert budget_names(written()) == ("tiny", "paper")
+
+
+def test_an_axis_of_quirks_has_all_of_them_and_the_rules_as_reference():
+    spec = load_study(Path(__file__).parents[2] / "docs/quirks.toml")
+    (axis,) = spec.axes
+    assert (axis.name, axis.values, spec.reference) == ("quirk", ("none", *QUIRK_NAMES), "none")
+    place = Place("program", "stochx", ("scattered_sites",))
+    assert spec.reference_of(place) == Place("program", "stochx", ("none",))
 
 
 def test_a_policy_file_lies_beside_the_study(written, tmp_path):
