@@ -12,7 +12,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cache, cached_property
 from itertools import product
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, get_origin
 
 from swarm_forage_env._internal.fields import (
@@ -263,13 +262,12 @@ class StudySpec:
         addresses = product(self.rules, labels, product(*(axis.values for axis in self.axes)))
         return tuple(Place(*address) for address in addresses)
 
-    def place_words(self, *others: "StudySpec") -> dict[Place, tuple[str, ...]]:
-        """Return conditions, also of other studies with the same axes, as shown to people: rules, policy, values."""
-        places = dict.fromkeys(place for study in (self, *others) for place in study.places)
-        words = [value_words(values) for values in zip(*(place.values for place in places), strict=True)]
+    def place_words(self) -> dict[Place, tuple[str, ...]]:
+        """Return conditions as shown to people: rules, policy, values."""
+        words = [value_words(axis.values) for axis in self.axes]
         return {
             place: (place.rules, place.policy, *(of[value] for of, value in zip(words, place.values, strict=True)))
-            for place in places
+            for place in self.places
         }
 
     @property
@@ -339,20 +337,6 @@ class StudySpec:
             **({"file": self.file} if self.file else {}),
             **({"looks": list(self.looks)} if self.looks else {}),
         }
-
-    @classmethod
-    def from_toml(
-        cls,
-        file: str | Path,
-        budget: str | None = None,
-        *,
-        seeds: int | None = None,
-        rules: tuple[str, ...] | None = None,
-    ) -> "StudySpec":
-        """Read a study file; arguments and errors as in `study_file.load_study`."""
-        from swarm_forage_env.studies.study_file import load_study  # late: that module builds on this one
-
-        return load_study(file, budget, seeds=seeds, rules=rules)
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "StudySpec":

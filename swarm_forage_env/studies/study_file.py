@@ -89,11 +89,6 @@ def find_study(name: str | Path) -> Path:
     return Path(name)
 
 
-def budget_names(name: str | Path) -> tuple[str, ...]:
-    """Return the names of a study's budgets: those in its file, and `PAPER`; raises as `load_study`."""
-    return tuple(_budgets(_read(find_study(name))))
-
-
 def load_study(
     name: str | Path,
     budget: str | None = None,
