@@ -1,4 +1,4 @@
-"""Pictures of score tables and of predictions. They need matplotlib (the optional extra "plots")."""
+"""Pictures of score tables. They need matplotlib (the optional extra "plots")."""
 
 import math
 from collections.abc import Iterable, Sequence

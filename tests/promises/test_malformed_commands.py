@@ -33,7 +33,7 @@ def test_any_command_ends_in_one_line(random, tmp_path, monkeypatch):
         "train --hidden 1000000000",
         "run --seeds 1000000000 --dry-run",
         "score --policy crw --seeds 1000000000 --dry-run",
-        "study show S1a --seeds 1000000000",
+        "study run S1a --seeds 1000000000 --dry-run",
         "run --horizon 1e308 --dry-run",
         "run --set width_m=1e308 --dry-run",
         "run --density 1e-320 --dry-run",
