@@ -14,7 +14,6 @@ from swarm_forage_env.studies.ladders import Budget
 from swarm_forage_env.wrappers.world import SIZE, World, WorldLike, world_of
 
 from ..checks import CurveError, chosen_seeds
-from .by_adversity import forecast_population
 from .curves_file import read_curves
 from .limits import share_of_limit
 from .measures import score_study
@@ -75,7 +74,6 @@ class ScoreQuestion(Question[Comparison]):
             policy=policy,
             scenario=self.world.title(),
             scores=scores,
-            forecasts=forecast_population(study),
             missing=missing,
             failures=table.failure_lines(policy),
             settings={
@@ -289,7 +287,6 @@ def score_curves(
                 policy=study.controller,
                 scenario="",
                 scores=scores,
-                forecasts=forecast_population(study),
                 missing=missing,
                 settings={"curves": str(path), "horizon_s": study.horizon_s, **told},
                 band=forms is not None and forms.band,

@@ -66,7 +66,6 @@ CURVE_COLUMNS: Mapping[str, Column] = {
     **{
         name: Column("amount", "1/s", "rate of the whole swarm, the same in each row") for name in RATE_COLUMNS.values()
     },
-    **{name: ALL_COLUMNS[name] for name in ("deaths", "malfunctions", "repairs", "time_in_repair_s")},
 }
 """Columns that measures read -> what they hold. Further columns are ignored."""
 INTERVAL_COLUMNS = tuple(

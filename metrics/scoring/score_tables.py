@@ -18,7 +18,6 @@ from ..checks import CurveError
 from ..curves import FloatArray
 from ..significance import SIGNIFICANT, holm, paired_p
 from ..statistics import Summary, aggregate
-from .by_adversity import FORECAST_HEADER, FORECAST_TITLE, PopulationForecast
 from .plots import draw_scores
 from .scores import BAND, DOUBTFUL, HEADER, Score, spread
 
@@ -51,8 +50,6 @@ class ScoreTable(Answer):
     scenario: str
     """The world for people: the scenario, and what differs from its preset; empty if it is not known."""
     scores: tuple[Score, ...]
-    forecasts: tuple[PopulationForecast, ...] = ()
-    """What the queue model predicts for a changing population, beside what the runs showed."""
     missing: Mapping[str, str] = field(default_factory=dict[str, str])
     """Measure -> why it could not be computed."""
     failures: tuple[str, ...] = ()
@@ -115,18 +112,17 @@ class ScoreTable(Answer):
             "scenario": self.scenario,
             "settings": dict(self.settings),
             "scores": [score.to_mapping() for score in self.scores],
-            "population": [forecast.to_mapping() for forecast in self.forecasts],
             "missing": dict(self.missing),
             "failures": list(self.failures),
         }
 
     def sheets(self) -> tuple[Sheet, ...]:
-        """Return scores, forecasts and notes."""
+        """Return scores and notes."""
         place = HEADER.index("95 % interval") + 1
         header = (*HEADER[:place], BAND, *HEADER[place:]) if self.band else HEADER
         rows = [score.cells(band=self.band) for score in self.scores]
         scores = Sheet(title=title([self]), header=header, rows=rows)
-        return scores, *forecast_sheets([self]), Sheet(notes=self.notes())
+        return scores, Sheet(notes=self.notes())
 
     @property
     def has_picture(self) -> bool:
@@ -150,16 +146,6 @@ def title(tables: Sequence[ScoreTable]) -> str:
         seeds = counted(len(settings["seeds"]), "seed")
         words += f", budget {settings['budget']}, {seeds}, {settings['horizon_s']:,g} s"
     return words
-
-
-def forecast_sheets(tables: Sequence[ScoreTable]) -> list[Sheet]:
-    """Return forecasts and observations; equal ones of several policies appear once."""
-    different: list[list[tuple[str, ...]]] = []
-    for table in tables:
-        rows = [forecast.cells() for forecast in table.forecasts]
-        if rows and rows not in different:
-            different.append(rows)
-    return [Sheet(title=FORECAST_TITLE, header=FORECAST_HEADER, rows=rows) for rows in different]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -313,7 +299,7 @@ class Comparison(Answer):
         return (*shared, *own)
 
     def sheets(self) -> tuple[Sheet, ...]:
-        """Return values, differences, forecasts and notes."""
+        """Return values, differences and notes."""
         if len(self.tables) == 1:
             return self.tables[0].sheets()
         header, *rows = self.value_rows()
@@ -323,7 +309,7 @@ class Comparison(Answer):
             header, *rows = self.difference_rows(self.pairs[start : start + PAIRS_PER_TABLE])
             is_last = start + PAIRS_PER_TABLE >= len(self.pairs)
             parts.append(Sheet(header=header, rows=rows, notes=(TEST,) if is_last else ()))
-        return *parts, *forecast_sheets(self.tables), Sheet(notes=self.notes())
+        return *parts, Sheet(notes=self.notes())
 
     @property
     def has_picture(self) -> bool:

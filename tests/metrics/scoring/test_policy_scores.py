@@ -205,13 +205,6 @@ def test_seeds_and_length_of_runs_can_be_chosen():
     assert planned(["random"], seeds=3).seeds == (0, 1, 2)
 
 
-def test_scores_of_population_changes_come_with_a_forecast(table):
-    (forecast,) = table.forecasts
-    assert (forecast.level, forecast.n_robots, forecast.n_runs) == (8.0, 4, 2)
-    assert 0.0 < forecast.predicted_at_work < 4.0
-    assert 0.0 < forecast.observed_at_work.mean <= 4.0
-
-
 def test_policies_are_compared_in_the_same_worlds(tmp_path):
     comparison = compare_policies(
         {"circles": Circling, "noise": "random"},
