@@ -61,8 +61,6 @@ from .queues import QueueStats as QueueStats
 from .queues import queue_statistics as queue_statistics
 from .queues import mean_away as mean_away
 from .queues import robots_at_work as robots_at_work
-from .queues import compare_population as compare_population
-from .queues import PopulationComparison as PopulationComparison
 from .population import population_robustness as population_robustness
 from .population import recorded_population_robustness as recorded_population_robustness
 from .population import population_weight as population_weight

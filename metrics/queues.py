@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import pdtrc  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
 
-from .checks import CurveError, PopulationError, check_horizon, check_rate, check_size
-from .curves import FRACTION_TOLERANCE, FloatArray, as_curve
-from .statistics import aggregate
+from .checks import PopulationError, check_horizon, check_rate, check_size
+from .curves import FloatArray
 
 
 @dataclass(frozen=True)
@@ -55,9 +54,8 @@ class PopulationRates:
 class QueueStats:
     """Equilibrium of the queue of robots away from work; numbers of robots, times in ticks.
 
-    The unlimited quantities are infinite if the queue is not stable, and NaN for rates per robot, which have no
-    unlimited counterpart. The paper prints the number of robots *waiting* as the number away. Its time away counts the
-    service twice, because 1 / (mu - lambda) already contains it.
+    The unlimited quantities are infinite if the queue is not stable. The paper prints the number of robots *waiting* as
+    the number away. Its time away counts the service twice, because 1 / (mu - lambda) already contains it.
     """
 
     lam: float
@@ -86,28 +84,7 @@ class QueueStats:
     """Probability that 0, 1, ..., n robots are away, shape (n + 1,); None if n was not given."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PopulationComparison:
-    """Robots at work over time, expected by the queue model and recorded in runs; divide by N for shares."""
-
-    predicted: FloatArray
-    """Expected robots at work in each interval, (T,)."""
-    observed: FloatArray
-    """Mean over runs, (T,)."""
-    lower: FloatArray
-    """Lower bounds of Student's intervals of these means, (T,); NaN for one run."""
-    upper: FloatArray
-    """Upper bounds, (T,)."""
-    mean_error: float
-    """Observed less predicted robots, mean over intervals."""
-    rms_error: float
-    """Root of the mean squared difference, robots."""
-    inside: float
-    """Share of the intervals whose bounds hold the prediction; NaN for one run. Intervals of a run are not independent:
-    a run that lost robots early lacks them later."""
-
-
-def queue_statistics(rates: PopulationRates, n: int | None = None, *, per_robot: bool = False) -> QueueStats:
+def queue_statistics(rates: PopulationRates, n: int | None = None) -> QueueStats:
     """Equilibrium of the queue of robots away from work, Eqs. (9) to (11), as printed and corrected.
 
     At most N robots of a swarm can be away. The study's population process has constant rates that stop at 0 and N, so
@@ -117,15 +94,11 @@ def queue_statistics(rates: PopulationRates, n: int | None = None, *, per_robot:
     Args:
         rates: Rates per tick.
         n: Swarm size N, for the truncated quantities.
-        per_robot: Read the leaving rates as rates of each robot at work (finite-source queue; not in the paper).
 
     Raises:
         CurveError: n < 1.
-        ValueError: per_robot without n.
     """
-    if per_robot and n is None:
-        raise ValueError("Expected the swarm size n with per_robot=True: the rate of leaving depends on it.")
-    distribution = None if n is None else stationary_distribution(rates, check_size("n", n), per_robot=per_robot)
+    distribution = None if n is None else stationary_distribution(rates, check_size("n", n))
     lam, mu = rates.lam, rates.mu
     rho = 0.0 if lam == 0.0 else math.inf if mu == 0.0 else lam / mu
     stable = rho < 1.0
@@ -134,9 +107,6 @@ def queue_statistics(rates: PopulationRates, n: int | None = None, *, per_robot:
     time = 1.0 / (mu - lam) if mu > lam else math.inf
     service = 1.0 / mu if mu > 0.0 else math.inf
     waiting_time = time - service if mu > lam else math.inf
-    if per_robot:
-        stable = True
-        length = waiting = time = service = waiting_time = math.nan
     return QueueStats(
         lam=lam,
         mu=mu,
@@ -153,7 +123,7 @@ def queue_statistics(rates: PopulationRates, n: int | None = None, *, per_robot:
     )
 
 
-def mean_away(rates: PopulationRates, n: int, horizon: float, *, per_robot: bool = False) -> float:
+def mean_away(rates: PopulationRates, n: int, horizon: float) -> float:
     """Mean number of robots away during a run that starts with no robot away, m_T.
 
     This solves the queue of `queue_statistics` over time. Runs have 50,000 ticks. The relaxation time is much longer
@@ -169,7 +139,6 @@ def mean_away(rates: PopulationRates, n: int, horizon: float, *, per_robot: bool
         rates: Rates per tick. The queue need not be stable; with mu = 0 robots only leave.
         n: Swarm size N.
         horizon: Run length T in ticks.
-        per_robot: As in `queue_statistics`.
 
     Returns:
         m_T in [0, n].
@@ -182,10 +151,10 @@ def mean_away(rates: PopulationRates, n: int, horizon: float, *, per_robot: bool
     """
     n = check_size("n", n)
     check_horizon(horizon)
-    return float(_mean_away_until(rates, n, np.array([horizon], dtype=np.float64), per_robot)[0])
+    return float(_mean_away_until(rates, n, np.array([horizon], dtype=np.float64))[0])
 
 
-def robots_at_work(rates: PopulationRates, n: int, interval_ends: ArrayLike, *, per_robot: bool = False) -> FloatArray:
+def robots_at_work(rates: PopulationRates, n: int, interval_ends: ArrayLike) -> FloatArray:
     """Expected number of robots at work in each interval of a run that starts with no robot away.
 
         robots_at_work(PopulationRates(lambda_d=0.001), 50, [1000, 2000])  # [49.5, 48.5], one death per 1000 ticks
@@ -196,7 +165,6 @@ def robots_at_work(rates: PopulationRates, n: int, interval_ends: ArrayLike, *, 
         rates: Rates per tick. The queue need not be stable.
         n: Swarm size N.
         interval_ends: Ends of the intervals in ticks, rising, (T,); the first begins at 0.
-        per_robot: As in `queue_statistics`.
 
     Returns:
         Robots in [0, n], mean over each interval, (T,).
@@ -210,63 +178,15 @@ def robots_at_work(rates: PopulationRates, n: int, interval_ends: ArrayLike, *, 
     starts = np.concatenate([[0.0], ends[:-1]]) if ends.ndim == 1 else ends
     if ends.ndim != 1 or ends.size == 0 or not np.isfinite(ends).all() or not (ends > starts).all():
         raise PopulationError(f"Expected ends of intervals that rise from above 0 ticks, (T,), got {ends.tolist()}.")
-    away = ends * _mean_away_until(rates, n, ends, per_robot)
+    away = ends * _mean_away_until(rates, n, ends)
     return n - np.diff(away, prepend=0.0) / (ends - starts)
 
 
-def compare_population(
-    n_active: ArrayLike,
-    rates: PopulationRates,
-    n: int,
-    interval_ends: ArrayLike,
-    *,
-    per_robot: bool = False,
-    level: float = 0.95,
-) -> PopulationComparison:
-    """Compare the robots at work in runs with the number that the queue model expects, interval by interval.
-
-    Args:
-        n_active: Robots at work, mean over each interval, (R, T), the same rates in all runs.
-        rates: Rates per tick.
-        n: Swarm size N.
-        interval_ends: As in `robots_at_work`.
-        per_robot: As in `queue_statistics`.
-        level: Confidence level of the intervals.
-
-    Raises:
-        CurveError: Curves that are missing, negative, infinite, of more than n robots or of another length.
-        PopulationError: Ends that do not rise from above 0.
-        ValueError: A level outside (0, 1).
-    """
-    predicted = robots_at_work(rates, n, interval_ends, per_robot=per_robot)
-    runs = np.atleast_2d(as_curve("n_active", n_active))
-    if runs.ndim != 2 or runs.shape[1] != predicted.size or (runs > n * (1.0 + FRACTION_TOLERANCE)).any():
-        raise CurveError(
-            f"Expected n_active of runs, (R, {predicted.size}), with at most {n} robots, got shape {runs.shape} and up "
-            f"to {np.nanmax(runs):g} robots."
-        )
-    each = [aggregate(at_work, level=level) for at_work in runs.T]
-    lower, upper = (np.array([getattr(summary, name) for summary in each]) for name in ("lower", "upper"))
-    observed = np.array([summary.mean for summary in each])
-    error = observed - predicted
-    known = ~np.isnan(lower)
-    inside = (lower <= predicted) & (predicted <= upper)
-    return PopulationComparison(
-        predicted=predicted,
-        observed=observed,
-        lower=lower,
-        upper=upper,
-        mean_error=float(error.mean()),
-        rms_error=float(np.sqrt((error**2).mean())),
-        inside=float(inside[known].mean()) if known.any() else math.nan,
-    )
-
-
-def _mean_away_until(rates: PopulationRates, n: int, ends: FloatArray, per_robot: bool) -> FloatArray:
+def _mean_away_until(rates: PopulationRates, n: int, ends: FloatArray) -> FloatArray:
     """m_T of `mean_away` for several T, (J,)."""
     if rates.lam == 0.0:
         return np.zeros_like(ends)
-    leave, back = _chain(rates, n, per_robot)
+    leave, back = _chain(rates, n)
     jump_rate = leave[0] + rates.mu  # no state has a larger total rate
     expected_jumps = jump_rate * ends
     most = float(expected_jumps[-1])
@@ -287,16 +207,14 @@ def _mean_away_until(rates: PopulationRates, n: int, ends: FloatArray, per_robot
     return total / expected_jumps
 
 
-def _chain(rates: PopulationRates, n: int, per_robot: bool) -> tuple[FloatArray, FloatArray]:
+def _chain(rates: PopulationRates, n: int) -> tuple[FloatArray, FloatArray]:
     """Rates of one robot more, and of one robot fewer, being away, from each state 0 ... n; shapes (n + 1,)."""
-    n_at_work = np.arange(n, -1.0, -1.0)
-    leave = rates.lam * (n_at_work if per_robot else np.minimum(n_at_work, 1.0))
-    back = np.full(n + 1, rates.mu)
-    back[0] = 0.0
+    leave, back = np.full(n + 1, rates.lam), np.full(n + 1, rates.mu)
+    leave[n] = back[0] = 0.0
     return leave, back
 
 
-def stationary_distribution(rates: PopulationRates, n: int, *, per_robot: bool = False) -> FloatArray:
+def stationary_distribution(rates: PopulationRates, n: int) -> FloatArray:
     """Probabilities that 0, 1, ..., n of n robots are away in equilibrium, shape (n + 1,).
 
     Balance across every cut between k and k + 1 robots away: leave[k] pi[k] = back[k + 1] pi[k + 1].
@@ -308,7 +226,7 @@ def stationary_distribution(rates: PopulationRates, n: int, *, per_robot: bool =
     if rates.mu == 0.0:
         distribution[n] = 1.0
         return distribution
-    leave, back = _chain(rates, n, per_robot)
+    leave, back = _chain(rates, n)
     log_weight = np.concatenate([[0.0], np.cumsum(np.log(leave[:-1]) - np.log(back[1:]))])
     weight = np.exp(log_weight - log_weight.max())  # logarithms, because rho^n overflows for large swarms
     return weight / weight.sum()

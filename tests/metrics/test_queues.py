@@ -7,10 +7,8 @@ import pytest
 from scipy.linalg import expm
 
 from metrics import (
-    CurveError,
     PopulationError,
     PopulationRates,
-    compare_population,
     mean_away,
     queue_statistics,
     robots_at_work,
@@ -76,11 +74,10 @@ def test_truncated_length_is_the_closed_form(rho):
     assert queue.truncated_length == pytest.approx(closed, abs=1e-9)
 
 
-@pytest.mark.parametrize("per_robot", [False, True])
 @pytest.mark.parametrize(("lam", "mu"), [(0.001, 0.002), (0.002, 0.002), (0.005, 0.002)])
-def test_truncated_distribution_is_the_null_vector_of_the_generator(lam, mu, per_robot):
-    queue = queue_statistics(PopulationRates(lambda_bd=lam, mu_bd=mu), 8, per_robot=per_robot)
-    expected = stationary_by_null_vector(generator(lam, mu, 8, per_robot=per_robot))
+def test_truncated_distribution_is_the_null_vector_of_the_generator(lam, mu):
+    queue = queue_statistics(PopulationRates(lambda_bd=lam, mu_bd=mu), 8)
+    expected = stationary_by_null_vector(generator(lam, mu, 8))
     assert queue.truncated_distribution == pytest.approx(expected, abs=1e-12)
 
 
@@ -115,14 +112,6 @@ def test_an_unlimited_queue_that_is_not_stable_grows_for_ever(mu):
     assert {queue.length, queue.waiting, queue.time, queue.waiting_time, queue.time_printed} == {math.inf}
 
 
-def test_rates_per_robot_have_no_unlimited_queue():
-    queue = queue_statistics(HALF, 5, per_robot=True)
-    assert queue.stable
-    assert np.isnan([queue.length, queue.waiting, queue.time, queue.time_printed, queue.waiting_time]).all()
-    with pytest.raises(ValueError, match="swarm size"):
-        queue_statistics(HALF, per_robot=True)
-
-
 def test_mean_away_of_one_robot():
     rates = PopulationRates(lambda_bd=0.001, mu_bd=0.001)
     expected = 0.5 * (1 - (1 - math.exp(-2)) / 2)
@@ -131,12 +120,11 @@ def test_mean_away_of_one_robot():
     assert mean_away(HALF, 10, 50_000) == pytest.approx(0.956239568, abs=1e-9)
 
 
-@pytest.mark.parametrize("per_robot", [False, True])
 @pytest.mark.parametrize(("lam", "mu"), [(0.001, 0.002), (0.002, 0.002), (0.005, 0.001), (0.001, 0.0)])
 @pytest.mark.parametrize("horizon", [10.0, 5_000.0])
-def test_mean_away_is_the_integrated_matrix_exponential(lam, mu, horizon, per_robot):
-    value = mean_away(PopulationRates(lambda_bd=lam, mu_bd=mu), 7, horizon, per_robot=per_robot)
-    expected = mean_away_by_exponential(generator(lam, mu, 7, per_robot=per_robot), horizon)
+def test_mean_away_is_the_integrated_matrix_exponential(lam, mu, horizon):
+    value = mean_away(PopulationRates(lambda_bd=lam, mu_bd=mu), 7, horizon)
+    expected = mean_away_by_exponential(generator(lam, mu, 7), horizon)
     assert value == pytest.approx(expected, rel=1e-9)
 
 
@@ -179,12 +167,9 @@ def test_deaths_alone_take_one_robot_after_the_other():
     np.testing.assert_allclose(found, [49.5, 48.5], rtol=1e-12)
 
 
-@pytest.mark.parametrize("per_robot", [False, True])
-def test_robots_at_work_are_those_of_the_matrix_exponential(per_robot):
+def test_robots_at_work_are_those_of_the_matrix_exponential():
     rates, n = PopulationRates(lambda_bd=0.02, mu_bd=0.03), 4
-    leave = rates.lam * (np.arange(n, -1.0, -1.0) if per_robot else np.array([1.0] * n + [0.0]))
-    back = np.array([0.0] + [rates.mu] * n)
-    chain = np.diag(leave[:-1], 1) + np.diag(back[1:], -1) - np.diag(leave + back)
+    chain = generator(rates.lam, rates.mu, n)
     ends = np.array([10.0, 40.0, 200.0])
     ticks = np.linspace(0.0, 200.0, 4001)
     step, states = expm(chain * 0.05), [np.eye(n + 1)[0]]
@@ -195,7 +180,7 @@ def test_robots_at_work_are_those_of_the_matrix_exponential(per_robot):
         np.trapezoid(at_work[(ticks >= start) & (ticks <= end)], dx=0.05) / (end - start)
         for start, end in zip((0.0, 10.0, 40.0), ends, strict=True)
     ]
-    np.testing.assert_allclose(robots_at_work(rates, n, ends, per_robot=per_robot), expected, rtol=1e-5)
+    np.testing.assert_allclose(robots_at_work(rates, n, ends), expected, rtol=1e-5)
 
 
 def test_intervals_add_up_to_the_mean_of_the_run():
@@ -205,18 +190,11 @@ def test_intervals_add_up_to_the_mean_of_the_run():
     assert robots_at_work(PopulationRates(), 50, ends).tolist() == [50.0] * 50
 
 
-def test_observed_populations_beside_predicted_ones():
+def test_robots_at_work_are_the_mean_of_drawn_runs():
     """Runs of the queue itself: 400 of them, drawn event by event."""
     rates, n, ends, rng = PopulationRates(lambda_bd=0.02, mu_bd=0.01), 5, [50.0, 100.0, 200.0], np.random.default_rng(5)
     runs = np.array([_drawn_population(rates, n, ends, rng) for _ in range(400)])
-    found = compare_population(runs, rates, n, ends)
-    assert abs(found.mean_error) < 0.1
-    assert found.rms_error < 0.12
-    assert found.inside >= 2 / 3
-    assert ((found.lower < found.observed) & (found.observed < found.upper)).all()
-    wrong = compare_population(runs, PopulationRates(lambda_bd=0.01, mu_bd=0.01), n, ends)
-    assert wrong.mean_error < -0.5
-    assert wrong.inside == 0.0
+    np.testing.assert_allclose(runs.mean(axis=0), robots_at_work(rates, n, ends), atol=0.25)
 
 
 def _drawn_population(rates, n, ends, rng):
@@ -231,19 +209,7 @@ def _drawn_population(rates, n, ends, rng):
     return [np.diff(clipped) @ at_work[:-1] / (clipped[-1] - clipped[0]) for clipped in inside]
 
 
-def test_one_run_has_no_interval():
-    found = compare_population([[4.0, 3.0]], PopulationRates(lambda_d=0.01), 4, [100, 200])
-    assert np.isnan(found.lower).all()
-    assert np.isnan(found.inside)
-
-
 @pytest.mark.parametrize("ends", [[], [0, 100], [100, 100], [200, 100], 100, [1.0, np.inf]])
 def test_ends_that_do_not_rise_are_refused(ends):
     with pytest.raises(PopulationError, match="ends of intervals"):
         robots_at_work(PopulationRates(lambda_d=0.01), 4, ends)
-
-
-@pytest.mark.parametrize("n_active", [[[4.0]], [[5.0, 4.0]], [[[4.0, 4.0]]]])
-def test_populations_that_do_not_fit_are_refused(n_active):
-    with pytest.raises(CurveError, match="with at most 4 robots"):
-        compare_population(n_active, PopulationRates(lambda_d=0.01), 4, [100, 200])

@@ -7,12 +7,12 @@ from scipy.linalg import expm, null_space
 Matrix = NDArray[np.float64]
 
 
-def generator(lam: float, mu: float, n: int, *, per_robot: bool = False) -> Matrix:
+def generator(lam: float, mu: float, n: int) -> Matrix:
     """Generator Q over the number of robots away, 0 ... n."""
     q = np.zeros((n + 1, n + 1))
     for away in range(n + 1):
         if away < n:
-            q[away, away + 1] = lam * (n - away) if per_robot else lam
+            q[away, away + 1] = lam
         if away > 0:
             q[away, away - 1] = mu
         q[away, away] = -q[away].sum()
