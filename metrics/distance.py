@@ -1,6 +1,5 @@
 """Distance between two curves: exact dynamic time warping, and the sum of differences without warping."""
 
-import logging
 from collections.abc import Callable
 from typing import Any, cast
 
@@ -15,22 +14,8 @@ from numba import njit
 from .checks import CurveError
 from .curves import FloatArray, as_curve, as_curves, check_broadcast
 
-MAX_CELLS = 1_000_000_000_000
-"""Most cells of all warping tables of a call, pairs x n x m; at about 1.5 ns each they take half an hour (our choice:
-nobody waits longer without having meant it). For example 120 pairs, as of the noise
-floor of sixteen runs, of 91,000 intervals."""
-TOLD_CELLS = 40_000_000_000
-"""From so many on, a minute, a line on stderr says what is going on."""
-_CELL_S = 1.5e-9
 
-
-def dtw(
-    x: ArrayLike,
-    y: ArrayLike,
-    *,
-    window: int | None = None,
-    per_interval: bool = False,
-) -> FloatArray:
+def dtw(x: ArrayLike, y: ArrayLike) -> FloatArray:
     """Exact dynamic time warping distance between the curves x and y.
 
         D(0, 0) = 0,  D(i, 0) = D(0, j) = inf
@@ -44,33 +29,24 @@ def dtw(
     Args:
         x: Curve or curves, shape (..., T); negative values are fine.
         y: Curve or curves of any length; leading axes broadcast with those of x.
-        window: Largest |i - j| of a path (Sakoe and Chiba band); None = no limit, as in the definition above.
-        per_interval: Divide by the length of the longer curve.
 
     Returns:
         Distances, shape (...,), in the unit of the cost times samples. A pair with a NaN gives NaN. Lower is closer.
 
     Raises:
-        CurveError: A curve is missing, empty or infinite, leading axes do not broadcast, the window lets no
-            path through, or the tables have more than `MAX_CELLS` cells.
+        CurveError: A curve is missing, empty or infinite, or leading axes do not broadcast.
     """
     x, y = as_curve("x", x, signed=True), as_curve("y", y, signed=True)
     check_broadcast((x, y), f"x {x.shape}, y {y.shape}")
     n, m = int(x.shape[-1]), int(y.shape[-1])
-    reach = max(n, m) if window is None else window
-    if reach < abs(n - m):
-        raise CurveError(f"Expected window >= |{n} - {m}| = {abs(n - m)} for these lengths, got {window}.")
     shape = np.broadcast_shapes(x.shape[:-1], y.shape[:-1])
     all_x = np.ascontiguousarray(np.broadcast_to(x, (*shape, n))).reshape(-1, n)
     all_y = np.ascontiguousarray(np.broadcast_to(y, (*shape, m))).reshape(-1, m)
     distances: FloatArray = np.empty(all_x.shape[0])
-    _check_cells(len(all_x), n, m, reach)
     diagonals: FloatArray = np.empty((3, n + 2))
     for pair in range(len(distances)):
-        distances[pair] = _warping_cost(all_x[pair], all_y[pair, ::-1].copy(), reach, diagonals)
+        distances[pair] = _warping_cost(all_x[pair], all_y[pair, ::-1].copy(), diagonals)
     distances[np.isnan(all_x).any(axis=1) | np.isnan(all_y).any(axis=1)] = np.nan
-    if per_interval:
-        distances /= max(n, m)
     return distances.reshape(shape)[()]
 
 
@@ -114,21 +90,6 @@ def noise_floor(perf_ideal: ArrayLike) -> FloatArray:
     return dtw(runs[first], runs[second])
 
 
-def _check_cells(n_pairs: int, n: int, m: int, reach: int) -> None:
-    """Refuse tables that would take hours, and announce those that take minutes."""
-    n_cells = n_pairs * max(n, m) * min(n, m, 2 * reach + 1)
-    told = (
-        f"{n_pairs:,} pairs of curves with {n:,} and {m:,} samples, about {n_cells * _CELL_S / 60:,.0f} min of warping"
-    )
-    if n_cells > MAX_CELLS:
-        raise CurveError(
-            f"Expected warping tables of at most {MAX_CELLS:,} cells in all, got {told}; "
-            "use longer intervals, or a window."
-        )
-    if n_cells > TOLD_CELLS:
-        logging.getLogger("metrics").warning(told)
-
-
 def _njit(**options: bool) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Compile functions that allocate nothing: without numba's memory runtime, calls with arrays take half the time."""
     return cast(Any, njit)(_nrt=False, **options)
@@ -163,7 +124,6 @@ def _next_diagonal(
 def _warping_cost(
     x: FloatArray,
     y: FloatArray,
-    window: int,
     diagonals: FloatArray,
 ) -> float:
     """D(n, m) of one pair of curves x (n,) and y (m,); both arrays of y are given backwards.
@@ -177,8 +137,8 @@ def _warping_cost(
     diagonals[0, 0] = 0.0
     earlier, before, now = diagonals[0], diagonals[1], diagonals[2]
     for k in range(2, n + m + 1):
-        low = max(1, k - m, (k - window + 1) // 2)
-        high = min(n, k - 1, (k + window) // 2)
+        low = max(1, k - m)
+        high = min(n, k - 1)
         first, last = low + m - k, high + m - k + 1
         _next_diagonal(
             x[low - 1 : high],

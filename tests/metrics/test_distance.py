@@ -4,7 +4,7 @@ import dtaidistance.dtw
 import numpy as np
 import pytest
 
-from metrics import CurveError, aligned_l1, distance, dtw, noise_floor
+from metrics import CurveError, aligned_l1, dtw, noise_floor
 from tests.reference.naive_dtw import dtw_by_enumeration, dtw_by_matrix
 
 
@@ -40,25 +40,6 @@ def test_kernel_finds_the_cheapest_of_all_paths(n, m):
         assert dtw(x, y) == pytest.approx(dtw_by_enumeration(n, m, lambda i, j, x=x, y=y: abs(x[i] - y[j])), abs=1e-12)
 
 
-@pytest.mark.parametrize("window", [0, 1, 3, 10])
-def test_window_limits_the_path(window):
-    rng = np.random.default_rng(7)
-    x, y = rng.random((2, 12))
-
-    def inside(i, j):
-        return abs(x[i] - y[j]) if abs(i - j) <= window else np.inf
-
-    assert dtw(x, y, window=window) == dtw_by_matrix(12, 12, inside)
-    if window == 0:
-        assert dtw(x, y, window=0) == pytest.approx(aligned_l1(x, y), abs=1e-12)
-
-
-def test_window_that_lets_no_path_through_is_refused():
-    assert dtw([0.0, 1.0, 2.0], [0.0], window=2) == 3.0
-    with pytest.raises(CurveError, match="window >= "):
-        dtw([0.0, 1.0, 2.0], [0.0], window=1)
-
-
 @pytest.mark.parametrize(("n", "m"), [(10, 10), (50, 50), (80, 37)])
 def test_agrees_with_an_independent_library(n, m):
     rng = np.random.default_rng(n + m)
@@ -84,35 +65,7 @@ def test_a_nan_spoils_its_own_pair_only():
     assert values[1] == 3.0
 
 
-def test_per_interval():
-    assert dtw(np.zeros(40), np.full(40, 0.25), per_interval=True) == 0.25
-    assert dtw([0.0, 0.0, 0.0, 0.0], [1.0], per_interval=True) == 1.0
-    assert dtw([1.0], [0.0, 0.0, 0.0, 0.0], per_interval=True) == 1.0
-
-
 def test_noise_floor_pairs_different_runs():
     assert noise_floor([[0.0, 0.0], [1.0, 1.0], [4.0, 4.0]]).tolist() == [2.0, 8.0, 6.0]
     with pytest.raises(CurveError, match="two runs"):
         noise_floor([0.0, 1.0])
-
-
-def test_a_window_allows_few_cells_on_either_side_of_the_diagonal():
-    x, y = np.random.default_rng(3).normal(size=(2, 5, 12))
-    for n, m, window in ((12, 12, 0), (12, 12, 1), (12, 9, 3), (9, 12, 4)):
-        for one, other in zip(x[:, :n], y[:, :m], strict=True):
-            cost = lambda i, j, x=one, y=other, w=window: abs(x[i] - y[j]) if abs(i - j) <= w else np.inf  # noqa: E731 - as above
-            assert dtw(one, other, window=window) == dtw_by_matrix(n, m, cost)
-
-
-def test_tables_that_take_hours_are_refused_with_the_figure(caplog):
-    long = np.zeros(1_000_001)
-    with pytest.raises(CurveError, match=r"at most 1,000,000,000,000 cells in all, got 1 pairs.*25 min.*or a window"):
-        dtw(long, long)
-    assert dtw(long[:300_000], long[:300_000], window=1) == 0.0
-    assert caplog.text == ""
-
-
-def test_tables_that_take_minutes_are_announced(caplog, monkeypatch):
-    monkeypatch.setattr(distance, "TOLD_CELLS", 99)
-    dtw(np.zeros((2, 10)), np.zeros((2, 10)))
-    assert "2 pairs of curves with 10 and 10 samples" in caplog.text

@@ -206,12 +206,11 @@ def test_dtw_ignores_a_common_shift_repeated_samples_and_scales(pair, shift, fac
 
 
 @law
-@given(x=performance, y=performance, window=st.integers(0, N_INTERVALS))
-def test_dtw_lies_between_its_ends_and_the_aligned_distance(x, y, window):
-    free, limited, aligned = metrics.dtw(x, y), metrics.dtw(x, y, window=window), metrics.aligned_l1(x, y)
+@given(x=performance, y=performance)
+def test_dtw_lies_between_its_ends_and_the_aligned_distance(x, y):
+    free, aligned = metrics.dtw(x, y), metrics.aligned_l1(x, y)
     assert max(abs(x[0] - y[0]), abs(x[-1] - y[-1])) <= free * (1 + 1e-12)
-    assert free <= limited * (1 + 1e-12)
-    assert limited <= aligned * (1 + 1e-12)
+    assert free <= aligned * (1 + 1e-12)
 
 
 @law
