@@ -34,7 +34,6 @@ from .emergence import undisturbed_gain as undisturbed_gain
 
 # scalability
 from .scaling import scalability as scalability
-from .scaling import skipped_intervals as skipped_intervals
 from .scaling import efficiency as efficiency
 from .scaling import raw_performance as raw_performance
 

@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from .checks import CurveError, check_option
 
 FloatArray: TypeAlias = NDArray[np.float64]
-IntArray: TypeAlias = NDArray[np.int64]
 
 Variant: TypeAlias = Literal["paper", "corrected"]
 """`paper`: as printed; `corrected`: with the printing errors corrected."""

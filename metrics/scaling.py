@@ -1,15 +1,10 @@
 """Performance over swarm size: scalability, Eq. (4), efficiency, and performance itself."""
 
-from typing import Literal, TypeAlias
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .checks import check_option, check_size, check_size_order
-from .curves import FloatArray, IntArray, Reduction, Variant, as_curves, reduce_intervals
-
-ZeroPolicy: TypeAlias = Literal["nan", "skip"]
-"""How an interval without performance enters a sum: with its IEEE value, NaN included, or not at all."""
+from .curves import FloatArray, Reduction, Variant, as_curves, reduce_intervals
 
 _DEFAULT_REDUCTION: dict[Variant, Reduction] = {"paper": "sum", "corrected": "total"}
 
@@ -22,7 +17,6 @@ def scalability(
     *,
     variant: Variant = "corrected",
     reduce: Reduction | None = None,
-    zero_policy: ZeroPolicy = "nan",
 ) -> FloatArray:
     """Scalability C(N1, N2), Eq. (4): one minus Karp and Flatt's serial fraction e of the swarm.
 
@@ -47,8 +41,6 @@ def scalability(
         variant: Which of the two above.
         reduce: Overrides the reduction of the variant: `total` takes S of the summed curves, `sum`, `mean` and `last`
             take S in each interval.
-        zero_policy: `skip` leaves out of `sum` or `mean` all intervals in which either swarm delivered nothing; report
-            `skipped_intervals`, too. A run in which every interval is skipped gives NaN.
 
     Returns:
         C, shape (...,). Corrected: 1 for a linear gain, 0 for no gain, above 1 for a superlinear gain (at most r / (r -
@@ -57,26 +49,20 @@ def scalability(
 
     Raises:
         CurveError: Curves are missing, negative, infinite or of different length; n1 >= n2.
-        ValueError: Unknown option, or zero_policy="skip" without a sum or mean over intervals.
+        ValueError: Unknown option.
     """
     n1, n2 = check_size("n1", n1), check_size("n2", n2)
     perf1, perf2 = as_curves(perf1=perf1, perf2=perf2)
     check_option("variant", variant, Variant)
-    check_option("zero_policy", zero_policy, ZeroPolicy)
     check_size_order(n1, n2)
     if reduce is None:
         reduce = _DEFAULT_REDUCTION[variant]
     check_option("reduce", reduce, Reduction)
-    if zero_policy == "skip" and reduce not in ("sum", "mean"):
-        raise ValueError(f"Expected reduce='sum' or 'mean' with zero_policy='skip', got {reduce!r}.")
-
     theta = _THETA[variant]
     with np.errstate(divide="ignore", invalid="ignore"):
         if reduce == "total":
             total1, total2 = perf1.sum(axis=-1, keepdims=True), perf2.sum(axis=-1, keepdims=True)
             return reduce_intervals(theta(total1, n1, total2, n2), "last", total1, total2)
-        if zero_policy == "skip":
-            return _reduce_without_zeros(theta(perf1, n1, perf2, n2), perf1, perf2, reduce)
         return reduce_intervals(theta(perf1, n1, perf2, n2), reduce, perf1, perf2)
 
 
@@ -91,24 +77,6 @@ def _as_printed(perf1: FloatArray, n1: int, perf2: FloatArray, n2: int) -> Float
 
 
 _THETA = {"corrected": _karp_flatt, "paper": _as_printed}
-
-
-def _reduce_without_zeros(theta: FloatArray, perf1: FloatArray, perf2: FloatArray, reduce: Reduction) -> FloatArray:
-    kept = (perf1 != 0.0) & (perf2 != 0.0)
-    n_kept = kept.sum(axis=-1)
-    total = np.where(kept, theta, 0.0).sum(axis=-1)
-    value = np.where(n_kept == 0, np.nan, total / n_kept if reduce == "mean" else total)
-    return value[()]
-
-
-def skipped_intervals(perf1: ArrayLike, perf2: ArrayLike) -> IntArray:
-    """Number of intervals that `scalability` leaves out under zero_policy="skip", shape (...,): either curve is 0.
-
-    Raises:
-        CurveError: As `scalability`.
-    """
-    perf1, perf2 = as_curves(perf1=perf1, perf2=perf2)
-    return ((perf1 == 0.0) | (perf2 == 0.0)).sum(axis=-1)
 
 
 def efficiency(perf: ArrayLike, n: int, *, reduce: Reduction = "last") -> FloatArray:

@@ -25,7 +25,6 @@ CALLS = {
     "population_robustness": lambda curve: metrics.population_robustness(
         curve, ONE_RUN, metrics.PopulationRates(), horizon=100
     ),
-    "skipped_intervals": lambda curve: metrics.skipped_intervals(curve, ONE_RUN),
 }
 BAD_CURVES = {
     "missing": (None, "got None"),
@@ -60,7 +59,7 @@ def test_run_axes_that_do_not_broadcast_are_refused():
         metrics.dtw(np.ones((2, 4)), np.ones((3, 5)))
 
 
-@pytest.mark.parametrize("name", [name for name in CALLS if name != "skipped_intervals"])
+@pytest.mark.parametrize("name", CALLS)
 def test_a_nan_spoils_its_own_run_only(name):
     healthy = np.array([[1.0, 2.0, 3.0], [1.0, 1.0, 1.0]])
     broken = healthy.copy()
@@ -120,7 +119,6 @@ def test_more_interfering_robots_than_robots_are_refused():
         lambda: metrics.spatial_emergence([1.0], [0.1], 2, [1.0], [0.1], 4, [1.0], [0.1], variant="printed"),
         lambda: metrics.scalability([1.0], 1, [1.0], 2, variant="printed"),
         lambda: metrics.scalability([1.0], 1, [1.0], 2, reduce="median"),
-        lambda: metrics.scalability([1.0], 1, [1.0], 2, zero_policy="drop"),
         lambda: metrics.task_emergence([1.0], 1, [1.0], 2, reduce="median"),
         lambda: metrics.waveform("triangle", [0]),
         lambda: metrics.environment_scaling(0.5, 0.1, model="printed"),

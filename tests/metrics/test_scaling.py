@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from metrics import CurveError, efficiency, raw_performance, scalability, skipped_intervals
+from metrics import CurveError, efficiency, raw_performance, scalability
 
 INF, NAN = np.inf, np.nan
 
@@ -50,28 +50,10 @@ def test_sizes_that_are_equal_or_in_the_wrong_order_are_refused_in_every_form(va
         scalability([1.0], n1, [2.0], n2, variant=variant)
 
 
-def test_intervals_without_performance_can_be_skipped_and_are_counted():
-    perf1 = np.array([[0.0, 1.0, 1.0, 2.0], [0.0, 0.0, 0.0, 0.0], [1.0, 1.0, NAN, 1.0]])
-    perf2 = np.array([[1.0, 0.0, 2.0, 2.0], [1.0, 1.0, 1.0, 1.0], [2.0, 2.0, 2.0, 0.0]])
-    total = scalability(perf1, 1, perf2, 2, reduce="sum", zero_policy="skip")
-    mean = scalability(perf1, 1, perf2, 2, reduce="mean", zero_policy="skip")
-    assert total == pytest.approx([1.0, NAN, NAN], abs=1e-12, nan_ok=True)
-    assert mean == pytest.approx([0.5, NAN, NAN], abs=1e-12, nan_ok=True)
-    assert skipped_intervals(perf1, perf2).tolist() == [2, 4, 1]
-    paper = scalability(perf1[0], 1, perf2[0], 2, variant="paper", zero_policy="skip")
-    assert paper == pytest.approx(-2.0 + 0.0, abs=1e-12)
-
-
-def test_zeros_count_by_default():
+def test_zeros_count():
     assert scalability([0.0, 1.0], 1, [1.0, 2.0], 2, variant="paper") == -INF
     assert np.isnan(scalability([0.0, 1.0], 1, [0.0, 2.0], 2, variant="paper"))
     assert scalability([0.0, 1.0], 1, [1.0, 2.0], 2, reduce="sum") == pytest.approx(2.0 + 1.0, abs=1e-12)
-
-
-@pytest.mark.parametrize("reduce", ["last", "total"])
-def test_skipping_needs_a_sum_over_intervals(reduce):
-    with pytest.raises(ValueError, match="zero_policy"):
-        scalability([1.0], 1, [1.0], 2, reduce=reduce, zero_policy="skip")
 
 
 def test_performance_per_robot():
