@@ -65,7 +65,6 @@ from .population import recorded_population_robustness as recorded_population_ro
 from .population import population_weight as population_weight
 from .population import availability as availability
 from .population import availability_curves as availability_curves
-from .population import ratio_for_availability as ratio_for_availability
 from .population import ratio_for_team as ratio_for_team
 
 # the law of swarm sizes

@@ -95,16 +95,6 @@ def check_ratio(ratio_out: float) -> None:
         raise PopulationError(f"Expected ratio_out = lambda / mu >= 0, got {ratio_out}.")
 
 
-def check_availability(p_v: float) -> None:
-    """Check the probability that enough robots are at work.
-
-    Raises:
-        PopulationError: Outside [0, 1].
-    """
-    if not 0.0 <= p_v <= 1.0:
-        raise PopulationError(f"Expected an availability p_v in [0, 1], got {p_v}.")
-
-
 def check_team(team: float) -> None:
     """Check a mean number of robots at work.
 

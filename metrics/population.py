@@ -10,9 +10,7 @@ from numpy.typing import ArrayLike
 from .checks import (
     CurveError,
     PopulationError,
-    check_availability,
     check_horizon,
-    check_needed,
     check_option,
     check_ratio,
     check_size,
@@ -31,9 +29,6 @@ from .curves import (
 from .queues import PopulationRates, mean_away, queue_statistics
 
 PopulationWeight: TypeAlias = Literal["paper", "transient"]
-
-_SMALLEST_LOG, _LARGEST_LOG = math.log(5e-324), math.log(1.7976931348623157e308)
-"""Logarithms of the smallest and largest double: the range of ratios that can be returned."""
 
 
 def population_robustness(
@@ -192,35 +187,12 @@ def availability(n: int, n_min: int, ratio_out: float) -> float:
         return 0.0
     if ratio_out == 0.0 or math.isinf(ratio_out):
         return 1.0 if ratio_out == 0.0 else 0.0
-    return _availability(n, n_min, math.log(ratio_out))
-
-
-def ratio_for_availability(n: int, n_min: int, p_v: float) -> float:
-    """Ratio q = lambda / mu of leaving over entering at which `availability` is p_v, by bisection in log q.
-
-    Args:
-        n: Swarm size N.
-        n_min: Robots needed, 1 <= n_min <= n.
-        p_v: Wanted availability in [0, 1], strictly falling with q: 1 gives 0, 0 gives inf.
-
-    Raises:
-        CurveError: n < 1, or n_min is no whole number.
-        PopulationError: n_min or p_v outside its range.
-    """
-    n, n_min = check_size("n", n), check_whole("n_min", n_min)
-    check_needed(n_min, n)
-    check_availability(p_v)
-    if p_v in (0.0, 1.0):
-        return math.inf if p_v == 0.0 else 0.0
-    low, high = _SMALLEST_LOG, _LARGEST_LOG
-    middle = 0.5 * (low + high)
-    while low < middle < high:
-        if _availability(n, n_min, middle) > p_v:
-            low = middle
-        else:
-            high = middle
-        middle = 0.5 * (low + high)
-    return math.exp(middle)
+    if ratio_out == 1.0:
+        return (n - n_min + 1) / (n + 1)
+    # Powers of q <= 1 only, so that nothing overflows; exact near q = 1.
+    log_q = math.log(ratio_out)
+    p_v = math.expm1((n - n_min + 1) * -abs(log_q)) / math.expm1((n + 1) * -abs(log_q))
+    return p_v if log_q < 0.0 else p_v * math.exp(n_min * -abs(log_q))
 
 
 def ratio_for_team(team: float) -> float:
@@ -266,15 +238,6 @@ def availability_curves(n: int, teams: Sequence[float], n_min: Sequence[int] | N
     ratios = [ratio_for_team(team) for team in teams]
     curves = [[availability(n, demand, ratio) for demand in needed] for ratio in ratios]
     return np.array(curves, dtype=np.float64).reshape(len(ratios), len(needed))
-
-
-def _availability(n: int, n_min: int, log_q: float) -> float:
-    """p_v for 1 <= n_min <= n; powers of q <= 1 only, so that nothing overflows, and exact near q = 1."""
-    if log_q == 0.0:
-        return (n - n_min + 1) / (n + 1)
-    decay = -abs(log_q)
-    p_v = math.expm1((n - n_min + 1) * decay) / math.expm1((n + 1) * decay)
-    return p_v if log_q < 0.0 else p_v * math.exp(n_min * decay)
 
 
 def _share_at_work(rates: PopulationRates, horizon: float, n: int | None, weight: PopulationWeight) -> float:

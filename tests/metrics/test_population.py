@@ -14,7 +14,6 @@ from metrics import (
     population_robustness,
     population_weight,
     queue_statistics,
-    ratio_for_availability,
     ratio_for_team,
     recorded_population_robustness,
 )
@@ -190,26 +189,6 @@ def test_robots_needed_are_a_whole_number():
     for n_min in (4.5, math.nan):
         with pytest.raises(CurveError, match="n_min as a whole number"):
             availability(50, n_min, 1.2)
-        with pytest.raises(CurveError, match="n_min as a whole number"):
-            ratio_for_availability(50, n_min, 0.4)
-
-
-@pytest.mark.parametrize(("n", "n_min"), [(1, 1), (50, 5), (200, 200), (16_384, 10_000)])
-@pytest.mark.parametrize("p_v", [0.999, 0.5, 0.40, 1e-6])
-def test_ratio_for_availability_inverts(n, n_min, p_v):
-    q = ratio_for_availability(n, n_min, p_v)
-    assert availability(n, n_min, q) == pytest.approx(p_v, rel=1e-9)
-
-
-def test_ratio_for_certain_and_impossible_availability():
-    assert ratio_for_availability(50, 5, 1.0) == 0.0
-    assert ratio_for_availability(50, 5, 0.0) == math.inf
-
-
-@pytest.mark.parametrize(("n_min", "p_v"), [(0, 0.5), (51, 0.5), (5, -0.1), (5, 1.1), (5, math.nan)])
-def test_availabilities_that_no_ratio_gives_are_refused(n_min, p_v):
-    with pytest.raises(PopulationError, match="Expected"):
-        ratio_for_availability(50, n_min, p_v)
 
 
 def test_one_weight_serves_all_runs():

@@ -261,13 +261,6 @@ def test_availability_falls_with_robots_needed_and_with_the_rate_of_leaving(n, q
 
 
 @law
-@given(n=st.integers(1, 300), p_v=st.floats(1e-9, 1 - 1e-9), data=st.data())
-def test_ratio_for_availability_is_the_inverse(n, p_v, data):
-    n_min = data.draw(st.integers(1, n))
-    assert metrics.availability(n, n_min, metrics.ratio_for_availability(n, n_min, p_v)) == pytest.approx(p_v, rel=1e-6)
-
-
-@law
 @given(theta=arrays(np.float64, 5, elements=st.floats(-20, 20)))
 def test_normalize_is_odd_bounded_and_keeps_order(theta):
     value = metrics.normalize(theta)
