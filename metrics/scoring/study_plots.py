@@ -10,7 +10,6 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import known_name
 from swarm_forage_env._internal.files import replacing
-from swarm_forage_env._internal.wording import number
 from swarm_forage_env.rendering.figures import (
     FORMATS,
     SCREEN,
@@ -20,7 +19,6 @@ from swarm_forage_env.rendering.figures import (
     log_height,
     looks,
     saved_panels,
-    signed_log_height,
     size_axis,
 )
 from swarm_forage_env.wrappers.world import SIZE
@@ -50,14 +48,6 @@ _DOTS_ASIDE = 0.35
 """Distance of dots from the bar of their policy, in the same unit as those of policies."""
 MANY_DOTS = 500
 """More dots in a panel are put into vector pictures as an image: as single marks they take a megabyte and more."""
-_LINES_OF_WILD = 3
-FENCE = 10.0
-"""Means so many interquartile ranges of all means beyond their quartiles are wild (our choice): they are marked at the
-edge of the picture, with their value, so that all others can be seen."""
-WIDE = 10.0
-"""Where the largest loss is so many times the middle one, most of a linear axis is for a few swarms (our choice)."""
-Height: TypeAlias = Literal["linear", "log", "signed log"]
-"""Scale of a y axis: "signed log" is linear from -1 to 1 and logarithmic beyond."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -85,18 +75,12 @@ class StudyFigure:
         return f"{first.study}: {words}" + ("" if first.variant == "corrected" else f", measure {first.variant}")
 
     @property
-    def height(self) -> Height:
-        """Scale of the y axis: on a linear one, all small swarms lie on a line that says nothing."""
-        scores = [scores for panel in self.panels for scores in panel.scores.values()]
+    def is_log(self) -> bool:
+        """Whether its y axis is logarithmic: on a linear one, all small swarms lie on a line that says nothing."""
         first = self.panels[0]
-        if (first.measure, first.criterion) == ("raw_performance", SIZE) and all(
+        return (first.measure, first.criterion) == ("raw_performance", SIZE) and all(
             any((scores > 0.0).any() for scores in panel.scores.values()) for panel in self.panels
-        ):
-            return "log"
-        means = np.abs([summary.mean for of_policy in scores for summary in _summaries(of_policy)])
-        means = means[np.isfinite(means)]
-        is_wide = means.size > 0 and means.max() >= WIDE * max(1.0, float(np.median(means)))
-        return "signed log" if first.form == "interactive" and is_wide else "linear"
+        )
 
     def to_frame(self) -> "pl.DataFrame":
         """Return the numbers behind the picture: one row per panel, policy and level, and a column per run."""
@@ -147,10 +131,7 @@ def draw_figure(figure: StudyFigure, paths: Sequence[Path], *, band: Band = "ci"
     title = f"{figure.title}\n{caption(figure, band)}"
     with saved_panels(paths, len(figure.panels), (3.6, 3.2), sharey=True, title=title, style=style) as places:
         for place, panel in zip(places, figure.panels, strict=True):
-            _draw_panel(place, panel, band, figure.height)
-        limit_height(places[0], figure)
-        for place, panel in zip(places, figure.panels, strict=True):
-            _mark_wild(place, panel)
+            _draw_panel(place, panel, band, is_log=figure.is_log)
 
 
 def caption(figure: StudyFigure, band: Band) -> str:
@@ -161,19 +142,16 @@ def caption(figure: StudyFigure, band: Band) -> str:
     )
     if max(n_runs) < FEWEST_RUNS:
         return f"lines: means; dots: runs{floor}\nno bars: fewer than {FEWEST_RUNS} runs of a condition tell too little"
-    floor += "\nheight: logarithmic beyond ±1" if figure.height == "signed log" else ""
     lacking = f"\nno bar: conditions with fewer than {FEWEST_RUNS} runs, which tell too little"
     return f"bars: {_BANDS[band]}; dots: runs{floor}" + (lacking if any(0 < n < FEWEST_RUNS for n in n_runs) else "")
 
 
-def _draw_panel(place: Panel, panel: StudyPanel, band: Band, height: Height) -> None:
+def _draw_panel(place: Panel, panel: StudyPanel, band: Band, *, is_log: bool) -> None:
     if panel.criterion == SIZE:
         size_axis(place, panel.drawn_at)
-    if height == "log":
+    if is_log:
         log_height(place)
         place.yaxis.set_major_formatter("{x:,g}")
-    elif height == "signed log":
-        signed_log_height(place)
     are_many = sum(scores.size for scores in panel.scores.values()) > MANY_DOTS
     for (look, x, scores), (_, aside, _) in zip(_beside(panel), _beside(panel, aside=_DOTS_ASIDE), strict=True):
         style = {"color": look.colour, "alpha": 0.4, "markersize": 3.0, "zorder": 2.5}
@@ -215,66 +193,6 @@ def _draw_policy(
     lower, upper = _band(panel, summaries, band)
     reach = np.array([mean - lower, upper - mean]).clip(min=0.0)
     place.errorbar(x, mean, yerr=reach, color=look.colour, marker=look.marker, label=look.name, zorder=3)
-
-
-def _mark_wild(place: Panel, panel: StudyPanel) -> None:
-    """Mark means, with their value, and runs that lie beyond the picture at its edge.
-
-    Values that would run into each other are at different heights, and lie on white above all marks.
-    """
-    bottom, top = place.get_ylim()
-    told: list[tuple[float, float, float, str]] = []
-    for look, x, scores in _beside(panel):
-        for at, runs, mean in zip(x, scores, (summary.mean for summary in _summaries(scores)), strict=True):
-            for edge, is_beyond, marker in ((bottom, np.less, "v"), (top, np.greater, "^")):
-                style = {"color": look.colour, "linestyle": "", "marker": marker, "clip_on": False, "zorder": 4}
-                if is_beyond(mean, edge):
-                    place.plot(at, edge, markersize=6.0, **style)
-                    told.append((at, edge, mean, look.colour))
-                elif is_beyond(runs, edge).any():
-                    place.plot(at, edge, markersize=3.0, alpha=0.5, **style)
-    box = {"facecolor": "w", "edgecolor": "none", "alpha": 0.9, "pad": 0.5}
-    for index, (at, edge, mean, colour) in enumerate(sorted(told)):
-        line = 1.2 * ((index % _LINES_OF_WILD) + 0.6)  # in heights of the font, away from the edge
-        style = {"color": colour, "fontsize": "x-small", "ha": "center", "va": "center", "bbox": box, "zorder": 5}
-        off = (0.0, line if edge == bottom else -line)
-        place.annotate(number(mean), (at, edge), off, textcoords="offset fontsize", **style)
-
-
-def limit_height(place: Panel, figure: StudyFigure) -> None:
-    """Leave wild means out, and let bars reach beyond the runs by half of their range at most."""
-    height = figure.height
-    scores = [scores for panel in figure.panels for scores in panel.scores.values()]
-    means = np.array([summary.mean for of_policy in scores for summary in _summaries(of_policy)])
-    floors = [_mean_of(floor) for panel in figure.panels for floor in panel.floors.values()]
-    known = np.concatenate([*(of_policy.ravel() for of_policy in scores), means, floors])
-    means, known = (values[np.isfinite(values) & ((values > 0.0) | (height != "log"))] for values in (means, known))
-    if not means.size:
-        return
-    means, known = (_bent(values, height) for values in (means, known))
-    quartiles = np.percentile(means, (25.0, 75.0))
-    fence = FENCE * float(max(np.ptp(quartiles), np.ptp(np.percentile(known, (25.0, 75.0))))) or math.inf
-    tame = known[(known >= quartiles[0] - fence) & (known <= quartiles[1] + fence)]
-    low, high = float(tame.min()), float(tame.max())
-    reach = (0.5 if height == "linear" else 0.1) * (high - low) or abs(high) or 1.0
-    limits = np.array([low - reach, high + reach])
-    bottom, top = place.get_ylim()
-    lowest, highest = _straight(limits, height)
-    place.set_ylim(max(bottom, float(lowest)), min(top, float(highest)))
-
-
-def _bent(values: FloatArray, height: Height) -> FloatArray:
-    """Return where values are on an axis, in decades if it is logarithmic."""
-    if height == "linear":
-        return values
-    return np.log10(values) if height == "log" else np.sign(values) * np.log10(1.0 + np.abs(values))
-
-
-def _straight(places: FloatArray, height: Height) -> FloatArray:
-    """Return which values are at places of `_bent`."""
-    if height == "linear":
-        return places
-    return 10.0**places if height == "log" else np.sign(places) * (10.0 ** np.abs(places) - 1.0)
 
 
 def _mean_of(values: FloatArray) -> float:

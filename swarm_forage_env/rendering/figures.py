@@ -270,12 +270,6 @@ def log_height(panel: Panel) -> None:
     panel.yaxis.set_minor_formatter(between)
 
 
-def signed_log_height(panel: Panel) -> None:
-    """Make y an axis on which factors are equally far apart beyond 1 and -1, and numbers between them."""
-    panel.set_yscale("symlog", linthresh=1.0)
-    panel.yaxis.set_major_formatter("{x:,g}")
-
-
 def shade(panel: Panel, x: Any, low: Any, high: Any, colour: str, *, label: str | None = None) -> None:
     """Draw a band, behind all lines."""
     panel.fill_between(x, low, high, color=colour, alpha=0.2, linewidth=0.0, zorder=1.9, label=label)
