@@ -40,11 +40,11 @@ def _levels(study: StudyCurves, *criteria: str) -> tuple[tuple[RunCurves, RunCur
     return levels
 
 
-def _score(values: Values, pair: tuple[RunCurves, RunCurves], *, is_relative: bool = True, **told: Any) -> Score:
+def _score(values: Values, pair: tuple[RunCurves, RunCurves], **told: Any) -> Score:
     """Return a score that compares a level with its reference; `told` as in `score_runs`."""
     level = pair[1]
     at = f"{_WORDS[level.criterion]} {level.value:.4g}"
-    return score_runs(values, pair, at=at, x=level.value, compared_with=0 if is_relative else None, **told)
+    return score_runs(values, pair, at=at, x=level.value, compared_with=0, **told)
 
 
 def _conditions(runs: RunCurves, disturbance: str, variant: Variant) -> FloatArray:

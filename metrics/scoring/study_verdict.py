@@ -229,13 +229,13 @@ class StudyVerdict(Answer):
         """The same of those that wait for runs."""
         return {(one.claim.name, one.rules, one.variant): one for one in (*self.waiting, *self.expected_later)}
 
-    def counts(self, rules: str, variant: str, *, by_bands: bool = False) -> dict[str, int]:
+    def counts(self, rules: str, variant: str) -> dict[str, int]:
         """Return answer -> how many claims have it by these rules; and how many wait for runs, as `WAITS`.
 
         Claims that no run answers are counted with the corrected measures, under all rules.
         """
         mine = [one.verdict for one in self.judged if one.rules in (rules, "") and one.variant == variant]
-        answers = Counter(verdict.by_bands if by_bands else verdict.answer for verdict in mine)
+        answers = Counter(verdict.answer for verdict in mine)
         waiting = sum((one.rules, one.variant) == (rules, variant) for one in self.waiting)
         return {**{word: answers[word] for word in ANSWERS}, WAITS: waiting}
 
@@ -356,36 +356,21 @@ def verdict(*tables: "StudyTable", tell: Callable[[str], None] | None = None) ->
     refused = [why for table in tables if (why := why_no_claims(table.spec))]
     if refused:
         raise CurveError(f"{refused[0]} 'swarm-forage study plot' takes any study.")
-    return verdict_of(tables, scored_studies(tables, tell=tell))
-
-
-def verdict_of(tables: "Sequence[StudyTable]", scored: Sequence[StudyPanels]) -> StudyVerdict:
-    """Return the same of studies that are scored already; errors are those of `judge_claims`."""
+    scored: list[StudyPanels] = []
+    for table in tables:
+        if tell is not None:
+            tell(f"scoring {table.spec.name}")
+        scored.append(study_panels(table, VARIANTS))
     judged, waiting = judge_claims(tables, scored)
     expected, expected_later = judge_claims(tables, scored, ("corrected",), INTUITIONS)
     return StudyVerdict(
-        tables=tuple(tables),
+        tables=tables,
         scored=tuple(scored),
         judged=judged,
         waiting=waiting,
         expected=expected,
         expected_later=expected_later,
     )
-
-
-def scored_studies(
-    tables: "Sequence[StudyTable]",
-    variants: Sequence[Variant] = VARIANTS,
-    *,
-    tell: Callable[[str], None] | None = None,
-) -> list[StudyPanels]:
-    """Score studies, and tell which one is under way."""
-    scored: list[StudyPanels] = []
-    for table in tables:
-        if tell is not None:
-            tell(f"scoring {table.spec.name}")
-        scored.append(study_panels(table, variants))
-    return scored
 
 
 def claims_about(panels: Sequence[StudyPanel]) -> list[str]:

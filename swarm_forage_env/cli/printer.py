@@ -120,7 +120,6 @@ def ask_and_show(
     options: RunOptions,
     *,
     picture: Path | None = None,
-    as_markdown: bool = False,
 ) -> None:
     """Make the runs of a question and show its answer; or only its plan.
 
@@ -129,7 +128,6 @@ def ask_and_show(
         folder: Where records go.
         options: How runs are made, and what is printed.
         picture: File of the picture; None = the answer has none.
-        as_markdown: Print tables as Markdown, where it is not JSON.
 
     Raises:
         ConfigError: a picture whose ending is none of figures.
@@ -156,20 +154,19 @@ def ask_and_show(
         answer: Answer = question.answer(table)
     except CurveError as error:  # what is left is too little
         raise typer.Exit(complain(str(error), EXIT_FAILURE)) from None
-    show(answer, picture, as_json=options.as_json, as_markdown=as_markdown)
+    show(answer, picture, as_json=options.as_json)
     _tell_of_records(table, store)
     if table.failures:
         raise typer.Exit(EXIT_FAILURE)
 
 
-def show(answer: "Answer", picture: Path | None = None, *, as_json: bool = False, as_markdown: bool = False) -> None:
+def show(answer: "Answer", picture: Path | None = None, *, as_json: bool = False) -> None:
     """Print an answer, and draw it.
 
     Args:
         answer: What was found.
         picture: File for the picture; a picture that cannot be made is told of, because the answer is worth more.
         as_json: Print JSON; it names the picture.
-        as_markdown: Print tables as Markdown otherwise.
     """
     drawn = None if picture is None else _drawn(answer, picture)
     if as_json:
@@ -177,8 +174,7 @@ def show(answer: "Answer", picture: Path | None = None, *, as_json: bool = False
         told = {"picture": None if drawn is None else str(drawn)} if may_be_drawn else {}
         typer.echo(json.dumps({**answer.to_mapping(), **told}, indent=1))
     else:
-        text = answer.markdown() if as_markdown else answer.text(width=width_of_terminal())
-        typer.echo(printable(text.rstrip("\n")))
+        typer.echo(printable(answer.text(width=width_of_terminal()).rstrip("\n")))
     if drawn is not None:
         typer.echo(f"picture {drawn}", err=True)
 

@@ -270,9 +270,9 @@ def log_height(panel: Panel) -> None:
     panel.yaxis.set_minor_formatter(between)
 
 
-def shade(panel: Panel, x: Any, low: Any, high: Any, colour: str, *, label: str | None = None) -> None:
+def shade(panel: Panel, x: Any, low: Any, high: Any, colour: str) -> None:
     """Draw a band, behind all lines."""
-    panel.fill_between(x, low, high, color=colour, alpha=0.2, linewidth=0.0, zorder=1.9, label=label)
+    panel.fill_between(x, low, high, color=colour, alpha=0.2, linewidth=0.0, zorder=1.9)
 
 
 def heat_map(

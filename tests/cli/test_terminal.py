@@ -5,7 +5,6 @@ import sys
 import pytest
 from rich.console import Console
 
-from metrics.benchmark import load_protocol
 from swarm_forage_env.cli.printer import progress_bar, width_of_terminal
 from swarm_forage_env.inspect.descriptions import describe, overview
 from swarm_forage_env.studies.description import paper_sets
@@ -31,8 +30,8 @@ def test_only_a_terminal_has_a_width(monkeypatch, is_terminal, width):
 
 @pytest.mark.parametrize(
     "answer",
-    [lambda: overview("columns"), paper_sets, load_protocol, lambda: describe("search_and_rescue")],
-    ids=["list columns", "study list", "benchmark worlds", "info"],
+    [lambda: overview("columns"), paper_sets, lambda: describe("search_and_rescue")],
+    ids=["list columns", "study list", "info"],
 )
 def test_tables_fit_into_a_terminal_of_80_columns(answer):
     _title, *table = answer().text(width=80).splitlines()
