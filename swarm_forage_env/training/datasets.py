@@ -14,7 +14,6 @@ whole or not at all. With T decisions of N robots, row i being robot i:
 """
 
 import json
-import zipfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -23,9 +22,11 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError, several, whole
+from swarm_forage_env._internal.archives import ArchiveError, open_arrays, read_array
+from swarm_forage_env._internal.fields import ConfigError, known_keys, several, whole
 from swarm_forage_env._internal.files import alone_in, check_folder, read_json, replacing
 from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env._internal.typed import check_array
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
@@ -38,6 +39,8 @@ from swarm_forage_env.runs.workers import Tell, map_runs
 CARD_FILE = "dataset.json"
 ARRAYS = ("observations", "actions", "rewards", "terminated", "truncated", "active")
 _LONGER_BY_ONE = ("observations", "active")
+_MOST_BYTES = 2**32
+"""That a run may have unpacked: 50 robots for 10,000 ticks take 80 MB."""
 
 
 class DatasetError(ValueError):
@@ -85,12 +88,13 @@ class Dataset:
         file = self.folder / CARD_FILE
         card = read_json(file, DatasetError)
         try:
+            known_keys(card, ("run", "interface", "columns"), "key of a data set")
             self.spec = RunSpec.from_mapping(card["run"])
             self.interface = interface_from_mapping(card["interface"])
             self.columns = tuple(map(str, card["columns"]))
         except (KeyError, TypeError, ConfigError) as error:
             raise DatasetError(f"Cannot use {file}: {error}") from error
-        self.files = tuple(sorted(self.folder.glob("seed_*.npz")))
+        self.files = tuple(sorted(self.folder.glob(f"seed_{6 * '[0-9]'}.npz")))
 
     def runs(self) -> Iterator[Steps]:
         """Yield all runs, one in memory at a time; raises DatasetError for a damaged one."""
@@ -122,20 +126,24 @@ class Dataset:
 def read_steps(file: str | Path) -> Steps:
     """Read a run; raises DatasetError for a file that is damaged or holds other arrays."""
     try:
-        with Path(file).open("rb") as opened, np.load(opened, allow_pickle=False) as stored:
-            arrays: dict[str, Any] = {name: stored[name] for name in ARRAYS}
+        stored = open_arrays(Path(file), _MOST_BYTES)
+        rewards = read_array(stored, "rewards", (np.float64, (None, None)))
+        steps = rewards.shape
+        longer = (steps[0] + 1, steps[1])
+        arrays: dict[str, Any] = {
+            "observations": read_array(stored, "observations", (np.float32, (*longer, None))),
+            "actions": read_array(stored, "actions"),
+            "rewards": rewards,
+            "terminated": read_array(stored, "terminated", (np.bool_, steps)),
+            "truncated": read_array(stored, "truncated", (np.bool_, steps)),
+            "active": read_array(stored, "active", (np.bool_, longer)),
+        }
+        wanted = (np.int64, steps) if arrays["actions"].ndim == len(steps) else (np.float32, (*steps, None))
+        check_array("actions", arrays["actions"], *wanted)
     except OSError as error:
         raise DatasetError(f"Cannot read {file}: {error.strerror or error}.") from error
-    except (KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise DatasetError(f"Expected {file} to be a run of a data set, got {error}; record it again.") from error
-    n_steps, n_robots = arrays["rewards"].shape[:2]
-    for name, array in arrays.items():
-        shape = (n_steps + (name in _LONGER_BY_ONE), n_robots)
-        if array.shape[:2] != shape or (array.dtype.kind == "f" and not np.isfinite(array).all()):
-            raise DatasetError(
-                f"Expected {name} in {file} to hold finite numbers of {shape[0]} steps and {n_robots} robots, got "
-                f"shape {array.shape}; record it again."
-            )
+    except (ArchiveError, ConfigError) as error:
+        raise DatasetError(f"Expected {file} to be a run of a data set: {error} Record it again.") from error
     return Steps(seed=int(Path(file).stem.removeprefix("seed_")), **arrays)
 
 

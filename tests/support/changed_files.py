@@ -18,8 +18,7 @@ from swarm_forage_env.policies.network import NetworkError
 from swarm_forage_env.runs.record import RecordError, RunRecord
 from swarm_forage_env.runs.store import read_failure
 from swarm_forage_env.studies.study_table import read_study
-from swarm_forage_env.training.datasets.layout import DatasetError
-from swarm_forage_env.training.datasets.reading import TrajectoryDataset
+from swarm_forage_env.training.datasets import Dataset, DatasetError
 from swarm_forage_env.training.evaluations import read_evaluations
 from swarm_forage_env.training.plan import read_plan
 from tests.support.curve_tables import CROWDING
@@ -31,7 +30,7 @@ READERS: dict[str, tuple[Callable[[Path], Any], type[Exception]]] = {
     "packed.parquet": (read_study, RecordError),
     "failure.json": (read_failure, RecordError),
     "replay.html": (read_replays, ReplayError),
-    "dataset": (lambda place: list(TrajectoryDataset(place).chunks()), DatasetError),
+    "dataset": (lambda place: list(Dataset(place).runs()), DatasetError),
     "entry.json": (lambda file: read_entry(file, load_protocol(TINY)), BenchmarkError),
     "network.npz": (open_network, (NetworkError, ModelError)),
     "plan.json": (read_plan, ConfigError),

@@ -202,8 +202,9 @@ def test_damaged_files_are_named(tmp_path):
         arrays = dict(stored)
     damages = {
         "finite": {"rewards": arrays["rewards"] * np.nan},
-        "steps": {"active": arrays["active"][1:]},
-        "robots": {"observations": arrays["observations"][:, 1:]},
+        "active to be an array": {"active": arrays["active"][1:]},
+        "observations to be an array": {"observations": arrays["observations"][:, 1:]},
+        "actions to be an array": {"actions": arrays["actions"][1:]},
     }
     for told, change in damages.items():
         np.savez(run, **arrays | change)
