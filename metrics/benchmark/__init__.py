@@ -4,12 +4,12 @@ from .board import Board, board_of, draw_benchmark
 from .entry import BenchmarkQuestion, Entry, Training, benchmark_question, read_entry, run_benchmark
 from .protocol import BenchmarkError, Protocol, ProtocolWorld, load_protocol
 from .standing import Standing, reference_of, scripted_entries, standing_of
-from .verification import Verification, VerificationQuestion, verification_question
+from .verification import SAME, verify_entry
 
 __all__ = [
     "run_benchmark",
     "benchmark_question",
-    "verification_question",
+    "verify_entry",
     "load_protocol",
     "read_entry",
     "scripted_entries",
@@ -18,8 +18,6 @@ __all__ = [
     "board_of",
     "draw_benchmark",
     "BenchmarkQuestion",
-    "VerificationQuestion",
-    "Verification",
     "Board",
     "Protocol",
     "ProtocolWorld",
@@ -27,4 +25,5 @@ __all__ = [
     "Training",
     "Standing",
     "BenchmarkError",
+    "SAME",
 ]

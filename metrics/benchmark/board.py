@@ -164,7 +164,6 @@ def _mapping(standing: Standing) -> dict[str, Any]:
         "calm": plain(standing.calm),
         "disturbed": plain(standing.disturbed),
         "training_worlds": plain(standing.training),
-        "groups": {name: plain(value) for name, value in standing.groups.items()},
         "interference": plain(standing.interference),
         "by_policy": [plain(value) for value in standing.by_policy],
         "worlds_won_by_policy": [*standing.won_by_policy],

@@ -21,7 +21,7 @@ FOLDER = Path(__file__).parent
 """Where the protocol is, and in `scripted` the entries of the scripted controllers."""
 OPEN = "open"
 """The track without a budget."""
-_KEYS = ("physics", "horizon_s", "interval_s", "seeds", "trainings", "tracks", "quick", "set", "training", "group")
+_KEYS = ("physics", "horizon_s", "interval_s", "seeds", "trainings", "tracks", "quick", "training", "group")
 _TRAINING_KEYS = ("name", "scenario", "set")
 _GROUP_KEYS = ("name", "scenario", "set", "sizes", "disturbed", "variants")
 
@@ -74,8 +74,6 @@ class Protocol:
     seeds: tuple[int, ...]
     worlds: tuple[ProtocolWorld, ...]
     """The worlds to train in first."""
-    groups: tuple[str, ...]
-    """Names of the groups of held-out worlds."""
     tracks: Mapping[str, int]
     """Track with a budget -> the most decisions that one training may take."""
     n_trainings: int
@@ -119,7 +117,7 @@ def _protocol(content: Mapping[str, Any], *, quick: bool) -> Protocol:
     from swarm_forage_env.runs.spec import identity_of
 
     known_keys(content, _KEYS, "key of a protocol")
-    chosen = {name: content[name] for name in ("physics", "horizon_s", "interval_s", "seeds")} | content.get("set", {})
+    chosen = {name: content[name] for name in ("physics", "horizon_s", "interval_s", "seeds")}
     if quick:
         known_keys(content["quick"], ("horizon_s", "seeds"), prefix="quick.")
         chosen |= content["quick"]
@@ -140,7 +138,6 @@ def _protocol(content: Mapping[str, Any], *, quick: bool) -> Protocol:
         interval_s=chosen["interval_s"],
         seeds=seeds,
         worlds=tuple(worlds),
-        groups=tuple(entry["name"] for entry in content["group"]),
         tracks=content["tracks"],
         n_trainings=content["trainings"],
     )

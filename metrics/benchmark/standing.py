@@ -11,7 +11,6 @@ entry runs.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -60,8 +59,6 @@ class Standing:
     disturbed: float
     training: float
     """The same over the training worlds."""
-    groups: dict[str, float]
-    """Group -> the same over its worlds."""
     interference: float
     """Share of robot time lost in held-out worlds, mean over runs."""
     by_policy: tuple[float, ...]
@@ -70,18 +67,16 @@ class Standing:
     """Number of held-out worlds that each policy wins, where there are several."""
 
 
-def scripted_entries(protocol: Protocol, folder: Path | None = None) -> tuple[Entry, ...]:
+def scripted_entries(protocol: Protocol) -> tuple[Entry, ...]:
     """Return the entries of the scripted controllers, which come with the package.
 
     Args:
         protocol: The full protocol, not the quick one.
-        folder: Where they are; default in the package.
 
     Raises:
         BenchmarkError: one is missing, or belongs to another protocol.
     """
-    place = folder or scripted_folder()
-    return tuple(read_entry(place / f"{name}.json", protocol) for name in PAPER_POLICIES)
+    return tuple(read_entry(scripted_folder() / f"{name}.json", protocol) for name in PAPER_POLICIES)
 
 
 def reference_of(scripted: Sequence[Entry], protocol: Protocol) -> Reference:
@@ -148,7 +143,6 @@ def standing_of(entry: Entry, reference: Reference, protocol: Protocol) -> Stand
         calm=middle(lambda world: world.counts and not world.is_disturbed),
         disturbed=middle(lambda world: world.counts and world.is_disturbed),
         training=middle(lambda world: not world.is_held_out),
-        groups={group: middle(lambda world, of=group: world.group == of) for group in protocol.groups},
         interference=float(np.mean([entry.interference(world.name).mean() for world in counting])),
         by_policy=tuple(each.value for each in by_policy),
         won_by_policy=tuple(won) if len(won) > 1 else (),

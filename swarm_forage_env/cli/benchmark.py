@@ -130,16 +130,14 @@ def verify(
         int, typer.Option("--worlds", min=1, help="How many worlds to draw, counted for each policy.")
     ] = 8,
     jobs: Jobs = None,
-    as_json: AsJson = False,
 ) -> None:
     """Make runs of an entry again and say whether its numbers come out; exit code 1 if not."""
-    from metrics.benchmark import verification_question
-    from metrics.scoring.question import ask
-    from swarm_forage_env.cli.printer import show as print_answer
+    from metrics.benchmark import SAME, verify_entry
+    from swarm_forage_env._internal.wording import printable
 
-    answer = ask(verification_question(entry, policy or (), n_worlds=n_worlds), jobs=jobs)
-    print_answer(answer, as_json=as_json)
-    if not answer.is_same:
+    again = verify_entry(entry, policy or (), n_worlds=n_worlds, jobs=jobs)
+    typer.echo(printable(again.text()))
+    if any(row[-1] != SAME for row in again.rows):
         raise typer.Exit(EXIT_FAILURE)
 
 
