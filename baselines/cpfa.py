@@ -9,9 +9,6 @@ one of these stages of a trip; all else is as in `crw`, with the same steering:
              at random                                                                             -> GIVE_UP
     GIVE_UP  straight to the nest, with nothing; sees it                                           -> CHOOSE
 
-Where robots can send messages, one that has found much tells the others where (`tell_site`), and one that knows no site
-goes to the place of which it hears (`hear_of_site`): the paper's pheromone waypoints.
-
 Source: [Hecker and Moses 2015], section 3. What is "ours" below, the paper leaves open or has in another way for its
 robots; docs/controllers.md lists it.
 """
@@ -26,7 +23,7 @@ import numpy as np
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.detection import sees_object
 from swarm_forage_env.contract.layout import GROUND_SENSORS, WINDOW_CELLS
-from swarm_forage_env.contract.policy import COMMANDS, Memories, RobotStates, SwarmSpec
+from swarm_forage_env.contract.policy import Memories, RobotStates, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, IntArray, ObsArray, Row
 
 from .machines import (
@@ -44,7 +41,6 @@ from .parameters import ControllerParameters, ParameterError, chosen_parameters,
 from .robots import (
     ACQUIRE,
     ACTIVITY_WORDS,
-    DRAW_RESTART,
     DRAW_WANDER,
     DRAWS,
     HOMING,
@@ -87,13 +83,6 @@ DRAW_TURN = DRAWS + 1
 DRAW_TURN_SIDE = DRAWS + 2
 """Draw column: the same turn's second number."""
 CPFA_DRAWS = DRAWS + 3
-DRAW_TELL = DRAW_RESTART
-"""Draw column: whether it speaks in this tick. No robot of CPFA draws from it otherwise, as none explores; a column of
-its own would change the runs of robots that send no messages."""
-SITE_MESSAGE = 3
-"""Numbers of a message about a site: 1, and where it is, as in the slice `position`. All are 0 of who says nothing."""
-NO_MESSAGES = -1
-"""Column of messages where robots send none, or shorter ones."""
 _WINDOW = WINDOW_CELLS * WINDOW_CELLS
 _REACH = WINDOW_CELLS // 2
 
@@ -106,8 +95,7 @@ TRIP_FIELDS: list[tuple[str, type]] = [
     ("step_ticks", np.int32),  # left of a step of the search
     ("stage", np.int8),
     ("has_site", np.bool_),  # whether the last trip found an object
-    ("is_informed", np.bool_),  # whether this trip goes to the site, or to one of which it has heard
-    ("tells_site", np.bool_),  # whether it tells others of its site
+    ("is_informed", np.bool_),  # whether this trip goes to the site
 ]
 """What a robot keeps beside `robots.ROBOT_FIELDS`."""
 
@@ -129,11 +117,6 @@ class CPFAParameters(ControllerParameters):
     """lambda_id: rate at which the turns of an informed search become those of any other, per tick."""
     site_fidelity_rate: float = 0.0293
     """lambda_sf: the larger, the more objects a robot must have seen at a place to return there, 0 to 20."""
-    waypoint_rate: float = 4.0
-    """lambda_lp: the larger, the more objects a robot must have seen at a place to tell others of it, 0 to 20."""
-    tell_per_tick: float = 0.05
-    """Chance that such a robot speaks in a tick, 0 to 1; ours: robots hear means, so those who speak at the same time
-    of different sites blur each other."""
     search_step_s: float = 1.2
     """Time between two turns of a search, without that of turning on the spot; ours: 11 cm at the speed of a search."""
     site_tolerance_m: float = 0.2
@@ -151,8 +134,6 @@ class CPFAParameters(ControllerParameters):
             ("give_up_per_tick", 1.0),
             ("uninformed_turn_rad", WIDEST_TURN_RAD),
             ("site_fidelity_rate", 20.0),
-            ("waypoint_rate", 20.0),
-            ("tell_per_tick", 1.0),
         ):
             if getattr(self, name) > most:
                 raise ParameterError(f"Expected {name} <= {most:g}, got {getattr(self, name)}.")
@@ -246,18 +227,15 @@ def keep_course(robot: np.record, row: Row, c: np.record) -> None:
 def give_up(robot: np.record, senses: Senses, c: np.record) -> None:
     """Go home with nothing, and forget the site."""
     robot.stage = GIVE_UP
-    robot.has_site = robot.tells_site = False
+    robot.has_site = False
     robot.goal_x_m, robot.goal_y_m = nearest_nest(senses.x, senses.y, c)
     robot.goal_tolerance_m = c.site_tolerance_m
     start_vector(robot)
 
 
 @kernel
-def remember_site(robot: np.record, senses: Senses, row: Row, c: np.record, u: float) -> None:
-    """Remember where the robot has just picked up an object, and how many others it sees there.
-
-    It tells others of the site with the probability POIS(c, lambda_lp); `u`, uniform in [0, 1), decides.
-    """
+def remember_site(robot: np.record, senses: Senses, row: Row, c: np.record) -> None:
+    """Remember where the robot has just picked up an object, and how many others it sees there."""
     robot.has_site = True
     robot.site_x_m = senses.x
     robot.site_y_m = senses.y
@@ -265,44 +243,6 @@ def remember_site(robot: np.record, senses: Senses, row: Row, c: np.record, u: f
     for k in range(_WINDOW):
         if row[c.los_object + k] > 0.0:
             robot.n_nearby += 1
-    robot.tells_site = poisson_cdf(robot.n_nearby, c.waypoint_rate) > u
-
-
-@kernel
-def tell_site(robot: np.record, c: np.record, u: float, action: Row) -> None:
-    """Write the message: in some ticks, by `u` uniform in [0, 1), where the site is; in others nothing."""
-    speaks = robot.tells_site and u < c.tell_per_tick
-    action[COMMANDS] = 1.0 if speaks else 0.0
-    action[COMMANDS + 1] = robot.site_x_m / c.half_width_m - 1.0 if speaks else 0.0
-    action[COMMANDS + 2] = robot.site_y_m / c.half_height_m - 1.0 if speaks else 0.0
-
-
-@kernel
-def _inside(place: float, half_side_m: float, margin_m: float) -> float:
-    """A place told as a share of half a side from the middle, in m, and at least `margin_m` from both walls."""
-    return min(max((place + 1.0) * half_side_m, margin_m), 2.0 * half_side_m - margin_m)
-
-
-@kernel
-def hear_of_site(robot: np.record, row: Row, c: np.record) -> None:
-    """Set out for the site of which others tell, if the robot knows none and sees no object to go to.
-
-    A robot hears means over all in range, so the place is that of the speakers after division by their share. Noise may
-    put it beyond a wall, where nobody arrives.
-    """
-    if robot.activity != ACQUIRE or robot.has_site or robot.is_informed:
-        return
-    if robot.stage == SEARCH and robot.vector_state != VECTOR_IDLE:
-        return
-    speaking = float(row[c.messages])
-    if speaking <= 0.0:
-        return
-    robot.goal_x_m = _inside(float(row[c.messages + 1]) / speaking, c.half_width_m, c.wall_margin_m)
-    robot.goal_y_m = _inside(float(row[c.messages + 2]) / speaking, c.half_height_m, c.wall_margin_m)
-    robot.goal_tolerance_m = c.site_tolerance_m
-    robot.is_informed = True
-    robot.stage = TRAVEL
-    start_vector(robot)
 
 
 @kernel
@@ -408,12 +348,9 @@ def step_cpfa(
         senses = sense(row, c)
         before = robot.activity
         if follow_cargo(robot, senses, row, c, HOMING, ACQUIRE):
-            remember_site(robot, senses, row, c, draws[i, DRAW_DECISION])
+            remember_site(robot, senses, row, c)
         elif robot.activity == ACQUIRE and HOMING <= before <= WAIT_DROP:
             robot.stage = CHOOSE  # it has delivered, or lost its cargo
-        if c.messages >= 0:
-            hear_of_site(robot, row, c)
-            tell_site(robot, c, draws[i, DRAW_TELL], action)
         if robot.activity == ACQUIRE:
             found, x, y = go_on_a_trip(robot, senses, row, c, draws[i])
             if found:
@@ -450,7 +387,6 @@ class CPFAPolicy(ScriptedPolicy):
         "event",
         "los_cell",
         "los_object",
-        "messages if any",
     )
     _kernel = staticmethod(step_cpfa)
 
@@ -460,8 +396,7 @@ class CPFAPolicy(ScriptedPolicy):
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run: every robot sets out from where it stands, in a direction of its own."""
         step_ticks = max(1, round(self.parameters.search_step_s / spec.dt_s)) - 1  # after the tick of the turn
-        messages = spec.layout["messages"].start if spec.message_size >= SITE_MESSAGE else NO_MESSAGES
-        constants = kernel_constants(self.parameters, spec, search_step_ticks=step_ticks, messages=messages)
+        constants = kernel_constants(self.parameters, spec, search_step_ticks=step_ticks)
         self._start_script(spec, rng, CPFA_DRAWS, constants, new_robots(spec.n_robots, TRIP_FIELDS))
 
     @property

@@ -26,7 +26,6 @@ TESTS = (
     "tests/world/test_kinds.py",
     "tests/world/test_neighbourhood.py",
     "tests/world/test_lockstep.py",
-    "tests/wrappers/test_messages.py",
     "tests/wrappers/test_noise.py",
 )
 CHOICE = (

@@ -84,8 +84,6 @@ from .wrappers.population import PopulationDynamics as PopulationDynamics
 from .wrappers.population import PopulationConfig as PopulationConfig
 from .wrappers.handling import HandlingCost as HandlingCost
 from .wrappers.handling import HandlingCostConfig as HandlingCostConfig
-from .wrappers.noise import MessageNoise as MessageNoise
-from .wrappers.noise import MessageNoiseConfig as MessageNoiseConfig
 from .wrappers.waveform import Waveform as Waveform
 
 # what observations, actions and events mean

@@ -25,7 +25,6 @@ class Stream(IntEnum):
     SENSOR_NOISE = 6
     ACTUATOR_NOISE = 7
     POPULATION = 8
-    MESSAGE_NOISE = 9
     SCENARIO = 12
     TURN = 13
 

@@ -10,7 +10,7 @@ import numpy as np
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.codes import Task
-from swarm_forage_env.contract.layout import LIGHT_IF_CARRYING, MESSAGES, MESSAGES_IF_ANY, ObservationLayout
+from swarm_forage_env.contract.layout import LIGHT_IF_CARRYING, ObservationLayout
 from swarm_forage_env.contract.policy import Policy, SwarmSpec, sees_world
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.env import ForageEnv
@@ -220,9 +220,9 @@ def _checked_statements(policy: Policy, layout: ObservationLayout) -> tuple[str,
     if isinstance(reads, str):
         raise CheckError(f"Expected reads as a tuple of names of slices, got {reads!r}; write ({reads!r},).")
     for name in reads:
-        if name not in (*layout.names, LIGHT_IF_CARRYING, MESSAGES_IF_ANY):
+        if name not in (*layout.names, LIGHT_IF_CARRYING):
             raise CheckError(
                 f"Expected reads to name slices of the observation, got {name!r}.{suggestion(str(name), layout.names)} "
                 f"Known: {', '.join(layout.names)}."
             )
-    return tuple(MESSAGES if name == MESSAGES_IF_ANY else name for name in reads)
+    return tuple(reads)

@@ -11,8 +11,6 @@ RING_SENSORS = 24
 """Proximity beams, and as many light sensors: on one ring, every 15 degrees, the first at 7.5 degrees to the left."""
 LIGHT_IF_CARRYING = "light if carrying"
 """Entry of `reads`: light is read in rows of robots that carry; the others may stay zero."""
-MESSAGES_IF_ANY = "messages if any"
-"""Entry of `reads`: messages are read in scenarios that have them; the policy also runs in others."""
 GROUND_SENSORS = 4
 WINDOW_CELLS = WINDOWS_CELLS[-1]
 """Side of the square line-of-sight window, in cells (1.0 m)."""
@@ -157,7 +155,7 @@ def observation_layout(
 def neighbours_row(n_seen: int, range_m: float) -> LayoutRow:
     """Return the slice of the `n_seen` nearest robots within `range_m` metres."""
     meaning = f"{n_seen} nearest robots: forward, left / {range_m:g} m, 1 if carrying, 1 if there is one"
-    return NEIGHBOURS, (range_m, range_m, 1.0, 1.0) * n_seen, NEIGHBOURS, meaning
+    return NEIGHBOURS, (range_m, range_m, 1.0, 1.0) * n_seen, "", meaning
 
 
 def messages_row(message_size: int) -> LayoutRow:

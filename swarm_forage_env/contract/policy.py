@@ -252,8 +252,7 @@ class Policy(Protocol):
     policy that has it is a yardstick and no contestant, so that `check_policy` and the benchmark refuse it;
     `compiled() -> CompiledPolicy | None`, for runs without Python between ticks (`KernelPolicy` has it); the class
     attributes `caches` ("none", "static", "dynamic": those that the policy is made for) and `reads` (names of the
-    slices it looks at; default all; "light if carrying" = light only of robots that carry, "messages if any" = messages
-    in scenarios that have them).
+    slices it looks at; default all; "light if carrying" = light only of robots that carry).
     """
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:

@@ -17,7 +17,6 @@ from swarm_forage_env.contract.layout import (
     KIND,
     LIGHT_IF_CARRYING,
     MESSAGES,
-    MESSAGES_IF_ANY,
     NEIGHBOURS,
     ObservationLayout,
 )
@@ -60,10 +59,8 @@ def read_slices(reads: Collection[str] | None, layout: ObservationLayout) -> tup
                 f"Expected a scenario with the own sensor {name!r}, which the policy reads, got one without; give it "
                 f"own_sensors=({name!r},), on the command line --set own_sensors={name}."
             )
-        known_name("entry of reads", name, (*layout.names, LIGHT_IF_CARRYING, MESSAGES_IF_ANY))
-    plain = {LIGHT_IF_CARRYING: "light", MESSAGES_IF_ANY: MESSAGES}
-    names = (plain.get(name, name) for name in reads)
-    return tuple(name for name in names if name in layout.names)
+        known_name("entry of reads", name, (*layout.names, LIGHT_IF_CARRYING))
+    return tuple("light" if name == LIGHT_IF_CARRYING else name for name in reads)
 
 
 def light_of_carriers_only(reads: Collection[str] | None) -> bool:

@@ -28,7 +28,6 @@ STACK_ORDER = (
     "Throttle",
     "ActuatorNoise",
     "HandlingCost",
-    "MessageNoise",
     "ForageEnv",
 )
 """The documented stack, outermost first; `SwarmWrapper.stack_position` counts along it."""

@@ -1,16 +1,14 @@
-"""Noise on what robots sense, on what their wheels do, and on what they hear from each other, with loss of it."""
+"""Noise on what robots sense, and on what their wheels do."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from math import sqrt
 from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError, known_name, number, one_of, several, table
+from swarm_forage_env._internal.fields import known_name, several, table
 from swarm_forage_env._internal.rng import Stream, stream_rng
-from swarm_forage_env.contract.layout import MESSAGES, NEIGHBOUR_FIELDS, NEIGHBOURS
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import from_mapping
@@ -19,11 +17,9 @@ from swarm_forage_env.world.kernels.disturbances import (
     Noise,
     disturb,
     draw_bits,
-    garble,
     new_lanes,
     noisy_gain,
     room_for_draws,
-    shift_neighbours,
 )
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 from swarm_forage_env.wrappers.waveform import (
@@ -40,19 +36,13 @@ from swarm_forage_env.wrappers.waveform import (
 
 NOISE_GROUPS = ("proximity", "light", "ground", "wheel_speed", "position", "heading")
 """Groups of sensors that can be noisy, in the order of their columns."""
-NAMED_GROUPS = (NEIGHBOURS,)
-"""Groups that are noisy only where they are named, because few scenarios have them."""
-ALL_GROUPS = (*NOISE_GROUPS, *NAMED_GROUPS)
 POSE_GROUPS = NOISE_GROUPS[4:]
 """Groups that the authors' program leaves exact (quirk `pose_sensors_exact`); the paper speaks of all sensors."""
-DISTRIBUTIONS = ("gaussian", "uniform")
 
 _READINGS = ("proximity", "light", "ground")
 """Groups with values in [0, 1]; those of the others lie in [-1, 1]."""
 _NATURAL_UNITS = {"wheel_speed": 0.01}
 """What sigma = 1 is in the natural unit of a group's columns: 1 cm/s in m/s; for the others 1 (reading, m, rad)."""
-_UNIFORM_WIDTH = 2.0 * sqrt(3.0)
-"""Width of a uniform distribution with standard deviation 1."""
 
 
 _Span: TypeAlias = tuple[int, int, int, int]
@@ -75,9 +65,8 @@ class SensorNoise(SwarmWrapper):
     """Perturbs what policies see. The rules of the arena and the measure of interference use exact readings.
 
     Unit of sigma: 1 for readings (proximity, light, ground; clamped to [0, 1]), 1 cm/s for wheel speeds and 1 m per
-    axis for positions (both clamped to the ends of their range), 1 rad for the heading, whose angle is perturbed. Where
-    the group `neighbours` is named, 1 is 1 m forward and left to each neighbour that is seen; nobody is seen wrongly or
-    overlooked. All other columns stay exact, rows of robots that are not present stay zero.
+    axis for positions (both clamped to the ends of their range), 1 rad for the heading, whose angle is perturbed. All
+    other columns stay exact, rows of robots that are not present stay zero.
 
     In every tick a number is drawn for each robot and noisy column, whether it is used or not. So a death, the policy's
     choice of slices and the size of sigma do not change the draws of other robots and columns.
@@ -89,32 +78,22 @@ class SensorNoise(SwarmWrapper):
     stack_position: ClassVar[int] = 1
 
     def __init__(self, env: ForageEnv | SwarmWrapper, config: "SensorNoiseConfig") -> None:
-        """Wrap `env`; raises ConfigError as `reconfigure`."""
+        """Wrap `env`."""
         super().__init__(env, config)
         self._proximity = self.unwrapped.layout.part("proximity").start
         self._behind_counts = self.unwrapped.scenario.quirks.obstacle_behind_counts
         self.reconfigure(config)
 
     def reconfigure(self, config: "SensorNoiseConfig") -> None:
-        """Go on under another configuration from the next tick on; with other noisy groups, all draws are others.
-
-        Raises:
-            ConfigError: noise on neighbours where robots see none.
-        """
-        if NEIGHBOURS in config.group_sigmas() and not self.unwrapped.scenario.robots.neighbours_seen:
-            raise ConfigError(
-                "Expected a scenario in which robots see neighbours, for noise on them; give it neighbours_seen, or "
-                "leave the group out."
-            )
+        """Go on under another configuration from the next tick on; with other noisy groups, all draws are others."""
         self.made_from = config
-        is_uniform = config.distribution == "uniform"
         exact = POSE_GROUPS if self.unwrapped.scenario.quirks.pose_sensors_exact else ()
         sigmas = config.group_sigmas().items()
         noisy = {name: sigma for name, sigma in sigmas if is_noisy(sigma) and name not in exact}
-        self._place_groups(noisy, is_uniform=is_uniform)
+        self._place_groups(noisy)
         self._draws = room_for_draws(self.unwrapped.scenario.robots.n_robots * len(self._units))
 
-    def _place_groups(self, sigmas: dict[str, Sigma], *, is_uniform: bool) -> None:
+    def _place_groups(self, sigmas: dict[str, Sigma]) -> None:
         """Give each noisy group its columns of the draws, in a fixed order, and the factors from draws to noise."""
         parts = {part.noise_group: part for part in self.unwrapped.layout if part.noise_group in sigmas}
         units: list[float] = []
@@ -123,8 +102,7 @@ class SensorNoise(SwarmWrapper):
         constant: list[float] = []
         self._varying: list[tuple[slice, WaveformAhead]] = []
         heading = 0, NOT_NOISY
-        self._neighbours: tuple[int, int, int] | None = None
-        for name in (name for name in ALL_GROUPS if name in sigmas):
+        for name in (name for name in NOISE_GROUPS if name in sigmas):
             part, sigma, first = parts[name], sigmas[name], len(units)
             # Other slices are not read, and the environment does not rewrite them: noise would add up there.
             is_read = part.name in self.unwrapped.arena.reads
@@ -132,10 +110,6 @@ class SensorNoise(SwarmWrapper):
                 units.append(1.0)
                 if is_read:
                     heading = part.start, first
-            elif name == NEIGHBOURS:
-                n_seen = part.size // NEIGHBOUR_FIELDS
-                units += [1.0 / part.scale[0]] * (2 * n_seen)
-                self._neighbours = (part.start, first, n_seen) if is_read else None
             else:
                 units += [_NATURAL_UNITS.get(name, 1.0) / scale for scale in part.scale]
                 if is_read:
@@ -147,9 +121,9 @@ class SensorNoise(SwarmWrapper):
                 signal = sigma.signal(self.unwrapped.scenario.dt_s)
                 self._varying.append((slice(first, len(units)), WaveformAhead(signal)))
             constant += [0.0 if isinstance(sigma, Waveform) else sigma] * (len(units) - first)
-        self._units: ObsArray = np.array(units, np.float32) * np.float32(_UNIFORM_WIDTH if is_uniform else 1.0)
+        self._units: ObsArray = np.array(units, np.float32)
         self._constant: ObsArray = np.array(constant, np.float32) * self._units
-        self._noise = Noise(is_uniform, np.array(spans, np.int32).reshape(-1, 4), np.array(lows, np.float32), heading)
+        self._noise = Noise(np.array(spans, np.int32).reshape(-1, 4), np.array(lows, np.float32), heading)
 
     def _factors(self, tick: int, n_ticks: int) -> ObsArray:
         """Return the factors (n_ticks, C) from draws to noise of some ticks, or (1, C) where they do not change."""
@@ -183,8 +157,6 @@ class SensorNoise(SwarmWrapper):
             self._proximity,
             self._behind_counts,
         )
-        if self._neighbours is not None:
-            shift_neighbours(obs, self._draws, self._noise.is_uniform, factors, *self._neighbours)
         return obs
 
     def after_step(self, tasks: CodeArray | None, terminated: BoolArray, truncated: bool) -> None:
@@ -193,8 +165,6 @@ class SensorNoise(SwarmWrapper):
 
     def ahead(self, n_ticks: int) -> tuple[int, dict[str, Any]]:
         """Return what disturbs the observations after the coming ticks."""
-        if self._neighbours is not None:
-            return 0, {}
         tick = self.unwrapped.tick + 1
         n_ticks = min([n_ticks, *(len(waveform.of(tick)) for _, waveform in self._varying)])
         return n_ticks, {
@@ -230,10 +200,8 @@ class ActuatorNoise(SwarmWrapper):
         """Go on under another configuration from the next tick on."""
         self.made_from = config
         sigma = config.sigma
-        self._is_uniform = config.distribution == "uniform"
         self._is_noisy = is_noisy(sigma)
-        width = _UNIFORM_WIDTH if self._is_uniform else 1.0
-        self._factors = WaveformAhead(partial(_factor, sigma_signal(sigma, self.unwrapped.scenario.dt_s), width))
+        self._factors = WaveformAhead(partial(_factor, sigma_signal(sigma, self.unwrapped.scenario.dt_s)))
 
     def on_reset(self, seed: int) -> None:
         """Start the random stream."""
@@ -246,7 +214,7 @@ class ActuatorNoise(SwarmWrapper):
         outer_gain = self._unit_gain if wheel_gain is None else wheel_gain
         draw_bits(self._lanes, self._draws)
         factor = self._factors.of(self.unwrapped.tick + 1)[0]
-        noisy_gain(self._draws, self._is_uniform, factor, outer_gain, self._gain)
+        noisy_gain(self._draws, factor, outer_gain, self._gain)
         return self._gain
 
     def ahead(self, n_ticks: int) -> tuple[int, dict[str, Any]]:
@@ -258,60 +226,13 @@ class ActuatorNoise(SwarmWrapper):
             "wheel_lanes": self._lanes,
             "wheel_draws": self._draws,
             "wheel_factors": factors,
-            "wheels_uniform": self._is_uniform,
             "gain": self._gain,
         }
 
 
-def _factor(signal: Signal, width: float, tick: int) -> float:
-    """Return the factor from draws to noise at a tick, for draws of standard deviation 1 / width."""
-    return max(0.0, signal(tick)) * width
-
-
-class MessageNoise(SwarmWrapper):
-    """Disturbs the slice `messages`: in each tick a robot hears nothing with some probability, else Gaussian noise.
-
-    Both happen where a message is heard, so two robots may hear the same one differently. In every tick numbers are
-    drawn for all robots, whether they are used or not.
-    """
-
-    stack_position: ClassVar[int] = 6
-
-    def __init__(self, env: ForageEnv | SwarmWrapper, config: "MessageNoiseConfig") -> None:
-        """Wrap `env`.
-
-        Raises:
-            ConfigError: a scenario without messages.
-        """
-        super().__init__(env, config)
-        robots = self.unwrapped.scenario.robots
-        if not robots.message_size:
-            raise ConfigError("Expected a scenario with messages for message_noise; give it message_size.")
-        self._size = robots.message_size
-        self._start = self.unwrapped.layout.part(MESSAGES).start
-        # A slice that is not read is not rewritten either: noise would add up there.
-        self._is_read = MESSAGES in self.unwrapped.arena.reads
-        self._n_robots = robots.n_robots
-        self.reconfigure(config)
-
-    def reconfigure(self, config: "MessageNoiseConfig") -> None:
-        """Go on under another configuration from the next tick on."""
-        self.made_from = config
-        self._signal = sigma_signal(config.sigma, self.unwrapped.scenario.dt_s)
-        self._loss = config.loss
-
-    def on_reset(self, seed: int) -> None:
-        """Start the random stream."""
-        self._rng = stream_rng(seed, Stream.MESSAGE_NOISE)
-
-    def observe(self, obs: ObsArray) -> ObsArray:
-        """Disturb `obs` in place."""
-        draws = self._rng.integers(2**32, size=(self._n_robots, self._size), dtype=np.uint32)
-        lost = self._rng.random(self._n_robots)
-        if self._is_read:
-            sigma = max(0.0, self._signal(self.unwrapped.tick))
-            garble(obs, draws, lost, self._start, sigma, self._loss, self._size)
-        return obs
+def _factor(signal: Signal, tick: int) -> float:
+    """Return the standard deviation at a tick; negative values count as 0."""
+    return max(0.0, signal(tick))
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -319,7 +240,7 @@ class SensorNoiseConfig(WrapperConfig):
     """A `SensorNoise` as data.
 
     Raises:
-        ConfigError: an unknown group or distribution, or a sigma that is negative or no number.
+        ConfigError: an unknown group, or a sigma that is negative or no number.
     """
 
     name: ClassVar[str] = "sensor_noise"
@@ -328,22 +249,19 @@ class SensorNoiseConfig(WrapperConfig):
     sigma: Sigma = 0.0
     """Standard deviation for all of `groups`, in the unit of each."""
     groups: tuple[str, ...] = NOISE_GROUPS
-    """Which of `ALL_GROUPS` are noisy; kept in that order."""
+    """Which of `NOISE_GROUPS` are noisy; kept in that order."""
     sigmas: Mapping[str, Sigma] = field(default_factory=dict, hash=False)
     """Group -> its own standard deviation, instead of `sigma`; the group need not be among `groups`."""
-    distribution: str = "gaussian"
-    """One of `DISTRIBUTIONS`; a uniform one has the same standard deviation (our choice)."""
     example: ClassVar[str] = "sigma=0.03"
 
     def __post_init__(self) -> None:
         several("sensor_noise.groups", self.groups, "names of sensors")
         for name in (*self.groups, *table("sensor_noise.sigmas", self.sigmas)):
-            known_name("group of sensors", name, ALL_GROUPS)
+            known_name("group of sensors", name, NOISE_GROUPS)
         check_sigma("sensor_noise.sigma", self.sigma)
         for name, sigma in self.sigmas.items():
             check_sigma(f"sensor_noise.sigmas.{name}", sigma)
-        one_of("sensor_noise.distribution", self.distribution, DISTRIBUTIONS)
-        object.__setattr__(self, "groups", tuple(name for name in ALL_GROUPS if name in self.groups))
+        object.__setattr__(self, "groups", tuple(name for name in NOISE_GROUPS if name in self.groups))
         object.__setattr__(self, "sigmas", dict(self.sigmas))
 
     def group_sigmas(self) -> dict[str, Sigma]:
@@ -359,7 +277,7 @@ class SensorNoiseConfig(WrapperConfig):
             f"sigma {sigma} ({'all sensors' if len(groups) == len(NOISE_GROUPS) else ', '.join(groups)})"
             for sigma, groups in by_sigma.items()
         ]
-        return f"{_distribution_in_words(self.distribution)}sensor noise: {'; '.join(parts)}"
+        return f"sensor noise: {'; '.join(parts)}"
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "SensorNoiseConfig":
@@ -384,7 +302,7 @@ class ActuatorNoiseConfig(WrapperConfig):
     """An `ActuatorNoise` as data.
 
     Raises:
-        ConfigError: an unknown distribution, or a sigma that is negative or no number.
+        ConfigError: a sigma that is negative or no number.
     """
 
     name: ClassVar[str] = "actuator_noise"
@@ -393,44 +311,14 @@ class ActuatorNoiseConfig(WrapperConfig):
 
     sigma: Sigma
     """Standard deviation of the factor on a wheel's speed."""
-    distribution: str = "gaussian"
-    """One of `DISTRIBUTIONS`; a uniform one has the same standard deviation (our choice)."""
     example: ClassVar[str] = "sigma=0.1"
 
     def __post_init__(self) -> None:
         check_sigma("actuator_noise.sigma", self.sigma)
-        one_of("actuator_noise.distribution", self.distribution, DISTRIBUTIONS)
 
     def in_words(self, dt_s: float) -> str:
         """Return how noisy wheels are; see `WrapperConfig.in_words`."""
-        return f"{_distribution_in_words(self.distribution)}wheel noise: sigma {sigma_in_words(self.sigma)}"
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class MessageNoiseConfig(WrapperConfig):
-    """A `MessageNoise` as data.
-
-    Raises:
-        ConfigError: a sigma that is negative or no number, or a loss that is no probability.
-    """
-
-    name: ClassVar[str] = "message_noise"
-    wrapper: ClassVar[type[SwarmWrapper]] = MessageNoise
-    waveform_field: ClassVar[str] = "sigma"
-
-    sigma: Sigma = 0.0
-    """Standard deviation of what is added to each number heard."""
-    loss: float = 0.0
-    """Probability, per robot and tick, that it hears nothing at all."""
-    example: ClassVar[str] = "sigma=0.1"
-
-    def __post_init__(self) -> None:
-        check_sigma("message_noise.sigma", self.sigma)
-        number("message_noise.loss", self.loss, at_least=0.0, at_most=1.0)
-
-    def in_words(self, dt_s: float) -> str:
-        """Return how noisy messages are, and how many are lost; see `WrapperConfig.in_words`."""
-        return f"message noise: sigma {sigma_in_words(self.sigma)}, {100 * self.loss:g} % lost"
+        return f"wheel noise: sigma {sigma_in_words(self.sigma)}"
 
 
 def noise_levels(
@@ -448,7 +336,3 @@ def noise_levels(
         (SensorNoiseConfig(sigma=sigma, groups=groups), ActuatorNoiseConfig(sigma=sigma))
         for sigma in np.linspace(0.0, sigma_max, n_levels).tolist()
     )
-
-
-def _distribution_in_words(distribution: str) -> str:
-    return "" if distribution == "gaussian" else f"{distribution} "

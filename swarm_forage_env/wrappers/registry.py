@@ -15,7 +15,6 @@ WRAPPERS: dict[str, str] = {
     "throttle": "swarm_forage_env.wrappers.throttle:ThrottleConfig",
     "actuator_noise": "swarm_forage_env.wrappers.noise:ActuatorNoiseConfig",
     "handling_cost": "swarm_forage_env.wrappers.handling:HandlingCostConfig",
-    "message_noise": "swarm_forage_env.wrappers.noise:MessageNoiseConfig",
 }
 """Name -> "module:class" of a `WrapperConfig`. Strings, so that reading a specification imports only what it names."""
 

@@ -19,9 +19,7 @@ from baselines.cpfa import (
 )
 from baselines.parameters import ParameterError, kernel_constants
 from baselines.robots import ACTIVITY_WORDS, Activity, new_robots, sense
-from swarm_forage_env import RobotKind, plan_run, run_one, scenario
 from swarm_forage_env.contract.codes import Event, Grip
-from swarm_forage_env.contract.layout import messages_row, observation_layout
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
 from tests.baselines.test_controller_twins import Fuzz
 from tests.reference.cpfa import CPFARobot
@@ -308,8 +306,6 @@ def test_what_carries_is_described_as_in_other_controllers():
         {"search_per_tick": 1.1},
         {"give_up_per_tick": 2.0},
         {"uninformed_turn_rad": 13.0},
-        {"waypoint_rate": 21.0},
-        {"tell_per_tick": 1.5},
     ],
 )
 def test_values_that_make_no_sense_are_refused(values):
@@ -318,149 +314,27 @@ def test_values_that_make_no_sense_are_refused(values):
         CPFAParameters(**values)
 
 
-def talking_spec(n_robots=1, message_size=3, **changes):
-    """The task of robots that send messages."""
-    layout = observation_layout(32.0, 16.0, 200, (messages_row(message_size),))
-    return make_spec(n_robots, message_size=message_size, layout=layout, **changes)
-
-
-def hear(robot, place, share=1.0):
-    """Let a robot hear of a place, from this share of the robots in range."""
-    x, y = 2.0 * np.array(place) / (32.0, 16.0) - 1.0
-    robot.seen.set("messages", (share, share * x, share * y, 1.0))
-
-
-def test_who_has_found_much_says_where_now_and_then():
-    robot = Robot(talking_spec(), tell_per_tick=1.0)
-    assert robot.act()[3:].tolist() == [0.0, 0.0, 0.0]
-    robot.pick_up(n_nearby=20)
-    assert robot.act()[3:] == pytest.approx([1.0, 2.0 * 20.0 / 32.0 - 1.0, 0.0])
-    robot.policy._constants["tell_per_tick"] = 0.3
-    assert {robot.act()[3] for _ in range(30)} == {0.0, 1.0}
-    robot.policy._constants["tell_per_tick"] = 1.0
-    robot.deliver()
-    robot.arrive()
-    robot.policy._constants["give_up_per_tick"] = 1.0
-    robot.act(2)
-    assert robot.act()[3:].tolist() == [0.0, 0.0, 0.0], "it has forgotten the place"
-
-
-def test_who_has_found_little_says_nothing():
-    """POIS(0, 20) is 2e-9."""
-    robot = Robot(talking_spec(), tell_per_tick=1.0, waypoint_rate=20.0)
-    robot.act()
-    robot.pick_up(n_nearby=0)
-    assert robot.act()[3:].tolist() == [0.0, 0.0, 0.0]
-
-
-@pytest.mark.parametrize("share", [1.0, 0.125])
-def test_who_knows_no_place_goes_to_one_of_which_it_hears(share):
-    robot = Robot(talking_spec())
-    robot.act()
-    hear(robot, (24.0, 6.0), share)
-    robot.act()
-    assert robot.goal == pytest.approx((24.0, 6.0), abs=1e-5)
-    hear(robot, (28.0, 12.0))
-    robot.act()
-    assert robot.goal == pytest.approx((24.0, 6.0), abs=1e-5), "it is on its way"
-    robot.arrive()
-    assert robot.stage is Stage.SEARCH
-    assert robot.record["is_informed"]
-
-
-def test_a_place_beyond_a_wall_is_looked_for_before_it():
-    robot = Robot(talking_spec(), wall_margin_m=0.5)
-    robot.act()
-    robot.seen.set("messages", (0.1, 0.9, -0.3, 1.0))  # as noise can make it
-    robot.act()
-    assert robot.goal == pytest.approx((31.5, 0.5))
-
-
-def test_silence_tells_nothing():
-    robot = Robot(talking_spec())
-    robot.act()
-    goal = robot.goal
-    robot.seen.set("messages", (0.0, 0.0, 0.0, 1.0))
-    robot.act()
-    assert robot.goal == goal
-
-
-def test_who_knows_a_place_or_sees_an_object_does_not_follow_others():
-    robot, seeing = Robot(talking_spec()), Robot(talking_spec())
-    robot.act()
-    robot.pick_up(n_nearby=10)
-    robot.deliver()
-    hear(robot, (24.0, 6.0))
-    robot.act()
-    assert robot.goal == pytest.approx(SITE, abs=1e-5)
-    seeing.act()
-    seeing.arrive()
-    seeing.seen.window({(1, 0): 4})
-    seeing.act()
-    hear(seeing, (24.0, 6.0))
-    seeing.act()
-    assert math.dist(seeing.goal, (24.0, 6.0)) > 1.0
-    assert not seeing.record["is_informed"]
-
-
-@pytest.mark.compiled
-def test_messages_pay_where_a_place_is_hard_to_find():
-    """A heap of 2 x 2 m in a hall of 40 x 40 m; deaf robots run as those that send no messages, bit for bit."""
-    heap = tuple((x, y) for x in np.arange(30.1, 32.0, 0.2) for y in np.arange(28.1, 30.0, 0.2))
-    fields = {
-        "n_robots": 32,
-        "n_objects": 80,
-        "width_m": 40.0,
-        "height_m": 40.0,
-        "nest_centre_m": (20.0, 20.0),
-        "nest_size_m": (6.0, 6.0),
-        "placement": "positions",
-        "object_positions_m": heap,
-        "horizon_s": 3000.0,
-    }
-    talk = {"message_size": 3, "message_range_m": 10.0}
-    deaf = (RobotKind(name="deaf", lacks=("messages",)),)
-    told, untold, silent = (
-        run_one(plan_run(scenario("warehouse_medium", **fields, **more), "cpfa", seed=1)).performance
-        for more in (talk, {**talk, "robot_kinds": deaf}, {})
-    )
-    assert told.sum() > 1.3 * untold.sum() > 0
-    np.testing.assert_array_equal(untold, silent)
-
-
 OFTEN = {"search_per_tick": 0.1, "give_up_per_tick": 0.02, "site_fidelity_rate": 0.5, "informed_decay_per_tick": 0.05}
 
 
-@pytest.mark.parametrize(
-    ("quirks", "message_size"),
-    [(Quirks(), 0), (AUTHORS_PROGRAM, 0), (Quirks(), 3)],
-    ids=["as described", "authors' program", "with messages"],
-)
-def test_compiled_controller_acts_like_the_slow_one(quirks, message_size):
+@pytest.mark.parametrize("quirks", [Quirks(), AUTHORS_PROGRAM], ids=["as described", "authors' program"])
+def test_compiled_controller_acts_like_the_slow_one(quirks):
     n_robots = 6
-    spec = talking_spec(n_robots, message_size, quirks=quirks) if message_size else make_spec(n_robots, quirks=quirks)
+    spec = make_spec(n_robots, quirks=quirks)
     parameters = CPFAParameters(**OFTEN)
-    fuzz, policy = Fuzz(spec, seed=1 + message_size // 3), CPFAPolicy(parameters)
+    fuzz, policy = Fuzz(spec, seed=1), CPFAPolicy(parameters)
     policy.reset(spec, np.random.default_rng(2))
     draws_again = np.random.default_rng(2)
     twins = [CPFARobot(spec, parameters=parameters) for _ in range(n_robots)]
     met: set[tuple[str, str, bool]] = set()
-    spoken: set[float] = set()
     for _ in range(1500):
         for i, twin in enumerate(twins):
             fuzz.perturb(i, twin.goal)
-            if message_size:
-                speaking = fuzz.rng.choice([0.0, 0.25, 1.0], p=[0.9, 0.05, 0.05])
-                fuzz.seen.set("messages", speaking * np.resize([1.0, *fuzz.rng.uniform(-1, 1, 2)], message_size + 1), i)
         active = fuzz.rng.random(n_robots) < 0.95
         actions = policy.act(fuzz.seen.array, active)
         draws = draws_again.random((n_robots, CPFA_DRAWS))
         for i in np.flatnonzero(active):
             assert actions[i, :3] == pytest.approx(twins[i].act(fuzz.seen.array[i], draws[i]), abs=2e-6)
-            if message_size:
-                said = twins[i].message()
-                assert actions[i, 3:6] == pytest.approx(said, abs=2e-6)
-                spoken.add(said[0])
         robots = policy._robots
         assert [Stage(int(code)).name.lower().replace("_", " ") for code in robots["stage"]] == [
             twin.stage for twin in twins
@@ -470,4 +344,3 @@ def test_compiled_controller_acts_like_the_slow_one(quirks, message_size):
     for informed in (False, True):
         assert met >= {("search", "idle", informed), ("search", "vector", informed), ("travel", "vector", informed)}
     assert {stage for stage, _, _ in met} >= {"give up", "search", "travel"}
-    assert spoken == ({0.0, 1.0} if message_size else set())

@@ -20,7 +20,6 @@ def test_stream_numbers_are_stored_history():
         "SENSOR_NOISE": 6,
         "ACTUATOR_NOISE": 7,
         "POPULATION": 8,
-        "MESSAGE_NOISE": 9,
         "SCENARIO": 12,
         "TURN": 13,
     }

@@ -12,7 +12,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.layout import MESSAGES, NEIGHBOURS
 from swarm_forage_env.contract.policy import layout_for
 from swarm_forage_env.wrappers.world import World
-from tests.support.random_scenarios import random_scenario, random_wrappers
+from tests.support.random_scenarios import random_scenario
 from tests.support.random_worlds import random_world, visit
 
 pytestmark = pytest.mark.compiled
@@ -46,11 +46,10 @@ def test_every_kind_of_world_is_drawn():
         found["kinds"] += len(config.robots.robot_kinds) > 1
         lacking = {sensor for kind in config.robots.robot_kinds for sensor in kind.lacks}
         found["lacking messages or neighbours"] += not lacking.isdisjoint({MESSAGES, NEIGHBOURS} & _slices(config))
-        found["message noise"] += any(one.name == "message_noise" for one in random_wrappers(random, config))
         found[config.objects.placement] += 1
         found[config.caches] += 1
     assert found["valid"] > 60
-    robots = ("neighbours", "messages", "message noise", "kinds", "lacking messages or neighbours")
+    robots = ("neighbours", "messages", "kinds", "lacking messages or neighbours")
     assert min(found[name] for name in (*robots, "obstacles", "positions")) > 3
     assert min(found[name] for name in ("power_law", "quad_source", "none", "static", "dynamic")) > 3
 

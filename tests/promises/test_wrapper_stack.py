@@ -25,7 +25,6 @@ from swarm_forage_env.wrappers.handling import HandlingCostConfig
 from swarm_forage_env.wrappers.noise import (
     ActuatorNoise,
     ActuatorNoiseConfig,
-    MessageNoiseConfig,
     SensorNoise,
     SensorNoiseConfig,
 )
@@ -50,9 +49,8 @@ ACTIVE: dict[str, WrapperConfig] = {
     "throttle": ThrottleConfig(
         waveform=Waveform(kind="square", amplitude=0.4, offset=0.4, period_s=3.0), carriers=True
     ),
-    "actuator_noise": ActuatorNoiseConfig(sigma=0.3, distribution="uniform"),
+    "actuator_noise": ActuatorNoiseConfig(sigma=0.3),
     "handling_cost": HandlingCostConfig(waveform=Waveform(kind="square", amplitude=2.0, offset=3.0, period_s=3.0)),
-    "message_noise": MessageNoiseConfig(sigma=0.3, loss=0.2),
 }
 """One strong example of each wrapper."""
 
@@ -62,7 +60,6 @@ QUIET: dict[str, WrapperConfig] = {
     "throttle": ThrottleConfig(waveform=Waveform(kind="sine", amplitude=0.0, period_s=10.0)),
     "actuator_noise": ActuatorNoiseConfig(sigma=0.0),
     "handling_cost": HandlingCostConfig(waveform=Waveform(kind="sine", amplitude=0.0, period_s=10.0)),
-    "message_noise": MessageNoiseConfig(),
 }
 """Each wrapper with amplitudes, sigmas and rates of zero."""
 
@@ -300,10 +297,8 @@ def test_every_difference_between_wrappers_is_another_run():
             SensorNoiseConfig(sigma=0.03, groups=("proximity", "light"), sigmas={"position": 0.1}),
         ),
         (
-            "actuator_noise:sigma=sine,amplitude=0.1,offset=0.1,period_s=100,distribution=uniform",
-            ActuatorNoiseConfig(
-                sigma=Waveform(kind="sine", amplitude=0.1, offset=0.1, period_s=100), distribution="uniform"
-            ),
+            "actuator_noise:sigma=sine,amplitude=0.1,offset=0.1,period_s=100",
+            ActuatorNoiseConfig(sigma=Waveform(kind="sine", amplitude=0.1, offset=0.1, period_s=100)),
         ),
         (
             "population:death_per_tick=1e-4,initial_robots=20,deaths=absorbing",
@@ -368,8 +363,8 @@ def test_the_example_of_a_wrapper_works_and_does_something(name):
         ),
         ("sensor_noise:sigma=0.03", "sensor noise: sigma 0.03 (all sensors)"),
         (
-            "sensor_noise:sigma=0.03,groups=light+wheel_speed,sigmas.position=0.1,distribution=uniform",
-            "uniform sensor noise: sigma 0.03 (light, wheel speed); sigma 0.1 (position)",
+            "sensor_noise:sigma=0.03,groups=light+wheel_speed,sigmas.position=0.1",
+            "sensor noise: sigma 0.03 (light, wheel speed); sigma 0.1 (position)",
         ),
         (
             "actuator_noise:sigma=square,amplitude=0.2,offset=0.1,period_s=100",

@@ -51,7 +51,7 @@ def normal_of(uniform: np.ndarray) -> np.ndarray:
 
 def normal_of_bits(bits: np.ndarray) -> np.ndarray:
     """Standard normal numbers of random bits."""
-    return np.array([standard(each, False) for each in bits.ravel()], np.float32).reshape(bits.shape)
+    return np.array([standard(each) for each in bits.ravel()], np.float32).reshape(bits.shape)
 
 
 def noisy_row(
@@ -72,26 +72,6 @@ def noisy_row(
     angle = math.atan2(row[57], row[56]) + sigma * draws["heading"][0]
     noisy[56:58] = math.cos(angle), math.sin(angle)
     return noisy
-
-
-def shifted_neighbours(row: list[float], draws: list[float], sigma_m: float, range_m: float) -> list[float]:
-    """The four numbers of each neighbour with noise on forward and left; `draws` are two per neighbour."""
-    noisy: list[float] = []
-    for k in range(len(row) // 4):
-        forward, left, carrying, there = row[4 * k : 4 * k + 4]
-        if there:
-            forward += draws[2 * k] * sigma_m / range_m
-            left += draws[2 * k + 1] * sigma_m / range_m
-        noisy += [max(-1.0, min(1.0, forward)), max(-1.0, min(1.0, left)), carrying, there]
-    return noisy
-
-
-def garbled(row: list[float], draws: list[float], lost: float, sigma: float, loss: float) -> list[float]:
-    """What a robot hears of the mean message and the mark behind it."""
-    *heard, mark = row
-    if mark == 0.0 or lost < loss:
-        return [0.0] * len(row)
-    return [*(max(-1.0, min(1.0, number + sigma * draw)) for number, draw in zip(heard, draws, strict=True)), 1.0]
 
 
 class SlowPopulation:

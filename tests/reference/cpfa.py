@@ -10,7 +10,6 @@ from baselines.cpfa import CPFAParameters
 from tests.reference.controllers import ReferenceRobot, visible_objects, with_length
 
 DECISION, TURN, TURN_SIDE = 4, 5, 6
-TELL = 2
 STEP_TICKS = 5
 
 
@@ -27,8 +26,6 @@ class CPFARobot(ReferenceRobot):
     stage: str = "choose"
     site: tuple[tuple[float, float], int] | None = None
     """Where the last trip found an object, and how many others were there."""
-    tells: bool = False
-    """Whether it tells others of the site."""
     informed: bool = False
     course: complex = 1.0
     """Direction of the search."""
@@ -42,29 +39,8 @@ class CPFARobot(ReferenceRobot):
             self.restart()
         if before in ("acquire", "wait for pick-up") and self.state == "homing":
             self.site = (tuple(self.position), len(self.visible()))
-            self.tells = poisson_cdf(self.site[1], self.parameters.waypoint_rate) > self.draws[DECISION]
         if before in ("homing", "homing in nest", "wait for drop") and self.state == "acquire":
             self.stage = "choose"
-        if self.spec.message_size >= 3:
-            self.hear()
-
-    def hear(self) -> None:
-        """Set out for the place of which others tell."""
-        speaking, x, y = self.senses["messages"][:3]
-        is_free = self.state == "acquire" and self.site is None and not self.informed
-        if is_free and speaking > 0 and not (self.stage == "search" and self.vector != "idle"):
-            middle = np.array(self.spec.arena_size_m) / 2
-            place = middle + middle * np.array((x, y), dtype=np.float64) / float(speaking)
-            margin = self.parameters.wall_margin_m
-            self.head_for(tuple(np.clip(place, margin, 2 * middle - margin)), self.parameters.site_tolerance_m)
-            self.stage, self.informed = "travel", True
-
-    def message(self) -> tuple[float, float, float]:
-        """What it says in this tick."""
-        if not self.tells or self.draws[TELL] >= self.parameters.tell_per_tick:
-            return 0.0, 0.0, 0.0
-        width, height = self.spec.arena_size_m
-        return 1.0, 2.0 * self.site[0][0] / width - 1.0, 2.0 * self.site[0][1] / height - 1.0
 
     def visible(self) -> dict[tuple[int, int], int]:
         return visible_objects(self.spec, self.senses)[1]

@@ -143,14 +143,6 @@ TWINS = {
     "swarm_forage_env.world.kernels.disturbances.draw_bits": Twin(
         "adversity.noise_bits", "wrappers/test_noise.py", "swarm_forage_env.world.kernels.disturbances.draw_bits"
     ),
-    "swarm_forage_env.world.kernels.disturbances.garble": Twin(
-        "adversity.garbled", "wrappers/test_messages.py", "swarm_forage_env.wrappers.base.SwarmWrapper.step_batch"
-    ),
-    "swarm_forage_env.world.kernels.disturbances.shift_neighbours": Twin(
-        "adversity.shifted_neighbours",
-        "wrappers/test_messages.py",
-        "swarm_forage_env.wrappers.base.SwarmWrapper.step_batch",
-    ),
     "swarm_forage_env.world.kernels.counting.add_task_shares": Twin(
         "task_shares.task_shares",
         "wrappers/test_recorder.py",

@@ -26,7 +26,7 @@ POOLS = (
     (
         "sensor_noise:sigma=0.02",
         "sensor_noise:sigma=0",
-        "sensor_noise:sigma=0.05,distribution=uniform,groups=proximity+heading",
+        "sensor_noise:sigma=0.05,groups=proximity+heading",
         "sensor_noise:sigma=sine,amplitude=0.03,period_s=7,groups=light+ground+position",
     ),
     (
@@ -42,7 +42,7 @@ POOLS = (
     ),
     (
         "actuator_noise:sigma=0.2",
-        "actuator_noise:sigma=0.1,distribution=uniform",
+        "actuator_noise:sigma=0.1",
         "actuator_noise:sigma=step,amplitude=0.3,start_s=20",
         "actuator_noise:sigma=0",
     ),

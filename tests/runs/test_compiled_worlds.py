@@ -74,7 +74,6 @@ def assert_same_in_pieces(policy: Callable[[], Policy], world: ScenarioConfig, s
         pytest.param(policy, fields, id=f"{policy}-{name}")
         for policy in ("crw", "dpo", "cpfa", "stochx")
         for name, fields in WORLDS.items()
-        if (policy, name) != ("cpfa", "messages")  # it listens, tick by tick
     ],
 )
 def test_scripted_policies_do_the_same_in_pieces(policy, fields):

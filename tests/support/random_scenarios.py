@@ -14,10 +14,8 @@ from swarm_forage_env.views.sampler import SampledWorld, ScenarioSampler
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.handling import HandlingCostConfig
 from swarm_forage_env.wrappers.noise import (
-    DISTRIBUTIONS,
     NOISE_GROUPS,
     ActuatorNoiseConfig,
-    MessageNoiseConfig,
     SensorNoiseConfig,
 )
 from swarm_forage_env.wrappers.population import DEATHS, PopulationConfig
@@ -188,7 +186,6 @@ def random_wrappers(random: Random, config: ScenarioConfig) -> tuple[WrapperConf
         SensorNoiseConfig(
             sigma=_sigma(random),
             groups=tuple(random.sample(NOISE_GROUPS, random.randint(1, len(NOISE_GROUPS)))),
-            distribution=random.choice(DISTRIBUTIONS),
         ),
         PopulationConfig(
             death_per_tick=random.choice((0.0, rate)),
@@ -200,11 +197,9 @@ def random_wrappers(random: Random, config: ScenarioConfig) -> tuple[WrapperConf
             deaths=random.choice(DEATHS),
         ),
         ThrottleConfig(waveform=_waveform(random, 1.0), carriers=random.random() < 0.5),
-        ActuatorNoiseConfig(sigma=_sigma(random), distribution=random.choice(DISTRIBUTIONS)),
+        ActuatorNoiseConfig(sigma=_sigma(random)),
         HandlingCostConfig(waveform=_waveform(random, 40.0)),
     ]
-    if config.robots.message_size:
-        made.append(MessageNoiseConfig(sigma=_sigma(random), loss=random.choice((0.0, 1.0, random.random()))))
     return tuple(random.sample(made, random.choice((0, 0, 1, 2, 3, len(made)))))
 
 

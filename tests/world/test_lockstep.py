@@ -360,7 +360,7 @@ def test_a_stack_whose_step_was_replaced_is_stepped_by_it(monkeypatch):
     [
         (ADVERSITY, {"walk_probability": 0.05, "caches": "dynamic", "pickup_ticks": 3, "n_objects": 300}),
         (
-            ("message_noise:sigma=0.1,loss=0.2", "handling_cost:waveform=square,amplitude=5,offset=6,period_s=8"),
+            ("handling_cost:waveform=square,amplitude=5,offset=6,period_s=8",),
             {"message_size": 2, "neighbours_seen": 3, "neighbour_range_m": 3.0},
         ),
         ((), {"n_objects": 300}),

@@ -162,12 +162,10 @@ class OneByOne(ArenaBatch):
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize(
-    ("observation", "wrappers"), [("full", ()), ("compact", ("message_noise:sigma=0.1,loss=0.2",))]
-)
-def test_arenas_together_are_what_they_are_alone(observation, wrappers):
+@pytest.mark.parametrize("observation", ["full", "compact"])
+def test_arenas_together_are_what_they_are_alone(observation):
     world = scenario("warehouse_small", **SMALL | BOTH)
-    plan = plan_arena(world, interface={"observation": observation}, wrappers=wrappers, max_cycles=12)
+    plan = plan_arena(world, interface={"observation": observation}, max_cycles=12)
     batches = ArenaBatch(plan, 2), OneByOne(plan, 2)
     first = [batch.reset([3, 4], [None, None])[0] for batch in batches]
     np.testing.assert_array_equal(*first)

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarm_forage_env import check_policy
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import CELL_OBJECT, Event, Grip
 from swarm_forage_env.env import ForageEnv
@@ -219,15 +218,6 @@ def test_light_may_be_read_by_carriers_only():
     expected, obs = full.arena.observe(), partial.arena.observe()
     np.testing.assert_array_equal(obs[1, light], expected[1, light])
     assert not np.any(obs[[0, 2, 3], light])
-
-
-def test_messages_if_any_are_read_where_there_are_messages_and_asked_for_nowhere_else():
-    reads = ("position", "messages if any")
-    assert ForageEnv(scenario("warehouse_small", n_robots=4), reads=reads).arena.reads == ("position",)
-    talking = ForageEnv(scenario("warehouse_small", n_robots=4, message_size=3), reads=reads)
-    assert talking.arena.reads == ("position", "messages")
-    assert talking.arena.needs_python
-    check_policy("cpfa", scenario("warehouse_small", n_robots=4, message_size=3))
 
 
 def test_reading_nothing_leaves_the_dear_slices_out():

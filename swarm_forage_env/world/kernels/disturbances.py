@@ -1,4 +1,4 @@
-"""What wrappers do to robots in each tick: throttle, noise on wheels, on observations and on messages.
+"""What wrappers do to robots in each tick: throttle, noise on wheels, and on observations.
 
 Noise needs thousands of random numbers in every tick, so it has a generator of its own: xoshiro128+ (Blackman and
 Vigna, 2021), `LANES` of them side by side, because a processor works on many at a time. numpy takes four times as long.
@@ -15,7 +15,7 @@ from scipy.special import ndtri
 
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.detection import sees_obstacle
-from swarm_forage_env.contract.layout import NEIGHBOUR_FIELDS, RING_SENSORS
+from swarm_forage_env.contract.layout import RING_SENSORS
 from swarm_forage_env.contract.types import ActionArray, BitArray, BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.world.kernels.drive import limit_command, sinc_and_cosine
 from swarm_forage_env.world.kernels.kinds import blank
@@ -31,7 +31,6 @@ _OF_CELL, _WITHIN = np.uint32(20), np.uint32(8)
 """Of 32 bits the upper 12 say which cell, and the next 12 where in it."""
 _LAST, _ONE = np.uint32(_CELLS - 1), np.uint32(1)
 _STEP, _HALF_STEP = np.float32(1.0 / _CELLS), np.float32(0.5 / _CELLS)
-_UNIT, _HALF = np.float32(2.0**-24), np.float32(0.5)
 LANES = 64
 """Generators side by side: number k comes from the one of k modulo this."""
 _ALL_BITS = np.uint64(2**32 - 1)
@@ -43,8 +42,6 @@ NOT_NOISY = -1
 class Noise(NamedTuple):
     """Which columns of an observation are noisy, and how."""
 
-    is_uniform: bool
-    """Whether noise is uniform, else normal."""
     spans: IntArray
     """(S, 4) runs of neighbouring columns: first in obs, first in draws, length, 1 = only carriers read them."""
     lows: ObsArray
@@ -65,7 +62,7 @@ def room_for_draws(n_draws: int) -> BitArray:
 
 def no_noise() -> Noise:
     """Return noise on nothing."""
-    return Noise(False, np.zeros((0, 4), np.int32), np.zeros(0, np.float32), (0, NOT_NOISY))
+    return Noise(np.zeros((0, 4), np.int32), np.zeros(0, np.float32), (0, NOT_NOISY))
 
 
 class Disturbances(NamedTuple):
@@ -84,8 +81,6 @@ class Disturbances(NamedTuple):
     """(2 N or more,) scratch for its numbers."""
     wheel_factors: FloatArray = np.zeros(0)
     """(ticks,) see `noisy_gain`."""
-    wheels_uniform: bool = False
-    """Likewise."""
     gain: FloatArray = np.zeros((0, 2))
     """(N, 2) scratch for the gain of wheels; (0, 2) where nothing changes it."""
     lanes: BitArray = np.zeros((0, LANES), np.uint32)
@@ -122,10 +117,8 @@ def draw_bits(lanes: BitArray, draws: BitArray) -> None:
 
 
 @kernel
-def standard(bits: np.uint32, is_uniform: bool) -> np.float32:
-    """Return a random number of mean 0: normal with standard deviation 1, or uniform in [-0.5, 0.5)."""
-    if is_uniform:
-        return np.float32(np.int32(bits >> _WITHIN)) * _UNIT - _HALF
+def standard(bits: np.uint32) -> np.float32:
+    """Return a random number of the normal distribution with mean 0 and standard deviation 1."""
     cell = np.uint32(bits >> _OF_CELL)
     place = np.uint32((bits >> _WITHIN) & _LAST)
     if cell == 0:
@@ -184,9 +177,9 @@ def disturb(
                 if span[3] == 0 or carried_object[i] >= 0:
                     row = obs[i, span[0] : span[0] + span[2]]
                     first, end = span[1], span[1] + span[2]
-                    _add_noise(row, own[first:end], factors[first:end], noise.lows[first:end], noise.is_uniform)
+                    _add_noise(row, own[first:end], factors[first:end], noise.lows[first:end])
             if turned != NOT_NOISY:
-                angle = np.float64(standard(own[turned], noise.is_uniform)) * np.float64(factors[turned])
+                angle = np.float64(standard(own[turned])) * np.float64(factors[turned])
                 _turn_heading(obs[i], start, angle)
     blank(obs, blanks)
     for i in range(obs.shape[0]):
@@ -197,14 +190,14 @@ def disturb(
 
 
 @kernel
-def _add_noise(row: ObsArray, bits: BitArray, factors: ObsArray, lows: ObsArray, is_uniform: bool) -> None:
+def _add_noise(row: ObsArray, bits: BitArray, factors: ObsArray, lows: ObsArray) -> None:
     """Add random numbers times their factors to the columns of one run and clamp them to [low, 1]."""
     one, least, most = np.float32(1.0), bits[0], bits[0]
     for k in range(bits.shape[0]):
         least, most = min(least, bits[k]), max(most, bits[k])
-    if is_uniform or least >> _OF_CELL == 0 or most >> _OF_CELL == _LAST:
+    if least >> _OF_CELL == 0 or most >> _OF_CELL == _LAST:
         for k in range(bits.shape[0]):
-            row[k] = min(one, max(lows[k], row[k] + standard(bits[k], is_uniform) * factors[k]))
+            row[k] = min(one, max(lows[k], row[k] + standard(bits[k]) * factors[k]))
     else:  # without branches the processor works on many at a time
         for k in range(bits.shape[0]):
             row[k] = min(one, max(lows[k], row[k] + _between_edges(bits[k]) * factors[k]))
@@ -220,58 +213,6 @@ def _turn_heading(obs: ObsArray, start: int, angle: float) -> None:
     # Rounding to float32 can leave the unit circle by one unit in the last place.
     obs[start] = min(1.0, max(-1.0, x * cos - y * sin))
     obs[start + 1] = min(1.0, max(-1.0, x * sin + y * cos))
-
-
-@kernel
-def shift_neighbours(
-    obs: ObsArray, draws: BitArray, is_uniform: bool, factors: ObsArray, start: int, first: int, n_seen: int
-) -> None:
-    """Add noise to forward and left of neighbours that are there, and clamp them to [-1, 1].
-
-    Args:
-        obs: (N, D), edited.
-        draws: (N C or more,) as in `disturb`; two numbers per robot and neighbour.
-        is_uniform: As in `Noise`.
-        factors: (C,) float32, as in `disturb`.
-        start: First column of the neighbours in `obs`.
-        first: Their first column in `draws` and `factors`.
-        n_seen: Neighbours that an observation has room for.
-    """
-    one, n_columns = np.float32(1.0), factors.shape[0]
-    for i in range(obs.shape[0]):
-        own = draws[i * n_columns : (i + 1) * n_columns]
-        for k in range(n_seen):
-            at = start + NEIGHBOUR_FIELDS * k
-            if obs[i, at + NEIGHBOUR_FIELDS - 1] > 0.0:
-                for axis in range(2):
-                    column = first + 2 * k + axis
-                    noise = standard(own[column], is_uniform) * factors[column]
-                    obs[i, at + axis] = min(one, max(-one, obs[i, at + axis] + noise))
-
-
-@kernel
-def garble(obs: ObsArray, draws: BitArray, lost: FloatArray, start: int, factor: float, loss: float, size: int) -> None:
-    """Disturb what was heard: some robots hear nothing, the others get normal noise added, clamped to [-1, 1].
-
-    Args:
-        obs: (N, D), edited.
-        draws: (N, m) random bits.
-        lost: (N,) uniform in [0, 1).
-        start: First column of the messages in `obs`.
-        factor: Standard deviation of the noise.
-        loss: Probability that a robot hears nothing.
-        size: m, numbers of a message; the column after them is 1 where anything was heard.
-    """
-    one = np.float32(1.0)
-    scale = np.float32(factor)
-    for i in range(obs.shape[0]):
-        if obs[i, start + size] == 0.0:
-            continue
-        if lost[i] < loss:
-            obs[i, start : start + size + 1] = 0.0
-            continue
-        for k in range(size):
-            obs[i, start + k] = min(one, max(-one, obs[i, start + k] + standard(draws[i, k], False) * scale))
 
 
 @kernel
@@ -305,21 +246,18 @@ def throttle(
 
 
 @kernel
-def noisy_gain(
-    draws: BitArray, is_uniform: bool, factor: float, outer_gain: FloatArray, wheel_gain: FloatArray
-) -> None:
+def noisy_gain(draws: BitArray, factor: float, outer_gain: FloatArray, wheel_gain: FloatArray) -> None:
     """Write outer_gain * (1 + noise * factor) into `wheel_gain`, which may be the same array.
 
     Args:
         draws: (2 N or more,) random bits.
-        is_uniform: As in `Noise`.
         factor: Per unit of `standard`.
         outer_gain: (N, 2).
         wheel_gain: (N, 2).
     """
     for i in range(wheel_gain.shape[0]):
         for wheel in range(2):
-            noise = np.float64(standard(draws[2 * i + wheel], is_uniform)) * factor
+            noise = np.float64(standard(draws[2 * i + wheel])) * factor
             wheel_gain[i, wheel] = outer_gain[i, wheel] * (1.0 + noise)
 
 
@@ -338,4 +276,4 @@ def disturb_wheels(
                 d.gain[i, wheel] = outer_gain[i, wheel]
     if d.wheel_lanes.shape[0] > 0:
         draw_bits(d.wheel_lanes, d.wheel_draws)
-        noisy_gain(d.wheel_draws, d.wheels_uniform, d.wheel_factors[k], d.gain, d.gain)
+        noisy_gain(d.wheel_draws, d.wheel_factors[k], d.gain, d.gain)
