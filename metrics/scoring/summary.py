@@ -1,4 +1,4 @@
-"""What runs achieved in each condition: performance, deliveries and interference, of swarms and of their parts.
+"""What runs achieved in each condition: performance, deliveries and interference.
 
 table = run_plan(Plan.product(policy_specs(["crw", "dpo"]), [World(scenario("warehouse_small"))], seeds=range(4)))
 print(summarize_runs(table))
@@ -13,8 +13,6 @@ from typing import Any
 import numpy as np
 
 from swarm_forage_env._internal.wording import counted, percent, plain
-from swarm_forage_env.policies.mixture import is_mixture, part_sizes
-from swarm_forage_env.policies.registry import part_labels
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 from swarm_forage_env.rendering.plots import Curve, draw_curves
 from swarm_forage_env.runs.answer import Answer, Sheet
@@ -23,9 +21,7 @@ from swarm_forage_env.runs.policy_spec import PolicyLike, policy_specs
 from swarm_forage_env.runs.record import RunRecord
 from swarm_forage_env.runs.store import RunStore, failure_lines
 from swarm_forage_env.runs.table import Table
-from swarm_forage_env.scenarios.columns import part_column
-from swarm_forage_env.scenarios.performance import Performance, performance_curve, performance_of
-from swarm_forage_env.scenarios.robots import kind_sizes
+from swarm_forage_env.scenarios.performance import Performance, performance_of
 from swarm_forage_env.wrappers.world import World, WorldLike, world_of
 
 from ..checks import chosen_seeds
@@ -37,23 +33,7 @@ from .scores import bounds
 
 LEVEL = 0.95
 """Confidence level of all intervals."""
-NO_NUMBER = "-"
-"""What robots do on average where there are none."""
 _ENDS = ("mean", "low", "high")
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PartSummary:
-    """What one part of a mixed swarm, or one kind of robots, achieves."""
-
-    policy: str
-    n_robots: int
-    deliveries_per_1000_s: Summary
-    deliveries_per_robot_per_1000_s: Summary | None
-    """Per robot of the part that is present; None where the part has no robots, as of a share that is too small."""
-    first_pickups_per_1000_s: Summary
-    interference_fraction: float
-    """NaN where the part has no robots."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,8 +54,6 @@ class ConditionSummary:
     interference_fraction: float
     simulated_s_per_wall_s: float
     """Simulated seconds per second and process, policy and recording included."""
-    parts: tuple[PartSummary, ...] = ()
-    """Of a mixed swarm, or of several kinds of robots, in order."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -97,29 +75,24 @@ class RunSummary(Answer):
         return performance_of(self.world.scenario.performance)
 
     def sheets(self) -> tuple[Sheet, ...]:
-        """Return one row per condition and part, and why runs failed."""
+        """Return one row per condition, and why runs failed."""
         failures = Sheet(notes=[f"failed: {line}" for line in failure_lines(self.table.failures.values())])
         if not self.rows:
             return (failures,)
         n_worlds = len({condition.world for condition in self.table.plan.conditions})
-        is_mixed = any(row.parts for row in self.rows)
         # Deliveries are always there; what else the scenario calls performance stands before them.
         other = [] if self.read_as.name == "collected" else [f"{self.read_as.title} {span(self.read_as)}"]
         header = ["policy", *(["world"] if n_worlds > 1 else []), "caches", "runs", *other, "deliveries per 1,000 s"]
         has_limit = any(row.share_of_limit is not None for row in self.rows)
-        header += [*(["per robot"] if is_mixed else []), *(["of the limit"] if has_limit else [])]
-        header += ["interference", "simulated s per wall s"]
+        header += [*(["of the limit"] if has_limit else []), "interference", "simulated s per wall s"]
         lines: list[list[str]] = []
         for row in self.rows:
             about = [row.condition.policy.label, *([row.condition.world.name] if n_worlds > 1 else [])]
             numbers = [spread_text(row.performance)] if other else []
             numbers += [spread_text(row.deliveries_per_1000_s)]
-            numbers += [spread_text(row.deliveries_per_robot_per_1000_s)] if is_mixed else []
             numbers += ["-" if row.share_of_limit is None else percent(row.share_of_limit)] if has_limit else []
             tail = [f"{row.interference_fraction:.3f}", f"{row.simulated_s_per_wall_s:,.0f}"]
             lines.append([*about, row.caches, str(row.n_runs), *numbers, *tail])
-            empty = [""] * (len(about) + 1 + len(other))
-            lines += [_part_line(part, empty, [""] * has_limit) for part in row.parts]
         notes = [f"{self._about_interval}; interference: share of active robot time"]
         notes += [ABOUT_LIMIT] if has_limit else []
         return Sheet(title=self._title(n_worlds), header=header, rows=lines, notes=notes), failures
@@ -257,10 +230,8 @@ def span(read_as: Performance) -> str:
     return "per 1,000 s" if read_as.is_total else "mean"
 
 
-def spread_text(summary: Summary | None) -> str:
+def spread_text(summary: Summary) -> str:
     """Return a mean with half of its interval, with two digits behind the point."""
-    if summary is None or math.isnan(summary.mean):
-        return NO_NUMBER
     half = summary.upper - summary.mean
     return f"{summary.mean:.2f}" + ("" if math.isnan(half) else f" ± {half:.2f}")
 
@@ -284,7 +255,6 @@ def _condition_summaries(table: Table) -> Iterator[ConditionSummary]:
             share_of_limit=share_of_limit(planned, float(np.mean([record.performance.sum() for record in records]))),
             interference_fraction=float(np.mean([record.interference_fraction.mean() for record in records])),
             simulated_s_per_wall_s=sum(record.horizon_s for record in records) / wall_s if wall_s else math.nan,
-            parts=tuple(_part_summaries(condition, records)),
         )
 
 
@@ -299,66 +269,22 @@ def _deliveries_per_robot(record: RunRecord) -> float:
     return float(share.sum()) * 1000.0 / record.horizon_s
 
 
-def _part_summaries(condition: Condition, records: Sequence[RunRecord]) -> Iterator[PartSummary]:
-    """What each part of a mixed swarm, or each of several kinds of robots, has done; nothing of others."""
-    policy, robots = condition.policy, condition.world.scenario.robots
-    if is_mixture(policy.policy):
-        labels = part_labels(policy.policy)
-        sizes = part_sizes(policy.policy, robots.n_robots, policy.parameters.get("share"))
-    elif robots.tells_kinds:
-        labels = tuple(kind.name for kind in robots.robot_kinds)
-        sizes = kind_sizes(robots.robot_kinds, robots.n_robots)
-    else:
-        return
-    for part, (label, size) in enumerate(zip(labels, sizes, strict=True), start=1):
-
-        def rate(name: str, part: int = part) -> Summary:
-            column = part_column(part, name)
-            totals = [float(performance_curve(column, record.columns()).sum()) for record in records]
-            rates = [total * 1000.0 / record.horizon_s for total, record in zip(totals, records, strict=True)]
-            return aggregate(rates, level=LEVEL)
-
-        fractions = [performance_curve(part_column(part, "interference_fraction"), one.columns()) for one in records]
-        yield PartSummary(
-            policy=label,
-            n_robots=size,
-            deliveries_per_1000_s=rate("collected"),
-            deliveries_per_robot_per_1000_s=rate("collected_per_robot") if size else None,
-            first_pickups_per_1000_s=rate("first_picked"),
-            interference_fraction=float(np.mean(fractions)) if size else math.nan,
-        )
-
-
-def _part_line(part: PartSummary, empty: Sequence[str], no_share: Sequence[str]) -> list[str]:
-    name = f"  of which {part.policy} ({counted(part.n_robots, 'robot')})"
-    rates = [spread_text(part.deliveries_per_1000_s), spread_text(part.deliveries_per_robot_per_1000_s)]
-    interference = f"{part.interference_fraction:.3f}" if part.n_robots else NO_NUMBER
-    return [name, *empty, *rates, *no_share, interference, ""]
-
-
 def _condition_mapping(row: ConditionSummary) -> dict[str, Any]:
     return {
         "controller": row.condition.policy.label,
         "caches": row.caches,
         "n_runs": row.n_runs,
         "performance": _ends(row.performance),
-        **_rates_mapping(row),
-        "share_of_limit": row.share_of_limit,
-        "simulated_s_per_wall_s": plain(row.simulated_s_per_wall_s),
-        "parts": [{"policy": part.policy, "n_robots": part.n_robots, **_rates_mapping(part)} for part in row.parts],
-    }
-
-
-def _rates_mapping(row: ConditionSummary | PartSummary) -> dict[str, Any]:
-    return {
         "deliveries_per_1000_s": _ends(row.deliveries_per_1000_s),
         "deliveries_per_robot_per_1000_s": _ends(row.deliveries_per_robot_per_1000_s),
         "first_pickups_per_1000_s": _ends(row.first_pickups_per_1000_s),
         "interference_fraction": plain(row.interference_fraction),
+        "share_of_limit": row.share_of_limit,
+        "simulated_s_per_wall_s": plain(row.simulated_s_per_wall_s),
     }
 
 
-def _ends(summary: Summary | None) -> dict[str, float | None]:
+def _ends(summary: Summary) -> dict[str, float | None]:
     return dict(zip(_ENDS, bounds(summary) or (None, None, None), strict=True))
 
 

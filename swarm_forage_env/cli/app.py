@@ -155,13 +155,11 @@ def _run(command: Command, words: Sequence[str], *, trusts: bool) -> int:
 def _trust(words: Sequence[str], *, all_files: bool) -> Iterator[None]:
     """While the context lasts, only models among the words of a command are opened, and stderr says which."""
     from swarm_forage_env.cli.options import complain
-    from swarm_forage_env.policies.mixture import policies_in_mixtures
     from swarm_forage_env.policies.registry import file_of
     from swarm_forage_env.policies.trust import of_a_command, trusting
 
     pieces = (piece.strip() for word in words for piece in (word, *word.split(","), *word.partition("=")[2].split(",")))
-    parts = [part for word in words for part in policies_in_mixtures(word)]
-    typed = [name for piece in (*pieces, *parts) for name in (piece, file_of(piece))]
+    typed = [name for piece in pieces for name in (piece, file_of(piece))]
     looks_only = "--dry-run" in words
 
     def tell(line: str) -> None:

@@ -2,14 +2,13 @@
 
 import dataclasses
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, get_origin
 
 from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, whole
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.cli.options import PlaceOptions, WorldOptions
-from swarm_forage_env.policies.mixture import leading_mixture
 from swarm_forage_env.policies.registry import split_interface
 from swarm_forage_env.runs.spec import RunSpec, plan_run
 from swarm_forage_env.scenarios.overrides import checked_density, field_types, parse_tuple
@@ -31,13 +30,13 @@ def split_names(text: str) -> tuple[str, ...]:
     """Split a comma-separated list of names, dropping repetitions.
 
     A word field=value belongs to the policy file before it: "crw,model.zip:observation=compact,decision_ticks=5" are
-    two policies. So are "crw,mixed:dpo=10,stochm=40": parts belong to their mixed swarm.
+    two policies.
 
     Raises:
         ConfigError: there is no name in it.
     """
     words: list[str] = []
-    for word in _pieces(text):
+    for word in filter(None, map(str.strip, text.split(","))):
         if words and split_interface(words[-1])[1] and _FIELD.fullmatch(word):
             words[-1] += f",{word}"
         else:
@@ -46,16 +45,6 @@ def split_names(text: str) -> tuple[str, ...]:
     if not names:
         raise ConfigError(f"Expected one or more names separated by commas, got {text!r}.")
     return names
-
-
-def _pieces(text: str) -> Iterator[str]:
-    """Split a text at its commas, but not within mixed swarms; there are no spaces around the pieces."""
-    left = ",".join(part.strip() for part in text.split(","))
-    while left:
-        piece = leading_mixture(left) or left.partition(",")[0]
-        if piece:
-            yield piece
-        left = left[len(piece) + 1 :]
 
 
 def described_world(options: PlaceOptions) -> tuple[World, str | None]:

@@ -6,7 +6,7 @@ A policy, scripted or trained, sees observations and never the state of the worl
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
@@ -112,15 +112,6 @@ class SwarmSpec:
     def state_size(self) -> int:
         """Numbers in the global view `ForageEnv.state()`: six per robot, three per object."""
         return state_size(self.n_robots, self.n_objects)
-
-    def part(self, rows: slice) -> "SwarmSpec":
-        """Return what a policy knows that drives these rows only."""
-        return replace(
-            self,
-            n_robots=rows.stop - rows.start,
-            object_reach_cells=self.object_reach_cells[rows],
-            cache_reach_cells=self.cache_reach_cells[rows],
-        )
 
     @classmethod
     def of(cls, scenario: ScenarioConfig, *, horizon_s: float | None = None) -> "SwarmSpec":
@@ -246,8 +237,7 @@ class Policy(Protocol):
     Optional attributes: `task`, an (N,) int8 array of `Task` codes; `describe_robot(row) -> str`, what one robot is
     doing, for people (`inspect.play` shows it); `describe_robots() -> RobotStates`, the same of all robots as arrays
     (`inspect.replay` keeps it); `describe_memories() -> Memories`, where all robots remember things (`inspect.replay`
-    keeps it, and `inspect.play` shows those of one); `part_rows`, slices of rows that the record tells apart, set by
-    `reset` (of mixed swarms, whose runs are counted tick by tick);
+    keeps it, and `inspect.play` shows those of one);
     `see_world(env)`, called by runs after `reset` with the `ForageEnv`, which a policy may read and must not change: a
     policy that has it is a yardstick and no contestant, so that `check_policy` and the benchmark refuse it;
     `compiled() -> CompiledPolicy | None`, for runs without Python between ticks (`KernelPolicy` has it); the class

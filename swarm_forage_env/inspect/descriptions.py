@@ -14,7 +14,6 @@ from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.inspect.networks import in_words, network_lines
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
-from swarm_forage_env.policies.mixture import is_mixture, mixture_parts
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.pretrained import network_file
 from swarm_forage_env.policies.python_files import classes_of
@@ -125,8 +124,6 @@ LISTS: dict[str, Callable[[], Sheet]] = {
 def describe(name: str) -> Description:
     """Return everything about a scenario (by name, environment id or file) or a policy (by name or file).
 
-    Of a mixed swarm that is everything about the policies in it.
-
     Raises:
         ConfigError: nothing has that name, or the file holds none.
     """
@@ -145,8 +142,6 @@ def _lines(name: str) -> Iterable[str]:
         return [*_policy_lines(name), *([] if network is None else ["", *_file_lines(network)])]
     if is_policy_file(name):
         return _file_lines(Path(file_of(name)))
-    if is_mixture(name):
-        return "\n\n".join("\n".join(_lines(part.policy)) for part in mixture_parts(name)).splitlines()
     known = (*presets.scenario_names(), *policy_names())
     raise ConfigError(f"Unknown scenario or policy {name!r}.{suggestion(name, known)} Known: {', '.join(known)}.")
 

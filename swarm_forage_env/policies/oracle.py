@@ -59,7 +59,7 @@ class OraclePolicy:
         if self._world is None:
             raise ConfigError(
                 "Expected a run that gives the oracle its world, got none: it drives whole swarms in runs, films and "
-                "replays, and neither parts of mixed swarms nor environments of your own."
+                "replays, and no environments of your own."
             )
         swarm, objects = self._world.swarm, self._world.objects
         carries = swarm.carried_object >= 0

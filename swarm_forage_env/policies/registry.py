@@ -16,7 +16,6 @@ from swarm_forage_env.contract.policy import Policy, SwarmSpec
 from swarm_forage_env.contract.reset_and_step import real_numbers
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.policies import trust
-from swarm_forage_env.policies.mixture import Part, different_labels, is_mixture, mixture_of, mixture_parts
 
 POLICY_ENTRY_POINTS = "swarm_forage_env.policies"
 """Entry-point group under which installed packages offer policies by name."""
@@ -141,29 +140,15 @@ def named_interface(policy: str, parameters: Mapping[str, Any]) -> tuple[str, di
 
 def policy_label(policy: str) -> str:
     """Return the name of a policy for people: of a file its name without folder and ending, or its class."""
-    if is_mixture(policy):
-        parts = mixture_parts(policy)
-        return mixture_of([Part(policy_label(part.policy), part.amount) for part in parts])
     if not is_policy_file(policy):
         return policy
     return split_class(policy)[1] or PurePath(policy).stem
-
-
-def part_labels(policy: str) -> tuple[str, ...]:
-    """Return the names of the parts of a mixed swarm for people, all different."""
-    return different_labels([policy_label(part.policy) for part in mixture_parts(policy)])
 
 
 def file_of(policy: str) -> str:
     """Return a policy without what may stand behind its file: a class, or words of an interface, which are not read."""
     found = _FILE_WITH_WORDS.fullmatch(policy)
     return split_class(policy if found is None else found["file"])[0]
-
-
-def policy_files(policy: str) -> tuple[str, ...]:
-    """Return the files that a policy, or the parts of a mixed swarm, come from."""
-    parts = [part.policy for part in mixture_parts(policy)] if is_mixture(policy) else [policy]
-    return tuple(file_of(part) for part in parts if is_policy_file(part))
 
 
 def whole_path(policy: str) -> str:
@@ -195,8 +180,6 @@ def policy_class(name: str) -> Callable[..., Policy]:
     """
     if name in _LOCAL_POLICIES:
         return _LOCAL_POLICIES[name]
-    if is_mixture(name):
-        return _mixed(name)
     file, _ = split_interface(name)
     for opener in _openers(file):
         trust.check(file_of(file))
@@ -210,14 +193,6 @@ def policy_class(name: str) -> Callable[..., Policy]:
         "known, give its file (policy.npz, model.zip, my_module.py:MyPolicy), or pip install a package that offers it "
         f"by the entry point {POLICY_ENTRY_POINTS!r} (docs/policies.md)."
     )
-
-
-def _mixed(name: str) -> Callable[..., Policy]:
-    from swarm_forage_env.policies.mixed import MixedPolicy  # late: that module builds on this one
-
-    for part in mixture_parts(name):
-        policy_class(part.policy)  # refuses what is unknown or not trusted before anything is opened
-    return partial(MixedPolicy, name)
 
 
 def _opened(opener: Callable[..., Policy], name: str, **parameters: Any) -> Policy:

@@ -40,7 +40,7 @@ MARKERS = "osD^vPX*"
 POLICY_NAMES = {"crw": "CRW", "dpo": "DPO", "stochm": "STOCHM", "stochx": "STOCHX"}
 """Names of the paper; their order is that of their colours."""
 _POLICY_WORD = re.compile(rf"(?<![\w./\\:=-])({'|'.join(POLICY_NAMES)})(?![\w./\\:=-])")
-"""One of them as a word of its own, no part of a file's name or of a mixture."""
+"""One of them as a word of its own, no part of a file's name."""
 _PLACES_OF_OTHERS = (6, 4, 5, 0, 1, 2, 3, 7)
 """Colours of other policies: black stands out beside the paper's."""
 PANELS_PER_ROW = 4

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from swarm_forage_env._internal.wording import counted
-from swarm_forage_env.policies.registry import local_policy, policy_files
+from swarm_forage_env.policies.registry import file_of, is_policy_file, local_policy
 from swarm_forage_env.policies.trust import only_looks_at
 from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.cost import Cost, Kind, calibrate, duration, kind_of
@@ -219,7 +219,7 @@ def measured_costs(specs: Iterable[RunSpec], tell: Callable[[str], None] | None)
 
 def _is_closed(policy: str) -> bool:
     """Whether a policy has a file that is not to be opened, see `policies.trust.only_looks_at`."""
-    return any(map(only_looks_at, policy_files(policy)))
+    return is_policy_file(policy) and only_looks_at(file_of(policy))
 
 
 def _hours_text(hours: float) -> str:

@@ -4,7 +4,7 @@
 """
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
@@ -54,8 +54,6 @@ class LiveRun:
         self._obs = stack.reset_batch(seed)
         if sees_world(policy):
             policy.see_world(self.forage_env)  # type: ignore[attr-defined] - optional, see Policy
-        if isinstance(stack, RunRecorder):
-            stack.divide(_told_apart(policy, self.forage_env.scenario))
         self._has_tasks = hasattr(policy, "task")
 
     @property
@@ -86,24 +84,14 @@ class LiveRun:
 def compiled_policy_of(stack: ForageEnv | SwarmWrapper, policy: Policy) -> CompiledPolicy | None:
     """Return a policy, which was reset, for a run without Python between ticks; None where Python might have a say.
 
-    That is where `needs_no_python` says so, a recorder that is a subclass or was changed, a mixed swarm, or robots of
-    several kinds.
+    That is where `needs_no_python` says so, or a recorder that is a subclass or was changed.
     """
     if type(stack) is not RunRecorder or "after_step" in vars(stack) or not steps_as_made(stack):
         return None
     env = stack.unwrapped
-    if _told_apart(policy, env.scenario):  # parts are counted tick by tick
-        return None
     if not hasattr(type(policy), "compiled") or not needs_no_python(env, stack.stack[1:]):
         return None
     return policy.compiled()  # type: ignore[attr-defined] - optional, see Policy
-
-
-def _told_apart(policy: Policy, scenario: ScenarioConfig) -> Sequence[slice]:
-    """Return the rows of what a record tells apart: parts of a mixed swarm, else kinds of robots, else nothing."""
-    if hasattr(policy, "part_rows"):
-        return policy.part_rows  # type: ignore[attr-defined] - optional, see Policy
-    return scenario.robots.kind_rows if scenario.robots.tells_kinds else ()
 
 
 def build_env(

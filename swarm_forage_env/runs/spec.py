@@ -11,15 +11,12 @@ from typing import TYPE_CHECKING, Any
 from swarm_forage_env._internal.fields import ConfigError, instance, known_keys, table, text, whole
 from swarm_forage_env._internal.files import parse_json
 from swarm_forage_env.policies import trust
-from swarm_forage_env.policies.mixed import agreed_caches
-from swarm_forage_env.policies.mixture import Part, is_mixture, mixture_of, mixture_parts, part_sizes
 from swarm_forage_env.policies.registry import (
     file_of,
     is_policy_file,
     load_policy,
     named_interface,
     policy_class,
-    policy_label,
     whole_path,
 )
 from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping, to_mapping, whole_intervals
@@ -57,8 +54,8 @@ class RunSpec:
     The world is taken as it is; `plan_run` also looks at the caches that the policy states.
 
     Raises:
-        ConfigError: `world` is no World, parameters that JSON cannot hold, a bad seed, parts of a mixed swarm that do
-            not add up to it, or a horizon that is not a whole number of recording intervals.
+        ConfigError: `world` is no World, parameters that JSON cannot hold, a bad seed, or a horizon
+            that is not a whole number of recording intervals.
     """
 
     world: World
@@ -73,8 +70,6 @@ class RunSpec:
         instance("world", self.world, World)
         text("policy", self.policy)
         table("parameters", self.parameters)
-        if is_mixture(self.policy):
-            part_sizes(self.policy, self.world.n_robots, self.parameters.get("share"))
         whole_intervals(self.scenario)
         try:
             plain = json.loads(json.dumps(dict(self.parameters), allow_nan=False))
@@ -240,8 +235,7 @@ def plan_run(
     chosen = dict(parameters or {})
     stating: object = None
     # A study plans thousands of runs of a policy that was looked up before, so it is not looked up again.
-    is_unpinned = (is_policy_file(policy) and "digest" not in chosen) or (is_mixture(policy) and "parts" not in chosen)
-    if caches is None or is_unpinned:
+    if caches is None or (is_policy_file(policy) and "digest" not in chosen):
         policy, chosen, stating = pin_policy(policy, chosen)
     more = tuple(wrappers)
     disturbed = replace(given, wrappers=(*given.wrappers, *more), name="") if more else given
@@ -265,8 +259,6 @@ def pin_policy(policy: str | Path, parameters: Mapping[str, Any]) -> tuple[str, 
     Raises:
         ValueError: no installed policy has that name, the file cannot be opened, or an interface is given twice.
     """
-    if is_mixture(str(policy)):
-        return _pin_mixture(str(policy), parameters)
     name, pinned = named_interface(str(policy), parameters)
     if not is_policy_file(name):
         return name, pinned, policy_class(name)
@@ -282,41 +274,6 @@ def pin_policy(policy: str | Path, parameters: Mapping[str, Any]) -> tuple[str, 
         planned,
         load_policy(file, pinned),
     )  # without a digest it says what it guesses, which runs do not repeat
-
-
-@dataclass(frozen=True, slots=True)
-class _Stating:
-    """What a mixed swarm states: what its parts agree on."""
-
-    policies: Mapping[str, object]
-    """Name for people -> what states the caches of that part."""
-
-    @property
-    def caches(self) -> str | None:
-        """Kind of caches; raises ConfigError where the parts state different ones."""
-        return agreed_caches(self.policies)
-
-
-def _pin_mixture(policy: str, parameters: Mapping[str, Any]) -> tuple[str, dict[str, Any], object]:
-    """Do what `pin_policy` does for each part of a mixed swarm; its parameters are kept as `parts` by policy."""
-    given = table("parts", parameters.get("parts", {}))
-    parts: list[Part] = []
-    pinned: dict[str, Any] = {}
-    stating: dict[str, object] = {}
-    for part in mixture_parts(policy):
-        found, chosen, states = pin_policy(part.policy, table("parts", given.get(part.policy, {})))
-        if pinned.setdefault(found, chosen) != chosen:
-            raise ConfigError(f"Expected one interface of {found} in {policy!r}, got two.")
-        parts.append(Part(found, part.amount))
-        stating[policy_label(part.policy)] = states
-    unknown = given.keys() - {part.policy for part in mixture_parts(policy)}
-    if unknown:
-        raise ConfigError(f"Expected parameters of parts of {policy!r}, got those of {min(unknown)!r}.")
-    return (
-        mixture_of(parts),
-        {**parameters, "parts": {name: one for name, one in pinned.items() if one}},
-        _Stating(stating),
-    )
 
 
 def wrappers_to_list(wrappers: "Iterable[WrapperConfig]") -> list[dict[str, Any]]:

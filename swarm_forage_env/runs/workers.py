@@ -28,7 +28,7 @@ from swarm_forage_env._internal.compiling import tell_of_first_run
 from swarm_forage_env._internal.fields import as_whole
 from swarm_forage_env._internal.files import check_folder
 from swarm_forage_env.policies import trust
-from swarm_forage_env.policies.registry import policy_files
+from swarm_forage_env.policies.registry import file_of, is_policy_file
 from swarm_forage_env.runs.first_compilation import (
     WAKE_UP_EVERY_S,
     compile_outermost,
@@ -142,7 +142,7 @@ def map_runs(
             yield do(spec, None if advance is None else partial(_advance, advance, done, spec.robot_ticks))
             done += spec.robot_ticks
         return
-    for file in {file for spec in specs for file in policy_files(spec.policy)}:
+    for file in {file_of(spec.policy) for spec in specs if is_policy_file(spec.policy)}:
         trust.check(file)  # workers know nothing of what the user of a command allows
     with _process_pool(n_workers) as pool:
         _check_workers_start(pool)

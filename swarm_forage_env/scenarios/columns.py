@@ -140,29 +140,9 @@ CONTRIBUTED_COLUMNS: Mapping[str, Column] = {
 }
 """One value per interval, in records of runs to which they apply."""
 
-COUNTED_OF_PARTS = ("collected", "first_picked")
-PART_COLUMNS = (*COUNTED_OF_PARTS, "interference_fraction", "n_active", "n_present")
-"""Columns that the record of a mixed swarm also has of each part, under the name of `part_column`; that of another
-swarm has them of each kind of robots where there are several."""
-
-
-def part_column(part: int | str, column: str) -> str:
-    """Return the name of a column about one part of a mixed swarm, numbered from 1; "K" stands for any."""
-    return f"part_{part}_{column}"
-
-
 ALL_COLUMNS: Mapping[str, Column] = {
     **KEY_COLUMNS,
     **INTERVAL_COLUMNS,
     **CONTRIBUTED_COLUMNS,
-    **{
-        part_column("K", name): Column(
-            INTERVAL_COLUMNS[name].kind,
-            INTERVAL_COLUMNS[name].unit,
-            f"{name} of part K of a mixed swarm, or of kind K of robots, from 1",
-            INTERVAL_COLUMNS[name].is_total,
-        )
-        for name in PART_COLUMNS
-    },
 }
 """All columns of records, in the order of the schema."""

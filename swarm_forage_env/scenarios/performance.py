@@ -3,15 +3,12 @@
     collected                   a recorded column, as it is
     1/interference_fraction     a column of which less is better, turned round: 1/x in each interval, where 1/0 is 0
     task_balance, cache_load    computed from several columns
-    part_1_collected            the same of the first part of a mixed swarm, see `columns.PART_COLUMNS`
-    part_1_collected_per_robot  divided by the robots of that part which are present
 
 Performance is a way to read a run and no part of it: a record holds all columns, so another performance needs no other
 run. The paper proposes such measures beside deliveries in its discussion.
 """
 
 import math
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -23,10 +20,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.scenarios.columns import (
     CONTRIBUTED_COLUMNS,
-    COUNTED_OF_PARTS,
     INTERVAL_COLUMNS,
-    PART_COLUMNS,
-    part_column,
 )
 
 if TYPE_CHECKING:
@@ -134,51 +128,18 @@ DERIVED_PERFORMANCES = tuple(_FORMULAS)
 """Performances that are computed from several columns."""
 
 
-_PER_ROBOT = "_per_robot"
-_PART_NAME = re.compile(
-    rf"part_(?P<part>[1-9]\d{{0,3}})_(?P<column>{'|'.join(PART_COLUMNS)}|(?:{'|'.join(COUNTED_OF_PARTS)}){_PER_ROBOT})"
-)
-
-
-def _performance_of_part(name: str) -> Performance | None:
-    found = _PART_NAME.fullmatch(name)
-    if found is None:
-        return None
-    column, of_part = found["column"], f"of part {found['part']}"
-    whole = PERFORMANCE_COLUMNS[column.removesuffix(_PER_ROBOT)]
-    if column.endswith(_PER_ROBOT):
-        return Performance(name, f"{whole.unit} per robot", whole.is_total, f"{whole.title} per robot {of_part}")
-    return Performance(name, whole.unit, whole.is_total, f"{whole.title} {of_part}")
-
-
-def _of_part(name: str, columns: Columns) -> Curve:
-    """Compute a performance of one part. A swarm that is not mixed, of robots of one kind, is its only part."""
-    found = _PART_NAME.fullmatch(name)
-    assert found is not None, "performance_of knows the name"
-    part, column = int(found["part"]), found["column"]
-    if column.endswith(_PER_ROBOT):
-        total = _of_part(part_column(part, column.removesuffix(_PER_ROBOT)), columns)
-        robots = _of_part(part_column(part, "n_present"), columns)
-        return np.divide(total, robots, out=np.zeros_like(total), where=robots > 0.0)
-    if name in columns:
-        return columns[name].astype(np.float64)
-    is_mixed = part_column(1, "collected") in columns
-    return np.zeros(len(columns["interval"])) if is_mixed or part > 1 else _column(column, columns)
-
-
 def performance_of(name: str) -> Performance:
     """Return what the numbers of a performance are.
 
     Args:
-        name: A column of `PERFORMANCE_COLUMNS`, one of `DERIVED_PERFORMANCES`, a column of a part of a mixed swarm, or
-            one of them after "1/".
+        name: A column of `PERFORMANCE_COLUMNS`, one of `DERIVED_PERFORMANCES`, or one of them after "1/".
 
     Raises:
         ConfigError: there is no such performance; the message has the nearest one.
     """
     is_text = isinstance(name, str)  # pyright: ignore[reportUnnecessaryIsInstance] - files and users give anything
     sign, own = _split(name) if is_text else ("", "")
-    found = _FORMULAS[own][0] if own in _FORMULAS else PERFORMANCE_COLUMNS.get(own) or _performance_of_part(own)
+    found = _FORMULAS[own][0] if own in _FORMULAS else PERFORMANCE_COLUMNS.get(own)
     if found is None:
         known = [sign + each for each in (*PERFORMANCE_COLUMNS, *_FORMULAS)]
         meant = sign + _NAME_OF_WORDS.get(own, own)
@@ -210,7 +171,7 @@ def performance_curve(name: str, columns: Columns) -> Curve:
     if own in _FORMULAS:
         values = _FORMULAS[own][1](columns)
     else:
-        values = _of_part(own, columns) if _PART_NAME.fullmatch(own) else _column(own, columns)
+        values = _column(own, columns)
     if not sign:
         return values
     # 1/0 is 0, because distances between curves cannot take infinities. It suits columns that are rarely 0.

@@ -25,7 +25,6 @@ from swarm_forage_env._internal.fields import (
     whole,
 )
 from swarm_forage_env._internal.typed import typed
-from swarm_forage_env.policies.mixture import SHARE, has_open_share
 from swarm_forage_env.runs.plan import Condition, Plan
 from swarm_forage_env.runs.policy_spec import PolicySpec
 from swarm_forage_env.runs.spec import RunSpec, identity_of, wrappers_from_list, wrappers_to_list
@@ -75,8 +74,7 @@ class Axis:
 
     name: str
     """A criterion (`ladders.CRITERIA`), a scenario field, a field of a wrapper ("sensor_noise.sigma",
-    "throttle.waveform.amplitude"), `QUIRK`, which switches one quirk of the rules at a time, or `SHARE`, which policies
-    like "mixed:ppo=share,crw=rest" have."""
+    "throttle.waveform.amplitude"), or `QUIRK`, which switches one quirk of the rules at a time."""
     values: tuple[Value, ...]
     """Numbers, texts or truth values. For a field that holds a list, texts with its entries between commas
     (`list_word`)."""
@@ -86,8 +84,8 @@ class Axis:
         if dot:
             wrapper_config_class(wrapper)  # refuses unknown names; the field is checked with its values
         else:
-            allowed = (*CRITERIA, QUIRK, SHARE, *(name for name in SCENARIO_FIELDS if name not in OF_THE_STUDY))
-            others = ", ".join((*CRITERIA, QUIRK, SHARE))
+            allowed = (*CRITERIA, QUIRK, *(name for name in SCENARIO_FIELDS if name not in OF_THE_STUDY))
+            others = ", ".join((*CRITERIA, QUIRK))
             shown_by = f"{others}, and the fields that swarm-forage info warehouse_small lists"
             known_name("axis", self.name, allowed, all_by=shown_by)
         several(f"the values of axis {self.name}", self.values, "values")
@@ -240,13 +238,6 @@ class StudySpec:
             raise ConfigError(f"Expected quirks from one place, got the axis {QUIRK} and a quirk of its own.")
         if self.reference is not None and (not self.axes or self.reference not in self.axes[-1].values):
             raise ConfigError(f"Expected the reference among the values of the last axis, got {self.reference!r}.")
-        if any(axis.name == SHARE for axis in self.axes):
-            for policy in self.policies:
-                if not has_open_share(policy.policy):
-                    raise ConfigError(
-                        f"Expected only mixed swarms with a part that the axis {SHARE} sets, such as "
-                        f"mixed:dpo={SHARE},crw=rest, got {policy.label}. At the share 0 or 1 they have one part."
-                    )
         n_conditions = len(self.rules) * len(self.policies) * math.prod(len(axis.values) for axis in self.axes)
         if n_conditions > MOST_CONDITIONS:
             raise ConfigError(
@@ -376,11 +367,6 @@ class StudySpec:
         found: dict[Place, Condition] = {}
         for place in self.places:
             policy = self._policies[place.policy]
-            shares = {
-                axis.name: value for axis, value in zip(self.axes, place.values, strict=True) if axis.name == SHARE
-            }
-            if shares:
-                policy = replace(policy, parameters={**policy.parameters, **shares})
             if has_caches:
                 policy = replace(policy, caches=None)
             found[place] = Condition(policy, self.world(place))

@@ -13,7 +13,7 @@
     death_per_tick = 0.0001
 
     [[axis]]                               # any number; the last one is plotted along x
-    criterion = "noise"                    # or "quirk", or field = "n_objects", "sensor_noise.sigma" or "share"
+    criterion = "noise"                    # or "quirk", or field = "n_objects" or "sensor_noise.sigma"
     values = [0.01, 0.02, 0.03]            # default for a criterion: the paper's values; for "quirk": none, and each
     reference = 0.0                        # only on the last axis; default see `load_study`
 
@@ -34,7 +34,6 @@ from typing import Any
 from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, known_keys, known_name, several, table, whole
 from swarm_forage_env._internal.files import parse_toml
 from swarm_forage_env._internal.wording import suggestion
-from swarm_forage_env.policies.mixture import Part, is_mixture, mixture_of, mixture_parts
 from swarm_forage_env.policies.registry import is_policy_file
 from swarm_forage_env.runs.policy_spec import PolicySpec, policy_spec
 from swarm_forage_env.scenarios.presets import scenario
@@ -234,9 +233,7 @@ def _policy(entry: Any, folder: Path) -> PolicySpec:
 
 
 def _beside(word: str, folder: Path) -> str:
-    """Return a policy with the paths of its files, also those in a mixed swarm, relative to a folder."""
-    if is_mixture(word):
-        return mixture_of([Part(_beside(part.policy, folder), part.amount) for part in mixture_parts(word)])
+    """Return a policy with the path of its file relative to a folder."""
     return str(folder / word) if is_policy_file(word) else word
 
 

@@ -1,16 +1,15 @@
 """RunRecorder: turns the arena's cumulative counters into columns over recording intervals."""
 
-from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
 
-from swarm_forage_env.contract.codes import Counter, Event, Task
+from swarm_forage_env.contract.codes import Counter, Task
 from swarm_forage_env.contract.kernel_policy import CompiledPolicy
 from swarm_forage_env.contract.policy import refused_tasks
 from swarm_forage_env.contract.types import BoolArray, CodeArray
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.scenarios.columns import INTERVAL_COLUMNS, part_column
+from swarm_forage_env.scenarios.columns import INTERVAL_COLUMNS
 from swarm_forage_env.scenarios.config import whole_intervals
 from swarm_forage_env.scenarios.performance import performance_curve
 from swarm_forage_env.world.arena import UNDISTURBED
@@ -47,41 +46,6 @@ TICK_MEANS: dict[str, Counter] = {
 """Columns that are means over the ticks of an interval."""
 
 
-class _PartTally:
-    """What the robots of one part of a swarm do in a recording interval."""
-
-    def __init__(self, rows: slice) -> None:
-        self._rows = rows
-        self._start()
-
-    def _start(self) -> None:
-        self._collected = self._first_picked = self._active = self._present = 0
-        self._interference = 0.0
-
-    def count(self, env: ForageEnv) -> None:
-        """Count a tick, after the environment has stepped."""
-        rows, events, swarm = self._rows, env.events, env.swarm
-        if events.happened[0]:
-            self._collected += int(np.count_nonzero(events.code[rows] == Event.DELIVERED))
-            self._first_picked += int(np.count_nonzero(events.first_picked[rows]))
-        n_active = int(np.count_nonzero(swarm.active[rows]))
-        self._active += n_active
-        self._present += int(np.count_nonzero(swarm.present[rows]))
-        self._interference += np.count_nonzero(events.interfering[rows]) / max(1, n_active)
-
-    def columns(self, n_ticks: int) -> dict[str, float]:
-        """Return the columns of the interval that ends now, see `scenarios.columns.PART_COLUMNS`; start anew."""
-        columns = {
-            "collected": float(self._collected),
-            "first_picked": float(self._first_picked),
-            "interference_fraction": self._interference / n_ticks,
-            "n_active": self._active / n_ticks,
-            "n_present": self._present / n_ticks,
-        }
-        self._start()
-        return columns
-
-
 class RunRecorder(SwarmWrapper):
     """Outermost wrapper: records a run interval by interval.
 
@@ -114,15 +78,6 @@ class RunRecorder(SwarmWrapper):
         self._interference = np.zeros(self._n_intervals)
         self._contributed: dict[str, np.ndarray] = {}
         self._task_sums = np.zeros(len(Task))
-        self._parts: tuple[_PartTally, ...] = ()
-
-    def divide(self, rows: Sequence[slice]) -> None:
-        """Tell parts of the swarm apart in the run that has just begun: the record gets columns of each.
-
-        Args:
-            rows: Robots of each part.
-        """
-        self._parts = tuple(_PartTally(each) for each in rows)
 
     def after_step(self, tasks: CodeArray | None, terminated: BoolArray, truncated: bool) -> None:
         """Count the tick; close the interval at its end and at the end of the run."""
@@ -130,8 +85,6 @@ class RunRecorder(SwarmWrapper):
             return
         if tasks is not None and not add_task_shares(tasks, self.unwrapped.active, self._task_sums):
             raise refused_tasks(tasks, len(self.unwrapped.active))
-        for part in self._parts:
-            part.count(self.unwrapped)
         self._ticks_left -= 1
         # Checking the first row alone is fast, and in almost every tick it is enough.
         self._complete = truncated or bool(terminated[0] and terminated.all())
@@ -239,9 +192,6 @@ class RunRecorder(SwarmWrapper):
             for code, share in zip(Task, self._task_sums / self._interval_ticks, strict=True):
                 self._contribute(f"task_share_{code.name.lower()}", share)
             self._task_sums[:] = 0.0
-        for number, part in enumerate(self._parts, start=1):
-            for name, value in part.columns(self._interval_ticks).items():
-                self._contribute(part_column(number, name), value)
         for wrapper in self._inside:
             for name, value in wrapper.interval_columns().items():
                 self._contribute(name, value)

@@ -46,7 +46,6 @@ SMALL = (
 ROOM = f"--robots 6 {SMALL} --jobs 1"
 SECONDS = "--horizon 400 --set interval_s=100"
 RUN = f"run --policy crw,dpo --seeds 2 {ROOM} {SECONDS}"
-MIXED = f"run --policy mixed:dpo=2,crw=rest --performance n_carrying --wrapper sensor_noise:sigma=0.01 {ROOM} {SECONDS}"
 SCORE = f"score --policy crw --budget quick --seeds 2 --horizon 400 {ROOM}"
 FORMS = "--variant corrected,paper --form marginal,interactive --band --measures spatial_emergence,scalability"
 CURVES = "score --curves curves.csv"
@@ -58,8 +57,6 @@ BENCHMARK = "benchmark --policy crw --name again --trained-in nothing --jobs 1"
 CASES = {
     "run.txt": RUN,
     "run.json": f"{RUN} --json",
-    "run_mixed.txt": MIXED,
-    "run_mixed.json": f"{MIXED} --json",
     "run_plan.txt": f"{RUN} --first-seed 7 --dry-run",
     "run_plan.json": f"{RUN} --first-seed 7 --dry-run --json",
     "rerun.txt": "rerun record.parquet",

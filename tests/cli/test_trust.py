@@ -125,23 +125,6 @@ def test_a_study_that_names_a_model_is_refused(command, model, tmp_path):
         assert (code, Path("owned").exists()) == (2, False), err
 
 
-def test_the_same_holds_for_each_part_of_a_mixed_swarm(command, model, tmp_path):
-    pytest.importorskip("stable_baselines3")
-    mixture = f"mixed:{model.name}=1,crw=rest"
-    code, out, err = command("run", "--policy", f"crw,{mixture}", *TINY, "--dry-run", "--json", "--caches", "none")
-    assert (code, Path("owned").exists()) == (0, False), err
-    spec = RunSpec.from_mapping(json.loads(out)["runs"][1]["spec"])
-    assert spec.policy == f"mixed:{model}=1,crw=rest"
-    store = RunStore(tmp_path / "store")
-    store.write_failure(RunFailure(spec=spec, error="e", traceback="t"))
-    code, _, err = command("rerun", str(store.failure_path(spec.run_id)))
-    assert (code, Path("owned").exists()) == (2, False)
-    assert "which you did not name yourself" in err
-    code, _, err = command("run", "--policy", mixture, *TINY)
-    assert (code, Path("owned").exists()) == (2, True)
-    assert f"opening {model}, a model" in err
-
-
 def test_the_option_opens_what_a_file_names(command, model, tmp_path):
     pytest.importorskip("stable_baselines3")
     spec = RunSpec(world=World(scenario("warehouse_small", n_robots=2, n_objects=10)), policy=str(model))
@@ -201,7 +184,3 @@ def test_a_typed_python_file_is_run_and_one_in_a_study_only_on_trust(command):
     code, out, err = command("--trust-models", "study", "run", "study.toml", "--dry-run")
     assert (code, Path("owned").exists()) == (0, True), err
     assert "Mine" in out
-    Path("owned").unlink()
-    Path("mine.py").write_text(OWNING + "\n")
-    code, _, err = command("run", "--policy", "mixed:mine.py:Mine=1,crw=rest", *TINY, "--dry-run")
-    assert (code, "swarm-forage:" in err, Path("owned").exists()) == (0, False, True)

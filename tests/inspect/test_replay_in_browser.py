@@ -233,7 +233,7 @@ def test_a_page_is_ready_when_it_is_loaded(page, desktop):
 
 
 def test_names_are_whole_above_the_counts_of_many_runs(replays, browser, tmp_path):
-    names = ["ppo_warehouse_small", "mixed:crw=10,dpo=40", "stochm with sensor noise", "crw"]
+    names = ["ppo_warehouse_small", "dpo minus site fidelity", "stochm with sensor noise", "crw"]
     many = [dataclasses.replace(replays[1], label=name) for name in names]
     browser.open(write_replays(tmp_path / "many.html", many))
     seek(browser, 400.0)

@@ -12,7 +12,7 @@ from swarm_forage_env.policies.model_files import ModelError
 from swarm_forage_env.policies.python_files import PythonFileError, classes_of
 from swarm_forage_env.policies.registry import file_of, is_policy_file, load_policy, policy_label, split_class
 from swarm_forage_env.runs.runner import run_specs
-from swarm_forage_env.runs.spec import pin_policy, plan_run
+from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import scenario
 
 CODE = """
@@ -74,7 +74,6 @@ def test_its_names():
     assert split_class("a/mine.py:Ahead") == ("a/mine.py", "Ahead")
     assert split_class("model.zip:decision_ticks=5") == ("model.zip:decision_ticks=5", None)
     assert policy_label("a/mine.py:Ahead") == "Ahead"
-    assert policy_label("mixed:a/mine.py:Ahead=20%,crw=rest") == "mixed:Ahead=0.2,crw=rest"
     assert file_of("a/mine.py:Ahead") == "a/mine.py"
     assert is_policy_file("a/mine.py:Ahead")
     assert is_policy_file("a/mine.py")
@@ -91,8 +90,6 @@ def test_path_and_content_are_the_identity_of_its_runs(file):
     assert load_policy(changed.policy, changed.parameters) is not None
     with pytest.raises(ModelError, match="a file that has changed since"):
         load_policy(spec.policy, spec.parameters)
-    pinned = {"parts": {f"{file}:Ahead": changed.parameters}}
-    assert pin_policy("mixed:mine.py:Ahead=1,crw=rest", {})[:2] == (f"mixed:{file}:Ahead=1,crw=rest", pinned)
 
 
 @pytest.mark.compiled

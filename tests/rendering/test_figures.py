@@ -209,7 +209,6 @@ def test_policies_of_the_paper_have_its_names_and_always_their_own_looks():
         ("stochm with sensor noise", "STOCHM with sensor noise"),
         ("dpo minus crw", "DPO minus CRW"),
         ("level 1, crw, dpo", "level 1, CRW, DPO"),
-        ("mixed:crw=10,dpo=40", "mixed:crw=10,dpo=40"),
         ("results/crw.npz", "results/crw.npz"),
         ("crw2", "crw2"),
     ],

@@ -247,26 +247,3 @@ def test_unknown_keys_of_a_stored_study_are_refused():
     del mapping["seeds"]
     with pytest.raises(ConfigError, match="Missing key 'seeds'"):
         StudySpec.from_mapping(mapping)
-
-
-def test_the_share_of_a_part_is_an_axis():
-    mixed = policy_spec("mixed:ppo_warehouse_small=share,crw=rest", label="learned among crw")
-    spec = study(Axis(name="share", values=(0.0, 0.25, 1.0)), policies=(mixed,), reference=0.0)
-    assert StudySpec.from_mapping(json.loads(spec.to_json())) == spec
-    runs = [spec.specs_of(place)[0] for place in spec.places]
-    assert [run.parameters["share"] for run in runs] == [0.0, 0.25, 1.0]
-    assert len({run.run_id for run in runs}) == 3
-    assert {run.policy for run in runs} == {"mixed:ppo_warehouse_small=share,crw=rest"}
-    assert [run.world.criterion for run in runs] == ["none"] * 3
-
-
-def test_a_share_that_no_part_has_is_refused():
-    with pytest.raises(ConfigError, match="mixed:dpo=share,crw=rest, got crw"):
-        study(Axis(name="share", values=(0.0, 0.5)))
-    mixed = policy_spec("mixed:dpo=share,crw=rest")
-    with pytest.raises(ConfigError, match="the parameter share for"):
-        study(policies=(mixed,))
-    with pytest.raises(ConfigError, match="Expected share"):
-        study(Axis(name="share", values=(0.5, 2.0)), policies=(mixed,))
-    with pytest.raises(ConfigError, match="add up to a swarm of 3 robots"):
-        study(Axis(name="population_size", values=(3, 6)), policies=(policy_spec("mixed:dpo=2,crw=4"),))

@@ -220,7 +220,7 @@ def test_an_unknown_axis_is_told_the_nearest_few_and_where_all_are():
 
 def test_the_studies_of_the_page_are_some(written, tmp_path):
     page = (Path(__file__).parents[2] / "docs/studies.md").read_text()
-    text, of_densities, of_shares = re.findall(r"^```toml\n(name = .*?)^```", page, re.DOTALL | re.MULTILINE)
+    text, of_densities = re.findall(r"^```toml\n(name = .*?)^```", page, re.DOTALL | re.MULTILINE)
     policy = next(Path(pretrained.__file__).parent.glob("*.npz"))
     (tmp_path / "my_policy.npz").write_bytes(policy.read_bytes())
     file = written(text)
@@ -228,16 +228,6 @@ def test_the_studies_of_the_page_are_some(written, tmp_path):
     assert (first.n_experiments, first.n_runs, full.n_runs) == (6, 48, 384)
     assert first.reference_of(first.places[0]) == Place("described", "crw", (10, 0.1))
     assert load_study(written(of_densities)).n_experiments > 1
-    assert [place.values for place in load_study(written(of_shares)).places] == [(0.0,), (0.1,), (0.2,), (0.5,), (1.0,)]
-
-
-def test_files_in_a_mixed_swarm_lie_beside_the_study(written, tmp_path):
-    policy = next(Path(pretrained.__file__).parent.glob("*.npz"))
-    (tmp_path / "my_policy.npz").write_bytes(policy.read_bytes())
-    file = written('name = "m"\nscenario = "warehouse_small"\npolicies = ["mixed:my_policy.npz=20%,crw=rest"]\n')
-    (found,) = load_study(file).policies
-    assert found.policy == f"mixed:{tmp_path / 'my_policy.npz'}=0.2,crw=rest"
-    assert found.label == "mixed:my_policy=0.2,crw=rest"
 
 
 def test_a_set_of_the_paper_is_known_by_more_than_its_name():

@@ -220,9 +220,6 @@ def test_trained_policies_run_where_there_are_messages():
     actions = policy.act(env.reset_batch(seed=1), env.active)
     assert not actions[:, 3:].any()
     env.step_batch(actions)
-    mixed = load_policy("mixed:ppo_warehouse_small=4,crw=rest")
-    mixed.reset(env.swarm_spec, np.random.default_rng(1))
-    assert not mixed.act(env.last_obs, env.active)[:, 3:].any()
 
 
 def test_a_policy_says_what_it_needs():

@@ -52,7 +52,7 @@ def recorded() -> set[str]:
     """Columns of every record that hold a number per interval, but for the clock and performance itself."""
     lines = [line.split() for line in record_columns().text().splitlines()[2:]]
     keys = {"run_id", "scenario", "controller", "n_robots", "criterion", "criterion_value", "seed"}
-    names = {name for name, *_ in lines if not name.startswith("part_K_")}  # those are of mixed swarms alone
+    names = {name for name, *_ in lines}
     return names - keys - {"interval", "t_end_s", "performance"}
 
 
