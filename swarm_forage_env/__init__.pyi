@@ -15,7 +15,7 @@ from .scenarios.quirks import AUTHORS_PROGRAM as AUTHORS_PROGRAM
 
 # policies
 from .policies.registry import load_policy as load_policy
-from .policies.registry import policy_names as policy_names
+from .policies.registry import POLICIES as POLICIES
 from .policies.registry import from_callable as from_callable
 from .contract.policy import Policy as Policy
 from .contract.robot_policy import RobotPolicy as RobotPolicy

@@ -14,7 +14,7 @@ from swarm_forage_env._internal.compiling import Callback, kernel
 from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.contract.kernel_policy import example_of
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policies.registry import from_callable, policy_names
+from swarm_forage_env.policies.registry import POLICIES, from_callable
 from swarm_forage_env.runs.run import build_stack
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv
@@ -148,7 +148,7 @@ def test_without_pytest_it_says_what_to_install(monkeypatch):
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("name", sorted({*policy_names()} - {"oracle"}))
+@pytest.mark.parametrize("name", sorted({*POLICIES} - {"oracle"}))
 def test_shipped_policies_pass(name):
     check_policy(name, scenario("warehouse_small", n_robots=20, n_objects=300))
     check_determinism(name, scenario("warehouse_small", n_robots=20, n_objects=300), seeds=[3], seconds=30.0)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from swarm_forage_env.policies.registry import policy_names
+from swarm_forage_env.policies.registry import POLICIES
 from swarm_forage_env.runs.answer import Sheet
 from swarm_forage_env.runs.plan import Condition, Plan
 from swarm_forage_env.runs.policy_spec import policy_specs
@@ -41,7 +41,7 @@ def verify_entry(
     """
     entry, protocol = read_entry(file), load_protocol()
     names = [policy.name for policy in entry.policies]
-    if not policies and not set(names) <= set(policy_names()):
+    if not policies and not set(names) <= set(POLICIES):
         raise BenchmarkError(f"Expected --policy FILE for each of {', '.join(names)}, in this order, got none.")
     specs = policy_specs(policies or names)
     if [policy_origin(spec.policy)[0] for spec in specs] != [policy.digest for policy in entry.policies]:

@@ -143,33 +143,23 @@ def _run(command: Command, words: Sequence[str], *, trusts: bool) -> int:
             if _below(command.words):
                 _say(f"\n{_listed_below(command)}")
             return ending.exit_code
+        from swarm_forage_env.policies.trust import only_typed
+
         try:
-            with context, _trust(words, all_files=trusts):
+            with context, nullcontext() if trusts else only_typed(_files_typed(words)):
                 parsed.invoke(context)
         except typer.Exit as ending:
             return ending.exit_code
     return 0
 
 
-@contextmanager
-def _trust(words: Sequence[str], *, all_files: bool) -> Iterator[None]:
-    """While the context lasts, only models among the words of a command are opened, and stderr says which."""
-    from swarm_forage_env.cli.options import complain
+def _files_typed(words: Sequence[str]) -> Iterator[str]:
+    """Yield what may be a policy file among the words of a command."""
     from swarm_forage_env.policies.registry import file_of
-    from swarm_forage_env.policies.trust import of_a_command, trusting
 
-    pieces = (piece.strip() for word in words for piece in (word, *word.split(","), *word.partition("=")[2].split(",")))
-    typed = [name for piece in pieces for name in (piece, file_of(piece))]
-    looks_only = "--dry-run" in words
-
-    def tell(line: str) -> None:
-        complain(line, 0)
-
-    with (
-        of_a_command(filter(None, typed), looks_only=looks_only, tell=tell),
-        trusting() if all_files else nullcontext(),
-    ):
-        yield
+    for word in words:
+        for piece in (word, *word.split(","), *word.partition("=")[2].split(",")):
+            yield from filter(None, (piece.strip(), file_of(piece.strip())))
 
 
 @contextmanager

@@ -5,7 +5,6 @@ import inspect
 import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterfac
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.pretrained import network_file
 from swarm_forage_env.policies.python_files import classes_of
-from swarm_forage_env.policies.registry import file_of, is_policy_file, policy_class, policy_names
+from swarm_forage_env.policies.registry import POLICIES, file_of, is_policy_file, policy_class
 from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.record import record_columns
 from swarm_forage_env.runs.spec import stated_caches
@@ -70,37 +69,20 @@ def overview(what: str | None = None) -> Overview:
 
 
 def _scenarios() -> Sheet:
-    rows = [_row_or_fault(name, _scenario_cells, n_cells=4) for name in presets.scenario_names()]
+    rows = [(name, *_scenario_cells(name)) for name in presets.SCENARIO_NAMES]
     return Sheet(title="scenarios", header=("scenario", "robots", "objects", "arena", "what it is"), rows=rows)
 
 
 def _scenario_cells(name: str) -> tuple[str, ...]:
     config = presets.scenario(name)
     arena = f"{config.arena.width_m:g} x {config.arena.height_m:g} m"
-    return str(config.robots.n_robots), str(config.objects.n_objects), arena, _scenario_headline(name)
-
-
-def _scenario_headline(name: str) -> str:
-    maker = presets.scenario_maker(name)
-    return "a configuration of another package" if isinstance(maker, partial) else _first_line(maker)
+    return str(config.robots.n_robots), str(config.objects.n_objects), arena, _first_line(presets.PRESETS[name])
 
 
 def _policies() -> Sheet:
-    rows = [_row_or_fault(name, _policy_cells, n_cells=2) for name in policy_names()]
+    policies = {name: policy_class(name) for name in POLICIES}
+    rows = [(name, _caches(policy), _first_line(policy)) for name, policy in policies.items()]
     return Sheet(title="policies", header=("policy", "caches", "what it is"), rows=rows)
-
-
-def _policy_cells(name: str) -> tuple[str, ...]:
-    policy = policy_class(name)
-    return _caches(policy), _first_line(policy)
-
-
-def _row_or_fault(name: str, cells: Callable[[str], tuple[str, ...]], *, n_cells: int) -> tuple[str, ...]:
-    """Return the row of something installed; where its package is broken, what is wrong: the others stay listed."""
-    try:
-        return name, *cells(name)
-    except Exception as error:  # noqa: BLE001 - whatever another package does when it is imported
-        return name, *["-"] * (n_cells - 1), f"broken: {type(error).__name__}: {error}"
 
 
 def _wrappers() -> Sheet:
@@ -132,17 +114,17 @@ def describe(name: str) -> Description:
 
 def _lines(name: str) -> Iterable[str]:
     name = re.sub(r"^swarm_forage/(\w+)-v\d+$", r"\1", name)
-    if name in presets.scenario_names():
-        return _scenario_lines(presets.scenario(name), _scenario_headline(name))
+    if name in presets.PRESETS:
+        return _scenario_lines(presets.scenario(name), _first_line(presets.PRESETS[name]))
     if Path(name).suffix == FILE:
         world = read_world(name)
         return _scenario_lines(world.scenario, world.title(digests=False))
-    if name in policy_names():
+    if name in POLICIES:
         network = network_file(name)
         return [*_policy_lines(name), *([] if network is None else ["", *_file_lines(network)])]
     if is_policy_file(name):
         return _file_lines(Path(file_of(name)))
-    known = (*presets.scenario_names(), *policy_names())
+    known = (*presets.SCENARIO_NAMES, *POLICIES)
     raise ConfigError(f"Unknown scenario or policy {name!r}.{suggestion(name, known)} Known: {', '.join(known)}.")
 
 

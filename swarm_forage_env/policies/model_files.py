@@ -7,9 +7,7 @@ wherever the name of a policy may.
 import hashlib
 import pickle
 import warnings
-import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
@@ -17,13 +15,10 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from swarm_forage_env._internal.archives import BROKEN_ARCHIVE
-from swarm_forage_env._internal.fields import ConfigError, table
-from swarm_forage_env._internal.files import parse_json
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.contract.policy import COMMANDS, SwarmSpec
 from swarm_forage_env.contract.types import ObsArray
-from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.interface import (
     GivenInterface,
     InterfaceConfig,
@@ -37,10 +32,6 @@ from swarm_forage_env.scenarios.config import CACHE_KINDS
 MODEL_NOTE = "swarm_forage_note"
 """Attribute of a model, saved with it: {"interface": fields, "caches": kind}, which its spaces do not show."""
 _DIGEST_DIGITS = 16
-_DESCRIPTION = "data"
-"""Part of a model file in which stable-baselines3 keeps all but the weights, as JSON with pickles in it."""
-_MOST_DESCRIPTION = 2**26
-"""Bytes; our choice, a model of ours has a thousandth of it."""
 MODEL_FAULTS = (
     ValueError,
     LookupError,
@@ -196,60 +187,6 @@ def open_network(path: str | Path, *, digest: str | None = None, interface: Give
     return NetworkPolicy(Network.load(path))
 
 
-@dataclass(frozen=True, slots=True)
-class ModelOutside:
-    """What a policy file shows without being opened."""
-
-    caches: str | None
-    """Kind of caches that its note states; None without a note."""
-    interface: InterfaceConfig | None = None
-    """What it saw and did in training, from its note and what is said with it; None for files of other packages."""
-
-
-def look_at_file(path: str | Path, *, digest: str | None = None, **parameters: Any) -> ModelOutside:
-    """Return what a policy file shows without being opened: a model its note, a file of another package nothing.
-
-    Args:
-        path: The file.
-        digest: As in `ModelPolicy`.
-        parameters: Those that the file would be opened with; those of another package are its own.
-
-    Raises:
-        ModelError: the file is missing or has changed; see also `look_at_model`.
-        ConfigError: see `look_at_model`.
-    """
-    checked_digest(path, digest)
-    return look_at_model(path, **parameters) if Path(path).suffix.lower() == ".zip" else ModelOutside(caches=None)
-
-
-def look_at_model(path: str | Path, *, interface: GivenInterface = None) -> ModelOutside:
-    """Return what a model file shows without being opened: nothing in it is run.
-
-    Args:
-        path: The file.
-        interface: As in `ModelPolicy`; it is only checked.
-
-    Raises:
-        ModelError: the file is missing, holds no model, or a note that cannot be used.
-        ConfigError: an unknown field or value in `interface`.
-    """
-    file = Path(path)
-    try:
-        with zipfile.ZipFile(file) as archive:
-            size = archive.getinfo(_DESCRIPTION).file_size
-            if size > _MOST_DESCRIPTION:
-                raise ModelError(f"Expected {path} to describe itself in {_MOST_DESCRIPTION:,} bytes, got {size:,}.")
-            about = table("the description of the model", parse_json(archive.read(_DESCRIPTION).decode("utf-8")))
-    except OSError as error:
-        raise ModelError(f"Cannot read the policy file {path}: {error.strerror or error}.") from error
-    except (*BROKEN_ARCHIVE, ValueError) as error:
-        reason = " ".join(str(error).split())
-        raise ModelError(f"Expected {path} to be a model saved by stable-baselines3: {reason}.") from error
-    note = about.get(MODEL_NOTE)
-    noted, caches = (None, None) if note is None else _read_note(note, file)
-    return ModelOutside(caches=caches, interface=chosen_interface(interface, noted))
-
-
 def file_digest(path: str | Path) -> str:
     """Return a short hash of a policy file, which makes its content part of a run's identity.
 
@@ -300,7 +237,6 @@ def _open_model(path: str, digest: str) -> tuple[Any, Any]:  # noqa: ARG001 - wi
     except ImportError as error:
         raise ImportError(f"The model {path} needs stable-baselines3: {install_command('train')}.") from error
 
-    trust.tell(path)
     try:
         data, parameters, _ = load_from_zip_file(path, device="cpu")
         if data is None:

@@ -3,8 +3,8 @@
 import re
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
-from functools import cache, partial
-from importlib.metadata import EntryPoint, entry_points
+from functools import partial
+from importlib import import_module
 from pathlib import Path, PurePath
 from typing import Any, ClassVar
 
@@ -17,11 +17,24 @@ from swarm_forage_env.contract.reset_and_step import real_numbers
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.policies import trust
 
-POLICY_ENTRY_POINTS = "swarm_forage_env.policies"
-"""Entry-point group under which installed packages offer policies by name."""
-POLICY_FILE_ENTRY_POINTS = "swarm_forage_env.policy_files"
-"""Entry-point group of functions that open policy files. The name is the suffix of the file without its dot; the value
-is called with the path and the parameters of a run. Of a Python file the class is said with the path."""
+POLICIES = {
+    "cpfa": "baselines.cpfa:CPFAPolicy",
+    "crw": "baselines.crw:CRWPolicy",
+    "dpo": "baselines.dpo:DPOPolicy",
+    "generalist": "swarm_forage_env.policies.pretrained:Generalist",
+    "oracle": "swarm_forage_env.policies.oracle:OraclePolicy",
+    "ppo_warehouse_small": "swarm_forage_env.policies.pretrained:PPOWarehouseSmall",
+    "random": "swarm_forage_env.policies.registry:RandomPolicy",
+    "stochm": "baselines.stochm:STOCHMPolicy",
+    "stochx": "baselines.stochx:STOCHXPolicy",
+}
+"""Name -> where its class is, imported when it is asked for."""
+_OPENERS = {
+    ".npz": "swarm_forage_env.policies.model_files:open_network",
+    ".py": "swarm_forage_env.policies.python_files:open_class",
+    ".zip": "swarm_forage_env.policies.model_files:ModelPolicy",
+}
+"""Suffix of a policy file -> what opens it, called with the path and the parameters of a run."""
 _LOCAL_POLICIES: dict[str, Callable[..., Policy]] = {}
 """Names that `local_policy` has given to policies of this process."""
 
@@ -84,17 +97,12 @@ def from_callable(function: Callable[[ObsArray], ActionArray], *, name: str | No
     return CallablePolicy(function, name or getattr(function, "__name__", type(function).__name__))
 
 
-def policy_names() -> tuple[str, ...]:
-    """Return the names of all installed policies, sorted."""
-    return tuple(sorted({point.name for point in _installed(POLICY_ENTRY_POINTS)}))
-
-
 def is_policy_file(name: str) -> bool:
-    """Return whether `name` has the suffix of files that an installed package opens as policies.
+    """Return whether `name` has the suffix of a policy file.
 
     The interface may be said with it, see `split_interface`, and the class of a Python file, see `split_class`.
     """
-    return bool(_openers(split_interface(name)[0]))
+    return _opener(split_interface(name)[0]) is not None
 
 
 def split_interface(policy: str) -> tuple[str, dict[str, Any]]:
@@ -107,7 +115,7 @@ def split_interface(policy: str) -> tuple[str, dict[str, Any]]:
         ConfigError: a word that is no field=value.
     """
     found = _FILE_WITH_WORDS.fullmatch(policy)
-    if found is None or not _openers(found["file"]):
+    if found is None or _opener(found["file"]) is None:
         return policy, {}
     fields: dict[str, Any] = {}
     for word in found["words"].split(","):
@@ -158,22 +166,21 @@ def whole_path(policy: str) -> str:
     return path if name is None else f"{path}:{name}"
 
 
-@cache  # every run asks, and the answer is in the files of all packages that are installed
-def _installed(group: str) -> tuple[EntryPoint, ...]:
-    return tuple(entry_points(group=group))
+def _opener(name: str) -> str | None:
+    """Return where that is what opens the policy file of that name."""
+    return _OPENERS.get(PurePath(split_class(name)[0]).suffix.lower())
 
 
-def _openers(name: str) -> list[EntryPoint]:
-    """Return what opens the policy file of that name: one entry point or none."""
-    suffix = PurePath(split_class(name)[0]).suffix.removeprefix(".").lower()
-    return [point for point in _installed(POLICY_FILE_ENTRY_POINTS) if point.name == suffix]
+def _imported(place: str) -> Callable[..., Policy]:
+    module, _, name = place.partition(":")
+    return getattr(import_module(module), name)
 
 
 def policy_class(name: str) -> Callable[..., Policy]:
     """Return the class (or factory) registered under `name`, or what opens the policy file of that name.
 
     Raises:
-        ValueError: no installed policy has that name; the message lists the known ones.
+        ValueError: no policy has that name; the message lists the known ones.
         UntrustedModelError: a file that runs code, and the console command was not told to trust it.
 
     What opens a file takes no interface where one is said with the file: see `named_interface`.
@@ -181,17 +188,15 @@ def policy_class(name: str) -> Callable[..., Policy]:
     if name in _LOCAL_POLICIES:
         return _LOCAL_POLICIES[name]
     file, _ = split_interface(name)
-    for opener in _openers(file):
+    opener = _opener(file)
+    if opener is not None:
         trust.check(file_of(file))
-        return partial(_opened, opener.load(), name)
-    for point in _installed(POLICY_ENTRY_POINTS):
-        if point.name == name:
-            return point.load()
-    known = policy_names()
+        return partial(_opened, _imported(opener), name)
+    if name in POLICIES:
+        return _imported(POLICIES[name])
     raise ValueError(
-        f"Unknown policy {name!r}.{suggestion(name, known)} Installed: {', '.join(known) or 'none'}. To make one "
-        "known, give its file (policy.npz, model.zip, my_module.py:MyPolicy), or pip install a package that offers it "
-        f"by the entry point {POLICY_ENTRY_POINTS!r} (docs/policies.md)."
+        f"Unknown policy {name!r}.{suggestion(name, POLICIES)} Known: {', '.join(POLICIES)}. Give one of your own by "
+        "its file: policy.npz, model.zip, my_module.py:MyPolicy (docs/policies.md)."
     )
 
 
@@ -205,13 +210,13 @@ def local_policy(name: str, factory: Callable[..., Policy]) -> Generator[None]:
     """While the context lasts, `name` means `factory`; in this process only, so run with jobs=1.
 
     Args:
-        name: A name that no installed policy has.
+        name: A name that no policy has.
         factory: Builds a fresh policy for each run.
 
     Raises:
         ValueError: the name is taken, or looks like a policy file.
     """
-    if name in _LOCAL_POLICIES or name in policy_names() or is_policy_file(name):
+    if name in _LOCAL_POLICIES or name in POLICIES or is_policy_file(name):
         raise ValueError(f"Expected a name of its own for the policy, got {name!r}, which stands for another one.")
     _LOCAL_POLICIES[name] = factory
     try:
@@ -225,7 +230,7 @@ def load_policy(name: str | PurePath, parameters: Mapping[str, Any] | None = Non
 
     Raises:
         TypeError: `name` is neither text nor a path.
-        ValueError: no installed policy has that name; the message lists the known ones. Or an interface is given twice.
+        ValueError: no policy has that name; the message lists the known ones. Or an interface is given twice.
     """
     if not isinstance(name, str | PurePath):  # pyright: ignore[reportUnnecessaryIsInstance] - people pass None
         raise TypeError(f"Expected the name of a policy or of a policy file, got {name!r}.")

@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from swarm_forage_env._internal.wording import counted
-from swarm_forage_env.policies.registry import file_of, is_policy_file, local_policy
-from swarm_forage_env.policies.trust import only_looks_at
+from swarm_forage_env.policies.registry import local_policy
 from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.cost import Cost, Kind, calibrate, duration, kind_of
 from swarm_forage_env.runs.plan import Condition, Plan
@@ -28,9 +27,7 @@ WORLDS_SHOWN = 60
 _WORLDS_HEADER = ("scenario", "varied", "value", "robots", "objects", "seconds", "runs", "to do")
 _DENSITIES = ("robots/m2", "objects/m2")
 _POLICIES_HEADER = ("policy", "caches", "runs", "to do", "robot-ticks", "core-hours")
-_NOT_MEASURED = (
-    "What has no core-hours is not in the estimate: models, which are not opened to plan, and policies that fail."
-)
+_NOT_MEASURED = "What has no core-hours is not in the estimate: policies that fail."
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -208,18 +205,12 @@ def measured_costs(specs: Iterable[RunSpec], tell: Callable[[str], None] | None)
     """Return what runs take, but for those that cannot be tried: their runs will say why."""
     by_kind: dict[Kind, list[RunSpec]] = {}
     for spec in specs:
-        if not _is_closed(spec.policy):
-            by_kind.setdefault(kind_of(spec), []).append(spec)
+        by_kind.setdefault(kind_of(spec), []).append(spec)
     costs: dict[Kind, Cost] = {}
     for some in by_kind.values():
         with suppress(Exception):  # whatever a run raises is its failure
             costs |= calibrate(some, tell=tell)
     return costs
-
-
-def _is_closed(policy: str) -> bool:
-    """Whether a policy has a file that is not to be opened, see `policies.trust.only_looks_at`."""
-    return is_policy_file(policy) and only_looks_at(file_of(policy))
 
 
 def _hours_text(hours: float) -> str:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 from swarm_forage_env._internal.fields import ConfigError, instance, known_keys, table, text, whole
 from swarm_forage_env._internal.files import parse_json
-from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.registry import (
     file_of,
     is_policy_file,
@@ -253,8 +252,7 @@ def pin_policy(policy: str | Path, parameters: Mapping[str, Any]) -> tuple[str, 
 
     Returns:
         The registered name, or the whole path of the file; the parameters, with the file's digest; and the class of the
-        name or the opened policy, which may state `caches`; of a model where nothing is to be run
-        (`policies.trust.only_looks_at`), what it shows from outside.
+        name or the opened policy, which may state `caches`.
 
     Raises:
         ValueError: no installed policy has that name, the file cannot be opened, or an interface is given twice.
@@ -262,18 +260,12 @@ def pin_policy(policy: str | Path, parameters: Mapping[str, Any]) -> tuple[str, 
     name, pinned = named_interface(str(policy), parameters)
     if not is_policy_file(name):
         return name, pinned, policy_class(name)
-    from swarm_forage_env.policies.model_files import file_digest, look_at_file  # late: most runs open no model
+    from swarm_forage_env.policies.model_files import file_digest  # late: most runs open no model
 
     file = whole_path(name)
     planned = pinned if "digest" in pinned else {"digest": file_digest(file_of(file)), **pinned}
-    if trust.only_looks_at(file_of(file)):
-        trust.check(file)
-        return file, planned, look_at_file(file, **pinned)
-    return (
-        file,
-        planned,
-        load_policy(file, pinned),
-    )  # without a digest it says what it guesses, which runs do not repeat
+    # Without a digest it says what it guesses, which runs do not repeat.
+    return file, planned, load_policy(file, pinned)
 
 
 def wrappers_to_list(wrappers: "Iterable[WrapperConfig]") -> list[dict[str, Any]]:

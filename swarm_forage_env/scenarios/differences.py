@@ -15,7 +15,7 @@ from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.scenarios.config import ArenaConfig, ScenarioConfig, to_mapping
 from swarm_forage_env.scenarios.floor import CELL_M
 from swarm_forage_env.scenarios.overrides import field_sections
-from swarm_forage_env.scenarios.presets import scenario, scenario_names
+from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.quirks import QUIRK_NAMES, RULES
 
 _READ_ONLY = ("name", "performance")
@@ -85,7 +85,7 @@ def preset_of(config: ScenarioConfig) -> ScenarioConfig | None:
 
 @lru_cache(maxsize=256)  # each world asks
 def _preset(name: str, n_robots: int) -> ScenarioConfig | None:
-    if name not in scenario_names():
+    if name not in SCENARIO_NAMES:
         return None
     for sizes in ({"n_robots": n_robots}, {}):
         try:

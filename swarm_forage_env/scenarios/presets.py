@@ -6,8 +6,6 @@ Section numbers refer to the paper, "Improved Swarm Engineering: Aligning Intuit
 """
 
 from collections.abc import Callable, Mapping
-from functools import cache, partial
-from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from swarm_forage_env._internal import fields
@@ -246,57 +244,14 @@ PRESETS: dict[str, Callable[..., ScenarioConfig]] = {
 }
 """Name -> what builds the scenario. A new one of this package is registered here, and nowhere else."""
 SCENARIO_NAMES = tuple(PRESETS)
-"""Scenarios of this package; `scenario_names` has those of other packages, too."""
-SCENARIO_ENTRY_POINTS = "swarm_forage_env.scenarios"
-"""Entry-point group under which installed packages offer scenarios by name: functions like `warehouse_small`, which
-take overrides, or a `ScenarioConfig`. Each builds a configuration of the entry point's name."""
-
-
-@cache  # every world asks, and the answer is in the files of all packages that are installed
-def _installed() -> dict[str, EntryPoint]:
-    return {point.name: point for point in entry_points(group=SCENARIO_ENTRY_POINTS) if point.name not in PRESETS}
-
-
-def scenario_names() -> tuple[str, ...]:
-    """Return what `scenario` takes: the scenarios of this package, then those of others, sorted."""
-    return (*SCENARIO_NAMES, *sorted(_installed()))
-
-
-def scenario_maker(name: str) -> Callable[..., ScenarioConfig]:
-    """Return the function that builds the scenario of that name with fields overridden.
-
-    Raises:
-        ConfigError: unknown name (with the nearest known one), or an entry point that cannot be loaded.
-    """
-    known_name("scenario", name, scenario_names())
-    if name in PRESETS:
-        return PRESETS[name]
-    point = _installed()[name]
-    try:
-        found = point.load()
-    except Exception as error:  # whatever another package does when it is imported
-        raise ConfigError(
-            f"Cannot load the scenario {name!r} from {point.value}: {type(error).__name__}: {error}. "
-            "Mend or uninstall the package that offers it."
-        ) from error
-    return partial(with_overrides, found) if isinstance(found, ScenarioConfig) else found
-
-
-def _made(name: str, overrides: Mapping[str, Any]) -> ScenarioConfig:
-    found: Any = scenario_maker(name)(**overrides)
-    if not isinstance(found, ScenarioConfig) or found.name != overrides.get("name", name):
-        came = found.name if isinstance(found, ScenarioConfig) else type(found).__name__
-        raise ConfigError(
-            f"Expected what offers the scenario {name!r} to build a ScenarioConfig of that name, got {came}."
-        )
-    return found
+"""What `scenario` takes."""
 
 
 def scenario(name: str, /, *, density: float | None = None, **overrides: Any) -> ScenarioConfig:
     """Return a preset by name with fields overridden.
 
     Args:
-        name: One of `scenario_names()`.
+        name: One of `SCENARIO_NAMES`.
         density: Robots per m^2, for example 0.05; the arena is as large as the swarm needs, see `at_density`. Default:
             the arena of the preset.
         overrides: Field names of ScenarioConfig or of its sections, see `with_overrides`.
@@ -307,13 +262,13 @@ def scenario(name: str, /, *, density: float | None = None, **overrides: Any) ->
     if density is not None:
         others = {key: value for key, value in overrides.items() if key not in _SIZES}
         return _with_density(scenario(name, **others), density, overrides)
-    known_name("scenario", name, scenario_names())
+    known_name("scenario", name, SCENARIO_NAMES)
     if "side_m" in overrides and name != "search_and_rescue":
         raise ConfigError(
             f"Expected side_m with search_and_rescue only, got it with {name}; "
             "other arenas change by width_m and height_m."
         )
-    return _made(name, overrides)
+    return PRESETS[name](**overrides)
 
 
 def chosen_scenario(given: str | ScenarioConfig, overrides: Mapping[str, Any]) -> ScenarioConfig:

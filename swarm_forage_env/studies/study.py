@@ -29,7 +29,7 @@ from swarm_forage_env.runs.plan import Condition, Plan
 from swarm_forage_env.runs.policy_spec import PolicySpec
 from swarm_forage_env.runs.spec import RunSpec, identity_of, wrappers_from_list, wrappers_to_list
 from swarm_forage_env.scenarios.overrides import field_sections, field_types, parse_tuple
-from swarm_forage_env.scenarios.presets import scenario, scenario_names
+from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.quirks import QUIRK_NAMES, RULES, Quirks
 from swarm_forage_env.scenarios.robots import words_of_kind
 from swarm_forage_env.studies.ladders import CRITERIA, swarms_of_sizes, wrappers_at
@@ -208,7 +208,7 @@ class StudySpec:
             check_file_name("budget", self.budget)
         for what in ("title", "budget", "file"):
             typed(str, getattr(self, what), what)
-        known_name("scenario", self.scenario, scenario_names())
+        known_name("scenario", self.scenario, SCENARIO_NAMES)
         for name in table("set", self.settings):
             if name in OF_THE_STUDY:
                 raise ConfigError(f"Expected no {name} in set: {OF_THE_STUDY[name]}.")

@@ -17,7 +17,7 @@ import pytest
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import pretrained
 from swarm_forage_env.policies.network import Network
-from swarm_forage_env.policies.registry import RandomPolicy, policy_names
+from swarm_forage_env.policies.registry import POLICIES, RandomPolicy
 from swarm_forage_env.runs.record import RunRecord
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import RunStore, load
@@ -346,7 +346,7 @@ def test_check_says_who_keeps_the_rules(command):
 def test_list_names_everything(command):
     code, out, _ = command("list")
     assert code == 0
-    for name in (*SCENARIO_NAMES, *policy_names()):
+    for name in (*SCENARIO_NAMES, *POLICIES):
         assert name in out
     assert max(map(len, out.splitlines())) <= 80, "columns of a terminal"
 
@@ -362,7 +362,7 @@ def test_info_shows_every_field_space_and_slice_of_a_scenario(command, name):
         assert part in out
 
 
-@pytest.mark.parametrize("name", policy_names())
+@pytest.mark.parametrize("name", POLICIES)
 def test_info_describes_a_controller(command, name):
     code, out, _ = command("info", name)
     assert code == 0

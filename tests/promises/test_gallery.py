@@ -6,7 +6,7 @@ import pytest
 
 from scripts.make_gallery import EXHIBITS, FILMS, FOLDER, page
 from swarm_forage_env.inspect.replay.files import FORMAT_VERSION
-from swarm_forage_env.policies.registry import policy_names
+from swarm_forage_env.policies.registry import POLICIES
 from swarm_forage_env.rendering.pages import SCRIPTS, take_replay_page_apart
 from swarm_forage_env.wrappers.registry import WRAPPERS
 from tests.support.foraging import NEAR
@@ -18,7 +18,7 @@ DISTURBED = {exhibit.name: exhibit.wrapper.partition(":")[0] for exhibit in EXHI
 
 def test_every_scenario_controller_and_wrapper_is_shown():
     assert {exhibit.scenario for exhibit in EXHIBITS} >= NEAR.keys()
-    assert {name for exhibit in EXHIBITS for name in exhibit.policies} == {*policy_names()} - {"random"}
+    assert {name for exhibit in EXHIBITS for name in exhibit.policies} == {*POLICIES} - {"random"}
     assert {*DISTURBED.values()} - {""} == WRAPPERS.keys()
 
 

@@ -13,7 +13,7 @@ from swarm_forage_env.policies import model_files
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.model_files import file_digest
 from swarm_forage_env.policies.network import Network, NetworkAbout
-from swarm_forage_env.policies.registry import policy_class, policy_names
+from swarm_forage_env.policies.registry import POLICIES, policy_class
 from swarm_forage_env.runs.spec import RunSpec, chosen_caches, plan_run
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM
@@ -40,7 +40,7 @@ def registered(monkeypatch):
     monkeypatch.setitem(registry.WRAPPERS, "test_inner", "tests.support.wrapper_configs:InnerConfig")
 
 
-@pytest.mark.parametrize("policy", policy_names())
+@pytest.mark.parametrize("policy", POLICIES)
 @pytest.mark.parametrize("name", SCENARIO_NAMES)
 def test_every_scenario_and_policy_survives_json(name, policy):
     spec = plan_run(World(scenario(name), criterion="noise", value=0.0043), policy, seed=3)
@@ -191,7 +191,7 @@ def test_caches_are_those_asked_for_or_of_the_policy_or_of_the_scenario(asked, p
     assert chosen_caches(asked, policy, scenario("warehouse_small", caches=of_scenario)) == chosen
 
 
-@pytest.mark.parametrize("policy", policy_names())
+@pytest.mark.parametrize("policy", POLICIES)
 def test_a_planned_run_has_the_world_its_policy_is_made_for(policy):
     made_for = getattr(policy_class(policy), "caches", "none")
     assert plan_run(scenario("warehouse_small"), policy).scenario.caches == made_for

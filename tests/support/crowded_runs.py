@@ -8,7 +8,8 @@ import numpy as np
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policies.registry import load_policy, policy_names
+from swarm_forage_env.policies.registry import POLICIES as NAMES
+from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import build_stack
 from swarm_forage_env.scenarios.presets import scenario
 from tests.support.busy import BusyPolicy, change_population
@@ -25,7 +26,7 @@ DENSE = {
 }
 
 
-POLICIES = sorted({*policy_names()} - {"oracle"})
+POLICIES = sorted({*NAMES} - {"oracle"})
 """Policies that see observations and not the world."""
 
 

@@ -22,7 +22,7 @@ from swarm_forage_env.inspect.play.levels import LEVELS
 from swarm_forage_env.inspect.play.run import SPEEDS, RunByHand
 from swarm_forage_env.inspect.replay.capture import caches_now, objects_now, status_now
 from swarm_forage_env.inspect.replay.files import counted_performance, geometry, kind_counts, page_of, task_names
-from swarm_forage_env.policies.registry import policy_label, policy_names
+from swarm_forage_env.policies.registry import POLICIES, policy_label
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.obstacles import MIN_SIDE_M, Rectangle
@@ -76,7 +76,7 @@ class PlaySession:
             ValueError: see `plan_run`; or a policy that does not fit the scenario.
         """
         self._lock, self._clock = Lock(), clock
-        self._policies = tuple(dict.fromkeys((*policy_names(), setting.policy)))
+        self._policies = tuple(dict.fromkeys((*POLICIES, setting.policy)))
         self._serial = 0
         self.note = ""
         self._begin(setting)

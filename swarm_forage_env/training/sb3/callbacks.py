@@ -1,7 +1,6 @@
 """Callbacks of stable-baselines3 by name: code of the user that runs beside a training.
 
     swarm-forage train --callback my_callbacks:Mine     # class Mine in my_callbacks.py, in this folder or installed
-    swarm-forage train --callback wandb                 # an entry point that an installed package offers
 
 Only the command line and Python name callbacks. A plan, which may come from anywhere, cannot: it holds no code.
 """
@@ -10,7 +9,6 @@ import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
@@ -18,17 +16,13 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from swarm_forage_env._internal.faults import in_words
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.wording import suggestion
-
-CALLBACK_ENTRY_POINTS = "swarm_forage_env.callbacks"
-"""Entry-point group under which installed packages offer classes of callbacks by name."""
 
 
 def named_callbacks(names: Iterable[str]) -> tuple[BaseCallback, ...]:
     """Return callbacks by their names, each made without arguments.
 
     Args:
-        names: "module:Class", or the name of an entry point. A module may lie in the current folder.
+        names: "module:Class". A module may lie in the current folder.
 
     Raises:
         ConfigError: there is none of that name, it cannot be imported or made, or it is no callback.
@@ -71,15 +65,9 @@ def _made(name: str) -> BaseCallback:
 def _found(name: str) -> Any:
     """The class (or function) of that name; whatever its import raises comes through."""
     module, colon, attribute = name.partition(":")
-    if colon:
-        return getattr(_imported(module), attribute)
-    offered = {point.name: point for point in entry_points(group=CALLBACK_ENTRY_POINTS)}
-    if name not in offered:
-        raise ConfigError(
-            f"Expected a callback as module:Class or as the name of an entry point, got {name!r}."
-            f"{suggestion(name, offered)} Entry points: {', '.join(sorted(offered)) or 'none'}."
-        )
-    return offered[name].load()
+    if not colon:
+        raise ConfigError(f"Expected a callback as module:Class, got {name!r}.")
+    return getattr(_imported(module), attribute)
 
 
 def _imported(module: str) -> Any:

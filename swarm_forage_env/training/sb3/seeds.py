@@ -193,8 +193,6 @@ def _how_it_ended(code: int) -> str:
 
 def _started(job: _Job) -> tuple[Any, BaseProcess]:
     """Start the process of a training; returns what it tells through."""
-    if job.resume:
-        trust.tell(job.folder / MODEL_FILE)  # the process does not know whom to tell
     context = get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_train_here, args=(job, theirs), name=job.folder.name)

@@ -262,7 +262,6 @@ def _check_baseline(plan: TrainingPlan) -> None:
 def _checkpoint(plan: TrainingPlan, folder: Path, env: SwarmVecEnv) -> BaseAlgorithm:
     path = folder / MODEL_FILE
     trust.check(path)
-    trust.tell(path)
     try:
         return ALGORITHM_CLASSES[plan.algorithm].load(path, env=env, device="cpu")
     except MODEL_FAULTS as error:
