@@ -1,33 +1,20 @@
 """Try the package at random until the time is over, and show what fails with the number that repeats it.
 
-    scripts/fuzz commands --minutes 30
     scripts/fuzz worlds --first 123 --count 1
-    scripts/fuzz kills --count 50 --note
+    scripts/fuzz files --minutes 30
 
-commands   malformed words and files. A command may end with an exit code that is documented and with one line on
-           stderr; a traceback, another exit code or one that takes too long is a fault. Nothing is run, only begun.
 files      small files of every format with other bytes, or cut off. The reader of the format returns or raises an
            error that it documents. A case that ends the process is a fault, and another process goes on.
 worlds     scenarios, wrappers, actions, wrong calls and snapshots. Walls, objects, observations, rewards, agents and
            records are looked at after every tick, and each run is made twice.
-kills      run, score, compare, train and study run: killed at a random moment and given again, until what they
-           leave can be compared with what an undisturbed run leaves.
-pairs      a command that writes, given twice at a random moment to the same folder or file: both end well or one is
-           refused, and what they leave is what one alone leaves.
-signals    Ctrl-C or SIGTERM at a random moment of any command, also while it starts: the documented exit code, one
-           line, and no half file.
 
-The same number makes the same case again; of the last three, what the machine had done by then may differ. The last
-line holds figures, also after Ctrl-C; --note keeps them in docs/promises.md, and adds them to those of a campaign that
-ended where this one begins. In tests/support, malformed.py, changed_files.py, random_worlds.py, kills.py and pairs.py
-say what a case is.
+The same number makes the same case again. The last line holds figures, also after Ctrl-C. In tests/support,
+changed_files.py and random_worlds.py say what a case is.
 """
 
 import argparse
 import os
-import re
 import resource
-import shlex
 import signal
 import sys
 import tempfile
@@ -36,7 +23,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from importlib.util import find_spec
 from itertools import count as numbers_from
 from multiprocessing import get_context
@@ -47,9 +33,6 @@ from random import Random
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 
-PAGE = Path(__file__).resolve().parent.parent / "docs/promises.md"
-BLOCK = re.compile(r"(<!-- table by scripts/fuzz -->\n).*?(<!-- end of table -->)", re.DOTALL)
-HEADINGS = ("what", "cases", "faults", "figures", "on", "command")
 LIMIT_S = 120
 """Seconds of a core: a command that only begins takes one, or twenty if it compiles; our choice."""
 MEMORY_BYTES = 12 * 2**30
@@ -110,32 +93,11 @@ class Campaign:
         return f"{self.n_cases:,} {self.kind}, {self.n_faults:,} faults; {self.told() or 'nothing was tried'}"
 
 
-def one_command(number: int, folder: Path) -> tuple[Counter[str], str]:
-    """Give a malformed command; returns figures, and the fault or nothing."""
-    from tests.support.malformed import malformed_command, outcome
-
-    words = malformed_command(Random(number), folder)
-    signal.setitimer(signal.ITIMER_PROF, LIMIT_S)
-    found = outcome(words)
-    signal.setitimer(signal.ITIMER_PROF, 0.0)
-    if found.fault:
-        return Counter(), f"swarm-forage {shlex.join(words)[:2000]}\n{found.fault}"
-    return Counter({f"ended with exit code {found.code}": 1}), ""
-
-
 def one_world(number: int, _folder: Path) -> tuple[Counter[str], str]:
     """Visit a random world; returns figures, and the fault or nothing."""
     from tests.support.random_worlds import random_world, visit
 
     seen = visit(random_world(Random(number)))
-    return seen.figures, seen.fault
-
-
-def one_kill(number: int, folder: Path) -> tuple[Counter[str], str]:
-    """Kill a command; returns figures, and the fault or nothing."""
-    from tests.support.kills import kill, possible
-
-    seen = kill(Random(number), folder, possible())
     return seen.figures, seen.fault
 
 
@@ -151,33 +113,11 @@ def one_file(number: int, folder: Path) -> tuple[Counter[str], str]:
     return Counter({outcome: 1, f"of {name}": 1}), f"{name}\n{fault}" if fault else ""
 
 
-def one_pair(number: int, folder: Path) -> tuple[Counter[str], str]:
-    """Give a command twice at once; returns figures, and the fault or nothing."""
-    from tests.support.pairs import MIXED, can_be_given, pair
-
-    seen = pair(Random(number), folder, (*can_be_given(), *MIXED))
-    return seen.figures, seen.fault
-
-
-def one_signal(number: int, folder: Path) -> tuple[Counter[str], str]:
-    """Interrupt a command; returns figures, and the fault or nothing."""
-    from tests.support.pairs import READERS, can_be_given, interrupted
-
-    seen = interrupted(Random(number), folder, (*can_be_given(), *READERS))
-    return seen.figures, seen.fault
-
-
-OF_STRANGERS = ("commands", "files")
-"""Kinds whose cases are made in a process of their own, which they may end."""
 ERRORS = "stderr.txt"
 """In the folder: what such a process wrote to stderr."""
 KINDS: dict[str, Callable[[int, Path], tuple[Counter[str], str]]] = {
-    "commands": one_command,
     "files": one_file,
     "worlds": one_world,
-    "kills": one_kill,
-    "pairs": one_pair,
-    "signals": one_signal,
 }
 
 
@@ -188,19 +128,16 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--minutes", type=float, default=30.0, help="how long; default 30")
     parser.add_argument("--first", type=int, default=0, help="number of the first case; default 0")
     parser.add_argument("--count", type=int, default=None, help="cases; default as many as fit")
-    parser.add_argument("--note", action="store_true", help="write the figures into docs/promises.md")
     given = parser.parse_args(words)
     if find_spec("pytest") is None:
         parser.error("expected pytest, with which cases are checked: pip install -e '.[test]'")
     campaign = Campaign(given.kind, given.first)
     with _listening(campaign) as folder, suppress(KeyboardInterrupt):
         ends = time.monotonic() + 60.0 * given.minutes
-        (_go_on_elsewhere if given.kind in OF_STRANGERS else _go_on)(campaign, folder, ends, given.count)
+        (_go_on_elsewhere if given.kind == "files" else _go_on)(campaign, folder, ends, given.count)
     if campaign.is_stopped:
         print("Stopped by Ctrl-C.")
     print(campaign.last_line())
-    if given.note:
-        note(campaign)
     return 1 if campaign.n_faults else 0
 
 
@@ -208,7 +145,7 @@ def main(words: Sequence[str] | None = None) -> int:
 def _listening(campaign: Campaign) -> Iterator[Path]:
     """Work in an empty folder that is removed, with Ctrl-C told to the campaign."""
     place, before = Path.cwd(), signal.signal(signal.SIGINT, campaign.stop)
-    in_memory = IN_MEMORY if campaign.kind in OF_STRANGERS and os.access(IN_MEMORY, os.W_OK) else None
+    in_memory = IN_MEMORY if campaign.kind == "files" and os.access(IN_MEMORY, os.W_OK) else None
     try:
         with tempfile.TemporaryDirectory(dir=in_memory) as folder:
             os.chdir(folder)
@@ -259,40 +196,6 @@ def _make_cases(kind: str, first: int, folder: Path, sender: Connection) -> None
     with suppress(BrokenPipeError):
         for number in numbers_from(first):
             sender.send(KINDS[kind](number, folder))
-
-
-def note(campaign: Campaign) -> None:
-    """Put the figures of a campaign into the page, with those of the one that it goes on; other kinds stay."""
-    text = PAGE.read_text(encoding="utf-8")
-    found = BLOCK.search(text)
-    if found is None:
-        raise ValueError(f"Expected the marks of a table by scripts/fuzz in {PAGE}, found none.")
-    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in found[0].splitlines()]
-    rows = {line[0]: line[1:] for line in cells if line[0] in KINDS}
-    whole = _joined(campaign, rows.get(campaign.kind))
-    command = f"`scripts/fuzz {whole.kind} --first {whole.first} --count {whole.n_cases}`"
-    today = f"{datetime.now(UTC):%Y-%m-%d}"
-    rows[whole.kind] = [f"{whole.n_cases:,}", f"{whole.n_faults:,}", whole.told(), today, command]
-    lines = [HEADINGS, ["---"] * len(HEADINGS), *([kind, *rows[kind]] for kind in KINDS if kind in rows)]
-    table = "\n".join(f"| {' | '.join(line)} |" for line in lines)
-    PAGE.write_text(BLOCK.sub(lambda kept: f"{kept[1]}{table}\n{kept[2]}", text), encoding="utf-8")
-
-
-def _joined(campaign: Campaign, row: Sequence[str] | None) -> Campaign:
-    """Return a campaign with what its row in the page has, where it goes on behind that; else the campaign."""
-    found = re.search(r"--first (\d+) --count (\d+)`", row[-1]) if row else None
-    if row is None or found is None:
-        return campaign
-    first, n_cases = int(found[1]), int(found[2])
-    if first + n_cases != campaign.first:
-        return campaign
-    n_faults, told = int(row[1].replace(",", "")), re.findall(r"(\d[\d,]*) (.+?)(?:, (?=\d)|$)", row[2])
-    figures = Counter({name: int(number.replace(",", "")) for number, name in told})
-    joined = Campaign(campaign.kind, first, n_cases, n_faults, figures)
-    joined.n_cases += campaign.n_cases
-    joined.n_faults += campaign.n_faults
-    joined.figures += campaign.figures
-    return joined
 
 
 def _too_long(*_: object) -> None:
