@@ -14,15 +14,6 @@ def maps(
     described: WorldOptions,
     seeds: Annotated[int, typer.Option("--seeds", min=1, help="Runs per policy.")] = 1,
     square: Annotated[float, typer.Option("--square", help="Side of the squares in m.")] = 0.4,
-    per_robot: Annotated[
-        bool, typer.Option("--per-robot", help="Divide by the swarm size, to compare swarms of several sizes.")
-    ] = False,
-    own_scales: Annotated[
-        bool,
-        typer.Option(
-            "--own-scales", help="Give each map its own scale; default one scale per column, to compare rows."
-        ),
-    ] = False,
     jobs: Jobs = None,
     picture: Picture = None,
 ) -> None:
@@ -41,7 +32,7 @@ def maps(
     with progress_bar("runs", sum(spec.robot_ticks for spec in specs)) as advance:
         found = maps_of_runs(specs, side_m=square, jobs=jobs, advance=advance)
     try:
-        (found.per_robot() if per_robot else found).write(file, own_scales=own_scales)
+        found.write(file)
     except ImportError as error:
         notes().print(str(error))
     typer.echo(f"wrote maps to {file} and .npz files beside it")

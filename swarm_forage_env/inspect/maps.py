@@ -1,6 +1,5 @@
 """Maps of the floor: where robots were, where they took and left objects, where they got in each other's way."""
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -15,7 +14,6 @@ from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.inspect.replay.capture import record_replay
 from swarm_forage_env.inspect.replay.frames import Replay, Status
 from swarm_forage_env.policies.registry import policy_label
-from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.workers import Tell, map_runs
 from swarm_forage_env.scenarios.floor import CELL_M
@@ -53,17 +51,13 @@ class FloorMaps:
     def minus(self, other: "FloorMaps") -> "FloorMaps":
         """Return what is more here than in `other`, square by square.
 
-        Arenas may differ in size if they have the same proportions and as many squares: then squares at corresponding
-        places are compared.
-
         Raises:
-            ConfigError: arenas of other proportions, or another number of squares.
+            ConfigError: arenas or squares of other sizes.
         """
-        if not (_same_proportions(self.size_m, other.size_m) and self._grid == other._grid):
-            mine, theirs = ((maps.size_m, maps.side_m) for maps in (self, other))
+        mine, theirs = ((*maps.size_m, maps.side_m) for maps in (self, other))
+        if mine != theirs:
             raise ConfigError(
-                "Expected maps of arenas of one shape with as many squares, got sizes and sides of "
-                f"{mine} and {theirs} m."
+                f"Expected maps of one arena in equal squares, got sizes and sides of {mine} and {theirs} m."
             )
         return replace(
             self,
@@ -71,15 +65,6 @@ class FloorMaps:
             arrays={name: array - other.arrays[name] for name, array in self.arrays.items()},
             is_difference=True,
         )
-
-    def per_robot(self) -> "FloorMaps":
-        """Return everything divided by the swarm size, so that swarms of several sizes can be compared."""
-        return replace(self, arrays={name: array / self.n_robots for name, array in self.arrays.items()})
-
-    @property
-    def _grid(self) -> tuple[int, ...]:
-        """Number of squares along y and x."""
-        return self.arrays["density"].shape
 
     def write(self, path: str | Path) -> None:
         """Write the arrays to an .npz file, whole or not at all."""
@@ -140,25 +125,17 @@ class ComparedMaps:
     """Maps of several swarms, and what is more in each after the first than in the first."""
 
     maps: tuple[FloorMaps, ...]
-    per: str = ""
-    """What everything is divided by, for the units."""
 
     @property
     def rows(self) -> tuple[FloorMaps, ...]:
         """Maps and differences."""
         return (*self.maps, *(one.minus(self.maps[0]) for one in self.maps[1:]))
 
-    def per_robot(self) -> "ComparedMaps":
-        """Return everything divided by the swarm sizes."""
-        return ComparedMaps(maps=tuple(one.per_robot() for one in self.maps), per="robot")
-
-    def write(self, picture: str | Path, *, own_scales: bool = False, style: FigureStyle = SCREEN) -> None:
+    def write(self, picture: str | Path) -> None:
         """Write arrays to .npz files beside a picture, and then draw it.
 
         Args:
             picture: File to write.
-            own_scales: See `rendering.plots.draw_maps`.
-            style: Of the figure.
 
         Raises:
             ImportError: matplotlib is not installed; the arrays are written.
@@ -168,13 +145,10 @@ class ComparedMaps:
         rows = self.rows
         for one in rows:
             one.write(Path(picture).with_suffix(f".{as_file_name(one.label)}.npz"))
-        columns = {
-            name: (what, f"{unit}, per {self.per}" if self.per else unit) for name, (what, unit) in MEANINGS.items()
-        }
         shown = [
             MapRow(one.label, one.arrays, one.is_difference, one.size_m, one.obstacles_m, one.nests_m) for one in rows
         ]
-        draw_maps(picture, shown, columns, own_scales=own_scales, style=style)
+        draw_maps(picture, shown, MEANINGS)
 
 
 def maps_of_runs(
@@ -217,8 +191,3 @@ def _mean_maps(maps: Sequence[FloorMaps], label: str) -> FloorMaps:
     """Return the mean of maps of several runs of one experiment, under another label."""
     arrays = {name: np.mean([one.arrays[name] for one in maps], axis=0) for name in MEANINGS}
     return replace(maps[0], label=label, arrays=arrays)
-
-
-def _same_proportions(size_m: tuple[float, float], other_m: tuple[float, float]) -> bool:
-    """Return whether two floors differ by a scale at most."""
-    return math.isclose(size_m[0] * other_m[1], size_m[1] * other_m[0], rel_tol=1e-6)

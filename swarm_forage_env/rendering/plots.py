@@ -186,7 +186,6 @@ def draw_maps(
     rows: Sequence[MapRow],
     columns: Mapping[str, tuple[str, str]],
     *,
-    own_scales: bool = False,
     style: FigureStyle = SCREEN,
 ) -> None:
     """Draw maps of floors of the same proportions: a row of panels per map or difference, a column per quantity.
@@ -199,7 +198,6 @@ def draw_maps(
         path: File to write; as in `saved_figure`, whose errors this has.
         rows: One per map or difference.
         columns: What is counted, and its unit, by name of the array; their order is that of the columns.
-        own_scales: Whether every panel has a scale of its own instead, which shows more of what is rare.
         style: Of the figure.
     """
     n_across = len(columns)
@@ -216,7 +214,7 @@ def draw_maps(
         panels = iter(figure.subplots(n_lines, n_across, squeeze=False))
         for names, row in product(blocks, rows):
             line: list[Panel] = [*next(panels)]
-            alike = [row] if own_scales else [one for one in rows if one.is_difference == row.is_difference]
+            alike = [one for one in rows if one.is_difference == row.is_difference]
             for name, axes in zip(names, line, strict=False):
                 top = _map_top([one.arrays[name] for one in alike])
                 image = _draw_map(axes, row, name, top)

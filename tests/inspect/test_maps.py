@@ -88,24 +88,10 @@ def test_a_difference_is_what_is_more_here(replay):
 
 
 def test_maps_that_do_not_match_are_refused(replay):
-    with pytest.raises(ConfigError, match="one shape with as many squares"):
+    with pytest.raises(ConfigError, match="one arena in equal squares"):
         floor_maps(replay).minus(floor_maps(replay, side_m=1.0))
     with pytest.raises(ConfigError, match="side_m"):
         floor_maps(replay, side_m=0.1)
-
-
-def test_arenas_of_one_shape_are_compared_at_corresponding_places(replay):
-    mine = floor_maps(replay)
-    larger = dataclasses.replace(mine, size_m=(64.0, 32.0), side_m=0.8, arrays={"density": mine.arrays["density"] + 1})
-    assert larger.minus(mine).arrays["density"] == pytest.approx(1.0)
-    narrow = dataclasses.replace(mine, size_m=(64.0, 16.0))
-    with pytest.raises(ConfigError, match="one shape"):
-        narrow.minus(mine)
-
-
-def test_shares_of_robots(replay):
-    mine = floor_maps(replay)
-    assert np.array_equal(mine.per_robot().arrays["density"], mine.arrays["density"] / 2)
 
 
 def test_arrays_go_to_a_file(replay, tmp_path):

@@ -88,11 +88,6 @@ def test_narrow_maps_stand_below_each_other(drawn):
     assert [(place.rowspan.start, place.colspan.start) for place in places] == [(0, 0), (0, 1), (1, 0), (1, 1)]
 
 
-def test_maps_may_have_scales_of_their_own(drawn):
-    _, scales = maps_drawn(drawn, own_scales=True)
-    assert [top for _, top in scales] == pytest.approx([1.0, 10.0, 9.0, 4.5])
-
-
 def test_maps_tell_their_units(drawn):
     axes, _ = maps_drawn(drawn)
     assert {(one.get_xlabel(), one.get_ylabel()) for one in axes} == {("x [m]", "y [m]")}
