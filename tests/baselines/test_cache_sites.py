@@ -53,48 +53,6 @@ def test_near_the_nest_the_site_is_pushed_out_to_the_proximity_distance():
     assert choose(robot, 24.0, 43.4) == pytest.approx((24.1, 33.7), abs=1e-6), "19.4 m away, half way is allowed"
 
 
-def test_sites_keep_away_from_remembered_caches():
-    robot = TaskRobot()
-    robot.know_cache(1, (72, 40), 5)  # at (14.5, 8.1)
-    x, y = choose(robot, 24.0, 8.0)
-    assert math.dist((x, y), (14.5, 8.1)) == pytest.approx(6.4, abs=0.06)
-    assert math.dist((x, y), (3.2, 8.0)) >= 6.4
-
-
-@pytest.mark.parametrize(
-    ("x", "y", "allowed"),
-    [
-        (9.61, 8.0, True),
-        (9.59, 8.0, False),  # 6.4 m from the nest centre at (3.2, 8)
-        (28.79, 8.1, True),
-        (28.81, 8.1, False),  # border of the box
-        (20.0, 3.21, True),
-        (20.0, 3.19, False),
-        (20.91, 8.1, True),
-        (20.89, 8.1, False),  # 6.4 m from the cache at (14.5, 8.1)
-    ],
-)
-def test_what_is_allowed(x, y, allowed):
-    robot = TaskRobot()
-    if x > 20.0:
-        robot.know_cache(1, (72, 40), 5)
-    assert is_allowed(robot.record, x, y, robot.constants, robot.memory) == allowed
-
-
-def test_a_box_without_any_allowed_point_gives_no_site():
-    robot = TaskRobot()
-    for serial, cell in enumerate([(30, 40), (72, 40), (114, 40), (50, 40), (95, 40), (140, 40)], start=1):
-        robot.know_cache(serial, cell, 5)
-    assert choose(robot, 24.0, 8.0) is None
-
-
-def test_no_offset_where_none_is_allowed():
-    robot = TaskRobot()
-    robot.policy._constants["site_x_low_m"] = robot.policy._constants["site_x_high_m"] = 13.6
-    assert choose(robot, 24.0, 8.0, u=0.0, v=1.0) == pytest.approx((13.6, 8.0))
-    assert choose(robot, 24.0, 8.0, u=0.25, v=1.0) == pytest.approx((13.6, 8.5))
-
-
 @pytest.mark.parametrize(
     ("changes", "box"),
     [

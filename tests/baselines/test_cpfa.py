@@ -8,7 +8,6 @@ from scipy import stats
 
 from baselines.cpfa import (
     CPFA_DRAWS,
-    STAGE_WORDS,
     CPFAParameters,
     CPFAPolicy,
     Stage,
@@ -17,9 +16,9 @@ from baselines.cpfa import (
     poisson_cdf,
     search_turn_rad,
 )
-from baselines.parameters import ParameterError, kernel_constants
-from baselines.robots import ACTIVITY_WORDS, Activity, new_robots, sense
-from swarm_forage_env.contract.codes import Event, Grip
+from baselines.parameters import kernel_constants
+from baselines.robots import Activity, new_robots, sense
+from swarm_forage_env.contract.codes import Event
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
 from tests.baselines.test_controller_twins import Fuzz
 from tests.reference.cpfa import CPFARobot
@@ -71,14 +70,6 @@ def test_a_new_direction_ends_before_the_wall(degrees, goal):
     c = constants_of(wall_margin_m=0.5)
     aim_at_wall(robot, sense(seen.array[0], c), math.radians(degrees), c)
     assert (robot.goal_x_m, robot.goal_y_m) == pytest.approx(goal, abs=1e-5)
-
-
-def test_who_stands_nearer_to_a_wall_than_that_does_not_drive_into_it():
-    seen, robot = Observations(make_spec()), new_robots(1)[0]
-    seen.pose(31.8, 5.0)
-    c = constants_of()
-    aim_at_wall(robot, sense(seen.array[0], c), 0.1, c)
-    assert (robot.goal_x_m, robot.goal_y_m) == pytest.approx((31.8, 5.0), abs=1e-5)
 
 
 class Robot:
@@ -147,87 +138,6 @@ class Robot:
         self.seen.ground("floor")
 
 
-def test_the_first_trip_goes_in_a_direction_by_chance():
-    seen = Observations(make_spec(500))
-    policy = CPFAPolicy()
-    policy.reset(seen.spec, np.random.default_rng(5))
-    policy.act(seen.array, np.ones(500, np.bool_))
-    robots = policy._robots
-    assert not robots["is_informed"].any()
-    angles = np.arctan2(robots["goal_y_m"] - 10.0, robots["goal_x_m"] - 10.0)
-    assert stats.kstest(angles, stats.uniform(-np.pi, 2.0 * np.pi).cdf).pvalue > 0.01
-
-
-def test_a_robot_on_its_way_looks_at_no_object():
-    robot = Robot()
-    robot.seen.window({(1, 0): 3})
-    robot.seen.ground("object")
-    robot.act(20)
-    assert robot.stage is Stage.TRAVEL
-    assert robot.word == "going out"
-
-
-def test_it_searches_where_the_way_ends_or_by_chance():
-    robot, soon = Robot(), Robot(search_per_tick=1.0)
-    robot.act(5)
-    robot.arrive()
-    assert robot.stage is Stage.SEARCH
-    soon.act()
-    assert soon.stage is Stage.TRAVEL
-    soon.act()
-    assert soon.stage is Stage.SEARCH
-    assert soon.word == "searching"
-
-
-def test_a_search_goes_to_the_nearest_object_in_view_and_takes_it():
-    robot = Robot()
-    robot.act()
-    robot.arrive()
-    robot.seen.pose(10.1, 10.1)
-    robot.seen.window({(2, 0): 3, (1, 0): 4, (-2, -2): 5})
-    left, right, grip = robot.act()
-    assert robot.goal == pytest.approx((10.3, 10.1), abs=1e-5)
-    assert left == pytest.approx(right, abs=1e-5)
-    assert grip == pytest.approx(Grip.RELEASE)
-    robot.seen.pose(10.3, 10.1)
-    robot.seen.ground("object")
-    assert robot.act() == pytest.approx([0.0, 0.0, Grip.GRASP])
-    robot.seen.event(Event.NOTHING_HERE)
-    robot.seen.ground("floor")
-    robot.seen.window({})
-    robot.act()
-    assert robot.stage is Stage.SEARCH, "it goes on where somebody else was faster"
-
-
-def test_steps_are_equally_long_and_turns_on_the_spot_do_not_count():
-    robot = Robot(search_step_s=1.2, uninformed_turn_rad=0.0)
-    robot.act()
-    robot.arrive()
-    assert robot.act() == pytest.approx([0.45, 0.45, Grip.RELEASE])
-    left = []
-    for _ in range(14):
-        robot.act()
-        left.append(int(robot.record["step_ticks"]))
-    assert left == [3, 2, 1, 0, 5, 4, 3, 2, 1, 0, 5, 4, 3, 2], "six ticks of 0.2 s"
-    robot.seen.pose(10.0, 10.0, heading=math.pi / 2)
-    turning = robot.act(10)
-    assert turning[0] == -turning[1]
-    assert robot.record["step_ticks"] == 1
-
-
-def test_a_search_goes_on_in_the_direction_in_which_it_avoids():
-    robot = Robot()
-    robot.act()
-    robot.arrive()
-    robot.seen.obstacle(math.radians(40.0))
-    robot.act()
-    robot.seen.obstacle(None)
-    course = float(robot.record["course_rad"])
-    assert -math.pi / 2 < course < -math.radians(15.0)
-    left, right, _ = robot.act()
-    assert left > 0.0 > right
-
-
 def test_who_gives_up_goes_to_the_nest_with_nothing_and_forgets_the_site():
     robot = Robot(site_fidelity_rate=0.0)
     robot.act()
@@ -268,16 +178,6 @@ def test_it_returns_to_where_it_found_many():
     assert robot.record["is_informed"]
 
 
-def test_a_place_with_few_objects_is_left():
-    """POIS(0, 20) is 2e-9."""
-    robot = Robot(site_fidelity_rate=20.0)
-    robot.act()
-    robot.pick_up(n_nearby=0)
-    robot.deliver()
-    assert not robot.record["is_informed"]
-    assert robot.goal != pytest.approx(SITE, abs=1e-2)
-
-
 def test_returns_are_as_likely_as_the_poisson_distribution_says():
     n_robots, c = 2000, 3
     seen = Observations(make_spec(n_robots))
@@ -288,30 +188,6 @@ def test_returns_are_as_likely_as_the_poisson_distribution_says():
     policy.act(seen.array, np.ones(n_robots, np.bool_))
     share = policy._robots["is_informed"].mean()
     assert stats.binomtest(round(share * n_robots), n_robots, stats.poisson.cdf(c, 4.0)).pvalue > 0.01
-
-
-def test_what_carries_is_described_as_in_other_controllers():
-    robot = Robot()
-    robot.act()
-    robot.pick_up()
-    assert robot.word == "going home"
-    words = robot.policy.describe_robots().words
-    assert words == (*ACTIVITY_WORDS, *STAGE_WORDS)
-    assert len(STAGE_WORDS) == len(Stage)
-
-
-@pytest.mark.parametrize(
-    "values",
-    [
-        {"search_per_tick": 1.1},
-        {"give_up_per_tick": 2.0},
-        {"uninformed_turn_rad": 13.0},
-    ],
-)
-def test_values_that_make_no_sense_are_refused(values):
-    ((name, value),) = values.items()
-    with pytest.raises(ParameterError, match=f"Expected {name} <= .*, got {value}"):
-        CPFAParameters(**values)
 
 
 OFTEN = {"search_per_tick": 0.1, "give_up_per_tick": 0.02, "site_fidelity_rate": 0.5, "informed_decay_per_tick": 0.05}

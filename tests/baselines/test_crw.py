@@ -76,12 +76,6 @@ def leaver() -> Robot:
     return Robot(quirks=Quirks(nest_left_at_random=True))
 
 
-def test_starts_exploring_at_9_cm_per_second_with_an_empty_gripper(robot):
-    action = robot.act()
-    assert robot.activity is Activity.ACQUIRE
-    assert action == pytest.approx([0.45, 0.45, Grip.RELEASE])
-
-
 def test_objects_are_ignored_for_the_first_50_ticks(robot):
     robot.seen.ground("object")
     robot.act(50)
@@ -97,18 +91,6 @@ def test_stands_still_and_asks_in_the_tick_of_detection(robot):
     assert robot.act(20) == pytest.approx([0.0, 0.0, Grip.GRASP])
 
 
-@pytest.mark.parametrize("event", [Event.NOTHING_HERE, Event.VANISHED])
-def test_a_lost_object_means_exploring_with_a_new_lock(robot, event):
-    robot.bring_to(Activity.WAIT_PICKUP)
-    robot.seen.event(event)
-    robot.act()
-    robot.seen.event(Event.NONE)
-    robot.act(49)
-    assert robot.activity is Activity.ACQUIRE
-    robot.act()
-    assert robot.activity is Activity.WAIT_PICKUP
-
-
 def test_carries_towards_the_light_at_8_cm_per_second(robot):
     robot.bring_to(Activity.HOMING)
     robot.seen.light(0.0)
@@ -122,30 +104,6 @@ def test_homing_adds_avoidance_to_phototaxis(robot):
     robot.seen.light(0.0)
     robot.seen.obstacle(math.pi / 2)  # to the left: the sum points 45 degrees to the right
     assert robot.act() == pytest.approx([0.5, -0.5, Grip.GRASP])
-
-
-def test_a_homing_robot_that_only_turns_for_longer_than_half_a_turn_takes_drives_on(robot):
-    robot.bring_to(Activity.HOMING)
-    robot.seen.light(math.radians(20.0))  # sensed 20 degrees to the left however long it turns
-    for _ in range(13):
-        assert robot.act() == pytest.approx([-0.5, 0.5, Grip.GRASP])
-    left, right, _ = robot.act()
-    assert left + right == pytest.approx(1.0, abs=0.02), "8 cm/s to the light and 9 cm/s ahead: at full speed"
-    assert left < right, "in an arc"
-    assert robot.act() == pytest.approx([-0.5, 0.5, Grip.GRASP]), "and patience begins anew"
-
-
-def test_waiting_is_not_turning(robot):
-    robot.bring_to(Activity.WAIT_PICKUP)
-    robot.act(20)
-    robot.seen.light(math.radians(20.0))
-    robot.take()
-    assert robot.act() == pytest.approx([-0.5, 0.5, Grip.GRASP])
-
-
-def test_exploring_avoids_obstacles(robot):
-    robot.seen.obstacle(-math.pi / 2)
-    assert robot.act() == pytest.approx([-0.5, 0.5, Grip.RELEASE])
 
 
 def test_drop_depth_is_uniform_between_a_centimetre_and_the_entry_distance():
@@ -167,47 +125,9 @@ def test_drop_depth_is_uniform_between_a_centimetre_and_the_entry_distance():
     assert np.all(policy.activity == Activity.WAIT_DROP)
 
 
-def test_inside_the_nest_wander_and_phototaxis_add_up_to_the_speed_limit(robot):
-    robot.bring_to(Activity.HOMING_IN_NEST)
-    robot.seen.pose(4.75, 8.0)
-    robot.seen.light(0.0)
-    left, right, _ = robot.act()
-    assert robot.activity is Activity.HOMING_IN_NEST
-    assert (left + right) / 2 * 20.0 == pytest.approx(10.0, abs=1e-5)
-
-
-def test_waits_until_it_sees_the_nest_again_before_dropping(robot):
-    robot.bring_to(Activity.HOMING_IN_NEST)
-    robot.seen.ground("floor")
-    robot.seen.pose(3.2, 8.0)
-    robot.act()
-    assert robot.activity is Activity.HOMING_IN_NEST
-
-
 def test_asks_to_deliver_standing_still(robot):
     robot.bring_to(Activity.WAIT_DROP)
     assert robot.act(3) == pytest.approx([0.0, 0.0, Grip.DELIVER])
-
-
-@pytest.mark.parametrize("event", [Event.NOTHING_HERE, Event.VANISHED])
-def test_a_refused_delivery_resumes_homing(robot, event):
-    robot.bring_to(Activity.WAIT_DROP)
-    robot.seen.ground("floor")
-    robot.seen.event(event)
-    action = robot.act()
-    assert robot.activity is Activity.HOMING
-    assert action[2] == Grip.GRASP
-
-
-def test_looks_for_the_next_object_at_once_after_a_delivery(robot):
-    robot.bring_to(Activity.WAIT_DROP)
-    robot.deliver()
-    assert robot.activity is Activity.ACQUIRE
-    robot.seen.ground("object")
-    robot.act(49)
-    assert robot.activity is Activity.ACQUIRE, "with a new lock"
-    robot.act()
-    assert robot.activity is Activity.WAIT_PICKUP
 
 
 def test_quirk_nest_left_at_random_wanders_out_then_explores_with_a_new_lock(leaver):
@@ -223,33 +143,6 @@ def test_quirk_nest_left_at_random_wanders_out_then_explores_with_a_new_lock(lea
     assert robot.activity is Activity.WAIT_PICKUP
 
 
-@pytest.mark.parametrize("activity", [Activity.HOMING, Activity.HOMING_IN_NEST])
-def test_a_robot_whose_cargo_is_gone_explores_again(robot, activity):
-    robot.bring_to(activity)
-    robot.seen.carry(None)
-    robot.seen.event(Event.DROPPED)
-    robot.act()
-    assert robot.activity is Activity.ACQUIRE
-
-
-def test_a_robot_that_lost_its_cargo_while_waiting_outside_the_nest_explores(robot):
-    robot.bring_to(Activity.WAIT_DROP)
-    robot.seen.ground("floor")
-    robot.seen.carry(None)
-    robot.act()
-    assert robot.activity is Activity.ACQUIRE
-
-
-@pytest.mark.parametrize("activity", [Activity.ACQUIRE, Activity.WAIT_PICKUP, Activity.LEAVE_NEST])
-def test_a_robot_that_finds_itself_carrying_goes_home(leaver, activity):
-    robot = leaver
-    robot.bring_to(activity)
-    robot.seen.pose(4.7, 8.0)
-    robot.seen.carry(9)
-    robot.act()
-    assert robot.activity in (Activity.HOMING, Activity.HOMING_IN_NEST)
-
-
 def test_an_inactive_robot_is_frozen(robot):
     robot.seen.ground("object")
     robot.act(30)
@@ -260,18 +153,6 @@ def test_an_inactive_robot_is_frozen(robot):
     assert robot.activity is Activity.ACQUIRE
     robot.act()
     assert robot.activity is Activity.WAIT_PICKUP
-
-
-def test_an_inactive_robot_does_not_shift_the_chances_of_others():
-    task = make_spec(3)
-    actions = []
-    for middle_active in (True, False):
-        seen = Observations(task)
-        policy = CRWPolicy()
-        policy.reset(task, np.random.default_rng(4))
-        active = np.array([True, middle_active, True])
-        actions.append([policy.act(seen.array, active)[[0, 2]].copy() for _ in range(30)])
-    np.testing.assert_array_equal(actions[0], actions[1])
 
 
 def test_quirk_explore_double_start_runs_the_strategy_twice_in_the_first_tick():

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from baselines import memory
 from baselines.dpo import DPOPolicy
 from baselines.memory import density
 from tests.reference.controllers import ObjectDictionary, visible_objects
@@ -25,34 +24,10 @@ def look(policy: DPOPolicy, observations: Observations, x: float, y: float, obje
     return policy.remembered(0)
 
 
-def test_memories_that_the_machine_cannot_hold_are_announced_with_the_figure(monkeypatch, caplog):
-    monkeypatch.setattr(memory, "memory_of_machine", lambda: 1_000)
-    memory.new_memory(5, 10)
-    assert caplog.text == ""
-    memory.new_memory(5, 11)
-    assert "5 robots that remember 11 objects may need 0.0 GB" in caplog.text
-
-
-def test_the_machine_tells_its_memory():
-    assert memory.memory_of_machine() > 100_000_000
-
-
 def test_density_of_an_object_seen_now_and_long_ago():
     log_keep = DPOPolicy().parameters.derived()["log_keep"]
     assert density(0, log_keep) == pytest.approx(1.0 - 0.00001, abs=1e-12)
     assert density(49_999, log_keep) == pytest.approx(0.6065, abs=1e-4)
-
-
-def test_objects_are_remembered_with_cell_and_decaying_density():
-    observations = Observations(make_spec())
-    policy = new_policy(observations.spec)
-    known = look(policy, observations, 10.1, 8.1, {(0, 0): 7, (2, -2): 199})  # own cell (50, 40)
-    assert {row: entry[:2] for row, entry in known.items()} == {7: (50, 40), 199: (52, 38)}
-    for _ in range(3):
-        known = look(policy, observations, 20.1, 8.1, {})
-    assert known[7][2] == pytest.approx((1.0 - 0.00001) ** 4, abs=1e-15)
-    known = look(policy, observations, 10.1, 8.1, {(0, 0): 7, (2, -2): 199})
-    assert known[7][2] == pytest.approx(1.0 - 0.00001, abs=1e-15)
 
 
 def test_what_should_be_visible_but_is_not_is_forgotten():
@@ -61,30 +36,6 @@ def test_what_should_be_visible_but_is_not_is_forgotten():
     look(policy, observations, 10.1, 8.1, {(2, 0): 7, (-2, 0): 8})
     assert set(look(policy, observations, 10.3, 8.1, {(1, 0): 7})) == {7, 8}  # (-3, 0) is out of view
     assert set(look(policy, observations, 10.1, 8.1, {(2, 0): 7})) == {7}
-
-
-def test_an_object_that_vanishes_from_an_unmoved_window_is_forgotten():
-    observations = Observations(make_spec())
-    policy = new_policy(observations.spec)
-    look(policy, observations, 10.1, 8.1, {(2, 0): 7, (1, 1): 8})
-    assert set(look(policy, observations, 10.1, 8.1, {(1, 1): 8})) == {8}
-
-
-def test_another_object_at_a_remembered_cell_replaces_it():
-    observations = Observations(make_spec())
-    policy = new_policy(observations.spec)
-    look(policy, observations, 10.1, 8.1, {(1, 1): 7})
-    assert {row: entry[:2] for row, entry in look(policy, observations, 10.1, 8.1, {(1, 1): 8}).items()} == {
-        8: (51, 41)
-    }
-
-
-def test_a_moved_object_is_remembered_where_it_is_now():
-    observations = Observations(make_spec())
-    policy = new_policy(observations.spec)
-    look(policy, observations, 10.1, 8.1, {(1, 1): 7})
-    assert look(policy, observations, 10.1, 8.1, {(1, 2): 7})[7][:2] == (51, 42)
-    assert look(policy, observations, 20.1, 8.1, {(0, 0): 7})[7][:2] == (100, 40)
 
 
 @pytest.mark.parametrize(("reach", "kept"), [(2, set()), (1, {8}), (0, {7, 8}), (-1, {7, 8})])
@@ -101,16 +52,6 @@ def test_a_picked_up_object_is_forgotten_whatever_the_target_was():
     look(policy, observations, 10.1, 8.1, {(1, 1): 7, (0, 1): 8})
     observations.carry(7)
     assert set(look(policy, observations, 20.1, 8.1, {})) == {8}
-
-
-def test_an_inactive_robot_neither_sees_nor_ages():
-    observations = Observations(make_spec())
-    policy = new_policy(observations.spec)
-    before = look(policy, observations, 10.1, 8.1, {(1, 1): 7})
-    observations.window({(0, 0): 3})
-    for _ in range(5):
-        policy.act(observations.array, np.zeros(1, bool))
-    assert policy.remembered(0) == before
 
 
 def test_positions_come_from_the_exact_cell_not_from_the_noisy_position():

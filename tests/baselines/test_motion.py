@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from baselines.crw import CRWPolicy
-from baselines.motion import arrival, avoidance, drive, is_standing, phototaxis, recovery, wander, wander_freely
+from baselines.motion import arrival, drive, phototaxis, wander, wander_freely
 from baselines.parameters import ControllerParameters, kernel_constants
 from baselines.robots import new_robots
 from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
@@ -84,42 +84,10 @@ def test_arrival_points_to_the_goal_in_the_robot_frame():
     assert polar(force) == pytest.approx((8.0, 60.0))
 
 
-def test_avoidance_is_opposite_to_the_obstacle():
-    assert polar(avoidance(0.3, 0.3, C)) == pytest.approx((8.0, -135.0))
-
-
 def test_phototaxis_follows_the_light_and_goes_straight_in_the_dark():
     readings = np.maximum(0.0, np.cos(BEAM_ANGLES_RAD - math.radians(40.0))).astype(np.float32)
     assert polar(phototaxis(readings, C)) == pytest.approx((8.0, 40.0), abs=1e-4)
     assert phototaxis(np.zeros(24, np.float32), C) == (0.08, 0.0)
-
-
-def test_recovery_is_straight_ahead():
-    assert polar(recovery(C)) == pytest.approx((7.0, 0.0))
-
-
-@pytest.mark.parametrize(
-    ("left", "right", "standing"), [(10.0, -10.0, True), (0.0, 0.0, True), (0.2, 0.0, True), (0.3, 0.0, False)]
-)
-def test_standing_means_at_most_a_millimetre_per_second(left, right, standing):
-    reading = np.array([left, right], np.float32) / 20.0
-    assert is_standing(reading, C) == standing
-
-
-def test_wander_angle_wraps_through_zero_and_keeps_its_sign():
-    robot = new_robots(1)[0]
-    robot.wander_deg = 4.0
-    wander(robot, C, 0.8)  # U(-5, 5) = 3
-    assert robot.wander_deg == pytest.approx(2.0)
-    robot.wander_deg = -4.0
-    wander(robot, C, 0.2)
-    assert robot.wander_deg == pytest.approx(-2.0)
-
-
-def test_wander_force_is_9_cm_per_second_a_little_wider_than_its_angle():
-    robot = new_robots(1)[0]
-    robot.wander_deg = 3.0
-    assert polar(wander(robot, C, 0.5)) == pytest.approx((9.0, 3.0 * 1.0416), abs=2e-4)
 
 
 @pytest.fixture(scope="module")

@@ -56,11 +56,6 @@ def test_a_pickle_takes_no_compiled_function_along(policy_class):
     assert b"numba" not in pickle.dumps(policy)
 
 
-def test_a_policy_can_be_copied_before_its_first_run():
-    policy = copy.deepcopy(CRWPolicy(wander_speed_mps=0.05))
-    assert policy.parameters.wander_speed_mps == 0.05
-
-
 @pytest.mark.parametrize("policy_class", POLICIES)
 def test_the_layout_of_observations_in_memory_does_not_matter(policy_class):
     policy, obs = started(policy_class)

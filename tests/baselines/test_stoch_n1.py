@@ -12,7 +12,7 @@ from baselines.stochx import STOCHXPolicy
 from baselines.task_policy import task_constants
 from baselines.tasks import STOCHM_PARAMETERS, STOCHX_PARAMETERS
 from swarm_forage_env.contract.codes import Tab, Task
-from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
+from swarm_forage_env.scenarios.quirks import Quirks
 from tests.reference import task_chain
 from tests.support.observations import make_spec
 
@@ -69,31 +69,11 @@ def test_switch_probability(ratio, stochm, stochx):
     assert stoch_n1.switch_probability(ratio * 2000, 2000, 1.0, 1.25, 1.0) == pytest.approx(stochx, abs=6e-4)
 
 
-@pytest.mark.parametrize(("last", "other"), [(2000, 1000), (0, 1000), (1000, 0), (1000, 1000)])
-def test_switch_ratio_is_one_when_the_other_subtask_is_no_slower_or_unknown(last, other):
-    assert stoch_n1.switch_probability(last, other, 1.0, 1.25, 1.0) == pytest.approx(1 / (1 + math.exp(0.25)))
-
-
 @pytest.mark.parametrize(("ratio", "expected"), [(1, 0.0002), (2, 0.009), (3, 0.25), (4, 0.491)])
 def test_move_probability_by_ratio_of_imbalances(ratio, expected):
     # Imbalances of ratio / 10 and 1 / 10 of a root of 1000 ticks.
     p = stoch_n1.move_probability(1000, 1000 + 100 * ratio, 1000, 900, 4.0, 3.0, 0.5, False)
     assert p == pytest.approx(expected, abs=6e-4)
-
-
-@pytest.mark.parametrize(
-    ("blocks", "is_integer"),
-    [
-        ((1000, 1000, 1000, 900), False),
-        ((1000, 900, 1000, 1000), False),
-        ((0, 5, 1000, 900), False),
-        ((1000, 900, 0, 5), False),
-        ((1000, 1999, 1000, 1500), True),
-        ((1000, 2500, 1000, 1500), True),
-    ],
-)
-def test_move_probability_of_balanced_or_unknown_blocks(blocks, is_integer):
-    assert stoch_n1.move_probability(*blocks, 4.0, 3.0, 0.5, is_integer) == 0.5
 
 
 def test_move_probability_of_two_blocks_without_root_estimates_compares_subtasks():
@@ -120,10 +100,6 @@ def test_abort_probability_is_a_bump(ratio, expected):
     assert stoch_n1.abort_probability(1000 * ratio, 1000, 4.0, 3.0, 1.0, 1e-4) == pytest.approx(expected, rel=0.02)
 
 
-def test_abort_probability_without_an_estimate_is_the_least():
-    assert stoch_n1.abort_probability(1000, 0, 4.0, 3.0, 1.0, 1e-4) == 1e-4
-
-
 @pytest.mark.parametrize(("estimate", "median"), [(1000, 1.53), (1500, 1.43), (3000, 1.26), (4000, 1.18)])
 def test_median_abort_of_continuous_execution(estimate, median):
     alive, ticks = 1.0, 0
@@ -136,11 +112,6 @@ def test_median_abort_of_continuous_execution(estimate, median):
 def test_moving_average():
     assert stoch_n1.new_estimate(1500, 2001, 0.5, True) == 1750
     assert stoch_n1.new_estimate(1500, 2001, 0.5, False) == 1750.5
-
-
-def test_logistic_does_not_overflow():
-    assert stoch_n1.logistic(-1e6) == 0.0
-    assert stoch_n1.logistic(1e6) == 1.0
 
 
 # Procedures
@@ -188,28 +159,6 @@ def test_first_block_estimates_and_coins():
     assert (m.tab == Tab.GENERALIST).all()
 
 
-def test_first_partition_probability_comes_from_the_estimates_or_from_nothing():
-    a = stoch_n1.new_allocation(5, STOCHM_PARAMETERS, Quirks(), 1, np.random.default_rng(3))
-    e = a.estimate
-    expected = [
-        stoch_n1.partition_probability(root, parts, *M_PARTITION, False)
-        for root, parts in zip(e[:, Task.GENERALIST], e[:, Task.HARVESTER] + e[:, Task.COLLECTOR], strict=True)
-    ]
-    assert a.partition[:, Tab.GENERALIST] == pytest.approx(expected)
-    coded = stoch_n1.new_allocation(5, STOCHM_PARAMETERS, AUTHORS_PROGRAM, 1, np.random.default_rng(3))
-    assert (coded.partition == 0.875).all()
-
-
-def test_root_or_subtask_by_the_stored_probability():
-    robot = Robot(STOCHMPolicy)
-    robot.a.partition[0, Tab.GENERALIST] = 0.6
-    robot.a.last_child[0, Tab.GENERALIST] = 1
-    assert robot.next(partition=0.6) is Task.GENERALIST
-    assert robot.next(partition=0.59) is Task.COLLECTOR
-    assert robot.next(partition=0.59, switch=0.0) is Task.HARVESTER
-    assert robot.next(partition=0.59) is Task.HARVESTER, "the subtask done last is the one to repeat"
-
-
 @pytest.mark.parametrize(
     ("tab", "last", "moves_to"),
     [
@@ -235,14 +184,6 @@ def test_active_block_moves_by_one_level(tab, last, moves_to):
     assert robot.tab is tab
 
 
-def test_stochm_never_leaves_its_only_block():
-    robot = Robot(STOCHMPolicy)
-    for last in (Task.GENERALIST, Task.HARVESTER, Task.COLLECTOR):
-        robot.be(Tab.GENERALIST, last)
-        robot.next(move=0.0)
-        assert robot.tab is Tab.GENERALIST
-
-
 def test_ending_a_task_updates_its_estimate_and_its_block_only():
     robot = Robot()
     robot.be(Tab.HARVESTER, Task.STARTER)
@@ -262,15 +203,6 @@ def run_ticks(robot: Robot, first: int, last: int, activity: Activity) -> None:
         stoch_n1.after_tick(robot.a, 0, now, activity, robot.c)
 
 
-def test_execution_time_counts_from_the_start_of_this_execution():
-    robot = Robot()
-    robot.be(Tab.HARVESTER, Task.HARVESTER)
-    robot.a.exec_start[0, Task.HARVESTER] = 100
-    robot.next(partition=1.0, now=500)
-    run_ticks(robot, 501, 510, Activity.ACQUIRE)
-    assert robot.a.exec_time[0, Task.HARVESTER] == 10
-
-
 def test_quirk_execution_time_counts_from_the_last_completion():
     robot = Robot(quirks=Quirks(exec_time_since_last_completion=True))
     robot.be(Tab.HARVESTER, Task.HARVESTER)
@@ -278,16 +210,6 @@ def test_quirk_execution_time_counts_from_the_last_completion():
     robot.next(partition=1.0, now=500)
     run_ticks(robot, 501, 510, Activity.ACQUIRE)
     assert robot.a.exec_time[0, Task.HARVESTER] == 410
-
-
-def test_a_task_that_ends_before_its_first_full_tick_took_no_time():
-    robot = Robot()
-    robot.be(Tab.HARVESTER, Task.HARVESTER)
-    robot.a.estimate[0, Task.HARVESTER] = 1500
-    robot.a.exec_time[0, Task.HARVESTER] = 700
-    assert robot.next(partition=1.0, now=500) is Task.HARVESTER
-    stoch_n1.end_task(robot.a, 0, 501, robot.c)
-    assert robot.a.estimate[0, Task.HARVESTER] == 750
 
 
 @pytest.mark.parametrize(

@@ -61,30 +61,6 @@ def test_swarms_deliver_and_use_caches(policy_name):
 
 
 @pytest.mark.compiled
-def test_stochx_creates_caches_in_the_medium_warehouse():
-    assert Run("warehouse_medium", "stochx", ticks=300, seed=2).counters[Counter.CACHES_CREATED] > 0
-
-
-@pytest.mark.compiled
-@pytest.mark.parametrize("policy_name", CACHES)
-def test_a_run_repeats_with_its_seed_and_changes_with_it(policy_name):
-    first, again, other = (Run("warehouse_small", policy_name, ticks=300, seed=seed) for seed in (4, 4, 5))
-    np.testing.assert_array_equal(first.env.swarm.position, again.env.swarm.position)
-    np.testing.assert_array_equal(first.policy.task_estimates, again.policy.task_estimates)
-    assert np.any(first.policy.task_estimates != other.policy.task_estimates)
-
-
-@pytest.mark.compiled
-@pytest.mark.parametrize("policy_name", CACHES)
-def test_only_declared_slices_are_needed(policy_name):
-    full, reduced = (
-        Run("warehouse_medium", policy_name, ticks=300, seed=4, declared_only=declared) for declared in (False, True)
-    )
-    np.testing.assert_array_equal(full.env.swarm.position, reduced.env.swarm.position)
-    np.testing.assert_array_equal(full.counters, reduced.counters)
-
-
-@pytest.mark.compiled
 def test_what_robots_remember_of_caches_was_true_and_is_while_they_see_them():
     run = Run("warehouse_small", "stochm", ticks=3000, seed=6)
     run.policy.act(run.obs, run.env.active)  # takes note of what is seen now

@@ -3,7 +3,6 @@
 import pkgutil
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -11,8 +10,6 @@ import metrics
 import metrics.claims
 import metrics.scoring
 from tests.support.public_names import homes_of
-
-FOLDER = Path(metrics.__file__).parent
 
 
 def test_every_public_name_loads():

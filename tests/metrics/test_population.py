@@ -21,7 +21,6 @@ from tests.reference.population_chain import generator, stationary_by_null_vecto
 
 HALF = PopulationRates(lambda_bd=0.001, mu_bd=0.002)
 DEATHS = PopulationRates(lambda_d=0.001)
-DEATHS_AND_REPAIRS = PopulationRates(lambda_d=0.0001, lambda_bd=0.001, mu_bd=0.002)
 
 
 def robustness(weight, **options):

@@ -10,7 +10,6 @@ import metrics
 from metrics import METRICS, PopulationRates
 from tests.reference.naive_dtw import dtw_by_matrix
 
-RATES = PopulationRates(lambda_bd=0.001, mu_bd=0.002)
 N_INTERVALS = 6
 
 performance = arrays(np.float64, N_INTERVALS, elements=st.floats(0.0, 100.0))

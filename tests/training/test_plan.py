@@ -45,8 +45,6 @@ every_steps = 50
 horizon_s = 400.0
 """
 
-SMALL = warehouse_small(n_robots=6)
-
 
 @pytest.fixture
 def plan(tmp_path) -> TrainingPlan:

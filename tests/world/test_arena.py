@@ -56,16 +56,6 @@ def test_the_observation_shows_the_world_after_the_step():
     assert obs[0, env.layout["wheel_speed"]].tolist() == pytest.approx([0.5, 0.5])
 
 
-def test_ticks_are_counted():
-    env = tidy_world()
-    assert env.tick == 0
-    for tick in range(1, 4):
-        act(env, {})
-        assert env.tick == tick
-    env.reset_batch(1)
-    assert env.tick == 0
-
-
 def test_objects_walk_in_every_tick():
     env = ForageEnv(scenario("warehouse_small", n_robots=1, walk_probability=1.0))
     env.reset_batch(0)
@@ -74,15 +64,6 @@ def test_objects_walk_in_every_tick():
     moved = np.any(env.objects.cell != before, axis=1)
     assert env.events.counters[Counter.OBJECTS_MOVED] == np.count_nonzero(moved) > 190
     assert_conserved(env)
-
-
-def test_caches_and_their_contents_are_counted_per_tick():
-    env = tidy_world(caches="static")
-    build_cache(env, [0, 1, 2], (70, 40))
-    for _ in range(3):
-        act(env, {})
-    assert env.events.counters[Counter.CACHES_ALIVE] == 3
-    assert env.events.counters[Counter.OBJECTS_CACHED] == 9
 
 
 # Who is in the world
@@ -119,28 +100,6 @@ def test_the_dead_are_out_of_the_way():
     assert env.swarm.wheel_speed[1].tolist() == [0.0, 0.0]
 
 
-def test_a_robot_is_dead_from_when_it_leaves_until_it_comes_back():
-    env = tidy_world()
-    env.set_population(**population(env, gone=(1,)))
-    act(env, {})
-    env.set_population(**population(env, gone=(1, 2)))
-    assert env.swarm.dead.tolist() == [False, True, True, False]
-    env.set_population(**population(env))
-    assert not env.swarm.dead.any()
-
-
-def test_a_robot_that_comes_drives_where_it_faces():
-    env = tidy_world()
-    env.set_population(**population(env, gone=(1,)))
-    act(env, {})
-    env.swarm.position[1], env.swarm.heading[1] = (20.0, 8.0), math.pi / 2
-    env.set_population(**population(env))
-    env.step_batch(STRAIGHT)
-    assert env.swarm.position[1] == pytest.approx((20.0, 8.02))
-    assert env.swarm.heading[1] == pytest.approx(math.pi / 2)
-    assert env.active.all()
-
-
 def test_a_robot_repaired_goes_on_with_its_cargo():
     env = tidy_world()
     stand(env, 0, OPEN_CELL)
@@ -150,31 +109,6 @@ def test_a_robot_repaired_goes_on_with_its_cargo():
     assert env.swarm.carried_object[0] == 3
     env.set_population(**population(env))
     assert act(env, {0: Grip.RELEASE})[0] == Event.DROPPED
-
-
-@pytest.mark.parametrize(
-    ("active", "present", "message"),
-    [
-        (np.ones(3, np.bool_), np.ones(4, np.bool_), r"shape \(4,\), got \(3,\)"),
-        (np.ones(4, np.bool_), np.ones((4, 1), np.bool_), r"got \(4,\) and \(4, 1\)"),
-        (np.ones(4, np.bool_), np.array([True, True, True, False]), "active robots to be present"),
-    ],
-)
-def test_impossible_populations_are_refused(active, present, message):
-    env = tidy_world()
-    load(env, 3, 0)
-    with pytest.raises(ValueError, match=message):
-        env.set_population(active=active, present=present)
-    assert env.swarm.present.all()
-    assert env.swarm.carried_object[3] == 0
-
-
-def test_terminated_is_one_flag_per_robot():
-    env = tidy_world()
-    gone = population(env, gone=(1,))
-    with pytest.raises(ValueError, match=r"terminated with shape \(4,\), got \(3,\)"):
-        env.set_population(**gone, terminated=np.ones(3, np.bool_))
-    assert env.swarm.present.all()
 
 
 def test_only_permanent_death_terminates():
@@ -199,13 +133,6 @@ def test_a_reset_brings_everybody_back():
     assert env.swarm.present.all()
     for _ in range(5):
         np.testing.assert_array_equal(env.step_batch(STRAIGHT)[0], fresh.step_batch(STRAIGHT)[0])
-
-
-def test_the_horizon_truncates():
-    env = ForageEnv(scenario("warehouse_small", n_robots=4), max_cycles=3)
-    env.reset_batch(0)
-    assert [env.step_batch(STRAIGHT)[3] for _ in range(4)] == [False, False, True, True]
-    assert env.swarm_spec.horizon_s == pytest.approx(0.6)
 
 
 # Global state

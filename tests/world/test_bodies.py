@@ -10,7 +10,7 @@ from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.bodies import PAIRS_PER_ROBOT
 from swarm_forage_env.world.kernels.bodies import find_pairs, move_bodies, tell_poses
-from swarm_forage_env.world.kernels.drive import sinc_and_cosine, unpack_poses
+from swarm_forage_env.world.kernels.drive import sinc_and_cosine
 from swarm_forage_env.world.state import SwarmState
 from tests.reference.bodies import moved
 from tests.support.engines import SensedBodies, drive_at, make_bodies
@@ -82,19 +82,6 @@ def test_all_pairs_within_sight_are_found_in_order(speed):
     assert n_pairs > 80
 
 
-def test_poses_are_told_as_for_chipmunk():
-    rng = np.random.default_rng(0)
-    poses, present = rng.uniform(-9, 9, (51, 3)), rng.random(50) < 0.8
-    one, other = SwarmState.empty(50), SwarmState.empty(50)
-    for _ in range(3):
-        poses[::2, 2] += rng.uniform(-1, 1, 26)
-        tell_poses(poses, present, one.position, one.heading, one.facing)
-        unpack_poses(poses, present, other.position, other.heading, other.facing)
-        for name in ("position", "heading"):
-            np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
-        np.testing.assert_allclose(one.facing, other.facing, rtol=0, atol=1e-12)
-
-
 # The oracle
 
 SCENES = {
@@ -156,24 +143,6 @@ def test_a_run_can_be_repeated_bit_for_bit():
     np.testing.assert_array_equal(run_heap(places, twists), run_heap(places, twists))
 
 
-@pytest.mark.parametrize("flip", [(-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)])
-def test_a_mirrored_heap_moves_mirrored(flip):
-    """Contacts are solved in the order of rows, which is the same in both scenes."""
-    rng = np.random.default_rng(1)
-    places, twists = heap(rng, 20), rng.uniform(-0.07, 0.07, (5, 20, 3))
-    mirrored = twists * (*flip, flip[0] * flip[1])
-    np.testing.assert_allclose(run_heap(places * flip, mirrored), run_heap(places, twists) * flip, atol=1e-8)
-
-
-def test_the_order_of_rows_matters_little():
-    """It does matter: friction of several contacts has more than one solution, and rounds find one of them."""
-    rng = np.random.default_rng(2)
-    places, twists, order = heap(rng, 20), rng.uniform(-0.07, 0.07, (1, 20, 3)), rng.permutation(20)
-    one, other = run_heap(places, twists)[order], run_heap(places[order], twists[:, order])
-    np.testing.assert_allclose(one, other, atol=1e-4)
-    assert np.abs(one - places[order]).max() > 0.01
-
-
 def test_absent_robots_touch_nobody_and_stay():
     places = np.array([(0.0, 0.0), (0.05, 0.0), (0.1, 0.02)])
     twists = np.tile([(0.05, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)], (10, 1, 1))
@@ -202,13 +171,6 @@ def test_facing_stays_the_direction_of_the_heading_for_a_whole_run():
 
 
 # Nobody is missed, nothing overflows
-
-
-def test_robots_faster_than_proximity_reaches_do_not_pass_through_each_other():
-    overrides = {"dt_s": 0.4, "max_speed_mps": 0.2}
-    bodies, swarm = bodies_at([(16.0, 8.0), (16.0 + DIAMETER_M + 0.15, 8.0)], [0.0, math.pi], **overrides)
-    drive_at(bodies, swarm, np.array([0.0, math.pi]), 0.2)
-    assert pdist(swarm.position)[0] == pytest.approx(DIAMETER_M, abs=0.011)
 
 
 def test_a_pile_gets_more_room_for_pairs_and_keeps_its_impulses():

@@ -1,6 +1,5 @@
 """Static caches: which objects they hold, and when they are restored. Slots and serial numbers."""
 
-import itertools
 import math
 
 import numpy as np
@@ -9,17 +8,15 @@ import pytest
 from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, Counter, Grip, ObjectStatus, Task
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.floor import square_box
-from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
-from swarm_forage_env.world.allocation import new_objects
+from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.caches import (
     count_cache_users,
     create_static_caches,
-    n_cache_slots,
     restoration_probability,
     restore_static_caches,
 )
 from swarm_forage_env.world.placement import static_cache_centres
-from swarm_forage_env.world.state import CacheState, StepEvents, listed, make_list
+from swarm_forage_env.world.state import listed, make_list
 from tests.support.engines import in_each_engine
 from tests.support.stage import act, assert_conserved, build_cache, clear, lay, load, stand, tidy_world
 
@@ -59,25 +56,6 @@ def test_random_placement_absorbs_what_lies_on_the_squares(n_objects):
     assert_conserved(env)
 
 
-def test_dual_source_starts_with_two_objects_in_each_of_two_caches():
-    env = reset("warehouse_dual", caches="static")
-    assert env.caches.cell[env.caches.alive].tolist() == [[104, 40], [56, 40]]
-    # No square reaches a strip, so nothing is absorbed: 104 + 15 < 120 and 56 - 15 > 39.
-    assert [contents(env, slot) for slot in (0, 1)] == [[0, 1], [2, 3]]
-    assert_conserved(env)
-
-
-def test_quad_source_absorbs_what_lies_on_its_squares():
-    env = reset("warehouse_quad", caches="static")
-    assert env.caches.alive.sum() == 4
-    # West: a square of cells 49 .. 95, so 11 columns of the left strip (36 .. 59) and its 47 rows. East: cells 144 ..
-    # 190, so 11 columns of the right strip (180 .. 203). South and north alike. Each object has picked one of the four
-    # strips, so about a quarter of 800 lies in the 24 x 168 cells of each.
-    expected = 800 / 4 * (11 * 47) / (24 * 168)
-    assert np.all(np.abs(env.caches.count[:4] - expected) < 4 * math.sqrt(expected))
-    assert_conserved(env)
-
-
 @in_each_engine
 def test_first_objects_in_row_order_from_outside_of_every_square():
     env = tidy_world(n_objects=8, caches="static")
@@ -100,12 +78,6 @@ def test_power_law_caches_stand_before_the_clusters_are_drawn():
             inside = np.all((env.objects.cell >= (x_low, y_low)) & (env.objects.cell < (x_high, y_high)), axis=1)
             assert not np.any(inside & (env.objects.status == ObjectStatus.FREE))
         assert_conserved(env)
-
-
-def test_one_object_makes_no_cache():
-    env = reset("warehouse_small", n_objects=1, caches="static")
-    assert not env.caches.alive.any()
-    assert env.objects.status.tolist() == [ObjectStatus.FREE]
 
 
 def test_size_of_static_caches_is_configurable():
@@ -165,16 +137,6 @@ def test_missing_caches_are_restored_at_the_published_rate():
     assert abs(restored - expected) < 4 * math.sqrt(expected)
 
 
-@in_each_engine
-def test_nothing_is_drawn_while_every_cache_stands():
-    env = missing_world()
-    build_cache(env, [0, 1], STATIC_CENTRE)
-    rng = np.random.default_rng(0)
-    before = rng.bit_generator.state
-    restore_static_caches(env.scenario, env.swarm, env.objects, env.caches, env.events, HARVEST, rng)
-    assert rng.bit_generator.state == before
-
-
 @pytest.mark.compiled
 @in_each_engine
 def test_steps_restore_from_the_tasks_that_the_policy_tells():
@@ -190,35 +152,6 @@ def test_steps_restore_from_the_tasks_that_the_policy_tells():
         assert_conserved(env)
     assert waits[0] < 100
     assert waits[1] == 300, "nobody carries anything"
-
-
-@in_each_engine
-def test_without_tasks_the_cargo_tells_who_harvests():
-    env = missing_world()
-    actions = np.zeros((15, 3), np.float32)
-    actions[:, 2] = Grip.GRASP
-    for robot in range(5):
-        load(env, robot, robot)
-    for _ in range(100):
-        env.step_batch(actions)
-    assert env.caches.alive.any()
-    assert contents(env, 0) == [5, 6], "from objects in the world, not from the carried ones"
-    assert_conserved(env)
-
-
-@in_each_engine
-def test_a_restored_cache_takes_the_orphan_too():
-    env = missing_world()
-    build_cache(env, [3, 4], STATIC_CENTRE)
-    stand(env, 0, STATIC_CENTRE)
-    act(env, {0: Grip.GRASP})
-    act(env, {0: Grip.GRASP})
-    assert not env.caches.alive.any()
-    orphan = next(row for row in (3, 4) if env.objects.status[row] == ObjectStatus.FREE)
-    create_static_caches(env.scenario, env.objects, env.caches, env.events)
-    assert contents(env, 0) == sorted([0, 1, orphan])
-    assert env.caches.serial[0] == 2, "a new cache, though in the same slot"
-    assert_conserved(env)
 
 
 def test_all_missing_caches_come_back_together():
@@ -241,15 +174,6 @@ def test_all_missing_caches_come_back_together():
 # Slots
 
 
-@pytest.mark.parametrize("name", SCENARIO_NAMES)
-def test_slots_suffice_for_as_many_caches_as_fit(name):
-    config = scenario(name, caches="dynamic")
-    side, (nx, ny) = config.cache_side_cells, config.arena.n_cells
-    packed = list(itertools.product(range(side // 2, nx - side // 2, side), range(side // 2, ny - side // 2, side)))
-    assert n_cache_slots(config) == len(packed)
-    assert n_cache_slots(scenario(name)) == 0
-
-
 def test_a_freed_slot_is_used_again_under_a_new_serial():
     config = scenario("warehouse_small", n_robots=1, n_objects=20, caches="dynamic", respawn_scale=0.0)
     env = ForageEnv(config)
@@ -270,11 +194,3 @@ def test_a_freed_slot_is_used_again_under_a_new_serial():
         for row in (turn, turn + 1):
             lay(env, row, (121 + row % 10, 14 + row // 10))
     assert serials == [1, 2, 3, 4, 5, 6]
-
-
-def test_creation_takes_waiting_objects_off_the_waiting_list():
-    config = scenario("search_and_rescue", side_m=16.0, n_robots=1, caches="static")
-    objects, caches = new_objects(config), CacheState.empty(n_cache_slots(config))
-    create_static_caches(config, objects, caches, StepEvents.empty(1), supply=ObjectStatus.WAITING)
-    assert listed(objects.waiting).tolist() == list(range(8, config.objects.n_objects))
-    assert np.all(objects.status[:8] == ObjectStatus.CACHED)

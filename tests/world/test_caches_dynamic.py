@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarm_forage_env.contract.codes import CELL_CACHE, CELL_OBJECT, Counter, Event, Grip, ObjectStatus
+from swarm_forage_env.contract.codes import CELL_CACHE, Counter, Event, Grip, ObjectStatus
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.floor import overlap_cells, square_box
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import Quirks
-from swarm_forage_env.world.caches import MAX_PASSES, cache_members, clear_centre, protected_boxes
+from swarm_forage_env.world.caches import cache_members, clear_centre, protected_boxes
 from swarm_forage_env.world.placement import place_objects
 from swarm_forage_env.world.state import Source, listed
 from tests.support.engines import in_each_engine
@@ -58,13 +58,6 @@ def test_a_site_drop_creates_nothing():
 
 
 @in_each_engine
-def test_a_lone_object_creates_nothing():
-    env = tidy_world(caches="dynamic")
-    assert found_at(env, MIDDLE) == []
-    assert env.objects.cell[0].tolist() == list(MIDDLE)
-
-
-@in_each_engine
 @pytest.mark.parametrize(
     ("offset", "joins"),
     [((16, 0), True), ((0, -16), True), ((17, 0), False), ((11, 11), True), ((12, 11), False)],
@@ -75,15 +68,6 @@ def test_members_lie_within_min_dist_of_the_dropped_object(offset, joins):
     lay(env, 1, (MIDDLE[0] + offset[0], MIDDLE[1] + offset[1]))
     slots = found_at(env, MIDDLE)
     assert bool(slots) == joins
-
-
-@in_each_engine
-def test_distance_is_to_the_dropped_object_not_between_members():
-    env = tidy_world(caches="dynamic")
-    for row, x in enumerate([MIDDLE[0] - 15, MIDDLE[0] + 15], start=1):
-        lay(env, row, (x, MIDDLE[1]))
-    (slot,) = found_at(env, MIDDLE)
-    assert contents(env, slot) == [0, 1, 2]
 
 
 def test_distances_are_compared_in_whole_cells():
@@ -115,35 +99,6 @@ def test_the_source_strip_creates_nothing():
     assert found_at(env, STRIP_CELL) == []
 
 
-@in_each_engine
-def test_objects_of_the_source_strip_do_not_join():
-    env = tidy_world(caches="dynamic")
-    for row, cell in ((1, (103, 40)), (2, (120, 40))):
-        lay(env, row, cell)
-    (slot,) = found_at(env, (105, 40))
-    assert contents(env, slot) == [0, 1]
-    assert env.objects.status[2] == ObjectStatus.FREE
-
-
-@in_each_engine
-@pytest.mark.parametrize("strip_cell", [STRIP_CELL, (30, 60)], ids=["right", "left"])
-def test_both_strips_of_a_dual_source_create_nothing(strip_cell):
-    env = tidy_world(caches="dynamic", placement="dual_source", nest_centre_m=(16.0, 8.0))
-    lay(env, 1, (strip_cell[0] - 1, strip_cell[1]))
-    assert found_at(env, strip_cell) == []
-
-
-@in_each_engine
-@pytest.mark.parametrize(("x", "centre"), [(103, 104), (54, 55)])
-def test_a_cache_fits_between_the_nest_and_each_strip_of_a_dual_source(x, centre):
-    # The nest has the columns 72 .. 87, the strips 24 .. 39 and 120 .. 135: 32 columns between them for a side of 31.
-    env = tidy_world(caches="dynamic", placement="dual_source", nest_centre_m=(16.0, 8.0))
-    for row, cell in enumerate([(x + 1, 40), (x + 2, 40)], start=1):
-        lay(env, row, cell)
-    (slot,) = found_at(env, (x, 40))
-    assert env.caches.cell[slot].tolist() == [centre, 40]
-
-
 @pytest.mark.parametrize(("side_share", "forms"), [(0.2, False), (0.14, True)])
 def test_a_quad_source_has_room_for_smaller_caches_only(side_share, forms):
     # 36 cells between the nest (96 .. 143) and a strip (36 .. 59): too few for the usual 47, enough for 33.
@@ -170,37 +125,6 @@ def test_clusters_are_protected():
     assert cache_members(rows[0], env.scenario, env.objects, []).size >= 2
 
 
-def test_random_placement_protects_nothing():
-    env = ForageEnv(scenario("warehouse_medium", n_robots=1, caches="dynamic"))
-    env.reset_batch(0)
-    assert protected_boxes(env.scenario, env.arena._arrays.source) == []
-    row = int(np.argmin(np.abs(env.objects.cell - (60, 120)).sum(axis=1)))
-    cell = tuple((env.objects.cell[row] + (1, 0)).tolist())
-    other = next(row for row in range(800) if env.objects.floor[cell[1], cell[0]] != CELL_OBJECT + row)
-    (slot,) = found_at(env, cell, row=other)
-    assert env.caches.count[slot] > 20
-
-
-@in_each_engine
-def test_the_centre_keeps_a_nominal_side_from_the_border():
-    env = tidy_world(caches="dynamic")
-    lay(env, 1, (70, 13))
-    (slot,) = found_at(env, (72, 13))
-    # D = 6.4 m = 32 cells; the mean at cell 13 is moved to cell 32.
-    assert env.caches.cell[slot].tolist() == [71, 32]
-
-
-@in_each_engine
-@pytest.mark.parametrize(("x", "clear_x"), [(37, range(39, 128)), (106, range(32, 105))])
-def test_the_square_is_pushed_clear_of_nest_and_source(x, clear_x):
-    env = tidy_world(caches="dynamic")
-    lay(env, 1, (x, 42))
-    (slot,) = found_at(env, (x, 40))
-    # Nest up to cell 23, source from cell 120, 15 cells to either side of the centre.
-    assert env.caches.cell[slot, 0] in clear_x
-    assert contents(env, slot) == [0, 1]
-
-
 @in_each_engine
 def test_a_second_cache_stands_clear_of_the_first():
     # Caches this close are refused to robots; two CREATE_CACHE drops that finish in the same tick can still come close.
@@ -215,32 +139,6 @@ def test_a_second_cache_stands_clear_of_the_first():
         act(env, {0: Grip.CREATE_CACHE, 1: Grip.CREATE_CACHE})
     assert env.caches.alive.sum() == 2
     assert_conserved(env)  # no two squares overlap
-
-
-@in_each_engine
-def test_two_founders_of_one_group_make_one_cache():
-    env = tidy_world(n_robots=2, caches="dynamic")
-    for robot, cell in enumerate([(70, 40), (76, 40)]):
-        stand(env, robot, cell)
-        load(env, robot, robot)
-    for _ in range(2):
-        events = act(env, {0: Grip.CREATE_CACHE, 1: Grip.CREATE_CACHE})
-    assert events == [Event.DROPPED, Event.DROPPED]
-    (slot,) = np.flatnonzero(env.caches.alive).tolist()
-    assert contents(env, slot) == [0, 1]
-    assert_conserved(env)
-
-
-@in_each_engine
-def test_a_create_cache_drop_without_a_free_cell_creates_nothing():
-    env = tidy_world(caches="dynamic")
-    lay(env, 1, MIDDLE)
-    lay(env, 2, (MIDDLE[0] + 1, MIDDLE[1]))
-    stand(env, 0, MIDDLE)
-    load(env, 0, 0)
-    act(env, {0: Grip.CREATE_CACHE})
-    assert act(env, {0: Grip.CREATE_CACHE})[0] == Event.DROPPED_ELSEWHERE
-    assert not env.caches.alive.any()
 
 
 # Pushing a centre clear
@@ -272,14 +170,6 @@ def test_an_accepted_centre_is_clear_and_a_place_for_an_object(centre, obstacles
         assert all(overlap_cells(box, obstacle) == 0 for obstacle in obstacles)
         assert 24 <= accepted[0] <= 136
         assert 12 <= accepted[1] <= 68
-
-
-def test_a_centre_without_room_is_given_up():
-    config = scenario("warehouse_small", caches="dynamic")
-    rng = np.random.default_rng(0)
-    assert clear_centre(MIDDLE, config, [(0, 0, 160, 80)], rng) is None
-    drawn = np.random.default_rng(0).random(2 * MAX_PASSES)
-    assert rng.random() != drawn[0], "it tried"
 
 
 def test_objects_stay_when_no_cache_finds_room():
@@ -345,43 +235,6 @@ def test_a_cache_stands_on_clusters_that_leave_it_no_room():
     assert contents(env, slot) == [0, 1, 2]
 
 
-def test_a_cache_among_clusters_avoids_them_where_there_is_room():
-    cluster = (84, 56, 92, 62)
-    env = clustered_world([cluster], n_objects=3)
-    lay(env, 1, (64, 60))
-    lay(env, 2, (84, 58))
-    (slot,) = found_at(env, (60, 60))
-    # A square around (62, 60) would overlap the cluster in the columns 84 and 85.
-    assert overlap_cells(square_box((62, 60), 47), cluster) == 2 * 6
-    assert overlap_cells(square_box(tuple(env.caches.cell[slot].tolist()), 47), cluster) == 0
-    assert contents(env, slot) == [0, 1]
-
-
-def test_a_cache_on_clusters_keeps_off_the_nest():
-    env = clustered_world(n_objects=2)
-    lay(env, 1, (75, 120))
-    (slot,) = found_at(env, (71, 120))
-    # A square around (73, 120) would overlap the nest in column 96.
-    assert env.caches.cell[slot, 0] <= 72
-
-
-def test_caches_on_clusters_keep_off_each_other():
-    env = clustered_world()
-    lay(env, 2, (106, 66))
-    lay(env, 3, (109, 78))
-    for robot, cell in enumerate([(60, 60), (148, 60)]):
-        stand(env, robot, cell)
-        load(env, robot, robot)
-    for _ in range(2):
-        events = act(env, {0: Grip.CREATE_CACHE, 1: Grip.CREATE_CACHE})
-    assert events == [Event.DROPPED, Event.DROPPED]
-    # Means (83, 63) and (128.5, 69): 46 columns apart, one less than a side.
-    assert env.caches.cell[0].tolist() == [83, 63]
-    assert env.caches.cell[1, 0] >= 130
-    assert [contents(env, slot) for slot in (0, 1)] == [[0, 2], [1, 3]]
-    assert_conserved(env)
-
-
 def test_a_cluster_takes_objects_on_the_cells_that_a_cache_leaves_to_it():
     cluster = (40, 44, 48, 50)
     env = clustered_world([cluster], n_objects=10)
@@ -445,23 +298,6 @@ def test_quirk_merges_all_usable_objects_wherever_they_lie():
         lay(env, row, cell)
     (slot,) = found_at(env, MIDDLE)
     assert contents(env, slot) == [0, 1, 2, 3]
-
-
-def test_quirk_needs_no_usable_founder():
-    env = quirky_world()
-    for row in range(8):
-        lay(env, row, depot(row))
-    lay(env, 1, (60, 40))
-    lay(env, 2, (80, 40))
-    (slot,) = found_at(env, STRIP_CELL)
-    assert contents(env, slot) == [1, 2]
-
-
-def test_quirk_never_forms_a_cache_in_random_placement():
-    env = quirky_world("warehouse_medium")
-    for row in range(8):
-        lay(env, row, (60 + 2 * row, 120))
-    assert found_at(env, (50, 120)) == []
 
 
 @in_each_engine

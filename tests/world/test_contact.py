@@ -14,7 +14,7 @@ from swarm_forage_env.world.kernels.tick import look
 from swarm_forage_env.world.motion import TOUCH_SLACK_M
 from tests.reference.contact import pressed_velocities
 from tests.support.heaps import DIAMETER_M, RADIUS_M, heap
-from tests.support.stage import lay, put, stand, tidy_world
+from tests.support.stage import put, tidy_world
 
 pytestmark = pytest.mark.usefixtures("each_engine")
 
@@ -64,18 +64,6 @@ def test_the_common_speed_is_kept_when_commands_change_and_clipped_to_them():
     assert drive(env, (FULL, FULL), (-0.2, -0.2))[0, 0] == pytest.approx(0.04, abs=1e-6), "dragged along by who flees"
 
 
-def test_the_common_speed_is_forgotten_when_a_pair_no_longer_presses():
-    env = world((-0.10, 0.0, 0.0), (0.10, 0.0, math.pi))
-    drive(env, (FULL, FULL), (0.3, 0.3), ticks=3)
-    drive(env, (0.0, 0.0), (0.0, 0.0))
-    assert drive(env, (0.2, 0.2), (0.4, 0.4))[0, 0] == pytest.approx(-0.02, abs=1e-6)
-
-
-def test_robots_side_by_side_pass_each_other():
-    env = world((0.0, 0.0, 0.0), (0.0, DIAMETER_M, math.pi))
-    np.testing.assert_allclose(drive(env, (FULL, FULL), (FULL, FULL)), [(0.10, 0.0), (-0.10, 0.0)], atol=1e-9)
-
-
 def test_across_the_line_between_them_robots_move_as_commanded():
     env = world((0.0, 0.0, 0.5), (DIAMETER_M, 0.0, math.pi))
     velocity = drive(env, (FULL, FULL), (0.2, 0.2))
@@ -112,19 +100,6 @@ def test_of_two_robots_at_one_target_one_gets_there(rows, mirrored):
     assert abs(env.swarm.position[rows[1], 0] - MIDDLE[0]) < 0.02
 
 
-@pytest.mark.compiled
-@pytest.mark.parametrize("rows", [(0, 1), (1, 0)])
-@pytest.mark.parametrize("ahead_m", [0.0, 1e-9, 1e-4])
-def test_of_two_that_are_equally_strong_one_gets_there_too(rows, ahead_m):
-    poses = [(-0.30, 0.0, 0.0), (0.30 + ahead_m, 0.0, math.pi)]
-    env = world(*(poses[row] for row in rows))
-    speeds = np.array(seek(env, 1_400))
-    assert np.all(np.sign(speeds) == np.sign(speeds[0])), "it never turns round"
-    assert np.abs(speeds).min() == pytest.approx(3e-4, rel=0.01)
-    if ahead_m == 0.0:
-        assert speeds[0] > 0.0, "nobody is stronger: eastwards, whoever has the first row"
-
-
 # Several robots
 
 
@@ -135,23 +110,6 @@ def test_a_robot_between_two_is_moved_by_the_mean_of_both():
     env = world((-DIAMETER_M, 0.0, 0.0), (0.0, 0.0, 1.0), (DIAMETER_M, 0.0, math.pi))
     drift = drive(env, (FULL, FULL), (0.0, 0.0), (0.25, 0.25), ticks=10)
     assert 0.0 < drift[1, 0] < 0.05, "towards the weaker one"
-
-
-def test_one_robot_shoves_a_row():
-    env = world((-DIAMETER_M, 0.0, 0.0), (0.0, 0.0, 1.0), (DIAMETER_M, 0.0, 2.0))
-    velocity = drive(env, (FULL, FULL), (0.0, 0.0), (0.0, 0.0), ticks=10)
-    assert np.all(velocity[:, 0] > 0.01)
-    assert np.ptp(velocity[:, 0]) < 0.05
-
-
-def test_two_that_shove_one_do_not_kick_it_ahead():
-    half = DIAMETER_M / 2 + 0.0005
-    behind = -math.sqrt(DIAMETER_M**2 - half**2)
-    env = world((behind, half, 0.0), (behind, -half, 0.0), (0.0, 0.0, 0.0))
-    for _ in range(20):
-        velocity = drive(env, (FULL, FULL), (FULL, FULL), (0.0, 0.0))
-        assert velocity[2, 1] == pytest.approx(0.0, abs=1e-6)
-        assert 0.0 < velocity[2, 0] <= 0.10 + 1e-9
 
 
 class Pressing:
@@ -258,59 +216,6 @@ def test_a_robot_at_a_wall_is_held_there_by_one_that_shoves():
     assert math.dist(*env.swarm.position) > 0.97 * DIAMETER_M
     away = drive(env, (0.0, 0.0), (-FULL, -FULL), ticks=5)
     assert away[1, 0] == pytest.approx(-0.10, abs=1e-6)
-
-
-def test_an_inactive_robot_is_shoved_at_half_speed():
-    env = world((0.0, 0.0, 0.0), (DIAMETER_M, 0.0, 2.0))
-    env.set_population(active=np.array([True, False]), present=np.array([True, True]))
-    velocity = drive(env, (FULL, FULL), (FULL, FULL), ticks=10)
-    np.testing.assert_allclose(velocity[:, 0], 0.05, atol=1e-6)
-    assert env.swarm.wheel_speed[1].tolist() == [0.0, 0.0]
-
-
-def test_a_robot_in_an_interaction_is_shoved_too():
-    env = world((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), n_objects=1)
-    stand(env, 1, (60, 40))
-    lay(env, 0, (60, 40))
-    x, y = env.swarm.position[1]
-    put(env, 0, x - DIAMETER_M, y)
-    env.arena.observe()
-    drive(env, (0.0, 0.0), (0.0, 0.0))
-    assert env.swarm.pending_kind[1] != 0, "it picks up"
-    velocity = drive(env, (FULL, FULL), (FULL, FULL))
-    np.testing.assert_allclose(velocity[:, 0], 0.05, atol=1e-6)
-
-
-def test_a_throttled_robot_presses_with_what_is_left_of_its_speed():
-    env = world((-DIAMETER_M, 0.0, 0.0), (0.0, 0.0, math.pi))
-    actions = np.array([[FULL, FULL, 1.0], [FULL, FULL, 1.0]], np.float32)
-    gain = np.array([[0.5, 0.5], [1.0, 1.0]])
-    before = env.swarm.position.copy()
-    env.step_batch(actions, wheel_gain=gain)
-    velocity = (env.swarm.position - before) / env.scenario.dt_s
-    np.testing.assert_allclose(velocity[:, 0], -0.025, atol=1e-6)
-
-
-def test_a_robot_that_turns_on_the_spot_is_shoved_and_goes_on_turning():
-    env = world((0.0, 0.0, 0.0), (DIAMETER_M, 0.0, 0.0))
-    velocity = drive(env, (FULL, FULL), (-FULL, FULL), ticks=5)
-    np.testing.assert_allclose(velocity[:, 0], 0.05, atol=1e-4)
-    assert env.swarm.heading[1] == pytest.approx(5 * 0.20 / 0.14 * 0.2, abs=1e-6)
-
-
-def test_absent_robots_take_no_part_from_the_first_tick_on():
-    env = world((0.0, 0.0, 0.0), (DIAMETER_M, 0.0, math.pi))
-    env.set_population(active=np.array([True, False]), present=np.array([True, False]))
-    assert drive(env, (FULL, FULL), (FULL, FULL))[0, 0] == pytest.approx(0.10, abs=1e-9)
-
-
-def test_a_robot_that_comes_takes_part_from_the_first_tick_on():
-    env = world((0.0, 0.0, 0.0), (DIAMETER_M, 0.0, math.pi))
-    env.set_population(active=np.array([True, False]), present=np.array([True, False]))
-    drive(env, (0.0, 0.0), (0.0, 0.0))
-    env.set_population(active=np.array([True, True]), present=np.array([True, True]))
-    velocity = drive(env, (FULL, FULL), (0.3, 0.3))
-    np.testing.assert_allclose(velocity[:, 0], 0.02, atol=1e-6)
 
 
 def test_a_reset_forgets_who_pressed():

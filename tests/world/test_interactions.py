@@ -24,7 +24,6 @@ from tests.support.stage import (
     cell_centre,
     clear,
     count,
-    depot,
     events_of,
     lay,
     load,
@@ -83,22 +82,6 @@ def test_grasping_over_an_object_picks_it_up_one_tick_later():
     assert env.objects.floor[OPEN_CELL[::-1]] == CELL_EMPTY
     assert events_of(env, Grip.GRASP, 3) == [NONE, NONE, NONE], "a carrying robot that grasps holds"
     assert count(env, Counter.FREE_PICKUPS) == 1
-    assert_conserved(env)
-
-
-@in_each_engine
-def test_grasping_in_a_cache_takes_from_the_cache():
-    env = tidy_world(caches="static")
-    slot = build_cache(env, [1, 3, 5], BASE_CELL)
-    stand(env, 0, (BASE_CELL[0] + 12, BASE_CELL[1] - 12))
-    assert events_of(env, Grip.GRASP, 2) == [NONE, PICKED_FROM_CACHE]
-    taken = int(env.events.event_object[0])
-    assert taken in (1, 3, 5)
-    assert env.events.event_cache[0].tolist() == [env.caches.serial[slot], *BASE_CELL, 2]
-    assert env.swarm.cargo_from_cache[0]
-    assert env.caches.count[slot] == 2
-    assert count(env, Counter.CACHE_PICKUPS) == 1
-    assert count(env, Counter.FREE_PICKUPS) == 0
     assert_conserved(env)
 
 
@@ -167,17 +150,6 @@ def test_any_release_in_the_nest_delivers_one_tick_later(grip, caches):
 
 
 @in_each_engine
-def test_the_nest_is_a_closed_rectangle():
-    env = tidy_world(n_robots=5)
-    x_low, y_low, x_high, y_high = env.scenario.arena.nest_box_m
-    for robot, place in enumerate([(x_low, y_low), (x_high, y_high), (x_high, 8.0), (x_high + 1e-6, 6.0)]):
-        put(env, robot, *place)
-        load(env, robot, robot)
-    act(env, dict.fromkeys(range(4), Grip.DELIVER))
-    assert act(env, dict.fromkeys(range(4), Grip.DELIVER))[:4] == [DELIVERED, DELIVERED, DELIVERED, NOTHING_HERE]
-
-
-@in_each_engine
 @pytest.mark.parametrize("caches", ["static", "dynamic"])
 @pytest.mark.parametrize("grip", ANY_RELEASE)
 def test_any_release_in_a_cache_joins_it_one_tick_later(grip, caches):
@@ -194,55 +166,6 @@ def test_any_release_in_a_cache_joins_it_one_tick_later(grip, caches):
 
 
 @in_each_engine
-def test_release_over_open_floor_acts_at_once():
-    env = tidy_world()
-    stand(env, 0, OPEN_CELL)
-    load(env, 0, 4)
-    assert act(env, {0: Grip.RELEASE})[0] == DROPPED
-    assert env.events.event_object[0] == 4
-    assert env.objects.cell[4].tolist() == list(OPEN_CELL)
-    assert env.objects.carriers[4] == 1, "laid down by a robot, not placed anew"
-    assert count(env, Counter.FLOOR_DROPS) == 1
-    assert count(env, Counter.DISPLACED_DROPS) == 0
-    assert_conserved(env)
-
-
-@in_each_engine
-@pytest.mark.parametrize("caches", ["none", "static", "dynamic"])
-def test_deliver_acts_nowhere_else(caches):
-    env = tidy_world(caches=caches)
-    load(env, 0, 4)
-    for cell in (OPEN_CELL, WALL_CELL, depot(0)):
-        stand(env, 0, cell)
-        assert events_of(env, Grip.DELIVER, 2) == [NOTHING_HERE] * 2
-    assert env.swarm.carried_object[0] == 4
-
-
-@in_each_engine
-@pytest.mark.parametrize("grip", [Grip.SITE, Grip.CREATE_CACHE])
-def test_site_and_found_take_a_tick_in_dynamic_worlds(grip):
-    env = tidy_world(caches="dynamic")
-    stand(env, 0, OPEN_CELL)
-    load(env, 0, 4)
-    assert events_of(env, grip, 2) == [NONE, DROPPED]
-    assert env.objects.cell[4].tolist() == list(OPEN_CELL)
-    assert count(env, Counter.CACHES_CREATED) == 0, "alone"
-    assert_conserved(env)
-
-
-@in_each_engine
-@pytest.mark.parametrize("caches", ["none", "static"])
-@pytest.mark.parametrize("grip", [Grip.SITE, Grip.CREATE_CACHE])
-def test_site_and_found_are_release_in_other_worlds(grip, caches):
-    env = tidy_world(caches=caches)
-    stand(env, 0, OPEN_CELL)
-    load(env, 0, 4)
-    lay(env, 3, (OPEN_CELL[0] + 1, OPEN_CELL[1]))
-    assert act(env, {0: grip})[0] == DROPPED
-    assert not env.caches.alive.any()
-
-
-@in_each_engine
 @pytest.mark.parametrize("grip", [Grip.SITE, Grip.CREATE_CACHE])
 def test_site_and_found_are_refused_near_a_cache(grip):
     env = tidy_world(caches="dynamic")
@@ -256,15 +179,6 @@ def test_site_and_found_are_refused_near_a_cache(grip):
     assert env.events.event_cache[0, 0] != env.caches.serial[far]
     put(env, 0, x + 12.81, y)
     assert events_of(env, grip, 2) == [NONE, DROPPED]
-
-
-@in_each_engine
-def test_release_near_a_cache_is_never_refused():
-    env = tidy_world(caches="dynamic")
-    build_cache(env, [0, 1], CORNER_CACHE)
-    stand(env, 0, (60, 20))
-    load(env, 0, 4)
-    assert act(env, {0: Grip.RELEASE})[0] == DROPPED
 
 
 @in_each_engine
@@ -415,13 +329,3 @@ def test_a_first_pick_up_is_one_since_the_object_was_placed():
     stand(env, 0, tuple(env.objects.cell[5].tolist()))
     assert events_of(env, Grip.GRASP, 2)[-1] == PICKED_UP
     assert count(env, Counter.FIRST_PICKED) == 2, "delivered and placed anew"
-
-
-@in_each_engine
-def test_an_object_taken_from_a_cache_can_be_a_first_pick_up():
-    env = tidy_world(caches="static")
-    build_cache(env, [0, 1, 2], BASE_CELL)
-    stand(env, 0, BASE_CELL)
-    events_of(env, Grip.GRASP, 2)
-    assert env.events.first_picked[0]
-    assert count(env, Counter.FIRST_PICKED) == 1

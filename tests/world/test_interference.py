@@ -49,14 +49,6 @@ def test_who_is_behind_interferes_in_the_program_only(quirks):
 
 
 @in_each_engine
-def test_walls_interfere_too():
-    env = tidy_world()
-    put(env, 0, 31.6 - 0.1, 8.0)
-    act(env, {})
-    assert env.events.interfering.tolist() == [True, False, False, False]
-
-
-@in_each_engine
 def test_every_state_counts():
     env = tidy_world()
     met(env, 0, 1)
@@ -79,52 +71,6 @@ def test_robots_in_repair_are_obstacles_but_never_interfere():
     assert env.events.interfering.tolist() == [False, True, False, False]
     assert env.events.interference_sum[0] == pytest.approx(1 / 3)
     assert [int(env.events.counters[c]) for c in (Counter.ACTIVE, Counter.PRESENT)] == [3, 4]
-
-
-@in_each_engine
-def test_robots_at_work_that_carry_are_counted_in_each_tick():
-    """Robots 0 to 2 hold an object; robot 2 is in repair; robot 0 lets go, which is seen from the next tick on."""
-    env = tidy_world()
-    for robot in range(3):
-        load(env, robot, robot)
-    env.set_population(active=np.array([True, True, False, True]), present=np.ones(4, np.bool_))
-    counted = []
-    for grips in ({}, {0: Grip.RELEASE}, {}):
-        act(env, grips)
-        counted.append(int(env.events.counters[Counter.CARRYING]))
-    assert counted == [2, 4, 5]
-
-
-@in_each_engine
-def test_absent_robots_are_no_obstacles():
-    env = tidy_world()
-    met(env, 0, 1)
-    gone = np.array([False, True, True, True])
-    env.set_population(active=gone, present=gone)
-    act(env, {})
-    assert not env.events.interfering.any()
-    assert [int(env.events.counters[c]) for c in (Counter.ACTIVE, Counter.PRESENT)] == [3, 3]
-
-
-@in_each_engine
-def test_nobody_active_is_no_interference():
-    env = tidy_world()
-    met(env, 0, 1)
-    env.set_population(active=np.zeros(4, np.bool_), present=np.ones(4, np.bool_))
-    act(env, {})
-    assert env.events.interference_sum[0] == 0.0
-    assert not env.events.interfering.any()
-
-
-@in_each_engine
-def test_counters_are_sums_over_ticks():
-    env = tidy_world()
-    met(env, 0, 1)
-    for _ in range(5):
-        act(env, {})
-    assert env.events.counters[Counter.INTERFERING] == 10
-    assert env.events.counters[Counter.ACTIVE] == env.events.counters[Counter.PRESENT] == 20
-    assert env.events.interference_sum[0] == pytest.approx(5 * 2 / 4)
 
 
 @in_each_engine
@@ -154,16 +100,6 @@ def test_time_lost_near_a_cache_is_told_from_other_time(away_m, near):
     act(env, {})
     assert env.events.interfering.tolist() == [True, True, True, False]
     assert env.events.counters[Counter.INTERFERING_NEAR_CACHES] == 2 * near
-
-
-@in_each_engine
-def test_who_comes_back_from_repair_beside_another_begins_anew():
-    env = tidy_world()
-    met(env, 0, 1)
-    for at_work in (True, False, True):
-        env.set_population(active=np.array([at_work, True, True, True]), present=np.ones(4, np.bool_))
-        act(env, {})
-    assert env.events.counters[Counter.AVOIDANCES] == 3
 
 
 @in_each_engine

@@ -2,7 +2,6 @@
 
 import copy
 import pickle
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -17,7 +16,6 @@ from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.plans import ArenaPlan, plan_arena
 from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.world.lockstep import Lockstep, can_go_in_lockstep
-from swarm_forage_env.wrappers.throttle import Throttle
 from tests.support.branches import pickled
 
 pytestmark = pytest.mark.compiled
@@ -124,22 +122,6 @@ def test_arenas_together_are_those_alone(wrappers, fields, chosen_ways):
     assert n_ended >= 6
 
 
-def test_a_refused_decision_leaves_the_noise_as_it_was():
-    chosen = plan("sensor_noise:sigma=0.03", "actuator_noise:sigma=0.1", interface=DRIVEN)
-    asked, other = LearnerArena(chosen), LearnerArena(chosen)
-    for arena in (asked, other):
-        arena.reset(2)
-    assert asked.decides_at_once
-    good = np.full((N_ROBOTS, 2), 0.5, np.float32)
-    bad = good.copy()
-    bad[3] = np.nan
-    with pytest.raises(ActionError, match="nan"):
-        asked.step(bad, np.zeros(N_ROBOTS, np.float32))
-    for arena in (asked, other):
-        arena.step(good, np.zeros(N_ROBOTS, np.float32))
-    np.testing.assert_array_equal(asked.observe(), other.observe())
-
-
 def test_a_swarm_that_dies_between_two_decisions_ends_with_the_next_tick():
     chosen = plan("population:death_per_tick=1e-6", interface=DRIVEN, tick=-1.0)
     ends = []
@@ -152,60 +134,6 @@ def test_a_swarm_that_dies_between_two_decisions_ends_with_the_next_tick():
         ends.append((dead.tolist(), all_dead, arena.forage_env.tick, rewards.tolist()))
     assert ends[0] == ends[1]
     assert ends[0][1:3] == (True, 1)
-
-
-def test_arenas_with_other_weights_are_not_stepped_together():
-    batch = ArenaBatch(plan(), 2)
-    batch.reset([0, 1], [None, {"scenario": {"first_pickup": 3.0}}])
-    assert ways(batch) == (False, True, True, True)
-    batch.reset([0, 1], [{"scenario": {"first_pickup": 3.0}}, None])
-    assert ways(batch) == (True,) * 4
-
-
-def test_one_arena_alone_takes_the_same_way():
-    batch, other = ArenaBatch(plan(nest_progress=0.1), 1), OneByOne(plan(nest_progress=0.1), 1)
-    np.testing.assert_array_equal(batch.reset([3], [None])[0], other.reset([3], [None])[0])
-    for actions in drawn(70, 1):
-        ours, theirs = batch.step(actions), other.step(actions)
-        for name in COLUMNS:
-            np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name), err_msg=name)
-    assert ways(batch) == (True,) * 4
-
-
-def through_the_arena(batch: ArenaBatch) -> Callable[[], None]:
-    """Take a snapshot of the second arena; returns what goes back to it."""
-    snapshot = batch.arenas[1].snapshot()
-    return lambda: batch.arenas[1].restore(snapshot)
-
-
-def through_the_batch(batch: ArenaBatch) -> Callable[[], object]:
-    """Do the same in the way of a user of vector environments, who has only methods of environments."""
-    (snapshot,) = batch.call_method("snapshot", [1])
-    return lambda: batch.call_method("restore_batch", [1], snapshot)
-
-
-@pytest.mark.parametrize("way", [through_the_arena, through_the_batch])
-@pytest.mark.parametrize(
-    "interface", [InterfaceConfig(), InterfaceConfig(observation="compact"), DRIVEN], ids=["full", "compact", "driven"]
-)
-def test_the_arrays_of_a_snapshot_are_found(interface, way):
-    batches = [each(plan(interface=interface, nest_progress=0.1), 2) for each in (ArenaBatch, OneByOne)]
-    for batch in batches:
-        batch.reset([0, 1], [None] * 2)
-    shape = batches[0].interface.action_space.shape
-    assert shape is not None
-    actions = drawn(5, 2)[..., : shape[0]]
-    for batch in batches:
-        for now in actions[:2]:
-            batch.step(now)
-        go_back = way(batch)
-        before = [batch.step(now) for now in actions[2:]]
-        go_back()
-        for now, first in zip(actions[2:], before, strict=True):
-            again = batch.step(now)
-            np.testing.assert_array_equal(again.obs[N_ROBOTS:], first.obs[N_ROBOTS:])
-            np.testing.assert_array_equal(again.rewards[N_ROBOTS:], first.rewards[N_ROBOTS:])
-    assert ways(batches[0])[:3] == (batches[0].interface.passes_on, True, True)
 
 
 def arenas(n: int) -> list[ForagingArena]:
@@ -251,31 +179,6 @@ def test_a_seat_may_stay_be_stepped_alone_begin_anew_and_go_back():
             assert_same(one, other)
 
 
-def test_with_nothing_to_step_nothing_happens():
-    ours, theirs = arenas(2), arenas(2)
-    assert not Lockstep(ours).step({}, np.zeros((2, N_ROBOTS, 3), np.float32))
-    for one, other in zip(ours, theirs, strict=True):
-        assert_same(one, other)
-
-
-def test_one_seat_may_need_more_room(monkeypatch):
-    monkeypatch.setattr("swarm_forage_env.world.bodies.PAIRS_PER_ROBOT", 1)
-    ours, theirs = arenas(2), arenas(2)
-    lockstep = Lockstep(ours)
-    for arena in (ours[1], theirs[1]):  # everybody on one spot: more pairs than there is room for
-        arena.swarm.position[:] = 4.0 + 1e-3 * np.arange(N_ROBOTS)[:, None]
-        for robot, (x, y) in enumerate(arena.swarm.position.tolist()):
-            arena.bodies.place(robot, x, y, 0.0)
-        arena.has_changed = True
-    for now in drawn(5, 2).reshape(5, 2, N_ROBOTS, 3):
-        lockstep.step({0: None, 1: None}, now)
-        for arena, rows in zip(theirs, now, strict=True):
-            arena.step(rows)
-        for one, other in zip(ours, theirs, strict=True):
-            assert_same(one, other)
-    assert ours[0].bodies.n_pairs == N_ROBOTS < ours[1].bodies.n_pairs
-
-
 def test_a_refused_action_stops_its_own_arena_only():
     ours, theirs = arenas(3), arenas(3)
     now = drawn(1, 3).reshape(3, N_ROBOTS, 3)
@@ -297,17 +200,6 @@ def test_a_refused_action_stops_its_own_arena_only():
     assert "arena 1, which was not stepped" in "".join(raised.value.__notes__)
 
 
-def test_a_copy_of_a_batch_goes_on_by_itself():
-    batch = ArenaBatch(plan(), 2)
-    batch.reset([0, 1], [None] * 2)
-    actions = drawn(20, 2)
-    for now in actions[:10]:
-        batch.step(now)
-    other = copy.deepcopy(batch)
-    ours = [batch.step(now).obs for now in actions[10:]]
-    np.testing.assert_array_equal(ours, [other.step(now).obs for now in actions[10:]])
-
-
 def test_who_may_go_in_lockstep():
     config = plan().world.scenario
     assert can_go_in_lockstep([ForagingArena(config), ForagingArena(config)])
@@ -320,39 +212,6 @@ def test_who_may_go_in_lockstep():
         with pytest.raises(ValueError, match="Expected arenas of one scenario"):
             Lockstep([ForagingArena(config), other])
     assert not can_go_in_lockstep([ForagingArena(scenario("warehouse_small", physics="chipmunk"))] * 2)
-
-
-def test_whole_numbers_among_fractions_are_the_same_world():
-    """Configurations that say 1 and 1.0 are equal, so their arenas may sit side by side."""
-    worlds = [scenario("warehouse_small", n_robots=2, n_objects=60, walk_probability=one) for one in (1.0, 1)]
-    together, alone = [ForagingArena(world) for world in worlds], ForagingArena(worlds[1])
-    for arena in (*together, alone):
-        arena.reset(3)
-    actions = np.zeros((2, 2, 3), np.float32)
-    Lockstep(together).step({0: None, 1: None}, actions)
-    alone.step(actions[1])
-    for arena in together:
-        np.testing.assert_array_equal(arena.objects.cell, alone.objects.cell)
-
-
-def test_a_stack_whose_step_was_replaced_is_stepped_by_it(monkeypatch):
-    batch = ArenaBatch(plan("throttle:waveform=sine,amplitude=0.2,offset=0.2,period_s=20"), 2)
-    batch.reset([0, 1], [None] * 2)
-    assert ways(batch)[0]
-    calls = []
-    original = Throttle.step_batch
-
-    def counted(self, actions, **options):
-        calls.append(self)
-        return original(self, actions, **options)
-
-    monkeypatch.setattr(Throttle, "step_batch", counted)
-    other = ArenaBatch(plan("throttle:waveform=sine,amplitude=0.2,offset=0.2,period_s=20"), 2)
-    other.reset([0, 1], [None] * 2)
-    assert ways(other) == (False,) * 4
-    now = drawn(1, 2)[0]
-    np.testing.assert_array_equal(other.step(now).obs, batch.step(now).obs)
-    assert len(calls) == 2
 
 
 @pytest.mark.parametrize(

@@ -5,24 +5,20 @@ import math
 import numpy as np
 import pytest
 
-from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.contract.codes import CELL_OBSTACLE, Counter, ObjectStatus
+from swarm_forage_env.contract.codes import Counter, ObjectStatus
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.obstacles import distances_m
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.kernels.bodies import move_bodies
 from swarm_forage_env.world.kernels.obstacles import hold_outside
 from swarm_forage_env.world.state import SwarmState
-from swarm_forage_env.wrappers.population import PopulationConfig
 from tests.reference.bodies import held_outside, moved
 from tests.reference.sensing import RADIUS_M, interferes, observe, proximity
 from tests.support.engines import drive_at, make_bodies
 from tests.support.heaps import heap
-from tests.support.stage import assert_conserved, kill, load, put, tidy_world
+from tests.support.stage import assert_conserved, put, tidy_world
 
 BLOCK = (16.0, 8.0, 16.4, 8.6)
-ELL = ((16.0, 8.0, 16.4, 10.0), (16.4, 8.0, 18.0, 8.4))
-"""Two boxes that make a corner at (16.4, 8.4)."""
 ROOM = (0.285036758, 0.285036758, 31.514963242, 15.714963242)
 
 
@@ -54,19 +50,6 @@ def test_a_disc_at_a_box_moves_as_in_chipmunk(place, turn, heading):
     np.testing.assert_allclose(compiled, chipmunk, atol=1e-9)
     free = np.array(place) + 0.8 * np.array((math.cos(heading + turn), math.sin(heading + turn)))
     assert np.abs(compiled[-1, :2] - free).max() > 0.01, "it touched the box"
-
-
-@pytest.mark.parametrize("physics", ["chipmunk", "compiled"])
-@pytest.mark.parametrize("heading", np.linspace(-3.0, 3.0, 5))
-def test_a_disc_comes_out_of_a_corner_again(physics, heading):
-    bodies, swarm = bodies_at([(16.52, 8.52)], [heading], physics, ELL)
-    for _ in range(30):
-        drive_at(bodies, swarm, np.array([-3 * math.pi / 4]), 0.1)
-    deepest = swarm.position[0].copy()
-    assert np.all(deepest >= (16.4 + RADIUS_M - 1e-9, 8.4 + RADIUS_M - 1e-9))
-    for _ in range(30):
-        drive_at(bodies, swarm, np.array([math.pi / 4]), 0.1)
-    assert np.linalg.norm(swarm.position[0] - deepest) > 0.5
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -184,53 +167,6 @@ def test_robots_objects_and_caches_start_clear_of_boxes(placement, caches):
             env.step_batch(np.zeros((60, 3), np.float32))
             assert_conserved(env)
         assert env.events.counters[Counter.OBJECTS_MOVED] > 100
-
-
-def test_without_boxes_nothing_is_drawn_otherwise():
-    """A box that nobody meets changes no start pose and no place of an object."""
-    far = ForageEnv(scenario("warehouse_small", n_robots=10, n_objects=20, obstacles=((0.0, 0.0, 1.0, 1.0),)))
-    bare = ForageEnv(scenario("warehouse_small", n_robots=10, n_objects=20))
-    far.reset_batch(3)
-    bare.reset_batch(3)
-    np.testing.assert_array_equal(far.swarm.position, bare.swarm.position)
-    np.testing.assert_array_equal(far.objects.cell, bare.objects.cell)
-
-
-def test_static_caches_on_a_box_are_refused():
-    with pytest.raises(ConfigError, match=r"clear of nest, obstacles and each other, got .* m; move nest or obs"):
-        ForageEnv(scenario("warehouse_small", caches="static", obstacles=((14.0, 0.2, 17.0, 15.8),))).reset_batch(0)
-
-
-def test_no_room_for_start_poses_or_clusters_is_said():
-    comb = tuple((2.9 + 1.2 * k, 0.0, 3.9 + 1.2 * k, 16.0) for k in range(2, 22))
-    with pytest.raises(ConfigError, match="obstacles"):
-        scenario("warehouse_small", n_robots=400, obstacles=comb, n_objects=1)
-    around = ((2.4, 2.4, 13.6, 6.0), (2.4, 10.0, 13.6, 13.6), (2.4, 6.0, 6.0, 10.0), (10.0, 6.0, 13.6, 10.0))
-    crowded = scenario("search_and_rescue", side_m=16.0, n_robots=2, obstacles=around)
-    with pytest.raises(ConfigError, match="or fewer obstacles"):
-        ForageEnv(crowded).reset_batch(0)
-
-
-def test_cargo_of_the_dead_is_placed_again_where_a_box_keeps_the_cell_free():
-    """The box takes a strip of the cell; a robot can stand on the rest of it."""
-    env = tidy_world(n_robots=1, n_objects=2, obstacles=((14.0, 8.0, 14.43, 9.0),), physics="compiled")
-    load(env, 0, 0)
-    put(env, 0, 14.43 + RADIUS_M + 0.001, 8.3)
-    assert env.objects.floor[41, 72] == CELL_OBSTACLE
-    kill(env, 0)
-    assert env.events.counters[Counter.DISPLACED_DROPS] == 1
-    assert_conserved(env)
-
-
-def test_robots_are_born_clear_of_boxes():
-    boxes = tuple((3.0 + 2.0 * k, 2.0, 4.5 + 2.0 * k, 14.0) for k in range(1, 13))
-    config = scenario("warehouse_small", n_robots=40, n_objects=4, obstacles=boxes, physics="compiled")
-    env = PopulationConfig(birth_per_tick=1.0, initial_robots=1).wrap(ForageEnv(config))
-    env.reset_batch(0)
-    for _ in range(30):
-        env.step_batch(np.zeros((40, 3), np.float32))
-        assert distances_m(boxes, env.unwrapped.swarm.position[env.unwrapped.swarm.present]).min() >= RADIUS_M
-    assert np.count_nonzero(env.unwrapped.swarm.present) > 5
 
 
 def test_objects_appear_at_positions_of_ones_own_and_nowhere_else():

@@ -13,12 +13,11 @@ from swarm_forage_env.world.bodies import Bodies
 from swarm_forage_env.world.chipmunk import ChipmunkBodies
 from swarm_forage_env.world.kernels.drive import hold_inside
 from swarm_forage_env.world.state import SwarmState
-from swarm_forage_env.wrappers.noise import ActuatorNoise, ActuatorNoiseConfig
 from tests.reference.motion import WHEEL_BASE_M, WHEEL_SCALE_MPS, free_motion, held_inside, limited_wheels
 from tests.support import engines
 from tests.support.engines import drive_at, make_bodies
 from tests.support.heaps import DIAMETER_M, RADIUS_M
-from tests.support.stage import begin, put, tidy_world
+from tests.support.stage import put, tidy_world
 
 pytestmark = pytest.mark.usefixtures("each_engine")
 
@@ -104,13 +103,6 @@ def test_a_robot_at_full_speed_is_stopped_by_one_that_pushes_back():
     assert np.diff(swarm.position[:, 0])[0] == pytest.approx(DIAMETER_M, rel=DEEPEST_OVERLAP)
 
 
-def test_robots_that_do_not_touch_do_not_feel_each_other():
-    physics, swarm, _ = world([MIDDLE, (16.0, 8.0 + DIAMETER_M + 0.002)], [0.0, math.pi])
-    for _ in range(20):
-        drive_ahead(physics, swarm)
-    np.testing.assert_allclose(swarm.position, [(16.4, 8.0), (15.6, 8.0 + DIAMETER_M + 0.002)], atol=1e-9)
-
-
 def room_to_walls(swarm: SwarmState) -> float:
     """Least distance of a body from the border of the free floor, m; negative outside. All in the small warehouse."""
     x_low, y_low, x_high, y_high = scenario("warehouse_small").arena.interior_m
@@ -127,14 +119,6 @@ def test_walls_hold(corner):
         for _ in range(15):
             drive_ahead(physics, swarm)
             assert room_to_walls(swarm) >= -ROUNDING_M, heading
-
-
-def test_a_wall_stops_but_does_not_hold_back_a_sliding_robot_entirely():
-    physics, swarm, config = world([(16.0, 15.7)], [math.radians(30)])
-    for _ in range(50):
-        drive_ahead(physics, swarm)
-    assert swarm.position[0, 0] > 16.1
-    assert swarm.position[0, 1] <= config.arena.interior_m[3] - RADIUS_M + ROUNDING_M
 
 
 @pytest.mark.compiled
@@ -157,43 +141,7 @@ def test_a_crowd_does_not_push_anybody_through_a_wall(at):
     assert max(deepest) < 2 * DEEPEST_OVERLAP
 
 
-@pytest.mark.compiled
-@pytest.mark.parametrize("sigma", [0.5, 10.0, 1e9])
-def test_noise_on_the_wheels_drives_nobody_through_a_wall(sigma):
-    env = tidy_world(n_robots=40)
-    x_high = env.scenario.arena.interior_m[2]
-    for robot in range(40):
-        put(env, robot, x_high - 0.1 - 0.2 * (robot % 2), 2.0 + 0.3 * (robot // 2), 0.0)
-    stack = ActuatorNoise(env, ActuatorNoiseConfig(sigma=sigma))
-    begin(stack)
-    rng = np.random.default_rng(0)
-    for _ in range(200):
-        stack.step_batch(rng.uniform(0.0, 1.0, (40, 3)).astype(np.float32))
-        assert room_to_walls(env.swarm) >= -ROUNDING_M
-
-
-def test_a_body_that_was_put_back_stays_where_it_was_put():
-    physics, swarm, _ = world([(31.58, 8.0), (5.0, 5.0)], [0.0, 0.0])  # born inside a wall
-    physics.advance(swarm)
-    assert room_to_walls(swarm) >= -ROUNDING_M
-    np.testing.assert_array_equal(physics.poses()[:-1, :2], swarm.position)
-    x_before = swarm.position[0, 0]
-    physics.twist[0, 0] = -0.10
-    physics.advance(swarm)
-    assert swarm.position[0, 0] == pytest.approx(x_before - 0.02, abs=0.001)
-    assert swarm.position[1] == pytest.approx((5.0, 5.0))
-
-
 # Rows
-
-
-def test_twists_reach_the_bodies_in_order():
-    physics, swarm, _ = world([(4.0 + row, 8.0) for row in range(5)], np.zeros(5))
-    physics.twist[:-1, 1] = np.arange(5) * 0.02
-    physics.twist[:-1, 2] = np.arange(5) * 0.1
-    physics.advance(swarm)
-    np.testing.assert_allclose(swarm.position[:, 1], 8.0 + 0.2 * np.arange(5) * 0.02, atol=1e-12)
-    np.testing.assert_allclose(swarm.heading, 0.2 * np.arange(5) * 0.1, atol=1e-12)
 
 
 def test_parked_bodies_are_out_of_the_way():
@@ -210,22 +158,6 @@ def test_parked_bodies_are_out_of_the_way():
     parked = physics.poses()[1:3, :2]
     assert np.linalg.norm(parked[0] - parked[1]) >= 1.0 - 1e-9
     assert np.all(parked < -5.0)
-
-
-def test_a_parked_body_can_be_placed_again():
-    physics, swarm, _ = world([MIDDLE, (16.3, 8.0)], [0.0, 0.0])
-    physics.park(1)
-    swarm.present[1] = False
-    physics.advance(swarm)
-    physics.place(1, 16.3, 8.0, math.pi)
-    swarm.present[1] = True
-    physics.twist[:] = 0.0
-    physics.advance(swarm)
-    assert swarm.position[1] == pytest.approx((16.3, 8.0))
-    assert swarm.heading[1] == pytest.approx(math.pi)
-    for _ in range(30):
-        drive_ahead(physics, swarm)
-    assert np.diff(swarm.position[:, 0])[0] == pytest.approx(DIAMETER_M, rel=DEEPEST_OVERLAP), "it collides again"
 
 
 def test_the_fastest_wheel_moves_less_than_a_radius_per_tick():

@@ -1,26 +1,20 @@
 """Where objects appear: uniform over free cells, one per cell, and a waiting list for those without a place."""
 
-import resource
-import sys
-
 import numpy as np
 import pytest
 from scipy.stats import chisquare
 
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, CELL_OBJECT, ObjectStatus
 from swarm_forage_env.contract.types import IntArray
-from swarm_forage_env.scenarios.config import ArenaConfig, ObjectConfig, ScenarioConfig
+from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.floor import PLACEMENTS, Box, source_boxes
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
-from swarm_forage_env.scenarios.robots import RobotConfig
 from swarm_forage_env.world.allocation import new_objects
 from swarm_forage_env.world.kernels.placement import (
     DRAWS,
     UNLIMITED,
     count_objects,
-    draw_source_cell,
     place_displaced,
     scatter,
 )
@@ -100,25 +94,6 @@ def test_sources_are_the_regions_without_limit(placement):
     assert rng.bit_generator.state == stream_rng(0, Stream.PLACEMENT).bit_generator.state
 
 
-def test_a_full_source_strip_takes_exactly_its_cells():
-    objects, _, _ = furnished(scenario("warehouse_small", n_objects=896))
-    assert np.all(objects.floor[12:68, 120:136] >= CELL_OBJECT)
-
-
-def test_same_seed_same_places():
-    config = scenario("search_and_rescue")
-    first, other = furnished(config, 5)[0], furnished(config, 6)[0]
-    np.testing.assert_array_equal(first.floor, furnished(config, 5)[0].floor)
-    assert np.any(first.floor != other.floor)
-
-
-def test_place_all_says_how_many_fit():
-    objects = bare_objects(30, 20, 20)
-    with pytest.raises(ConfigError, match=r"Expected at most 24 objects .* got 30; ask for fewer"):
-        place_all(objects, one_region((3, 3, 9, 7)), (0, 0, 20, 20), np.random.default_rng(0))
-    assert_consistent(objects)
-
-
 def test_place_all_leaves_objects_in_caches_alone():
     objects = bare_objects(6, 20, 20)
     objects.status[[1, 4]] = ObjectStatus.CACHED
@@ -130,31 +105,6 @@ def test_place_all_leaves_objects_in_caches_alone():
     assert objects.status.tolist() == [0, 2, 0, 0, 2, 0]
     assert objects.cache_slot.tolist() == [-1, 0, -1, -1, 0, -1]
     assert np.all(objects.floor[14:17, 14:17] == CELL_CACHE)
-
-
-def test_a_huge_floor_takes_memory_only_where_something_lies():
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    arena = ArenaConfig(width_m=4000.0, height_m=4000.0, nest_centre_m=(2000.0, 2000.0), nest_size_m=(8.0, 8.0))
-    floor = new_objects(scenario("warehouse_medium", arena=arena)).floor
-    assert floor.nbytes == 1_600_000_000
-    assert floor[10_000, 10_000] == CELL_NEST
-    assert floor[0, 0] == floor[19_999, 19_999] == CELL_EMPTY
-    after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    assert (after - before) * (1 if sys.platform == "darwin" else 1024) < floor.nbytes / 10
-
-
-@pytest.mark.compiled
-def test_the_largest_arena_is_furnished():
-    arena = ArenaConfig(width_m=576.0, height_m=576.0, nest_centre_m=(288.0, 288.0), nest_size_m=(115.2, 115.2))
-    config = ScenarioConfig(
-        name="bench",
-        arena=arena,
-        robots=RobotConfig(n_robots=16_384),
-        objects=ObjectConfig(n_objects=116_121, placement="random"),
-    )
-    objects, _, _ = furnished(config)
-    assert waiting(objects) == []
-    assert_consistent(objects)
 
 
 @pytest.mark.compiled
@@ -175,19 +125,6 @@ def test_every_free_cell_is_equally_likely(share_free):
         lift(objects, 0)
     assert counts[~free].sum() == 0
     assert chisquare(counts[free]).pvalue > SIGNIFICANCE
-
-
-@pytest.mark.compiled
-def test_a_crowded_region_is_filled_uniformly():
-    # Three of four cells are taken each time, so both ways of drawing a cell take part.
-    counts = np.zeros((6, 8), int)
-    for seed in range(400):
-        objects = bare_objects(36, 8, 6)
-        place_all(objects, one_region((0, 0, 8, 6)), (0, 0, 8, 6), np.random.default_rng(seed))
-        counts += objects.floor >= CELL_OBJECT
-    # A cell is taken 36 / 48 of the time with variance p (1 - p); sampling without replacement takes one degree.
-    statistic = np.sum((counts - 300) ** 2) / (400 * 0.75 * 0.25) * 47 / 48
-    assert 25 < statistic < 80  # 0.1 and 99.9 percent points of chi-square with 47 degrees lie at 23 and 83
 
 
 @pytest.mark.compiled
@@ -238,23 +175,6 @@ def test_a_region_at_capacity_is_skipped_dropped_objects_included():
     assert waiting(objects) == []
 
 
-def test_a_cluster_under_a_cache_is_passed_over():
-    regions = np.array([(0, 0, 4, 4), (6, 0, 10, 4)], np.int32)
-    source = Source(regions, np.array([8, 8], np.int32), np.array([0, 2], np.int32))
-    objects = bare_objects(8, 12, 6)
-    objects.floor[0:5, 0:5] = CELL_CACHE - 1
-    place_all(objects, source, (0, 0, 12, 6), np.random.default_rng(1))
-    assert np.all(objects.cell[:, 0] >= 6)
-
-
-def test_a_region_outside_the_distributable_box_is_passed_over():
-    regions = np.array([(0, 0, 3, 3), (2, 2, 8, 8)], np.int32)
-    source = Source(regions, np.full(2, UNLIMITED, np.int32), np.array([0, 2], np.int32))
-    objects = bare_objects(9, 10, 10)
-    place_all(objects, source, (4, 5, 7, 10), np.random.default_rng(0))
-    assert np.all(objects.floor[5:8, 4:7] >= CELL_OBJECT)
-
-
 @pytest.mark.parametrize("capacity", [UNLIMITED, 13], ids=["room for all", "too few places"])
 def test_the_tick_places_as_python_does(capacity):
     """From the same generator, whoever places; what waits, or what is too much at once, is left to Python."""
@@ -287,52 +207,6 @@ def test_the_tick_places_as_python_does(capacity):
     assert slow_rng.random() == fast_rng.random()
     assert n_fast > 50
     assert (len(waiting(slow)) > 0) == (capacity != UNLIMITED)
-
-
-def test_placed_objects_start_anew():
-    config = scenario("warehouse_small")
-    objects, source, rng = furnished(config)
-    lift(objects, 17)
-    objects.status[17] = ObjectStatus.WAITING
-    assert objects.carriers[17] == 1
-    place_objects(np.array([17], np.int32), objects, source, config.arena.distributable_cells, rng)
-    assert objects.status[17] == ObjectStatus.FREE
-    assert objects.carriers[17] == 0
-    assert objects.cache_slot[17] == -1
-    assert 120 <= objects.cell[17, 0] < 136
-    assert_consistent(objects)
-
-
-def test_newest_first_then_the_longest_wait():
-    objects = bare_objects(6, 5, 3)
-    make_list(objects.waiting, [])
-    area, source, rng = (0, 0, 5, 3), one_region((1, 1, 4, 2)), np.random.default_rng(0)
-    place_objects([0, 1, 2, 3], objects, source, area, rng)
-    assert waiting(objects) == [3]
-    place_objects([4], objects, source, area, rng)
-    assert waiting(objects) == [3, 4]
-    lift(objects, 0)
-    place_objects([5], objects, source, area, rng)
-    assert (waiting(objects), int(objects.status[5])) == ([3, 4], ObjectStatus.FREE)
-    lift(objects, 1)
-    lift(objects, 5)
-    place_objects([0], objects, source, area, rng)
-    assert (waiting(objects), int(objects.status[3])) == ([4], ObjectStatus.FREE)
-    lift(objects, 2)
-    lift(objects, 0)
-    place_objects([1, 2], objects, source, area, rng)  # 1, then 4, which leaves no cell for 2
-    assert waiting(objects) == [2]
-    assert [int(row) for row in np.flatnonzero(objects.status == ObjectStatus.FREE)] == [1, 3, 4]
-    assert np.flatnonzero(objects.status == ObjectStatus.CARRIED).tolist() == [0, 5]
-    assert_consistent(objects)
-
-
-def test_nothing_to_place_draws_nothing_and_wakes_nobody():
-    objects = bare_objects(3, 5, 3)
-    rng = np.random.default_rng(0)
-    place_objects([], objects, one_region((0, 0, 5, 3)), (0, 0, 5, 3), rng)
-    assert waiting(objects) == [0, 1, 2]
-    assert rng.bit_generator.state == np.random.default_rng(0).bit_generator.state
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -377,12 +251,3 @@ def test_scatter_agrees_with_its_slow_twin(seed):
     assert n_placed == len(placed) > 5
     np.testing.assert_array_equal(floor, slow_floor)
     assert {row: tuple(cell[row].tolist()) for row in placed} == placed
-
-
-def test_largest_uniforms_stay_inside():
-    source, floor = one_region((2, 3, 9, 7)), np.full((10, 10), CELL_EMPTY, np.int32)
-    last = np.full(DRAWS, np.nextafter(1.0, 0.0))
-    args = (source.regions, source.capacity, source.group_start, (0, 0, 10, 10), last)
-    assert draw_source_cell(floor, *args) == (8, 6)
-    floor[6, 8] = CELL_OBJECT
-    assert draw_source_cell(floor, *args) == (7, 6)  # all tries hit the taken cell, the list ends before it

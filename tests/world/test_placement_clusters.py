@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from scipy.stats import chisquare
 
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.rng import Stream, stream_rng
-from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST
+from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.presets import SEARCH_AND_RESCUE_OBJECTS, scenario
 from swarm_forage_env.scenarios.quirks import Quirks
@@ -58,11 +57,6 @@ def test_cluster_law_table(side):
     assert set(drawn.tolist()) == sizes
 
 
-def test_object_counts_are_what_the_smallest_clusters_hold():
-    counts = {side: n_clusters * 2**k_min for side, (k_min, _, _, n_clusters) in LAW_TABLE.items()}
-    assert counts == SEARCH_AND_RESCUE_OBJECTS
-
-
 @pytest.mark.parametrize(("k_min", "k_max"), [(4, 6), (5, 7), (3, 8)])
 def test_larger_sizes_are_more_likely_in_the_program(k_min, k_max):
     n_clusters = 20_000
@@ -73,21 +67,6 @@ def test_larger_sizes_are_more_likely_in_the_program(k_min, k_max):
     assert np.all(np.diff(expected) > 0)
     assert sum(observed) == n_clusters
     assert chisquare(observed, expected).pvalue > 0.001
-
-
-def test_a_single_possible_size():
-    # 20 m: both roots round up to the same k, whose cube root must not fall below it.
-    law = cluster_law(20.0)
-    assert law.k_min == law.k_max == 4
-    assert set(draw_program_sizes(law, np.random.default_rng(0)).tolist()) == {16}
-    assert set(draw_sizes(law, 2400, np.random.default_rng(0)).tolist()) == {8, 16}
-
-
-def test_sizes_come_largest_first():
-    law = cluster_law(128)
-    for sizes in (draw_program_sizes(law, np.random.default_rng(3)), draw_sizes(law, 1568, np.random.default_rng(3))):
-        assert np.all(np.diff(sizes) <= 0)
-        assert len(set(sizes.tolist())) >= 2
 
 
 def test_twice_as_large_is_half_as_likely():
@@ -118,11 +97,6 @@ def test_every_arena_has_clusters_of_several_sizes_smaller_ones_likelier(side):
     whole = [counts[2**k] for k in range(k_min - 1, k_max + 1)]
     assert len(whole) >= 3
     assert np.all(np.diff(whole) < 0)
-
-
-@pytest.mark.parametrize(("size", "cells"), [(8, (7, 5)), (16, (8, 6)), (32, (10, 8)), (64, (12, 10))])
-def test_footprint_leaves_space_around_the_objects(size, cells):
-    assert footprint(size) == cells
 
 
 @pytest.mark.parametrize("side", LAW_TABLE)
@@ -168,45 +142,3 @@ def test_every_object_lies_in_a_cluster_within_its_capacity(side, seed):
     occupancy = np.array([count_objects(objects.floor, *box) for box in source.regions.tolist()])
     assert occupancy.sum() == config.objects.n_objects
     assert np.all(occupancy <= source.capacity)
-
-
-def test_source_groups_hold_equal_capacities():
-    config = scenario("search_and_rescue", side_m=128, quirks=PROGRAM)
-    source = draw_source(config, new_objects(config).floor, stream_rng(0, Stream.PLACEMENT))
-    assert source.group_start[0] == 0
-    assert source.group_start[-1] == len(source.regions) == len(source.capacity)
-    groups = [set(part.tolist()) for part in np.split(source.capacity, source.group_start[1:-1])]
-    assert groups == [{32}, {64}]
-    for box, capacity in zip(source.regions.tolist(), source.capacity.tolist(), strict=True):
-        assert (box[2] - box[0], box[3] - box[1]) == footprint(capacity)
-
-
-def test_too_many_objects_for_the_clusters_of_the_program():
-    config = scenario("search_and_rescue", n_objects=369, quirks=PROGRAM)
-    with pytest.raises(ConfigError, match=r"Expected at most 368 objects for the 23 power-law clusters .* got 369"):
-        draw_source(config, new_objects(config).floor, stream_rng(0, Stream.PLACEMENT))
-
-
-def test_no_room_for_the_clusters():
-    config = scenario("search_and_rescue")
-    floor = np.full((240, 240), CELL_NEST, np.int32)
-    with pytest.raises(ConfigError, match=r"room for \d+ clusters of \d+ to 32 objects .* found none in 100 random"):
-        draw_clusters(config, floor, np.random.default_rng(0))
-
-
-def test_an_arena_narrower_than_a_cluster():
-    corridor = scenario(
-        "search_and_rescue",
-        side_m=16.0,
-        width_m=2.0,
-        height_m=2_100.0,
-        nest_centre_m=(1.0, 1_050.0),
-        nest_size_m=(0.4, 0.4),
-        start_margin_m=0.5,
-        n_objects=5,
-        n_robots=1,
-        quirks=PROGRAM,
-    )
-    # 8 distributable cells across; a cluster of 32 objects needs 10.
-    with pytest.raises(ConfigError, match="Expected room for 29 clusters of 16 to 32 objects"):
-        draw_clusters(corridor, new_objects(corridor).floor, np.random.default_rng(0))

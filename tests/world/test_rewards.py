@@ -75,19 +75,6 @@ def test_team_reward_is_the_mean_over_active_robots():
     assert rewards_of(env, NEXT) == pytest.approx([1.1 / 3] * 3 + [0.0])
 
 
-def test_inactive_robots_receive_nothing():
-    env = delivering_world(reward=RewardConfig(tick=0.5))
-    env.set_population(active=np.array([False, True, True, True]), present=np.ones(4, np.bool_))
-    assert rewards_of(env, NEXT) == pytest.approx([0.0, 0.6, 0.5, 0.5])
-    assert env.swarm.carried_object[0] == -1, "the delivery itself went through"
-
-
-def test_nobody_active_receives_nothing():
-    env = tidy_world(reward=RewardConfig(tick=1.0, team=True))
-    env.set_population(active=np.zeros(4, np.bool_), present=np.ones(4, np.bool_))
-    assert rewards_of(env, {}) == [0.0] * 4
-
-
 def test_nest_progress_pays_carrying_robots_by_the_metre():
     env = tidy_world(reward=replace(NOTHING, nest_progress=10.0))
     put(env, 0, 16.0, 8.0, np.pi)  # towards the nest centre at (3.2, 8)
@@ -111,10 +98,3 @@ def test_interference_can_be_penalised():
     put(env, 0, 16.0, 8.0)
     put(env, 1, 16.25, 8.0, np.pi)
     assert rewards_of(env, {}) == [-0.25, -0.25, 0.0, 0.0]
-
-
-def test_rewards_are_float32_of_one_per_robot():
-    env = delivering_world()
-    reward = env.step_batch(np.zeros((4, 3), np.float32))[1]
-    assert reward.dtype == np.float32
-    assert reward.shape == (4,)

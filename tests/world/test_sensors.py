@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import CELL_OBJECT, Event, Grip
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
@@ -133,22 +132,6 @@ def test_proximity_readings(gap, value):
     assert proximity_reading(gap) == pytest.approx(value, abs=5e-5)
 
 
-def test_proximity_is_one_at_contact():
-    assert proximity_reading(0.0098) == proximity_reading(0.0) == proximity_reading(-0.01) == 1.0
-    assert proximity_reading(0.0099) < 1.0
-
-
-def test_light_is_brightest_ahead_and_dark_behind():
-    env = ForageEnv(scenario("search_and_rescue", side_m=16.0, n_robots=1))
-    env.reset_batch(0)
-    put(env, 0, 12.0, 8.0, np.pi - np.radians(7.5))  # sensor 0 looks straight at the light over (8, 8)
-    actions = np.array([[0, 0, Grip.RELEASE]], np.float32)
-    lit = env.step_batch(actions)[0][0, env.layout["light"]]
-    distance = np.hypot(4.0, 4.0)  # the light hangs 4 m high
-    np.testing.assert_allclose(lit[:7], np.exp(-2 * distance / 16) * (1 - np.arange(7) / 6), atol=1e-6)
-    np.testing.assert_allclose(lit[6:19], np.zeros(13), atol=1e-9)
-
-
 @in_each_engine
 def test_rows_of_absent_robots_are_zero_and_those_in_repair_are_not():
     env = tidy_world(n_robots=3)
@@ -160,20 +143,6 @@ def test_rows_of_absent_robots_are_zero_and_those_in_repair_are_not():
     np.testing.assert_array_equal(obs[2], np.zeros(env.layout.size))
     assert obs[:, env.layout["active"]].ravel().tolist() == [1, 0, 0]
     assert obs[1, env.layout["ground"]] == pytest.approx([179 / 255] * 4)
-    assert_matches_twin(env, obs)
-
-
-@in_each_engine
-def test_nearest_four_caches_are_listed_nearest_first():
-    env = tidy_world(n_robots=1, n_objects=12, caches="static", side_share=0.00625, static_size=2)
-    assert env.scenario.cache_side_cells == 1
-    for pair, cell in enumerate([(60, 40), (61, 41), (58, 38), (62, 40), (60, 42), (59, 39)]):
-        build_cache(env, [2 * pair, 2 * pair + 1], cell)
-    put(env, 0, 12.12, 8.11)  # in cell (60, 40), a little to the upper right
-    act(env, {})
-    obs = env.arena.observe()
-    serials = obs[0, env.layout["los_cache"]][::4] * 2**24
-    assert serials.tolist() == [1, 2, 6, 4]
     assert_matches_twin(env, obs)
 
 
@@ -204,34 +173,6 @@ def test_reads_may_only_skip_slices_that_nobody_reads(reads):
         expected, obs = full.step_batch(actions)[0], partial.step_batch(actions)[0]
     np.testing.assert_array_equal(full.state(), partial.state())
     np.testing.assert_array_equal(full.events.counters, partial.events.counters)
-
-
-def test_light_may_be_read_by_carriers_only():
-    config = scenario("warehouse_small", n_robots=4)
-    full, partial = ForageEnv(config), ForageEnv(config, reads=("light if carrying",))
-    expected, obs = full.reset_batch(3), partial.reset_batch(3)
-    light = full.layout["light"]
-    assert np.any(expected[:, light])
-    assert not np.any(obs[:, light])
-    for env in (full, partial):
-        load(env, 1, 0)
-    expected, obs = full.arena.observe(), partial.arena.observe()
-    np.testing.assert_array_equal(obs[1, light], expected[1, light])
-    assert not np.any(obs[[0, 2, 3], light])
-
-
-def test_reading_nothing_leaves_the_dear_slices_out():
-    env = ForageEnv(scenario("warehouse_small", n_robots=3), reads=())
-    obs = env.reset_batch(0)
-    for name in ("light", "ground", "los_cell", "los_object", "los_cache"):
-        assert not np.any(obs[:, env.layout[name]])
-
-
-def test_unknown_slice_to_read_is_refused():
-    with pytest.raises(ConfigError, match=r"entry of reads 'lidr'.*Known: proximity, light"):
-        ForageEnv(scenario("warehouse_small", n_robots=3), reads=("lidr",))
-    with pytest.raises(ConfigError, match="Did you mean 'proximity'"):
-        ForageEnv(scenario("warehouse_small", n_robots=3), reads=("proximty",))
 
 
 # Declared bounds

@@ -4,8 +4,6 @@ import copy
 import itertools
 import pickle
 import re
-from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +12,6 @@ from swarm_forage_env import Snapshot, SnapshotError, parallel_env, scenario
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.config import PHYSICS_ENGINES
-from swarm_forage_env.world import snapshots
 from tests.support.branches import Branch, pickled
 from tests.support.busy import BusyPolicy
 from tests.support.crowded_runs import DENSE, side
@@ -93,20 +90,6 @@ def test_a_snapshot_stays_as_it_is(physics):
     assert isinstance(snapshot, Snapshot)
 
 
-def test_a_snapshot_of_a_snapshot_is_the_same_and_shares_the_history():
-    fields: dict[str, Any] = {"n_robots": 20, "n_objects": 9, "physics": "chipmunk", "snapshots": True}
-    env = parallel_env("warehouse_small", **fields)
-    Branch(env, load_policy("crw")).go_on(140)
-    first = env.snapshot()
-    env.restore(first)
-    second = env.snapshot()
-    assert (len(first.kept), second.kept) == (2, first.kept)
-    assert all(mine is yours for mine, yours in zip(second.kept, first.kept, strict=True))
-    other = parallel_env("warehouse_small", **fields)
-    other.restore(second)
-    np.testing.assert_array_equal(other.state(), env.state())
-
-
 @pytest.mark.parametrize("physics", PHYSICS_ENGINES)
 def test_agents_and_observations_come_back(physics):
     env = small(physics=physics, snapshots=True)
@@ -126,35 +109,6 @@ def test_agents_and_observations_come_back(physics):
         assert (target.tick, target.seed_value) == (1, 1)
 
 
-@pytest.mark.parametrize("physics", PHYSICS_ENGINES)
-def test_robots_that_left_and_came_back_are_where_they_were(physics):
-    env, other = (small(physics=physics, snapshots=True) for _ in range(2))
-    env.reset_batch(1)
-    everybody, alone = np.ones(3, np.bool_), np.array([True, False, False])
-    env.set_population(active=alone, present=alone)
-    env.step_batch(np.ones((3, 3), np.float32))
-    env.swarm.position[1] = 9.0, 9.0
-    env.set_population(active=everybody, present=everybody)
-    env.step_batch(np.ones((3, 3), np.float32))
-    other.restore(env.snapshot())
-    for target in (env, other):
-        target.step_batch(np.ones((3, 3), np.float32))
-    assert other.swarm.position.tolist() == env.swarm.position.tolist()
-    assert np.hypot(*(env.swarm.position[1] - (9.0, 9.0))) < 0.1
-
-
-def test_the_seed_of_the_next_reset_comes_back():
-    env, other = small(), small()
-    env.reset(seed=5)
-    env.reset()
-    snapshot = env.snapshot()
-    env.reset()
-    expected = env.seed_value
-    other.restore(snapshot)
-    other.reset()
-    assert other.seed_value == expected
-
-
 def test_a_finished_run_is_finished_after_a_restore_and_can_be_left():
     env = small(max_cycles=3)
     env.reset(seed=1)
@@ -168,27 +122,6 @@ def test_a_finished_run_is_finished_after_a_restore_and_can_be_left():
     env.restore(beginning)
     env.step({agent: np.ones(3, np.float32) for agent in env.agents})
     assert env.tick == 1
-
-
-def test_the_picture_is_that_of_the_environment_that_restores():
-    seen = small(render_mode="rgb_array")
-    env = small()
-    env.reset(seed=1)
-    seen.restore(env.snapshot())
-    assert seen.render().ndim == 3
-    env.restore(seen.snapshot())
-    assert env.render() is None
-
-
-def test_an_environment_can_be_copied_before_its_first_run():
-    for env in (parallel_env("warehouse_small", n_robots=3), small()):
-        for twin in (copy.deepcopy(env), pickled(env)):
-            np.testing.assert_array_equal(twin.reset_batch(4), env.reset_batch(4))
-
-
-def test_a_snapshot_needs_a_run():
-    with pytest.raises(RuntimeError, match="before the first reset"):
-        small().snapshot()
 
 
 @pytest.mark.parametrize("way", [ForageEnv.snapshot, copy.deepcopy, pickle.dumps])
@@ -219,74 +152,3 @@ def test_snapshots_of_others_are_refused(options, reason):
         env.restore(other.snapshot())
     np.testing.assert_array_equal(env.state(), before)
     assert env.seed_value == 1
-
-
-def test_snapshots_with_other_sensors_are_refused():
-    world = scenario("warehouse_small", n_robots=3, physics="compiled")
-    some, carriers = ForageEnv(world, reads=("light",)), ForageEnv(world, reads=("light if carrying",))
-    some.reset(seed=1)
-    with pytest.raises(SnapshotError, match="reads is light there and light if carrying here"):
-        carriers.restore(some.snapshot())
-
-
-def test_snapshots_of_other_versions_are_refused(monkeypatch):
-    env = small()
-    env.reset(seed=1)
-    snapshot = env.snapshot()
-    monkeypatch.setattr("swarm_forage_env.env.package_version", lambda: "9.0")
-    with pytest.raises(
-        SnapshotError, match=r"version is swarm_forage_v0 of \S+ there and swarm_forage_v0 of 9\.0 here"
-    ):
-        env.restore(snapshot)
-
-
-def test_many_differences_are_counted():
-    env, other = small(), small(n_robots=4, n_objects=8, max_cycles=7, caches="static", dt_s=0.1)
-    other.reset(seed=1)
-    with pytest.raises(SnapshotError, match=r"here and \d more\. Restore it"):
-        env.restore(other.snapshot())
-
-
-def test_what_is_no_snapshot_is_refused():
-    with pytest.raises(SnapshotError, match=r"Expected a Snapshot, as `snapshot\(\)` returns it, got dict"):
-        small().restore({})
-
-
-@pytest.mark.parametrize(
-    "damage",
-    [
-        lambda content: {"content": content[:100]},
-        lambda content: {"content": b""},
-        lambda content: {"content": None},
-        lambda content: {"content": content[:2000] + bytes([content[2000] ^ 4]) + content[2001:]},
-        lambda content: {"kept": (bytes(5000),)},
-        lambda content: {"kept": None},
-    ],
-    ids=["cut", "empty", "none", "bit", "parts", "no parts"],
-)
-def test_a_damaged_snapshot_is_refused_and_changes_nothing(damage):
-    """A flipped bit could be an index beyond the end of an array."""
-    env = small(n_robots=30)
-    env.reset(seed=1)
-    twin = copy.deepcopy(env)
-    snapshot = env.snapshot()
-    snapshot = replace(snapshot, **damage(snapshot.content))
-    with pytest.raises(SnapshotError, match="Expected a snapshot as it was taken, got a damaged one"):
-        env.restore(snapshot)
-    np.testing.assert_array_equal(env.last_obs, twin.last_obs)
-    actions = np.full((30, 3), 0.5, np.float32)
-    np.testing.assert_array_equal(env.step_batch(actions)[0], twin.step_batch(actions)[0])
-
-
-def test_a_snapshot_that_this_python_cannot_read_is_refused():
-    env = small()
-    env.reset(seed=1)
-    content = b"cno_such_module\nThing\n."
-    foreign = replace(env.snapshot(), content=content, checksum=snapshots.checksum_of(content, ()))
-    with pytest.raises(SnapshotError, match="cannot be read here: ModuleNotFoundError: No module named 'no_such"):
-        env.restore(foreign)
-
-
-def test_the_switch_is_checked():
-    with pytest.raises(ValueError, match="snapshots to be True or False, got 'yes'"):
-        small(snapshots="yes")

@@ -5,7 +5,6 @@ import itertools
 import numpy as np
 import pytest
 from pettingzoo.test import parallel_api_test
-from pettingzoo.utils import BaseParallelWrapper
 
 from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.env import ForageEnv
@@ -76,13 +75,6 @@ def test_hooks_run_inwards_before_the_step_and_outwards_after_it(stack):
     ]
 
 
-@pytest.mark.parametrize("method", ["step", "step_batch", "begin_step", "end_step"])
-def test_a_wrapper_whose_step_would_be_skipped_is_refused_inside_of_another(method):
-    own = type("Own", (SwarmWrapper,), {"stack_position": 4, method: lambda *_: None})(FakeArena())
-    with pytest.raises(TypeError, match=rf"Expected Own inside of Throttle .* got its own {method}, .* before_step"):
-        wrapper_at(3)(own)
-
-
 @pytest.mark.parametrize("actions", [np.zeros((3, 3), np.float32), np.zeros((4, 2), np.float32), None])
 def test_actions_of_a_wrong_shape_are_refused_before_any_hook(stack, actions):
     stack.reset_batch(7)
@@ -114,16 +106,6 @@ def test_what_the_arena_would_refuse_is_refused_before_any_hook(stack, action, g
     assert stack.unwrapped.calls == []
 
 
-def test_numbers_of_robots_that_are_away_are_ignored(stack):
-    stack.reset_batch(7)
-    away = np.array([True, True, False, True])
-    stack.unwrapped.set_population(active=away, present=away)
-    actions = np.zeros((4, 3), np.float32)
-    actions[2] = np.nan
-    stack.step_batch(actions)
-    assert len(stack.unwrapped.calls) == 1
-
-
 @pytest.mark.parametrize("hook", ["before_step", "gain", "observe", "after_step"])
 def test_a_hook_that_fails_leaves_a_tick_that_is_not_gone_on_with(hook):
     """Some hooks of the tick have been called, and others not."""
@@ -145,22 +127,6 @@ def test_a_hook_that_fails_leaves_a_tick_that_is_not_gone_on_with(hook):
         wrapper.step_batch(actions)
     env.reset_batch(7)
     env.step_batch(actions)
-
-
-@pytest.mark.parametrize("of_the_inside", [False, True])
-def test_a_step_before_the_first_reset_is_refused(of_the_inside):
-    env = wrapper_at(2)(FakeArena(small_scenario()))
-    message = "Call reset before step"
-    if of_the_inside:
-        env.unwrapped.reset_batch(0)
-        message = "Expected a reset of the outermost wrapper"
-    with pytest.raises(RuntimeError, match=message):
-        env.step_batch(np.zeros((4, 3), np.float32))
-
-
-def test_a_reset_without_seed_hands_on_the_seed_that_was_drawn(stack):
-    stack.reset_batch()
-    assert Logging.log[0] == ("inner", "on_reset", 4711)
 
 
 def test_gains_multiply_and_tasks_pass_through(stack):
@@ -200,12 +166,6 @@ def test_the_recorder_is_outermost():
     assert STACK_ORDER[RunRecorder.stack_position] == "RunRecorder"
     with pytest.raises(ValueError, match="RunRecorder not inside of Throttle"):
         wrapper_at(3)(RunRecorder(FakeArena()))
-
-
-@pytest.mark.parametrize("foreign", [BaseParallelWrapper(FakeArena()), object()], ids=["foreign wrapper", "no env"])
-def test_a_foreign_layer_in_between_is_refused(foreign):
-    with pytest.raises(TypeError, match="outside of the swarm wrappers"):
-        wrapper_at(1)(foreign)
 
 
 def test_dict_api_packs_once_steps_the_stack_and_unpacks_once(stack):

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.detection import sees_cache, sees_nest, sees_object, sees_obstacle
 from swarm_forage_env.env import ForageEnv
@@ -354,10 +353,6 @@ def test_random_bits_are_random():
     assert stats.chisquare(counts).pvalue > 0.01
 
 
-def test_room_is_for_whole_rounds_of_the_lanes():
-    assert [len(room_for_draws(n)) for n in (0, 1, 64, 65)] == [0, 64, 64, 128]
-
-
 # Actuators
 
 
@@ -412,76 +407,4 @@ def test_wheel_noise_never_leaves_the_space_of_observations():
         assert all(env.observation_space("robot_0").contains(row) for row in obs)
 
 
-def test_without_actuator_noise_gains_pass_untouched():
-    outer = np.ones((4, 2))
-    env = FakeArena()
-    stack = ActuatorNoiseConfig(sigma=0.0).wrap(env)
-    stack.reset_batch(0)
-    stack.step_batch(np.zeros((4, 3), np.float32), wheel_gain=outer)
-    stack.step_batch(np.zeros((4, 3), np.float32))
-    assert env.calls[0]["wheel_gain"] is outer
-    assert env.calls[1]["wheel_gain"] is None
-
-
-def test_there_is_no_wheel_noise_where_its_waveform_is_negative():
-    np.testing.assert_array_equal(actuator_gains(3, sigma=Waveform(kind="constant", amplitude=-0.1)), 1.0)
-
-
-def test_wheel_noise_may_follow_a_waveform():
-    late = Waveform(kind="step", amplitude=0.1, start_s=1.0)
-    gains, steady = actuator_gains(8, sigma=late), actuator_gains(8, sigma=0.1)
-    np.testing.assert_array_equal(gains[:4], 1.0)
-    np.testing.assert_array_equal(gains[4:], steady[4:])
-
-
-def test_wheel_noise_belongs_to_the_seed():
-    np.testing.assert_array_equal(actuator_gains(2, sigma=0.1, seed=4), actuator_gains(2, sigma=0.1, seed=4))
-    assert not np.array_equal(actuator_gains(2, sigma=0.1, seed=4), actuator_gains(2, sigma=0.1, seed=5))
-
-
 # Configuration
-
-
-def test_a_configuration_keeps_its_own_table_of_sigmas():
-    sigmas = {"light": 0.1}
-    config = SensorNoiseConfig(sigmas=sigmas)
-    sigmas["light"] = 0.2
-    assert config.sigmas == {"light": 0.1}
-
-
-def test_groups_are_kept_in_the_order_of_their_columns():
-    config = SensorNoiseConfig(sigma=0.1, groups=("ground", "proximity"))
-    assert config.groups == ("proximity", "ground")
-    assert config == SensorNoiseConfig.from_mapping({"sigma": 0.1, "groups": "ground+proximity"})
-    assert config == SensorNoiseConfig.from_mapping({"sigma": 0.1, "groups": ["ground", "proximity"]})
-
-
-@pytest.mark.parametrize(
-    ("fields", "message"),
-    [
-        ({"sigma": -0.1}, "sensor_noise.sigma to be a finite number >= 0, got -0.1"),
-        ({"sigma": np.nan}, "sensor_noise.sigma to be a finite number >= 0, got nan"),
-        ({"sigma": "high"}, "sensor_noise.sigma to be a finite number >= 0, got 'high'"),
-        ({"sigma": 0.1, "groups": ("proximty",)}, "Unknown group of sensors 'proximty'.*Did you mean 'proximity'"),
-        ({"sigma": 0.1, "groups": ()}, "one or more names of sensors"),
-        ({"sigma": 0.1, "groups": "proximity"}, "one or more names of sensors, got 'proximity'"),
-        ({"sigmas": {"lights": 0.1}}, "Unknown group of sensors 'lights'.*Did you mean 'light'"),
-        ({"sigmas": {"light": -0.1}}, "sensor_noise.sigmas.light to be a finite number >= 0"),
-        ({"sigmas": 0.1}, "sigmas to be a table"),
-    ],
-)
-def test_nonsense_about_sensors_is_refused(fields, message):
-    with pytest.raises(ConfigError, match=message):
-        SensorNoiseConfig(**fields)
-
-
-@pytest.mark.parametrize(
-    ("fields", "message"),
-    [
-        ({"sigma": -0.1}, "actuator_noise.sigma to be a finite number >= 0, got -0.1"),
-        ({"sigma": np.inf}, "actuator_noise.sigma to be a finite number"),
-    ],
-)
-def test_nonsense_about_actuators_is_refused(fields, message):
-    with pytest.raises(ConfigError, match=message):
-        ActuatorNoiseConfig(**fields)

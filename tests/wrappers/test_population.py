@@ -142,21 +142,6 @@ def test_the_dead_lose_their_cargo_and_their_body(place, status, event, deaths):
     assert np.all(env.arena._physics.poses()[0, :2] < 0.0), "parked outside"
 
 
-@in_each_engine
-def test_a_dead_robot_is_out_of_the_way():
-    env = tidy_world(n_robots=2)
-    put(env, 0, 16.0, 8.0)
-    put(env, 1, 16.3, 8.0)
-    stack = at_hand(env)
-    strike(stack, "death", hold(env, 0.5))
-    survivor = int(np.flatnonzero(env.active)[0])
-    start = env.swarm.position[survivor].copy()
-    for _ in range(30):
-        obs, *_ = stack.step_batch(hold(env, 0.5))
-        assert not obs[survivor, env.layout["proximity"]].any()
-    assert env.swarm.position[survivor] - start == pytest.approx((30 * 0.02, 0.0))
-
-
 def kill_all(deaths: str) -> list[tuple[list[str], dict[str, bool]]]:
     """Agents and terminations of each step while three robots die, one per step."""
     env = ForageEnv(scenario("warehouse_small", n_robots=3, n_objects=20, physics=engines.CHOSEN))
@@ -184,16 +169,6 @@ def test_permanent_death_terminates_the_agent():
         assert set(terminations) == set(agents)
         assert {agent for agent, is_dead in terminations.items() if is_dead} == set(agents) - set(left)
         agents = left
-
-
-@in_each_engine
-def test_absorbing_deaths_keep_every_agent_until_the_last_death():
-    agents = [f"robot_{row}" for row in range(3)]
-    assert kill_all("absorbing") == [
-        (agents, dict.fromkeys(agents, False)),
-        (agents, dict.fromkeys(agents, False)),
-        ([], dict.fromkeys(agents, True)),
-    ]
 
 
 @in_each_engine
@@ -248,17 +223,6 @@ def test_the_unborn_are_agents_without_a_body_from_the_reset_on():
     assert env.swarm.present.tolist() == [True, True, False, False, False, False]
 
 
-def test_nobody_sees_the_unborn_at_reset():
-    crowded = {"n_robots": 30, "n_objects": 50, "start_margin_m": 3.5, "width_m": 8.0, "height_m": 8.0}
-    crowded |= {"nest_centre_m": (2.0, 4.0), "nest_size_m": (1.0, 1.0), "start_margin_m": 2.9}
-    config = scenario("warehouse_medium", **crowded)
-    alone, full = ForageEnv(config), ForageEnv(config)
-    stack = PopulationDynamics(alone, PopulationConfig(initial_robots=1))
-    proximity = stack.reset_batch(0)[0, alone.layout["proximity"]]
-    assert full.reset_batch(0)[0, full.layout["proximity"]].any(), "there would be somebody to see"
-    assert not proximity.any()
-
-
 @in_each_engine
 def test_births_bring_working_robots_at_free_places():
     stack = nursery(n_robots=40, initial_robots=1)
@@ -282,30 +246,6 @@ def test_births_bring_working_robots_at_free_places():
     make_due(stack, "birth")
     stack.step_batch(hold(env))
     assert env.active.all(), "nobody is left to be born"
-
-
-@in_each_engine
-def test_a_birth_waits_until_there_is_a_place():
-    stack = nursery()
-    env = stack.unwrapped
-    stack.reset_batch(0)
-    stack._body_m = 100.0
-    make_due(stack, "birth")
-    for _ in range(3):
-        stack.step_batch(hold(env))
-        assert env.swarm.present.sum() == 2
-    stack._body_m = 0.2
-    stack.step_batch(hold(env))
-    assert env.swarm.present.sum() == 3
-
-
-@in_each_engine
-def test_nobody_is_born_while_enough_are_here():
-    stack = nursery(max_robots=3)
-    stack.reset_batch(0)
-    for _ in range(3):
-        strike(stack, "birth", hold(stack.unwrapped))
-    assert stack.unwrapped.swarm.present.sum() == 3
 
 
 @pytest.mark.parametrize(("start_margin_m", "nearest_m"), [(1.0, 1.0), (2.5, 2.0)])
@@ -372,46 +312,6 @@ def test_times_at_work_are_means_over_the_stays_that_ended():
     assert record["time_at_work_s"] @ record["malfunctions"] == pytest.approx(tally.stay_ticks * 0.2)
 
 
-def test_an_interval_in_which_nothing_ended_has_times_of_zero():
-    recorder = RunRecorder(
-        at_hand(ForageEnv(scenario("warehouse_small", n_robots=2, n_objects=9, horizon_s=2.0, interval_s=1.0)))
-    )
-    recorder.reset_batch(0)
-    while not recorder.complete:
-        recorder.step_batch(hold(recorder.unwrapped))
-    recorded = recorder.contributed()
-    assert not any(recorded[name].any() for name in ("malfunctions", "time_at_work_s", "time_in_repair_s"))
-
-
-def test_a_run_that_was_broken_off_leaves_no_trace_in_the_next_record():
-    config = scenario("warehouse_small", n_robots=5, n_objects=9, horizon_s=4.0, interval_s=2.0)
-    recorder = RunRecorder(PopulationConfig(malfunction_per_tick=0.3, repair_per_tick=0.1).wrap(ForageEnv(config)))
-    records = []
-    for broken_off in (0, 7):
-        recorder.reset_batch(8)
-        for _ in range(broken_off):
-            recorder.step_batch(hold(recorder.unwrapped))
-        recorder.reset_batch(1)
-        while not recorder.complete:
-            recorder.step_batch(hold(recorder.unwrapped))
-        records.append(recorder.contributed())
-    assert records[0]["n_in_repair"].any()
-    assert_same_world(*records)
-
-
-def test_malfunctions_do_not_end_an_episode():
-    env = ForageEnv(scenario("warehouse_small", n_robots=2, n_objects=9, horizon_s=4.0, interval_s=1.0))
-    recorder = RunRecorder(PopulationConfig(malfunction_per_tick=5.0).wrap(env))
-    recorder.reset(seed=0)
-    for _ in range(20):
-        _, _, terminations, truncations, _ = recorder.step(
-            {agent: np.zeros(3, np.float32) for agent in recorder.agents}
-        )
-        assert not any(terminations.values())
-    assert all(truncations.values())
-    assert recorder.columns()["n_active"].tolist() == [0.2, 0.0, 0.0, 0.0]
-
-
 # Configuration
 
 
@@ -426,32 +326,6 @@ def test_levels_of_the_study():
     ]  # fmt: skip
     with pytest.raises(ConfigError, match="Expected 50 or 200 robots"):
         malfunction_levels(100)
-
-
-@pytest.mark.parametrize(
-    ("fields", "message"),
-    [
-        ({"death_per_tick": -0.1}, "population.death_per_tick to be a finite number >= 0, got -0.1"),
-        ({"repair_per_tick": np.nan}, "population.repair_per_tick to be a finite number >= 0, got nan"),
-        ({"malfunction_per_tick": "often"}, "population.malfunction_per_tick to be a finite number >= 0, got 'often'"),
-        ({"birth_per_tick": np.inf}, "population.birth_per_tick to be a finite number"),
-        ({"initial_robots": 0}, "population.initial_robots to be a whole number >= 1 or None, got 0"),
-        ({"max_robots": 2.5}, "population.max_robots to be a whole number >= 1 or None, got 2.5"),
-        ({"max_robots": True}, "population.max_robots to be a whole number >= 1 or None, got True"),
-        ({"deaths": "absorb"}, "population.deaths to be one of terminate, absorbing.*Did you mean 'absorbing'"),
-    ],
-)
-def test_nonsense_is_refused(fields, message):
-    with pytest.raises(ConfigError, match=message):
-        PopulationConfig(**fields)
-
-
-def test_populations_that_do_not_fit_the_scenario_are_refused():
-    env = ForageEnv(scenario("warehouse_small", n_robots=4, n_objects=9))
-    with pytest.raises(ConfigError, match="initial_robots <= 4, the robots of the scenario, got 5"):
-        PopulationConfig(initial_robots=5).wrap(env)
-    with pytest.raises(ConfigError, match=r"initial_robots below 4.*a robot can be born, got None"):
-        PopulationConfig(birth_per_tick=0.1).wrap(env)
 
 
 def test_rates_change_while_a_run_goes_on_and_nothing_else():

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from metrics.queues import PopulationRates, mean_away
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.wrappers.population import death_levels, malfunction_levels
 from swarm_forage_env.wrappers.population_process import (
     EventClock,
@@ -15,8 +14,6 @@ from swarm_forage_env.wrappers.population_process import (
     EventRates,
     PopulationState,
     advance_population,
-    break_down,
-    come_back,
     simulate_population,
 )
 from tests.reference.adversity import SlowPopulation
@@ -76,10 +73,6 @@ def test_a_rate_of_zero_never_fires():
     assert simulate_population(EventRates(), 5, 100, seed=0).n_active.tolist() == [5] * 100
 
 
-def test_a_tiny_rate_may_wait_for_ever():
-    assert clock(1e-320).next_tick > 1e300
-
-
 LEVELS = malfunction_levels(50)
 N_SEEDS = 60
 
@@ -95,15 +88,6 @@ def at_work():
     )
 
 
-def test_every_level_has_a_history_of_its_own(at_work):
-    """Over seeds the robots at work of two levels do not go together."""
-    correlations = np.corrcoef(at_work)[np.triu_indices(len(LEVELS), 1)]
-    # Of independent histories each is around 0 by 1 / sqrt(seeds - 1).
-    deviation = 1.0 / np.sqrt(N_SEEDS - 1)
-    assert abs(correlations.mean()) < 3.3 * deviation / np.sqrt(correlations.size)
-    assert np.abs(correlations).max() < 4.0 * deviation
-
-
 def test_robots_at_work_are_those_of_the_chain_with_few_seeds_too(at_work):
     """At every level, and in the first four seeds of all levels together."""
     chains = [generator(level.malfunction_per_tick, level.repair_per_tick, 50) for level in LEVELS]
@@ -112,23 +96,6 @@ def test_robots_at_work_are_those_of_the_chain_with_few_seeds_too(at_work):
     assert (abs(at_work.mean(axis=1) - expected) < 3.3 * deviation / np.sqrt(N_SEEDS)).all()
     few = (at_work[:, :4].mean(axis=1) - expected) / (deviation / np.sqrt(4))
     assert abs(few.mean()) < 3.3 / np.sqrt(len(LEVELS))
-
-
-@pytest.mark.parametrize("process", ["death", "birth", "malfunction", "repair"])
-def test_any_rate_that_differs_changes_the_victims(process):
-    rates = {"death": 0.01, "birth": 0.01, "malfunction": 0.01, "repair": 0.01}
-
-    def victims(**changed: float) -> list[int]:
-        clocks = EventClocks(EventRates(**rates | changed), seed=5)
-        return [clocks.death.choose(np.ones(1000, np.bool_)) for _ in range(3)]
-
-    assert victims() == victims() != victims(**{process: 0.02})
-
-
-def test_rates_that_are_equal_have_the_same_history():
-    """A run is told by its specification, in which 0, 0.0 and -0.0 are the same."""
-    plain, signed = EventRates(death=1, birth=0), EventRates(death=1.0, birth=-0.0)
-    assert EventClocks(plain, 3).death.choices.random() == EventClocks(signed, 3).death.choices.random()
 
 
 # Choices
@@ -142,44 +109,7 @@ def test_victims_are_uniform_among_candidates():
     assert stats.chisquare(chosen[candidates]).pvalue > SURE
 
 
-def test_who_else_is_a_candidate_does_not_shift_the_draw():
-    everybody = np.ones(8, np.bool_)
-    first = clock(1.0, 4).choose(everybody)
-    without_first = everybody.copy()
-    without_first[first] = False
-    one, other = clock(1.0, 4), clock(1.0, 4)
-    second = one.choose(without_first)
-    bystander = next(row for row in range(8) if row not in (first, second))
-    fewer = everybody.copy()
-    fewer[bystander] = False
-    assert other.choose(fewer) == first
-    assert one.choose(everybody) == other.choose(everybody), "the next draw is where it would be anyway"
-
-
 # The four processes
-
-
-def test_the_repair_queue_is_first_in_first_out():
-    state = PopulationState.start(6)
-    for tick in (1, 2, 3):
-        assert advance_population(state, due({"malfunction": tick}), tick)
-    waiting = list(state.repair_queue)
-    assert len(waiting) == 3
-    assert not state.active[waiting].any()
-    assert state.present.all()
-    for tick, row in enumerate(waiting, start=10):
-        assert advance_population(state, due({"repair": tick}), tick)
-        assert state.active[row]
-    assert state.repair_queue == []
-
-
-def test_a_repair_of_nobody_is_lost():
-    state, clocks = PopulationState.start(3), due({"repair": 5, "malfunction": 6})
-    assert not advance_population(state, clocks, 5)
-    assert clocks.repair.next_tick > 1000, "the clock was started again"
-    assert advance_population(state, clocks, 6)
-    assert len(state.repair_queue) == 1
-    assert state.tally.repairs == 0
 
 
 def test_a_malfunction_without_a_victim_waits_for_one():
@@ -211,20 +141,6 @@ def test_the_dead_leave_the_repair_queue_and_stay_dead():
     assert not state.active[broken]
 
 
-def test_deaths_strike_robots_in_repair_too():
-    struck = 0
-    for seed in range(200):
-        state = PopulationState.start(4)
-        clocks = EventClocks(EventRates(death=0.01, malfunction=0.01), seed)
-        clocks.death.next_tick, clocks.malfunction.next_tick = 2, 1
-        advance_population(state, clocks, 1)
-        broken = state.repair_queue[0]
-        clocks.malfunction.next_tick = np.inf
-        advance_population(state, clocks, 2)
-        struck += bool(state.dead[broken])
-    assert stats.binomtest(struck, 200, 0.25).pvalue > SURE
-
-
 def test_births_bring_the_next_row_while_there_is_room():
     state, clocks = PopulationState.start(4, initial_robots=2, max_robots=3), due({"birth": 3})
     assert state.present.tolist() == [True, True, False, False]
@@ -240,26 +156,6 @@ def test_births_bring_the_next_row_while_there_is_room():
     assert advance_population(state, clocks, 6)
     assert np.count_nonzero(state.present) == 2, "nobody is left to be born"
     assert clocks.birth.next_tick == 6
-
-
-def test_a_birth_without_a_place_waits_for_one():
-    state, clocks, asked = PopulationState.start(2, initial_robots=1), due({"birth": 1}), []
-
-    def find_place(row, rng):
-        asked.append(row)
-        return len(asked) == 3
-
-    changes = [advance_population(state, clocks, tick, find_place) for tick in (1, 2, 3, 4)]
-    assert changes == [False, False, True, False]
-    assert asked == [1, 1, 1]
-
-
-def test_the_first_stay_begins_at_birth():
-    state = PopulationState.start(2, initial_robots=1)
-    advance_population(state, due({"birth": 10}), 10)
-    state.active[0] = False  # so that the one just born must be the victim
-    advance_population(state, due({"malfunction": 15}), 15)
-    assert (state.tally.stays, state.tally.stay_ticks) == (1, 5), "at work in the ticks 10 to 14"
 
 
 def test_stays_and_absences_are_measured_in_ticks():
@@ -297,36 +193,6 @@ def test_equals_the_slow_twin_in_every_tick(seed, death, birth, malfunction, rep
         assert set(np.flatnonzero(fast.dead)) == slow.dead
         np.testing.assert_array_equal(fast.present, ~fast.dead & (np.arange(8) < fast.born))
         assert changed or np.array_equal(before, (fast.present, fast.active))
-
-
-def test_idle_ticks_may_be_skipped():
-    rates = EventRates(death=0.01, birth=0.02, malfunction=0.05, repair=0.05)
-    history = simulate_population(rates, 20, 2_000, seed=1, initial_robots=10)
-    state, clocks = PopulationState.start(20, initial_robots=10), EventClocks(rates, 1)
-    n_active = []
-    for tick in range(1, 2_001):
-        advance_population(state, clocks, tick)
-        n_active.append(np.count_nonzero(state.active))
-    np.testing.assert_array_equal(history.n_active, n_active)
-    assert history.tally == state.tally
-    tally = history.tally
-    assert history.n_present[-1] == 10 + tally.births - tally.deaths
-    assert min(tally.deaths, tally.births, tally.malfunctions, tally.repairs) > 5
-
-
-@pytest.mark.parametrize(
-    ("rate", "message"),
-    [(-0.1, "death to be a finite number >= 0, got -0.1"), ("often", "a finite number >= 0, got 'often'")],
-)
-def test_rates_that_make_no_sense_are_refused(rate, message):
-    with pytest.raises(ConfigError, match=f"Expected the rate of .*{message}"):
-        EventRates(death=rate)
-
-
-@pytest.mark.parametrize("initial_robots", [0, 6])
-def test_more_robots_than_rows_or_none_are_refused(initial_robots):
-    with pytest.raises(ConfigError, match=f"initial_robots from 1 to n_robots = 5, got {initial_robots}"):
-        simulate_population(EventRates(), 5, 10, seed=0, initial_robots=initial_robots)
 
 
 # The study
@@ -390,21 +256,3 @@ def test_a_rate_that_changes_in_every_tick_has_as_many_events_as_one_that_stays(
         advance_population(state, clocks, tick)
     gap = 1.0 / np.expm1(rate) - np.expm1(-rate)  # mean floor, and a tick where it is 0
     assert state.tally.deaths == pytest.approx(ticks / gap, abs=3.3 * np.sqrt(ticks / gap))
-
-
-def test_an_event_that_waits_stays_due_under_another_rate_until_there_is_none():
-    clocks = due({"birth": 7})
-    clocks.change(EventRates(birth=0.001), 0, 20)
-    assert clocks.birth.next_tick == 7
-    clocks.change(EventRates(), 0, 21)
-    assert clocks.birth.next_tick == np.inf
-
-
-def test_whoever_is_repaired_by_hand_leaves_the_queue_wherever_it_is():
-    state = PopulationState.start(4)
-    for row in (2, 0, 3):
-        break_down(state, row, 5)
-    come_back(state, 0, 9)
-    assert state.repair_queue == [2, 3]
-    assert state.active.tolist() == [True, True, False, False]
-    assert (state.tally.repairs, state.tally.absence_ticks) == (1, 4)

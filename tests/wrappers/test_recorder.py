@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Counter, Task
 from swarm_forage_env.world.kernels.counting import add_task_shares
 from swarm_forage_env.wrappers.base import SwarmWrapper
@@ -52,15 +51,6 @@ def test_totals_are_differences_and_means_are_over_ticks():
 
 def test_every_counter_of_the_world_is_recorded():
     assert {*TOTALS.values(), *TICK_MEANS.values()} == set(Counter)
-
-
-def test_counters_that_earlier_records_lack_are_recorded_beside_the_others():
-    recorder = drive(RunRecorder(FakeArena(small_scenario(performance="1/avoidances"))))
-    contributed = recorder.contributed()
-    assert contributed["avoidances"].tolist() == [5, 5, 5]
-    assert contributed["n_searching"].tolist() == [3.0, 3.0, 3.0]
-    assert not contributed.keys() & recorder.columns().keys()
-    assert recorder.columns()["performance"].tolist() == [0.2, 0.2, 0.2]
 
 
 def test_performance_is_what_the_scenario_declares():
@@ -117,48 +107,11 @@ def test_after_the_last_death_the_rest_is_zero_even_if_the_world_is_stepped_on(f
     assert recorder.contributed()["throttle"].tolist() == [5.0, 7.0, 0.0]
 
 
-def test_one_survivor_keeps_the_record_open():
-    world = FakeArena(dies_at=1)
-    recorder = RunRecorder(world)
-    recorder.reset_batch(0)
-    recorder.after_step(None, np.array([True, True, True, False]), False)
-    assert not recorder.complete
-    recorder.after_step(None, np.ones(4, np.bool_), False)
-    assert recorder.complete
-
-
-def test_a_horizon_of_broken_intervals_is_refused():
-    with pytest.raises(ConfigError, match=r"whole number of intervals of 1 s, got 2\.6 s"):
-        RunRecorder(FakeArena(small_scenario(horizon_s=2.6)))
-    with pytest.raises(ConfigError, match=r"got 1\.4 s"):
-        RunRecorder(FakeArena(max_cycles=7))
-
-
-def test_an_environment_with_fewer_cycles_is_recorded_to_its_own_end():
-    columns = drive(RunRecorder(FakeArena(max_cycles=10)), ticks=10).columns()
-    assert columns["collected"].tolist() == [15, 40]
-
-
-def test_an_unfinished_run_has_no_record():
-    recorder = drive(RunRecorder(FakeArena()), ticks=14)
-    for columns in (recorder.columns, recorder.contributed):
-        with pytest.raises(RuntimeError, match="has not reached its horizon"):
-            columns()
-
-
 def test_a_reset_starts_anew():
     recorder = drive(RunRecorder(FakeArena()), ticks=9)
     again = drive(recorder).columns()
     for name, column in drive(RunRecorder(FakeArena())).columns().items():
         np.testing.assert_array_equal(again[name], column)
-
-
-def test_a_reset_forgets_the_tasks_of_a_run_that_was_broken_off():
-    tasks = np.array([1, 1, 2, 3], np.int8)
-    recorder = drive(RunRecorder(FakeArena()), ticks=7, tasks=tasks)
-    shares = drive(recorder, tasks=tasks).contributed()
-    assert shares["task_share_generalist"].tolist() == [0.5, 0.5, 0.5]
-    assert told(drive(recorder)) == {}
 
 
 def test_other_wrappers_contribute_columns():
@@ -181,18 +134,6 @@ def test_task_shares_are_means_over_ticks_of_active_robots():
     np.testing.assert_allclose(shares["task_share_collector"], [0.25, 0.5, 0.5])
     np.testing.assert_allclose(shares["task_share_generalist"], [0.25, 0.0, 0.0])
     np.testing.assert_allclose(shares["task_share_none"], 0.0)
-
-
-def test_policies_without_tasks_leave_no_task_columns():
-    assert told(drive(RunRecorder(FakeArena()))) == {}
-
-
-@pytest.mark.parametrize("tasks", [[1, 2, 3], [1, 2, 3, 8], [1, 2, -1, 0]], ids=["too few", "unknown", "negative"])
-def test_impossible_tasks_are_refused(tasks):
-    recorder = RunRecorder(FakeArena())
-    recorder.reset_batch(0)
-    with pytest.raises(ValueError, match=r"shape \(n_robots,\) = \(4,\) and codes of Task"):
-        recorder.step_batch(STILL, tasks=np.array(tasks, np.int8))
 
 
 @given(st.lists(st.tuples(st.integers(0, 7), st.booleans()), min_size=1, max_size=30))

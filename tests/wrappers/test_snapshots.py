@@ -6,7 +6,6 @@ import pickle
 import subprocess
 import sys
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ import pytest
 from swarm_forage_env import SnapshotError, load_policy
 from swarm_forage_env.runs.run import LiveRun, build_env
 from swarm_forage_env.scenarios.config import PHYSICS_ENGINES
-from swarm_forage_env.wrappers.base import SwarmWrapper
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.support.branches import Branch, pickled, whole_stack
 from tests.support.fake_arena import small_scenario
@@ -90,52 +88,6 @@ def test_a_live_run_is_resumed_from_its_pickle():
     assert resumed.forage_env.events.counters.tolist() == run.forage_env.events.counters.tolist()
 
 
-class Numbering(SwarmWrapper):
-    """Adds the number of the tick to every observation; what it keeps open cannot be pickled."""
-
-    stack_position: ClassVar[int] = 0
-
-    def __init__(self, env):
-        super().__init__(env)
-        self.opened = (line for line in "abc")
-
-    def on_reset(self, seed):
-        self.world, self.number = self.unwrapped.arena, 0
-
-    def observe(self, obs):
-        self.number += 1
-        return obs + np.float32(self.number)
-
-
-class CarefulNumbering(Numbering):
-    def __getstate__(self):
-        return {name: value for name, value in vars(self).items() if name != "opened"}
-
-
-def wrapped(kind, *words):
-    world = small_scenario(physics="compiled")
-    return kind(build_env(world, [parse_wrapper(word) for word in words]))
-
-
-def test_a_wrapper_leaves_out_what_cannot_be_pickled():
-    env, other = wrapped(CarefulNumbering), wrapped(CarefulNumbering)
-    run = Branch(env, load_policy("crw")).go_on(4)
-    snapshot, kept_open = env.snapshot(), other.opened
-    expected = run.beside(env, run.obs).go_on(3).seen
-    branch = run.beside(other, other.restore_batch(snapshot))
-    assert branch.go_on(3).seen == expected
-    assert other.opened is kept_open
-    assert other.world is other.unwrapped.arena, "parts of the stack are those of the environment that restores"
-    assert other.number == 8, "the first observation, and seven ticks"
-
-
-def test_a_wrapper_with_something_that_cannot_be_pickled_is_told_so():
-    env = wrapped(Numbering)
-    env.reset_batch(1)
-    with pytest.raises(SnapshotError, match=r"got TypeError: .*generator.*leaves it out by `__getstate__`"):
-        env.snapshot()
-
-
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
@@ -153,14 +105,6 @@ def test_snapshots_of_other_stacks_are_refused(words, reason):
         other.restore(env.snapshot())
     with pytest.raises(SnapshotError, match="wrappers is SensorNoise there and none here"):
         env.unwrapped.restore(env.snapshot())
-
-
-def test_snapshots_of_wrappers_without_configuration_go_by_their_class():
-    env, other = wrapped(CarefulNumbering), wrapped(CarefulNumbering)
-    env.reset_batch(1)
-    other.unwrapped.max_cycles = 3
-    with pytest.raises(SnapshotError, match=r"another: max_cycles is 15 there and 3 here\. Restore"):
-        other.restore(env.snapshot())
 
 
 def test_observations_per_agent_are_those_that_the_wrappers_showed():

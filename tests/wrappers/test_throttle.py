@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.robots import WHEEL_SCALE_MPS
@@ -63,16 +62,6 @@ def test_driving_straight(lone_robot, strength, force_cms, expected_cms):
     assert moved == pytest.approx(expected_cms / 100 * 0.2, abs=1e-8)
 
 
-def test_soft_turns_slow_down_by_as_much_as_straight_driving(lone_robot):
-    wheels = wheels_after(lone_robot, constant(0.8), steered_wheels(9.0, 10.0))
-    assert wheels == pytest.approx([0.6, 3.0], abs=1e-6)
-
-
-def test_turns_on_the_spot_are_free(lone_robot):
-    wheels = wheels_after(lone_robot, constant(0.8), steered_wheels(9.0, 90.0))
-    assert wheels == pytest.approx([-10.0, 10.0])
-
-
 def test_the_gain_is_taken_of_the_limited_command(lone_robot):
     """(1, -0.5) asks for 5 cm/s and a difference of 30 cm/s; the drive gives the difference 20 cm/s."""
     assert limited_wheels(1.0, -0.5) == pytest.approx((0.15, -0.05))
@@ -104,17 +93,6 @@ def test_between_straight_and_on_the_spot_the_gain_is_continuous():
     assert ours == pytest.approx(gains[::100], abs=1e-6)
 
 
-def test_straight_driving_loses_exactly_the_throttle():
-    gain = gain_of(constant(0.3), [(0.37, 0.37), (-0.2, -0.2), (0.0, 0.0), (0.1, 0.3)])
-    assert gain.tolist() == [[0.7] * 2, [0.7] * 2, [1.0] * 2, [0.7] * 2]
-
-
-def test_carriers_only():
-    config = constant(0.5, carriers=True)
-    gain = gain_of(config, [(0.4, 0.4)] * 4, carrying=(1, 3))
-    assert gain[:, 0].tolist() == [1.0, 0.5, 1.0, 0.5]
-
-
 def test_whoever_carries_at_the_start_of_a_step_is_throttled_in_it():
     env = tidy_world(n_robots=2)
     stack = Throttle(env, constant(0.5, carriers=True))
@@ -131,25 +109,6 @@ def test_whoever_carries_at_the_start_of_a_step_is_throttled_in_it():
     # Robot 0 asks, waits with its wheels held and gets its object in the second step, and is slow from the third on.
     assert speeds == [[8.0, 4.0], [0.0, 4.0], [4.0, 4.0]]
     assert env.swarm.carried_object.tolist() == [0, 1]
-
-
-def test_gains_from_outside_are_multiplied_and_left_alone():
-    outer = np.array([[0.5, 0.25]] * 4)
-    gain = gain_of(constant(0.5), [(0.4, 0.4)], wheel_gain=outer)
-    assert gain[:2].tolist() == [[0.25, 0.125], [0.5, 0.25]]
-    assert outer.tolist() == [[0.5, 0.25]] * 4
-
-
-@pytest.mark.parametrize("amplitude", [0.0, -0.3])
-def test_nothing_happens_without_throttle(amplitude):
-    outer = np.ones((4, 2))
-    assert gain_of(constant(amplitude), [(0.4, 0.4)]) is None
-    assert gain_of(constant(amplitude), [(0.4, 0.4)], wheel_gain=outer) is outer
-
-
-def test_rows_of_the_inactive_may_be_no_numbers_and_disturb_nobody():
-    gain = gain_of(constant(0.5), [(np.nan, 0.4), (np.inf, -np.inf), (0.4, 0.4)])
-    assert gain[2].tolist() == [0.5, 0.5]
 
 
 # Time
@@ -187,17 +146,6 @@ def test_last_value_and_mean_are_recorded_per_interval(carriers):
         assert recorder.columns()["adversity"].tolist() == recorded["throttle_mean"].tolist()
 
 
-def test_a_run_that_was_broken_off_leaves_no_trace_in_the_next_mean():
-    recorder = RunRecorder(ramp(50).wrap(FakeArena()))
-    recorder.reset_batch(0)
-    for _ in range(3):
-        recorder.step_batch(np.zeros((4, 3), np.float32))
-    recorder.reset_batch(1)
-    while not recorder.complete:
-        recorder.step_batch(np.zeros((4, 3), np.float32))
-    assert recorder.contributed()["throttle_mean"].tolist() == pytest.approx([0.03, 0.08, 0.13])
-
-
 def test_the_waveform_itself_is_recorded_where_it_is_negative():
     waveform = Waveform(kind="square", amplitude=0.5, period_s=2.0)
     recorder = RunRecorder(ThrottleConfig(waveform=waveform).wrap(FakeArena()))
@@ -224,23 +172,3 @@ def test_levels_of_the_study():
             assert (config.waveform.kind, config.waveform.period_s) == (kind, period_s)
             assert config.waveform.offset == config.waveform.amplitude
         assert configs[-1].waveform.peak == pytest.approx(highest)
-
-
-@pytest.mark.parametrize(
-    ("fields", "message"),
-    [
-        ({"waveform": Waveform(kind="constant", amplitude=1.1)}, "at most 1.*reaches 1.1"),
-        (
-            {"waveform": Waveform(kind="sine", amplitude=0.6, offset=0.6, period_s=1.0)},
-            "reaches 1.2; lower its amplitude",
-        ),
-        ({"waveform": 0.3}, "throttle.waveform to be a Waveform, got 0.3; for example Waveform.kind='constant'"),
-        (
-            {"waveform": Waveform(kind="constant"), "carriers": "yes"},
-            "throttle.carriers to be True or False, got 'yes'",
-        ),
-    ],
-)
-def test_nonsense_is_refused(fields, message):
-    with pytest.raises(ConfigError, match=message):
-        ThrottleConfig(**fields)

@@ -1,6 +1,5 @@
 """World: its name, its wrappers in order, and what it refuses."""
 
-import copy
 from dataclasses import replace
 
 import pytest
@@ -40,38 +39,6 @@ SMALL = scenario("warehouse_small")
 )
 def test_a_name_tells_the_swarm_and_what_is_varied_or_disturbs_it(world, name):
     assert world.name == name
-
-
-def test_a_name_is_for_people_only():
-    named = World(SMALL, name="home")
-    assert named == World(SMALL)
-    assert hash(named) == hash(World(SMALL))
-    assert named != World(SMALL, criterion="noise")
-
-
-def test_a_changed_copy_makes_its_own_name_and_keeps_a_given_one():
-    fewer = scenario("warehouse_small", n_objects=3)
-    assert replace(World(SMALL), scenario=fewer).name == "warehouse_small, 50 robots, 3 objects"
-    assert replace(World(SMALL, name="home"), scenario=fewer).name == "home"
-    assert copy.deepcopy(World(SMALL)).file_name == "warehouse_small"
-
-
-def test_a_title_says_place_facts_and_changes_once():
-    changed = World(scenario("warehouse_small", n_objects=3), (InnerConfig(sigma=0.1),))
-    assert World(SMALL).title() == "warehouse_small"
-    assert World(SMALL).title("50 robots", "400 s") == "warehouse_small: 50 robots, 400 s"
-    assert changed.title() == "warehouse_small with 3 objects, test inner: sigma 0.1"
-    assert changed.title("3 objects") == "warehouse_small: 3 objects, with test inner: sigma 0.1"
-    assert replace(changed, name="mine").title("400 s").startswith("mine (warehouse_small): 400 s, with 3 objects")
-
-
-def test_worlds_beside_each_other_are_told_apart_by_digests():
-    several = [tuple((x, y, x + 1.0, y + 0.2) for x in (8.0, 12.0, 16.0, 20.0)) for y in (2.0, 4.0)]
-    first, second = (World(scenario("warehouse_small", obstacles=boxes)) for boxes in several)
-    assert first.title(digests=False) == "warehouse_small with 4 obstacles"
-    assert first.title().startswith("warehouse_small with 4 obstacles (")
-    assert first.title() != second.title()
-    assert first.name != second.name
 
 
 WORLDS = [
@@ -115,11 +82,6 @@ def test_no_two_worlds_share_a_file_name():
         check_file_name("file_name", world.file_name)
 
 
-def test_what_is_read_of_runs_and_what_is_varied_leave_the_file_name_alone():
-    assert World(scenario("warehouse_small", performance="n_active")).file_name == "warehouse_small"
-    assert World(SMALL, criterion="noise", value=0.1).file_name == "warehouse_small"
-
-
 def test_wrappers_are_kept_in_stack_order_and_at_most_once():
     shuffled = World(SMALL, (InnerConfig(), OuterConfig()))
     assert shuffled.wrappers == (OuterConfig(), InnerConfig())
@@ -142,11 +104,6 @@ def test_wrappers_are_kept_in_stack_order_and_at_most_once():
 def test_what_is_no_world_is_refused(given, fields, message):
     with pytest.raises(ConfigError, match=message):
         World(given, **fields)
-
-
-def test_whole_values_are_numbers_like_others():
-    assert World(SMALL, criterion=SIZE, value=50) == World(SMALL, criterion=SIZE, value=50.0)
-    assert isinstance(World(SMALL, value=50).value, float)
 
 
 def test_a_world_is_given_as_itself_a_scenario_or_a_preset():
