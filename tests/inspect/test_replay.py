@@ -1,5 +1,4 @@
 """Replays: they show the run that its record describes, come back from their files, and change nothing."""
-# long file: these tests share one run, which takes seconds to record
 
 import dataclasses
 import json
