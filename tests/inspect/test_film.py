@@ -13,7 +13,7 @@ from swarm_forage_env.inspect import film as film_module
 from swarm_forage_env.inspect.film import record_run
 from swarm_forage_env.policies.registry import RandomPolicy, load_policy
 from swarm_forage_env.rendering.video import check_film, write_film
-from swarm_forage_env.rendering.view import PALETTE, THEMES, RenderError
+from swarm_forage_env.rendering.view import PALETTE, RenderError
 from swarm_forage_env.runs.run import run_policy
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import scenario
@@ -54,20 +54,6 @@ def test_a_gif_shows_every_picture_in_true_colours_for_ever(tmp_path):
         assert film.info["loop"] == 0
     for shown, drawn in zip(frames_of(path), pictures(12), strict=True):
         assert np.abs(shown.astype(int) - drawn).max() <= 4
-
-
-def test_a_light_film_keeps_its_colours(tmp_path, small):
-    path = record_run(small, "random", tmp_path / "light.gif", seconds=2.0, size_px=240, theme="light")
-    light = THEMES["light"]
-    shown = frames_of(path)[-1].astype(int)
-    for colour in (light.page, light.floor, light.wall, light.object):
-        assert (np.abs(shown - colour).max(axis=2) <= 4).any()
-
-
-def test_gifs_store_only_what_changes(tmp_path):
-    short = write_film(pictures(2, 300, 400), tmp_path / "short.gif", fps=20, n_frames=2).stat().st_size
-    long = write_film(pictures(22, 300, 400), tmp_path / "long.gif", fps=20, n_frames=22).stat().st_size
-    assert (long - short) / 20 < 0.01 * 300 * 400 + 768  # 768 bytes: the colours of a frame
 
 
 def test_an_mp4_has_every_picture_even_of_odd_size(tmp_path):
@@ -125,13 +111,6 @@ def test_impossible_films_are_refused(tmp_path, name, fps, n_frames, expected):
         check_film(tmp_path / name, fps, n_frames)
 
 
-def test_a_missing_folder_is_made_when_the_film_is_written(tmp_path):
-    path = check_film(tmp_path / "new" / "films" / "film.gif", 20, 3)
-    assert list(tmp_path.iterdir()) == []
-    write_film(pictures(3), path, fps=20, n_frames=3)
-    assert path.is_file()
-
-
 def test_without_ffmpeg_the_message_tells_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(ImportError, match=r'pip install ".\[render\]"'):
@@ -167,40 +146,6 @@ class Witness(RandomPolicy):
     def act(self, obs, active):
         self.calls += 1
         return super().act(obs, active)
-
-
-def test_pictures_are_spaced_evenly_in_ticks(small, tmp_path):
-    policy, seen = Witness(), []
-    record_run(
-        small,
-        policy,
-        tmp_path / "run.gif",
-        seconds=4.0,
-        speedup=8.0,
-        fps=20.0,  # 0.4 s, two ticks per picture
-        size_px=300,
-        trail_s=0.0,
-        progress=lambda *_: seen.append(policy.calls),
-    )
-    assert seen == list(range(0, 21, 2))
-
-
-@pytest.mark.parametrize(
-    ("given", "stated", "asked", "expected"),
-    [
-        ("none", None, None, "none"),
-        ("none", "static", None, "static"),
-        ("none", "static", "none", "none"),
-        ("static", "none", None, "none"),
-        ("static", None, "dynamic", "dynamic"),
-    ],
-)
-def test_caches_are_those_of_a_run(tmp_path, given, stated, asked, expected):
-    world, policy = scenario("warehouse_small", n_robots=4, n_objects=10, caches=given), Witness()
-    if stated is not None:
-        policy.caches = stated
-    record_run(world, policy, tmp_path / "run.gif", seconds=2.0, size_px=300, caches=asked)
-    assert policy.caches_seen == expected
 
 
 @pytest.fixture
@@ -258,12 +203,6 @@ def test_a_film_shows_the_run_that_its_name_promises(filmed, tmp_path, monkeypat
     assert counters[Counter.FREE_PICKUPS] > 0
     for name, counter in TOTALS.items():
         assert counters[counter] == record.columns()[name].sum(), name
-
-
-def test_a_film_needs_no_whole_intervals(filmed, tmp_path):
-    broken = scenario("warehouse_small", n_robots=4, n_objects=10, horizon_s=300.0)
-    record_run(broken, "random", tmp_path / "run.gif", seconds=20.0)
-    assert [tick for tick, *_ in filmed] == list(range(0, 101, 5))
 
 
 def test_a_run_that_is_over_stays_as_it_ended(filmed, tmp_path):

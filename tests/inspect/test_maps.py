@@ -69,15 +69,6 @@ def test_objects_count_where_they_lay_and_where_they_were_dropped(replay):
     assert arrays.keys() == MEANINGS.keys()
 
 
-def test_squares_need_not_fit_the_arena(replay):
-    """The arena is 32 m x 16 m: the last square is 2 m wide, and the uppermost row 1 m high."""
-    replay = dataclasses.replace(replay, position=np.rint(replay.position_m * [1.5, 3.0] / 0.005).astype(np.uint16))
-    density = floor_maps(replay, side_m=5.0).arrays["density"]
-    assert density.shape == (4, 7)
-    assert density[3, 3] * (5.0 * 1.0) == pytest.approx(1.0), "robot 0 at (15.15, 15.3) m, in all frames"
-    assert density[1, 6] * (2.0 * 5.0) == pytest.approx(3 / 4), "robot 1 from (30.15, 6.3) m on, until it is gone"
-
-
 def test_a_difference_is_what_is_more_here(replay):
     other = floor_maps(dataclasses.replace(replay, status=np.full((4, 2), Status.REPAIR, np.uint8), label="other"))
     mine = floor_maps(replay)

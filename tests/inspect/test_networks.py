@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swarm_forage_env.inspect.networks import in_words, network_lines
+from swarm_forage_env.inspect.networks import network_lines
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.network import Network, NetworkAbout
 
@@ -22,11 +22,6 @@ SAMPLED = {
     },
     "turned": True,
     "stages": [{"steps": 300, "scenario": {}, "sampler": {}}, {"steps": 4000, "scenario": {}}],
-}
-ONE_WORLD = {
-    "scenario": {"name": "warehouse_medium", "robots": {"n_robots": 50}},
-    "wrappers": {},
-    "stages": [{"steps": 20, "scenario": {"horizon_s": 600.0}}],
 }
 
 
@@ -49,18 +44,6 @@ def test_every_field_of_the_interface_and_the_layers_are_told():
     assert (fields["decision_ticks"], fields["frame_decisions"], fields["neighbours_seen"]) == ("5", "200", "none")
 
 
-@pytest.mark.parametrize(
-    ("interface", "samples", "words"),
-    [
-        (FRAMED, True, "True (draws actions by their probabilities)"),
-        (FRAMED, False, "False (greedy: takes the likeliest action)"),
-        (InterfaceConfig(), True, "True (takes the mean)"),
-    ],
-)
-def test_it_tells_how_actions_are_chosen(interface, samples, words):
-    assert f"\n  samples             {words}\n" in told(NetworkAbout(interface=interface, samples=samples))
-
-
 def test_it_tells_the_worlds_that_a_sampler_drew():
     text = told(NetworkAbout(interface=FRAMED, card={"plan": SAMPLED}))
     assert section(text, "trained in") == [
@@ -74,48 +57,9 @@ def test_it_tells_the_worlds_that_a_sampler_drew():
     ]
 
 
-def test_it_tells_the_only_world():
-    text = told(NetworkAbout(interface=FRAMED, card={"plan": ONE_WORLD}))
-    assert section(text, "trained in") == [
-        ("warehouse_medium", "n_robots 50"),
-        ("wrappers", "none"),
-        ("turned", "False"),
-        ("stage 1", "20 decisions, horizon_s 600.0"),
-    ]
-
-
-def test_it_tells_how_a_network_learnt_to_decide_where_that_is_not_how_it_runs():
-    in_runs = {"decision_ticks": 2, "frame_decisions": 200}
-    plan = {**ONE_WORLD, "interface": {"decision_ticks": 5, "frame_decisions": 200}, "in_runs": in_runs}
-    text = told(NetworkAbout(interface=FRAMED, card={"plan": plan}))
-    assert ("learnt with", "decision_ticks 5") in section(text, "trained in")
-
-
-def test_it_tells_a_temperature_of_the_plan():
-    text = told(NetworkAbout(interface=FRAMED, card={"plan": {**ONE_WORLD, "temperature": 0.5}}))
-    assert ("temperature", "0.5, in the weights of the last layer") in section(text, "trained in")
-
-
-def test_a_list_of_tables_takes_a_line_for_each():
-    worlds = [{"world": "one", "ratio": 1.23456789}, {"world": "two", "ratio": 2.0}]
-    text = told(NetworkAbout(interface=FRAMED, card={"evaluation": {"steps": 5, "worlds": worlds}}))
-    assert section(text, "evaluation") == [
-        ("steps", "5"),
-        ("worlds", "world one, ratio 1.23457"),
-        ("world two, ratio 2",),
-    ]
-
-
 @pytest.mark.parametrize(
     "plan",
     ["a text", {}, {"sampler": 3}, {"sampler": {"worlds": [4]}, "stages": {}}, {"scenario": [], "stages": [None]}],
 )
 def test_a_card_may_hold_anything(plan):
     assert told(NetworkAbout(interface=FRAMED, card={"plan": plan, "by": "me"})).endswith("\n  [by]\n    me")
-
-
-@pytest.mark.parametrize(
-    ("value", "words"), [((4, 6.5), "4 x 6.5"), (("a", "b"), "a, b"), ({"uniform": 3}, "uniform 3"), (None, "None")]
-)
-def test_values_in_words(value, words):
-    assert in_words(value) == words

@@ -8,10 +8,8 @@ import pytest
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.inspect.play import session as playing
-from swarm_forage_env.inspect.play.levels import LEVELS
 from swarm_forage_env.inspect.play.run import SPEEDS
 from swarm_forage_env.inspect.play.session import PlaySession, Setting, wall_of
-from swarm_forage_env.inspect.replay.capture import record_replay
 from swarm_forage_env.inspect.replay.files import read_replays
 from swarm_forage_env.inspect.replay.frames import ReplayError, Status
 from swarm_forage_env.runs.run import run_one
@@ -115,16 +113,6 @@ def test_levels_change_while_the_run_goes_on():
     assert frame["run"] == 1, "nothing was started again"
 
 
-def test_a_level_of_now_is_there_from_the_start_of_the_next_run():
-    session, clock = session_of()
-    session.carry_out({"do": "level", "name": "sensor_noise", "value": 0.02})
-    session.carry_out({"do": "start"})
-    session.carry_out({"do": "speed", "value": 100})
-    frame = look_after(session, clock, 4.1)
-    record = run_one(plan_run(World(SMALL, (SensorNoiseConfig(sigma=0.02),)), "crw", seed=3))
-    assert (counted(frame), frame["changes"]) == (int(record.collected.sum()), [])
-
-
 def test_a_robot_is_killed_broken_and_repaired():
     session, clock = session_of()
     look_after(session, clock, 0.5)
@@ -143,27 +131,6 @@ def test_a_robot_is_killed_broken_and_repaired():
     assert not frame["status"][5] & Status.REPAIR
     assert (frame["x"][5], frame["y"][5]) != where
     assert frame["changes"] == ["robot 2 killed", "robot 5 broken", "robot 5 repaired"]
-
-
-def test_the_last_changes_are_told_and_how_many_there_were():
-    session, _ = session_of("random")
-    for _ in range(15):
-        session.carry_out({"do": "break", "robot": 5})
-        session.carry_out({"do": "repair", "robot": 5})
-    frame = session.frame()
-    assert (len(frame["changes"]), frame["n_changes"]) == (20, 30)
-    told = session.summary()
-    assert "10 more before, robot 5 broken, robot 5 repaired" in told
-    assert told.count("robot 5") == 20
-
-
-def test_the_last_words_wait_for_no_run_that_is_being_started(monkeypatch):
-    monkeypatch.setattr(playing, "LONGEST_SUMMARY_S", 0.01)
-    session, _ = session_of("random")
-    with session._lock:
-        assert session.summary() == "random: 0 s, 0 delivered"
-        assert session._lock.locked()
-    assert session.summary() == "random: 0 s, 0 delivered"
 
 
 def test_a_wall_starts_the_run_again_with_the_same_seed():
@@ -208,16 +175,6 @@ def test_robots_policy_scenario_and_seed_start_another_run():
     assert about["header"]["n_robots"] == scenario("warehouse_small").robots.n_robots
 
 
-def test_a_world_keeps_its_name_until_another_one_is_chosen():
-    session = PlaySession(Setting(world=World(SMALL, name="hall"), policy="crw", seed=3), clock=Clock())
-    for command in (None, {"do": "start", "seed": 9}, {"do": "wall", "box": WALL}):
-        if command is not None:
-            session.carry_out(command)
-        assert session.frame()["about"]["place"] == "hall (warehouse_small)"
-    session.carry_out({"do": "start", "scenario": "warehouse_small"})
-    assert session.frame()["about"]["place"] == "warehouse_small"
-
-
 @pytest.mark.parametrize(
     "command",
     [
@@ -254,20 +211,6 @@ def test_a_wrong_command_is_refused_and_changes_nothing(command):
     with pytest.raises(ConfigError):
         session.carry_out(command)
     assert (session.setting, session.run, run.levels.changes) == (before, run, [])
-
-
-def test_no_more_robots_than_the_page_offers():
-    session, _ = session_of("random")
-    most = session.frame()["about"]["most_robots"]
-    with pytest.raises(ConfigError, match=f"robots to be a whole number from 1 to {most}, got {most + 1}"):
-        session.carry_out({"do": "start", "robots": most + 1})
-
-
-@pytest.mark.parametrize("asked", [[], {"robot": 8, "run": 1}, {"robot": "all"}, {"since": 3}])
-def test_a_wrong_question_is_refused(asked):
-    session, _ = session_of("random")
-    with pytest.raises(ConfigError):
-        session.frame(asked)
 
 
 def test_a_chosen_robot_is_told_of():
@@ -318,22 +261,3 @@ def test_a_run_is_saved_as_a_replay_and_goes_on(tmp_path):
     assert len(replay.deliveries) == replay.counters[-1, Counter.COLLECTED]
     session.carry_out({"do": "play"})
     assert look_after(session, clock, 2.0)["over"]
-
-
-def test_the_replay_of_a_run_that_nobody_touched_is_that_of_its_specification():
-    session, clock = session_of("stochm", NOISY)
-    session.carry_out({"do": "speed", "value": 100})
-    look_after(session, clock, 4.1)
-    made, _ = record_replay(plan_run(World(SMALL, NOISY), "stochm", seed=3))
-    kept = session.run.replay()
-    for name in ("position", "heading", "status", "activity", "remembered", "counters", "object_events", "deliveries"):
-        np.testing.assert_array_equal(getattr(kept, name), getattr(made, name), err_msg=name)
-    assert kept.label == made.label
-    np.testing.assert_array_equal(kept.signals["throttle"], made.signals["throttle"])
-
-
-def test_every_slider_reaches_its_end():
-    session, _ = session_of("random")
-    for name, slider in LEVELS.items():
-        session.carry_out({"do": "level", "name": name, "value": slider.most})
-    assert session.frame()["levels"] == {name: slider.most for name, slider in LEVELS.items()}

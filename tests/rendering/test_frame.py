@@ -2,12 +2,12 @@
 
 import copy
 import sys
-from itertools import combinations, product
+from itertools import product
 
 import numpy as np
 import pytest
 
-from swarm_forage_env.contract.codes import Counter, ObjectStatus
+from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.rendering import view
 from swarm_forage_env.rendering.frame import Trails, render_frame
 from swarm_forage_env.rendering.view import (
@@ -25,7 +25,6 @@ from swarm_forage_env.scenarios.floor import CELL_M
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.allocation import new_objects
 from swarm_forage_env.world.state import CacheState, StepEvents, SwarmState
-from tests.support.colours import VISION, seen_lab
 
 pytest.importorskip("PIL")
 
@@ -99,13 +98,6 @@ def test_drawing_writes_nothing(world):
             assert array.tobytes() == arrays_of(old)[name].tobytes(), name
 
 
-def test_equal_states_give_equal_pictures(world):
-    world.lay(0, (120, 40))
-    first = world.draw()
-    world.draw(tick=7, size_px=300)  # other pictures in between leave no trace
-    np.testing.assert_array_equal(first, world.draw())
-
-
 def test_grounds_have_their_colours(world):
     picture = world.draw()
     assert world.pixel(picture, 16.0, 8.0) == PALETTE.floor
@@ -166,13 +158,6 @@ def test_the_needle_points_where_the_robot_is_heading(world, heading, right, up)
     assert behind == PALETTE.floor
 
 
-def test_y_points_up(world):
-    world.swarm.position[:] = (16.0, 15.0)
-    blue = np.argwhere((world.draw() == PALETTE.empty).all(axis=2))
-    arena_rows = blue[(blue[:, 0] < world.view.bottom)]
-    assert (arena_rows[:, 0] < world.view.bottom - 14.0 * world.view.scale).all()
-
-
 def test_colours_tell_what_robots_do(world):
     swarm, (x, y) = world.swarm, world.swarm.position[0]
     assert world.pixel(world.draw(), x, y) == PALETTE.empty
@@ -214,50 +199,10 @@ def test_robots_without_a_body_are_not_drawn(world):
     assert world.pixel(world.draw(), *world.swarm.position[1]) == PALETTE.empty
 
 
-def test_clock_and_figures_stand_in_the_header(world):
-    header = slice(0, int(world.view.bottom - 16.2 * world.view.scale))
-    before = world.draw(tick=100)
-    later = world.draw(tick=105)
-    world.events.counters[Counter.COLLECTED] = 12
-    delivered = world.draw(tick=105)
-    titled = world.draw(tick=105, title="another headline")
-    for one, two in ((before, later), (later, delivered), (delivered, titled)):
-        rows = np.argwhere((one != two).any(axis=2))[:, 0]
-        assert rows.size
-        assert rows.max() < header.stop
-
-
 @pytest.mark.parametrize("size_px", [0, -5, 239, 4001, 900.5, True, "900", None])
 def test_impossible_sizes_are_refused(world, size_px):
     with pytest.raises(RenderError, match="size_px"):
         world.draw(size_px=size_px)
-
-
-@pytest.mark.parametrize("size_px", [240, 600, 1500])
-def test_size_is_the_longer_side_of_the_arena(size_px):
-    tall = scenario(
-        "warehouse_small", width_m=16.0, height_m=32.0, nest_centre_m=(8.0, 4.0), nest_size_m=(6.4, 3.2), n_objects=10
-    )
-    world = World(tall)
-    picture = world.draw(size_px=size_px)
-    view = arena_view(tall, size_px)
-    assert picture.shape == (view.height, view.width, 3)
-    assert view.scale * 32.4 == pytest.approx(size_px)
-    left, top, right, bottom = view.box((0.0, 0.0, 16.0, 32.0))
-    assert 0 < left < right < view.width
-    assert 0 < top < bottom < view.height
-
-
-@pytest.mark.parametrize("width", [240, 500, 900, 2000])
-def test_the_legend_stays_inside_the_picture(width):
-    config = scenario("warehouse_small", caches="dynamic")
-    rows = legend_rows(config, width, width / 32.4)
-    names = [name for row in rows for name, _, _ in row]
-    assert names == ["empty", "carrying", "in interference", "in repair", "dead", "object", "source", "nest", "cache"]
-    font = view.text_font(view.text_height(width / 900))
-    for row in rows:
-        name, x, _ = row[-1]
-        assert x + font.getlength(name) < width
 
 
 def test_the_legend_names_only_what_the_world_has():
@@ -289,57 +234,11 @@ def test_trails_fade_towards_the_past(world):
     assert world.pixel(world.draw(), 12.0, 10.0) == PALETTE.floor
 
 
-def test_trails_have_the_colour_of_what_the_robot_did_there(world):
-    trails = Trails(4, 20)
-    for step in range(20):
-        world.swarm.position[0] = (10.0 + 0.1 * step, 10.0)
-        world.swarm.carried_object[0] = 2 if step >= 10 else -1
-        trails.add(world.swarm)
-    world.swarm.position[0] = (20.0, 13.0)
-    picture = world.draw(trails=trails)
-    red, _, blue = world.pixel(picture, 10.8, 10.0)
-    assert blue > red
-    red, _, blue = world.pixel(picture, 11.6, 10.0)
-    assert red > blue
-
-
-def test_trails_have_gaps_where_a_robot_was_away(world):
-    trails = Trails(4, 3)
-    for x, present in ((10.0, True), (15.0, False), (20.0, True)):
-        world.swarm.position[0] = (x, 12.0)
-        world.swarm.present[0] = present
-        trails.add(world.swarm)
-    picture = world.draw(trails=trails)
-    for x in (12.0, 15.0, 18.0):
-        assert world.pixel(picture, x, 12.0) == PALETTE.floor
-
-
 def test_trails_of_another_world_are_refused(world):
     with pytest.raises(RenderError, match="4 robots, got 5"):
         world.draw(trails=Trails(5, 3))
     with pytest.raises(RenderError, match="n_samples"):
         Trails(4, 1)
-
-
-def test_sixteen_thousand_robots_leave_the_floor_visible():
-    config = scenario(
-        "warehouse_medium", width_m=576.0, height_m=576.0, nest_centre_m=(288.0, 288.0), nest_size_m=(115.2, 115.2),
-        n_robots=16_384, n_objects=20_000,
-    )  # fmt: skip
-    world = World(config)
-    world.swarm.position[:] = np.random.default_rng(1).uniform(1.0, 575.0, (16_384, 2))
-    picture = world.draw()
-    left, top, right, bottom = (int(edge) for edge in world.view.box((10.0, 10.0, 70.0, 566.0)))
-    strip = picture[top:bottom, left:right]
-    floor_share = (strip == PALETTE.floor).all(axis=2).mean()
-    assert 0.5 < floor_share < 0.95
-    assert world.view.robot_px >= 1.0
-
-
-def test_a_million_robots_leave_the_floor_visible_in_a_large_picture():
-    view = arena_view(scenario("warehouse_quad", density=0.05, n_robots=2**20), 2000)
-    arena_px = (view.scale * 4579.6) ** 2
-    assert 0.2 < 2**20 * np.pi * view.robot_px**2 / arena_px < 0.4
 
 
 def test_without_pillow_the_message_tells_what_to_install(world, monkeypatch):
@@ -351,25 +250,6 @@ def test_without_pillow_the_message_tells_what_to_install(world, monkeypatch):
 
 
 # Colour vision
-
-
-@pytest.mark.parametrize("palette", THEMES.values(), ids=THEMES.keys())
-@pytest.mark.parametrize("vision", VISION.values(), ids=VISION.keys())
-def test_colours_stay_apart_for_colour_blind_readers(vision, palette):
-    things = [palette.empty, palette.carrying, palette.interference, palette.repair, palette.object]
-    grounds = [
-        palette.floor,
-        mix(palette.floor, palette.nest, NEST_OPACITY),
-        mix(palette.floor, palette.cache, CACHE_OPACITY),
-        mix(palette.floor, palette.source, SOURCE_OPACITY),
-    ]
-    pairs = [*combinations([*things, palette.cache], 2), *product(things, grounds)]
-    close = {
-        pair: apart
-        for pair in pairs
-        if (apart := np.linalg.norm(np.subtract(*(seen_lab(one, vision) for one in pair)))) <= 17.0
-    }
-    assert close == {}
 
 
 def test_a_light_picture_shows_the_same_in_other_colours(world):

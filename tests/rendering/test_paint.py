@@ -3,13 +3,10 @@
 import numpy as np
 import pytest
 
-from swarm_forage_env.rendering import kernels
 from swarm_forage_env.rendering.paint import (
     Canvas,
-    Canvases,
     paint_box,
     paint_discs,
-    paint_glows,
     paint_needles,
     paint_rings,
     paint_squares,
@@ -45,24 +42,6 @@ def test_shapes_cover_their_area_wherever_they_are(paint, area, centre):
     assert not canvas.colours[..., 1:].any()
 
 
-def test_a_disc_is_centred_where_it_was_asked_for():
-    canvas = blank()
-    paint_discs(canvas, [(12.3, 25.8)], 4.0, (255, 255, 255))
-    rows, columns = np.mgrid[0:40, 0:40] + 0.5
-    weight = canvas.colours[..., 0]
-    assert (columns * weight).sum() / weight.sum() == pytest.approx(12.3, abs=0.02)
-    assert (rows * weight).sum() / weight.sum() == pytest.approx(25.8, abs=0.02)
-
-
-def test_a_box_shares_its_edge_pixels():
-    canvas = blank(8)
-    paint_box(canvas, (1.25, 2.0, 4.5, 3.5), (100, 0, 0), opacity=0.5)
-    expected = np.zeros((8, 8))
-    expected[2, 1:5] = 50.0 * np.array([0.75, 1.0, 1.0, 0.5])
-    expected[3, 1:5] = 0.5 * expected[2, 1:5]
-    np.testing.assert_allclose(canvas.colours[..., 0], expected)
-
-
 def test_shapes_may_stick_out_of_the_canvas_or_be_absent():
     canvas = blank(10)
     paint_discs(canvas, [(0.0, 5.0), (-30.0, 4.0), (5.0, 100.0)], 3.0, (255, 0, 0))
@@ -72,12 +51,6 @@ def test_shapes_may_stick_out_of_the_canvas_or_be_absent():
     paint_discs(canvas, np.empty((0, 2)), 3.0, (0, 255, 0))
     paint_box(canvas, (20.0, 0.0, 30.0, 5.0), (0, 255, 0))
     np.testing.assert_array_equal(canvas.colours, before)
-
-
-def test_shapes_of_one_call_do_not_add_up():
-    canvas = blank()
-    paint_discs(canvas, [(20.0, 20.0)] * 3, 5.0, (200, 0, 0), opacity=0.5)
-    assert canvas.colours.max() == pytest.approx(100.0)
 
 
 # Against the twin
@@ -121,16 +94,6 @@ def test_squares_cover_what_their_twin_says():
     np.testing.assert_allclose(found, expected, atol=1e-3)
 
 
-def test_a_glow_fades_from_its_middle():
-    canvas = blank()
-    paint_glows(canvas, [(20.5, 20.5), (0.0, 38.0)], 10.0, (200, 0, 0), 0.5)
-    red = canvas.colours[20, 20:, 0]
-    assert red[0] == pytest.approx(100.0)
-    assert (np.diff(red[:10]) < 0.0).all()
-    assert not red[10:].any()
-    assert canvas.colours[38, 0, 0] > 90.0
-
-
 def test_places_that_are_none_are_not_painted():
     canvas = blank()
     nowhere = [(np.nan, 5.0), (5.0, np.inf), (-1e300, 5.0)]
@@ -152,19 +115,3 @@ def test_a_picture_rounds_and_leaves_the_ground():
     np.testing.assert_array_equal(canvas.colours, ground)
     np.testing.assert_array_equal(canvas.take_picture(), ground)
     assert not canvas.sheet.share.any()
-
-
-def test_a_sheet_of_colours_becomes_a_picture():
-    canvas = Canvas(plain(1, 2, GROUND))
-    kernels.paint_share(canvas.sheet, 0, 1, np.full((1, 1), 0.5, np.float32), np.zeros(3, np.float32))
-    picture = plain(1, 2, GROUND)
-    kernels.take_picture(canvas.sheet, plain(1, 2, GROUND).reshape(-1, 3), picture.reshape(-1, 3))
-    assert picture.tolist() == [[[24, 31, 42], [12, 16, 21]]]
-
-
-def test_canvases_are_used_again_but_never_by_two():
-    canvases = Canvases(plain(4, 4, GROUND))
-    first = canvases.borrow()
-    assert canvases.borrow() is not first
-    canvases.give_back(first)
-    assert canvases.borrow() is first

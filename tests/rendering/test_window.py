@@ -1,7 +1,5 @@
 """The window, on a display that nobody sees."""
 
-import copy
-import pickle
 import sys
 
 import numpy as np
@@ -49,36 +47,10 @@ def test_a_closed_window_opens_again_and_one_that_the_user_has_closed_does_not(w
         assert not pygame.display.get_init()
 
 
-def test_copies_are_closed_windows(window):
-    window.show(FRAME, "")
-    for twin in (copy.deepcopy(window), pickle.loads(pickle.dumps(window))):  # noqa: S301 - our own bytes
-        twin.close()
-    assert pygame.display.get_init()
-
-
 def test_without_a_display_the_message_says_what_else_there_is(monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "there is no such driver")
     with pytest.raises(RenderError, match="swarm-forage record"):
         Window().show(FRAME, "")
-
-
-def test_a_display_that_nobody_can_see_is_none_unless_it_was_asked_for(monkeypatch):
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    window = Window()
-    monkeypatch.setattr(pygame.display, "get_driver", lambda: "offscreen")
-    window.show(FRAME, "")
-    window.close()
-    set_mode = pygame.display.set_mode
-
-    def without_the_variable(size):
-        surface = set_mode(size)
-        monkeypatch.delenv("SDL_VIDEODRIVER")
-        return surface
-
-    monkeypatch.setattr(pygame.display, "set_mode", without_the_variable)
-    with pytest.raises(RenderError, match="nobody can see"):
-        window.show(FRAME, "")
-    assert not pygame.display.get_init()
 
 
 def test_without_pygame_the_message_tells_what_to_install(monkeypatch):

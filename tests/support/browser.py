@@ -39,7 +39,7 @@ class Browser:
         width: Width of the window in pixels.
     """
 
-    def __init__(self, folder: Path, *, width: int, height: int, touch: bool = False, dark: bool = False) -> None:
+    def __init__(self, folder: Path, *, width: int, height: int, touch: bool = False) -> None:
         self.complaints: list[str] = []
         self.requests: list[str] = []
         self.width = width
@@ -66,7 +66,7 @@ class Browser:
         shape = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": touch}
         self.call("Emulation.setDeviceMetricsOverride", **shape)
         self.call("Emulation.setTouchEmulationEnabled", enabled=touch)
-        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
+        scheme = {"name": "prefers-color-scheme", "value": "light"}
         self.call("Emulation.setEmulatedMedia", features=[scheme])
 
     def __enter__(self) -> "Browser":
@@ -172,24 +172,10 @@ class Browser:
         for kind in ("mousePressed", "mouseReleased"):
             self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
 
-    def move_to(self, x: float, y: float) -> None:
-        """Move the mouse, with no button down."""
-        self.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
-
-    def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
-        """Press the mouse at one place, move it to another, and release it there."""
-        for kind, (x, y) in (("mousePressed", start), ("mouseMoved", end), ("mouseReleased", end)):
-            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
-
     def press(self, key: str, *, code: str = "") -> None:
         """Press and release a key."""
         for kind in ("keyDown", "keyUp"):
             self.call("Input.dispatchKeyEvent", type=kind, key=key, code=code or key)
-
-    def touch(self, kind: str, *points: tuple[float, float]) -> None:
-        """Send a touch event, "touchStart" for example."""
-        touches = [{"x": x, "y": y, "id": finger} for finger, (x, y) in enumerate(points)]
-        self.call("Input.dispatchTouchEvent", type=kind, touchPoints=touches)
 
     def picture(self, file: Path) -> Path:
         """Write what the page looks like as PNG."""

@@ -40,14 +40,6 @@ def choose_robot(browser: Browser, session: PlaySession, robot: int) -> None:
     browser.wait_for(f"document.querySelector('#robot h2')?.textContent === 'robot {robot}'")
 
 
-def move_slider(browser: Browser, name: str, value: float) -> None:
-    """Move a slider as a hand does, to a value."""
-    browser.ask(
-        f"(({{value}}) => {{const one = document.getElementById('{name}'); one.value = value; "
-        f"one.dispatchEvent(new Event('input')); one.dispatchEvent(new Event('change'));}})({{value: '{value}'}})"
-    )
-
-
 def run_shown(browser: Browser, text: str) -> None:
     """Wait until the headline, or the line below it, has some text."""
     browser.wait_for(f"document.querySelector('.names').textContent.includes('{text}')")

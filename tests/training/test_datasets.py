@@ -105,13 +105,6 @@ def test_with_frames_rows_and_actions_are_those_that_robots_see_and_choose_in_th
     assert (np.array(as_it_is) != steps.observations[:-1]).any(axis=2).mean() > 0.5, "most robots see it as it is"
 
 
-def test_observations_can_be_compact_for_any_policy(tmp_path):
-    dataset = recorded(tmp_path, "crw", observation="compact")
-    assert len(dataset.columns) == LearnerInterface(dataset.interface, env_spec()).layout.size == 23
-    with pytest.raises(ConfigError, match="observation"):
-        recorded(tmp_path / "other", "crw", observation="compakt")
-
-
 @pytest.mark.parametrize("policy", ["crw", "generalist"])
 def test_what_robots_remember_is_recorded_where_it_is_asked_for_or_seen(policy, tmp_path):
     """It is what an interface of the same choices says of the recorded rows, from the first on."""

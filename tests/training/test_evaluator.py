@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from gymnasium.spaces import flatdim
 
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
-from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkError
+from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.runs.policy_spec import policy_spec
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.scenarios.presets import warehouse_small
@@ -107,35 +106,7 @@ def test_an_evaluation_is_due_when_its_decisions_are_full_and_at_the_end_of_each
     assert made == [75, 100, 175, 250]
 
 
-def test_a_folder_with_a_training_is_refused(tmp_path):
-    Evaluator(PLAN, tmp_path, {})  # it has begun, and left nothing to lose
-    Evaluator(PLAN, tmp_path, {}).evaluate(network(stands=True), 60)
-    with pytest.raises(ConfigError, match="with a training run; choose another folder"):
-        Evaluator(PLAN, tmp_path, {})
-    (tmp_path / "file").touch()
-    with pytest.raises(ConfigError, match=r"Expected a folder to write to, got .*file: .*; choose another"):
-        Evaluator(PLAN, tmp_path / "file", {})
-
-
-def test_decisions_that_go_back_and_layers_that_do_not_fit_are_refused_before_runs(tmp_path, monkeypatch):
-    evaluator = Evaluator(PLAN, tmp_path, {})
-    evaluator.evaluate(network(stands=True), 60)
-    monkeypatch.setattr("swarm_forage_env.training.evaluator.evaluated", None)
-    with pytest.raises(ConfigError, match="more decisions than at the last evaluation, 60, got 60"):
-        evaluator.evaluate(network(stands=True), 60)
-    one_more = replace(network(stands=True), weights=(np.zeros((N_INPUTS + 1, N_ACTIONS), np.float32),))
-    with pytest.raises(NetworkError, match=f"Expected a network from {N_INPUTS} columns"):
-        evaluator.evaluate(one_more, 120)
-
-
 def test_baselines_of_another_training_save_their_runs(tmp_path, monkeypatch):
     first = Evaluator(PLAN, tmp_path / "first", {})
     monkeypatch.setattr("swarm_forage_env.training.evaluator.baselines_of", None)
     assert Evaluator(PLAN, tmp_path / "second", {}, baselines=first.baselines).baselines == first.baselines
-
-
-@pytest.mark.parametrize("changes", [{"samples": False}, {"interface": InterfaceConfig()}])
-def test_a_network_that_sees_or_acts_in_another_way_is_refused(tmp_path, changes):
-    moves = network(stands=False)
-    with pytest.raises(ConfigError, match="Expected a network with the plan's interface and samples"):
-        Evaluator(PLAN, tmp_path, {}).evaluate(replace(moves, about=replace(moves.about, **changes)), 60)

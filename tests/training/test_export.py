@@ -6,7 +6,6 @@ import subprocess
 import sys
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,7 +20,6 @@ from swarm_forage_env.policies.pretrained import network_file
 from swarm_forage_env.training.export.c_header import c_header
 from swarm_forage_env.training.export.manual import manual_of
 
-EXPORT_PAGE = Path(__file__).resolve().parents[2] / "docs" / "export.md"
 PROGRAM = """\
 #include <stdio.h>
 #include "NAME.h"
@@ -127,14 +125,6 @@ def test_the_header_computes_what_the_policy_does(which, tmp_path):
     np.testing.assert_allclose(found.reshape(LARGE, -1), expected(network, seen), rtol=1e-6, atol=1e-6)
 
 
-def test_the_page_tells_how_large_the_generalist_is():
-    network = Network.load(network_file("generalist"))
-    products = sum(weights.size for weights in network.weights)
-    kilobytes = 4 * (products + sum(biases.size for biases in network.biases)) / 1000
-    told = f"The generalist takes {products:,} multiplications per decision, and {kilobytes:.0f} kB of constants."
-    assert told in " ".join(EXPORT_PAGE.read_text().split())
-
-
 def test_the_header_chooses_as_the_policy_does(tmp_path):
     export_policy("generalist", tmp_path / "generalist.h")
     rng = np.random.default_rng(2)
@@ -201,16 +191,6 @@ def test_the_formulas_of_frames_do_what_runs_do(which, tmp_path):
         np.testing.assert_array_equal(found, view)
         taken |= {*frames.taken}
     assert taken == {*range(8)}
-
-
-@pytest.mark.parametrize("name", ["été-7", "7.1", "_a", "int", "a b", "..."])
-def test_any_name_of_a_policy_gives_a_header_that_compiles(name, tmp_path):
-    file = tmp_path / f"{name}.npz"
-    NETWORKS["one layer, drives only"].save(file)
-    export_policy(file, tmp_path / "net.h")
-    (identifier,) = re.findall(r"inline void (\w+)_forward", (tmp_path / "net.h").read_text())
-    program = PROGRAM.replace("NAME.h", "net.h")
-    assert answer(tmp_path, identifier, program, np.zeros(23, np.float32).tobytes())
 
 
 def test_names_become_identifiers_and_words_do_not_end_the_comment():

@@ -12,7 +12,6 @@ pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-b
 from stable_baselines3 import DQN, PPO
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.cli.training_report import heading
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.turns import AS_IT_IS
@@ -21,10 +20,8 @@ from swarm_forage_env.scenarios.presets import warehouse_small
 from swarm_forage_env.training import evaluations
 from swarm_forage_env.training.evaluation_plan import EvaluationPlan, EvaluationWorld
 from swarm_forage_env.training.evaluations import (
-    Evaluation,
     baseline_runs,
     best_baselines,
-    chosen,
     ratio_to,
     read_evaluations,
 )
@@ -32,7 +29,6 @@ from swarm_forage_env.training.plan import Stage, TrainingPlan, named_plan, read
 from swarm_forage_env.training.recipe import recipe
 from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv
 from swarm_forage_env.training.sb3.training import train
-from swarm_forage_env.wrappers.registry import wrapper_configs
 from swarm_forage_env.wrappers.world import World
 from tests.support.sampled import TWO_WORLDS, sampler
 
@@ -136,37 +132,6 @@ def test_the_same_plan_with_a_sampler_gives_the_same_weights_in_one_process_and_
     assert not all(map(np.array_equal, first, other))
 
 
-def test_plans_without_worlds_write_what_they_always_wrote():
-    plan = dataclasses.replace(
-        tiny_plan(), sampler=None, world=World(warehouse_small(**QUICK)), evaluation=EvaluationPlan(every_steps=5)
-    )
-    mapping = plan.to_mapping()
-    assert "sampler" not in mapping
-    assert list(mapping["evaluation"]) == ["every_steps", "horizon_s", "n_runs", "first_seed", "baseline"]
-    assert list(mapping["stages"][0]) == ["steps", "scenario", "options"]
-    plain = Evaluation(
-        steps=1, wall_time_s=1.0, cpu_time_s=1.0, performance=1.0, baseline=1.0, interference_fraction=0.0
-    )
-    assert list(plain.to_mapping()) == [
-        "steps",
-        "wall_time_s",
-        "performance",
-        "baseline",
-        "interference_fraction",
-        "cpu_time_s",
-    ]
-
-
-def test_of_equal_evaluations_the_latest_is_chosen():
-    first, again, worse = (
-        Evaluation(
-            steps=steps, wall_time_s=1.0, cpu_time_s=1.0, performance=reached, baseline=1.0, interference_fraction=0.0
-        )
-        for steps, reached in ((1, 5.0), (2, 5.0), (3, 4.0))
-    )
-    assert chosen([first, again, worse]) is again
-
-
 def test_a_baseline_that_finds_nothing_counts_as_one_object():
     assert ratio_to(0.0, 5.0, 400.0) == pytest.approx(5.0 / (1000.0 / 400.0))
     assert ratio_to(10.0, 5.0, 400.0) == 0.5
@@ -214,12 +179,6 @@ def test_plans_that_are_refused(mapping, reason):
         TrainingPlan.from_mapping(mapping)
 
 
-def test_stages_share_the_caches_of_the_policy():
-    cached = type(WORLDS).from_mapping({"worlds": [{"scenario": {"preset": "warehouse_small", "caches": "static"}}]})
-    with pytest.raises(ConfigError, match="same caches"):
-        tiny_plan(stages=(Stage(steps=5, sampler=cached),))
-
-
 FIXED = TrainingPlan(world=World(warehouse_small(**QUICK)), interface=NUMBERED)
 
 
@@ -232,32 +191,6 @@ def test_worlds_to_be_judged_in_fit_the_policy(fields):
         dataclasses.replace(
             FIXED, world=World(warehouse_small(**QUICK, **seen)), evaluation=EvaluationPlan(worlds=(odd,))
         )
-
-
-def test_wrappers_stand_where_they_take_effect():
-    noise = wrapper_configs(["sensor_noise:sigma=0.1"])
-    judged = EvaluationPlan(worlds=JUDGED)
-    stages = (Stage(steps=5, sampler=WORLDS),)
-    for changes in ({"evaluation": judged}, {"evaluation": judged, "stages": stages}):
-        with pytest.raises(ConfigError, match=r"without wrappers beside .* got sensor_noise;"):
-            dataclasses.replace(FIXED, world=World(FIXED.scenario, noise), **changes)
-
-
-def test_worlds_of_one_name_have_one_performance():
-    """Their progress is told under that name."""
-    worlds = [
-        {"scenario": {"preset": "warehouse_small", **QUICK, "performance": performance}}
-        for performance in ("collected", "first_picked")
-    ]
-    with pytest.raises(ConfigError, match=r"warehouse_small to have one performance, .* collected and first_picked"):
-        tiny_plan(stages=(Stage(steps=5, sampler=type(WORLDS).from_mapping({"worlds": worlds})),))
-
-
-def test_the_heading_tells_one_horizon_only_where_all_runs_have_it():
-    longer = EvaluationWorld(scenario=warehouse_small(**{**QUICK, "horizon_s": 400.0}), name="longer", baseline="crw")
-    for worlds, words in ((JUDGED, "in 1 run of 200 s in each of 2 worlds"), ((*JUDGED, longer), "in 1 whole run in")):
-        plan = dataclasses.replace(FIXED, evaluation=EvaluationPlan(worlds=worlds))
-        assert words in heading(plan)
 
 
 def test_drawn_worlds_are_turned_unless_the_plan_says_no(tmp_path):
@@ -276,18 +209,6 @@ def test_drawn_worlds_are_turned_unless_the_plan_says_no(tmp_path):
     assert named_plan(str(plan), frame_decisions=9).run_interface.frame_decisions == 9
     plan.write_text(f"turned = false\n{text}")
     assert read_plan(plan).turned is False
-
-
-@pytest.mark.parametrize("turned", [True, False])
-def test_a_plan_beside_a_training_says_how_it_was(turned, tmp_path):
-    """One that says nothing was written before there were turns."""
-    plan = tiny_plan(turned=turned)
-    plan.write(tmp_path / "plan.json")
-    assert read_plan(tmp_path / "plan.json") == plan
-    mapping = plan.to_mapping()
-    del mapping["turned"]
-    (tmp_path / "plan.json").write_text(json.dumps(mapping))
-    assert read_plan(tmp_path / "plan.json").turned is False
 
 
 @pytest.mark.parametrize("turned", [True, False])

@@ -136,13 +136,6 @@ def test_replay_draws_every_present_step_and_no_other():
     np.testing.assert_array_equal(samples.dones.numpy().ravel(), (steps == 1) & (robots != 0))
 
 
-def test_replay_without_anybody_present_says_so():
-    with pytest.raises(ValueError, match="robot in the world"):
-        filled_replay([[False, False]]).sample(1)
-    with pytest.raises(ValueError, match="optimize_memory_usage"):
-        PresentReplayBuffer(4, spaces.Box(-1, 1, (2,)), spaces.Discrete(3), optimize_memory_usage=True)
-
-
 def test_dqn_learns_from_it():
     env = SwarmVecEnv(**lives.WORLD, interface=InterfaceConfig(observation="compact", actions="discrete"))
     model = DQN(
@@ -174,15 +167,6 @@ def test_a_wait_is_one_transition_for_lambda_too():
     np.testing.assert_allclose(buffer.advantages[[0, 3], 0], [-2.5625, -1.0])
 
 
-def test_a_rollout_without_anybody_at_work_says_so():
-    buffer = ActiveRolloutBuffer(1, spaces.Box(0, 1, (1,)), spaces.Box(-1, 1, (1,)), active_column=0)
-    one = torch.ones(1)
-    buffer.add(np.zeros((1, 1)), np.zeros((1, 1)), np.zeros(1), np.zeros(1), one, one)
-    buffer.compute_returns_and_advantage(one, np.zeros(1))
-    with pytest.raises(ValueError, match="at work in the rollout"):
-        next(buffer.get())
-
-
 def test_behind_stacked_frames_the_newest_one_counts():
     """Robot 1 is in repair in the ticks 2 and 3; an older frame would show it at work, or not, too late."""
     env = SwarmVecEnv(**lives.WORLD, interface=InterfaceConfig(observation="compact"))
@@ -200,11 +184,3 @@ def test_behind_stacked_frames_the_newest_one_counts():
     model.collect_rollouts(stacked, callback, model.rollout_buffer, lives.N_TICKS)
     assert len(next(model.rollout_buffer.get()).returns) == lives.ACTIVE_BEFORE.sum()
     np.testing.assert_array_equal(model.rollout_buffer._is_active, lives.ACTIVE_BEFORE)
-
-
-@pytest.mark.parametrize(("active_column", "n_columns"), [(1, 3), (2, 2), (-1, None), (4, None), (0, 0)])
-def test_a_column_that_observations_do_not_have_is_refused(active_column, n_columns):
-    with pytest.raises(ValueError, match=r"column .* got \(4,\)"):
-        ActiveRolloutBuffer(
-            1, spaces.Box(0, 1, (4,)), spaces.Box(-1, 1, (1,)), active_column=active_column, n_columns=n_columns
-        )

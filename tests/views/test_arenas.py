@@ -6,7 +6,6 @@ import pytest
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.views import learner_arena
 from swarm_forage_env.views.arenas import ArenaBatch, ArenaStep
 from swarm_forage_env.views.plans import ArenaPlan, plan_arena
 from swarm_forage_env.wrappers.registry import parse_wrapper
@@ -176,20 +175,6 @@ def test_a_refused_scenario_leaves_the_arena_as_it_was(options, reason):
     assert batch.step(np.zeros((3, 3), np.float32)).rewards.tolist() == [1.0, 1.0, 1.0]
 
 
-def test_an_interface_that_is_refused_leaves_the_world_as_it_was(monkeypatch):
-    def refuse(config, spec):
-        raise ConfigError("no such interface")
-
-    batch = ArenaBatch(plan(), 1)
-    batch.reset([0], [None])
-    with monkeypatch.context() as patched:
-        patched.setattr(learner_arena, "LearnerInterface", refuse)
-        with pytest.raises(ConfigError, match="no such interface"):
-            batch.reset([0], [{"scenario": {"n_objects": 9}}])
-    batch.reset([0], [None])
-    assert batch.arenas[0].forage_env.scenario.objects.n_objects == 4
-
-
 def test_closed_arenas_take_no_reset_and_no_step():
     batch = ArenaBatch(plan(), 1)
     batch.reset([0], [None])
@@ -197,17 +182,6 @@ def test_closed_arenas_take_no_reset_and_no_step():
     for call in (lambda: batch.step(np.zeros((3, 3))), batch.action_masks, lambda: batch.reset([0], [None])):
         with pytest.raises(RuntimeError, match="were closed"):
             call()
-
-
-def test_steps_in_which_nothing_ends_share_what_is_empty_and_nothing_else():
-    batch = ArenaBatch(plan(), 1)
-    batch.reset([0], [None])
-    first, second = (batch.step(np.zeros((3, 3), np.float32)) for _ in range(2))
-    assert first.ended.shape == first.returns.shape == first.lengths.shape == first.is_episode.shape == (0,)
-    assert first.final_obs.shape == (0, batch.interface.layout.size)
-    assert first.outcomes == ()
-    for name in ("obs", "rewards", "terminated", "truncated", "active"):
-        assert not np.shares_memory(getattr(first, name), getattr(second, name))
 
 
 def test_refuses_too_few_rows_and_steps_before_a_reset():
@@ -239,26 +213,6 @@ def test_actions_that_are_not_finite_are_refused_by_name(interface):
     assert [arena.forage_env.tick for arena in batch.arenas] == [1, 0], "other arenas may have been stepped"
     batch.reset([0, 1], [None, None])
     assert batch.step(np.zeros_like(actions)).obs.shape[0] == 6
-
-
-def test_a_step_that_was_refused_does_not_count():
-    batch = ArenaBatch(plan(), 1)
-    batch.reset([0], [None])
-    idle = np.zeros((3, 3), np.float32)
-    with pytest.raises(ValueError, match="robot_0"):
-        batch.step(np.full_like(idle, np.nan))
-    for _ in range(lives.HORIZON_TICKS):
-        step = batch.step(idle)
-    assert step.lengths.tolist() == [lives.HORIZON_TICKS] * 3
-    assert step.returns.tolist() == [5.0] * 3
-
-
-def test_small_rewards_of_long_runs_add_up():
-    batch = ArenaBatch(plan(InterfaceConfig(decision_ticks=10), max_cycles=3000, tick=0.1), 1)
-    batch.reset([0], [None])
-    for _ in range(300):
-        step = batch.step(np.zeros((3, 3), np.float32))
-    np.testing.assert_allclose(step.returns, [300.0] * 3, rtol=3e-7)
 
 
 def test_attributes_are_set_where_they_are_also_below_wrappers():

@@ -46,14 +46,6 @@ def test_shows_the_same_world_as_the_parallel_environment():
         assert truncated == all(truncations.values())
 
 
-def test_observations_of_earlier_steps_stay_valid():
-    env = JointForageEnv("warehouse_small", n_robots=4)
-    first, _ = env.reset(seed=0)
-    kept = first.copy()
-    env.step(np.ones((4, 3), np.float32))
-    np.testing.assert_array_equal(first, kept)
-
-
 def test_terminates_only_when_every_robot_is_dead():
     env = JointForageEnv("warehouse_small", n_robots=3)
     env.reset(seed=0)
@@ -90,13 +82,6 @@ def test_an_interface_decides_what_is_seen_and_done():
         numbered.step(np.full(4, 0.7))
 
 
-def test_without_an_interface_the_spaces_are_those_of_the_parallel_environment():
-    env = JointForageEnv(n_robots=4)
-    assert env.observation_space == spaces.Box(-1.0, 1.0, (4, env.forage_env.layout.size), np.float32)
-    assert env.action_space == spaces.Box(-1.0, 1.0, (4, 3), np.float32)
-    assert env.reset(seed=0)[1].keys() == {"active"}
-
-
 @pytest.mark.parametrize("interface", INTERFACES.values(), ids=INTERFACES)
 def test_an_interface_shows_the_rows_of_the_vector_view_and_sums_their_rewards(interface):
     options = {"n_robots": 4, "interface": interface, "max_cycles": 20, "tick": 0.01}
@@ -119,19 +104,6 @@ def test_an_interface_shows_the_rows_of_the_vector_view_and_sums_their_rewards(i
         total += reward
     assert joint.forage_env.tick == 20
     assert total >= 20 * 4 * 0.01 * (1 - 1e-6), "0.01 per robot and tick, also of the decision cut short"
-
-
-def test_a_curriculum_keeps_the_interface():
-    env = JointForageEnv(n_robots=4, interface={"observation": "compact"})
-    obs, _ = env.reset(seed=0, options={"scenario": {"width_m": 24.0}})
-    assert env.forage_env.scenario.arena.width_m == 24.0
-    assert env.interface.layout.part("position").scale[0] == 12.0
-    assert env.observation_space.contains(obs)
-
-
-def test_there_is_nothing_to_step_before_a_reset():
-    with pytest.raises(RuntimeError, match="There is no world before the first reset"):
-        JointForageEnv(n_robots=4).step(np.zeros((4, 3), np.float32))
 
 
 def test_unknown_scenario_names_the_nearest():

@@ -1,15 +1,11 @@
 """render_mode="human": steps are shown in a window, and nothing else changes."""
 
-import copy
-import pickle
 import sys
 
-import gymnasium
 import numpy as np
 import pytest
 
 import swarm_forage_env  # noqa: F401 - registers the environment ids
-from swarm_forage_env.views.gymnasium import JointForageEnv, SwarmVectorEnv
 from swarm_forage_env.views.pettingzoo import parallel_env
 
 SMALL = {"scenario": "warehouse_small", "n_robots": 5, "n_objects": 20}
@@ -63,36 +59,6 @@ def test_a_window_that_the_user_closes_stays_closed(display):
     for _ in range(3):
         env.step({agent: np.zeros(3, np.float32) for agent in env.agents})
         assert not display.get_init()
-
-
-def test_the_joint_view_and_learners_have_a_window(display):
-    with gymnasium.make("swarm_forage/warehouse_small-v0", n_robots=5, render_mode="human") as env:
-        env.reset(seed=1)
-        assert display.get_init()
-        env.step(env.action_space.sample())
-        env.reset(options={"scenario": {"n_objects": 10}})
-        assert display.get_init()
-    assert not display.get_init()
-    learner = parallel_env(**SMALL, interface={"actions": "discrete"}, render_mode="human")
-    learner.reset(seed=1)
-    assert display.get_init()
-    learner.close()
-    assert not display.get_init()
-    assert "human" in JointForageEnv.metadata["render_modes"]
-
-
-def test_copies_go_on_without_the_window(display):
-    env = parallel_env(**SMALL, render_mode="human", physics="compiled")
-    env.reset_batch(seed=1)
-    for twin in (copy.deepcopy(env), pickle.loads(pickle.dumps(env))):  # noqa: S301 - our own bytes
-        actions = np.ones((5, 3), np.float32)
-        assert twin.step_batch(actions)[0].tobytes() == copy.deepcopy(env).step_batch(actions)[0].tobytes()
-
-
-def test_vector_environments_have_none():
-    assert SwarmVectorEnv.metadata["render_modes"] == ["rgb_array"]
-    with pytest.raises(ValueError, match="a window shows one arena"):
-        SwarmVectorEnv(**SMALL, n_arenas=2, render_mode="human")
 
 
 def test_without_pygame_the_message_tells_what_to_install(monkeypatch):

@@ -1,17 +1,14 @@
 """The learner's interface under the PettingZoo API: its contract, and the same runs as the rows of arenas."""
 
 import numpy as np
-import pettingzoo
 import pytest
-from gymnasium import spaces
-from pettingzoo.test import api_test, parallel_api_test, parallel_seed_test
+from pettingzoo.test import parallel_api_test, parallel_seed_test
 
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.views.arenas import ArenaBatch
 from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv, parallel_env
 from swarm_forage_env.views.plans import ArenaPlan
-from swarm_forage_env.wrappers.noise import SensorNoise
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.world import World
 
@@ -98,15 +95,6 @@ def test_wrappers_of_others_find_a_generator_that_follows_the_seed(interface):
     assert drawn[0] == drawn[1] != drawn[2]
 
 
-def test_actions_are_asked_of_everybody():
-    env = ParallelLearnerEnv("warehouse_small", n_robots=3)
-    with pytest.raises(RuntimeError, match="Call reset"):
-        env.step({})
-    env.reset(seed=0)
-    with pytest.raises(ValueError, match=r"missing \['robot_1'\]"):
-        env.step({"robot_0": np.zeros(3), "robot_2": np.zeros(3)})
-
-
 @pytest.mark.parametrize(
     ("interface", "action"),
     [
@@ -122,29 +110,3 @@ def test_actions_that_would_have_to_be_stretched_or_cut_are_refused(interface, a
     env.reset(seed=0)
     with pytest.raises(ValueError, match=r"Expected an action of .* for robot_0"):
         env.step(dict.fromkeys(env.agents, action))
-
-
-def test_an_interface_is_asked_for_by_id():
-    env_id, options = "swarm_forage/warehouse_small-v0", {"n_robots": 3, "max_cycles": 9}
-    parallel = pettingzoo.make("parallel", env_id, interface=INTERFACES["numbered"], **options)
-    assert isinstance(parallel.unwrapped, ParallelLearnerEnv)
-    assert parallel.action_space("robot_0") == spaces.Discrete(11)
-    turns = pettingzoo.make("aec", env_id, interface={"actions": "discrete", "automatic_gripper": True}, **options)
-    assert turns.action_space("robot_0") == spaces.Discrete(6)
-    api_test(turns, num_cycles=20)
-
-
-def test_what_disturbs_the_swarm_is_asked_for_by_id_with_or_without_an_interface():
-    env_id, words = "swarm_forage/warehouse_small-v0", ["sensor_noise:sigma=0.1"]
-    plain = pettingzoo.make("parallel", env_id, n_robots=3, wrappers=words)
-    assert isinstance(plain, SensorNoise)
-    learner = pettingzoo.make("parallel", env_id, n_robots=3, wrappers=words, interface={})
-    np.testing.assert_equal(plain.reset(seed=1)[0], learner.reset(seed=1)[0])
-
-
-def test_draws_pictures():
-    pytest.importorskip("PIL", reason="needs the render extra: pillow")
-    env = ParallelLearnerEnv("warehouse_small", n_robots=3, render_mode="rgb_array")
-    env.reset(seed=0)
-    assert env.render().ndim == 3
-    env.close()

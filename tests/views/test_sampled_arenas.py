@@ -2,12 +2,10 @@
 
 import gymnasium
 import numpy as np
-import pettingzoo
 import pytest
 from pettingzoo.test import parallel_api_test
 
 from swarm_forage_env import SnapshotError, parallel_env
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.views.arenas import ArenaBatch
@@ -108,18 +106,6 @@ def test_fields_of_a_reset_hold_in_every_world():
     assert {config.reward.delivery for config in batch.get_attribute("scenario", [0, 1])} == {7.0}
 
 
-@pytest.mark.parametrize("fields", [{"n_robots": 3}, {"n_objects": WORLDS.n_objects + 1}])
-def test_a_refused_reset_changes_no_world_and_no_seed(fields):
-    env, twin = (ParallelLearnerEnv(sampler=WORLDS) for _ in range(2))
-    for one in (env, twin):
-        one.reset(seed=3)
-    with pytest.raises(ConfigError, match=next(iter(fields))):
-        env.reset(options={"scenario": fields})
-    for one in (env, twin):
-        one.reset()
-    np.testing.assert_array_equal(env.state(), twin.state())
-
-
 def test_processes_give_the_same_rows():
     together, apart = ArenaBatch(PLAN, 2), ArenaProcesses(PLAN, 2, 1)
     try:
@@ -165,25 +151,6 @@ def test_a_snapshot_of_one_world_is_restored_from_another():
     np.testing.assert_array_equal(np.stack(list(restored.values())), np.stack(list(first.values())))
 
 
-@pytest.mark.parametrize(
-    ("given", "reason"),
-    [
-        ({"scenario": "warehouse_small", "n_robots": 2, "physics": "compiled"}, "with a sampler, got one without"),
-        ({"sampler": worlds_of(n_robots=9)}, "n_robots of at most 6, .* got 9"),
-        ({"sampler": worlds_of(n_objects=WORLDS.n_objects + 1)}, f"n_objects of at most {WORLDS.n_objects},"),
-    ],
-)
-def test_a_snapshot_for_which_there_is_no_room_changes_nothing(given, reason):
-    env, other = ParallelLearnerEnv(sampler=WORLDS), ParallelLearnerEnv(**given)
-    env.reset(seed=3)
-    other.reset(seed=3)
-    agents, state = list(env.agents), env.state()
-    with pytest.raises(SnapshotError, match=reason):
-        env.restore(other.snapshot())
-    assert env.agents == agents
-    np.testing.assert_array_equal(env.state(), state)
-
-
 def test_a_snapshot_of_a_drawn_world_needs_a_sampler():
     env, other = ParallelLearnerEnv("warehouse_small", n_robots=2), ParallelLearnerEnv(sampler=worlds_of())
     other.reset(seed=3)
@@ -211,14 +178,3 @@ def test_vector_environments_of_gymnasium_have_spare_rows():
     expected = np.arange(6) < np.array(sizes([3, 5]))[:, None]
     np.testing.assert_array_equal(infos["active"], expected.ravel())
     np.testing.assert_array_equal(obs.any(axis=1), expected.ravel())
-
-
-def test_a_sampler_decides_alone():
-    with pytest.raises(ConfigError, match=r"either a sampler.* or scenario, n_robots"):
-        parallel_env("warehouse_small", sampler=WORLDS, n_robots=3)
-    with pytest.raises(ConfigError, match=r"either a sampler.* or wrappers"):
-        SwarmVectorEnv(sampler=WORLDS, wrappers=["sensor_noise:sigma=0.1"])
-    with pytest.raises(ConfigError, match="Expected a sampler for"):
-        pettingzoo.make("parallel", "swarm_forage/sampled-v0")
-    with pytest.raises(ConfigError, match="ScenarioSampler"):
-        parallel_env(sampler={"worlds": []})

@@ -13,7 +13,6 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import VecEnvWrapper, VecFrameStack, VecMonitor
 
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.training.sb3 import SwarmVecEnv
 from swarm_forage_env.wrappers.registry import parse_wrapper
@@ -106,14 +105,6 @@ def test_evaluations_of_the_library_count_episodes_and_no_absences():
     assert set(lost) == {0.0, 1.0}, "whoever dies earns nothing in the last step of its episode, and in no other"
 
 
-def test_a_method_is_called_once_per_arena():
-    env = SwarmVecEnv(**lives.WORLD, n_arenas=2)
-    env.seed(0)
-    env.reset()
-    env.env_method("step_batch", IDLE, indices=[0, 1, 4])
-    assert env.get_attr("tick", indices=[0, 3]) == [1, 1]
-
-
 def test_options_change_the_scenario_of_the_next_resets():
     env = SwarmVecEnv(**lives.WORLD, n_arenas=2)
     env.set_options({"scenario": {"n_objects": 9}})
@@ -131,15 +122,6 @@ def test_masks_are_found_where_masking_algorithms_look():
     assert masks.shape == (3, env.action_space.n)
     np.testing.assert_array_equal(masks, env.action_masks())
     assert not SwarmVecEnv(**lives.WORLD).has_attr("action_masks")
-
-
-def test_one_picture_per_arena():
-    pytest.importorskip("PIL", reason="needs the render extra: pillow")
-    env = SwarmVecEnv(**lives.WORLD, n_arenas=2, render_mode="rgb_array")
-    env.reset()
-    pictures = env.get_images()
-    assert len(pictures) == 2
-    assert pictures[0].dtype == np.uint8
 
 
 def test_works_inside_the_wrappers_of_the_library():
@@ -191,39 +173,6 @@ def test_arenas_in_processes_give_the_same_bits():
 def test_refuses_more_processes_than_arenas():
     with pytest.raises(ValueError, match="n_processes from 1 to n_arenas = 2"):
         SwarmVecEnv(**lives.WORLD, n_arenas=2, n_processes=3)
-
-
-def test_rows_are_asked_for_by_arenas_or_by_their_number():
-    assert SwarmVecEnv(n_robots=6, num_envs=12).n_arenas == 2
-    with pytest.raises(ValueError, match="num_envs to be a multiple of n_robots = 5"):
-        SwarmVecEnv(n_robots=5, num_envs=12)
-
-
-def test_takes_words_plain_values_and_lists_of_actions():
-    env = SwarmVecEnv(n_robots=3, wrappers=["sensor_noise:sigma=0.1"], interface={"actions": "discrete"})
-    env.seed(0)
-    obs = env.reset()
-    assert env.step([0, 1, 2])[1].shape == (3,)
-    clean = SwarmVecEnv(n_robots=3)
-    clean.seed(0)
-    assert not np.array_equal(clean.reset(), obs)
-    with pytest.raises(ConfigError, match="wrappers as a list"):
-        SwarmVecEnv(wrappers="sensor_noise:sigma=0.1")
-
-
-def test_options_beside_the_scenario_are_refused():
-    env = SwarmVecEnv(**lives.WORLD)
-    env.set_options({"n_objects": 9})
-    with pytest.raises(ConfigError, match="'n_objects' inside of the reset option 'scenario'"):
-        env.reset()
-
-
-def test_closed_environments_take_no_step():
-    env = SwarmVecEnv(**lives.WORLD)
-    env.reset()
-    env.close()
-    with pytest.raises(RuntimeError, match="were closed"):
-        env.step(IDLE)
 
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, pickled])

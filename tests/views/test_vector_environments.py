@@ -3,10 +3,9 @@
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env, data_equivalence
+from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
-from gymnasium.wrappers.vector import DictInfoToList, RecordEpisodeStatistics
 
 import swarm_forage_env
 from swarm_forage_env._internal.fields import ConfigError
@@ -105,30 +104,6 @@ def test_words_of_the_command_line_and_plain_values_are_taken_everywhere():
 def test_other_wrappers_and_interfaces_are_refused(view, given, reason):
     with pytest.raises(ConfigError, match=reason):
         view(n_robots=3, **given)
-
-
-@pytest.mark.parametrize("n_processes", [0, 1])
-def test_actions_may_be_lists_and_closed_environments_take_none(n_processes):
-    envs = SwarmVectorEnv(n_robots=3, interface={"actions": "discrete"}, n_processes=n_processes)
-    envs.reset(seed=0)
-    assert envs.step([0, 1, 2])[1].shape == (3,)
-    envs.close()
-    for call in (lambda: envs.step([0, 1, 2]), envs.reset):
-        with pytest.raises(RuntimeError, match="Expected open arenas, but they were closed"):
-            call()
-
-
-def test_numbers_that_are_not_whole_are_no_actions():
-    envs = SwarmVectorEnv(n_robots=3, interface=INTERFACES[2])
-    envs.reset(seed=0)
-    with pytest.raises(ValueError, match="whole numbers from 0 to 10, got float64"):
-        envs.step(np.array([0.7, 1.0, 2.0]))
-
-
-def test_other_vectorizers_take_the_joint_view():
-    envs = gymnasium.make_vec("swarm_forage/warehouse_small-v0", num_envs=2, vectorization_mode="sync", n_robots=3)
-    obs, _ = envs.reset(seed=0)
-    assert obs.shape[:2] == (2, 3)
 
 
 def told_story() -> list[tuple]:
@@ -236,11 +211,6 @@ def test_a_reset_can_change_the_scenario(view):
         env.reset(options={"width_m": 24.0})
 
 
-def test_the_checker_of_gymnasium_passes_with_wrappers_and_options():
-    wrappers = [parse_wrapper("sensor_noise:sigma=0.05"), parse_wrapper("population:death_per_tick=0.01")]
-    check_env(JointForageEnv("warehouse_small", n_robots=5, wrappers=wrappers, max_cycles=50), skip_render_check=True)
-
-
 def test_attributes_and_methods_reach_the_arenas():
     envs = SwarmVectorEnv("warehouse_small", num_envs=6, n_robots=3, n_processes=2)
     try:
@@ -257,27 +227,9 @@ def test_attributes_and_methods_reach_the_arenas():
         envs.close()
 
 
-def test_pictures_are_one_per_arena():
-    pytest.importorskip("PIL", reason="needs the render extra: pillow")
-    envs = SwarmVectorEnv("warehouse_small", num_envs=6, n_robots=3, render_mode="rgb_array")
-    envs.reset(seed=0)
-    assert [picture.ndim for picture in envs.render()] == [3, 3]
-    assert SwarmVectorEnv("warehouse_small", num_envs=3, n_robots=3).render() is None
-
-
 def test_masks_come_with_discrete_actions():
     envs = SwarmVectorEnv("warehouse_small", num_envs=6, n_robots=3, interface=INTERFACES[2])
     envs.reset(seed=0)
     masks = envs.action_masks()
     assert masks.shape == (6, envs.single_action_space.n)
     assert masks[:, :6].all()
-
-
-def test_works_inside_wrappers_of_gymnasium():
-    envs = RecordEpisodeStatistics(SwarmVectorEnv(**lives.WORLD), stats_key="counted")
-    envs = DictInfoToList(envs)
-    envs.reset(seed=0)
-    for _ in range(lives.HORIZON_TICKS):
-        _, _, _, truncated, infos = envs.step(IDLE)
-    assert truncated.all()
-    assert [info["counted"]["r"] for info in infos] == [info["episode"]["r"] for info in infos] == [5.0] * 3
