@@ -43,28 +43,25 @@ def draw_scores(
     path: str | Path,
     *,
     band: bool = False,
-    all_panels: bool = False,
     style: FigureStyle = SCREEN,
 ) -> None:
     """Draw score tables side by side into a picture file: one panel per measure, one line per policy.
 
     Amounts and distances are drawn relative to performance, where they have such values: a swarm that does little has
     little to lose. Error bars are the intervals of the tables; below a dotted line, the noise floor, a distance says
-    nothing; hollow marks are values that mislead. Measures that are computed without runs (availability) and values
-    that are not finite are left out.
+    nothing; hollow marks are values that mislead. The measures are those of `PICTURED`, or all where only some were
+    scored. Measures that are computed without runs (availability) and values that are not finite are left out.
 
     Args:
         tables: One per policy.
         path: File to write; as in `saved_figure`, whose errors this has.
         band: Shade the mean plus and minus two standard deviations of single runs, as the paper does.
-        all_panels: Draw every measure, itself and relative to performance. Default: those of `PICTURED`, or all where
-            only some measures were scored.
         style: Of the figure.
 
     Raises:
         ValueError: no table has a score that can be drawn.
     """
-    drawn = _contents(tables, all_panels=all_panels)
+    drawn = _contents(tables)
     if not drawn:
         raise ValueError("Expected a score to draw, got tables without a finite value from runs.")
     where = next((table.scenario for table in tables if table.scenario), "")
@@ -112,11 +109,9 @@ class _Content:
         return score.relative_floor if self.is_relative else score.noise_floor
 
 
-def _contents(tables: "Sequence[ScoreTable]", *, all_panels: bool) -> list[_Content]:
+def _contents(tables: "Sequence[ScoreTable]") -> list[_Content]:
     """Return the panels that have something to show, in the order of tables, relative ones beside their measure."""
     found = _all_contents(tables)
-    if all_panels:
-        return found
     relative = {content.label for content in found if content.is_relative}
     each = [content for content in found if content.is_relative or content.label not in relative]
     measures = {content.measure for content in found}

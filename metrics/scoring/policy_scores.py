@@ -86,7 +86,6 @@ class ScoreQuestion(Question[Comparison]):
                 "out": None if table.folder is None else str(table.folder),
             },
             band=self.forms.band,
-            all_panels=self.forms.all_panels,
         )
 
     def _beside_limit(self, score: Score, policy: str) -> Score:
@@ -290,7 +289,6 @@ def score_curves(
                 missing=missing,
                 settings={"curves": str(path), "horizon_s": study.horizon_s, **told},
                 band=forms is not None and forms.band,
-                all_panels=forms is not None and forms.all_panels,
             )
         )
     return tuple(tables)

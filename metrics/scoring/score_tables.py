@@ -58,8 +58,6 @@ class ScoreTable(Answer):
     """How the runs were made: budget, length, seeds, folder."""
     band: bool = False
     """Whether the authors' bands stand beside the intervals."""
-    all_panels: bool = False
-    """Whether its picture has every measure, see `draw_scores`."""
 
     def __getitem__(self, measure: str) -> tuple[Score, ...]:
         """Return the scores of one measure.
@@ -131,7 +129,7 @@ class ScoreTable(Answer):
 
     def draw(self, path: str | Path, *, style: FigureStyle = SCREEN) -> None:
         """Draw the scores, see `draw_scores`."""
-        draw_scores([self], path, band=self.band, all_panels=self.all_panels, style=style)
+        draw_scores([self], path, band=self.band, style=style)
 
 
 def title(tables: Sequence[ScoreTable]) -> str:
@@ -318,8 +316,7 @@ class Comparison(Answer):
 
     def draw(self, path: str | Path, *, style: FigureStyle = SCREEN) -> None:
         """Draw the scores of all policies, see `draw_scores`."""
-        all_panels = any(table.all_panels for table in self.tables)
-        draw_scores(self.tables, path, band=self.band, all_panels=all_panels, style=style)
+        draw_scores(self.tables, path, band=self.band, style=style)
 
 
 def side_by_side(tables: Sequence[ScoreTable]) -> Comparison:

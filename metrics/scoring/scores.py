@@ -90,8 +90,6 @@ class ScoreForms:
     """For measures that compare two sizes."""
     band: bool = False
     """Whether tables and pictures have the authors' bands, too: mean plus and minus two standard deviations."""
-    all_panels: bool = False
-    """Whether pictures have every measure, itself and relative to performance, in place of those of `PICTURED`."""
 
     def __post_init__(self) -> None:
         _check_words("variant", self.variants, get_args(Variant))

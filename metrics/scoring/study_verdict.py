@@ -280,7 +280,7 @@ class StudyVerdict(Answer):
             name.experiment.split()[0] for one in self.later.values() for name in one.lacks if one.claim.name in names
         }
         words = f"{len(names)} of {n_all} wait" + ("s" if len(names) == 1 else "")
-        return f"{words} for runs of {', '.join(sorted(lacks))}; --all shows them."
+        return f"{words} for runs of {', '.join(sorted(lacks))}."
 
     def cells(self, claim: Claim, rules: str) -> tuple[str, str, str]:
         """Return the answers to a claim by the paper's bands, by ours, and by ours relative to performance."""

@@ -101,13 +101,6 @@ Forms = Annotated[
 Band = Annotated[
     bool, typer.Option("--band", help="Show the paper's bands, mean ± 2 standard deviations of single runs.")
 ]
-AllPanels = Annotated[
-    bool,
-    typer.Option(
-        "--all-panels",
-        help="Draw every measure, itself and relative to performance; default the paper's nine, each in one panel.",
-    ),
-]
 Budget = Annotated[
     str, typer.Option("--budget", help="quick, standard or paper: sets the length and number of runs, and the levels.")
 ]

@@ -10,7 +10,6 @@ import typer
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.options import (
     OF_RUNS,
-    AllPanels,
     Band,
     Budget,
     Curves,
@@ -98,7 +97,7 @@ def _picture(folder: Path, name: str, world: "World") -> Path:
     return folder / (f"{name}.png" if is_usual else f"{name}_{as_file_name(read_as)}.png")
 
 
-_CURVES_OF_SCORE = ("curves", "measures", "performance", "variant", "form", "band", "all_panels", "picture", "as_json")
+_CURVES_OF_SCORE = ("curves", "measures", "performance", "variant", "form", "band", "picture", "as_json")
 """Options that go with --curves."""
 
 
@@ -112,7 +111,6 @@ def score(
     variant: Variants = "corrected",
     form: Forms = "marginal",
     band: Band = False,
-    all_panels: AllPanels = False,
     budget: Budget = "standard",
     seeds: ScoreSeeds = None,
     disturbance: Disturbance = "throttle",
@@ -130,7 +128,7 @@ def score(
     from swarm_forage_env.cli.printer import ask_and_show, refusing, show
     from swarm_forage_env.cli.scenario_options import default_folder, split_names
 
-    forms = score_forms(variant, form, band=band, all_panels=all_panels)
+    forms = score_forms(variant, form, band=band)
     wanted = None if measures is None else split_names(measures)
     if curves is not None:
         refuse_others(context, "--curves", _CURVES_OF_SCORE, OF_RUNS)
@@ -181,7 +179,7 @@ def asked_scores(policies: Sequence[str], described: WorldOptions, **options: An
         return score_question(policies, world, horizon_s=described.horizon, caches=caches, density=density, **options)
 
 
-def score_forms(variants: str, forms: str, *, band: bool = False, all_panels: bool = False) -> "ScoreForms":
+def score_forms(variants: str, forms: str, *, band: bool = False) -> "ScoreForms":
     """Return the variants and forms that the words name, separated by commas.
 
     Raises:
@@ -193,4 +191,4 @@ def score_forms(variants: str, forms: str, *, band: bool = False, all_panels: bo
 
     words: dict[str, Any] = {"variants": split_names(variants), "forms": split_names(forms)}
     with refusing():
-        return ScoreForms(**words, band=band, all_panels=all_panels)
+        return ScoreForms(**words, band=band)

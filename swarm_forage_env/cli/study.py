@@ -172,9 +172,6 @@ def verdict(
         Path | None,
         typer.Option("--file", help="Also write the answer to a file: .txt, .md, .csv or .json, with more numbers."),
     ] = None,
-    whole: Annotated[
-        bool, typer.Option("--all", help="Also show the claims that wait for runs, which are else only counted.")
-    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Test the claims of the paper with runs of its sets: which claims they support, contradict or leave open.
@@ -200,7 +197,7 @@ def verdict(
     if as_json:
         typer.echo(found.json())
     else:
-        show_boxed(replace(found, is_folded=not whole))
+        show_boxed(replace(found, is_folded=True))
     if file is not None:
         found.write(file)
         aside.print(f"written {file}")

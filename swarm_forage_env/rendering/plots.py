@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import cycle, product, repeat
+from itertools import cycle, repeat
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
@@ -24,10 +24,8 @@ from swarm_forage_env.rendering.figures import (
 _OBSTACLE = {"facecolor": "white", "edgecolor": "black", "hatch": "////", "linewidth": 0.5}
 """Hatched: neither a map nor a difference has that."""
 _NEST = {"facecolor": "none", "edgecolor": "black", "linestyle": "--", "linewidth": 0.8}
-_NARROWEST_MAP = 0.2
-"""Inches per point of the font: narrower maps stand below each other."""
-_NARROW_MAP = 0.3
-"""The same: beside narrower maps, scales and titles would run into each other, so scales stand below."""
+_MAP_IN = 3.6
+"""Width of a map with its scale, inches."""
 _SMOOTHED = 5
 """Intervals of a running mean: deliveries come in bursts, which hide who delivers more (our choice)."""
 _MANY_INTERVALS = 20
@@ -185,37 +183,24 @@ def draw_maps(
     path: str | Path,
     rows: Sequence[MapRow],
     columns: Mapping[str, tuple[str, str]],
-    *,
-    style: FigureStyle = SCREEN,
 ) -> None:
     """Draw maps of floors of the same proportions: a row of panels per map or difference, a column per quantity.
 
     Colours of a quantity mean the same in all maps, and the same in all differences, where white is 0. Squares in which
-    nothing happened are white, and what happened in a small part of the floor only is shown there. A narrow figure has
-    fewer quantities beside each other, and the scales below the maps.
+    nothing happened are white, and what happened in a small part of the floor only is shown there.
 
     Args:
         path: File to write; as in `saved_figure`, whose errors this has.
         rows: One per map or difference.
         columns: What is counted, and its unit, by name of the array; their order is that of the columns.
-        style: Of the figure.
     """
-    n_across = len(columns)
-    if style.width_in is not None:
-        n_across = max(1, min(n_across, int(style.width_in / (_NARROWEST_MAP * style.font_size))))
-    width = style.width_in or 3.6 * n_across
     shape = rows[0].size_m[1] / rows[0].size_m[0]
-    blocks = [[*columns][start : start + n_across] for start in range(0, len(columns), n_across)]
-    n_lines = len(blocks) * len(rows)
-    is_narrow = n_across < len(columns) or width / n_across < _NARROW_MAP * style.font_size
-    bar = {"location": "bottom", "aspect": 12} if is_narrow else {"shrink": min(1.0, 1.2 * shape)}
-    size_in = width, (0.75 * shape * width / n_across + (0.18 if is_narrow else 0.1) * style.font_size) * n_lines
-    with saved_figure(path, size_in, style=style) as figure:
-        panels = iter(figure.subplots(n_lines, n_across, squeeze=False))
-        for names, row in product(blocks, rows):
-            line: list[Panel] = [*next(panels)]
+    size_in = _MAP_IN * len(columns), (0.75 * shape * _MAP_IN + 0.9) * len(rows)
+    with saved_figure(path, size_in) as figure:
+        panels = figure.subplots(len(rows), len(columns), squeeze=False)
+        for row, line in zip(rows, panels, strict=True):
             alike = [one for one in rows if one.is_difference == row.is_difference]
-            for name, axes in zip(names, line, strict=False):
+            for name, axes in zip(columns, line, strict=True):
                 top = _map_top([one.arrays[name] for one in alike])
                 image = _draw_map(axes, row, name, top)
                 x_low, y_low, x_high, y_high = _busy_part([one.arrays[name] for one in rows])
@@ -224,10 +209,8 @@ def draw_maps(
                 what, unit = columns[name]
                 axes.set_title(f"{policy_words(row.label)}\n{what}")
                 ends = "both" if row.is_difference else "max"
-                scale = figure.colorbar(image, ax=axes, extend=ends, **bar)
+                scale = figure.colorbar(image, ax=axes, extend=ends, shrink=min(1.0, 1.2 * shape))
                 scale.set_label(f"more {unit}" if row.is_difference else unit)
-            for axes in line[len(names) :]:
-                axes.set_axis_off()
 
 
 def _draw_map(axes: Panel, row: MapRow, name: str, top: float) -> Any:

@@ -16,7 +16,7 @@ def drawn(monkeypatch, tmp_path):
     return keep_figures(monkeypatch)
 
 
-def maps_drawn(drawn, **options):
+def maps_drawn(drawn):
     few, many = np.array([[0.0, 1.0]]), np.array([[0.0, 10.0]])
     rows = [
         MapRow("few", {"density": few}, False, (2.0, 1.0), ()),
@@ -24,7 +24,7 @@ def maps_drawn(drawn, **options):
         MapRow("many minus few", {"density": many - few}, True, (2.0, 1.0), ()),
         MapRow("few minus many", {"density": 0.5 * (few - many)}, True, (2.0, 1.0), ()),
     ]
-    draw_maps("unused.png", rows, {"density": ("robots", "per m²")}, **options)
+    draw_maps("unused.png", rows, {"density": ("robots", "per m²")})
     axes = [axes for axes in drawn[-1].axes if axes.get_images()]
     return axes, [axes.get_images()[0].get_clim() for axes in axes]
 

@@ -74,20 +74,6 @@ def test_nothing_to_draw_is_refused(tmp_path):
         draw_scores([ScoreTable(policy="mine", scenario="", scores=())], tmp_path / "scores.png")
 
 
-def test_all_panels_are_drawn_on_request_with_amounts_and_distances_themselves(tmp_path, monkeypatch):
-    (given,) = tables("mine")
-    figure = drawn(monkeypatch, tmp_path / "scores.png", [given], all_panels=True)
-    (itself, panel) = [axes for axes in figure.axes if axes.get_title().startswith("noise robustness (")]
-    (score,) = given["noise_robustness"]
-    assert itself.get_lines()[0].get_ydata()[0] == pytest.approx(score.summary.mean)
-    assert itself.get_ylabel() == "B_sa, objects (DTW)"
-    line, floor = panel.get_lines()[0], panel.get_lines()[-1]
-    assert line.get_ydata()[0] == pytest.approx(score.relative.mean)
-    assert floor.get_ydata()[0] == pytest.approx(score.relative_floor)
-    assert panel.get_ylabel() == "B_sa, share of performance"
-    assert len([axes for axes in figure.axes if axes.get_title().startswith("scalability (")]) == 1
-
-
 def test_of_all_measures_the_usual_nine_are_drawn(tmp_path, monkeypatch):
     (given,) = tables("mine")
     some = given["scalability"][0]
