@@ -46,7 +46,6 @@ Scenario = Annotated[
 ]
 Robots = Annotated[int | None, typer.Option("--robots", min=1, help="Number of robots.")]
 Objects = Annotated[int | None, typer.Option("--objects", min=1, help="Number of objects.")]
-Side = Annotated[float | None, typer.Option("--side", help="Side of the square arena in m (search_and_rescue only).")]
 Density = Annotated[
     str | None,
     typer.Option("--density", help="Robots per m2, e.g. 0.05 or 5%. The arena becomes as large as the swarm needs."),
@@ -160,7 +159,6 @@ class PlaceOptions:
     scenario: Scenario = "warehouse_small"
     """Name of a preset, or a file."""
     objects: Objects = None
-    side: Side = None
     caches: Caches = None
     horizon: Horizon = None
     performance: Performance = None

@@ -65,18 +65,18 @@ def described_fields(options: PlaceOptions) -> WorldDescription:
     """
     is_file = Path(options.scenario).suffix == FILE
     file = describe_file(options.scenario) if is_file else WorldDescription(preset=options.scenario)
-    fields = {**file.fields, **_fields_of(options, file.preset)}
+    fields = {**file.fields, **_fields_of(options)}
     wrappers = tuple(parse_wrapper(word) for word in options.wrappers)
     named = {wrapper.name for wrapper in wrappers}
     left = (wrapper for wrapper in file.wrappers if wrapper.name not in named)
     return WorldDescription(preset=file.preset, fields=fields, wrappers=(*wrappers, *left), name=file.name)
 
 
-def _fields_of(options: PlaceOptions, preset: str) -> dict[str, Any]:
+def _fields_of(options: PlaceOptions) -> dict[str, Any]:
     """Return the scenario fields that the options set, by name."""
     fields = dict(parse_setting(word) for word in options.settings)
     named = {"n_objects": options.objects, "horizon_s": options.horizon}
-    named |= {"side_m": options.side, "caches": options.caches, "performance": options.performance}
+    named |= {"caches": options.caches, "performance": options.performance}
     if isinstance(options, WorldOptions):
         named |= {"n_robots": options.robots, "density": parsed_density(options.density)}
     for name, value in named.items():
@@ -84,11 +84,6 @@ def _fields_of(options: PlaceOptions, preset: str) -> dict[str, Any]:
             raise ConfigError(f"Expected {name} once, got it from an option and from --set.")
         if value is not None:
             fields[name] = value
-    if options.side is not None and preset != "search_and_rescue":
-        raise ConfigError(
-            f"Expected --side with search_and_rescue only, got it with {preset}; "
-            "other arenas change by --set width_m=... and --set height_m=..."
-        )
     return fields
 
 
@@ -119,7 +114,7 @@ def parse_setting(word: str) -> tuple[str, Any]:
         raise ConfigError(f"Expected --set key=value, got {word!r}.")
     if name == "quirks":
         return name, text
-    types = field_types()
+    types = {**field_types(), "side_m": float}  # of search_and_rescue
     if name not in types:
         raise ConfigError(f"Unknown scenario field {name!r}.{suggestion(name, types)} See: swarm-forage info SCENARIO.")
     return name, _parse_value(name, text, types[name])

@@ -59,7 +59,7 @@ def test_a_single_seed_has_no_interval(command):
 
 
 def test_first_pickups_are_shown_where_they_are_the_performance(command):
-    words = ("run", "--policy", "random", "--scenario", "search_and_rescue", "--side", "16", "--jobs", "1")
+    words = ("run", "--policy", "random", "--scenario", "search_and_rescue", "--set", "side_m=16", "--jobs", "1")
     code, out, _ = command(*words, "--horizon", "4", "--set", "interval_s=2")
     assert code == 0
     assert "first pick-ups" in out
@@ -403,8 +403,8 @@ def test_the_columns_of_records_are_listed(command):
         (("run", "--objects", "100000"), "Expected at most"),
         (("run", "--horizon", "100"), "Expected a horizon of a whole number of intervals of 200 s, got 100 s"),
         (("run", "--horizon", "-200"), "horizon_s to be a finite number > 0"),
-        (("run", "--side", "32"), "Expected --side with search_and_rescue only"),
-        (("run", "--scenario", "search_and_rescue", "--side", "33"), "Expected side_m to be one of"),
+        (("run", "--set", "side_m=32"), "Expected side_m with search_and_rescue only"),
+        (("run", "--scenario", "search_and_rescue", "--set", "side_m=33"), "Expected side_m to be one of"),
         (("run", "--density", "five"), "Expected --density as a share such as 5% or 0.05, got 'five'"),
         (("run", "--density", "500%"), "density (robots per m^2; 0.05 is 5 %)"),
         (("run", "--density", "5%", "--set", "width_m=64"), "either density, which chooses the arena, or width_m"),
