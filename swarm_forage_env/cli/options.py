@@ -50,10 +50,6 @@ Density = Annotated[
     str | None,
     typer.Option("--density", help="Robots per m2, e.g. 0.05 or 5%. The arena becomes as large as the swarm needs."),
 ]
-Caches = Annotated[
-    str | None,
-    typer.Option("--caches", help="none, static or dynamic; default: the policy's, or else the scenario's."),
-]
 Performance = Annotated[
     str | None,
     typer.Option(
@@ -159,7 +155,6 @@ class PlaceOptions:
     scenario: Scenario = "warehouse_small"
     """Name of a preset, or a file."""
     objects: Objects = None
-    caches: Caches = None
     horizon: Horizon = None
     performance: Performance = None
     settings: Settings = ()

@@ -75,8 +75,7 @@ def described_fields(options: PlaceOptions) -> WorldDescription:
 def _fields_of(options: PlaceOptions) -> dict[str, Any]:
     """Return the scenario fields that the options set, by name."""
     fields = dict(parse_setting(word) for word in options.settings)
-    named = {"n_objects": options.objects, "horizon_s": options.horizon}
-    named |= {"caches": options.caches, "performance": options.performance}
+    named = {"n_objects": options.objects, "horizon_s": options.horizon, "performance": options.performance}
     if isinstance(options, WorldOptions):
         named |= {"n_robots": options.robots, "density": parsed_density(options.density)}
     for name, value in named.items():

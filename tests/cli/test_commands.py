@@ -105,7 +105,7 @@ def test_json_has_null_where_there_is_no_interval(command):
 
 
 def test_several_controllers_and_their_worlds(command):
-    code, out, _ = command("run", "--policy", "random, crw,random", *SHORT, "--caches", "static", "--dry-run")
+    code, out, _ = command("run", "--policy", "random, crw,random", *SHORT, "--set", "caches=static", "--dry-run")
     assert code == 0
     rows = [line.split()[:2] for line in out.splitlines() if " static " in line]
     assert rows[-3:] == [["random", "static"], ["crw", "static"], ["all", "static"]]
@@ -408,7 +408,7 @@ def test_the_columns_of_records_are_listed(command):
         (("run", "--density", "five"), "Expected --density as a share such as 5% or 0.05, got 'five'"),
         (("run", "--density", "500%"), "density (robots per m^2; 0.05 is 5 %)"),
         (("run", "--density", "5%", "--set", "width_m=64"), "either density, which chooses the arena, or width_m"),
-        (("run", "--caches", "foo"), "Expected caches to be one of none, static, dynamic, got 'foo'"),
+        (("run", "--set", "caches=foo"), "Expected caches to be one of none, static, dynamic, got 'foo'"),
         (("run", "--set", "n_robot=5"), "Unknown scenario field 'n_robot'. Did you mean 'n_robots'?"),
         (("run", "--set", "quirks=PROGRAM"), "Unknown rules 'PROGRAM'. Did you mean 'AUTHORS_PROGRAM'?"),
         (("run", "--set", "n_robots"), "Expected --set key=value, got 'n_robots'"),

@@ -24,7 +24,7 @@ def test_record_films_a_run(command):
     assert Path("results/warehouse_small_3_robots_random.gif").read_bytes() == Path("film.gif").read_bytes()
 
 
-@pytest.mark.parametrize(("asked", "filmed"), [((), "static"), (("--caches", "none"), "none")])
+@pytest.mark.parametrize(("asked", "filmed"), [((), "static"), (("--set", "caches=none"), "none")])
 def test_record_films_the_caches_that_were_asked_for(command, monkeypatch, asked, filmed):
     pytest.importorskip("PIL")
     build, built = film.build_env, []

@@ -155,7 +155,7 @@ def test_a_plan_counts_in_words(command):
 
 
 def test_seeds_length_and_world_can_be_chosen(command):
-    command(*SCORE, *FEW, "--seeds", "1", "--horizon", "2", "--set", "walk_probability=0.1", "--caches", "static")
+    command(*SCORE, *FEW, "--seeds", "1", "--horizon", "2", "--set", "walk_probability=0.1", "--set", "caches=static")
     records = load("results/warehouse_small_3_robots_ba6106")
     assert {(record.seed, record.horizon_s) for record in records} == {(0, 2.0)}
     assert all('"caches": "static"' in record.spec and '"walk_probability": 0.1' in record.spec for record in records)
