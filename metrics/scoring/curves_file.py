@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from swarm_forage_env.runs.parquet import ParquetError, panics_untold, parse_parquet
+from swarm_forage_env.runs.parquet import ParquetError, read_parquet
 from swarm_forage_env.scenarios.performance import INVERTED, Performance
 from swarm_forage_env.wrappers.world import SIZE
 
@@ -48,8 +48,6 @@ _ROW = "row of the table"
 """Column for the order of rows; no table of curves has one of this name."""
 MOST = 1e15
 """Largest number in a table; our choice: sums of squares of such numbers are finite, and whole ones are exact."""
-MOST_BYTES = 2**31
-"""What a Parquet file may have, in the file, unpacked and in memory: 6 million rows of 20 columns; our choice."""
 MOST_ROBOTS = 10_000_000
 """Largest swarm in a table; our choice: some measures need an array of this length."""
 _STEERING = "[\\p{Cc}\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]"
@@ -92,31 +90,22 @@ def _check_comparable(study: StudyCurves) -> None:
 def _read_frame(file: Path) -> "pl.DataFrame":
     import polars as pl
 
-    reader = {".csv": _read_csv, ".parquet": _read_parquet}.get(file.suffix.lower())
+    reader = {".csv": pl.read_csv, ".parquet": _read_parquet}.get(file.suffix.lower())
     if reader is None:
         raise CurveError(f"Expected curves as a .csv or .parquet file, got {file}.")
     try:
-        content = file.read_bytes()
+        if not file.read_bytes().strip():
+            raise CurveError(f"Expected curves in {file}, but the file is empty.")
+        return reader(file)
     except OSError as error:
         raise CurveError(f"Cannot read {file}: {error.strerror or error}.") from error
-    if not content.strip():
-        raise CurveError(f"Expected curves in {file}, but the file is empty.")
-    try:
-        return reader(content)
     except (ParquetError, pl.exceptions.PolarsError, pl.exceptions.PanicException, UnicodeDecodeError) as error:
         reason = str(error).splitlines()[0]
         raise CurveError(f"Cannot read {file} as {file.suffix.lower()[1:].upper()}: {reason}.") from error
 
 
-def _read_csv(content: bytes) -> "pl.DataFrame":
-    import polars as pl
-
-    with panics_untold():
-        return pl.read_csv(content)
-
-
-def _read_parquet(content: bytes) -> "pl.DataFrame":
-    return parse_parquet(content, MOST_BYTES, ours=False).frame()
+def _read_parquet(file: Path) -> "pl.DataFrame":
+    return read_parquet(file)[1]
 
 
 def with_performance(frame: "pl.DataFrame", given: PerformanceLike, where: str) -> tuple["pl.DataFrame", Performance]:

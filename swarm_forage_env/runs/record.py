@@ -1,34 +1,25 @@
 """RunRecord: one run as columns over recording intervals, and the Parquet file that holds it.
 
 The fields of `RunRecord` are the schema. Units and meanings stand in `scenarios.columns`; `record_columns()` lists all
-of them. A file is self-contained: its metadata hold the complete specification of the run, the versions that made it,
-and a digest by which a damaged file is noticed.
+of them. A file is self-contained: its metadata hold the complete specification of the run, and the versions that made
+it.
 """
 
-import hashlib
 import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_forage_env._internal.fields import number, table, text, whole
 from swarm_forage_env._internal.files import parse_json, replacing
+from swarm_forage_env._internal.typed import typed
 from swarm_forage_env.contract.types import FloatArray, IntArray
 from swarm_forage_env.runs.answer import Sheet
-from swarm_forage_env.runs.parquet import (
-    ParquetError,
-    check_columns,
-    check_size,
-    check_texts,
-    open_parquet,
-    parse_parquet,
-)
+from swarm_forage_env.runs.parquet import ParquetError, read_parquet, write_parquet
 from swarm_forage_env.runs.versions import identity
 from swarm_forage_env.scenarios.columns import ALL_COLUMNS, INTERVAL_COLUMNS, KEY_COLUMNS
 from swarm_forage_env.scenarios.performance import performance_curve
@@ -36,15 +27,13 @@ from swarm_forage_env.scenarios.performance import performance_curve
 if TYPE_CHECKING:
     import polars as pl
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 1
 """Version of the file layout; raised whenever a column changes its name, type or meaning."""
 
 CountArray: TypeAlias = NDArray[np.int64]
 
-MOST_BYTES = 2**28
-"""What a record may have, in the file, unpacked and in memory: 600,000 intervals; our choice."""
 _PREFIX = "swarm_forage_env."
-_FILE_KEYS = tuple(_PREFIX + name for name in ("schema_version", "spec", "provenance", "digest"))
+_FILE_KEYS = tuple(_PREFIX + name for name in ("schema_version", "spec", "provenance"))
 
 
 class RecordError(ValueError):
@@ -205,23 +194,11 @@ class RunRecord:
             path: File to create or replace; its folder must exist.
 
         Raises:
-            RecordError: it is larger than what `read` reads.
             OSError: the file cannot be written.
         """
-        provenance = json.dumps(dict(self.provenance), sort_keys=True)
-        values = (str(SCHEMA_VERSION), self.spec, provenance, _digest(self, provenance))
-        frame = self.to_frame()
+        values = (str(SCHEMA_VERSION), self.spec, json.dumps(dict(self.provenance), sort_keys=True))
         with replacing(Path(path)) as draft:
-            # By way of memory: polars tells a full disk as an error of its own, among many others.
-            buffer = BytesIO()
-            frame.write_parquet(buffer, metadata=dict(zip(_FILE_KEYS, values, strict=True)))
-            content = buffer.getvalue()
-            try:
-                check_texts(frame, MOST_BYTES)
-                parse_parquet(content, MOST_BYTES)
-            except ParquetError as error:
-                raise _too_large(self.run_id, error) from error
-            draft.write_bytes(content)
+            write_parquet(draft, self.to_frame(), dict(zip(_FILE_KEYS, values, strict=True)))
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> "RunRecord":
@@ -230,46 +207,18 @@ class RunRecord:
         Raises:
             RecordError: the file is missing, no record, damaged, or of another schema version; the message names it.
         """
-        import polars as pl
-
         name = str(path)
         try:
-            opened = open_parquet(Path(path), MOST_BYTES)
-            _check_stamp(name, opened.stamp)
-            frame = opened.frame()
+            stamp, frame = read_parquet(path)
+            _check_stamp(stamp)
+            _, spec, provenance = (stamp[key] for key in _FILE_KEYS)
+            return record_of(frame, spec, typed(Mapping[str, str], parse_json(provenance), "provenance"))
         except OSError as error:
             raise RecordError(f"Cannot read {name}: {error.strerror or error}.") from error
         except ParquetError as error:
             raise RecordError(f"Cannot read {name}: {error}.") from error
-        version, spec, provenance, digest = (opened.stamp[key] for key in _FILE_KEYS)
-        try:
-            check_columns(frame, _column_types(), (pl.Float64,), needed=cls.column_names())
-            check_texts(frame, MOST_BYTES)
-            if sum(frame.null_count().row(0)):
-                raise RecordError("it has empty places")
-            record = record_of(frame, spec, _checked_provenance(provenance))
-            _check_content(record)
-        except (pl.exceptions.PolarsError, LookupError, OverflowError, RecursionError, TypeError, ValueError) as error:
-            raise RecordError(f"Cannot read {name}: its content does not match schema {version} ({error}).") from error
-        if _digest(record, provenance) != digest:
-            raise RecordError(f"Cannot read {name}: its content does not match its digest, so the file is damaged.")
-        return record
-
-
-def check_intervals(run_id: str, n_intervals: int) -> None:
-    """Refuse a run of more intervals than any record has, before it is made.
-
-    Raises:
-        RecordError: its record would be larger than what `RunRecord.read` reads.
-    """
-    try:
-        check_size(n_intervals, len(RunRecord.column_names()), MOST_BYTES)
-    except ParquetError as error:
-        raise _too_large(run_id, error) from error
-
-
-def _too_large(run_id: str, why: ParquetError) -> RecordError:
-    return RecordError(f"Cannot store run {run_id}: {why}; choose longer intervals (interval_s).")
+        except (LookupError, OverflowError, TypeError, ValueError) as error:
+            raise RecordError(f"Cannot read {name}: its content is damaged ({error}).") from error
 
 
 _DTYPES: dict[Any, type] = {
@@ -310,65 +259,20 @@ def _checked(name: str, values: Any, dtype: type, n_intervals: int) -> np.ndarra
     return column
 
 
-def _digest(record: RunRecord, provenance: str) -> str:
-    state = hashlib.blake2b(digest_size=16)
-    state.update(json.dumps([record.keys(), record.spec, provenance], sort_keys=True).encode())
-    for name, values in record.columns().items():
-        state.update(name.encode())
-        state.update(values.tobytes())
-    return state.hexdigest()
-
-
 def _polars_type(dtype: type) -> Any:
     import polars as pl
 
     return {str: pl.String, int: pl.Int64, float: pl.Float64}[dtype]
 
 
-def _column_types() -> dict[str, tuple[Any, ...]]:
-    """Column of a record -> types that it may have in a file."""
-    import polars as pl
-
-    whole = (pl.Int64, pl.Int32)
-    types = {str: (pl.String,), int: whole, float: (pl.Float64,), np.int32: whole, np.int64: whole}
-    types[np.float64] = types[float]
-    return {name: types[dtype] for name, dtype in (_KEY_DTYPES | COLUMN_DTYPES).items()}
-
-
-def _checked_provenance(told: str) -> Mapping[str, str]:
-    """Return versions and times as a file has them, if they are texts by name, and times numbers."""
-    found = table("provenance", parse_json(told))
-    for name, value in found.items():
-        if not isinstance(value, str):
-            raise RecordError(f"expected provenance.{name} to be a text")
-        if name in ("wall_time_s", "cpu_time_s") and value:
-            number(name, float(value), at_least=0.0)
-    return found
-
-
-def _check_content(record: RunRecord) -> None:
-    """Refuse what no run has: a clock that stands, no robots, a specification without what it is read by."""
-    for name in ("run_id", "scenario", "controller", "criterion"):
-        text(name, getattr(record, name))
-    number("criterion_value", record.criterion_value)
-    whole("n_robots", record.n_robots, at_least=1)
-    whole("seed", record.seed, at_least=0)
-    if not np.array_equal(record.interval, np.arange(record.n_intervals)):
-        raise RecordError("expected the intervals 0, 1, 2, ... once each")
-    if not (np.diff(record.t_end_s, prepend=0.0) > 0.0).all():
-        raise RecordError("expected a rising t_end_s")
-    scenario = table("scenario", table("the specification", parse_json(record.spec)).get("scenario"))
-    text("performance", scenario.get("performance"))
-
-
-def _check_stamp(name: str, stamp: Mapping[str, str]) -> None:
+def _check_stamp(stamp: Mapping[str, str]) -> None:
     if not set(_FILE_KEYS) <= stamp.keys():
-        raise RecordError(f"Cannot read {name}: it is a Parquet file, but no run record of swarm_forage_env.")
+        raise ParquetError("it is a Parquet file, but no run record of swarm_forage_env")
     version = stamp[_FILE_KEYS[0]]
     if version != str(SCHEMA_VERSION):
-        raise RecordError(
-            f"Cannot read {name}: it has schema version {version}, this version of swarm_forage_env reads "
-            f"{SCHEMA_VERSION}; read it with the version that wrote it."
+        raise ParquetError(
+            f"it has schema version {version}, this version of swarm_forage_env reads {SCHEMA_VERSION}; read it with "
+            "the version that wrote it"
         )
 
 
@@ -381,6 +285,8 @@ def record_of(frame: "pl.DataFrame", spec: str, provenance: Mapping[str, str]) -
     missing = [name for name in (*_KEY_DTYPES, *COLUMN_DTYPES) if name not in frame.columns]
     if missing:
         raise RecordError(f"it has no column {missing[0]}")
+    if frame.is_empty():
+        raise RecordError("it has no rows")
     first = frame.row(0, named=True)
     values: dict[str, Any] = {name: dtype(first[name]) for name, dtype in _KEY_DTYPES.items()}
     values |= {name: frame[name].to_numpy() for name in COLUMN_DTYPES}

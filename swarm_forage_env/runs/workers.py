@@ -36,11 +36,10 @@ from swarm_forage_env.runs.first_compilation import (
     compile_start,
     is_first_run,
 )
-from swarm_forage_env.runs.record import RecordError, RunRecord, check_intervals
+from swarm_forage_env.runs.record import RecordError, RunRecord
 from swarm_forage_env.runs.run import run_one, warm_up
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import RunFailure, RunStore
-from swarm_forage_env.scenarios.config import whole_intervals
 from swarm_forage_env.world.compiled import compile_half
 
 Outcome: TypeAlias = RunRecord | RunFailure
@@ -94,14 +93,11 @@ def run_each(
 
     Raises:
         OSError: the store cannot be written to; then nothing has been run.
-        RecordError: a run has more intervals than a record may; likewise.
         WorkerError: no worker process could be started, or `executor` ended before all runs were done.
     """
     todo = deque((spec,) for spec in specs)
     if store is not None and todo:
         check_folder(store.folder)
-        for (spec,) in todo:
-            check_intervals(spec.run_id, whole_intervals(spec.scenario))
     if jobs is not None:
         jobs = as_whole("jobs", jobs, at_least=1, or_none=True)
     if executor is not None:

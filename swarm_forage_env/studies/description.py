@@ -130,8 +130,7 @@ class StudyStatus(Answer):
 
     def _failures(self) -> list[dict[str, Any]]:
         lost = self.table.frame.filter(self.table.frame["state"] == FAILED)
-        keys = {"run_id": "run_id", "rules": "reading"} | {name: name for name in ("policy", "seed", *LOSS_COLUMNS[1:])}
-        return [{key: row[name] for key, name in keys.items()} for row in lost.iter_rows(named=True)]
+        return lost.select("rules", "policy", "seed", *LOSS_COLUMNS[1:]).to_dicts()
 
 
 def status(table: StudyTable) -> StudyStatus:

@@ -53,8 +53,6 @@ OF_THE_STUDY = {
     "quirks": "the rules of a study set them",
 }
 """Scenario field that a study must not set -> what decides it instead."""
-_STORED = {"rules": "readings"}
-"""Field -> its key in files, where the two differ."""
 MOST_CONDITIONS = 100_000
 """Largest number of rules times policies times values of all axes; our choice: 400 times that of the largest set."""
 NOTHING = "none"
@@ -320,7 +318,7 @@ class StudySpec:
             "policies": [_plain(policy) for policy in self.policies],
             "axes": [{"name": axis.name, "values": list(axis.values)} for axis in self.axes],
             "reference": self.reference,
-            _STORED["rules"]: list(self.rules),
+            "rules": list(self.rules),
             "budget": self.budget,
             "seeds": list(self.seeds),
             "horizon_s": self.horizon_s,
@@ -336,7 +334,7 @@ class StudySpec:
         Raises:
             ConfigError: unknown or missing keys, or values that do not describe a study.
         """
-        own = [_STORED.get(item.name, item.name) for item in fields(cls)]
+        own = [item.name for item in fields(cls)]
         known_keys(table("a study", mapping), own, "key of a study")
         missing = [key for key in own if key not in mapping and key not in ("file", "looks")]
         if missing:
@@ -350,7 +348,7 @@ class StudySpec:
         values["settings"] = plain_settings(table("settings", values["settings"]))
         values["seeds"] = typed(tuple[int, ...], values["seeds"], "seeds")
         values["looks"] = typed(tuple[int, ...], values.get("looks", ()), "looks")
-        values["rules"] = typed(tuple[str, ...], values.pop(_STORED["rules"]), _STORED["rules"])
+        values["rules"] = typed(tuple[str, ...], values["rules"], "rules")
         return cls(**values)
 
     def to_json(self) -> str:

@@ -57,9 +57,7 @@ SETS = Path(__file__).parent / "sets"
 """Folder of the paper's sets."""
 PAPER = "paper"
 """Name of the budget that every study has: runs as long, and as many, as in the paper."""
-FORMER_RULES = "readings"
-"""Key of `rules` in study files of earlier versions."""
-FILE_KEYS = ("name", "title", "scenario", "policies", "rules", FORMER_RULES, "set", "wrappers", "axis", "budget")
+FILE_KEYS = ("name", "title", "scenario", "policies", "rules", "set", "wrappers", "axis", "budget")
 AXIS_KEYS = ("criterion", "field", "values", "reference")
 BUDGET_KEYS = ("seeds", "horizon_s", "interval_s", "values")
 
@@ -177,11 +175,8 @@ def _study(
     settings = plain_settings(table("set", content.get("set", {})))
     axes, reference = _axes(content, settings, allowed)
     told: dict[str, Any] = {}
-    given = [key for key in ("rules", FORMER_RULES) if key in content]
-    if len(given) > 1:
-        raise ConfigError(f"Expected rules once, got {' and '.join(given)}, which is their former name.")
-    if rules is not None or given:
-        told["rules"] = tuple(_listed("rules", rules or content[given[0]]))
+    if rules is not None or "rules" in content:
+        told["rules"] = tuple(_listed("rules", rules or content["rules"]))
     return StudySpec(
         name=content["name"],
         title=content.get("title", ""),

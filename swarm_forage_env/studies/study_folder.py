@@ -97,7 +97,7 @@ class StudyFolder:
             looks=spec.looks or there.looks,
         )
         mine, other = kept.to_mapping(), there.to_mapping()
-        told = ("seeds", "readings", "title", "budget", "file", *(() if there.looks else ("looks",)))
+        told = ("seeds", "rules", "title", "budget", "file", *(() if there.looks else ("looks",)))
         differing = [key for key in mine if key not in told and mine[key] != other[key]]
         if differing:
             raise RecordError(

@@ -4,17 +4,15 @@ It is a `Table` like that of any plan. In addition, its conditions have addresse
 
 It has one row per interval of a run, in the order of the study's conditions, seeds and intervals. A failed or missing
 run has one row without an interval, so that readers notice it. The file needs no other file: its metadata hold the
-study, the versions that made its runs, and a digest that reveals damage. The same runs make the same bytes, in any
-order and on any number of machines.
+study and the versions that made its runs. The same runs make the same bytes, in any order and on any number of
+machines.
 """
 
-import hashlib
 import json
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
@@ -23,30 +21,35 @@ import numpy as np
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import alone_in, parse_json, replacing
 from swarm_forage_env._internal.typed import typed
-from swarm_forage_env.runs.parquet import ParquetError, check_texts, open_parquet, parse_parquet
+from swarm_forage_env.runs.parquet import ParquetError, read_parquet, write_parquet
 from swarm_forage_env.runs.plan import Condition, Plan
 from swarm_forage_env.runs.record import COLUMN_DTYPES, RecordError, RunRecord, record_of
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import DONE, FAILED, FAILURES, MISSING, RunFailure, RunStore, read_failure
 from swarm_forage_env.runs.table import Curves, Table
 from swarm_forage_env.runs.versions import VERSION_NAMES
-from swarm_forage_env.studies.packed_rows import AXIS, LOSS_COLUMNS, MOST_BYTES, check_rows, check_types
 from swarm_forage_env.studies.study import Place, StudySpec
 from swarm_forage_env.studies.study_folder import PlaceState, StudyFolder, place_state
 
 if TYPE_CHECKING:
     import polars as pl
 
+AXIS = "axis_"
+"""Prefix of the columns of axes, because axes may have the names of columns of records: throttle, handling_cost."""
+LOSS_COLUMNS = ("state", "error", "traceback", "rerun")
+"""Last columns: one of `study_folder.STATES`; for failed runs the exception in one line, its traceback, and the command
+that makes the run again from within the folder of the study."""
 TABLE_VERSION = 1
 """Version of the layout; raised whenever a column changes its name, type or meaning."""
 Versions: TypeAlias = tuple[Mapping[str, str], ...]
 """Versions and commits that made the runs of a study, each once."""
 _PREFIX = "swarm_forage_env.study."
-_FILE_KEYS = tuple(_PREFIX + name for name in ("table_version", "study", "versions", "digest"))
+_FILE_KEYS = tuple(_PREFIX + name for name in ("table_version", "study", "versions"))
 _COMPRESSION = 19
 """Level of Zstandard; packing a thousand runs takes a second, and reading them is as quick."""
-_NOT_KEPT = "controller"
-"""Column of records that the table leaves out, because it has a column with the label of the policy."""
+_NOT_KEPT = ("run_id", "controller")
+"""Columns of records that the table leaves out: the study tells the first, and the column of the policy's label the
+second."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -55,7 +58,7 @@ class StudyTable(Table):
 
     spec: StudySpec
     frame: "pl.DataFrame" = field()  # pyright: ignore[reportIncompatibleVariableOverride] - here it is given
-    """Columns: `study`, `cell` (index in `spec.places`), `reading` (the rules), `policy`, one `AXIS` column per axis;
+    """Columns: `study`, `condition` (index in `spec.places`), `rules`, `policy`, one `AXIS` column per axis;
     the columns of `RunRecord`, null for runs without such a column; `LOSS_COLUMNS`."""
     versions: Versions
     wall_time_s: float | None = None
@@ -124,8 +127,7 @@ class StudyTable(Table):
         """
         if run_id not in self._of_run:
             raise KeyError(f"Study {self.spec.name} has no run {run_id!r}.")
-        first = self._rows_of(run_id).row(0, named=True)
-        return self._specs(first["cell"])[first["seed"]]
+        return self._spec_at(self._rows_of(run_id))
 
     def place_states(self) -> tuple[PlaceState, ...]:
         """Return how many runs of each condition are done, failed and missing."""
@@ -152,60 +154,40 @@ class StudyTable(Table):
         ]
         return pl.DataFrame(rows, infer_schema_length=None)
 
-    @cached_property
-    def digest(self) -> str:
-        """Hash of everything that a file of the table holds; it reveals damage."""
-        return _digest(self.frame, *self._texts)
-
     def write(self, path: str | Path) -> None:
         """Write the table to a Parquet file, whole or not at all.
 
         Raises:
-            RecordError: the table is too large for `read_study`.
             OSError: the file cannot be written.
         """
-        values = (str(TABLE_VERSION), *self._texts, self.digest)
+        values = (str(TABLE_VERSION), self.spec.to_json(), json.dumps(self.versions, sort_keys=True))
         with replacing(Path(path)) as draft:
-            buffer = BytesIO()  # polars tells a full disk as an error of its own, among many others
-            stamp = dict(zip(_FILE_KEYS, values, strict=True))
-            self.frame.write_parquet(buffer, metadata=stamp, compression_level=_COMPRESSION)
-            content = buffer.getvalue()
-            try:
-                check_texts(self.frame, MOST_BYTES)
-                parse_parquet(content, MOST_BYTES)
-            except ParquetError as error:
-                raise RecordError(
-                    f"Cannot pack study {self.spec.name}: {error}; split it into smaller ones."
-                ) from error
-            draft.write_bytes(content)
-
-    @cached_property
-    def _texts(self) -> tuple[str, str]:
-        """Study and versions as a file holds them."""
-        return self.spec.to_json(), json.dumps(self.versions, sort_keys=True)
+            write_parquet(draft, self.frame, dict(zip(_FILE_KEYS, values, strict=True)), _COMPRESSION)
 
     @cached_property
     def _spans(self) -> dict[Place, tuple[int, int]]:
         """First row of each condition, and the row behind its last."""
         numbers = np.arange(len(self.spec.places) + 1)
-        ends = np.searchsorted(self.frame["cell"].to_numpy(), numbers).tolist()
+        ends = np.searchsorted(self.frame["condition"].to_numpy(), numbers).tolist()
         return {place: (ends[number], ends[number + 1]) for number, place in enumerate(self.spec.places)}
 
     @cached_property
     def _of_run(self) -> dict[str, tuple[int, int]]:
         """First row and number of rows of each run; a run that several conditions share counts in the first of them."""
-        runs = self.frame["run_id"].rle().struct
-        lengths = runs.field("len").to_numpy()
-        starts = (np.cumsum(lengths) - lengths).tolist()
+        lengths = self.frame.select("condition", "seed").to_struct().rle().struct.field("len").to_numpy()
         found: dict[str, tuple[int, int]] = {}
-        for run_id, start, length in zip(runs.field("value"), starts, lengths.tolist(), strict=True):
-            found.setdefault(run_id, (start, length))
+        for start, length in zip((np.cumsum(lengths) - lengths).tolist(), lengths.tolist(), strict=True):
+            found.setdefault(self._spec_at(self.frame.slice(start, length)).run_id, (start, length))
         return found
 
     @cached_property
     def _specs(self) -> Callable[[int], Mapping[int, RunSpec]]:
         """Number of a condition -> seed -> specification."""
         return cache(lambda number: {spec.seed: spec for spec in self.spec.specs_of(self.spec.places[number])})
+
+    def _spec_at(self, rows: "pl.DataFrame") -> RunSpec:
+        """The specification of the run that rows are of."""
+        return self._specs(rows["condition"][0])[rows["seed"][0]]
 
     def _rows_of(self, run_id: str) -> "pl.DataFrame":
         return self.frame.slice(*self._of_run[run_id])
@@ -215,11 +197,12 @@ class StudyTable(Table):
         import polars as pl
 
         rows, spec = self._rows_of(run_id), self.spec_of(run_id)
-        here = {"study", "cell", "reading", "policy", *LOSS_COLUMNS, *(AXIS + axis.name for axis in self.spec.axes)}
+        here = {"study", "condition", "rules", "policy", *LOSS_COLUMNS, *(AXIS + axis.name for axis in self.spec.axes)}
         kept = [name for name in rows.columns if name not in here and not rows[name].null_count()]
         names = dict.fromkeys(name for made in self.versions for name in made)
         made = {name: " or ".join(dict.fromkeys(made.get(name, "") for made in self.versions)) for name in names}
-        return record_of(rows.select(pl.lit(spec.policy).alias(_NOT_KEPT), *kept), spec.to_json(), made)
+        keys = zip(_NOT_KEPT, (run_id, spec.policy), strict=True)
+        return record_of(rows.select(*(pl.lit(value).alias(name) for name, value in keys), *kept), spec.to_json(), made)
 
     def _failure(self, run_id: str) -> RunFailure:
         row = self._rows_of(run_id).row(0, named=True)
@@ -237,8 +220,8 @@ class _InState(Mapping[str, _T]):
 
     @cached_property
     def _run_ids(self) -> dict[str, None]:
-        frame = self._table.frame
-        return dict.fromkeys(frame.filter(frame["state"] == self._state)["run_id"])
+        states = self._table.frame["state"]
+        return {run_id: None for run_id, (start, _) in self._table._of_run.items() if states[start] == self._state}
 
     def __getitem__(self, run_id: str) -> _T:
         if run_id not in self._run_ids:
@@ -294,8 +277,7 @@ def gather_study(
                 records.append(record)
                 wall_time_s += record.wall_time_s
                 versions.add(tuple((name, record.provenance.get(name, "")) for name in VERSION_NAMES))
-        where = place_columns(spec, place)
-        first = {"study": spec.name, "cell": number, "reading": where.pop("rules"), **where}
+        first = {"study": spec.name, "condition": number, **place_columns(spec, place)}
         rows = pl.concat([_frame(records), _losses(lost)], how="diagonal").sort("seed", "interval")
         frames.append(rows.select(*(pl.lit(value).alias(name) for name, value in first.items()), pl.all()))
     frame = pl.concat(frames, how="diagonal")
@@ -320,7 +302,7 @@ def pack_study(folder: StudyFolder, chosen: Path | None = None, *, tell: Callabl
         The file that was written.
 
     Raises:
-        RecordError: see `gather_study` and `StudyTable.write`.
+        RecordError: see `gather_study`.
         OSError: the file cannot be written.
     """
     folder.study()  # a folder without one is refused before anything is made in it
@@ -376,21 +358,19 @@ def read_study(path: str | Path) -> StudyTable:
 
 def _read_file(path: Path) -> StudyTable:
     """Read a packed study; errors do not name the file."""
-    opened = open_parquet(path, MOST_BYTES)
-    if not set(_FILE_KEYS) <= opened.stamp.keys():
+    stamp, frame = read_parquet(path)
+    if not set(_FILE_KEYS) <= stamp.keys():
         raise ParquetError("it is a Parquet file, but no study of swarm_forage_env")
-    version, study, versions, digest = (opened.stamp[key] for key in _FILE_KEYS)
+    version, study, versions = (stamp[key] for key in _FILE_KEYS)
     if version != str(TABLE_VERSION):
         raise ParquetError(
             f"it has layout {version}, this version of swarm_forage_env reads {TABLE_VERSION}; "
             "read it with the version that wrote it"
         )
-    frame = opened.frame()
-    check_types(frame)
-    if _digest(frame, study, versions) != digest:
-        raise ParquetError("its content does not match its digest, so the file is damaged")
     spec = StudySpec.from_mapping(_parsed(study))
-    check_rows(frame, spec)
+    lacking = [name for name in (*_columns(spec), "seed", "interval", *LOSS_COLUMNS) if name not in frame.columns]
+    if lacking:
+        raise ParquetError(f"it has no column {lacking[0]}")
     return StudyTable(spec=spec, frame=frame, versions=typed(Versions, _parsed(versions), "versions"))
 
 
@@ -415,7 +395,6 @@ def _record(store: RunStore, run: RunSpec, damaged: list[str]) -> RunRecord | No
 def _loss(store: RunStore, run: RunSpec) -> dict[str, Any]:
     """The row of a run without a usable record."""
     row: dict[str, Any] = {
-        "run_id": run.run_id,
         "scenario": run.scenario.name,
         "n_robots": run.scenario.robots.n_robots,
         "criterion": run.world.criterion,
@@ -435,7 +414,7 @@ def _losses(rows: Sequence[Mapping[str, Any]]) -> "pl.DataFrame":
     """Rows of `_loss`; without rows, only the columns."""
     import polars as pl
 
-    schema: dict[str, Any] = {"run_id": str, "scenario": str, "n_robots": int, "criterion": str}
+    schema: dict[str, Any] = {"scenario": str, "n_robots": int, "criterion": str}
     schema |= {"criterion_value": float, "seed": int, "interval": pl.Int32, **dict.fromkeys(LOSS_COLUMNS, str)}
     return pl.DataFrame(rows, schema=schema)
 
@@ -450,33 +429,14 @@ def _frame(records: Sequence[RunRecord]) -> "pl.DataFrame":
     return frame.with_columns(pl.lit(DONE).alias("state"))
 
 
+def _columns(spec: StudySpec) -> list[str]:
+    """Columns of a condition's address."""
+    return ["study", "condition", "rules", "policy", *(AXIS + axis.name for axis in spec.axes)]
+
+
 def _in_order(columns: Sequence[str], spec: StudySpec) -> list[str]:
     """Columns in order: address, columns of every record, contributed columns by name, and losses."""
-    first = ["study", "cell", "reading", "policy", *(AXIS + axis.name for axis in spec.axes)]
+    first = _columns(spec)
     of_records = [name for name in RunRecord.column_names() if name in columns]
     contributed = sorted({*columns} - {*first, *of_records, *LOSS_COLUMNS})
     return [*first, *of_records, *contributed, *LOSS_COLUMNS]
-
-
-def _digest(frame: "pl.DataFrame", *texts: str) -> str:
-    state = hashlib.blake2b(digest_size=16)
-    for part in (*texts, *_content(frame)):
-        state.update(part.encode() if isinstance(part, str) else part)
-        state.update(b"\0")
-    return state.hexdigest()
-
-
-def _content(frame: "pl.DataFrame") -> Iterator[str | bytes]:
-    """The content of a table as bytes; texts, which most rows repeat from the row above, as values and lengths."""
-    import polars as pl
-
-    for column in frame.iter_columns():
-        yield f"{column.name} {column.dtype}"
-        yield column.is_null().to_numpy().tobytes()
-        if column.dtype == pl.String:
-            runs = column.rle().struct
-            yield runs.field("len").to_numpy().tobytes()
-            yield json.dumps(runs.field("value").to_list())
-        elif column.null_count() < len(column):
-            filled = column.fill_null(False if column.dtype == pl.Boolean else 0)
-            yield filled.to_numpy().tobytes()

@@ -130,7 +130,7 @@ def measured(file: Path) -> Iterator[tuple[tuple, np.ndarray]]:
     rows = pl.read_parquet(file).filter(pl.col("state") == "done").sort(f"axis_{last}", "seed", "interval")
     lines: dict[tuple, Line] = {}
     axes = [f"axis_{name}" for name in (*others, last)]
-    for place, condition in rows.group_by("reading", "policy", *axes, maintain_order=True):
+    for place, condition in rows.group_by("rules", "policy", *axes, maintain_order=True):
         lines.setdefault(place[:-1], {})[float(place[-1])] = condition
     for (rules, policy, *values), whole in lines.items():
         line = looked_at(whole, study)

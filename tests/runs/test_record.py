@@ -60,29 +60,11 @@ def test_a_file_gives_back_the_record_bit_for_bit(record, file):
         assert again.columns()[name].tobytes() == column.tobytes(), name
 
 
-@pytest.mark.parametrize(
-    ("damage", "told"),
-    [
-        (lambda table: table.drop("collected"), "it has no column collected"),
-        (lambda table: table.select(a=1), "it has no column run_id"),
-        (lambda table: table.head(0), "does not match schema"),
-        (lambda table: table.with_columns(collected=pl.lit("many")), "does not match schema"),
-        (lambda table: table.with_columns(collected=pl.lit([1, 2])), "columns of lists"),
-        (lambda table: table.with_columns(seed=pl.lit(2**70, dtype=pl.Int128)), "is of Int128, not of Int64"),
-    ],
-)
-def test_a_table_with_our_stamp_that_is_no_record_is_told_as_damaged(file, damage, told):
-    stamp = {key: value for key, value in pl.read_parquet_metadata(file).items() if key.startswith("swarm_forage_env")}
-    damage(pl.read_parquet(file)).write_parquet(file, metadata=stamp)
-    with pytest.raises(RecordError, match=told):
-        RunRecord.read(file)
-
-
 def test_provenance_that_is_too_deep_is_told_as_damaged(file):
     stamp = {key: value for key, value in pl.read_parquet_metadata(file).items() if key.startswith("swarm_forage_env")}
     deep = stamp | {"swarm_forage_env.provenance": '{"a":' * 100_000 + "1" + "}" * 100_000}
     pl.read_parquet(file).write_parquet(file, metadata=deep)
-    with pytest.raises(RecordError, match="does not match schema"):
+    with pytest.raises(RecordError, match="its content is damaged"):
         RunRecord.read(file)
 
 
@@ -95,23 +77,6 @@ def test_the_file_is_a_plain_table_with_keys_on_each_row(record, file):
     stamp = pl.read_parquet_metadata(file)
     assert json.loads(stamp["swarm_forage_env.spec"])["policy"] == "crw"
     assert json.loads(stamp["swarm_forage_env.provenance"])["numpy"] == "2.0"
-
-
-def test_any_damage_is_noticed(record, file):
-    sound = file.read_bytes()
-    noticed = 0
-    for position in range(0, len(sound), 37):
-        damaged = bytearray(sound)
-        damaged[position] ^= 0xFF
-        file.write_bytes(damaged)
-        try:
-            survived = RunRecord.read(file)
-        except RecordError:
-            noticed += 1
-        else:  # some bytes of the file format carry nothing
-            assert survived.same_results(record)
-            assert (survived.spec, survived.provenance) == (record.spec, record.provenance)
-    assert noticed > 100
 
 
 @pytest.mark.parametrize("share", [0.0, 0.01, 0.5, 0.99])
@@ -146,7 +111,7 @@ def rewritten(file: Path, change, **stamp) -> None:
 
 def test_another_schema_version_is_refused(file):
     rewritten(file, lambda table: table, schema_version="999")
-    with pytest.raises(RecordError, match=r"record\.parquet: it has schema version 999, this version .* reads 2"):
+    with pytest.raises(RecordError, match=r"record\.parquet: it has schema version 999, this version .* reads 1"):
         RunRecord.read(file)
 
 
@@ -162,18 +127,7 @@ def test_another_schema_version_is_refused(file):
 )
 def test_content_that_breaks_the_schema_is_refused(file, change):
     rewritten(file, change)
-    with pytest.raises(RecordError, match=r"record\.parquet: its content does not match schema 2"):
-        RunRecord.read(file)
-
-
-@pytest.mark.parametrize(
-    "change",
-    [lambda table: table.with_columns(pl.col("collected") + 1), lambda table: table.with_columns(seed=pl.lit(3))],
-    ids=["column", "key"],
-)
-def test_edited_content_is_refused(file, change):
-    rewritten(file, change)
-    with pytest.raises(RecordError, match="does not match its digest"):
+    with pytest.raises(RecordError, match=r"record\.parquet: its content is damaged"):
         RunRecord.read(file)
 
 
@@ -186,17 +140,6 @@ def test_a_failed_write_leaves_the_old_file_and_no_litter(record, file, monkeypa
         record.write(file)
     assert list(file.parent.iterdir()) == [file]
     assert RunRecord.read(file).same_results(record)
-
-
-@pytest.mark.parametrize(("most", "told"), [(100, "its texts have more"), (1000, "bytes, but at most 1,000")])
-def test_what_would_not_be_read_again_is_not_written(record, file, monkeypatch, most, told):
-    before = file.read_bytes()
-    monkeypatch.setattr(recording, "MOST_BYTES", most)
-    with pytest.raises(RecordError, match=rf"Cannot store run {record.run_id}: .*{told}.*; choose longer intervals"):
-        record.write(file)
-    assert {path: path.read_bytes() for path in file.parent.iterdir()} == {file: before}
-    with pytest.raises(RecordError):
-        RunRecord.read(file)
 
 
 @pytest.mark.parametrize("column", ["collected", "performance"])

@@ -7,11 +7,9 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from swarm_forage_env.runs import record as recording
 from swarm_forage_env.runs import store as runs_store
 from swarm_forage_env.runs.record import RecordError, RunRecord
 from swarm_forage_env.runs.run import run_one
-from swarm_forage_env.runs.runner import run_specs
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import (
     DONE,
@@ -24,7 +22,6 @@ from swarm_forage_env.runs.store import (
     load,
     read_failure,
 )
-from swarm_forage_env.scenarios.config import whole_intervals
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.world import World
 
@@ -170,15 +167,3 @@ def test_a_file_that_is_no_failure_is_refused(tmp_path, text):
 def test_a_missing_failure_is_refused(tmp_path):
     with pytest.raises(RecordError, match="No such file"):
         read_failure(tmp_path / "x.json")
-
-
-def test_a_run_of_more_intervals_than_a_record_has_is_told_before_the_first_run(tmp_path):
-    world = scenario("warehouse_small", n_robots=2, n_objects=10, horizon_s=4.0, interval_s=2.0)
-    tick = world.dt_s
-    longest = replace(world, interval_s=tick, horizon_s=tick * (recording.MOST_BYTES // 16 // 28))
-    recording.check_intervals("a", whole_intervals(longest))
-    longer = replace(longest, horizon_s=longest.horizon_s + tick)
-    specs = [RunSpec(world=World(config), policy="random") for config in (world, longer)]
-    with pytest.raises(RecordError, match=f"Cannot store run {specs[1].run_id}: .* rows of 28 columns"):
-        run_specs(specs, store=RunStore(tmp_path / "runs"), jobs=1)
-    assert list(tmp_path.iterdir()) == []

@@ -64,7 +64,7 @@ def test_the_reference_of_a_place_differs_on_the_last_axis_only():
         ("seeds", 5, "Expected seeds to be a list"),
         ("seeds", [0.5], r"Expected seeds\[0\] to be a whole number"),
         ("looks", "x", "Expected looks to be a list"),
-        ("readings", None, "Expected readings to be a list"),
+        ("rules", None, "Expected rules to be a list"),
         ("policies", [1], r"Expected policies\[0\] to be a table"),
         ("policies", [{"label": 3, "policy": "crw", "parameters": {}}], r"policies\[0\].label to be a text"),
         ("policies", [{"label": "a", "policy": "crw", "parameters": [1], "caches": None}], "parameters to be a table"),
@@ -242,8 +242,8 @@ def test_axes_that_cannot_be_are_refused(axes, message):
 
 def test_unknown_keys_of_a_stored_study_are_refused():
     mapping = study().to_mapping()
-    with pytest.raises(ConfigError, match="Did you mean 'readings'"):
-        StudySpec.from_mapping({**mapping, "reading": []})
+    with pytest.raises(ConfigError, match="Did you mean 'rules'"):
+        StudySpec.from_mapping({**mapping, "rule": []})
     del mapping["seeds"]
     with pytest.raises(ConfigError, match="Missing key 'seeds'"):
         StudySpec.from_mapping(mapping)

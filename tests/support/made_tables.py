@@ -5,7 +5,7 @@ import polars as pl
 
 from swarm_forage_env.runs.policy_spec import PolicySpec
 from swarm_forage_env.studies.study import Axis, StudySpec
-from swarm_forage_env.studies.study_table import StudyTable
+from swarm_forage_env.studies.study_table import LOSS_COLUMNS, StudyTable, place_columns
 
 FOUR = ("crw", "dpo", "stochm", "stochx")
 N_INTERVALS = 4
@@ -45,7 +45,7 @@ def made_table(spec, performance, *, lost=(), adversity=lambda place: 0.0):
     rows = []
     for number, place in enumerate(spec.places):
         for seed in spec.seeds:
-            where = {"cell": number, "seed": seed, "run_id": f"{number}_{seed}"}
+            where = {"condition": number, **place_columns(spec, place), "seed": seed, **dict.fromkeys(LOSS_COLUMNS)}
             if (place, seed) in lost:
                 rows.append({**where, "state": "missing"})
                 continue

@@ -290,11 +290,10 @@ def test_categories_are_texts(tmp_path):
     assert scored.policy == "crowd"
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
-def test_no_changed_byte_leads_to_another_error_or_to_a_word_on_stderr(tmp_path, capfd, suffix):
-    path = written(CROWDING, tmp_path / f"curves{suffix}")
+def test_no_changed_byte_leads_to_another_error_or_to_a_word_on_stderr(tmp_path, capfd):
+    path = written(CROWDING, tmp_path / "curves.csv")
     content, told = path.read_bytes(), list[str]()
-    for at in range(12, len(content), 14):  # the byte 54 would end this process
+    for at in range(12, len(content), 14):
         path.write_bytes(content[:at] + bytes((content[at] ^ 0x55,)) + content[at + 1 :])
         try:
             score_curves(path)
