@@ -29,8 +29,7 @@ Cluster = Annotated[
     str | None,
     typer.Option(
         "--cluster",
-        help="Run on Dask: local, slurm, slurm-jobs (--jobs sets their number), or the address of a scheduler "
-        "(docs/studies.md).",
+        help="Run on Dask: local, or the address of a scheduler (docs/studies.md).",
     ),
 ]
 

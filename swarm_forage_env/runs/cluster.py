@@ -5,7 +5,6 @@ worker may join or be killed at any time; what it was running is run elsewhere.
 """
 
 import logging
-import os
 import signal
 import threading
 from collections.abc import Iterator
@@ -18,9 +17,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.runs.workers import WorkerError, available_cores
 
-LOCAL, SLURM, SLURM_JOBS = "local", "slurm", "slurm-jobs"
-ROLES = ("the scheduler", "the process that writes", "at least one worker")
-"""What the tasks of an allocation do, in their order."""
+LOCAL = "local"
 CONNECT_WITHIN_S = 30.0
 """How long a scheduler may take to answer, at first and when the connection was lost."""
 TLS_NEEDS = ". An address with tls:// needs certificates: distributed.comm.tls in ~/.config/dask/distributed.yaml."
@@ -31,18 +28,13 @@ def cluster_executor(where: str, workers: int | None = None) -> Iterator[Executo
     """Give an executor on a Dask cluster; a cluster that was started here ends with the context.
 
     Args:
-        where: `LOCAL`: worker processes of this machine, reachable from it alone. `SLURM`: the tasks of this
-            allocation, in each of which srun started this command. `SLURM_JOBS`: jobs of their own as the file
-            `~/.config/dask/jobqueue.yaml` of dask-jobqueue describes them. Else the address of a running scheduler,
-            such as "tcp://10.0.0.5:8786".
-        workers: How many processes or jobs to start; default one per available core. A running scheduler and an
-            allocation have their own.
+        where: `LOCAL`: worker processes of this machine, reachable from it alone. Else the address of a running
+            scheduler, such as "tcp://10.0.0.5:8786".
+        workers: How many processes to start; default one per available core. A running scheduler has its own.
 
     Raises:
-        ConfigError: no scheduler answers there, no allocation of three tasks or more, or `workers` where they are
-            given.
+        ConfigError: no scheduler answers there, or it is given `workers`.
         ImportError: Dask is not installed.
-        SystemExit: in all tasks of an allocation but one, when the study is over: they are its scheduler and workers.
         WorkerError: the scheduler ended while the executor was in use.
     """
     try:
@@ -50,9 +42,8 @@ def cluster_executor(where: str, workers: int | None = None) -> Iterator[Executo
         from distributed.client import ClosedClientError
     except ImportError as error:
         raise ImportError(f"Studies on a cluster need Dask: {install_command('cluster')}.") from error
-    if where not in (LOCAL, SLURM_JOBS) and workers is not None:
-        what = "tasks of an allocation, whose number says how many" if where == SLURM else "a running scheduler"
-        raise ConfigError(f"Expected no number of workers for {what}, got {workers} for {where}.")
+    if where != LOCAL and workers is not None:
+        raise ConfigError(f"Expected no number of workers for a running scheduler, got {workers} for {where}.")
     with ExitStack() as stack:
         loggers = {name: logging.getLogger(f"distributed.{name}") for name in ("client", "nanny")}
         for logger in loggers.values():
@@ -69,17 +60,12 @@ def cluster_executor(where: str, workers: int | None = None) -> Iterator[Executo
                         dashboard_address=None,  # type: ignore[arg-type] - None is documented: no dashboard
                     )
                 )
-        elif where == SLURM:
-            target = stack.enter_context(_allocation())
-        elif where == SLURM_JOBS:
-            target = stack.enter_context(slurm_cluster())
-            target.scale(jobs=workers or available_cores())
         try:
             client = stack.enter_context(distributed.Client(target, timeout=CONNECT_WITHIN_S))
         except (OSError, RuntimeError, TypeError, ValueError) as error:  # Dask raises all of them of addresses
             hint = TLS_NEEDS if where.startswith("tls:") else ""
             raise ConfigError(
-                f"Expected the address of a Dask scheduler, local, slurm or slurm-jobs, got {where!r}: {error}{hint}"
+                f"Expected local or the address of a Dask scheduler, got {where!r}: {error}{hint}"
             ) from error
         try:
             yield client.get_executor(pure=False)
@@ -113,57 +99,3 @@ def _interrupts_later() -> Iterator[None]:
         signal.signal(signal.SIGINT, usual)
     if caught:
         raise KeyboardInterrupt
-
-
-def _allocation() -> Any:
-    """Make one Dask cluster of the tasks of this allocation; returns in the second task, when the scheduler is there.
-
-    The first task becomes the scheduler and all others workers. They leave with SystemExit when the study is over. They
-    find each other by a file in the working folder, which all nodes must see. The network is that of dask-jobqueue's
-    setting `jobqueue.slurm.interface`, "ib0" for example; default the usual one.
-    """
-    told = {
-        name: os.environ.get(name, "") for name in ("SLURM_JOB_ID", "SLURM_STEP_ID", "SLURM_PROCID", "SLURM_NTASKS")
-    }
-    if not all(told.values()) or int(told["SLURM_NTASKS"]) < len(ROLES):
-        got = f"{told['SLURM_NTASKS']} tasks" if all(told.values()) else "a process that srun did not start"
-        raise ConfigError(
-            f"Expected three tasks or more of a Slurm allocation, {', '.join(ROLES)}: srun --ntasks 17 swarm-forage "
-            f"study run ... --cluster slurm; got {got}."
-        )
-    usual = signal.getsignal(signal.SIGINT)
-    try:
-        from dask import config
-        from dask_jobqueue.slurm import SLURMRunner
-    except ImportError as error:
-        raise ImportError(f"Slurm needs dask-jobqueue: {install_command('cluster')}.") from error
-    network = {"interface": config.get("jobqueue.slurm.interface", None)}
-    runner = SLURMRunner(
-        scheduler_file="dask-scheduler-{job_id}.json",
-        scheduler_options={"dashboard_address": None, **network},
-        worker_options={"nthreads": 1, **network},
-    )
-    # The library ends its processes by Ctrl-C and answers it in all of them; here it means what it always does.
-    signal.signal(signal.SIGINT, usual)
-    return runner
-
-
-def slurm_cluster(**settings: Any) -> Any:
-    """Return a cluster of slurm jobs, without jobs yet.
-
-    Args:
-        settings: Of `dask_jobqueue.SLURMCluster`, over those of its configuration file. Default: one core and 4 GiB per
-            job (our choice; a run of 819 robots takes a tenth of that).
-
-    Raises:
-        ImportError: dask-jobqueue is not installed.
-    """
-    try:
-        from dask import config
-        from dask_jobqueue.slurm import SLURMCluster
-    except ImportError as error:
-        raise ImportError(f"Slurm needs dask-jobqueue: {install_command('cluster')}.") from error
-    usual = {"cores": 1, "processes": 1, "memory": "4GiB"}
-    configured = config.get("jobqueue.slurm", {})
-    kept = {name: value for name, value in usual.items() if configured.get(name) is None}
-    return SLURMCluster(**{**kept, **settings})

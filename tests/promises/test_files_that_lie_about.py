@@ -143,7 +143,7 @@ def console(tmp_path, here, marker, forged):
     (here / ".env").write_text(
         f"NUMBA_CACHE_DIR={tmp_path / 'cache'}\nIMAGEIO_FFMPEG_EXE={tmp_path / 'bin' / 'latex'}\n"
     )
-    for name in ("dask.yaml", "distributed.yaml", "jobqueue.yaml"):
+    for name in ("dask.yaml", "distributed.yaml"):
         (here / name).write_text("distributed: {worker: {preload: [multiprocessing.py]}}\n")
     programs = tmp_path / "bin"
     programs.mkdir()
