@@ -37,11 +37,11 @@ if TYPE_CHECKING:
 
 PICTURE_FILE = "curves.png"
 _HIDDEN = ",".join(map(str, DEFAULT_HIDDEN))
-_OF_SEEDS = ("picture", "as_json")
+_OF_SEEDS = ("picture", "as_json", "jobs")
 """Options that go with --seeds only."""
-_OF_PLAN = ("plan", "out", "seed", "turned", "frame_decisions", "seeds", *_OF_SEEDS, "callbacks", "jobs", "resume")
+_OF_PLAN = ("plan", "out", "seed", "turned", "frame_decisions", "seeds", *_OF_SEEDS, "callbacks", "resume")
 """Options that go with --plan."""
-_OF_RESUMING = ("steps", "out", "seeds", *_OF_SEEDS, "callbacks", "jobs", "resume")
+_OF_RESUMING = ("steps", "out", "seeds", *_OF_SEEDS, "callbacks", "resume")
 """Options that say nothing of the plan that is resumed."""
 
 
@@ -216,7 +216,7 @@ def train(
         typer.Option(
             "--jobs",
             min=1,
-            help="Processes: for the arenas, default 1; with --seeds for trainings, default one per usable core.",
+            help="Trainings at a time, each in a process; default one per usable core.",
         ),
     ] = None,
     resume: Annotated[
@@ -255,7 +255,7 @@ def train(
         chosen = resumed_plan(folder, chosen if says_more else None, asked.steps, is_shared=several.seeds is not None)
     how: dict[str, Any] = {"resume": resume, "callbacks": callbacks or ()}
     if several.seeds is None:
-        run_training(chosen, folder, n_processes=0 if jobs in (None, 1) else min(jobs, chosen.n_arenas), **how)
+        run_training(chosen, folder, **how)
     else:
         seeds, picture = range(chosen.seed, chosen.seed + several.seeds), several.picture or folder / PICTURE_FILE
         run_seeds(chosen, seeds, folder, jobs=jobs, picture=picture, as_json=several.as_json, **how)

@@ -39,9 +39,7 @@ LINE_EVERY_S = 60.0
 """Shortest time between two lines about the progress where stderr is no terminal, s."""
 
 
-def run_training(
-    plan: TrainingPlan, folder: Path, *, n_processes: int, resume: bool, callbacks: Sequence[str] = ()
-) -> None:
+def run_training(plan: TrainingPlan, folder: Path, *, resume: bool, callbacks: Sequence[str] = ()) -> None:
     """Train, show how it goes, and say where the results are; `callbacks` as in `training.sb3.callbacks`.
 
     Raises:
@@ -57,7 +55,7 @@ def run_training(
         console = bar.console
         try:
             report = _reporter(plan, bar, plan.total_steps)
-            result = train(plan, folder, n_processes=n_processes, resume=resume, report=report, callbacks=added)
+            result = train(plan, folder, resume=resume, report=report, callbacks=added)
         except KeyboardInterrupt:
             _draw(plan, read_evaluations(folder / EVALUATIONS_FILE), folder / PICTURE_FILE, console)
             words = _farewell(folder, is_kept=(folder / MODEL_FILE).exists())

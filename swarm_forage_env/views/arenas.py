@@ -12,7 +12,7 @@ rows (`LearnerArena`) are absent from the first step of the run to the last. The
   `ArenaStep.is_episode` is false for them.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, cast
 
@@ -24,13 +24,16 @@ from swarm_forage_env.contract.own_functions import OwnFunctionError
 from swarm_forage_env.contract.policy import COMMANDS
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policies.interface import GivenInterface
+from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.views.bookkeeping import Bookkeeping, can_book_together
 from swarm_forage_env.views.learner_arena import LearnerArena
-from swarm_forage_env.views.plans import ArenaPlan
+from swarm_forage_env.views.plans import ArenaPlan, plan_arena
+from swarm_forage_env.views.sampler import ScenarioSampler
 from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.world.kernels.reward import book_rows
 from swarm_forage_env.world.lockstep import Lockstep, can_go_in_lockstep
-from swarm_forage_env.wrappers.base import SwarmWrapper, steps_as_made
+from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig, steps_as_made
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -143,9 +146,7 @@ class ArenaBatch:
         interface: Spaces and layout of what learners see and do.
     """
 
-    def __init__(
-        self, plan: ArenaPlan, n_arenas: int, *, first_arena: int = 0, n_arenas_in_all: int | None = None
-    ) -> None:
+    def __init__(self, plan: ArenaPlan, n_arenas: int) -> None:
         """Build the arenas; `reset` must be called before `step`.
 
         Where a sampler draws the worlds, each arena keeps to one of its kinds, see `ScenarioSampler.shares`.
@@ -153,17 +154,14 @@ class ArenaBatch:
         Args:
             plan: What every arena is made from.
             n_arenas: How many.
-            first_arena: Number of the first of them, where this is part of a larger batch.
-            n_arenas_in_all: Arenas of that batch; None = `n_arenas`.
 
         Raises:
             ConfigError: n_arenas below 1, or a plan that cannot be built.
         """
         n_arenas = as_whole("n_arenas", n_arenas, at_least=1)
-        self._first_arena = first_arena
         shares: list[float | None] = [None] * n_arenas
         if plan.sampler is not None:
-            shares = plan.sampler.shares(n_arenas_in_all or n_arenas)[first_arena : first_arena + n_arenas]
+            shares = plan.sampler.shares(n_arenas)
         self.arenas = [LearnerArena(plan, share) for share in shares]
         self.interface = self.arenas[0].interface
         self.n_arenas = n_arenas
@@ -352,7 +350,7 @@ class ArenaBatch:
     def _note(self, error: ValueError, number: int) -> None:
         """Add to a refusal of actions in which arena it was."""
         error.add_note(
-            f"This was in arena {self._first_arena + number}, which was not stepped. Other arenas may have been "
+            f"This was in arena {number}, which was not stepped. Other arenas may have been "
             "stepped already; where there are others, reset before going on."
         )
 
@@ -407,7 +405,7 @@ class ArenaBatch:
         env = self.arenas[number].forage_env
         assert env.seed_value is not None, "an environment that was stepped has a seed"
         return RunOutcome(
-            arena=self._first_arena + number,
+            arena=number,
             seed=env.seed_value,
             seconds=env.tick * env.scenario.dt_s,
             collected=int(env.events.counters[Counter.COLLECTED]),
@@ -475,3 +473,76 @@ _NOBODY: BoolArray = np.zeros(0, np.bool_)
 
 def _joined(parts: list[np.ndarray], nothing: np.ndarray) -> np.ndarray:
     return np.concatenate(parts) if parts else nothing
+
+
+def open_arenas(
+    scenario: str | ScenarioConfig | None = None,
+    *,
+    num_envs: int = 1,
+    n_arenas: int | None = None,
+    sampler: ScenarioSampler | None = None,
+    interface: GivenInterface = None,
+    wrappers: Iterable[WrapperConfig | str] = (),
+    max_cycles: int | None = None,
+    render_mode: str | None = None,
+    snapshots: bool = False,
+    turned: bool = False,
+    **overrides: Any,
+) -> ArenaBatch:
+    """Build arenas.
+
+    Args:
+        scenario: Name of a preset, or a complete configuration; default warehouse_small.
+        num_envs: Robots in all arenas together, a multiple of the scenario's number. 1, the default of
+            `gymnasium.make_vec`, leaves the choice to `n_arenas`.
+        n_arenas: Arenas that run side by side; default as many as `num_envs` needs, at least one.
+        sampler: Draws the world of each run, instead of `scenario`, `wrappers` and `overrides`.
+        interface: What a learner sees and does, an `InterfaceConfig` or its fields by name; default full observations
+            and continuous actions.
+        wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
+            ("population:death_per_tick=0.01").
+        max_cycles: Ticks until truncation; default the scenario's horizon.
+        render_mode: None or "rgb_array".
+        snapshots: Keep what copies and snapshots need; see `ForageEnv`.
+        turned: Show each run turned or mirrored, see `plan_arena`.
+        overrides: Scenario fields by name (`n_robots=20`, `nest_progress=0.1`).
+
+    Raises:
+        ConfigError: as `plan_arena`, or n_arenas below 1.
+        ValueError: num_envs and n_arenas that do not fit together, or a window.
+    """
+    plan = plan_arena(
+        scenario,
+        sampler=sampler,
+        interface=interface,
+        wrappers=wrappers,
+        max_cycles=max_cycles,
+        render_mode=render_mode,
+        snapshots=snapshots,
+        turned=turned,
+        **overrides,
+    )
+    if render_mode == "human":
+        raise ValueError(
+            "Expected render_mode None or 'rgb_array' for a vector environment, got 'human'; a window shows one arena, "
+            "of parallel_env or JointForageEnv."
+        )
+    return ArenaBatch(plan, _number_of_arenas(num_envs, n_arenas, plan.world.n_robots))
+
+
+def _number_of_arenas(num_envs: int, n_arenas: int | None, n_robots: int) -> int:
+    if n_arenas is not None and num_envs not in (1, n_arenas * n_robots):
+        raise ValueError(
+            f"Expected num_envs = {n_arenas * n_robots} for n_arenas = {n_arenas} of n_robots = {n_robots} (one "
+            f"sub-environment per robot), got {num_envs}; leave num_envs or n_arenas away."
+        )
+    if n_arenas is not None:
+        return n_arenas
+    if num_envs == 1:
+        return 1
+    if num_envs < 1 or num_envs % n_robots:
+        raise ValueError(
+            f"Expected num_envs to be a multiple of n_robots = {n_robots} (one sub-environment per robot), got "
+            f"{num_envs}; choose another n_robots, or give n_arenas instead."
+        )
+    return num_envs // n_robots

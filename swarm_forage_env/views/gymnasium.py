@@ -13,10 +13,9 @@ from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.contract.types import BoolArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import LearnerInterface
-from swarm_forage_env.views.arenas import ArenaStep
+from swarm_forage_env.views.arenas import ArenaStep, open_arenas
 from swarm_forage_env.views.learner_arena import LearnerArena, LearnerSnapshot
 from swarm_forage_env.views.plans import constructor_takes, plan_arena
-from swarm_forage_env.views.processes import open_arenas
 from swarm_forage_env.wrappers.base import WrapperConfig
 
 
@@ -237,7 +236,7 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
             self._arenas.set_attribute(name, value, [arena])
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Close all arenas and end their processes."""
+        """Close all arenas."""
         self._arenas.close()
 
 

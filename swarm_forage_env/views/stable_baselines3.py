@@ -11,9 +11,8 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
 from swarm_forage_env.contract.types import BoolArray
-from swarm_forage_env.views.arenas import ArenaStep
+from swarm_forage_env.views.arenas import ArenaStep, open_arenas
 from swarm_forage_env.views.plans import constructor_takes
-from swarm_forage_env.views.processes import open_arenas
 
 
 class SwarmVecEnv(VecEnv):
@@ -161,7 +160,7 @@ class SwarmVecEnv(VecEnv):
         return [wrapper_class is Monitor] * len(self._rows(indices))
 
     def close(self) -> None:
-        """Close all arenas and end their processes."""
+        """Close all arenas."""
         self._arenas.close()
 
     def _rows(self, indices: VecEnvIndices) -> list[int]:

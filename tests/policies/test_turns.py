@@ -17,7 +17,6 @@ from swarm_forage_env.views.arenas import ArenaBatch
 from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv
 from swarm_forage_env.views.plans import plan_arena
-from swarm_forage_env.views.processes import ArenaProcesses
 from tests.support.sampled import sampler
 from tests.support.stage import build_cache, clear, lay, load, put
 
@@ -183,17 +182,6 @@ def test_a_batch_is_bit_for_bit_its_arenas_alone(interface):
         np.testing.assert_array_equal(step.obs, np.concatenate([one.obs for one in steps]))
         np.testing.assert_array_equal(step.rewards, np.concatenate([one.rewards for one in steps]))
     assert len({arena.turn for arena in batch.arenas}) > 1
-
-
-def test_processes_turn_as_one_process_does():
-    here, there = ArenaBatch(PLAN, 4), ArenaProcesses(PLAN, 4, 2)
-    try:
-        for batch in (here, there):
-            batch.reset(SEEDS, [None] * 4)
-        chosen = np.random.default_rng(0).integers(0, 6, here.n_rows)
-        np.testing.assert_array_equal(here.step(chosen).obs, there.step(chosen).obs)
-    finally:
-        there.close()
 
 
 def test_a_snapshot_keeps_the_turn():

@@ -116,11 +116,11 @@ def test_a_plan_is_carried_out_stage_by_stage(tmp_path):
     assert {path.name for path in tmp_path.iterdir()} >= {"plan.json", "model.zip", "policy.npz"}
 
 
-def test_the_same_plan_gives_the_same_weights_in_one_process_and_in_two(tmp_path):
-    first, divided = train(tiny_plan(), tmp_path / "a"), train(tiny_plan(), tmp_path / "b", n_processes=2)
+def test_the_same_plan_gives_the_same_weights(tmp_path):
+    first, again = train(tiny_plan(), tmp_path / "a"), train(tiny_plan(), tmp_path / "b")
     assert not same(weights(first.model), weights(train(tiny_plan(seed=1), tmp_path / "c").model))
-    assert same(weights(first.model), weights(divided.model))
-    assert [each.performance for each in first.evaluations] == [each.performance for each in divided.evaluations]
+    assert same(weights(first.model), weights(again.model))
+    assert [each.performance for each in first.evaluations] == [each.performance for each in again.evaluations]
 
 
 @pytest.mark.parametrize(("plan", "evaluated"), [(tiny_plan(), [256, 384, 640, 768]), (SHORT, [128])])
@@ -251,23 +251,20 @@ def test_a_training_that_kept_nothing_is_started_again(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("changes", "n_processes", "reason"),
+    ("changes", "reason"),
     [
-        ({}, 3, "processes from 0 to n_arenas = 2, got 3"),
-        ({}, -1, "processes from 0 to n_arenas = 2, got -1"),
-        ({"evaluation": EvaluationPlan(baseline="gone.npz")}, 0, r"baseline to be a controller: .*gone\.npz"),
+        ({"evaluation": EvaluationPlan(baseline="gone.npz")}, r"baseline to be a controller: .*gone\.npz"),
         # Clusters are drawn by the first reset.
         (
             {"world": World(search_and_rescue(side_m=48.0, n_robots=4, horizon_s=200.0)),
              "stages": (Stage(steps=64, scenario=ROOMLESS),)},
-            0,
             r"Cannot train in stage 1, with width_m = 9.6, .*: Expected room for \d+ clusters",
         ),
     ],
 )  # fmt: skip
-def test_what_cannot_begin_leaves_nothing_behind(tmp_path, changes, n_processes, reason):
+def test_what_cannot_begin_leaves_nothing_behind(tmp_path, changes, reason):
     with pytest.raises(ConfigError, match=reason):
-        train(tiny_plan(**changes), tmp_path / "new" / "folder", n_processes=n_processes)
+        train(tiny_plan(**changes), tmp_path / "new" / "folder")
     assert list(tmp_path.iterdir()) == []
 
 

@@ -201,7 +201,7 @@ def test_refuses_too_few_rows_and_steps_before_a_reset():
 
 @pytest.mark.parametrize("interface", [InterfaceConfig(), InterfaceConfig(automatic_gripper=True)])
 def test_actions_that_are_not_finite_are_refused_by_name(interface):
-    batch = ArenaBatch(plan(interface), 2, first_arena=4)
+    batch = ArenaBatch(plan(interface), 2)
     batch.reset([0, 1], [None, None])
     actions = np.zeros((6, *batch.interface.action_space.shape), np.float32)
     actions[4, 0] = np.nan
@@ -209,7 +209,7 @@ def test_actions_that_are_not_finite_are_refused_by_name(interface):
         batch.step(actions)
     assert "the world was not stepped" in str(refusal.value)
     (note,) = refusal.value.__notes__
-    assert "in arena 5, which was not stepped" in note
+    assert "in arena 1, which was not stepped" in note
     assert [arena.forage_env.tick for arena in batch.arenas] == [1, 0], "other arenas may have been stepped"
     batch.reset([0, 1], [None, None])
     assert batch.step(np.zeros_like(actions)).obs.shape[0] == 6

@@ -12,7 +12,6 @@ from swarm_forage_env.views.arenas import ArenaBatch
 from swarm_forage_env.views.gymnasium import JointForageEnv, SwarmVectorEnv
 from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv
 from swarm_forage_env.views.plans import plan_arena
-from swarm_forage_env.views.processes import ArenaProcesses
 from swarm_forage_env.views.sampler import SampledWorld, ScenarioSampler
 from tests.support.sampled import sampler
 
@@ -104,17 +103,6 @@ def test_fields_of_a_reset_hold_in_every_world():
     assert batch.get_attribute("scenario", [0])[0].reward.delivery == 7.0
     batch.reset([8, 9], [None] * 2)
     assert {config.reward.delivery for config in batch.get_attribute("scenario", [0, 1])} == {7.0}
-
-
-def test_processes_give_the_same_rows():
-    together, apart = ArenaBatch(PLAN, 2), ArenaProcesses(PLAN, 2, 1)
-    try:
-        for one, other in zip(together.reset([3, 5], [None] * 2), apart.reset([3, 5], [None] * 2), strict=True):
-            np.testing.assert_array_equal(one, other)
-        actions = np.ones(12, np.int64)
-        np.testing.assert_array_equal(together.step(actions).obs, apart.step(actions).obs)
-    finally:
-        apart.close()
 
 
 # PettingZoo's test wonders about possible agents that a run does not have; that is what a drawn size means.

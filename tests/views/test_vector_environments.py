@@ -212,7 +212,7 @@ def test_a_reset_can_change_the_scenario(view):
 
 
 def test_attributes_and_methods_reach_the_arenas():
-    envs = SwarmVectorEnv("warehouse_small", num_envs=6, n_robots=3, n_processes=2)
+    envs = SwarmVectorEnv("warehouse_small", num_envs=6, n_robots=3)
     try:
         envs.reset(seed=0)
         envs.set_attr("max_cycles", [2, 3])

@@ -105,7 +105,6 @@ def train(
     plan: TrainingPlan,
     folder: Path,
     *,
-    n_processes: int = 0,
     resume: bool = False,
     report: Report | None = None,
     callbacks: Sequence[BaseCallback] = (),
@@ -121,30 +120,26 @@ def train(
     Args:
         plan: What to do. A training goes on by its own plan, or by one with a longer last stage or further stages.
         folder: Where results go; created.
-        n_processes: Processes that the arenas are spread over; 0 = all in this process.
         resume: Go on where the checkpoint in `folder` stopped.
         report: Told the status about once a second, and every evaluation.
         callbacks: Further callbacks of the library; one that returns False ends the training, as the library has it.
 
     Raises:
-        ConfigError: the algorithm knows no such option, more processes than arenas, the folder holds a training run and
+        ConfigError: the algorithm knows no such option, the folder holds a training run and
             `resume` is False, `resume` is True and the folder holds no training run, or one by another plan, or broken
             files; another call that trains in the folder; a stage whose scenario cannot be built; or a training that
             diverged.
     """
     check_plan(plan)
-    if not 0 <= n_processes <= plan.n_arenas:
-        raise ConfigError(f"Expected processes from 0 to n_arenas = {plan.n_arenas}, got {n_processes}.")
     check_folder(folder)
     with alone_in(folder, ConfigError):
         check_place(folder, plan, resume=resume)
-        return _train(plan, folder, n_processes, resume, report or _keep_quiet, callbacks)
+        return _train(plan, folder, resume, report or _keep_quiet, callbacks)
 
 
 def _train(
     plan: TrainingPlan,
     folder: Path,
-    n_processes: int,
     resume: bool,
     report: Report,
     callbacks: Sequence[BaseCallback],
@@ -155,7 +150,7 @@ def _train(
     together = _Together(watch, callbacks)
     if available_cores() > 1:
         compile_world(plan.scenario)
-    env = SwarmVecEnv(**plan.arenas_of(plan.stages[0]), n_processes=n_processes)
+    env = SwarmVecEnv(**plan.arenas_of(plan.stages[0]))
     sampler = plan.stages[0].sampler
     try:
         model = _checkpoint(plan, folder, env) if resume else None
@@ -167,7 +162,7 @@ def _train(
             if done < ends:
                 if stage.sampler != sampler:
                     env.close()
-                    env, sampler = SwarmVecEnv(**plan.arenas_of(stage), n_processes=n_processes), stage.sampler
+                    env, sampler = SwarmVecEnv(**plan.arenas_of(stage)), stage.sampler
                 model = _prepared(plan, stage, folder, env, done)
                 _learn(model, ends - done, together, f"stage {number}{_changes(stage)}")
             if together.ended:
