@@ -10,8 +10,6 @@ from enum import IntEnum
 
 import numpy as np
 
-from swarm_forage_env._internal.pcg64 import Uniform
-
 
 class Stream(IntEnum):
     """Stream numbers. They are part of every stored result: never renumber, only append."""
@@ -55,7 +53,7 @@ class TickDraws:
             rng: The generator.
             shape: Of the numbers of one tick.
         """
-        self._numbers = Uniform(rng)
+        self._rng = rng
         self._shape = (max(1, self._NUMBERS_AT_ONCE // max(1, math.prod(shape))), *shape)
         self._rows = np.empty((0, *shape))  # numbers come with the first draw: snapshots hold none that is never used
         self._block = -1
@@ -73,6 +71,6 @@ class TickDraws:
         if self._block < 0:
             self._rows = np.empty(self._shape)
         while self._block < block:
-            self._numbers.fill(self._rows)
+            self._rng.random(out=self._rows)
             self._block += 1
         return self._rows[place:]

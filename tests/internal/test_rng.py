@@ -1,11 +1,9 @@
 """Named random streams."""
 
-import copy
 
 import numpy as np
 import pytest
 
-from swarm_forage_env._internal.pcg64 import LANES, Uniform
 from swarm_forage_env._internal.rng import Stream, TickDraws, stream_rng
 
 
@@ -71,31 +69,3 @@ def test_a_tick_may_be_left_out():
     draws, again = TickDraws(np.random.default_rng(5), 4000), np.random.default_rng(5).random((9, 4000))
     for tick in (1, 4, 9):
         np.testing.assert_array_equal(draws.row(tick), again[tick - 1])
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_compiled_numbers_are_those_of_numpy(seed):
-    """In pieces of all lengths, from wherever the generator stands when the first are drawn."""
-    rng, again = (np.random.default_rng(seed) for _ in range(2))
-    numbers = Uniform(again)
-    rng.random(seed)
-    again.random(seed)
-    for length in (5, 4, 0, 1, 2, 3, 1000, 7):
-        out = np.empty(length)
-        numbers.fill(out)
-        np.testing.assert_array_equal(out, rng.random(length))
-        numbers = copy.deepcopy(numbers)
-
-
-def test_the_kernel_itself_makes_numbers_of_numpy(monkeypatch):
-    monkeypatch.setattr("swarm_forage_env._internal.pcg64.is_compiled", lambda _: True)  # also where it is switched off
-    out = np.empty(2 * LANES + 3)
-    Uniform(np.random.default_rng(4)).fill(out)
-    np.testing.assert_array_equal(out, np.random.default_rng(4).random(len(out)))
-
-
-@pytest.mark.parametrize("bits", [np.random.MT19937, np.random.PCG64DXSM])
-def test_other_generators_draw_themselves(bits):
-    out = np.empty(9)
-    Uniform(np.random.Generator(bits(3))).fill(out)
-    np.testing.assert_array_equal(out, np.random.Generator(bits(3)).random(9))
