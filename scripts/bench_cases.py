@@ -191,7 +191,7 @@ def import_seconds(_engine: str, _effort: float) -> float:
 
 
 def first_run(engine: str, _effort: float) -> float:
-    """Seconds by the clock, because two processes compile."""
+    """Seconds by the clock."""
     words = ["run", "crw", "--robots", "50", "--horizon", "200", "--set", f"physics={engine}"]
     started = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:

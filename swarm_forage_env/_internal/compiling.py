@@ -253,13 +253,6 @@ def direct(function: F, *example: Any) -> F:
     return cast(F, _entry_points[key])
 
 
-def compile_part(function: Callable[..., Any], *example: Any) -> None:
-    """Compile what kernels take from `function` when they call it, for arguments of the types of `example`."""
-    if is_compiled(function):
-        with _collector_off():
-            cast(Any, function).get_call_template(tuple(type_of(argument) for argument in example), {})
-
-
 def is_new(function: Callable[..., Any], *example: Any) -> bool:
     """Whether `direct` would have to compile `function`, and other processes could use the result.
 
@@ -312,11 +305,6 @@ class Callback:
         if is_compiled(function):
             self._arguments = tuple(typeof(argument) for argument in example)
             self.type = types.FunctionType(types.none(*self._arguments))
-
-    def prepare(self) -> None:
-        """Compile it now, unless that has happened."""
-        if self.type is not None:
-            self.__wrapper_address__()
 
     def __call__(self, *arguments: Any) -> None:
         """Call the function itself, for kernels that are not compiled."""

@@ -17,7 +17,7 @@ from concurrent.futures import (
     ProcessPoolExecutor,
     wait,
 )
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from functools import partial
 from multiprocessing import get_context
@@ -29,18 +29,11 @@ from swarm_forage_env._internal.fields import as_whole
 from swarm_forage_env._internal.files import check_folder
 from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.registry import file_of, is_policy_file
-from swarm_forage_env.runs.first_compilation import (
-    WAKE_UP_EVERY_S,
-    compile_outermost,
-    compile_run,
-    compile_start,
-    is_first_run,
-)
 from swarm_forage_env.runs.record import RecordError, RunRecord
 from swarm_forage_env.runs.run import run_one, warm_up
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import RunFailure, RunStore
-from swarm_forage_env.world.compiled import compile_half
+from swarm_forage_env.world.compiled import is_first
 
 Outcome: TypeAlias = RunRecord | RunFailure
 Result = TypeVar("Result")
@@ -63,6 +56,8 @@ BATCH_ROBOT_TICKS = 20_000_000
 """How much an executor of several machines gets as one task: ten seconds or more, much longer than sending it takes."""
 QUEUED_ELSEWHERE = 4096
 """Tasks given to the executor of the caller at a time: enough for the workers that may join it, few enough to watch."""
+WAKE_UP_EVERY_S = 0.5
+"""The driver never sleeps longer, because with the signal handler of a library (polars) Ctrl-C may not end a sleep."""
 KILLED = (
     "The worker process that made the run was killed, most likely because memory ran out; try fewer processes at a "
     "time (--jobs 1), or a smaller run."
@@ -241,10 +236,7 @@ def _submitted(executor: Executor, task: Task) -> Future[Any]:
 
 
 def _run_here(todo: deque[Task]) -> Generator[Outcome]:
-    """Run `todo` in this process. A further one may help to compile."""
-    if todo and available_cores() > 1:
-        with suppress(Exception):  # the run itself raises it again, and it is recorded then
-            compile_run(todo[0][0])
+    """Run `todo` in this process."""
     yield from _run_on(_InProcess(), todo, limit=1)
 
 
@@ -332,27 +324,12 @@ def _warm_up_workers(pool: Executor, specs: Iterable[RunSpec]) -> bool:
     that is killed, too: False is returned, the pool is broken, and in the next one only runs that kill again fail.
     """
     kinds = tuple({_kernel_kind(spec): spec for spec in specs}.values())
-    if not all(_compiled_together(pool, spec) for spec in kinds[:1]):  # what is left of other kinds is their policy
-        return False
-    return not any(_is_broken_by(pool.submit(warm_up, spec)) for spec in kinds)
-
-
-def _compiled_together(pool: Executor, spec: RunSpec) -> bool:
-    """Have two workers compile what a first run needs, see `runs.first_compilation`; False if one is killed."""
-    asked = pool.submit(is_first_run, spec)
+    asked = pool.submit(is_first, kinds[0].scenario)
     if _is_broken_by(asked):
         return False
-    if asked.exception() is not None or not asked.result():
-        return True
-    tell_of_first_run()
-    try:
-        halves = [pool.submit(compile_half, spec.scenario, half) for half in (0, 1)]
-        if any([_is_broken_by(future) for future in halves]):  # noqa: C419 - a list: all are waited for
-            return False
-        ends = [pool.submit(end, spec) for end in (compile_outermost, compile_start)]
-        return not any([_is_broken_by(future) for future in ends])  # noqa: C419 - as above
-    except BrokenExecutor:  # between two tasks
-        return False
+    if asked.exception() is None and asked.result():
+        tell_of_first_run()  # workers have nobody to tell
+    return not any(_is_broken_by(pool.submit(warm_up, spec)) for spec in kinds)
 
 
 def _is_broken_by(future: Future[Any]) -> bool:

@@ -1,6 +1,5 @@
 """Named random streams."""
 
-
 import numpy as np
 import pytest
 

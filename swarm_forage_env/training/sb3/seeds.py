@@ -22,8 +22,15 @@ from swarm_forage_env._internal.faults import in_words
 from swarm_forage_env._internal.fields import ConfigError, as_whole, several
 from swarm_forage_env._internal.files import alone_in, check_folder
 from swarm_forage_env.policies import trust
-from swarm_forage_env.runs.first_compilation import WAKE_UP_EVERY_S, compile_world
-from swarm_forage_env.runs.workers import deaf_children, live_with_driver, processes_of, single_threaded_children
+from swarm_forage_env.runs.run import warm_up
+from swarm_forage_env.runs.spec import plan_run
+from swarm_forage_env.runs.workers import (
+    WAKE_UP_EVERY_S,
+    deaf_children,
+    live_with_driver,
+    processes_of,
+    single_threaded_children,
+)
 from swarm_forage_env.training.evaluations import MODEL_FILE, PLAN_FILE, Evaluation, TrainingStatus
 from swarm_forage_env.training.plan import TrainingPlan, read_plan
 from swarm_forage_env.training.sb3.callbacks import check_callbacks, named_callbacks
@@ -100,7 +107,8 @@ def train_seeds(
             for job in todo:
                 _train(job, partial(told, job.plan.seed))
         else:
-            compile_world(plan.scenario)  # before several do so at once
+            one_interval = replace(plan.scenario, horizon_s=plan.scenario.interval_s)
+            warm_up(plan_run(one_interval, "random"))  # compiles the world before several processes do so at once
             _train_apart(todo, n_processes, told)
         return read_seeds(plan, folder, seeds, failures)
 

@@ -31,10 +31,8 @@ from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.policies.model_files import MODEL_FAULTS, deterministic_choice
 from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.policies.registry import load_policy
-from swarm_forage_env.runs.first_compilation import compile_world
 from swarm_forage_env.runs.run import Started
 from swarm_forage_env.runs.versions import software_versions
-from swarm_forage_env.runs.workers import available_cores
 from swarm_forage_env.training.evaluation_plan import BEST
 from swarm_forage_env.training.evaluations import (
     EVALUATIONS_FILE,
@@ -148,8 +146,6 @@ def _train(
     torch.set_num_threads(1)  # networks this small gain nothing from more, and arenas want the cores
     watch = _Watch(plan, folder, report)
     together = _Together(watch, callbacks)
-    if available_cores() > 1:
-        compile_world(plan.scenario)
     env = SwarmVecEnv(**plan.arenas_of(plan.stages[0]))
     sampler = plan.stages[0].sampler
     try:
