@@ -82,7 +82,7 @@ class RunRecord:
     spec: str
     """The run's complete specification as JSON (`runs.spec.RunSpec.from_json`)."""
     provenance: Mapping[str, str]
-    """Versions, code, commit, time of creation, seconds of the clock and of a core."""
+    """Versions, commit, time of creation, seconds of the clock and of a core."""
 
     def __post_init__(self) -> None:
         n_intervals = len(self.interval)
@@ -151,7 +151,7 @@ class RunRecord:
         return replace(self, performance=curve, spec=json.dumps(spec, sort_keys=True))
 
     def made_by(self, versions: Mapping[str, str]) -> bool:
-        """Return whether these `software_versions` made the run: the same packages and the same code."""
+        """Return whether these `software_versions` made the run: the same packages and the same commit."""
         return identity(self.provenance) == identity(versions)
 
     def same_results(self, other: "RunRecord") -> bool:

@@ -62,9 +62,9 @@ def test_runs_of_a_file_become_a_folder_again(folder, file, tmp_path):
 def test_records_of_runs_by_several_versions_say_so(file):
     table = read_study(file)
     (made,) = table.versions
-    mixed = replace(table, versions=(made, {**made, "code": "0123456789abcdef"}))
+    mixed = replace(table, versions=(made, {**made, "commit": "0123456789abcdef"}))
     record = next(iter(mixed.records.values()))
-    assert record.provenance["code"] == f"{made['code']} or 0123456789abcdef"
+    assert record.provenance["commit"] == f"{made['commit']} or 0123456789abcdef"
     assert record.provenance["numpy"].startswith(made["numpy"])
 
 
