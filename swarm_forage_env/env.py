@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium import spaces
 from pettingzoo import ParallelEnv
 
-from swarm_forage_env._internal.fields import as_whole, instance, switch
+from swarm_forage_env._internal.fields import as_whole, instance
 from swarm_forage_env.contract.layout import ObservationLayout
 from swarm_forage_env.contract.own_functions import OwnFunctionError
 from swarm_forage_env.contract.policy import COMMANDS, ActionError, SwarmSpec
@@ -18,7 +18,7 @@ from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.world.rewards import RewardModel
 from swarm_forage_env.world.sensors import global_state
-from swarm_forage_env.world.snapshots import Origin, Snapshot, package_version, read, take
+from swarm_forage_env.world.snapshots import Origin, Snapshot, read, take
 from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
 
 if TYPE_CHECKING:
@@ -54,7 +54,6 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         max_cycles: int | None = None,
         render_mode: str | None = None,
         reads: Collection[str] | None = None,
-        snapshots: bool = False,
     ) -> None:
         """Create the environment of one scenario.
 
@@ -63,12 +62,9 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
             max_cycles: Steps until truncation; default the scenario's horizon.
             render_mode: None, "rgb_array", or "human": every reset and step is shown in a window, without waiting.
             reads: Observation slices that will be used; others may stay zero, which is faster. Default: all.
-            snapshots: Keep what `snapshot`, `copy.deepcopy` and `pickle` need with physics="chipmunk": a history of the
-                run, 24 bytes per robot and tick; a restore or copy repeats the motion of all bodies since the reset,
-                about 1 microsecond per robot and tick. With compiled bodies they always work and keep nothing.
 
         Raises:
-            ConfigError: `scenario` is no ScenarioConfig, an unknown slice in `reads`, or `snapshots` is no bool.
+            ConfigError: `scenario` is no ScenarioConfig, or an unknown slice in `reads`.
             ValueError: max_cycles is no whole number >= 1, or an unknown render mode.
             ImportError: render_mode is "human" and pygame is not installed.
         """
@@ -81,8 +77,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         self.render_mode = render_mode
         self._window = _new_window() if render_mode == "human" else None
         self.max_cycles = scenario.horizon_ticks if max_cycles is None else max_cycles
-        switch("snapshots", snapshots)
-        self.arena = ForagingArena(scenario, reads=reads, snapshots=snapshots)
+        self.arena = ForagingArena(scenario, reads=reads)
         self._reads = ("all",) if reads is None else tuple(sorted(set(reads)))
         n_robots = scenario.robots.n_robots
         self._terminated = np.zeros(n_robots, np.bool_)
@@ -347,7 +342,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
 
         Raises:
             RuntimeError: before the first reset, or after a step that failed half done.
-            SnapshotError: physics is "chipmunk" and the environment was made without `snapshots=True`.
+            SnapshotError: physics is "chipmunk", whose bodies cannot be copied.
         """
         return self.snapshot_through(())
 
@@ -358,7 +353,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         before. Arrays that were taken from the environment earlier, such as `env.swarm.position`, are not updated.
 
         Raises:
-            SnapshotError: not a snapshot, or one of another scenario, stack of wrappers or version; nothing changes.
+            SnapshotError: not a snapshot, or one of another scenario or stack of wrappers; nothing changes.
         """
         return self.per_agent(self.restore_batch(snapshot))
 
@@ -387,7 +382,6 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
 
     def _origin(self, wrappers: Sequence[Any]) -> Origin:
         return Origin(
-            version=f"{self.metadata['name']} of {package_version()}",
             scenario=self.scenario,
             max_cycles=self.max_cycles,
             reads=self._reads,

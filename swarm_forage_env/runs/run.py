@@ -99,7 +99,6 @@ def build_env(
     wrappers: Iterable[WrapperConfig] = (),
     *,
     reads: tuple[str, ...] | None = None,
-    snapshots: bool = False,
 ) -> ForageEnv | SwarmWrapper:
     """Build the environment with its wrappers, in the documented order.
 
@@ -107,9 +106,8 @@ def build_env(
         scenario: The scenario.
         wrappers: Wrapper configurations in any order, each kind at most once.
         reads: Observation slices that the policy looks at; default all.
-        snapshots: Keep what copies and snapshots need; see `ForageEnv`.
     """
-    return wrap_in_order(ForageEnv(scenario, reads=reads, snapshots=snapshots), wrappers)
+    return wrap_in_order(ForageEnv(scenario, reads=reads), wrappers)
 
 
 def build_stack(
@@ -117,10 +115,9 @@ def build_stack(
     wrappers: Iterable[WrapperConfig] = (),
     *,
     reads: tuple[str, ...] | None = None,
-    snapshots: bool = False,
 ) -> RunRecorder:
     """Build the environment by `build_env`, with a recorder around it; the horizon must be whole intervals."""
-    return RunRecorder(build_env(scenario, wrappers, reads=reads, snapshots=snapshots))
+    return RunRecorder(build_env(scenario, wrappers, reads=reads))
 
 
 def run_policy(policy: Policy, spec: RunSpec) -> RunRecord:

@@ -250,8 +250,8 @@ class LearnerArena:
         """Go back to a snapshot of this arena or of one of the same plan; see `ForageEnv.restore`.
 
         Raises:
-            SnapshotError: not such a snapshot, or one of another interface, scenario, sampler, stack or version;
-                nothing changes.
+            SnapshotError: not such a snapshot, or one of another interface, scenario, sampler or stack; nothing
+                changes.
         """
         if not isinstance(snapshot, LearnerSnapshot):  # pyright: ignore[reportUnnecessaryIsInstance] - from users
             raise SnapshotError(

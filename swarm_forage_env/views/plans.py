@@ -35,8 +35,6 @@ class ArenaPlan:
     max_cycles: int | None = None
     """Ticks until truncation; default the scenario's horizon."""
     render_mode: str | None = None
-    snapshots: bool = False
-    """Keep what copies and snapshots need; see `ForageEnv`."""
     turned: bool = False
     """Whether learners see each run turned or mirrored, see `policies.turns`."""
 
@@ -60,7 +58,6 @@ class ArenaPlan:
             max_cycles=self.max_cycles,
             render_mode=self.render_mode,
             reads=self.interface.reads,
-            snapshots=self.snapshots,
         )
         return wrap_in_order(env, given.wrappers)
 
@@ -93,7 +90,6 @@ def plan_arena(
     wrappers: Iterable[WrapperConfig | str] = (),
     max_cycles: int | None = None,
     render_mode: str | None = None,
-    snapshots: bool = False,
     turned: bool = False,
     **overrides: Any,
 ) -> ArenaPlan:
@@ -108,7 +104,6 @@ def plan_arena(
             ("population:death_per_tick=0.01").
         max_cycles: Ticks until truncation; default the scenario's horizon.
         render_mode: None, "rgb_array" or "human"; see `ForageEnv`.
-        snapshots: Keep what copies and snapshots need; see `ForageEnv`.
         turned: Show each run turned by quarter turns or mirrored, one of eight ways that its seed draws, so that a
             learner cannot learn the compass by heart (`policies.turns`). `ForageEnv` itself shows the world as it is.
         overrides: Scenario fields by name (`n_robots=20`, `n_objects=100`, `caches="static"`).
@@ -143,7 +138,6 @@ def plan_arena(
         interface=chosen,
         max_cycles=max_cycles,
         render_mode=render_mode,
-        snapshots=snapshots,
         turned=turned,
     )
 

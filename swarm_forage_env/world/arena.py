@@ -65,16 +65,13 @@ class ForagingArena:
         has_changed: Whether robots came or went since they last looked around.
     """
 
-    def __init__(
-        self, config: ScenarioConfig, *, reads: Collection[str] | None = None, snapshots: bool = False
-    ) -> None:
+    def __init__(self, config: ScenarioConfig, *, reads: Collection[str] | None = None) -> None:
         """Prepare the arena; `reset` must be called before `step`.
 
         Args:
             config: The scenario.
             reads: Observation slices that are used; the sensors of others may stay zero. Default: all. "light if
                 carrying" reads light in rows of robots that carry only.
-            snapshots: Whether Chipmunk's history is kept, see `chipmunk.History`; compiled bodies need none.
 
         Raises:
             ConfigError: `reads` holds an unknown name.
@@ -88,7 +85,6 @@ class ForagingArena:
         further = {NEIGHBOURS, MESSAGES, *config.robots.own_sensors}
         self._needs_python = not further.isdisjoint(self.reads)
         self._given_reads = reads
-        self._snapshots = snapshots
         self._static_caches = len(static_cache_centres(config)) if config.caches == "static" else 0
         self._unit_gain = np.ones((config.robots.n_robots, 2))
         self._nothing = np.zeros((1, config.robots.n_robots))
@@ -116,7 +112,7 @@ class ForagingArena:
         else:
             from swarm_forage_env.world.chipmunk import ChipmunkBodies  # pymunk is loaded where it is asked for
 
-            self._physics = ChipmunkBodies(config, position, heading, keeps_history=self._snapshots)
+            self._physics = ChipmunkBodies(config, position, heading)
         self.obs = sensors.obs
         twist = self._physics.twist
         self._arrays = new_arrays(config, state, sensors, twist, source, placement_draws, self._static_caches)

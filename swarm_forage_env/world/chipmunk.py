@@ -14,16 +14,16 @@ Facts this file relies on, each held by a test:
   0.1 m/s, so that in seconds nearly every body leaves its box in every tick. Time is therefore counted in units of
   `TIME_UNIT_S`, which changes no trajectory and makes a step several times cheaper.
 * A space cannot be copied such that the copy goes on bit for bit: what Chipmunk remembers of contacts, and the order of
-  its search tree, are out of reach. But the same calls lead to the same state, so a copy is made by repeating them.
+  its search tree, are out of reach.
 """
 
-from typing import Any, TypeAlias
+from typing import NoReturn
 
 import numpy as np
 import pymunk
 import pymunk.batch
 
-from swarm_forage_env.contract.types import BoolArray, FloatArray
+from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.world.bodies import PARKED_M, obstacle_rows, room_of_centres
 from swarm_forage_env.world.kernels.bodies import COLLISION_SLOP_M, FRICTION, WALL_INSET_M
@@ -46,76 +46,19 @@ _POSE = pymunk.batch.BodyFields.POSITION | pymunk.batch.BodyFields.ANGLE
 _TWIST = pymunk.batch.BodyFields.VELOCITY | pymunk.batch.BodyFields.ANGULAR_VELOCITY
 
 
-Change: TypeAlias = bytes | tuple[int] | tuple[int, float, float, float]
-"""Who is present from now on, (N,) bool as bytes; the row of a robot that is parked; row and pose of one that is
-placed."""
-
-
-class History:
-    """Everything that the bodies of a run were told, from which `ChipmunkBodies` builds a copy of itself.
-
-    It takes 24 bytes per robot and tick.
-    """
-
-    _TICKS_AT_ONCE = 64
-
-    def __init__(self, position: FloatArray, heading: FloatArray) -> None:
-        """Start with robots at `position` (N, 2) m and `heading` (N,) rad."""
-        self.start = position.copy(), heading.copy()
-        self.n_ticks = 0
-        self.changes: dict[int, list[Change]] = {}
-        """By the number of ticks done before."""
-        # Full blocks are bytes, which nobody can change: copies and snapshots share them.
-        self._full: list[bytes] = []
-        self._block: FloatArray = np.zeros((self._TICKS_AT_ONCE, len(heading) + 1, 3))
-        self._present = b""
-
-    def add_change(self, change: Change) -> None:
-        """Note a change between two ticks."""
-        self.changes.setdefault(self.n_ticks, []).append(change)
-
-    def add_tick(self, twist: FloatArray, present: BoolArray) -> None:
-        """Note a tick: twists (N + 1, 3) and who is present (N,)."""
-        if present.tobytes() != self._present:
-            self._present = present.tobytes()
-            self.add_change(self._present)
-        place = self.n_ticks % self._TICKS_AT_ONCE
-        self._block[place] = twist
-        self.n_ticks += 1
-        if place == self._TICKS_AT_ONCE - 1:
-            self._full.append(self._block.tobytes())
-
-    def twist_of(self, tick: int) -> FloatArray:
-        """Return the twists (N + 1, 3) of a tick; the first is 0."""
-        block, place = divmod(tick, self._TICKS_AT_ONCE)
-        if block == len(self._full):
-            return self._block[place]
-        return np.frombuffer(self._full[block]).reshape(self._block.shape)[place]
-
-
 class ChipmunkBodies:
-    """Bodies, walls and boxes of one run.
-
-    With a history, copies and pickles are made by repeating all ticks, which takes as long as the bodies took: about
-    1 microsecond per robot and tick. Without, they raise a SnapshotError.
+    """Bodies, walls and boxes of one run. Copies and pickles raise a SnapshotError.
 
     Attributes:
         twist: (N + 1, 3) float64 to be filled before `advance`: velocity x, y in m/s and turn rate in rad/s.
             The last row belongs to the static body and stays zero.
     """
 
-    def __init__(
-        self, config: ScenarioConfig, position: FloatArray, heading: FloatArray, *, keeps_history: bool = False
-    ) -> None:
+    def __init__(self, config: ScenarioConfig, position: FloatArray, heading: FloatArray) -> None:
         """Create the space with one disc per robot at `position` (N, 2) m and `heading` (N,) rad."""
         self.twist: FloatArray = np.zeros((len(heading) + 1, 3))
         self._config = config
-        self._history = History(position, heading) if keeps_history else None
-        self._build(position, heading)
-
-    def _build(self, position: FloatArray, heading: FloatArray) -> None:
-        config, n_robots = self._config, len(heading)
-        self._scaled = np.zeros((n_robots + 1, 3))
+        self._scaled = np.zeros((len(heading) + 1, 3))
         self._substeps = [config.dt_s / TIME_UNIT_S * share for share in config.physics_substeps]
         self._space = pymunk.Space()
         self._space.collision_slop = COLLISION_SLOP_M
@@ -161,13 +104,8 @@ class ChipmunkBodies:
 
     def advance(self, swarm: SwarmState) -> None:
         """Move all bodies by one tick along `twist` and write position, heading and facing of present robots."""
-        if self._history is not None:
-            self._history.add_tick(self.twist, swarm.present)
-        poses = self._move(self.twist, swarm.present)
-        unpack_poses(poses, swarm.present, swarm.position, swarm.heading, swarm.facing)
-
-    def _move(self, twist: FloatArray, present: BoolArray) -> FloatArray:
-        np.multiply(twist, TIME_UNIT_S, out=self._scaled)
+        present = swarm.present
+        np.multiply(self.twist, TIME_UNIT_S, out=self._scaled)
         pymunk.batch.set_space_bodies(self._space, _TWIST, self._write)
         for substep in self._substeps:
             self._space.step(substep)
@@ -177,7 +115,7 @@ class ChipmunkBodies:
             n_moved += hold_outside(poses, present, self._obstacles, self._room, self._config.robots.radius_m)
         if n_moved:
             pymunk.batch.set_space_bodies(self._space, _POSE, self._poses)
-        return poses
+        unpack_poses(poses, present, swarm.position, swarm.heading, swarm.facing)
 
     def poses(self) -> FloatArray:
         """Poses of all bodies, (N + 1, 3): x, y in m and unwrapped angle in rad; valid until the next call."""
@@ -190,11 +128,6 @@ class ChipmunkBodies:
 
         Bodies parked on one spot would be tested against each other in every substep, only to be told apart by filter.
         """
-        if self._history is not None:
-            self._history.add_change((row,))
-        self._park(row)
-
-    def _park(self, row: int) -> None:
         body = self._bodies[row]
         self._shapes[row].filter = pymunk.ShapeFilter(categories=0, mask=0)
         body.position = (PARKED_M - row, PARKED_M)
@@ -202,47 +135,15 @@ class ChipmunkBodies:
 
     def place(self, row: int, x: float, y: float, angle: float) -> None:
         """Put a robot's body (back) into the world at a pose in m and rad."""
-        if self._history is not None:
-            self._history.add_change((row, x, y, angle))
-        self._place(row, x, y, angle)
-
-    def _place(self, row: int, x: float, y: float, angle: float) -> None:
         body = self._bodies[row]
         self._shapes[row].filter = pymunk.ShapeFilter()
         body.position = (x, y)
         body.angle = angle
         self._space.reindex_shapes_for_body(body)
 
-    def __getstate__(self) -> dict[str, Any]:
-        """Return what copies and snapshots are made of.
-
-        Raises:
-            SnapshotError: there is no history.
-        """
-        if self._history is None:
-            raise SnapshotError(
-                "Expected physics='compiled', or an environment made with snapshots=True, got physics='chipmunk' "
-                "without it: Chipmunk's state cannot be copied, only repeated from a history of the run. "
-                "Make the environment with either; runs of the two engines differ."
-            )
-        return {"_config": self._config, "twist": self.twist, "_history": self._history}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state)
-        self._repeat(state["_history"])
-
-    def _repeat(self, history: History) -> None:
-        """Build the space and do everything again that is in the history."""
-        self._build(*history.start)
-        present: BoolArray = np.ones(len(self.twist) - 1, np.bool_)
-        for tick in range(history.n_ticks + 1):
-            for change in history.changes.get(tick, ()):
-                if isinstance(change, bytes):
-                    # A copy, because kernels are compiled for arrays that can be written.
-                    present = np.frombuffer(change, np.bool_).copy()
-                elif len(change) == 1:
-                    self._park(*change)
-                else:
-                    self._place(*change)
-            if tick < history.n_ticks:
-                self._move(history.twist_of(tick), present)
+    def __getstate__(self) -> NoReturn:
+        """Refuse copies and snapshots, which need the state of the space."""
+        raise SnapshotError(
+            "Expected physics='compiled' for a snapshot, copy or pickle, got physics='chipmunk': Chipmunk's state "
+            "cannot be copied. Make the environment with compiled bodies; runs of the two engines differ."
+        )

@@ -215,10 +215,9 @@ def _fails():
 
 @pytest.mark.usefixtures("_fails")
 @pytest.mark.parametrize("fields", OWN)
-@pytest.mark.parametrize("physics", ["chipmunk", "compiled"])
-def test_a_tick_that_fails_half_done_is_not_gone_on_with(fields, physics):
+def test_a_tick_that_fails_half_done_is_not_gone_on_with(fields):
     """The world has moved on, but what wraps it has not counted the tick: all that came later would be shifted."""
-    env = ForageEnv(scenario("warehouse_small", n_robots=6, physics=physics, **fields), snapshots=True)
+    env = ForageEnv(scenario("warehouse_small", n_robots=6, physics="compiled", **fields))
     stack = wrap_in_order(env, [parse_wrapper("sensor_noise:sigma=0.1")])
     stack.reset_batch(seed=1)
     for _ in range(2):

@@ -109,7 +109,6 @@ def test_an_arena_comes_back_with_its_frames():
     plan = plan_arena(
         scenario("warehouse_small", n_robots=6, n_objects=60, physics="compiled"),
         interface={"observation": "compact", "actions": "discrete", "frame_decisions": 3, "decision_ticks": 2},
-        snapshots=True,
     )
     arena, rng = LearnerArena(plan), np.random.default_rng(0)
     arena.reset(3)

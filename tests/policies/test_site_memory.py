@@ -111,7 +111,7 @@ def test_a_robot_remembers_an_object_seen_on_its_way_home():
 
 
 def test_a_new_run_begins_without_memory_and_a_snapshot_brings_it_back():
-    plan = plan_arena("warehouse_small", n_robots=2, physics="compiled", interface=INTERFACE, snapshots=True)
+    plan = plan_arena("warehouse_small", n_robots=2, physics="compiled", interface=INTERFACE)
     arena = LearnerArena(plan)
     sites = slice(arena.interface.layout["pickup_site"].start, arena.interface.layout["sighting_site"].stop)
     arena.reset(0)

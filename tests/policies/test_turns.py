@@ -140,7 +140,7 @@ def test_all_turns_are_equally_likely_and_a_seed_decides():
     assert [turn_of(seed) for seed in range(20)] == [turn_of(seed) for seed in range(20)]
 
 
-PLAN = plan_arena(sampler=sampler(), interface=COMPACT, max_cycles=20, turned=True, snapshots=True)
+PLAN = plan_arena(sampler=sampler(), interface=COMPACT, max_cycles=20, turned=True)
 SEEDS = (3, 5, 8, 13)
 
 

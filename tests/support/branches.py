@@ -69,4 +69,4 @@ def whole_stack(name: str, physics: str, caches: str = "none", **overrides: Any)
         name, **{"physics": physics, "caches": caches, "horizon_s": 100.0, "interval_s": 10.0, **overrides}
     )
     cost = parse_wrapper("handling_cost:waveform=square,amplitude=2,offset=3,period_s=30")
-    return build_stack(world, (*mild_wrappers(), cost), snapshots=True)
+    return build_stack(world, (*mild_wrappers(), cost))

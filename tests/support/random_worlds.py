@@ -169,16 +169,16 @@ def _steps_of_batch(sampler: ScenarioSampler, seed: int) -> list[bytes]:
 
 def _walk(world: RandomWorld, seen: Visit, *, by_dicts: bool, is_disturbed: bool) -> list[bytes]:
     """Walk through a world; returns a digest of all that could be seen in each tick."""
-    stack = build_stack(world.scenario, world.wrappers, snapshots=is_disturbed)
+    stack = build_stack(world.scenario, world.wrappers)
     assert RunSpec.from_json(_spec(world).to_json()) == _spec(world), "a specification comes back from its text"
-    chance = Random(world.seed)
+    chance, may_go_back = Random(world.seed), is_disturbed and world.scenario.physics == "compiled"
     if is_disturbed:
         seen.figures["wrong calls"] += misuse_before_reset(stack)
     walker = _Walker(world, stack, by_dicts=by_dicts, is_looked_at=is_disturbed)
     while not walker.is_over:
         if is_disturbed and chance.random() < 0.05:
             seen.figures["wrong calls"] += misuse(stack, chance)
-        if is_disturbed and stack.unwrapped.tick == world.detour_at:
+        if may_go_back and stack.unwrapped.tick == world.detour_at:
             snapshot, other = stack.snapshot(), copy.deepcopy(walker.driver)
             there = walker.go_on(min(10, world.scenario.horizon_ticks - world.detour_at))
             walker.return_to(snapshot, other)

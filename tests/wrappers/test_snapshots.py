@@ -6,13 +6,14 @@ import pickle
 import subprocess
 import sys
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
 
 from swarm_forage_env import SnapshotError, load_policy
 from swarm_forage_env.runs.run import LiveRun, build_env
-from swarm_forage_env.scenarios.config import PHYSICS_ENGINES
+from swarm_forage_env.wrappers.base import SwarmWrapper
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.support.branches import Branch, pickled, whole_stack
 from tests.support.fake_arena import small_scenario
@@ -20,21 +21,16 @@ from tests.support.foraging import NEAR
 
 ROOT = Path(__file__).resolve().parents[2]
 POLICY_OF = {"none": "dpo", "static": "stochm", "dynamic": "stochx"}
-RUNS = [
-    (name, caches, physics)
-    for place, name in enumerate(NEAR)
-    for caches in (tuple(POLICY_OF)[place % 3],)
-    for physics in PHYSICS_ENGINES
-]
+RUNS = [(name, tuple(POLICY_OF)[place % 3]) for place, name in enumerate(NEAR)]
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize(("name", "caches", "physics"), RUNS)
-def test_a_stack_goes_on_from_a_snapshot_to_the_same_record(name, caches, physics):
-    stack = whole_stack(name, physics, caches)
+@pytest.mark.parametrize(("name", "caches"), RUNS)
+def test_a_stack_goes_on_from_a_snapshot_to_the_same_record(name, caches):
+    stack = whole_stack(name, "compiled", caches)
     run = Branch(stack, load_policy(POLICY_OF[caches])).go_on(300)
     snapshot = stack.snapshot()
-    fresh = whole_stack(name, physics, caches)
+    fresh = whole_stack(name, "compiled", caches)
     branches = [run.beside(env, env.restore_batch(snapshot)) for env in (fresh,)]
     branches += [run.beside(env, run.obs) for env in (copy.deepcopy(stack), pickled(stack))]
     expected = run.beside(stack, run.obs).go_on(200)
@@ -51,25 +47,21 @@ CHILD = """
 import hashlib, pickle, sys
 from pathlib import Path
 from tests.support.branches import whole_stack
-for file in sys.argv[1:]:
-    snapshot, run, stack = pickle.loads(Path(file).read_bytes())
-    fresh = whole_stack("warehouse_small", snapshot.origin.scenario.physics, "dynamic")
-    for branch in (run.beside(fresh, fresh.restore_batch(snapshot)), run.beside(stack, run.obs)):
-        print(hashlib.sha256(b"".join(branch.go_on(200).seen)).hexdigest(), branch.columns())
+snapshot, run, stack = pickle.loads(Path(sys.argv[1]).read_bytes())
+fresh = whole_stack("warehouse_small", "compiled", "dynamic")
+for branch in (run.beside(fresh, fresh.restore_batch(snapshot)), run.beside(stack, run.obs)):
+    print(hashlib.sha256(b"".join(branch.go_on(200).seen)).hexdigest(), branch.columns())
 """
 
 
 @pytest.mark.compiled
-def test_another_process_goes_on_from_files(tmp_path):
-    expected = []
-    for physics in PHYSICS_ENGINES:
-        stack = whole_stack("warehouse_small", physics, "dynamic")
-        run = Branch(stack, load_policy("stochx")).go_on(300)
-        (tmp_path / physics).write_bytes(pickle.dumps((stack.snapshot(), run.beside(None, run.obs), stack)))
-        end = run.beside(stack, run.obs).go_on(200)
-        expected += [f"{hashlib.sha256(b''.join(end.seen)).hexdigest()} {end.columns()}"] * 2
-    files = [str(tmp_path / physics) for physics in PHYSICS_ENGINES]
-    child = subprocess.run([sys.executable, "-c", CHILD, *files], cwd=ROOT, capture_output=True, text=True, check=False)
+def test_another_process_goes_on_from_a_file(tmp_path):
+    stack = whole_stack("warehouse_small", "compiled", "dynamic")
+    run, file = Branch(stack, load_policy("stochx")).go_on(300), tmp_path / "run"
+    file.write_bytes(pickle.dumps((stack.snapshot(), run.beside(None, run.obs), stack)))
+    end = run.beside(stack, run.obs).go_on(200)
+    expected = [f"{hashlib.sha256(b''.join(end.seen)).hexdigest()} {end.columns()}"] * 2
+    child = subprocess.run([sys.executable, "-c", CHILD, file], cwd=ROOT, capture_output=True, text=True, check=False)
     assert child.stdout.splitlines() == expected, child.stderr
 
 
@@ -88,23 +80,46 @@ def test_a_live_run_is_resumed_from_its_pickle():
     assert resumed.forage_env.events.counters.tolist() == run.forage_env.events.counters.tolist()
 
 
+class Numbering(SwarmWrapper):
+    """Adds the number of the tick to every observation; what it keeps open cannot be pickled."""
+
+    stack_position: ClassVar[int] = 0
+
+    def __init__(self, env):
+        super().__init__(env)
+        self.opened = (line for line in "abc")
+
+    def on_reset(self, seed):
+        self.world, self.number = self.unwrapped.arena, 0
+
+    def observe(self, obs):
+        self.number += 1
+        return obs + np.float32(self.number)
+
+
+class CarefulNumbering(Numbering):
+    def __getstate__(self):
+        return {name: value for name, value in vars(self).items() if name != "opened"}
+
+
+def wrapped(kind, *words):
+    world = small_scenario(physics="compiled")
+    return kind(build_env(world, [parse_wrapper(word) for word in words]))
+
+
 @pytest.mark.parametrize(
-    ("words", "reason"),
-    [
-        (["sensor_noise:sigma=0.2"], r"SensorNoise\.sigma is 0\.1 there and 0\.2 here"),
-        ([], "wrappers is SensorNoise there and none here"),
-        (["throttle:waveform=constant,amplitude=0.1"], "wrappers is SensorNoise there and Throttle here"),
-    ],
+    "words",
+    [["sensor_noise:sigma=0.2"], [], ["throttle:waveform=constant,amplitude=0.1"]],
+    ids=["other", "none", "kind"],
 )
-def test_snapshots_of_other_stacks_are_refused(words, reason):
+def test_snapshots_of_other_stacks_are_refused(words):
     world = small_scenario(physics="compiled")
     env = build_env(world, [parse_wrapper("sensor_noise:sigma=0.1")])
     env.reset_batch(1)
     other = build_env(world, [parse_wrapper(word) for word in words])
-    with pytest.raises(SnapshotError, match=reason):
-        other.restore(env.snapshot())
-    with pytest.raises(SnapshotError, match="wrappers is SensorNoise there and none here"):
-        env.unwrapped.restore(env.snapshot())
+    for refusing in (other, env.unwrapped):
+        with pytest.raises(SnapshotError, match="wrappers of this one, got another"):
+            refusing.restore(env.snapshot())
 
 
 def test_observations_per_agent_are_those_that_the_wrappers_showed():
