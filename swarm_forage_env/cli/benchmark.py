@@ -72,7 +72,6 @@ def run(
     from metrics.scoring.question import ask
     from swarm_forage_env._internal.files import as_file_name, check_file
     from swarm_forage_env.cli.errors import resumable
-    from swarm_forage_env.cli.printer import notes
     from swarm_forage_env.policies.registry import policy_label
     from swarm_forage_env.runs.plan_summary import summarize_plan
 
@@ -80,7 +79,7 @@ def run(
     called = name or f"{policy_label(names[0])}{', quick' if quick else ''}"
     question = benchmark_question(names, name=called, protocol=protocol, training=trained.training())
     if dry_run:
-        typer.echo(summarize_plan(question.plan, out=out, jobs=jobs, tell=notes().print))
+        typer.echo(summarize_plan(question.plan, out=out))
         return
     entry_file = None if quick else file or Path("results/benchmark") / f"{as_file_name(called)}.json"
     if entry_file is not None:

@@ -134,7 +134,13 @@ Jobs = Annotated[
     typer.Option("--jobs", min=1, help="Number of processes; default one per usable core; 1 = only this process."),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the results as JSON.")]
-DryRun = Annotated[bool, typer.Option("--dry-run", help="Print the plan and an estimate of its time; no runs.")]
+DryRun = Annotated[
+    bool,
+    typer.Option(
+        "--dry-run",
+        help="Say how many runs there are, how many of them are stored, and how large the rest is; no runs.",
+    ),
+]
 
 
 def no_picture(path: Path, error: OSError) -> str:

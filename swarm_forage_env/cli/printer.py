@@ -144,8 +144,7 @@ def ask_and_show(
     for remark in question.remarks:
         aside.print(remark)
     if options.dry_run:
-        plan = summarize_plan(question.plan, out=folder, jobs=options.jobs, tell=aside.print)
-        show(plan, as_json=options.as_json)
+        show(summarize_plan(question.plan, out=folder), as_json=options.as_json)
         return
     store = RunStore(folder)
     with resumable(folder):

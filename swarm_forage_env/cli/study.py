@@ -78,7 +78,7 @@ def run(
     places = [_folder(spec, out, is_one=len(specs) == 1) for spec in specs]
     studies = [(spec, StudyFolder(place)) for spec, place in zip(specs, places, strict=True)]
     if dry_run:
-        typer.echo("\n\n".join(str(_summary(spec, folder, part, jobs)) for spec, folder in studies))
+        typer.echo("\n".join(str(_summary(spec, folder, part)) for spec, folder in studies))
         return
     try:
         with nullcontext() if cluster is None else cluster_executor(cluster, jobs) as executor:
@@ -116,16 +116,15 @@ def _run_all(
     return state.count(FAILED)
 
 
-def _summary(spec: "StudySpec", folder: "StudyFolder", part: tuple[int, int], jobs: int | None) -> "PlanSummary":
-    """Say what is left to run, and how long it takes."""
-    from swarm_forage_env.cli.printer import notes
+def _summary(spec: "StudySpec", folder: "StudyFolder", part: tuple[int, int]) -> "PlanSummary":
+    """Say what is left to run."""
     from swarm_forage_env.runs.plan_summary import summarize_plan
     from swarm_forage_env.studies.study_folder import shard
 
     index, count = part
     name = f"{spec.name}, budget {spec.budget}" + (f", shard {index} of {count}" if count > 1 else "")
     only, out = shard(spec.plan.specs, index, count), folder.store.folder
-    return summarize_plan(spec.plan, name=name, only=only, out=out, jobs=jobs, tell=notes().print)
+    return summarize_plan(spec.plan, name=name, only=only, out=out)
 
 
 def status(place: Place, as_json: AsJson = False) -> None:

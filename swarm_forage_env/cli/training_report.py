@@ -15,7 +15,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.cli.options import EXIT_FAILURE, complain, no_picture
 from swarm_forage_env.cli.signals import EXIT_INTERRUPTED
-from swarm_forage_env.runs.cost import duration
+from swarm_forage_env.runs.progress import duration
 from swarm_forage_env.runs.workers import processes_of
 from swarm_forage_env.training.curves import beside_baseline, place_of
 from swarm_forage_env.training.evaluation_plan import ALL_WORLDS

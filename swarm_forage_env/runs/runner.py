@@ -16,8 +16,8 @@ from typing import Any
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.registry import load_policy, local_policy, policy_class
 from swarm_forage_env.runs.answer import Answer, Sheet
-from swarm_forage_env.runs.cost import RunProgress
 from swarm_forage_env.runs.plan import Plan
+from swarm_forage_env.runs.progress import RunProgress
 from swarm_forage_env.runs.record import RecordError, RunRecord
 from swarm_forage_env.runs.run import run_one, run_policy
 from swarm_forage_env.runs.spec import RunSpec

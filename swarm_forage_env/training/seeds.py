@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from swarm_forage_env._internal.wording import counted, plain
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 from swarm_forage_env.runs.answer import Answer, Sheet
-from swarm_forage_env.runs.cost import duration
+from swarm_forage_env.runs.progress import duration
 from swarm_forage_env.training.curves import TrainingCurves, beside_baseline, counted_in, place_of
 from swarm_forage_env.training.evaluations import (
     EVALUATIONS_FILE,

@@ -63,7 +63,7 @@ def test_a_quick_look_writes_no_entry(command, tiny):
 def test_a_dry_run_tells_what_there_is_to_do(command, tiny):
     code, out, _ = command("benchmark", "--policy", "crw", "--policy", "dpo", "--name", "two", "--dry-run")
     assert code == 0
-    assert "28 runs, 28 to do" in out
+    assert "28 runs, 0 stored, 28 to do" in out
     assert not Path("results").exists()
 
 

@@ -105,10 +105,12 @@ def test_json_has_null_where_there_is_no_interval(command):
 
 
 def test_several_controllers_and_their_worlds(command):
-    code, out, _ = command("run", "--policy", "random, crw,random", *SHORT, "--set", "caches=static", "--dry-run")
+    words = ("--set", "caches=static", "--dry-run", "--json")
+    code, out, _ = command("run", "--policy", "random, crw,random", *SHORT, *words)
     assert code == 0
-    rows = [line.split()[:2] for line in out.splitlines() if " static " in line]
-    assert rows[-3:] == [["random", "static"], ["crw", "static"], ["all", "static"]]
+    answer = json.loads(out)
+    assert answer["policies"] == ["random", "crw"]
+    assert {run["spec"]["scenario"]["caches"] for run in answer["runs"]} == {"static"}
 
 
 @pytest.mark.parametrize("words", [("crw,dpo",), ("crw", "dpo"), ("--policy", "crw", "dpo"), ("--policy", "crw,dpo")])
@@ -118,11 +120,10 @@ def test_policies_are_words_or_an_option(command, words):
     assert {run["spec"]["policy"] for run in json.loads(out)["runs"]} == {"crw", "dpo"}
 
 
-def test_a_dry_run_plans_estimates_and_touches_nothing(command):
+def test_a_dry_run_plans_and_touches_nothing(command):
     code, out, _ = command("run", "--policy", "random", "--seeds", "3", "--jobs", "2", "--dry-run")
     assert code == 0
-    assert out.startswith("3 runs, 3 to do, records go to results/warehouse_small\n")
-    assert "on 2 cores as fast as this one is now" in out
+    assert out == "3 runs, 0 stored, 3 to do with 1.13e+07 robot-ticks; records go to results/warehouse_small\n"
     assert not list(Path.cwd().iterdir())
 
 
@@ -132,7 +133,6 @@ def test_a_dry_run_knows_what_is_stored(command):
     answer = json.loads(out)
     assert [run["stored"] for run in answer["runs"]] == [True, False]
     assert answer["runs"][1]["spec"]["seed"] == 1
-    assert 0.0 < answer["estimated_wall_s"] < 10.0
 
 
 def test_set_changes_any_field_with_its_type(command):

@@ -123,12 +123,12 @@ def test_another_performance_reads_the_same_runs(command, monkeypatch):
 def test_a_dry_run_shows_the_experiments_and_runs_nothing(command):
     code, out, _ = command(*COMPARE, "--dry-run")
     assert code == 0
-    assert out.startswith("28 runs, 28 to do, records go to results/warehouse_small_3_robots_bcf754\n")
-    assert "population_dynamics" in out
+    assert out.startswith("28 runs, 0 stored, 28 to do with ")
+    assert out.endswith("; records go to results/warehouse_small_3_robots_bcf754\n")
     assert not Path("results").exists()
     command(*SCORE, *FEW)
     _, out, _ = command(*COMPARE, *FEW, "--dry-run")
-    assert "16 runs, 8 to do" in out
+    assert "16 runs, 8 stored, 8 to do" in out
     _, out, _ = command(*COMPARE, *FEW, "--dry-run", "--json")
     answer = json.loads(out)
     assert answer["policies"] == ["random", "crw"]
@@ -146,12 +146,10 @@ def test_swarms_too_small_for_a_kind_are_named(command):
 def test_a_plan_counts_in_words(command):
     one = (*SCORE, "--measures", "availability", "--seeds", "1")
     _, out, _ = command(*one, "--dry-run")
-    assert out.startswith("2 runs, 2 to do, records go to")
-    assert "on 1 core as fast as this one is now" in out
+    assert out.startswith("2 runs, 0 stored, 2 to do with")
     command(*one)
     _, out, _ = command(*one, "--dry-run")
-    assert out.startswith("2 runs, 0 to do, records go to")
-    assert out.splitlines()[-1].split() == ["random", "none", "2", "0", "0", "0.00"]
+    assert out.startswith("2 runs, 2 stored, 0 to do with 0 robot-ticks")
 
 
 def test_seeds_length_and_world_can_be_chosen(command):

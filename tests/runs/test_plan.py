@@ -44,7 +44,7 @@ def test_configurations_need_no_hash():
     plan = Plan.product([CRW, STOCHM], [world], seeds=[3, 5])
     assert [spec.world.wrappers for spec in plan.specs] == [(ListedConfig(),)] * 4
     assert plan.specs_of(Condition(CRW, World(WORLD, (ListedConfig(),)))) == plan.specs[:2], "an equal condition"
-    assert len(summarize_plan(plan, jobs=1).todo) == 4
+    assert len(summarize_plan(plan).todo) == 4
 
 
 @pytest.mark.parametrize(

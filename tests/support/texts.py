@@ -9,12 +9,12 @@ from typing import Any
 
 VARIES = "<varies>"
 _VARYING_FIELDS = {
-    "commit", "core_hours", "cpu_time_s", "created", "digest", "estimated_wall_s", "simulated_s_per_wall_s",
+    "commit", "core_hours", "cpu_time_s", "created", "digest", "simulated_s_per_wall_s",
     "traceback", "versions", "wall_time_s",
 }  # fmt: skip
 """Fields of JSON documents; the digest of an entry is also of its versions and hours."""
 _PROGRESS = re.compile(
-    r"\d+/\d+ runs, .*|\d+ of \d+ runs (is|are) stored already\.|swarm-forage: Compiling what is used .*|measuring .*"
+    r"\d+/\d+ runs, .*|\d+ of \d+ runs (is|are) stored already\.|swarm-forage: Compiling what is used .*"
     r"|\d+ of them (was|were) made by other code .*"
 )
 """Lines that depend on what is stored and compiled already."""
@@ -22,8 +22,6 @@ _REPLACED: tuple[tuple[str, str], ...] = (
     (r"\d{4}-\d\d-\d\dT[\d:.+Z-]+", "<date>"),
     (r"\b[0-9a-f]{40}\b", "<commit>"),
     (r"(?<=made with      ).*", "<versions>"),
-    (r"about \d[^,\n]* on (\d+) cores?", r"about <time> on \1 core"),
-    (r"(?m)(e\+\d\d +)(<0\.01|\d[\d,.]*) *$", r"\1<hours>"),
     (r"(?<=\nVersions\n)study \|.*\n(.*\|\n)+", "<versions>\n"),
 )
 _SPEED = re.compile(r"(\d\.\d{3} +)[\d,]+$", re.MULTILINE)
