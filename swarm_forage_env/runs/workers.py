@@ -97,7 +97,7 @@ def run_each(
         jobs = as_whole("jobs", jobs, at_least=1, or_none=True)
     if executor is not None:
         outcomes = _run_elsewhere(executor, _batches(todo, BATCH_ROBOT_TICKS))
-    elif jobs == 1 or len(todo) == 1:
+    elif jobs == 1 or len(todo) <= 1:
         outcomes = _run_here(todo)
     else:
         outcomes = _run_in_pool(todo, processes_of(len(todo), jobs))
@@ -187,14 +187,12 @@ def run_several(specs: Task) -> tuple[Outcome, ...]:
     return tuple(outcomes)
 
 
-def _run_on(
-    executor: Executor, todo: deque[Task], *, limit: int, lost: deque[Task] | None = None
-) -> Generator[Outcome]:
+def _run_on(executor: Executor, todo: deque[Task], *, limit: int) -> Generator[Outcome]:
     """Run `todo` with at most `limit` tasks submitted at a time; if the executor breaks, stop and leave the rest.
 
-    Runs that were submitted when it broke are failures, or go to `lost` if it is given. If a task of several runs
-    fails as a whole, they are tried again one by one, so that only those fail that kill their worker. Tasks that the
-    executor cancels, because it ends, are in `todo` again at the end.
+    Runs that were submitted when it broke are failures. If a task of several runs fails as a whole, they are tried
+    again one by one, so that only those fail that kill their worker. Tasks that the executor cancels, because it ends,
+    are in `todo` again at the end.
     """
     running: dict[Future[Any], Task] = {}
     cancelled: list[Task] = []
@@ -214,11 +212,7 @@ def _run_on(
                     cancelled.append(task)
                     continue
                 error = future.exception()
-                if isinstance(error, BrokenExecutor):
-                    broken = True
-                    if lost is not None:
-                        lost.append(task)
-                        continue
+                broken = broken or isinstance(error, BrokenExecutor)
                 if error is None:
                     yield from future.result() if len(task) > 1 else (future.result(),)
                 elif len(task) > 1 and not broken:
@@ -291,22 +285,13 @@ class _InProcess(Executor):
 
 
 def _run_in_pool(todo: deque[Task], n_workers: int) -> Generator[Outcome]:
-    """Run `todo` in local processes.
-
-    A pool breaks as a whole when one worker is killed (for lack of memory, for example). It is replaced for the other
-    runs, and the runs that were under way are tried once more, one at a time. So only runs that kill their worker fail.
-    """
-    lost: deque[Task] = deque()
+    """Run `todo` in local processes. If one is killed, the runs that are under way fail, and no other is begun."""
     with _process_pool(n_workers) as pool:
         _check_workers_start(pool)
-        if _warm_up_workers(pool, [spec for task in todo for spec in task]):
-            yield from _run_on(pool, todo, limit=QUEUED_PER_WORKER * n_workers, lost=lost)
-    while todo:
-        with _process_pool(n_workers) as pool:
-            yield from _run_on(pool, todo, limit=QUEUED_PER_WORKER * n_workers, lost=lost)
-    while lost:
-        with _process_pool(1) as pool:
-            yield from _run_on(pool, lost, limit=1)
+        _warm_up_workers(pool, [spec for task in todo for spec in task])
+        yield from _run_on(pool, todo, limit=QUEUED_PER_WORKER * n_workers)
+    if todo:
+        raise WorkerError(KILLED)
 
 
 def _check_workers_start(pool: Executor) -> None:
@@ -317,19 +302,23 @@ def _check_workers_start(pool: Executor) -> None:
         )
 
 
-def _warm_up_workers(pool: Executor, specs: Iterable[RunSpec]) -> bool:
+def _warm_up_workers(pool: Executor, specs: Iterable[RunSpec]) -> None:
     """Have one run of each kind compile and cache its kernels before many processes need them.
 
-    Errors are ignored here: the same run raises them again later, and they are recorded then. That holds for a worker
-    that is killed, too: False is returned, the pool is broken, and in the next one only runs that kill again fail.
+    What a run raises is ignored here: it raises it again later, and it is recorded then.
+
+    Raises:
+        WorkerError: a worker was killed.
     """
     kinds = tuple({_kernel_kind(spec): spec for spec in specs}.values())
     asked = pool.submit(is_first, kinds[0].scenario)
     if _is_broken_by(asked):
-        return False
+        raise WorkerError(KILLED)
     if asked.exception() is None and asked.result():
         tell_of_first_run()  # workers have nobody to tell
-    return not any(_is_broken_by(pool.submit(warm_up, spec)) for spec in kinds)
+    for spec in kinds:
+        if _is_broken_by(pool.submit(warm_up, spec)):
+            raise WorkerError(KILLED)
 
 
 def _is_broken_by(future: Future[Any]) -> bool:

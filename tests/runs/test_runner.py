@@ -13,12 +13,11 @@ import pytest
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.policies.registry import RandomPolicy, from_callable
-from swarm_forage_env.policies.trust import UntrustedModelError, of_a_command
+from swarm_forage_env.policies.trust import UntrustedModelError, only_typed
 from swarm_forage_env.runs import store as runs_store
 from swarm_forage_env.runs import workers
 from swarm_forage_env.runs.plan import Condition, Plan
 from swarm_forage_env.runs.policy_spec import policy_spec
-from swarm_forage_env.runs.record import RunRecord
 from swarm_forage_env.runs.run import WARM_UP_TICKS, build_stack, run_one, run_policy, warm_up
 from swarm_forage_env.runs.runner import RunsInterrupted, longest_first, run_plan, run_specs
 from swarm_forage_env.runs.spec import RunSpec
@@ -306,34 +305,18 @@ def test_a_broken_executor_that_is_not_ours_ends_the_runs(one_by_one):
     assert {failure.spec for failure in seen} == set(SPECS[:2])
 
 
-def test_a_crashed_worker_costs_only_the_run_that_crashed_it(monkeypatch):
-    pools = []
-
+def test_a_killed_worker_ends_the_runs_and_the_same_call_does_the_rest(monkeypatch, tmp_path):
     @contextmanager
     def breaking_pool(n_workers):
-        pools.append(n_workers)
-        yield Breaking(SPECS[1], n_workers)
+        yield Breaking(SPECS[2], n_workers)
 
     monkeypatch.setattr(workers, "_process_pool", breaking_pool)
-    outcomes = list(workers._run_in_pool(deque((spec,) for spec in SPECS), 2))
-    assert {outcome.seed for outcome in outcomes if isinstance(outcome, RunRecord)} == {0, 2, 3}
-    (failure,) = (outcome for outcome in outcomes if isinstance(outcome, RunFailure))
-    assert failure.spec == SPECS[1]
-    assert pools[:2] == [2, 2], "the first pool broke, a second one did the rest"
-    assert set(pools[2:]) == {1}, "what was under way is tried again alone"
-
-
-def test_a_worker_that_is_killed_while_it_compiles_costs_only_its_run(monkeypatch):
-    @contextmanager
-    def breaking_pool(n_workers):
-        yield Breaking(SPECS[3], n_workers)
-
-    monkeypatch.setattr(workers, "_process_pool", breaking_pool)
-    outcomes = list(workers._run_in_pool(deque((spec,) for spec in SPECS), 2))
-    assert {outcome.seed for outcome in outcomes if isinstance(outcome, RunRecord)} == {0, 1, 2}
-    (failure,) = (outcome for outcome in outcomes if isinstance(outcome, RunFailure))
-    assert failure.spec == SPECS[3]
-    assert "was killed, most likely because memory ran out" in failure.error
+    store = RunStore(tmp_path)
+    with pytest.raises(WorkerError, match="was killed, most likely because memory ran out"):
+        run_specs(SPECS, store=store, jobs=2)
+    assert SPECS[0].run_id in store
+    assert store.failure_path(SPECS[2].run_id).exists()
+    assert len(run_specs(SPECS, store=store, jobs=1).records) == len(SPECS)
 
 
 def test_a_store_that_cannot_be_written_to_is_told_before_the_first_run(full_disk, tmp_path):
@@ -502,5 +485,5 @@ def test_any_function_of_runs_is_mapped_in_their_order(jobs, told):
 def test_other_processes_open_no_models_that_this_one_may_not(tmp_path):
     (tmp_path / "mine.zip").write_bytes(b"")
     specs = [RunSpec(world=World(WORLD), policy=str(tmp_path / "mine.zip"), seed=seed) for seed in (0, 1)]
-    with of_a_command([]), pytest.raises(UntrustedModelError):
+    with only_typed([]), pytest.raises(UntrustedModelError):
         list(map_runs(seed_of, specs, jobs=2))
