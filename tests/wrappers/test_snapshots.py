@@ -6,14 +6,12 @@ import pickle
 import subprocess
 import sys
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 import pytest
 
 from swarm_forage_env import SnapshotError, load_policy
 from swarm_forage_env.runs.run import LiveRun, build_env
-from swarm_forage_env.wrappers.base import SwarmWrapper
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.support.branches import Branch, pickled, whole_stack
 from tests.support.fake_arena import small_scenario
@@ -78,33 +76,6 @@ def test_a_live_run_is_resumed_from_its_pickle():
     assert resumed.over
     np.testing.assert_array_equal(resumed.forage_env.state(), run.forage_env.state())
     assert resumed.forage_env.events.counters.tolist() == run.forage_env.events.counters.tolist()
-
-
-class Numbering(SwarmWrapper):
-    """Adds the number of the tick to every observation; what it keeps open cannot be pickled."""
-
-    stack_position: ClassVar[int] = 0
-
-    def __init__(self, env):
-        super().__init__(env)
-        self.opened = (line for line in "abc")
-
-    def on_reset(self, seed):
-        self.world, self.number = self.unwrapped.arena, 0
-
-    def observe(self, obs):
-        self.number += 1
-        return obs + np.float32(self.number)
-
-
-class CarefulNumbering(Numbering):
-    def __getstate__(self):
-        return {name: value for name, value in vars(self).items() if name != "opened"}
-
-
-def wrapped(kind, *words):
-    world = small_scenario(physics="compiled")
-    return kind(build_env(world, [parse_wrapper(word) for word in words]))
 
 
 @pytest.mark.parametrize(
