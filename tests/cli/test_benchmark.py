@@ -1,14 +1,12 @@
 """The command `benchmark`, with a tiny protocol in place of the real one."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from metrics import PAPER_POLICIES
 from metrics.benchmark import load_protocol
-from metrics.benchmark.entry import EntryPolicy
 from tests.support.entries import TINY, made_up_entry
 
 
@@ -60,45 +58,6 @@ def test_a_quick_look_writes_no_entry(command, tiny):
     assert not list(Path("results/benchmark").glob("*.json"))
 
 
-def test_a_dry_run_tells_what_there_is_to_do(command, tiny):
-    code, out, _ = command("benchmark", "--policy", "crw", "--policy", "dpo", "--name", "two", "--dry-run")
-    assert code == 0
-    assert "28 runs, 0 stored, 28 to do" in out
-    assert not Path("results").exists()
-
-
-def test_a_quick_look_at_a_scripted_controller_has_another_name_than_its_entry(command, tiny):
-    code, out, err = command("benchmark", "--policy", "dpo", "--quick", "--jobs", "1", "--json")
-    assert code == 0, err
-    assert {standing["name"] for standing in json.loads(out)} == {*PAPER_POLICIES, "dpo, quick"}
-
-
-def test_the_entry_of_a_scripted_controller_that_was_made_again_is_shown(command, folder, tiny, tmp_path):
-    again = made_up_entry(load_protocol(), "dpo", lambda k: 40.0)
-    replace(again, policies=(EntryPolicy(name="dpo"),)).write(tmp_path / "dpo.json")
-    shipped = folder / "scripted" / "dpo.json"
-    code, out, err = command("benchmark", "show", str(shipped), "dpo.json", "--json")
-    assert code == 0, err
-    scores = {standing["name"]: standing["score"][0] for standing in json.loads(out)}
-    assert scores.keys() == set(PAPER_POLICIES)
-    assert max(scores, key=scores.get) == "dpo"
-
-
-def test_nothing_is_run_under_the_name_of_a_scripted_controller_or_without_their_entries(
-    command, tiny, tmp_path, monkeypatch
-):
-    for words in (("--policy", "random", "--name", "dpo"), ("--policy", "dpo", "--name", "dpo", "--quick")):
-        code, _, err = command("benchmark", *words, "--jobs", "1")
-        assert (code, len(err.splitlines())) == (2, 1)
-        assert "Expected another name than 'dpo'" in err
-    (tmp_path / "benchmark.toml").write_text(TINY.read_text())
-    monkeypatch.setattr("metrics.benchmark.protocol.FOLDER", tmp_path)
-    code, _, err = command("benchmark", "--policy", "random", "--jobs", "1")
-    assert (code, len(err.splitlines())) == (2, 1)
-    assert "crw.json" in err
-    assert not Path("results").exists()
-
-
 def spoil(name, change):
     file = Path(name)
     file.write_text(change(file.read_text()))
@@ -109,26 +68,4 @@ def test_an_altered_entry_is_refused_in_one_line(command, mine):
     code, out, err = command("benchmark", "show", "mine.json")
     assert (code, out) == (2, "")
     assert err.startswith("swarm-forage: Expected the numbers of mine.json as swarm-forage benchmark wrote them")
-    assert len(err.splitlines()) == 1
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ((), "Expected a policy, by name or file"),
-        (("--policy", "crw", "--policy", "dpo"), "Expected --name"),
-        (("--policy", "crw", "--quick", "--file", "x.json"), "a quick look is no entry"),
-        (("--policy", "cwr"), "Unknown policy 'cwr'"),
-        (("--policy", "none.npz"), "none.npz"),
-        (("--policy", "crw", "--trained-in", "mars"), "got 'mars'"),
-        (("--policy", "crw", "--track", "10M"), "Expected a track of the benchmark (short, open), got '10M'"),
-        (("show", "none.json"), "Cannot read none.json"),
-        (("show", "mine.json", "mine.json"), "'mine' twice"),
-        (("show", "dpo.json"), "another policy with the name 'dpo'"),
-    ],
-)
-def test_what_makes_no_sense_is_refused_in_one_line(words, message, command, mine):
-    code, _, err = command("benchmark", *words)
-    assert code in (1, 2)
-    assert message in err
     assert len(err.splitlines()) == 1

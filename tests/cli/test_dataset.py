@@ -14,23 +14,6 @@ def test_a_data_set_is_written_and_kept(command, tmp_path):
     assert command(*words)[1] == "0 runs recorded in here, 2 there before\n"
 
 
-def test_site_memory_is_eight_columns_more(command):
-    words = ("dataset", "--policy", "random", "--observation", "compact", *TINY)
-    for option, columns in (("--site-memory", 31), ("--no-site-memory", 23)):
-        assert command(*words, option, "--out", option)[0] == 0
-        assert len(Dataset(option).columns) == columns
-
-
-def test_what_is_wrong_is_told_in_one_line(command):
-    for words in (("--observation", "half"), ("--policy", "crv")):
-        code, _, err = command("dataset", *TINY, *words)
-        assert (code, err.count("\n")) == (2, 1)
-    assert command("dataset", "--policy", "random", "--out", "here", *TINY)[0] == 0
-    code, _, err = command("dataset", "--policy", "crw", "--out", "here", *TINY)
-    assert (code, err.count("\n")) == (2, 1)
-    assert "another run" in err
-
-
 def test_ctrl_c_says_how_to_go_on(command, monkeypatch):
     def interrupted(file, **arrays):
         raise KeyboardInterrupt

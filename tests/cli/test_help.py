@@ -36,27 +36,12 @@ def test_version_and_help(command):
         assert (one.about in out) == (" " not in one.words)
 
 
-@pytest.mark.parametrize("one", ALL, ids=lambda one: one.words)
-def test_a_line_of_help_is_cut_nowhere(one):
-    assert len(one.about) <= 50
-    assert one.about.endswith(".")
-
-
 @pytest.mark.parametrize("one", [one for one in ALL if one.place], ids=lambda one: one.words)
 def test_every_command_is_there(command, one):
     assert loaded(one).help
     code, out, err = command(*one.words.split(), "--help")
     assert (code, err) == (0, "")
     assert out.startswith(f"Usage: swarm-forage {one.words}")
-
-
-@pytest.mark.parametrize("words", [("study",), ("study", "--help"), ("benchmark", "--help")])
-def test_the_help_of_a_first_word_lists_the_second_ones(command, words):
-    code, out, err = command(*words)
-    assert (code, err) == (0, "")
-    below = [one for one in ALL if one.words.startswith(f"{words[0]} ")]
-    assert len(below) > 1
-    assert all(f"  {one.words.split()[1]} " in out and one.about in out for one in below)
 
 
 @pytest.mark.parametrize(
@@ -75,9 +60,3 @@ def test_words_that_mean_nothing_are_answered_with_the_nearest(command, words, t
 def test_only_what_is_asked_for_is_imported():
     assert imported("--help") == imported("study") == set()
     assert imported("run", "--help") <= {"typer", "rich"}
-
-
-@pytest.mark.parametrize("one", [one for one in ALL if one.place], ids=lambda one: one.words)
-def test_every_word_that_a_command_takes_is_explained(one):
-    """A complaint about a value quotes it."""
-    assert [param.opts for param in loaded(one).params if not param.help] == []

@@ -8,8 +8,6 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from swarm_forage_env.inspect.play.server import PlayServer
-
 WORDS = ("play", "random", "--robots", "3", "--objects", "20")
 MAIN = "from swarm_forage_env.cli import main; main()"
 
@@ -33,41 +31,3 @@ def test_it_serves_the_page_until_it_is_interrupted(tmp_path, sent, code):
     assert (started.returncode, out) == (code, "")
     assert err.splitlines()[-1] == "swarm-forage: Interrupted. The page has ended; random: 0 s, 0 delivered."
     assert err.count("swarm-forage: Interrupted") == 1
-
-
-def test_it_opens_the_browser_unless_it_is_told_not_to(command, monkeypatch):
-    opened = []
-    monkeypatch.setattr("webbrowser.open", opened.append)
-    monkeypatch.setattr(PlayServer, "serve_forever", lambda *_, **__: None)
-    code, out, err = command(*WORDS)
-    assert (code, err) == (0, "Ctrl-C ends it.\n")
-    assert [f"play at {address}\n" for address in opened] == [out]
-    assert command(*WORDS, "--no-browser")[0] == 0
-    assert len(opened) == 1
-
-
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        (("play", "nobody", "--no-browser"), "nobody"),
-        (("play", "crw", "dpo", "--no-browser"), "Expected one policy, got crw, dpo."),
-        ((*WORDS, "--port", "99999"), "--port"),
-        ((*WORDS, "--scenario", "moon"), "moon"),
-    ],
-)
-def test_it_complains_in_one_line(command, words, told):
-    code, out, err = command(*words)
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert told in err
-
-
-def test_a_port_that_is_taken_is_told_of(command, monkeypatch):
-    monkeypatch.setattr(PlayServer, "serve_forever", lambda *_, **__: None)
-
-    def taken(*_):
-        raise OSError(98, "Address already in use")
-
-    monkeypatch.setattr(PlayServer, "__init__", taken)
-    code, out, err = command(*WORDS, "--port", "8080", "--no-browser")
-    assert (code, out) == (1, "")
-    assert err == "swarm-forage: Address already in use: port 8080; leave out --port to get one that is free.\n"

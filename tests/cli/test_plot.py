@@ -31,17 +31,6 @@ def test_a_figure_for_a_paper(command, folder, painted):
     assert image.imread("figure.png").shape[1] == round(3.5 * 150)
 
 
-def test_another_performance_has_a_picture_of_its_own(command, folder):
-    assert command("plot", "here")[1] == "picture here/performance.png\n"
-    assert command("plot", "here", "--performance", "n_active")[1] == "picture here/performance_n_active.png\n"
-
-
-def test_of_scores_the_undisturbed_runs_are_drawn(command, folder):
-    words = ("--budget", "quick", "--measures", "noise_robustness", "--seeds", "1", "--jobs", "1", "--robots", "2")
-    assert command("score", "random", *words, "--horizon", "400", "--out", "scored")[0] == 0
-    assert [condition.world.criterion for condition in read_table("scored").plan.conditions] == ["none"]
-
-
 def test_what_cannot_be_drawn_is_one_line(command, folder):
     assert command("run", "random", *RUNS[:-4], "--horizon", "8", "--out", "here", "--jobs", "1")[0] == 0
     for words, complaint in (

@@ -55,31 +55,6 @@ def test_replay_makes_a_stored_run_again(command, stored):
         assert mine.counters[-1, 0] == stored.collected.sum()
 
 
-def test_what_is_beside_a_stored_run_must_be_a_policy(command, stored):
-    for word in ("crv", "gone.npz"):
-        code, out, err = command("replay", stored.run_id, word)
-        assert (code, out) == (2, "")
-        assert word in err
-        assert err.count("\n") == 1
-
-
-def test_a_page_under_the_name_of_a_film_is_refused_before_the_run(command):
-    code, out, err = command("replay", "random", *SHORT, "--file", "run.gif")
-    assert (code, out) == (2, "")
-    assert err == "swarm-forage: Expected a page that ends in .html, .htm, got 'run.gif'; 'record' makes films.\n"
-
-
-def test_a_stored_run_whose_policy_is_missing_is_one_line(command, stored):
-    import dataclasses
-
-    other = dataclasses.replace(stored, spec=stored.spec.replace('"policy": "dpo"', '"policy": "theirs"'))
-    other.write("results/other.parquet")
-    code, out, err = command("replay", "results/other.parquet")
-    assert (code, out) == (2, "")
-    assert "Unknown policy 'theirs'" in err
-    assert err.count("\n") == 1
-
-
 def test_replay_says_when_a_stored_run_comes_out_different(command, stored):
     import dataclasses
 
@@ -88,42 +63,3 @@ def test_replay_says_when_a_stored_run_comes_out_different(command, stored):
     code, _, err = command("replay", "results/other.parquet", "--file", "run.html")
     assert code == 0
     assert "comes out different from its record" in err
-
-
-@pytest.mark.parametrize(
-    ("words", "expected"),
-    [
-        (("0123456789abcdef",), "Expected the run 0123456789abcdef below results/, found none"),
-        (("gone.parquet",), "Cannot read gone.parquet"),
-        (("damaged.parquet",), "Cannot read damaged.parquet"),
-        (("folder.parquet",), "Cannot read folder.parquet"),
-        ((".",), "Unknown policy '.'"),
-        (("crv",), "Unknown policy 'crv'"),
-        (("crw", "crv"), "Unknown policy 'crv'"),
-        (("crw", "--seconds", "1e9"), "Expected seconds <= 10000"),
-        (("crw", "--seconds", "2", "--frame", "0.01"), "frame_s"),
-    ],
-)
-def test_wrong_words_are_one_line(command, words, expected):
-    Path("damaged.parquet").write_bytes(b"PAR1 and nothing behind it")
-    Path("folder.parquet").mkdir()
-    code, out, err = command("replay", *words)
-    assert (code, out) == (2, "")
-    assert expected in err
-    assert err.count("\n") == 1
-
-
-def test_a_stored_run_takes_no_options_of_another_one(command, stored):
-    code, _, err = command("replay", stored.run_id, "--robots", "5", "--seed", "1")
-    assert code == 2
-    assert "Expected a stored run without --robots, --seed, which describe another one" in err
-
-
-def test_an_interrupt_leaves_no_file(command, monkeypatch):
-    def interrupted(*_, **__):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("swarm_forage_env.runs.run.LiveRun.advance", interrupted)
-    told = "swarm-forage: Interrupted. Unfinished work is not kept; run the same command to start again.\n"
-    assert command("replay", "random", *SHORT, "--file", "run.html") == (130, "", told)
-    assert not list(Path().iterdir())

@@ -66,18 +66,6 @@ def test_other_options_go_before_the_file(command):
     ]
 
 
-def test_a_file_gives_table_and_folder_their_name(command):
-    text = CONFIG.replace("horizon_s = 4.0", 'horizon_s = 4.0\nphysics = "chipmunk"')
-    code, out, err = command(text, "--scenario", "world.toml")
-    assert code == 0
-    assert out.startswith(
-        "world (warehouse_small): 3 robots, 20 objects, 4 s, with physics chipmunk, 5 substeps, "
-        "throttle: robots lose 20 % of their speed, wheel noise: sigma 0.1\n"
-    )
-    assert "picture results/world_3_robots_4_s_bec93b/performance.png" in err
-    assert not list(Path("results").glob("warehouse_small*"))
-
-
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
@@ -102,11 +90,4 @@ def test_a_mistake_in_the_file_is_one_line_and_exit_code_2(command, text, compla
     code, out, err = command(text, "--scenario", "world.toml")
     assert (code, out) == (2, "")
     assert complaint in err
-    assert len(err.splitlines()) == 1
-
-
-def test_a_missing_file_is_one_line(command):
-    code, _, err = command(CONFIG, "--scenario", "nowhere.toml")
-    assert code == 2
-    assert "Cannot use nowhere.toml: No such file or directory" in err
     assert len(err.splitlines()) == 1

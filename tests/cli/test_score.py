@@ -1,20 +1,13 @@
 """The commands `score` and `compare`, as a person uses them: words in, tables and exit code out."""
 
 import json
-import os
-import re
-import signal
-import subprocess
-import sys
-import time
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
 from swarm_forage_env.policies.registry import RandomPolicy
 from swarm_forage_env.runs.spec import RunSpec
-from swarm_forage_env.runs.store import RunStore, load
+from swarm_forage_env.runs.store import load
 from swarm_forage_env.studies.ladders import BUDGETS, Budget
 
 WORLD = ("--robots", "3", "--objects", "20", "--jobs", "1", "--budget", "tiny")
@@ -53,16 +46,6 @@ def test_compare_shows_values_differences_and_the_test(command):
     assert Path("here/comparison.png").is_file()
 
 
-def test_flexibility_is_scored_under_a_handling_cost_if_asked(command):
-    code, out, _ = command(*SCORE, "--measures", "reactivity,adaptability", "--disturbance", "handling_cost")
-    assert code == 0
-    assert out.count("handling cost 800") >= 2
-    assert "throttle" not in out
-    columns = [record.columns() for record in load(Path("results/warehouse_small_3_robots_bcf754"))]
-    # A cycle is as long as an interval here: half of it at 1,601 ticks, half at one.
-    assert {float(values["adversity"].max()) for values in columns} == {1.0, 801.0}
-
-
 def test_sizes_keep_a_density_if_asked(command):
     words = ("--robots", "20", "--density", "5%", "--measures", "raw_performance")
     code, _, _ = command("score", "--policy", "random", "--jobs", "1", "--budget", "tiny", *words)
@@ -72,21 +55,6 @@ def test_sizes_keep_a_density_if_asked(command):
         for record in load(Path("results/warehouse_small_20_robots_9db01d"))
     }
     assert arenas == {(1, 28.4), (20, 28.4)}
-
-
-def test_variants_forms_and_bands_can_be_chosen(command):
-    words = ("--measures", "spatial_emergence,scalability", "--variant", "corrected,paper")
-    code, out, _ = command(*SCORE, *words, "--form", "marginal,interactive", "--band")
-    assert code == 0
-    for word in ("mean ± 2 sd", "spatial_emergence, interactive, paper", "scalability, interactive", "N = 1 to 3"):
-        assert word in out
-    _, out, _ = command(*COMPARE, *words, "--json")
-    answer = json.loads(out)
-    labels = {"spatial_emergence", "spatial_emergence, paper", "scalability", "scalability, paper"}
-    assert {difference["label"] for difference in answer["differences"]} == labels
-    assert {score["variant"] for score in answer["tables"][0]["scores"]} == {"corrected", "paper"}
-    _, out, _ = command(*COMPARE, *words, "--band")
-    assert "In square brackets: mean minus and plus two standard deviations" in out
 
 
 def test_json_is_the_only_thing_on_stdout(command):
@@ -104,22 +72,6 @@ def test_json_is_the_only_thing_on_stdout(command):
     assert answer["picture"].endswith("comparison.png")
 
 
-def test_the_same_command_again_runs_nothing(command, monkeypatch):
-    _, first, _ = command(*SCORE, *FEW)
-    monkeypatch.setattr(RandomPolicy, "reset", lambda *_: pytest.fail("a stored run was repeated"))
-    code, again, _ = command(*SCORE, *FEW)
-    assert (code, again) == (0, first)
-
-
-def test_another_performance_reads_the_same_runs(command, monkeypatch):
-    command(*SCORE, *FEW)
-    monkeypatch.setattr(RandomPolicy, "reset", lambda *_: pytest.fail("a stored run was repeated"))
-    code, out, _ = command(*SCORE, *FEW, "--performance", "1/interference_fraction")
-    assert code == 0
-    assert out.startswith("random in warehouse_small with 20 objects, performance 1/interference_fraction, budget tiny")
-    assert "1/interference_fraction (DTW)" in out
-
-
 def test_a_dry_run_shows_the_experiments_and_runs_nothing(command):
     code, out, _ = command(*COMPARE, "--dry-run")
     assert code == 0
@@ -133,30 +85,6 @@ def test_a_dry_run_shows_the_experiments_and_runs_nothing(command):
     answer = json.loads(out)
     assert answer["policies"] == ["random", "crw"]
     assert sum(run["stored"] for run in answer["runs"]) == 8
-
-
-def test_swarms_too_small_for_a_kind_are_named(command):
-    kinds = ("--set", "robot_kinds=scout:share=0.2+hauler:speed=0.5")
-    _, _, err = command(*SCORE, *kinds, "--dry-run")
-    assert "small swarms lack some: no scout with 1" in err
-    _, _, err = command(*SCORE, "--set", "robot_kinds=only", "--dry-run")
-    assert "small swarms" not in err
-
-
-def test_a_plan_counts_in_words(command):
-    one = (*SCORE, "--measures", "availability", "--seeds", "1")
-    _, out, _ = command(*one, "--dry-run")
-    assert out.startswith("2 runs, 0 stored, 2 to do with")
-    command(*one)
-    _, out, _ = command(*one, "--dry-run")
-    assert out.startswith("2 runs, 2 stored, 0 to do with 0 robot-ticks")
-
-
-def test_seeds_length_and_world_can_be_chosen(command):
-    command(*SCORE, *FEW, "--seeds", "1", "--horizon", "2", "--set", "walk_probability=0.1", "--set", "caches=static")
-    records = load("results/warehouse_small_3_robots_ba6106")
-    assert {(record.seed, record.horizon_s) for record in records} == {(0, 2.0)}
-    assert all('"caches": "static"' in record.spec and '"walk_probability": 0.1' in record.spec for record in records)
 
 
 @pytest.mark.parametrize(
@@ -220,15 +148,6 @@ def test_curves_from_elsewhere_are_scored(command):
     assert "Cannot compute reactivity for curves" in err
 
 
-def test_curves_of_several_policies_are_compared(command):
-    lines = CURVES.splitlines()
-    rows = [f"{name},{line}" for name in ("mine", "theirs") for line in lines[1:]]
-    Path("curves.csv").write_text("\n".join([f"controller,{lines[0]}", *rows]))
-    code, out, _ = command("score", "--curves", "curves.csv")
-    assert code == 0
-    assert "mine - theirs" in out
-
-
 def test_failed_runs_are_told_and_the_exit_code_says_so(command, monkeypatch):
     act = RandomPolicy.act
 
@@ -255,36 +174,3 @@ def test_ctrl_c_says_what_is_kept_and_how_to_go_on(command, monkeypatch):
     folder = "results/warehouse_small_3_robots_bcf754"
     expected = f"swarm-forage: Interrupted: 4 of 8 runs are finished and kept. They are in {folder}; "
     assert err.splitlines()[-1] == expected + "the same command does the rest."
-
-
-def test_without_matplotlib_it_says_how_to_get_the_picture(command, monkeypatch):
-    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
-    code, out, err = command(*SCORE, *FEW)
-    assert code == 0
-    assert "adaptability" in out
-    assert 'pip install ".[plots]"' in err
-    assert not Path("results/warehouse_small_3_robots_bcf754/scores.png").exists()
-
-
-@pytest.mark.slow
-def test_ctrl_c_with_worker_processes_and_going_on(tmp_path):
-    program = [sys.executable, "-m", "swarm_forage_env.cli", "score", "--policy", "random", "--budget", "quick"]
-    program += ["--measures", "noise_robustness", "--jobs", "2", "--out", str(tmp_path), "--horizon", "2000"]
-    pipe = subprocess.PIPE
-    with subprocess.Popen(program, stdout=pipe, stderr=pipe, text=True, start_new_session=True) as process:
-        try:
-            while not list(tmp_path.glob("*.parquet")) and process.poll() is None:
-                time.sleep(0.1)
-            os.killpg(process.pid, signal.SIGINT)
-            _, err = process.communicate(timeout=10)
-        finally:  # whatever went wrong, nothing stays behind
-            with suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
-    assert process.returncode == 130
-    assert "the same command does the rest" in err
-    kept = set(RunStore(tmp_path).run_ids())
-    assert 1 <= len(kept) < 12
-    again = subprocess.run(program, capture_output=True, text=True, check=True)
-    assert re.match(rf"{len(kept)} of 12 runs (is|are) stored already\.", again.stderr)
-    assert "noise_robustness" in again.stdout
-    assert kept < set(RunStore(tmp_path).run_ids())

@@ -46,14 +46,6 @@ def test_the_sets_are_listed_with_their_runs(command):
     assert re.search(r"^all +168 +129,024 ", out, re.MULTILINE)
 
 
-def test_what_a_budget_leaves_out_is_listed(command):
-    code, out, _ = command("study", "list", "--budget", "reduced")
-    assert code == 0
-    words = " ".join(out.split())
-    assert re.search(r"S2a walk_probability 0\.026; population_size .*460, 627, 819", words)
-    assert command("study", "list", "--budget", "quick")[0] == 2
-
-
 def test_a_study_runs_and_is_packed(written):
     code, out, err = written(*RUN)
     assert code == 0
@@ -86,17 +78,6 @@ def test_shards_are_not_packed_until_all_runs_are_asked_for(written):
     assert read_study("here/mine.parquet").spec.name == "mine"
 
 
-def test_several_studies_have_a_folder_around_theirs(written):
-    Path("other.toml").write_text(FILE.replace('"mine"', '"other"'))
-    code, out, _ = written("study", "run", "mine.toml", "other.toml", "--jobs", "1", "--out", "all")
-    assert code == 0
-    assert out.splitlines() == [f"8 of 8 runs done, in all/{name}_tiny" for name in ("mine", "other")]
-    code, out, _ = written(*RUN, "--out", "all/mine_tiny", "--rules", "program")
-    assert out.splitlines() == ["4 of 4 runs done, in all/mine_tiny", "The study in this folder has 8 runs in all."]
-    plans = written("study", "run", "mine.toml", "other.toml", "--jobs", "1", "--out", "all", "--dry-run")[1]
-    assert plans.count("8 runs, 8 stored, 0 to do") == 2
-
-
 def test_failures_are_told_with_the_command_that_makes_them_again(written, monkeypatch):
     Path("mine.toml").write_text(FILE.replace('"random"', '{ policy = "random", parameters = { speed = 3 } }'))
     code, out, _ = written(*RUN, "--seeds", "3")
@@ -112,17 +93,6 @@ def test_failures_are_told_with_the_command_that_makes_them_again(written, monke
     code, _, err = written(*rerun)
     assert code == 1
     assert "takes no arguments" in err.splitlines()[-2]
-
-
-def test_a_dry_run_runs_nothing(written):
-    code, out, _ = written(*RUN, "--dry-run")
-    assert code == 0
-    runs = "8 runs, 0 stored, 8 to do with 400 robot-ticks"
-    assert out == f"mine, budget tiny: {runs}; records go to {FOLDER / 'runs'}\n"
-    assert not FOLDER.exists()
-    written(*RUN)
-    assert "8 runs, 8 stored, 0 to do" in written(*RUN, "--dry-run")[1]
-    assert "shard 1 of 2: 4 runs, 4 stored, 0 to do" in written(*RUN, "--dry-run", "--shard", "1/2")[1]
 
 
 def test_an_interrupt_keeps_what_is_done(written, monkeypatch):

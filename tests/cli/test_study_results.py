@@ -62,14 +62,6 @@ def test_claims_are_held_against_a_study(ran):
     assert "why" not in short
 
 
-def test_a_study_of_ones_own_has_no_claims(ran):
-    Path("mine.toml").write_text(FILE.replace('"S1a"', '"mine"'))
-    assert ran("study", "run", "mine.toml", "--jobs", "1", "--out", "mine")[0] == 0
-    code, _, err = ran("study", "verdict", "mine")
-    assert code == 2
-    assert "Expected studies of the paper's sets" in err
-
-
 def test_figures_are_drawn_with_their_numbers(ran):
     code, out, _ = ran("study", "plot", "done", "--out", "figures", "--band", "--variant", "corrected,paper")
     assert code == 0
@@ -90,38 +82,3 @@ def test_figures_for_a_paper_have_its_width_and_no_headline(ran):
     words = words_in(Path("paper/S1a_raw_performance_described.svg"))
     assert {"CRW", "robots N"} <= {*words}
     assert not any("higher is better" in line for line in words)
-
-
-def test_what_cannot_be_drawn_is_told(ran):
-    code, _, err = ran("study", "plot", "done", "--format", "gif")
-    assert code == 2
-    assert "format 'gif'" in err
-    words = FILE.replace("values = [1, 2]", 'values = ["none", "static"]').replace("criterion", "field")
-    Path("words.toml").write_text(words.replace("population_size", "caches"))
-    assert ran("study", "run", "words.toml", "--jobs", "1", "--out", "words")[0] == 0
-    code, _, err = ran("study", "plot", "words")
-    assert code == 2
-    assert "Expected a study with finished runs and numbers on its last axis, got S1a" in err
-
-
-def test_the_place_of_results_is_looked_at_before_the_work(ran, monkeypatch):
-    Path("all.json").mkdir()
-    work = "metrics.scoring.study_verdict.study_panels"
-    monkeypatch.setattr(work, lambda *_, **__: pytest.fail("work was done"))
-    told = "swarm-forage: Expected a file to write, got a folder: all.json\n"
-    assert ran("study", "verdict", "done", "--file", "all.json") == (1, "", told)
-
-
-def test_a_disk_that_fills_up_leaves_no_half_page(ran, monkeypatch):
-    def half(self, text, **_):
-        self.write_bytes(text.encode()[: len(text) // 2])
-        raise OSError(28, "No space left on device", str(self))
-
-    page = Path("page.md")
-    page.write_text("an earlier one")
-    before = set(Path().iterdir())
-    monkeypatch.setattr(Path, "write_text", half)
-    code, _, err = ran("study", "verdict", "done", "--file", str(page))
-    assert (code, err.splitlines()[-1]) == (1, f"swarm-forage: No space left on device: {page}")
-    assert page.read_text() == "an earlier one"
-    assert set(Path().iterdir()) == before

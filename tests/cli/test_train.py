@@ -1,23 +1,18 @@
 """`swarm-forage train`, as a person uses it."""
 
 import builtins
-import inspect
 import json
 import re
-import subprocess
 import sys
-from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.cli import training_report
 from swarm_forage_env.cli.options import WorldOptions
-from swarm_forage_env.cli.train import RecipeOptions, train
-from swarm_forage_env.training.defaults import DEFAULT_REWARDS, EPISODE_S
+from swarm_forage_env.cli.train import RecipeOptions
 from swarm_forage_env.training.evaluation_plan import EvaluationPlan
 from swarm_forage_env.training.evaluations import Evaluation, write_evaluations
 from swarm_forage_env.training.plan import read_plan
@@ -108,13 +103,6 @@ def test_a_training_is_resumed_by_its_folder_alone(command):
     code, _, err = command(*TRUSTING, *TINY, "--steps", "400", "--seed", "3", "--out", "a", "--resume")
     assert (code, len(err.splitlines())) == (2, 1)
     assert "got others: seed: 0 before, 3 now. Without options" in err
-
-
-@needs_training
-def test_a_plan_is_carried_out_with_another_seed(command):
-    assert command("train", *TINY, "--out", "a")[0] == 0
-    assert command("train", "--plan", "a/plan.json", "--seed", "7")[0] == 0
-    assert read_plan(Path("results/training/plan_seed_7/plan.json")) == replace(read_plan(Path("a/plan.json")), seed=7)
 
 
 def test_without_the_training_library_the_message_says_what_to_install(command, monkeypatch):
@@ -211,11 +199,6 @@ def test_a_callback_of_the_user_runs_beside_the_training_and_can_end_it(command)
     assert "allback" not in Path("stopped/plan.json").read_text()  # a plan from elsewhere can name no code
 
 
-@pytest.mark.parametrize("name", ["warehouse_small", "search_and_rescue"])
-def test_the_plan_of_the_command_is_the_recipe(name):
-    assert RecipeOptions().plan(WorldOptions(scenario=name)) == recipe(name)
-
-
 def test_words_are_arguments_of_the_recipe(tmp_path):
     path = tmp_path / "world.toml"
     path.write_text("[set]\nn_robots = 7\nnest_progress = 0.0\n[wrappers.sensor_noise]\nsigma = 0.01\n")
@@ -272,43 +255,3 @@ def test_words_are_arguments_of_the_recipe(tmp_path):
         nest_progress=0.0,
         horizon_s=400.0,
     )
-
-
-@pytest.mark.parametrize("by_file", [True, False])
-def test_what_people_set_goes_before_the_recipe(tmp_path, by_file):
-    path = tmp_path / "world.toml"
-    path.write_text("[set]\nnest_progress = 0.0\nhorizon_s = 400.0\n" if by_file else "")
-    settings = () if by_file else ("nest_progress=0.0", "horizon_s=400")
-    plan = RecipeOptions().plan(WorldOptions(scenario=str(path), settings=settings))
-    assert (plan.scenario.reward.nest_progress, plan.scenario.reward.first_pickup) == (0.0, 1.0)
-    assert {stage.scenario["horizon_s"] for stage in plan.stages} == {400.0}
-
-
-@needs_training
-def test_small_runs_come_without_warnings(command, recwarn):
-    code, _, err = command("train", "--robots", "3", "--objects", "20", "--arenas", "1", "--steps", "6", "--arg",
-                           "n_steps=2", "--evaluate-every", "6", "--evaluation-horizon", "200")  # fmt: skip
-    assert code == 0, err
-    assert not [warning for warning in recwarn if "mini-batch" in str(warning.message)]
-
-
-@pytest.mark.parametrize("name", ["seed", "steps", "scenario", "n_robts"])
-def test_a_file_sets_fields_of_the_scenario_and_no_arguments_of_the_recipe(tmp_path, name):
-    path = tmp_path / "world.toml"
-    path.write_text(f"[set]\n{name} = 3\n")
-    with pytest.raises(ConfigError, match=f"Unknown scenario field '{name}'"):
-        RecipeOptions().plan(WorldOptions(scenario=str(path)))
-
-
-def test_a_wrapper_option_goes_before_the_same_wrapper_in_the_file(tmp_path):
-    path = tmp_path / "world.toml"
-    path.write_text("[wrappers.sensor_noise]\nsigma = 0.01\n")
-    words = WorldOptions(scenario=str(path), wrappers=("sensor_noise:sigma=0.02",))
-    (config,) = RecipeOptions().plan(words).wrappers
-    assert config.to_mapping()["sigma"] == 0.02
-
-
-def test_it_does_without_the_measures_where_a_file_of_that_name_is_in_the_way(command):
-    Path("metrics.py").write_text("")
-    code = "import sys; sys.path.insert(0, '.'); import metrics; from swarm_forage_env.cli.train import train, dataset"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

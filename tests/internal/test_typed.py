@@ -33,10 +33,6 @@ def test_tables_become_dataclasses_and_lists_tuples():
     assert typed(Whole, given, "") == Whole(parts=(part,), versions={"numpy": "2"}, more=[None])
 
 
-def test_numbers_stay_as_they_are_for_digests():
-    assert type(typed(float, 1, "a")) is int
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -72,11 +68,6 @@ def test_one_of_several_types():
             typed(float | str | bool, value, "a")
     with pytest.raises(ConfigError, match="Expected a to be one of a number, a text, got True"):
         typed(float | str, True, "a")
-
-
-def test_what_is_no_table_is_named_by_its_type():
-    with pytest.raises(ConfigError, match="Expected a Whole to be a table"):
-        typed(Whole, [], "")
 
 
 def test_arrays_are_of_one_type_and_shape():

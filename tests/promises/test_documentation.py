@@ -10,7 +10,6 @@ import pytest
 
 from scripts import update_docs
 from scripts.results_numbers import results_fields
-from scripts.update_docs import FIVE
 from swarm_forage_env.runs import workers
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -90,13 +89,6 @@ def test_what_pages_show_is_not_left_out_of_the_repository(tmp_path):
     assert left_out.split() == ["results/of_a_run"]
 
 
-def test_code_blocks_are_closed_before_the_next_begins():
-    for page in PAGES:
-        fences = re.findall(r"^```(.*)$", page.read_text(), re.MULTILINE)
-        assert len(fences) % 2 == 0, page.name
-        assert [language for language in fences[1::2] if language] == [], page.name
-
-
 def test_index_lists_every_page():
     items = "".join(re.findall(r"^- .*$", (ROOT / "docs/index.md").read_text(), re.MULTILINE))  # as docs/conf.py reads
     listed = set(re.findall(r"\]\((\w+\.md)\)", items))
@@ -124,42 +116,6 @@ def test_numbers_of_runs_are_those_of_the_store():
         by_hand = update_docs.BLOCK.sub("", text)
         numbers = {values[name] for source, values in store.items() for name in update_docs.SOURCES[source][1]}
         assert [number for number in numbers if number in by_hand] == [], f"{page}: a number outside of a block"
-
-
-def test_numbers_that_are_not_stored_say_how_to_make_them():
-    with pytest.raises(SystemExit, match="--remake walls makes them"):
-        update_docs.written("<!-- generated: walls.table by scripts/update_docs --><!-- end -->", {})
-
-
-def test_numbers_of_runs_leave_paragraphs_whole():
-    for page in update_docs.PAGES:
-        assert update_docs.broken_lines(page.read_text()) == [], f"{page}: put a word before the number"
-
-
-@pytest.mark.parametrize("before", ["", "  ", "- ", "12. ", "> "])
-def test_a_number_that_begins_a_line_is_found(before, tmp_path, monkeypatch, capsys):
-    """Markdown takes a comment at the start of a line for an HTML block, which breaks the paragraph."""
-    page = tmp_path / "page.md"
-    block = "<!-- generated: run.{} by scripts/update_docs -->{}<!-- end -->"
-    page.write_text(f"CRW delivers\n{before}{block.format('crw', 'x')}; see\n\n{block.format('table', '')}\n")
-    monkeypatch.setattr(update_docs, "PAGES", [page])
-    monkeypatch.setattr(update_docs, "ROOT", tmp_path)
-    assert update_docs.main([]) == 1
-    assert "page.md:2: expected a word before the number" in capsys.readouterr().out
-    page.write_text(page.read_text().replace(f"\n{before}<!-- generated: run.crw", " <!-- generated: run.crw"))
-    assert update_docs.main(["--check"]) == 0
-
-
-def test_the_page_of_policies_has_the_multiple_of_the_page_of_speed():
-    policies, speed = ((ROOT / f"docs/{name}.md").read_text() for name in ("policies", "speed"))
-    (said,) = re.findall(r"the example takes ([\d.]+) times as\s+long as DPO", policies)
-    (measured,) = re.findall(r"^\| `function-200` .*\| ([\d.]+) \(.*\) x dpo-200 \|$", speed, re.MULTILINE)
-    assert said == measured
-
-
-def test_a_block_is_written_from_the_store():
-    page = "before <!-- generated: run.crw by scripts/update_docs -->1.00 ± 0.10<!-- end --> after"
-    assert update_docs.written(page, {"run": {"crw": "2.00 ± 0.20"}}) == page.replace("1.00 ± 0.10", "2.00 ± 0.20")
 
 
 def test_answers_and_means_are_those_beside_the_results(tmp_path):
@@ -204,33 +160,6 @@ def test_answers_and_means_are_those_beside_the_results(tmp_path):
     assert f"{block}\n\n| claim |" in update_docs.written(f"{block}<!-- end -->", {"results": found})
 
 
-def test_deliveries_are_read_from_a_printed_table():
-    stored = json.loads(update_docs.STORE.read_text())["run"]
-    printed = stored["table"]
-    assert {"made_with": stored["made_with"], **update_docs.fields(f"before\n{printed}\nafter\n", FIVE)} == stored
-    with pytest.raises(ValueError, match="deliveries of crw"):
-        update_docs.fields(printed, ("crw",))
-
-
-def test_every_source_is_stored_with_what_made_it():
-    store = json.loads(update_docs.STORE.read_text())
-    assert list(store) == list(update_docs.SOURCES)
-    assert [set(values["made_with"]) for values in store.values()] == [set(update_docs.made_with())] * len(store)
-
-
-def test_what_is_made_anew_takes_its_place_in_the_store(tmp_path, monkeypatch):
-    first, second, *_ = update_docs.SOURCES
-    monkeypatch.setattr(update_docs, "STORE", tmp_path / "results.json")
-    monkeypatch.setattr(update_docs, "PAGES", [])
-    monkeypatch.setattr(update_docs, "make", lambda name: {"table": f"of {name}"})
-    update_docs.STORE.write_text(json.dumps({second: {"table": "old"}}))
-    assert update_docs.main(["--remake", first]) == 0
-    assert list(json.loads(update_docs.STORE.read_text()).items()) == [
-        (first, {"table": f"of {first}"}),
-        (second, {"table": "old"}),
-    ]
-
-
 def test_commands_of_the_store_are_those_that_the_pages_show():
     shown = {"run": "README.md", "trained": "docs/learning.md"}
     assert [
@@ -239,46 +168,3 @@ def test_commands_of_the_store_are_those_that_the_pages_show():
         for command in update_docs.SOURCES[name][0]
         if command not in (ROOT / page).read_text()
     ] == []
-
-
-def test_deliveries_are_compared_where_the_versions_are_the_same(capsys):
-    stored = json.loads(update_docs.STORE.read_text())["run"] | {"made_with": update_docs.made_with()}
-    other = stored["table"].replace(stored["dpo"], "11.11 ± 1.11")
-    assert update_docs.compare(stored["table"], stored) == 0
-    assert "are the stored ones" in capsys.readouterr().out
-    assert update_docs.compare(other, stored) == 1
-    assert f"dpo: {stored['dpo']} stored, 11.11 ± 1.11 now" in capsys.readouterr().out
-    stored["made_with"]["numpy"] = "0.1"
-    assert update_docs.compare(other, stored) == 0
-    assert "not compared with the stored ones: numpy 0.1 then" in capsys.readouterr().out
-
-
-@pytest.mark.compiled
-def test_remake_runs_the_command_and_writes_store_and_pages(tmp_path, monkeypatch):
-    """README's command itself, with a short horizon behind it."""
-    (command,), labels = update_docs.SOURCES["run"]
-    store, page = tmp_path / "results.json", tmp_path / "page.md"
-    store.write_text(json.dumps({"run": {}, "medium": {"crw": "as it was"}}))
-    block = "<!-- generated: {} by scripts/update_docs -->{}<!-- end -->"
-    page.write_text(
-        "Runs: " + block.format("run.table", "") + block.format("run.crw", "") + block.format("medium.crw", "")
-    )
-    monkeypatch.setitem(
-        update_docs.SOURCES, "run", ((f"{command} --robots 10 --horizon 200 --seeds 2 --jobs 1",), labels)
-    )
-    monkeypatch.setattr(update_docs, "STORE", store)
-    monkeypatch.setattr(update_docs, "PAGES", [page])
-    monkeypatch.setattr(update_docs, "ROOT", tmp_path)
-    assert update_docs.main(["--remake", "run"]) == 0
-    made = json.loads(store.read_text())
-    assert made["medium"] == {"crw": "as it was"}
-    assert set(made["run"]) == {"made_with", "table", *labels}
-    assert made["run"]["made_with"] == update_docs.made_with()
-    assert "10 robots, 200 objects, 200 s" in made["run"]["table"]
-    assert page.read_text() == (
-        "Runs: "
-        + block.format("run.table", f"\n```\n{made['run']['table']}\n```\n")
-        + block.format("run.crw", made["run"]["crw"])
-        + block.format("medium.crw", "as it was")
-    )
-    assert update_docs.main(["--check"]) == 0

@@ -114,10 +114,6 @@ def test_numba_has_no_settings_from_a_file(here, module):
     assert lines == ["  None"] * 2
 
 
-def test_what_numba_has_read_before_is_undone(here):
-    program = "import numba; a = numba.config.CACHE_DIR; import metrics.distance; print(a, [numba.config.CACHE_DIR])"
-    read = python(here, "-c", program).stdout
-    assert re.fullmatch(r"/\S+ \[''\]\n", read), read
 
 
 CONSOLE = """

@@ -1,6 +1,5 @@
 """Two commands at once: one is refused or waits, or both leave what one leaves; docs/promises.md has the table."""
 
-import json
 import subprocess
 import sys
 from contextlib import suppress
@@ -9,22 +8,17 @@ from importlib.util import find_spec
 from pathlib import Path
 from threading import Barrier, BrokenBarrierError, Thread
 
-import numpy as np
 import pytest
 
-from metrics.benchmark import load_protocol, read_entry
 from swarm_forage_env._internal.files import alone_in
 from swarm_forage_env.inspect.maps import floor_maps
-from swarm_forage_env.inspect.replay.files import read_replays, write_replays
+from swarm_forage_env.inspect.replay.files import read_replays
 from swarm_forage_env.runs.runner import run_specs
 from swarm_forage_env.runs.spec import plan_run
-from swarm_forage_env.runs.store import RunStore, load
+from swarm_forage_env.runs.store import load
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.studies import study_table
-from swarm_forage_env.studies.study_folder import StudyFolder, run_study
-from swarm_forage_env.studies.study_table import pack_study, read_study
+from swarm_forage_env.studies.study_folder import StudyFolder
 from tests.support.console import answer
-from tests.support.entries import TINY
 from tests.support.small_files import small_file
 from tests.support.tiny_study import RANDOM, tiny_study
 
@@ -60,14 +54,6 @@ def test_two_runs_into_one_folder_leave_what_one_leaves(tmp_path):
     assert not list((tmp_path / "both").glob(".*"))
 
 
-def test_two_commands_may_put_the_same_damaged_file_aside(tmp_path):
-    store = RunStore(tmp_path)
-    store.path("a").write_bytes(b"damaged")
-    store.put_aside("a")
-    store.put_aside("a")
-    assert [file.name for file in tmp_path.iterdir()] == ["a.parquet.damaged"]
-
-
 def test_two_shards_that_add_seeds_at_once_both_keep_theirs(tmp_path, monkeypatch):
     pytest.importorskip("fcntl")
     folder = StudyFolder(tmp_path / "study")
@@ -89,66 +75,6 @@ def test_two_shards_that_add_seeds_at_once_both_keep_theirs(tmp_path, monkeypatc
     assert read(folder).seeds == (0, 1, 5, 6)
 
 
-def test_shards_run_beside_each_other(tmp_path):
-    """One is under way while the other one begins and ends."""
-    folder = StudyFolder(tmp_path / "study")
-    folder.take(STUDY)
-    with alone_in(folder.store.folder):  # a third one packs
-        outcomes = [run_study(STUDY, folder, part=(part, 2), jobs=1) for part in (1, 2)]
-    assert [outcome.count("done") for outcome in outcomes] == [1, 1]
-
-
-def test_the_file_of_a_study_has_the_runs_of_whoever_packs_last(tmp_path, monkeypatch):
-    pytest.importorskip("fcntl")
-    folder = StudyFolder(tmp_path / "study")
-    run_study(STUDY, folder, part=(1, 2), jobs=1)
-    gather, others = study_table.gather_study, list[Thread]()
-
-    def gather_slowly(*given):
-        table = gather(*given)
-        if not others:  # the first one; the second begins and has all the time to end before the first has written
-            run_study(STUDY, folder, part=(2, 2), jobs=1)
-            others.append(Thread(target=pack_study, args=(folder,)))
-            others[0].start()
-            others[0].join(1.0)
-        return table
-
-    monkeypatch.setattr(study_table, "gather_study", gather_slowly)
-    file = pack_study(folder)
-    others[0].join()
-    assert read_study(file).frame["state"].unique().to_list() == ["done"]
-
-
-def replays(file: Path, label: str) -> None:
-    (replay,) = read_replays(small_file("replay.html"))
-    write_replays(file, replace(replay, label=label))
-
-
 def maps(file: Path, label: str) -> None:
     (replay,) = read_replays(small_file("replay.html"))
     replace(floor_maps(replay), n_robots=len(label)).write(file)
-
-
-def entry(file: Path, label: str) -> None:
-    replace(read_entry(small_file("entry.json"), load_protocol(TINY)), name=label).write(file)
-
-
-WRITERS = {
-    "page.html": (replays, lambda file: read_replays(file)[0].label),
-    "maps.npz": (maps, lambda file: "a" * int(np.load(file)["n_robots"])),
-    "entry.json": (entry, lambda file: json.loads(file.read_text())["name"]),
-}
-"""Name of a file -> what writes it under a label, and what reads the label."""
-
-
-@pytest.mark.parametrize("name", WRITERS)
-def test_of_two_commands_that_write_one_file_one_stands_whole(name, tmp_path):
-    write, read = WRITERS[name]
-    labels = ["a" * 40, "a" * 400]
-    writers = [Thread(target=lambda label=label: [write(tmp_path / name, label) for _ in range(3)]) for label in labels]
-    for writer in writers:
-        writer.start()
-    for writer in writers:
-        writer.join()
-    assert read(tmp_path / name) in labels
-    assert [file.name for file in tmp_path.iterdir()] == [name], "drafts"

@@ -11,7 +11,6 @@ from pettingzoo.test import api_test, parallel_api_test, parallel_seed_test
 from pettingzoo.utils import BaseParallelWrapper
 from pettingzoo.utils.conversions import parallel_to_aec
 
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.runs.record import RunRecord
@@ -30,12 +29,11 @@ from swarm_forage_env.wrappers.noise import (
 )
 from swarm_forage_env.wrappers.population import PopulationConfig
 from swarm_forage_env.wrappers.registry import WRAPPERS, parse_wrapper, wrapper_config_class, wrappers_from_mapping
-from swarm_forage_env.wrappers.throttle import Throttle, ThrottleConfig
+from swarm_forage_env.wrappers.throttle import ThrottleConfig
 from swarm_forage_env.wrappers.waveform import Waveform
 from swarm_forage_env.wrappers.world import World
 from tests.support.busy import BusyPolicy
 from tests.support.stage import assert_conserved
-from tests.support.wrapper_configs import OuterConfig
 
 ROBOTS = 8
 
@@ -84,10 +82,6 @@ def stacked(wrappers, **overrides):
     return build_stack(world_config(interval_s=2.0, **overrides), wrappers)
 
 
-def test_there_is_an_example_of_every_wrapper():
-    assert set(ACTIVE) == set(QUIET) == set(WRAPPERS)
-
-
 @pytest.mark.parametrize("name", WRAPPERS)
 def test_names_and_places_agree(name):
     config_class = wrapper_config_class(name)
@@ -104,15 +98,6 @@ def test_names_and_places_agree(name):
 @each_stack
 def test_parallel_api(wrappers):
     parallel_api_test(stacked(wrappers), num_cycles=120)
-
-
-@each_stack
-def test_parallel_api_without_births(wrappers):
-    without = tuple(
-        replace(config, birth_per_tick=0.0, initial_robots=None) if isinstance(config, PopulationConfig) else config
-        for config in wrappers
-    )
-    parallel_api_test(stacked(without, n_robots=2), num_cycles=150)
 
 
 @each_stack
@@ -237,14 +222,6 @@ def test_a_foreign_wrapper_belongs_outside(name):
     parallel_api_test(Foreign(ACTIVE[name].wrap(ForageEnv(world_config()))), num_cycles=20)
 
 
-def test_any_other_order_is_refused():
-    inner = Throttle(ForageEnv(world_config()), ACTIVE["throttle"])  # type: ignore[arg-type] - from a dict of all kinds
-    with pytest.raises(ValueError, match="RunRecorder, SensorNoise, PopulationDynamics, Throttle, ActuatorNoise"):
-        ACTIVE["actuator_noise"].wrap(inner)
-    with pytest.raises(ValueError, match="each at most once"):
-        ACTIVE["throttle"].wrap(inner)
-
-
 # As data
 
 
@@ -310,84 +287,10 @@ def test_wrappers_are_named_on_a_command_line(text, expected):
     assert parse_wrapper(text) == expected
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("throtle:amplitude=0.1", r"Unknown wrapper 'throtle'. Did you mean 'throttle'\? Known: actuator_noise"),
-        ("throttle:amplitude", "settings of wrapper throttle as key=value, got 'amplitude'"),
-        ("throttle:waveform=", "as key=value, got 'waveform='"),
-        ("throttle:=3", "as key=value, got '=3'"),
-        ("throttle:amplitude=0.1", r"Missing key 'waveform', the kind of the waveform: one of constant, sine"),
-        ("throttle:waveform=constant,amplitud=0.1", r"Unknown key 'amplitud'. Did you mean 'amplitude'\?"),
-        ("throttle:waveform=constant,amplitude=nan", "amplitude of a waveform to be a finite number"),
-        ("throttle:waveform=constant,amplitude=0.1,amplitude=0.2", "Expected amplitude of wrapper throttle once"),
-        ("sensor_noise:sigma=0.1,sigma.kind=sine", "sigma of wrapper sensor_noise either as a value or as a table"),
-        ("sensor_noise:sigma=0.1,groups=proximty", "Unknown group of sensors 'proximty'"),
-        ("population:death_per_tick=-1", "population.death_per_tick to be a finite number >= 0"),
-        ("population:", "Expected the settings of wrapper population after the colon, got none"),
-        ("sensor_noise", "Expected the settings of wrapper sensor_noise after its name and a colon, got none"),
-        ("population:death=0.1", r"Unknown key 'death'.* For example: population:death_per_tick=0\.0005$"),
-        ("", "Unknown wrapper ''"),
-    ],
-)
-def test_command_line_errors_say_what_is_wrong(text, message):
-    with pytest.raises(ConfigError, match=message):
-        parse_wrapper(text)
-
-
 @pytest.mark.parametrize("name", WRAPPERS)
 def test_the_example_of_a_wrapper_works_and_does_something(name):
     config = parse_wrapper(f"{name}:{wrapper_config_class(name).example}")
     assert config.in_words(0.2) != QUIET[name].in_words(0.2)
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("throttle:waveform=constant,amplitude=0.2", "throttle: robots lose 20 % of their speed"),
-        (
-            "throttle:waveform=sine,amplitude=0.2,offset=0.1,period_s=5000,carriers=true",
-            "throttle: carrying robots lose 0 to 30 % of their speed (sine, period 5,000 s)",
-        ),
-        (
-            "throttle:waveform=step,amplitude=0.3,start_s=500",
-            "throttle: robots lose 0, from 500 s on 30 % of their speed",
-        ),
-        (
-            "throttle:waveform=sawtooth,amplitude=0.1,offset=0.1,phase=1,period_s=50",
-            "throttle: robots lose 20 to 40 % of their speed (sawtooth, period 50 s)",
-        ),
-        (
-            "handling_cost:waveform=table,times_s=0+100,values=1+50",
-            "handling cost: a pick-up or a drop takes 0.2 to 10 s (table of 2 values)",
-        ),
-        ("sensor_noise:sigma=0.03", "sensor noise: sigma 0.03 (all sensors)"),
-        (
-            "sensor_noise:sigma=0.03,groups=light+wheel_speed,sigmas.position=0.1",
-            "sensor noise: sigma 0.03 (light, wheel speed); sigma 0.1 (position)",
-        ),
-        (
-            "actuator_noise:sigma=square,amplitude=0.2,offset=0.1,period_s=100",
-            "wheel noise: sigma 0 to 0.3 (square, period 100 s)",
-        ),
-        (
-            "population:death_per_tick=0.0005,birth_per_tick=0.001,initial_robots=20,max_robots=30",
-            "population: a death every 400 s on average, a birth every 200 s on average, 20 robots at the start, "
-            "at most 30",
-        ),
-        (
-            "population:malfunction_per_tick=0.01,repair_per_tick=0.02",
-            "population: a malfunction every 20 s on average, a repair every 10 s on average",
-        ),
-        ("population:deaths=terminate", "population: no changes"),
-    ],
-)
-def test_wrappers_tell_their_settings_in_plain_words(text, expected):
-    assert parse_wrapper(text).in_words(0.2) == expected
-
-
-def test_a_wrapper_of_someone_else_tells_its_settings_too():
-    assert OuterConfig().in_words(0.2) == "test outer: groups proximity"
 
 
 def test_wrappers_are_read_from_toml():
@@ -414,21 +317,3 @@ def test_wrappers_are_read_from_toml():
         PopulationConfig(malfunction_per_tick=0.001, repair_per_tick=0.001022222),
         ThrottleConfig(waveform=Waveform(kind="sine", amplitude=0.15, offset=0.15, period_s=10_000)),
     )
-
-
-@pytest.mark.parametrize(
-    ("tables", "message"),
-    [
-        ({"noise": {}}, "Unknown wrapper 'noise'"),
-        ({"throttle": 0.1}, "settings of wrapper throttle to be a table of values by name, got 0.1"),
-        ({"population": {"deaths_per_tick": 1}}, "Unknown key 'deaths_per_tick'. Did you mean 'death_per_tick'"),
-    ],
-)
-def test_toml_errors_say_what_is_wrong(tables, message):
-    with pytest.raises(ConfigError, match=message):
-        wrappers_from_mapping(tables)
-
-
-def test_a_configuration_says_of_what():
-    with pytest.raises(TypeError, match="Expected Nameless to say what it is a configuration of"):
-        type("Nameless", (WrapperConfig,), {})

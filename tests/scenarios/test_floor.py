@@ -67,12 +67,6 @@ def test_quad_source():
     assert source_boxes("quad_source", *config.arena.n_cells) == (right, left, bottom, top)
 
 
-def test_quad_source_corners_count_once():
-    strips = 4 * 24 * 168
-    corners = 4 * 24 * 24
-    assert capacity(source_boxes("quad_source", 240, 240), 240, 240, [(96, 96, 144, 144)]) == strips - corners
-
-
 @pytest.mark.parametrize("placement", PLACEMENTS)
 def test_capacity_is_the_number_of_source_cells_off_the_nest(placement):
     nest = (20, 4, 60, 40)

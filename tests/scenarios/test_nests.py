@@ -4,12 +4,9 @@ import numpy as np
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.cli.scenario_options import parse_setting
 from swarm_forage_env.contract.codes import CELL_NEST, Event, Grip
-from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
-from swarm_forage_env.runs.spec import RunSpec, plan_run
 from swarm_forage_env.scenarios.config import PHYSICS_ENGINES
 from swarm_forage_env.scenarios.presets import at_density, scenario
 from swarm_forage_env.training.recipe import small_arena
@@ -36,11 +33,6 @@ def test_nonsense_is_refused_with_one_clear_line(given, words):
     assert "\n" not in str(caught.value)
 
 
-def test_obstacles_keep_clear_of_every_nest():
-    with pytest.raises(ConfigError, match=r"obstacles\[0\] clear of the nest \(28\.0, 6\.0, 30\.0, 10\.0\)"):
-        scenario("warehouse_small", further_nests=(EAST,), obstacles=((29.0, 7.0, 31.0, 8.0),))
-
-
 def test_nests_are_whole_cells_with_lights_of_their_own():
     arena = scenario("warehouse_small", further_nests=(EAST, SQUARE, (10.05, 8.05, 10.26, 8.26))).arena
     assert arena.all_nest_cells[1:] == ((140, 30, 150, 50), (80, 10, 90, 20), (50, 40, 51, 41))
@@ -50,21 +42,6 @@ def test_nests_are_whole_cells_with_lights_of_their_own():
     places = [(29.0, 7.0), (29.0, 8.0), (29.0, 9.0), (17.0, 3.0), (10.1, 8.1)]
     assert arena.lights_m[3:] == tuple(pytest.approx((x, y, height)) for x, y in places)
     assert arena.lights_m[:3] == scenario("warehouse_small").arena.lights_m
-
-
-def test_a_run_without_further_nests_is_the_run_of_before():
-    spec = plan_run(scenario("warehouse_small", n_robots=3, horizon_s=200.0), "crw", seed=1)
-    mapping = spec.to_mapping()
-    del mapping["scenario"]["arena"]["further_nests"]
-    assert RunSpec.from_mapping(mapping).run_id == spec.run_id
-    other = plan_run(scenario("warehouse_small", n_robots=3, horizon_s=200.0, further_nests=(EAST,)), "crw", seed=1)
-    assert other.run_id != spec.run_id
-
-
-def test_nests_come_from_words_and_go_to_policies():
-    assert parse_setting("further_nests=28,6,30,10+16,2,18,4") == ("further_nests", (EAST, SQUARE))
-    config = scenario("warehouse_small", further_nests=(EAST, SQUARE))
-    assert SwarmSpec.of(config).nest_boxes_m == ((1.6, 1.6, 4.8, 14.4), EAST, SQUARE)
 
 
 def test_nests_keep_their_share_of_an_arena_of_another_size():
@@ -110,14 +87,3 @@ def test_the_controllers_bring_objects_to_both_nests(policy, caches):
         places.extend(env.swarm.position[env.arena.events.code == Event.DELIVERED, 0].tolist())
     west = sum(x < 16.0 for x in places)
     assert min(west, len(places) - west) >= 5, (west, len(places))
-
-
-def test_pictures_show_every_nest():
-    one, two = (scenario("warehouse_small", n_robots=1, further_nests=further) for further in ((), (EAST,)))
-    pictures = []
-    for config in (one, two):
-        env = ForageEnv(config, render_mode="rgb_array")
-        env.reset(seed=1)
-        pictures.append(env.render())
-    differs = np.argwhere((pictures[0] != pictures[1]).any(axis=2))
-    assert differs[:, 1].min() > 0.8 * pictures[0].shape[1], "the new nest lies in the east"

@@ -1,18 +1,13 @@
 """Obstacles and positions of objects as fields of a scenario: what is refused, where from they come, what they take."""
 
-import json
-
 import numpy as np
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.scenario_options import parse_setting
-from swarm_forage_env.runs.spec import RunSpec
-from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping, to_mapping
 from swarm_forage_env.scenarios.obstacles import MAX_BOXES, blocked_cells, covered_area_m2, distances_m
 from swarm_forage_env.scenarios.presets import at_density, scenario
-from swarm_forage_env.studies.study_file import load_study
-from swarm_forage_env.wrappers.world import World, describe_file
+from swarm_forage_env.wrappers.world import describe_file
 
 WALL = (14.0, 4.0, 14.4, 12.0)
 PILLAR = (18.0, 7.5, 19.0, 8.5)
@@ -73,34 +68,6 @@ def test_obstacles_come_from_the_command_line_and_from_files(tmp_path):
     file = tmp_path / "world.toml"
     file.write_text("[set]\nobstacles = [[14.0, 4.0, 14.4, 12.0], [18.0, 7.5, 19.0, 8.5]]\n")
     assert describe_file(file).fields == {"obstacles": (WALL, PILLAR)}
-
-
-def test_obstacles_come_back_from_json_and_make_another_run():
-    bare, walled = scenario("warehouse_small"), scenario("warehouse_small", obstacles=(WALL, PILLAR))
-    assert from_mapping(ScenarioConfig, json.loads(json.dumps(to_mapping(walled)))) == walled
-    one, other = RunSpec(world=World(bare), policy="crw"), RunSpec(world=World(walled), policy="crw")
-    assert one.run_id != other.run_id
-    assert RunSpec.from_json(other.to_json()) == other
-
-
-def test_runs_without_obstacles_keep_the_identity_of_before():
-    spec = RunSpec(world=World(scenario("warehouse_small")), policy="crw")
-    mapping = spec.to_mapping()
-    del mapping["scenario"]["arena"]["obstacles"], mapping["scenario"]["objects"]["object_positions_m"]
-    assert RunSpec.from_mapping(mapping).run_id == spec.run_id
-
-
-def test_obstacles_are_an_axis_of_a_study(tmp_path):
-    file = tmp_path / "walls.toml"
-    file.write_text(
-        'name = "walls"\nscenario = "warehouse_small"\npolicies = ["crw"]\nrules = ["described"]\n'
-        "[set]\nn_robots = 4\n[[axis]]\nfield = 'obstacles'\n"
-        "values = [[], [[14.0, 4.0, 14.4, 12.0]], [[14.0, 4.0, 14.4, 12.0], [18.0, 7.5, 19.0, 8.5]]]\n"
-        "[budget.smoke]\nseeds = 1\nhorizon_s = 400.0\n"
-    )
-    study = load_study(file, "smoke")
-    assert study.axes[0].values == ("none", "14.0,4.0,14.4,12.0", "14.0,4.0,14.4,12.0+18.0,7.5,19.0,8.5")
-    assert [spec.scenario.arena.obstacles for spec in study.plan.specs] == [(), (WALL,), (WALL, PILLAR)]
 
 
 def test_obstacles_keep_their_share_of_an_arena_at_another_density():

@@ -5,12 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.scenarios.performance import (
-    DERIVED_PERFORMANCES,
-    PERFORMANCE_COLUMNS,
     performance_curve,
-    performance_of,
 )
 
 TASKS = ("generalist", "harvester", "collector", "starter", "finisher", "transferer", "cache_collector")
@@ -69,64 +65,3 @@ def test_balance_takes_its_logarithms_from_the_c_library():
 def test_balance_is_about_robots_that_have_a_task():
     assert balance(none=0.5, harvester=0.25, collector=0.25) == pytest.approx(math.log(2) / math.log(7))
     assert balance(none=1.0) == 0.0
-
-
-def test_a_column_that_a_run_lacks_says_what_is_true_without_it():
-    """No population wrapper, no deaths; no tasks told, every robot without one."""
-    assert curve("deaths", collected=[1, 2]).tolist() == [0.0, 0.0]
-    assert curve("task_balance", collected=[1, 2]).tolist() == [0.0, 0.0]
-    assert curve("task_share_none", collected=[1, 2]).tolist() == [1.0, 1.0]
-    assert curve("task_share_none", task_share_none=[0.25]).tolist() == [0.25]
-
-
-@pytest.mark.parametrize(
-    ("name", "unit", "amount", "title", "is_total"),
-    [
-        ("collected", "objects", "objects", "deliveries", True),
-        ("n_carrying", "robots", "robots", "robots carrying", False),
-        ("1/interference_ticks", "1/robot-ticks", "1/robot-ticks", "1/interference ticks", False),
-        ("1/cache_load", "1/(objects per cache)", "1/(objects per cache)", "1/cache load", False),
-        ("task_balance", "1", "task_balance", "task balance", False),
-        ("1/task_balance", "1", "1/task_balance", "1/task balance", False),
-    ],
-)
-def test_units_and_words(name, unit, amount, title, is_total):
-    found = performance_of(name)
-    assert (found.name, found.unit, found.amount, found.title, found.is_total) == (name, unit, amount, title, is_total)
-
-
-def test_counts_add_up_over_robots_and_shares_do_not():
-    assert all(
-        performance_of(name).adds_up for name in ("collected", "n_carrying", "n_caches", "interference_ticks", "deaths")
-    )
-    others = ("task_balance", "cache_load", "interference_fraction", "time_at_work_s", "1/collected", "adversity")
-    assert not any(performance_of(name).adds_up for name in others)
-
-
-@pytest.mark.parametrize("name", [*PERFORMANCE_COLUMNS, *DERIVED_PERFORMANCES])
-def test_every_name_has_a_curve_and_an_inverse(name):
-    given = dict.fromkeys(PERFORMANCE_COLUMNS, np.array([0.5, 0.0]))
-    found = curve(name, **given)
-    assert found.shape == (2,)
-    np.testing.assert_allclose(curve(f"1/{name}", **given)[found > 0.0] * found[found > 0.0], 1.0)
-
-
-@pytest.mark.parametrize(
-    ("name", "hint"),
-    [
-        ("colected", "'colected'. Did you mean 'collected'?"),
-        ("1/interference_fractoin", "Did you mean '1/interference_fraction'?"),
-        ("task_blance", "Did you mean 'task_balance'?"),
-        ("first_pickups", "Did you mean 'first_picked'?"),
-        ("1/deliveries", "Did you mean '1/collected'?"),
-        ("1/1/collected", "got '1/1/collected'"),
-        ("interval", "got 'interval'"),
-        ("", "got ''"),
-        (3, "got 3"),
-        (None, "got None"),
-    ],
-)
-def test_unknown_names_are_refused_with_the_nearest(name, hint):
-    with pytest.raises(ConfigError, match="Expected performance to be a recorded column") as error:
-        performance_of(name)
-    assert hint in str(error.value)

@@ -17,7 +17,7 @@ from swarm_forage_env.scenarios.presets import (
     warehouse_quad,
     warehouse_small,
 )
-from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
+from swarm_forage_env.scenarios.quirks import Quirks
 
 OF_THE_STUDY = ("warehouse_small", "warehouse_medium", "warehouse_dual", "warehouse_quad", "search_and_rescue")
 SIDES = (16, 32, 48, 64, 80, 96, 112, 128)
@@ -140,50 +140,6 @@ def test_robots_pick_the_smallest_side_that_holds_them(n_robots, side):
     assert (config.robots.n_robots, config.arena.width_m) == (n_robots, side)
 
 
-def test_side_overrides_the_density_series():
-    config = search_and_rescue(n_robots=3, side_m=64)
-    assert (config.robots.n_robots, config.arena.width_m, config.objects.n_objects) == (3, 64.0, 448)
-
-
-def test_other_sides_need_an_object_count():
-    assert search_and_rescue(side_m=40.0, n_objects=100).robots.n_robots == 80
-    with pytest.raises(ConfigError, match=r"side_m to be one of 16, 32, .*128, got 40\.0; .* give n_objects too"):
-        search_and_rescue(side_m=40.0)
-
-
-def test_too_many_robots_for_the_series():
-    with pytest.raises(ConfigError, match=r"at most 819 robots .* got 820; for more give side_m and n_objects"):
-        search_and_rescue(n_robots=820)
-
-
-@pytest.mark.parametrize(
-    ("overrides", "message"),
-    [
-        ({"n_objects": 0}, r"objects\.n_objects to be a whole number >= 1, got 0"),
-        ({"n_robots": 0}, r"robots\.n_robots to be a whole number >= 1, got 0"),
-        ({"n_robots": 2.5}, r"robots\.n_robots to be a whole number >= 1, got 2\.5"),
-        ({"side_m": math.nan, "n_objects": 10, "n_robots": 1}, r"arena\.width_m to be a finite number > 0, got nan"),
-        ({"side_m": -16.0, "n_objects": 10}, r"arena\.width_m to be a finite number > 0, got -16\.0"),
-        ({"wlak_probability": 0.1}, r"Unknown scenario field 'wlak_probability'\. Did you mean 'walk_probability'\?"),
-    ],
-)
-def test_search_and_rescue_refuses_nonsense(overrides, message):
-    with pytest.raises(ConfigError, match=message):
-        search_and_rescue(**overrides)
-
-
 def test_unknown_scenario_names_the_nearest():
     with pytest.raises(ConfigError, match=r"Unknown scenario 'warehouse_smal'\. Did you mean 'warehouse_small'\?"):
         scenario("warehouse_smal")
-
-
-@pytest.mark.parametrize("name", SCENARIO_NAMES)
-def test_every_preset_takes_overrides(name):
-    config = scenario(name, n_robots=12, horizon_s=100.0, caches="static", quirks=AUTHORS_PROGRAM)
-    assert (config.robots.n_robots, config.horizon_ticks) == (12, 500)
-    assert (config.caches, config.quirks) == ("static", AUTHORS_PROGRAM)
-
-
-def test_a_side_is_refused_where_arenas_have_two():
-    with pytest.raises(ConfigError, match=r"with search_and_rescue only, got it with warehouse_small; .* width_m"):
-        scenario("warehouse_small", side_m=16.0)

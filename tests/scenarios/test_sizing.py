@@ -1,14 +1,10 @@
 """Arenas of constant density: their sizes by hand, their nests, their objects, and what is refused."""
 
-import math
-
 import pytest
 
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.scenarios.floor import source_boxes
-from swarm_forage_env.scenarios.overrides import robots_at_density, with_overrides
-from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, at_density, chosen_scenario, scenario
-from swarm_forage_env.views.pettingzoo import parallel_env
+from swarm_forage_env.scenarios.overrides import robots_at_density
+from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.world.placement import static_cache_centres
 
 
@@ -66,22 +62,6 @@ def test_objects_stay_as_many_per_square_metre():
     assert scenario("search_and_rescue", n_robots=200, density=0.05).objects.n_objects == 448
 
 
-def test_without_a_number_of_robots_it_is_that_of_the_preset():
-    config = scenario("warehouse_small", density=0.05)
-    assert (config.robots.n_robots, config.arena.width_m) == (50, 44.8)  # 1,000 m^2 = 2 a^2, a = 22.36 m
-    assert scenario("search_and_rescue", density=0.05) == scenario("search_and_rescue")
-
-
-def test_other_fields_and_complete_configurations():
-    words = {"n_robots": 200, "density": 0.05, "caches": "static", "walk_probability": 0.01}
-    named = scenario("warehouse_small", **words)
-    assert (named.caches, named.objects.walk_probability) == ("static", 0.01)
-    assert chosen_scenario("warehouse_small", words) == chosen_scenario(scenario("warehouse_small"), words) == named
-    changed = with_overrides(scenario("warehouse_small"), caches="static", walk_probability=0.01)
-    assert at_density(changed, 0.05, n_robots=200) == named
-    assert parallel_env("warehouse_small", **words).unwrapped.scenario == named
-
-
 @pytest.mark.parametrize("name", SCENARIO_NAMES)
 @pytest.mark.parametrize("n_robots", [50, 333, 800])
 def test_sources_and_static_caches_fit_in_every_size(name, n_robots):
@@ -90,23 +70,3 @@ def test_sources_and_static_caches_fit_in_every_size(name, n_robots):
     assert all(low_x < high_x and low_y < high_y for low_x, low_y, high_x, high_y in strips)
     centres = static_cache_centres(config)  # raises where squares overlap
     assert len(centres) == len(static_cache_centres(scenario(name)))
-
-
-@pytest.mark.parametrize(
-    ("name", "fields", "message"),
-    [
-        ("warehouse_small", {"density": 0.0}, "density .robots per m.2; 0.05 is 5 %. to be a number .*got 0.0"),
-        ("warehouse_small", {"density": 5}, "to be a number .*1.*got 5"),
-        ("warehouse_small", {"density": math.nan}, "got nan"),
-        ("warehouse_small", {"density": 0.05, "n_robots": 2.5}, "robots.n_robots to be a whole number"),
-        ("warehouse_small", {"density": 0.05, "n_robots": 1}, "larger than twice robots.start_margin_m"),
-        ("warehouse_small", {"density": 0.05, "width_m": 64.0}, "either density, .* or width_m; got both"),
-        ("search_and_rescue", {"density": 0.05, "side_m": 64.0}, "either density, .* or side_m; got both"),
-        ("search_and_rescue", {"density": 0.01, "n_robots": 500}, "at most 163 robots .* at 1 % density., got 500"),
-        ("search_and_rescue", {"density": 0.01, "n_robots": 0}, "robots.n_robots to be a whole number >= 1, got 0"),
-        ("warehouse_small", {"densty": 0.05}, "Unknown scenario field 'densty'"),
-    ],
-)
-def test_nonsense_is_refused(name, fields, message):
-    with pytest.raises(ConfigError, match=message):
-        scenario(name, **fields)
