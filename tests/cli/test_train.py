@@ -28,25 +28,6 @@ needs_training = pytest.mark.skipif(
 )
 
 
-def test_help_tells_the_rewards_of_the_recipe():
-    documented = inspect.getdoc(train)
-    assert documented is not None
-    assert all(f"{name}={value:g}" in documented for name, value in DEFAULT_REWARDS.items())
-    assert f"{EPISODE_S:,.0f} s" in documented
-
-
-@pytest.mark.parametrize(("baseline", "horizon_s", "times"), [(0.0, 200.0, 1), (20.0, 200.0, 0), (0.0, None, 0)])
-def test_a_baseline_that_scores_nothing_in_short_runs_is_told_once(baseline, horizon_s, times, capsys):
-    news = Evaluation(
-        steps=64, wall_time_s=1.0, cpu_time_s=1.0, performance=0.0, baseline=baseline, interference_fraction=0.0
-    )
-    with training_report._bar() as bar:
-        report = training_report._reporter(recipe(evaluation={"horizon_s": horizon_s}), bar, 128)
-        report(news)
-        report(news)
-    assert capsys.readouterr().err.count("crw scores 0 in such short runs. Longer ones say more") == times
-
-
 @needs_training
 def test_trains_shows_evaluations_and_goes_on(command, painted, monkeypatch):
     monkeypatch.setattr(training_report, "LINE_EVERY_S", 0.0)
@@ -119,38 +100,6 @@ def test_without_the_training_library_the_message_says_what_to_install(command, 
     code, _, err = command("train", *TINY)
     assert code == 1
     assert install_command("train") in err
-
-
-@pytest.mark.parametrize(
-    ("words", "reason"),
-    [
-        (("--algo", "ppp"), "Did you mean 'ppo'"),
-        (("--arg", "gamma=5"), "options.gamma to be a number in (0, 1], got 5"),
-        (("--arg", "hidden=128"), "Expected the network as --hidden 128,128"),
-        (("--hidden", "big"), "sizes of layers, such as 128,128, got 'big'"),
-        (("--objects", "800"), "(small_start) of 12.8 x 16.0 m: Expected at most 392 objects"),
-        (("--algo", "dqn", "--actions", "continuous"), "dqn can choose"),
-        pytest.param(("--arg", "gama=0.9"), "Did you mean 'gamma'", marks=needs_training),
-        (("--plan", "nothing.toml"), "Cannot read the plan nothing.toml"),
-        pytest.param(("--callback", "mine"), "Expected a callback as module:Class", marks=needs_training),
-        pytest.param(("--callback", "collections:Counter"), "got Counter; derive its class", marks=needs_training),
-        (("--plan", "ppo_warehouse_small", "--steps", "5"), "write them into its file"),
-        (("--plan", "ppo_warehouse_small", "--scenario", "warehouse_small"), "write them into its file"),
-    ],
-)
-def test_wrong_words_are_one_line_of_complaint(command, words, reason):
-    code, _, err = command("train", *words)
-    assert code == 2
-    assert reason in err
-    assert len(err.splitlines()) == 1
-    assert not list(Path().iterdir())
-
-
-@pytest.mark.parametrize("missing", ["stable_baselines3", "torch"])
-def test_the_message_is_the_same_from_python(missing):
-    code = f"import sys; sys.modules[{missing!r}] = None; import swarm_forage_env.training.sb3"
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert install_command("train") in result.stderr.splitlines()[-1]
 
 
 @needs_training

@@ -6,13 +6,20 @@ import sys
 import numpy as np
 import pytest
 
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.contract.codes import Counter
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.inspect import film as film_module
 from swarm_forage_env.inspect.film import record_run
-from swarm_forage_env.policies.registry import RandomPolicy
+from swarm_forage_env.policies.registry import RandomPolicy, load_policy
 from swarm_forage_env.rendering.video import check_film, write_film
 from swarm_forage_env.rendering.view import PALETTE, RenderError
 from swarm_forage_env.runs.run import run_policy
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.wrappers.recorder import TOTALS
+from swarm_forage_env.wrappers.registry import parse_wrapper
+from tests.support.drivers import tick_by_tick
 
 Image = pytest.importorskip("PIL.Image")
 
@@ -223,3 +230,26 @@ def test_one_seed_gives_one_film(small, tmp_path):
     ]
     assert films[0] == films[1]
     assert films[0] != films[2]
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ({"seconds": 0.0}, "seconds"),
+        ({"seconds": float("inf")}, "seconds"),
+        ({"seconds": 20_000.0}, "seconds <= 10000"),
+        ({"seconds": 0.5}, "seconds >= 1"),
+        ({"speedup": -1.0}, "speedup"),
+        ({"speedup": 1.0}, "fps <= 5"),
+        ({"fps": 0.0}, "fps"),
+        ({"size_px": 10}, "size_px"),
+        ({"trail_s": -1.0}, "trail_s"),
+        ({"trail_s": float("nan")}, "trail_s"),
+    ],
+)
+def test_impossible_recordings_are_refused_before_the_run(small, tmp_path, options, expected):
+    policy = Witness()
+    with pytest.raises(RenderError, match=expected):
+        record_run(small, policy, tmp_path / "run.gif", **options)
+    assert policy.calls == 0
+    assert not list(tmp_path.iterdir())

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.inspect.maps import MEANINGS, floor_maps
 from swarm_forage_env.inspect.replay.frames import Replay, Status
@@ -75,6 +76,13 @@ def test_a_difference_is_what_is_more_here(replay):
     assert (more.label, more.is_difference) == ("by hand minus other", True)
     assert np.array_equal(more.arrays["density"], mine.arrays["density"])
     assert not more.arrays["drops"].any()
+
+
+def test_maps_that_do_not_match_are_refused(replay):
+    with pytest.raises(ConfigError, match="one arena in equal squares"):
+        floor_maps(replay).minus(floor_maps(replay, side_m=1.0))
+    with pytest.raises(ConfigError, match="side_m"):
+        floor_maps(replay, side_m=0.1)
 
 
 def test_arrays_go_to_a_file(replay, tmp_path):

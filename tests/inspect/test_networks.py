@@ -1,8 +1,10 @@
 """What `info` says about a network file."""
 
+import re
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from swarm_forage_env.inspect.networks import network_lines
 from swarm_forage_env.policies.interface import InterfaceConfig
@@ -26,6 +28,12 @@ SAMPLED = {
 def told(about: NetworkAbout) -> str:
     network = Network((np.zeros((3, 4), np.float32), np.zeros((4, 2), np.float32)), (np.zeros(4), np.zeros(2)), about)
     return "\n".join(network_lines(Path("mine.npz"), network))
+
+
+def section(text: str, title: str) -> list[tuple[str, ...]]:
+    """Return names and values of a section of a card."""
+    (lines,) = re.findall(rf"^  \[{title}\]\n((?:    .*\n?)*)", text, re.MULTILINE)
+    return [tuple(re.split(r"\s{2,}", line.strip(), maxsplit=1)) for line in lines.splitlines()]
 
 
 def test_every_field_of_the_interface_and_the_layers_are_told():

@@ -149,6 +149,19 @@ def test_a_wall_starts_the_run_again_with_the_same_seed():
     assert session.setting.world.scenario.arena.obstacles == ()
 
 
+@pytest.mark.parametrize(
+    ("drawn", "wall"),
+    [
+        ((4.4, 5.0, 4.0, 2.0), (4.0, 2.0, 4.4, 5.0)),
+        ((4.0, 2.0, 4.05, 5.0), (3.83, 2.0, 4.23, 5.0)),
+        ((7.9, 7.0, 9.0, 7.5), (7.6, 7.0, 8.0, 7.5)),
+        ((-3.0, 7.95, -1.0, 8.0), (0.0, 7.6, 0.4, 8.0)),
+    ],
+)
+def test_walls_are_inside_and_thick_enough(drawn, wall):
+    assert wall_of(drawn, 8.0, 8.0) == pytest.approx(wall)
+
+
 def test_robots_policy_scenario_and_seed_start_another_run():
     session, _ = session_of()
     session.carry_out({"do": "wall", "box": WALL})

@@ -2,7 +2,8 @@
 
 import pytest
 
-from swarm_forage_env.inspect.play.levels import LEVELS
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.inspect.play.levels import LEVELS, Levels, with_idle
 from swarm_forage_env.inspect.play.run import RunByHand
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import LiveRun, build_env
@@ -44,3 +45,20 @@ def test_a_level_that_was_set_changes_the_run_and_is_told(name):
             each.step()
     assert state_of(runs[0].world) != state_of(runs[1].world)
     assert runs[0].summary().endswith(f"changed by hand: {title} {wanted:g}")
+
+
+def test_a_level_by_a_table_stays_as_it_is():
+    table = ThrottleConfig(waveform=Waveform(kind="table", times_s=(0.0, 9.0), values=(0.1, 0.2)))
+    levels = Levels(build_env(SMALL, with_idle((table,))))
+    with pytest.raises(ConfigError, match="got a table of values"):
+        levels.set("throttle", 0.3)
+    assert levels.changes == []
+
+
+def test_a_swarm_that_is_dead_ends_the_run():
+    run = RunByHand(plan_run(SMALL, "crw", seed=3))
+    for robot in range(8):
+        assert run.levels.kill(robot) == f"robot {robot} was killed"
+    assert run.levels.kill(6) == "robot 6 is not alive"
+    run.step()
+    assert run.run.over

@@ -6,7 +6,7 @@ import socket
 
 import pytest
 
-from swarm_forage_env.inspect.play.server import HOST, MOST_BYTES
+from swarm_forage_env.inspect.play.server import HOST, MOST_BYTES, PlayServer, hosts_of
 from swarm_forage_env.inspect.play.session import PlaySession, Setting
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.world import World
@@ -103,6 +103,11 @@ def test_long_bodies_are_refused_before_they_are_read(server):
         assert refusal(server, body="", Content_Length=given)[0] == 411
 
 
+@pytest.mark.parametrize(("method", "place"), [("GET", "frame"), ("GET", "../etc/passwd"), ("POST", "x"), ("POST", "")])
+def test_there_is_nothing_else(server, method, place):
+    assert refusal(server, method, place, body="null")[0] == 404
+
+
 def test_a_frame_a_command_and_a_replay_come_as_json(server):
     answer, text = ask(server, place="frame", body='{"run": 0}')
     assert answer.status == 200
@@ -118,6 +123,29 @@ def test_a_frame_a_command_and_a_replay_come_as_json(server):
     ask(server, body='{"do": "play"}')
 
 
+def test_a_policy_that_fails_is_told_of(server, monkeypatch):
+    monkeypatch.setattr(server.session, "frame", lambda _: 1 / 0)
+    assert refusal(server, place="frame", body="null") == (500, "ZeroDivisionError: division by zero")
+
+
+def test_the_page_is_asked_for_without_the_port_of_http():
+    assert hosts_of(80) == ("127.0.0.1:80", "localhost:80", "127.0.0.1", "localhost")
+    assert hosts_of(8080) == ("127.0.0.1:8080", "localhost:8080")
+
+
+@pytest.mark.parametrize("error", [TimeoutError, ConnectionAbortedError, BrokenPipeError])
+def test_an_answer_that_breaks_off_is_followed_by_no_other(server, monkeypatch, error):
+    def break_off(handler, *_):
+        handler.wfile.write(b"half")
+        raise error
+
+    monkeypatch.setattr(server.RequestHandlerClass, "_send", break_off)
+    with socket.create_connection((HOST, server.server_port), timeout=60) as connection:
+        connection.sendall(f"GET /{server.token}/ HTTP/1.1\r\nHost: {server.hosts[0]}\r\n\r\n".encode())
+        with connection.makefile("rb") as answer:
+            assert answer.read() == b"half", "and the connection is closed"
+
+
 @pytest.mark.parametrize("told", ["Content-Length: 40", "Transfer-Encoding: chunked"])
 def test_what_comes_with_a_get_is_no_further_request(server, told):
     smuggled = f"POST /{server.token}/command HTTP/1.1\r\n"
@@ -128,3 +156,8 @@ def test_what_comes_with_a_get_is_no_further_request(server, told):
             head = answer.readline(), *iter(answer.readline, b"\r\n")
             assert head[0].startswith(b"HTTP/1.1 200")
             assert b"Connection: close\r\n" in head
+
+
+def test_a_port_that_is_taken_is_no_port(server):
+    with pytest.raises(OSError, match=r"[Aa]ddress already in use"):
+        PlayServer(server.session, server.server_port)

@@ -1,6 +1,7 @@
 """Replays: they show the run that its record describes, come back from their files, and change nothing."""
 
 import dataclasses
+import json
 
 import numpy as np
 import pytest
@@ -11,8 +12,10 @@ from swarm_forage_env.inspect.replay import capture
 from swarm_forage_env.inspect.replay import files as files_module
 from swarm_forage_env.inspect.replay.capture import record_replay
 from swarm_forage_env.inspect.replay.files import read_replays, write_replays
-from swarm_forage_env.inspect.replay.frames import HEADING_STEPS, Replay, Status
+from swarm_forage_env.inspect.replay.frames import HEADING_STEPS, Replay, ReplayError, Status
 from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.rendering.pages import build_replay_page
+from swarm_forage_env.rendering.view import RenderError
 from swarm_forage_env.runs.run import LiveRun, build_env, run_one, run_policy
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import scenario

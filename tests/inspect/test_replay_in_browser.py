@@ -4,11 +4,13 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.inspect.replay.capture import record_replay
 from swarm_forage_env.inspect.replay.files import write_replays
+from swarm_forage_env.inspect.replay.frames import Status
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.registry import parse_wrapper
@@ -48,6 +50,11 @@ def replays(tmp_path_factory):
 @pytest.fixture(scope="module")
 def page(replays, tmp_path_factory) -> Path:
     return write_replays(tmp_path_factory.mktemp("page") / "one.html", replays[0])
+
+
+@pytest.fixture(scope="module")
+def pair(replays, tmp_path_factory) -> Path:
+    return write_replays(tmp_path_factory.mktemp("page") / "two.html", replays)
 
 
 @pytest.fixture(scope="module")

@@ -114,8 +114,6 @@ def test_numba_has_no_settings_from_a_file(here, module):
     assert lines == ["  None"] * 2
 
 
-
-
 CONSOLE = """
 import sys
 from swarm_forage_env.cli import main

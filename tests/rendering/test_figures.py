@@ -15,6 +15,7 @@ pytest.importorskip("matplotlib")
 import matplotlib as mpl
 from PIL import Image
 
+from swarm_forage_env import ConfigError
 from swarm_forage_env.rendering.figures import (
     COLOURS,
     FORMATS,
@@ -29,6 +30,7 @@ from tests.support.pictures import words_in
 TIMES = np.array([100.0, 200.0, 300.0])
 PLACE = {"PYTHONPATH": str(Path(__file__).resolve().parents[2]), "MPLCONFIGDIR": mpl.get_configdir()}
 """What another process needs to draw."""
+PAPER = FigureStyle(width_in=3.5, font_size=7, title=False)
 
 
 def draw(path, **options):
@@ -37,9 +39,22 @@ def draw(path, **options):
     return path
 
 
+def content_of(pdf: Path) -> bytes:
+    """A PDF with its compressed parts unpacked."""
+    raw = pdf.read_bytes()
+    parts = re.findall(rb"stream\r?\n(.*?)endstream", raw, re.DOTALL)
+    return raw + b"".join(zlib.decompressobj().decompress(part) for part in parts if part[:1] == b"\x78")
+
+
 def test_words_in_svg_are_text(tmp_path):
     words = words_in(draw(tmp_path / "it.svg"))
     assert {"CRW", "DPO", "$a$ mine", "deliveries", "time [s] (bands: two)", "the headline"} <= {*words}
+
+
+def test_fonts_in_pdf_are_truetype(tmp_path):
+    content = content_of(draw(tmp_path / "it.pdf"))
+    assert b"/Type3" not in content
+    assert b"/FontFile2" in content, "an embedded TrueType font"
 
 
 @pytest.mark.parametrize("width_in", [3.5, 7.16])
@@ -51,6 +66,12 @@ def test_widths_are_exact(tmp_path, width_in):
     assert float(svg.get("width").removesuffix("pt")) == pytest.approx(72 * width_in)
     box = re.search(rb"/MediaBox \[ ?0 0 ([\d.]+)", draw(tmp_path / "it.pdf", style=style).read_bytes())
     assert float(box[1]) == pytest.approx(72 * width_in)
+
+
+def test_a_paper_has_its_font_size_and_no_headline(tmp_path):
+    assert "the headline" not in words_in(draw(tmp_path / "it.svg", style=PAPER))
+    assert " 7px" in (tmp_path / "it.svg").read_text()
+    assert " 9px" in draw(tmp_path / "screen.svg").read_text()
 
 
 @pytest.mark.parametrize("ending", FORMATS)

@@ -16,7 +16,9 @@ from swarm_forage_env.rendering.view import (
     PALETTE,
     SOURCE_OPACITY,
     THEMES,
+    RenderError,
     arena_view,
+    legend_rows,
 )
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M

@@ -18,6 +18,19 @@ def test_data_come_back_whatever_they_hold():
     assert "<title>a &lt;title&gt; &amp; more</title>" in page
 
 
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("<html></html>", "no replay page"),
+        ('<script type="application/json" id="header">{</script></html>', "damaged"),
+        ('<script type="application/json" id="header">[]</script></html>', "no JSON object"),
+    ],
+)
+def test_other_texts_are_refused(text, expected):
+    with pytest.raises(PageError, match=expected):
+        take_replay_page_apart(text)
+
+
 def test_every_script_is_in_the_page():
     files = {file.name for file in FOLDER.iterdir() if file.name.endswith(".js")}
     assert files == set(SCRIPTS)
