@@ -105,18 +105,6 @@ def check_team(team: float) -> None:
         raise PopulationError(f"Expected a mean team of more than 0 robots at work, finite, got {team}.")
 
 
-def check_needed(n_min: int, n: int) -> None:
-    """Check a number of robots that are needed at work.
-
-    Raises:
-        PopulationError: None at all, or more than the swarm has.
-    """
-    if not 1 <= n_min <= n:
-        raise PopulationError(
-            f"Expected 1 <= n_min <= n = {n}, got {n_min}; elsewhere availability does not depend on q."
-        )
-
-
 def check_wave(frequency: float, amplitude: float, offset: float, phase: float) -> None:
     """Check the parameters of a waveform.
 
