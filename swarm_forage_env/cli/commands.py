@@ -26,10 +26,7 @@ COMMANDS: dict[str, tuple[Command, ...]] = {
         Command("replay", "Write runs as one HTML page that plays them.", "replay:replay"),
         Command("maps", "Draw maps of where things happened.", "maps:maps"),
     ),
-    "Score and decide": (
-        Command("score", "Score policies by all measures.", "questions:score"),
-        Command("compare", "Score several policies side by side.", "questions:score"),
-    ),
+    "Score and decide": (Command("score", "Score policies by all measures.", "questions:score"),),
     "Train": (
         Command("train", "Train one policy that every robot shares.", "train:train"),
         Command("train curves", "Draw the progress of trainings.", "train:curves"),

@@ -1,4 +1,4 @@
-"""The commands `run`, `plot`, `score` and `compare`: questions about policies."""
+"""The commands `run`, `plot` and `score`: questions about policies."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -23,7 +23,7 @@ FILMED = ("--policy", "random", "--robots", "3")
     [
         RUN,
         ("score", "--policy", "random", "--budget", "quick", "--jobs", "1"),
-        ("compare", "--policy", "random,crw", "--budget", "quick", "--jobs", "1"),
+        ("score", "--policy", "random,crw", "--budget", "quick", "--jobs", "1"),
         ("study", "run", "S1a", "--budget", "smoke", "--jobs", "1"),
         ("record", *FILMED),
         ("replay", "random", "--robots", "3"),

@@ -1,4 +1,4 @@
-"""The commands `score` and `compare`, as a person uses them: words in, tables and exit code out."""
+"""The command `score`, as a person uses them: words in, tables and exit code out."""
 
 import json
 from pathlib import Path
@@ -12,7 +12,7 @@ from swarm_forage_env.studies.ladders import BUDGETS, Budget
 
 WORLD = ("--robots", "3", "--objects", "20", "--jobs", "1", "--budget", "tiny")
 SCORE = ("score", "--policy", "random", *WORLD)
-COMPARE = ("compare", "--policy", "random,crw", *WORLD)
+COMPARE = ("score", "--policy", "random,crw", *WORLD)
 FEW = ("--measures", "t_lost_fraction,adaptability")
 CURVES = "n_robots,seed,interval,performance\n2,0,0,3\n4,0,0,5\n"
 
@@ -104,11 +104,11 @@ def test_a_dry_run_shows_the_experiments_and_runs_nothing(command):
         (("score", "--policy", "crw", "--measures", ","), "Expected one or more names"),
         (("score", "--policy", "crw", "--disturbance", "noise"), "one of throttle, handling_cost, got 'noise'"),
         (("score", "--policy", "crw", "--variant", "papr"), "Unknown variant 'papr'. Did you mean 'paper'?"),
-        (("compare", "--policy", "crw,dpo", "--form", "single"), "Unknown form 'single'"),
+        (("score", "--policy", "crw,dpo", "--form", "single"), "Unknown form 'single'"),
         (("score", "--curves", "curves.csv", "--form", "single"), "Unknown form 'single'"),
         (("score", "--policy", "crw", "--budget", "huge"), "Unknown budget 'huge'"),
         (("score", "--policy", "crw", "--performance", "n_carying"), "Did you mean 'n_carrying'?"),
-        (("compare", "--policy", "crw,dpo", "--set", "performance=colected"), "Did you mean 'collected'?"),
+        (("score", "--policy", "crw,dpo", "--set", "performance=colected"), "Did you mean 'collected'?"),
         (
             ("score", "--curves", "curves.csv", "--performance", "x"),
             "Expected a column x for performance in curves.csv",
@@ -117,8 +117,7 @@ def test_a_dry_run_shows_the_experiments_and_runs_nothing(command):
         (("score", "--policy", "crw", "--horizon", "150"), "whole number of intervals"),
         (("score", "--policy", "crw", "--robots", "1"), "at least 2 robots"),
         (("score", "--policy", "crw", "--set", "interval_s=2"), "which the budget sets"),
-        (("compare", "--policy", "crw,dpoo"), "Unknown policy 'dpoo'"),
-        (("compare",), "Expected a policy, by name or file"),
+        (("score", "--policy", "crw,dpoo"), "Unknown policy 'dpoo'"),
         (("score", "--curves", "gone.csv"), "Cannot read gone.csv: No such file"),
         (("score", "--curves", "curves.csv", "--measures", "scalability"), "Expected the columns seed, interval"),
     ],
