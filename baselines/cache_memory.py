@@ -193,22 +193,19 @@ def forget_cache(robot: np.record, caches: Row, entry: int, c: np.record) -> Non
 
 @kernel
 def _should_be_visible(robot: np.record, cache: np.record, c: np.record) -> bool:
-    """Whether a remembered cache's square meets the part of the window in which the robot sees caches."""
-    if robot.cache_reach < 0:
-        return False
-    size = 2 * robot.cache_reach + 1
-    left = robot.window_x + (WINDOW_CELLS - size) // 2
-    bottom = robot.window_y + (WINDOW_CELLS - size) // 2
+    """Whether a remembered cache's square meets the window."""
+    left = robot.window_x
+    bottom = robot.window_y
     if c.cache_forget_unit_mismatch:  # quirk: metres are compared with cells, and one axis suffices
         half = 0.5 * c.cache_side_m
         x = (cache.cell_x + 0.5) * c.cell_m
         y = (cache.cell_y + 0.5) * c.cell_m
-        in_x = left < x + half and x - half < left + size
-        in_y = bottom < y + half and y - half < bottom + size
+        in_x = left < x + half and x - half < left + WINDOW_CELLS
+        in_y = bottom < y + half and y - half < bottom + WINDOW_CELLS
         return in_x or in_y
     reach = c.cache_half_cells
-    in_x = cache.cell_x - reach < left + size and left <= cache.cell_x + reach
-    in_y = cache.cell_y - reach < bottom + size and bottom <= cache.cell_y + reach
+    in_x = cache.cell_x - reach < left + WINDOW_CELLS and left <= cache.cell_x + reach
+    in_y = cache.cell_y - reach < bottom + WINDOW_CELLS and bottom <= cache.cell_y + reach
     return in_x and in_y
 
 

@@ -188,14 +188,14 @@ def look_around(robot: np.record, row: Row, c: np.record, memory: OneMemory) -> 
 
 @kernel
 def _forget_what_is_gone(robot: np.record, c: np.record, memory: OneMemory) -> None:
-    """Forget objects whose remembered cell is in the part of the window that the robot sees, but does not show them.
+    """Forget objects whose remembered cell is in the window, but does not show them.
 
     One that shows elsewhere in the window comes back at once with its new cell.
     """
     for entry in range(robot.n_known - 1, -1, -1):  # backwards: forgetting moves the last entry here
         x = memory.cell_x[entry] - robot.window_x
         y = memory.cell_y[entry] - robot.window_y
-        if abs(x - _REACH) <= robot.object_reach and abs(y - _REACH) <= robot.object_reach:
+        if abs(x - _REACH) <= _REACH and abs(y - _REACH) <= _REACH:
             shown = object_row_of(memory.window[y * WINDOW_CELLS + x], c)
             if shown != memory.row[entry]:
                 forget(robot, memory, memory.row[entry])

@@ -15,7 +15,7 @@ import numpy as np
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env._internal.prefetching import AHEAD, LARGE, LINE, prefetch
 from swarm_forage_env.contract.detection import is_obstacle_vector, ring_is_empty, ring_sum, sees_nest
-from swarm_forage_env.contract.layout import EVENT_SCALE, GROUND_SENSORS, RING_SENSORS, WINDOW_CELLS
+from swarm_forage_env.contract.layout import EVENT_SCALE, GROUND_SENSORS, RING_SENSORS
 from swarm_forage_env.contract.types import CodeArray, ObsArray, Row
 
 
@@ -115,8 +115,6 @@ ROBOT_FIELDS: list[tuple[str, type]] = [
     ("n_known", np.int32),  # remembered objects
     ("window_x", np.int32),  # lower left cell of the window seen last
     ("window_y", np.int32),
-    ("object_reach", np.int8),  # cells on either side of its own in which it sees objects; -1: it sees none
-    ("cache_reach", np.int8),  # the same of caches
     ("n_shown", np.int8),  # objects in the window seen last
     ("activity", np.int8),
     ("vector_state", np.int8),
@@ -136,7 +134,6 @@ def new_robots(n_robots: int, more_fields: Sequence[tuple[str, type]] = ()) -> n
     robots = np.zeros(n_robots, np.dtype((np.record, fields)))
     robots["explore_ticks"] = NOT_EXPLORING
     robots["target"] = -1
-    robots["object_reach"] = robots["cache_reach"] = WINDOW_CELLS // 2
     robots["window_x"] = NO_WINDOW
     robots["window_y"] = NO_WINDOW
     return robots

@@ -39,8 +39,6 @@ class ScriptedPolicy(KernelPolicy):
         """
         self._constants = constants
         self._robots = robots
-        robots["object_reach"] = spec.object_reach_cells
-        robots["cache_reach"] = spec.cache_reach_cells
         actions = np.zeros((spec.n_robots, spec.action_size), np.float32)
         self._start(spec, rng, n_draws, constants, robots, *memory, actions)
 

@@ -23,7 +23,6 @@ TESTS = (
     "tests/policies/test_network_twin.py",
     "tests/promises/test_conservation.py",
     "tests/rendering/test_paint.py",
-    "tests/world/test_kinds.py",
     "tests/world/test_neighbourhood.py",
     "tests/world/test_lockstep.py",
     "tests/wrappers/test_noise.py",
@@ -33,7 +32,7 @@ CHOICE = (
     "or they_are_those_of_the_twins or as_by_the_twin or test_interface_twins or test_network_twin"
 )
 """Every kind of caches with Chipmunk; shapes beyond the edge; arenas together, wrapped and not, with the compiled
-engine; noise on wheels; neighbours, messages and kinds of robots."""
+engine; noise on wheels; neighbours and messages."""
 ELSEWHERE = {
     "tick.run": "whole runs by one kernel need a compiled policy, which would be compiled, too",
     "counting.add_task_shares": "a part of tick.run",

@@ -9,7 +9,6 @@ from .scenarios.overrides import with_overrides as with_overrides
 from .wrappers.world import World as World
 from .wrappers.world import read_world as read_world
 from .env import ForageEnv as ForageEnv
-from .scenarios.robots import RobotKind as RobotKind
 from .scenarios.quirks import Quirks as Quirks
 from .scenarios.quirks import AUTHORS_PROGRAM as AUTHORS_PROGRAM
 

@@ -20,9 +20,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.config import WHEEL_SCALE_MPS, ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M, Box, capacity
-from swarm_forage_env.scenarios.robots import WHEEL_SCALE_MPS
 from swarm_forage_env.wrappers.world import World, WorldLike, world_of
 
 from ..checks import CurveError, check_size
@@ -122,7 +121,6 @@ def limit_of(world: WorldLike) -> ForagingLimit:
         == "power_law",
         "objects that move (walk_probability)": scenario.objects.walk_probability > 0.0,
         f"{scenario.caches} caches": scenario.caches != "none",
-        "robots of unequal speed": any(kind.speed != 1.0 for kind in scenario.robots.robot_kinds),
     }
     for reason, is_there in unknown.items():
         if is_there:

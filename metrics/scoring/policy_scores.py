@@ -44,23 +44,6 @@ class ScoreQuestion(Question[Comparison]):
         """What the performance is: its name and unit, and whether it is a total and adds up over robots."""
         return self.performance or performance_of(self.world.scenario.performance)
 
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """Which swarms are too small for some kind of robots."""
-        swarms = {condition.world.n_robots: condition.world.scenario.robots for condition in self.plan.conditions}
-        missing: dict[str, list[int]] = {}
-        for size, robots in sorted(swarms.items()):
-            for kind, rows in zip(robots.robot_kinds, robots.kind_rows, strict=True):
-                if rows.start == rows.stop:
-                    missing.setdefault(kind.name, []).append(size)
-        if not missing:
-            return ()
-        told = "; ".join(f"no {name} with {', '.join(map(str, sizes))} robots" for name, sizes in missing.items())
-        return (
-            f"Kinds are shares of a swarm, and small swarms lack some: {told}. Measures over the size of the swarm "
-            "compare other mixtures there.",
-        )
-
     def answer(self, table: Table) -> Comparison:
         """Return one table of scores per policy, and their differences."""
         return side_by_side([self._scores(table, policy.label) for policy in self.plan.policies])

@@ -28,11 +28,6 @@ class Question(ABC, Generic[Found]):
 
     plan: Plan
 
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """What to know of the plan before its runs are made."""
-        return ()
-
     def make_runs(
         self,
         *,

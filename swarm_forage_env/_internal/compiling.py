@@ -43,7 +43,6 @@ _COMPILED_IN_EVERYWHERE = tuple(
         "contract/detection",
         "contract/layout",
         "scenarios/floor",
-        "scenarios/robots",
     )
 )
 """Modules whose functions and constants are compiled into those of other folders."""

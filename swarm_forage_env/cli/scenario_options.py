@@ -20,7 +20,6 @@ _FIELD = re.compile(r"[a-z_]+=[^/\\]*")
 _EXAMPLES = {
     "further_nests": "boxes such as 20,4,24,12 (x low, y low, x high, y high in m)",
     "obstacles": "boxes such as 10,4,11,12 or 10,4,11,12+20,4,21,12 (x low, y low, x high, y high in m)",
-    "robot_kinds": "kinds such as scout:share=0.2,window_cells=3+hauler:speed=0.5,lacks=light/los_cache",
     "object_positions_m": "places such as 10,4 or 10,4+20,4 (x, y in m)",
 }
 _TRUTH = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}

@@ -5,14 +5,14 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TypeAlias
 
-from swarm_forage_env.scenarios.robots import SENSORS, WHEEL_SCALE_MPS, WINDOWS_CELLS
+from swarm_forage_env.scenarios.config import WHEEL_SCALE_MPS
 
 RING_SENSORS = 24
 """Proximity beams, and as many light sensors: on one ring, every 15 degrees, the first at 7.5 degrees to the left."""
 LIGHT_IF_CARRYING = "light if carrying"
 """Entry of `reads`: light is read in rows of robots that carry; the others may stay zero."""
 GROUND_SENSORS = 4
-WINDOW_CELLS = WINDOWS_CELLS[-1]
+WINDOW_CELLS = 5
 """Side of the square line-of-sight window, in cells (1.0 m)."""
 VISIBLE_CACHES = 4
 """Caches listed in an observation, nearest first."""
@@ -27,12 +27,6 @@ NEIGHBOUR_FIELDS = 4
 """forward, left, carrying, there; of each neighbour that an observation has room for."""
 MESSAGES = "messages"
 """Name of the slice of what was heard, which a scenario may switch on."""
-KIND = "kind"
-"""Name of the slice of a robot's own kind, in scenarios with two or more kinds."""
-KIND_COLUMNS = ("speed", "window", *SENSORS)
-"""What a robot observes of its kind: what it can do, not what it is called. So one policy can learn for kinds that are
-drawn anew in every run, and runs with other kinds, or with more of them."""
-
 LayoutRow: TypeAlias = tuple[str, tuple[float, ...], str, str]
 """Name, scale, noise group and meaning of a slice, as in `ObservationSlice`; the columns follow from the order."""
 
@@ -163,13 +157,7 @@ def messages_row(message_size: int) -> LayoutRow:
     return MESSAGES, (1.0,) * (message_size + 1), "", "mean of the messages heard; 1 if there was one"
 
 
-def kind_row() -> LayoutRow:
-    """Return the slice of a robot's own kind."""
-    meaning = f"own kind: speed; side of the window / {WINDOW_CELLS} cells; 1 if not lacking {', '.join(SENSORS)}"
-    return KIND, (1.0,) * len(KIND_COLUMNS), "", meaning
-
-
 BUILT_IN_SLICES = observation_layout(1.0, 1.0, 1).names
 """Names of the slices that every observation has."""
-OPTIONAL_SLICES = (NEIGHBOURS, MESSAGES, KIND)
+OPTIONAL_SLICES = (NEIGHBOURS, MESSAGES)
 """Names of the slices of the package that come after those, where a scenario asks for them."""

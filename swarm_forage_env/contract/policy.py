@@ -15,17 +15,15 @@ from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.contract.layout import (
     LayoutRow,
     ObservationLayout,
-    kind_row,
     messages_row,
     neighbours_row,
     observation_layout,
 )
 from swarm_forage_env.contract.own_functions import own_sensor
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
-from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.config import WHEEL_SCALE_MPS, ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M, CELLS_PER_M
 from swarm_forage_env.scenarios.quirks import Quirks
-from swarm_forage_env.scenarios.robots import WHEEL_SCALE_MPS
 
 COMMANDS = 3
 """First columns of an action: left wheel, right wheel, gripper. What a robot says comes after them."""
@@ -61,7 +59,7 @@ class SwarmSpec:
     horizon_s: float
     layout: ObservationLayout
     max_speed_mps: float
-    """Limit of the centre speed; a robot of a slower kind has its share of this and of the wheels' speeds."""
+    """Limit of the centre speed."""
     max_wheel_difference_mps: float
     """Limit of right minus left wheel speed."""
     wheel_scale_mps: float
@@ -92,10 +90,6 @@ class SwarmSpec:
     """SITE and CREATE_CACHE drops are refused within this distance of a cache centre."""
     message_size: int
     """Numbers that a robot may say, columns of its action after `COMMANDS`."""
-    object_reach_cells: tuple[int, ...]
-    """(N,) cells on either side of its own in which each robot sees objects: half its window, -1 if it sees none."""
-    cache_reach_cells: tuple[int, ...]
-    """(N,) the same of caches."""
     quirks: Quirks
 
     @property
@@ -149,8 +143,6 @@ class SwarmSpec:
             min_dist_m=scenario.min_dist_m,
             cache_proximity_m=scenario.cache_proximity_m,
             message_size=robots.message_size,
-            object_reach_cells=robots.reach_cells("los_object"),
-            cache_reach_cells=robots.reach_cells("los_cache"),
             quirks=scenario.quirks,
         )
 
@@ -171,8 +163,6 @@ def layout_for(scenario: ScenarioConfig) -> ObservationLayout:
         further.append(neighbours_row(robots.neighbours_seen, robots.neighbour_range_m))
     if robots.message_size:
         further.append(messages_row(robots.message_size))
-    if robots.tells_kinds:
-        further.append(kind_row())
     further += [own_sensor(name).row for name in robots.own_sensors]
     arena = scenario.arena
     return observation_layout(arena.width_m, arena.height_m, scenario.objects.n_objects, tuple(further))

@@ -271,7 +271,6 @@ def _record(values: Mapping[str, Any], what: str) -> np.ndarray:
 
 
 def _numbers_of(spec: SwarmSpec) -> dict[str, Any]:
-    """Return the numbers of a specification that are the same for all robots and do not depend on the swarm."""
+    """Return the fields of a specification that are numbers."""
     found = {field.name: getattr(spec, field.name) for field in fields(spec)}
-    return {name: value for name, value in found.items()
-            if isinstance(value, bool | int | float | tuple) and not name.endswith("reach_cells")}  # fmt: skip
+    return {name: value for name, value in found.items() if isinstance(value, bool | int | float | tuple)}

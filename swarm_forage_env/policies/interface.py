@@ -20,7 +20,6 @@ from swarm_forage_env._internal.fields import ConfigError, known_keys, number, o
 from swarm_forage_env.contract.kernel_policy import example_of
 from swarm_forage_env.contract.layout import (
     BUILT_IN_SLICES,
-    KIND,
     MESSAGES,
     NEIGHBOURS,
     ObservationLayout,
@@ -87,9 +86,6 @@ class InterfaceConfig:
     message_size: int | None = None
     """Numbers of the messages that the learner sends and hears, as many as in its scenario, or 0: it says zeros and
     hears nothing. None: as for `neighbours_seen`. Messages need continuous actions."""
-    sees_kind: bool | None = None
-    """Whether the learner sees what a robot's kind can do, where its scenario has two or more. None: as for
-    `neighbours_seen`."""
     site_memory: bool = False
     """Two places that a robot remembers, see `policies.kernels.learner`: eight more columns."""
     frame_decisions: int = 0
@@ -113,8 +109,6 @@ class InterfaceConfig:
                 f"Expected interface.actions 'continuous' for messages of {self.message_size} numbers, got "
                 f"{self.actions!r}; choose continuous actions, or message_size=0 for a learner without messages."
             )
-        if self.sees_kind is not None:
-            switch("interface.sees_kind", self.sees_kind)
         switch("interface.site_memory", self.site_memory)
         whole("interface.frame_decisions", self.frame_decisions, at_least=0)
         if self.own_sensors is not None:
@@ -127,7 +121,7 @@ class InterfaceConfig:
         return -(-ticks // self.decision_ticks)
 
     def for_scenario(self, scenario: ScenarioConfig) -> "InterfaceConfig":
-        """Return these choices, with what the scenario has of neighbours, messages, kinds and own sensors unless told.
+        """Return these choices, with what the scenario has of neighbours, messages and own sensors unless told.
 
         What a scenario does not have stays None; own sensors are then empty.
 
@@ -143,14 +137,12 @@ class InterfaceConfig:
             found["neighbour_range_m"] = robots.neighbour_range_m
         if self.message_size is None and robots.message_size:
             found["message_size"] = robots.message_size
-        if self.sees_kind is None and robots.tells_kinds:
-            found["sees_kind"] = True
         return replace(self, **found) if found else self
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """The slices that are seen beside those of every observation: neighbours, messages, kind, own sensors."""
-        optional = {NEIGHBOURS: self.neighbours_seen, MESSAGES: self.message_size, KIND: self.sees_kind}
+        """The slices that are seen beside those of every observation: neighbours, messages, own sensors."""
+        optional = {NEIGHBOURS: self.neighbours_seen, MESSAGES: self.message_size}
         return (*(name for name, wanted in optional.items() if wanted), *(self.own_sensors or ()))
 
     @property
@@ -214,7 +206,6 @@ class LearnerInterface:
             cargo_starts=(start["carrying"], start["los_cell"], start["los_object"]),
             grip_starts=(start["ground"], start["carrying"], start["los_object"]),
             half=(float(half_x), float(half_y)),
-            reach_cells=np.array(spec.object_reach_cells, np.int32),
             sites=new_site_memory(spec.n_robots),
             frames=frames_of(config.frame_decisions, self.layout, spec.n_robots),
             wheels=np.array(list(MOTION_WHEELS.values()), np.float32),
@@ -290,7 +281,7 @@ class LearnerInterface:
             np.copyto(out[:, : t.n_shown], obs[:, : t.n_shown])
         at = t.n_shown
         if t.has_memory:
-            remember_sites(obs, t.pose_starts, t.cargo_starts, t.half, t.reach_cells, t.sites)
+            remember_sites(obs, t.pose_starts, t.cargo_starts, t.half, t.sites)
             show_sites(obs, t.pose_starts, t.half, t.sites, out[:, at:])
             at += N_SITES * SITE_COLUMNS
         if len(t.own_columns):
@@ -426,7 +417,7 @@ def learner_layout(source: ObservationLayout, config: InterfaceConfig) -> Observ
 
 
 def _check_company(source: ObservationLayout, config: InterfaceConfig) -> None:
-    """Refuse a scenario with other neighbours or messages than the learner knows, or without kinds that it sees."""
+    """Refuse a scenario with other neighbours or messages than the learner knows."""
     rows = {part.name: part.row for part in source}
     n_seen, size = config.neighbours_seen or 0, config.message_size or 0
     _, scale, _, shown = rows.get(NEIGHBOURS, (NEIGHBOURS, (1.0,), "", "none"))
@@ -441,11 +432,6 @@ def _check_company(source: ObservationLayout, config: InterfaceConfig) -> None:
         raise ConfigError(
             f"Expected a scenario with messages of {size} numbers, which the policy sends, got {there}; give the "
             f"scenario message_size={size}."
-        )
-    if config.sees_kind and KIND not in rows:
-        raise ConfigError(
-            "Expected a scenario whose robots are of several kinds, which the policy sees, got one in which all are "
-            "alike; give the scenario two or more robot_kinds."
         )
 
 

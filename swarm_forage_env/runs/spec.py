@@ -30,7 +30,6 @@ RUN_ID_DIGITS = 16
 _MAX_SEED = 2**63 - 1
 _LATER_FIELDS = (
     ("robots", "own_sensors"),
-    ("robots", "robot_kinds"),
     ("reward", "own_reward"),
     ("arena", "further_nests"),
     ("arena", "obstacles"),
@@ -92,7 +91,7 @@ class RunSpec:
 
         `performance` of the scenario is left out: it says how the run is read. So another one finds the stored run.
         `physics` is left out of runs in Chipmunk, as it was before there were compiled bodies;
-        so are own sensors, an own reward, neighbours, messages, kinds of robots, further nests, obstacles and
+        so are own sensors, an own reward, neighbours, messages, further nests, obstacles and
         positions of objects where there are none, and quirks of `_LATER_FIELDS` where they are off.
         """
         return identity_of({**self._others(), "scenario": _identifying_fields(self.scenario)})

@@ -29,10 +29,15 @@ from swarm_forage_env.scenarios.floor import (
 from swarm_forage_env.scenarios.obstacles import Rectangle, blocked_cells, check_boxes, covered_area_m2
 from swarm_forage_env.scenarios.performance import performance_of
 from swarm_forage_env.scenarios.quirks import Quirks
-from swarm_forage_env.scenarios.robots import WHEEL_SCALE_MPS, RobotConfig
 
 CACHE_KINDS = ("none", "static", "dynamic")
 PHYSICS_ENGINES = ("compiled", "chipmunk")
+WHEEL_SCALE_MPS = 0.20
+"""Wheel speed that an action or an observation of 1.0 stands for."""
+MAX_NEIGHBOURS_SEEN = 64
+"""Most neighbours in an observation (our choice: 256 columns, twice those of all other sensors)."""
+MAX_MESSAGE_SIZE = 64
+"""Most numbers in a message (our choice, as for neighbours)."""
 MAX_DISC_SHARE = 0.4
 """Robot discs may cover at most this share of the start area; with more, random start poses cannot be drawn."""
 MAX_HANDLING_TICKS = 1_000_000
@@ -174,6 +179,46 @@ class ArenaConfig:
     def light_intensity(self) -> float:
         """Distance scale of the nest lights, (X Y)^(1/2)."""
         return math.sqrt(self.width_m * self.height_m)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class RobotConfig:
+    """Differential-drive robots, all alike; defaults are those of the foot-bot used by the paper."""
+
+    n_robots: int
+    radius_m: float = 0.085036758
+    wheel_base_m: float = 0.14
+    max_speed_mps: float = 0.10
+    """Limit of the centre speed."""
+    max_wheel_difference_mps: float = 0.20
+    """Limit of right minus left wheel speed."""
+    start_margin_m: float = 2.8
+    """Robots start at uniform positions at least this far from the arena border."""
+    own_sensors: tuple[str, ...] = ()
+    """Names of further slices of an observation, registered by `contract.own_functions.register_sensor`."""
+    neighbours_seen: int = 0
+    """How many of the nearest robots a robot observes; 0 = none, as in the paper."""
+    neighbour_range_m: float = 2.0
+    """How far it sees them, between centres (our choice: twice the side of its window on the floor)."""
+    message_size: int = 0
+    """Numbers that a robot may broadcast in every tick; 0 = robots say nothing, as in the paper."""
+    message_range_m: float = 2.0
+    """How far a message is heard, between centres (our choice, as for neighbours)."""
+
+    def __post_init__(self) -> None:
+        fields.whole("robots.n_robots", self.n_robots, at_least=1)
+        for name in ("radius_m", "wheel_base_m", "max_speed_mps", "max_wheel_difference_mps", "start_margin_m"):
+            fields.number(f"robots.{name}", getattr(self, name), above=0.0)
+        least = EAST_WALL_M + self.radius_m
+        _require(
+            self.start_margin_m >= least,
+            f"Expected robots.start_margin_m >= {least:.3f} (wall plus radius), got {self.start_margin_m}.",
+        )
+        fields.unique_names("robots.own_sensors", self.own_sensors)
+        fields.whole("robots.neighbours_seen", self.neighbours_seen, at_least=0, at_most=MAX_NEIGHBOURS_SEEN)
+        fields.whole("robots.message_size", self.message_size, at_least=0, at_most=MAX_MESSAGE_SIZE)
+        for name in ("neighbour_range_m", "message_range_m"):
+            fields.number(f"robots.{name}", getattr(self, name), above=0.0)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -159,7 +159,6 @@ def _is_long(entries: Sequence[Any]) -> bool:
 _WORDS: dict[str, Callable[[Any], str]] = {
     "n_objects": lambda value: counted(value, "object"),
     "caches": lambda value: f"{value.replace('none', 'no')} caches",
-    "robot_kinds": lambda value: f"robots of kinds {'+'.join(kind.name for kind in value)}",
     "physics_substeps": lambda value: f"{len(value)} substeps",
 }
 """Fields that have words of their own."""

@@ -6,7 +6,7 @@ by `read_fields`; `draw_fields` then makes values of it, and `corners` all combi
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import product
 from typing import Any, cast
 
@@ -14,7 +14,6 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, known_keys, number, text
 from swarm_forage_env._internal.wording import shown
-from swarm_forage_env.scenarios.robots import RobotKind
 
 KINDS = ("uniform", "log_uniform", "choice", "same_as")
 """Ways to draw a value: all numbers of a range alike, all orders of magnitude alike, one of a list, and the value of
@@ -95,7 +94,7 @@ class Drawn:
 
 
 def read_value(value: Any) -> Any:
-    """Return a value in which tables such as `{"uniform": [1, 2]}` are `Drawn`, lists are tuples and kinds are tables.
+    """Return a value in which tables such as `{"uniform": [1, 2]}` are `Drawn`, lists are tuples.
 
     Raises:
         ConfigError: a table that begins like a distribution and is none.
@@ -112,8 +111,6 @@ def read_value(value: Any) -> Any:
         return read_fields(given)
     if isinstance(value, list | tuple):
         return tuple(read_value(item) for item in cast("list[Any]", value))
-    if isinstance(value, RobotKind):
-        return {name: item for name, item in asdict(value).items() if item is not None}
     return value
 
 

@@ -17,7 +17,6 @@ from swarm_forage_env.scenarios.config import SECTIONS, ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M, CELLS_PER_M
 from swarm_forage_env.scenarios.obstacles import stretched
 from swarm_forage_env.scenarios.quirks import RULES
-from swarm_forage_env.scenarios.robots import RobotKind, kind_from_words
 
 ARENA_FIELDS = ("width_m", "height_m", "nest_centre_m", "nest_size_m", "further_nests", "obstacles")
 """What a density decides, and what therefore cannot be given beside it."""
@@ -42,21 +41,16 @@ def field_types() -> dict[str, Any]:
 def parse_tuple(text: str, kind: Any) -> tuple[Any, ...]:
     """Return the tuple that a text stands for, by its type; an empty text is an empty tuple where there can be one.
 
-    Example: "1.6,8" for a pair of numbers; "10,4,11,12+20,4,21,12" for any number of boxes; "scout:share=0.2+hauler"
-    for kinds of robots.
+    Example: "1.6,8" for a pair of numbers; "10,4,11,12+20,4,21,12" for any number of boxes.
 
     Args:
-        text: Entries between commas. Of a tuple of tuples: tuples between plus signs; of kinds of robots likewise, each
-            as `robots.kind_from_words` reads it.
+        text: Entries between commas. Of a tuple of tuples: tuples between plus signs.
         kind: Type of a scenario field, such as `tuple[float, float]`.
 
     Raises:
-        ConfigError: a kind of robots that cannot be.
         ValueError: another number of entries, or an entry of another type.
     """
     kinds = get_args(kind)
-    if kinds[0] is RobotKind:
-        return tuple(kind_from_words(word) for word in text.split("+") if word.strip())
     is_nested = get_origin(kinds[0]) is tuple
     words = [word.strip() for word in text.split("+" if is_nested else ",")]
     if kinds[-1] is Ellipsis:
@@ -115,12 +109,6 @@ def scenario_of_same_size(scenario: ScenarioConfig, overrides: Mapping[str, Any]
             raise ConfigError(
                 f"Expected {name} to stay {before}, as spaces promise, got {now}; make another environment."
             )
-    if changed.robots.tells_kinds != scenario.robots.tells_kinds:
-        wanted = "two or more" if scenario.robots.tells_kinds else "fewer than two"
-        raise ConfigError(
-            f"Expected {wanted} robot_kinds, as the columns that spaces promise, got "
-            f"{len(changed.robots.robot_kinds)}; make another environment."
-        )
     before, now = scenario.robots.neighbour_range_m, changed.robots.neighbour_range_m
     if changed.robots.neighbours_seen and now != before:  # seen distances are shares of the range
         raise ConfigError(

@@ -10,7 +10,7 @@ from typing import Any
 
 from swarm_forage_env._internal import fields
 from swarm_forage_env._internal.fields import ConfigError, known_name
-from swarm_forage_env.scenarios.config import ArenaConfig, ObjectConfig, RewardConfig, ScenarioConfig
+from swarm_forage_env.scenarios.config import ArenaConfig, ObjectConfig, RewardConfig, RobotConfig, ScenarioConfig
 from swarm_forage_env.scenarios.obstacles import stretched
 from swarm_forage_env.scenarios.overrides import (
     ARENA_FIELDS,
@@ -20,7 +20,6 @@ from swarm_forage_env.scenarios.overrides import (
     robots_at_density,
     with_overrides,
 )
-from swarm_forage_env.scenarios.robots import RobotConfig
 
 SEARCH_AND_RESCUE_OBJECTS = {16: 80, 32: 272, 48: 368, 64: 448, 80: 544, 96: 1248, 112: 1408, 128: 1568}
 """Side in metres -> objects: what the clusters of the authors' program always hold, so that both readings have the same

@@ -31,7 +31,6 @@ from swarm_forage_env.runs.spec import RunSpec, identity_of, wrappers_from_list,
 from swarm_forage_env.scenarios.overrides import field_sections, field_types, parse_tuple
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.quirks import QUIRK_NAMES, RULES, Quirks
-from swarm_forage_env.scenarios.robots import words_of_kind
 from swarm_forage_env.studies.ladders import CRITERIA, swarms_of_sizes, wrappers_at
 from swarm_forage_env.wrappers.registry import wrapper_config_class
 from swarm_forage_env.wrappers.world import SIZE, UNDISTURBED, World
@@ -114,11 +113,8 @@ def _kind(value: Any) -> str:
 def list_word(entries: Sequence[Any]) -> str:
     """Return a list as a value on an axis: ["nest_distance", "x"] is "nest_distance,x", [] is "none".
 
-    Plus signs join lists within it: [[1, 2], [3, 4]] is "1,2+3,4". They also join tables, which are kinds of robots:
-    [{name = "scout", share = 0.2}, {name = "hauler"}] is "scout:share=0.2+hauler".
+    Plus signs join lists within it: [[1, 2], [3, 4]] is "1,2+3,4".
     """
-    if entries and all(isinstance(entry, Mapping) for entry in entries):
-        return "+".join(map(words_of_kind, entries))
     if any(isinstance(entry, list | tuple) for entry in entries):
         return "+".join(map(list_word, entries))
     return ",".join(map(str, entries)) or NOTHING

@@ -35,7 +35,6 @@ from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping, to_mapping
 from swarm_forage_env.scenarios.distributions import (
     KINDS,
-    Drawn,
     corners,
     draw_fields,
     drawn_names,
@@ -45,7 +44,6 @@ from swarm_forage_env.scenarios.distributions import (
 from swarm_forage_env.scenarios.floor import CELL_M
 from swarm_forage_env.scenarios.overrides import field_types
 from swarm_forage_env.scenarios.presets import chosen_scenario
-from swarm_forage_env.scenarios.robots import WINDOWS_CELLS
 from swarm_forage_env.world.placement import static_cache_centres
 from swarm_forage_env.wrappers.registry import wrapper_config_class, wrappers_from_mapping
 from swarm_forage_env.wrappers.world import World
@@ -62,7 +60,7 @@ class SampledWorld:
     """Worlds of one kind: a preset or a configuration, with fields that are fixed or drawn.
 
     Raises:
-        ConfigError: no preset, a distribution that is none, a range of window_cells, or a weight that is not above 0.
+        ConfigError: no preset, a distribution that is none, or a weight that is not above 0.
     """
 
     scenario: str | ScenarioConfig | Mapping[str, Any] = field(hash=False)
@@ -106,20 +104,7 @@ def _scenario_fields(given: Mapping[str, Any]) -> dict[str, Any]:
     for name, value in fields.items():
         if isinstance(value, Mapping):  # no field is a table, so this is a misspelt distribution
             known_keys(value, KINDS, "distribution", prefix=f"{name}.")
-    _check_windows(fields.get("robot_kinds"))
     return fields
-
-
-def _check_windows(kinds: Any) -> None:
-    """Refuse a range of window_cells: its ends may be windows, but numbers between them are none."""
-    for kind in kinds if isinstance(kinds, tuple) else ():
-        window = kind.get("window_cells") if isinstance(kind, Mapping) else None
-        if isinstance(window, Drawn) and window.kind in ("uniform", "log_uniform"):
-            raise ConfigError(
-                f"Expected the window_cells of robot kind {kind.get('name')} to be drawn from a choice of "
-                f"{', '.join(map(str, WINDOWS_CELLS))}, got {window.to_mapping()}; give it "
-                f"{{choice = {list(WINDOWS_CELLS)}}}."
-            )
 
 
 def _wrapper_tables(given: Any) -> dict[str, dict[str, Any]]:
@@ -324,8 +309,7 @@ def _check_columns(built: list[ScenarioConfig], largest: ScenarioConfig) -> None
             raise ConfigError(
                 f"Expected worlds with the same columns of observations, got {_said_columns(expected)} in "
                 f"{largest.name} and {_said_columns(columns_of(config))} in {config.name}; give all worlds the same "
-                "neighbours_seen, neighbour_range_m, message_size and own_sensors, and either all or none two or more "
-                "robot_kinds."
+                "neighbours_seen, neighbour_range_m, message_size and own_sensors."
             )
 
 

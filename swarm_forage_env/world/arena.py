@@ -26,9 +26,7 @@ from swarm_forage_env.world.compiled import CompiledTick, tasks_of
 from swarm_forage_env.world.kernels.bodies import BodyState
 from swarm_forage_env.world.kernels.disturbances import Disturbances
 from swarm_forage_env.world.kernels.interact import drop_cargo
-from swarm_forage_env.world.kernels.kinds import blank
 from swarm_forage_env.world.kernels.tick import DONE, NO_ROOM, TO_PLACE
-from swarm_forage_env.world.kinds import blank_boxes
 from swarm_forage_env.world.neighbourhood import Neighbourhood
 from swarm_forage_env.world.placement import (
     draw_ahead,
@@ -58,7 +56,6 @@ class ForagingArena:
         layout: Layout of the observation rows.
         reads: Names of the observation slices that are used; sensors of others may stay zero.
         light_of_carriers_only: Whether robots that carry nothing read no light.
-        blanks: (B, 4) what robots of some kinds cannot observe, see `kernels.kinds.blank`.
         tick: Ticks done since reset.
         swarm, objects, caches, events: The state; read freely, write through the methods.
         obs: (N, D) the observation, rewritten in every tick.
@@ -80,7 +77,6 @@ class ForagingArena:
         self.layout = layout_for(config)
         self.reads = read_slices(reads, self.layout)
         self.light_of_carriers_only = light_of_carriers_only(reads)
-        self.blanks = blank_boxes(config.robots, self.layout)
         self._own_names = tuple(name for name in config.robots.own_sensors if name in self.reads)
         further = {NEIGHBOURS, MESSAGES, *config.robots.own_sensors}
         self._needs_python = not further.isdisjoint(self.reads)
@@ -166,17 +162,12 @@ class ForagingArena:
         return found
 
     def _sense_further(self) -> None:
-        """Fill in neighbours, messages and the user's own sensors; robots that are not in the world sense nothing.
-
-        Nor do robots whose kind lacks the sensor.
-        """
+        """Fill in neighbours, messages and the user's own sensors; robots that are not in the world sense nothing."""
         if self._neighbourhood.is_used:
             self._neighbourhood.sense(self.swarm, self.obs)
         for sensor in self._own_sensors:
             values = sensor.read(self)
             self.obs[:, self.layout[sensor.name]] = np.where(self.swarm.present[:, None], values, 0.0)
-        if self._needs_python:
-            blank(self.obs, self.blanks)
 
     def _furnish(self) -> Source:
         """Place all objects and create static caches: before the clusters if placement is "power_law", else after.

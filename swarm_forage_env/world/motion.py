@@ -26,9 +26,7 @@ The rule is `kernels.contact`. The physics comes after that. It stops who still 
 import numpy as np
 
 from swarm_forage_env.contract.types import FloatArray
-from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.robots import WHEEL_SCALE_MPS
-from swarm_forage_env.world.kinds import speeds
+from swarm_forage_env.scenarios.config import WHEEL_SCALE_MPS, ScenarioConfig
 from swarm_forage_env.world.state import Motion, Touching
 
 TOUCH_SLACK_M = 0.001
@@ -55,7 +53,6 @@ def new_motion(config: ScenarioConfig, twist: FloatArray) -> Motion:
         twist=twist,
         command=np.zeros((n_robots, 2)),
         drive_limits=drive_limits(config),
-        speeds=speeds(config.robots),
         dt_s=float(config.dt_s),
         touch_m=2 * config.robots.radius_m + TOUCH_SLACK_M,
         touching=(_nobody_touching(n_robots), _nobody_touching(n_robots)),

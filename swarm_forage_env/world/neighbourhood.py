@@ -11,7 +11,7 @@ import numpy as np
 from swarm_forage_env.contract.layout import MESSAGES, NEIGHBOURS, ObservationLayout
 from swarm_forage_env.contract.policy import COMMANDS
 from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, IntArray, ObsArray
-from swarm_forage_env.scenarios.robots import RobotConfig
+from swarm_forage_env.scenarios.config import RobotConfig
 from swarm_forage_env.world.kernels.neighbourhood import bin_robots, hear, say, see_neighbours
 from swarm_forage_env.world.state import SwarmState
 

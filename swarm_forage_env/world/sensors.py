@@ -14,7 +14,6 @@ from swarm_forage_env._internal.fields import ConfigError, known_name
 from swarm_forage_env._internal.prefetching import LARGE
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.layout import (
-    KIND,
     LIGHT_IF_CARRYING,
     MESSAGES,
     NEIGHBOURS,
@@ -22,11 +21,9 @@ from swarm_forage_env.contract.layout import (
 )
 from swarm_forage_env.contract.own_functions import is_own_sensor
 from swarm_forage_env.contract.types import ObsArray
-from swarm_forage_env.scenarios.config import ArenaConfig, ScenarioConfig
+from swarm_forage_env.scenarios.config import WHEEL_SCALE_MPS, ArenaConfig, ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M
-from swarm_forage_env.scenarios.robots import WHEEL_SCALE_MPS
 from swarm_forage_env.world.bodies import obstacle_rows
-from swarm_forage_env.world.kinds import blank_boxes, half_windows, kind_columns
 from swarm_forage_env.world.state import Columns, ObjectState, Sensors, SwarmState
 
 PROXIMITY_RANGE_M = 0.1
@@ -34,7 +31,6 @@ PROXIMITY_RANGE_M = 0.1
 _SWITCHES = {
     NEIGHBOURS: ("neighbours", "neighbours_seen"),
     MESSAGES: ("messages", "message_size"),
-    KIND: ("robots of several kinds", "two or more robot_kinds"),
 }
 """Slices that only some scenarios have: what such a scenario has, and the field that gives it."""
 
@@ -104,10 +100,6 @@ def new_sensors(config: ScenarioConfig, layout: ObservationLayout, reads: Collec
         reads_ground="ground" in read,
         reads_line_of_sight=not {"los_cell", "los_object", "los_cache"}.isdisjoint(read),
         behind_counts=config.quirks.obstacle_behind_counts,
-        half_windows=half_windows(config.robots),
-        kinds=kind_columns(config.robots),
-        kind_start=starts.get(KIND, 0),
-        blanks=blank_boxes(config.robots, layout),
     )
 
 

@@ -291,14 +291,6 @@ class Sensors(NamedTuple):
     reads_line_of_sight: bool
     behind_counts: bool
     """Quirk `obstacle_behind_counts`."""
-    half_windows: IntArray
-    """(N,) squares that a robot sees on either side of its own."""
-    kinds: ObsArray
-    """(N, C) what robots observe of their kind; (0, C) where they do not differ."""
-    kind_start: int
-    """First column of that."""
-    blanks: IntArray
-    """(B, 4) what stays zero, as `kernels.kinds.blank` takes it."""
 
 
 Touching: TypeAlias = tuple[IntArray, IntArray, FloatArray]
@@ -314,8 +306,6 @@ class Motion(NamedTuple):
     """(N, 2) scratch."""
     drive_limits: FloatArray
     """Wheel scale, centre-speed limit, difference limit in m/s, wheel base in m."""
-    speeds: FloatArray
-    """(N,) factor on the wheels' speeds of each robot, by its kind."""
     dt_s: float
     touch_m: float
     """Distance of centres within which two robots touch."""

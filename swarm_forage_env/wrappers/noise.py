@@ -153,7 +153,6 @@ class SensorNoise(SwarmWrapper):
             self._draws,
             factors,
             self._noise,
-            env.arena.blanks,
             self._proximity,
             self._behind_counts,
         )

@@ -50,25 +50,6 @@ def test_a_cache_whose_square_should_be_in_the_window_but_is_not_seen_is_forgott
 
 
 @pytest.mark.parametrize(
-    ("reach", "cell", "forgets"),
-    [
-        (1, (55, 40), False),
-        (1, (56, 40), True),
-        (1, (72, 57), False),
-        (1, (72, 56), True),
-        (0, (56, 40), False),
-        (0, (57, 40), True),
-        (-1, (72, 40), False),
-    ],
-)
-def test_robots_of_a_kind_forget_only_caches_that_they_could_see(reach, cell, forgets):
-    robot = TaskRobot(cache_reach_cells=(reach,))
-    stand(robot, (60, 40), CACHE_SEEN)
-    stand(robot, cell)
-    assert (robot.policy.remembered_caches(0) == {}) == forgets
-
-
-@pytest.mark.parametrize(
     ("cell", "forgets"),
     [
         ((8, 70), False),

@@ -38,14 +38,6 @@ def test_what_should_be_visible_but_is_not_is_forgotten():
     assert set(look(policy, observations, 10.1, 8.1, {(2, 0): 7})) == {7}
 
 
-@pytest.mark.parametrize(("reach", "kept"), [(2, set()), (1, {8}), (0, {7, 8}), (-1, {7, 8})])
-def test_robots_of_a_kind_forget_only_what_they_could_see(reach, kept):
-    observations = Observations(make_spec(object_reach_cells=(reach,)))
-    policy = new_policy(observations.spec)
-    look(policy, observations, 10.1, 8.1, {(1, 1): 7, (0, 2): 8})
-    assert set(look(policy, observations, 10.1, 8.1, {})) == kept
-
-
 def test_a_picked_up_object_is_forgotten_whatever_the_target_was():
     observations = Observations(make_spec())
     policy = new_policy(observations.spec)

@@ -19,7 +19,6 @@ from swarm_forage_env.rendering.view import RenderError
 from swarm_forage_env.runs.run import LiveRun, build_env, run_one, run_policy
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.scenarios.robots import RobotKind, kind_sizes
 from swarm_forage_env.wrappers.recorder import TOTALS
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.world import World
@@ -398,14 +397,3 @@ def test_the_page_is_told_where_obstacles_are(replay):
     for one, expected in ((replay, []), (dataclasses.replace(replay, spec=spec), [list(box) for box in boxes])):
         header, _ = files_module.take_replay_page_apart(files_module.page_of([one]))
         assert header["runs"][0]["world"]["obstacles_m"] == expected
-
-
-def test_the_page_is_told_who_is_of_which_kind(replay):
-    kinds = (RobotKind(name="scout", share=0.25), RobotKind(name="hauler"))
-    robots = dataclasses.replace(CROWDED.robots, robot_kinds=kinds)
-    spec = dataclasses.replace(replay.spec, world=World(dataclasses.replace(CROWDED, robots=robots)))
-    n_scouts = kind_sizes(kinds, robots.n_robots)[0]
-    named = [["scout", n_scouts], ["hauler", robots.n_robots - n_scouts]]
-    for one, expected in ((replay, []), (dataclasses.replace(replay, spec=spec), named)):
-        header, _ = files_module.take_replay_page_apart(files_module.page_of([one]))
-        assert header["runs"][0]["kinds"] == expected

@@ -12,7 +12,6 @@ from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterfac
 from swarm_forage_env.policies.kernels.learner import SiteMemory
 from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.scenarios.robots import RobotKind
 from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.plans import plan_arena
 from swarm_forage_env.wrappers.registry import parse_wrapper
@@ -41,23 +40,14 @@ def seen(interface: LearnerInterface, env: ForageEnv, name: str) -> np.ndarray:
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize(("observation", "has_kinds"), [("compact", False), ("full", False), ("compact", True)])
-def test_sites_match_their_twin_along_a_run(observation, has_kinds):
-    kinds = (RobotKind(name="near", share=0.3, window_cells=3), RobotKind(name="here", share=0.3, window_cells=1))
-    env = ForageEnv(
-        scenario(
-            "search_and_rescue",
-            n_robots=30,
-            side_m=16.0,
-            physics="compiled",
-            robot_kinds=(*kinds, RobotKind(name="others")) if has_kinds else (),
-        )
-    )
+@pytest.mark.parametrize("observation", ["compact", "full"])
+def test_sites_match_their_twin_along_a_run(observation):
+    env = ForageEnv(scenario("search_and_rescue", n_robots=30, side_m=16.0, physics="compiled"))
     stack = parse_wrapper("sensor_noise:sigma=0.02").wrap(env)
     policy = load_policy("dpo")
     policy.reset(env.swarm_spec, stream_rng(0, Stream.POLICY))
     interface = remembering(env, observation=observation)
-    twins = [RobotSites(reach) for reach in ((1,) * 9 + (0,) * 9 + (2,) * 12 if has_kinds else (2,) * 30)]
+    twins = [RobotSites() for _ in range(30)]
     columns = slice(interface.layout["pickup_site"].start, interface.layout["sighting_site"].stop)
     obs, columns_used = stack.reset_batch(3), np.zeros(8)
     for tick in range(2000):

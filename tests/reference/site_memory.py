@@ -11,8 +11,7 @@ from tests.reference.compact_view import direction
 class RobotSites:
     """What one robot remembers: `pickup` and `sighting`, places in m from the middle of the arena, or None."""
 
-    def __init__(self, reach_cells: int = 2) -> None:
-        self.reach_cells = reach_cells
+    def __init__(self) -> None:
         self.pickup: tuple[float, float] | None = None
         self.sighting: tuple[float, float] | None = None
         self.carried = False
@@ -22,7 +21,7 @@ class RobotSites:
         part = {name: row[layout[name]] for name in layout.names}
         cos, sin = (float(value) for value in part["heading"])
         if cos == sin == 0.0:
-            self.__init__(self.reach_cells)
+            self.__init__()
             return [0.0] * 8
         half_x, half_y = layout.part("position").scale
         here = float(part["position"][0]) * half_x, float(part["position"][1]) * half_y
@@ -48,8 +47,7 @@ class RobotSites:
         return columns
 
     def _is_near(self, site: tuple[float, float] | None, here: tuple[float, float]) -> bool:
-        near = {2: 0.4, 1: 0.2}.get(self.reach_cells, 0.1)
-        return site is not None and max(abs(site[0] - here[0]), abs(site[1] - here[1])) < near
+        return site is not None and max(abs(site[0] - here[0]), abs(site[1] - here[1])) < 0.4
 
     @staticmethod
     def _nearest(part: dict, here: tuple[float, float], half: tuple[float, float]) -> tuple[float, float] | None:

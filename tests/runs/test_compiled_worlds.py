@@ -1,4 +1,4 @@
-"""Compiled policies in worlds with kinds, obstacles, messages, slow hands: in pieces as tick by tick, bit for bit."""
+"""Compiled policies in worlds with obstacles, messages, slow hands: in pieces as tick by tick, bit for bit."""
 
 from collections.abc import Callable
 from typing import Any
@@ -13,12 +13,10 @@ from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkPoli
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import LiveRun, build_stack
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.robots import RobotKind
 from tests.runs.test_compiled_disturbances import outcome, random_stack
 from tests.support.foraging import quick_world
 
 WORLDS: dict[str, dict[str, Any]] = {
-    "kinds": {"robot_kinds": (RobotKind(name="dim", lacks=("light", "los_object"), window_cells=3),)},
     "obstacles": {"obstacles": ((8.0, 4.0, 8.4, 12.0),)},
     "messages": {"message_size": 2, "neighbours_seen": 2, "neighbour_range_m": 2.0},
     "slow hands": {"pickup_ticks": 3, "drop_ticks": 2, "walk_probability": 0.02},

@@ -21,7 +21,6 @@ from swarm_forage_env.scenarios.config import (
 from swarm_forage_env.scenarios.overrides import field_sections, with_overrides
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, SEARCH_AND_RESCUE_OBJECTS, scenario
 from swarm_forage_env.scenarios.quirks import Quirks
-from swarm_forage_env.scenarios.robots import RobotKind
 
 PRESETS = [scenario(name) for name in SCENARIO_NAMES] + [
     scenario("search_and_rescue", side_m=side) for side in SEARCH_AND_RESCUE_OBJECTS
@@ -69,10 +68,6 @@ OTHER_VALUES: dict[str, Any] = {
     "neighbour_range_m": 1.5,
     "message_size": 2,
     "message_range_m": 4.0,
-    "robot_kinds": (
-        RobotKind(name="scout", share=0.25, window_cells=3),
-        RobotKind(name="hauler", speed=0.5, lacks=("light", "los_cache")),
-    ),
     "own_reward": "near_the_nest",
     **dict.fromkeys((item.name for item in dataclasses.fields(Quirks)), True),
 }

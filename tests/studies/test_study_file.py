@@ -9,7 +9,6 @@ import pytest
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import pretrained
 from swarm_forage_env.scenarios.quirks import QUIRK_NAMES
-from swarm_forage_env.scenarios.robots import RobotKind
 from swarm_forage_env.studies import study_file
 from swarm_forage_env.studies.ladders import BUDGETS
 from swarm_forage_env.studies.study import Axis, Place
@@ -258,19 +257,6 @@ def test_an_axis_of_lists(tmp_path):
     assert spec.axes[0].values == ("none", "nest_distance")
     assert spec.reference == "none"
     assert [spec.world(place).scenario.robots.own_sensors for place in spec.places] == [(), ("nest_distance",)]
-
-
-def test_an_axis_of_kinds(tmp_path):
-    file = tmp_path / "mine.toml"
-    file.write_text(
-        'name = "mine"\nscenario = "warehouse_small"\npolicies = ["random"]\nrules = ["described"]\n'
-        '[[axis]]\nfield = "robot_kinds"\nvalues = [[], [{name = "slow", share = 0.2, speed = 0.5}, {name = "rest"}]]\n'
-        "reference = []\n[budget.few]\nseeds = 1\n"
-    )
-    spec = load_study(file)
-    assert spec.axes[0].values == ("none", "slow:share=0.2,speed=0.5+rest")
-    kinds = [spec.world(place).scenario.robots.robot_kinds for place in spec.places]
-    assert kinds == [(), (RobotKind(name="slow", share=0.2, speed=0.5), RobotKind(name="rest"))]
 
 
 def test_what_a_budget_leaves_out_of_the_paper_is_told():

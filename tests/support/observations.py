@@ -46,8 +46,6 @@ def make_spec(n_robots: int = 1, **changes: Any) -> SwarmSpec:
         min_dist_m=3.2,
         cache_proximity_m=12.8,
         message_size=0,
-        object_reach_cells=(2,) * n_robots,
-        cache_reach_cells=(2,) * n_robots,
         quirks=Quirks(),
     )
     task = dataclasses.replace(task, **changes)

@@ -9,7 +9,6 @@ from swarm_forage_env.scenarios.obstacles import MIN_SIDE_M
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, QUIRK_NAMES, Quirks
-from swarm_forage_env.scenarios.robots import SENSORS, WINDOWS_CELLS, RobotKind
 from swarm_forage_env.views.sampler import SampledWorld, ScenarioSampler
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.handling import HandlingCostConfig
@@ -109,26 +108,7 @@ def _company(random: Random) -> dict[str, Any]:
         "neighbour_range_m": random.choice((0.05, 2.0, random.uniform(0.1, 40.0))),
         "message_size": random.choice((1, 2, random.randint(1, 64))),
         "message_range_m": random.choice((0.05, 2.0, random.uniform(0.1, 40.0))),
-        "robot_kinds": _kinds(random),
     }
-
-
-def _kinds(random: Random) -> tuple[RobotKind, ...]:
-    """One kind or some, a few of which are those of all robots; the last has what the others leave.
-
-    They may lack neighbours and messages where the scenario has none: that takes nothing away.
-    """
-    n_kinds = random.randint(1, 4)
-    return tuple(
-        RobotKind(
-            name=f"kind_{k}",
-            share=None if k == n_kinds - 1 else random.choice((0.0, 1 / n_kinds, random.uniform(0.0, 1 / n_kinds))),
-            speed=random.choice((1.0, random.uniform(0.01, 1.0))),
-            window_cells=random.choice(WINDOWS_CELLS),
-            lacks=tuple(random.sample(SENSORS, random.choice((0, 0, 1, 3)))),
-        )
-        for k in range(n_kinds)
-    )
 
 
 def _nests(random: Random, config: ScenarioConfig) -> tuple[tuple[float, ...], ...]:
@@ -237,7 +217,6 @@ def random_sampler(random: Random, config: ScenarioConfig, most_ticks: int) -> S
         "neighbours_seen",
         "neighbour_range_m",
         "message_size",
-        "robot_kinds",
     )  # so that rows have the same columns
     columns = {name: getattr(config.robots, name) for name in alike}
     other = with_overrides(random_scenario(random, None, most_ticks), **columns)

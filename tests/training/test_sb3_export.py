@@ -25,7 +25,6 @@ DRIVEN = InterfaceConfig(observation="compact", automatic_gripper=True)
         (PPO, NUMBERED, {}),
         (PPO, DRIVEN, {}),
         (PPO, DRIVEN, {"neighbours_seen": 3, "neighbour_range_m": 1.5, "message_size": 2}),
-        (PPO, DRIVEN, {"robot_kinds": ({"name": "fast", "share": 0.3}, {"name": "slow", "speed": 0.5})}),
         (DQN, NUMBERED, {}),
     ],
 )

@@ -21,7 +21,7 @@ from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.inspect.play.levels import LEVELS
 from swarm_forage_env.inspect.play.run import SPEEDS, RunByHand
 from swarm_forage_env.inspect.replay.capture import caches_now, objects_now, status_now
-from swarm_forage_env.inspect.replay.files import counted_performance, geometry, kind_counts, page_of, task_names
+from swarm_forage_env.inspect.replay.files import counted_performance, geometry, page_of, task_names
 from swarm_forage_env.policies.registry import POLICIES, policy_label
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -211,7 +211,6 @@ class PlaySession:
                 "scenario": here.name,
                 "seed": self.setting.seed,
                 "n_robots": here.robots.n_robots,
-                "kinds": [[kind.name, size] for kind, size in kind_counts(here)],
                 "n_objects": here.objects.n_objects,
                 "n_cache_slots": len(run.world.caches.alive),
                 "dt_s": here.dt_s,

@@ -27,7 +27,6 @@ from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M, WALL_M
 from swarm_forage_env.scenarios.performance import performance_of
-from swarm_forage_env.scenarios.robots import RobotKind, kind_sizes
 from swarm_forage_env.wrappers.recorder import TOTALS
 
 FORMAT = "swarm_forage_env replay"
@@ -174,7 +173,6 @@ def _about(replay: Replay) -> dict[str, Any]:
         "policy": spec.policy,
         "seed": spec.seed,
         "n_robots": scenario.robots.n_robots,
-        "kinds": [[kind.name, size] for kind, size in kind_counts(scenario)],
         "n_objects": scenario.objects.n_objects,
         "n_cache_slots": int(replay.cache_events[:, 1].max(initial=-1)) + 1,
         "n_frames": replay.n_frames,
@@ -203,12 +201,6 @@ def _about(replay: Replay) -> dict[str, Any]:
 def task_names() -> list[str]:
     """Return what tasks are called in the page, by code."""
     return [_TASKS.get(task, task.name.lower()) for task in Task]
-
-
-def kind_counts(scenario: ScenarioConfig) -> Iterable[tuple[RobotKind, int]]:
-    """Return the kinds of robots and how many there are of each, in the order of their rows."""
-    robots = scenario.robots
-    return zip(robots.robot_kinds, kind_sizes(robots.robot_kinds, robots.n_robots), strict=True)
 
 
 def counted_performance(scenario: ScenarioConfig) -> dict[str, str]:

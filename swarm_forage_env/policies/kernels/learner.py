@@ -35,8 +35,8 @@ SITE_COLUMNS = 4
 PICKUP, SIGHTING = 0, 1
 FAR_M = 20.0
 """Distance from which on a site counts as far (our choice: more than half of an arena of 32 m)."""
-_LEAST_REACH = 0.5
-"""Cells: so near to a site a robot has arrived, also one that sees only the cell it stands on."""
+_NEAR_M = WINDOW_CELLS // 2 / CELLS_PER_M
+"""Along x and y: so far a robot sees for certain, wherever in its cell it is."""
 GRASP = float(Grip.GRASP)
 RELEASE = float(Grip.RELEASE)
 DELIVER = float(Grip.DELIVER)
@@ -213,8 +213,6 @@ class Translation(NamedTuple):
     """See `automatic_grip`."""
     half: tuple[float, float]
     """Half the arena, m."""
-    reach_cells: IntArray
-    """(N,) see `is_near`."""
     sites: SiteMemory
     frames: Frames
     wheels: ActionArray
@@ -224,13 +222,9 @@ class Translation(NamedTuple):
 
 
 @kernel
-def is_near(place: FloatArray, x: float, y: float, reach_cells: int) -> bool:
-    """Return whether a place lies in the window of a robot at (x, y), wherever in its cell the robot is.
-
-    `reach_cells` on either side of its own are in the window.
-    """
-    near_m = max(reach_cells, _LEAST_REACH) / CELLS_PER_M
-    return abs(place[0] - x) < near_m and abs(place[1] - y) < near_m
+def is_near(place: FloatArray, x: float, y: float) -> bool:
+    """Return whether a place lies in the window of a robot at (x, y), wherever in its cell the robot is."""
+    return abs(place[0] - x) < _NEAR_M and abs(place[1] - y) < _NEAR_M
 
 
 @kernel
@@ -239,13 +233,12 @@ def remember_sites(
     pose_starts: tuple[int, int],
     cargo_starts: tuple[int, int, int],
     half: tuple[float, float],
-    reach_cells: IntArray,
     memory: SiteMemory,
 ) -> None:
     """Bring the memories up to date with observations (N, D); twice with the same ones is as good as once.
 
     Rows of robots that are not in the world forget everything. `pose_starts` = first columns of position, heading;
-    `cargo_starts` = those of carrying, los_cell, los_object; `half` = half the arena, m; `reach_cells` (N,): `is_near`.
+    `cargo_starts` = those of carrying, los_cell, los_object; `half` = half the arena, m.
     """
     position, heading = pose_starts
     carrying, cell, window = cargo_starts
@@ -267,7 +260,7 @@ def remember_sites(
             place[PICKUP, 0] = x
             place[PICKUP, 1] = y
             is_known[PICKUP] = True
-            if is_near(place[SIGHTING], x, y, reach_cells[i]):
+            if is_near(place[SIGHTING], x, y):
                 is_known[SIGHTING] = False  # it was this object
         memory.carried[i] = carries
         if carries and sees:
@@ -276,7 +269,7 @@ def remember_sites(
             is_known[SIGHTING] = True
         if not carries and not sees:
             for k in range(N_SITES):
-                if is_near(place[k], x, y, reach_cells[i]):
+                if is_near(place[k], x, y):
                     is_known[k] = False
 
 

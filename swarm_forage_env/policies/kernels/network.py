@@ -181,7 +181,7 @@ def see(obs: ObsArray, decision: int, t: Translation, view: ObsArray) -> None:
                 view[i, c] = obs[i, c]
     at = t.n_shown
     if t.has_memory:
-        remember_sites(obs, t.pose_starts, t.cargo_starts, t.half, t.reach_cells, t.sites)
+        remember_sites(obs, t.pose_starts, t.cargo_starts, t.half, t.sites)
         show_sites(obs, t.pose_starts, t.half, t.sites, view[:, at:])
         at += N_SITES * SITE_COLUMNS
     for i in range(obs.shape[0]):

@@ -5,8 +5,6 @@ function robotFacts(run, robot) {
   const state = run.status[robot];
   if (state & ABSENT) return [["state", run.isDead(robot) ? "dead" : "not yet born"]];
   const facts = [["state", stateWords(state)]];
-  const kind = run.kindOf(robot);
-  if (kind) facts.push(["kind", kind]);
   if (run.header.has_tasks) facts.push(["task", run.header.tasks[run.task(robot)]]);
   const activity = run.activity(robot);
   if (activity) facts.push(["activity", activity]);

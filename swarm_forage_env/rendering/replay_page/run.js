@@ -101,13 +101,6 @@ class Run {
     return (this.status[robot] >> TASK_SHIFT) & 7;
   }
 
-  /** Name of a robot's kind; null where all are alike. Kinds take the rows of the swarm in their order. */
-  kindOf(robot) {
-    let end = 0;
-    for (const [name, size] of this.header.kinds ?? []) if (robot < (end += size)) return name;
-    return null;
-  }
-
   activity(robot) {
     const codes = this.arrays.activity;
     return codes ? this.header.activities[codes[robot * this.nFrames + this.frame]] : null;

@@ -98,8 +98,6 @@ def _check_spaces(model: BaseAlgorithm, interface: InterfaceConfig) -> None:
     for name in ("neighbours_seen", "neighbour_range_m", "message_size"):
         if getattr(interface, name) is not None:
             shown[name] = getattr(interface, name)
-    if interface.sees_kind:
-        shown["robot_kinds"] = ({"name": "one", "share": 0.5}, {"name": "other"})
     spec = SwarmSpec.of(scenario("warehouse_small", **shown))
     bound = LearnerInterface(interface, spec)
     wanted, found = describe_spaces(bound), describe_spaces(model)

@@ -18,7 +18,6 @@ from swarm_forage_env.contract.detection import sees_obstacle
 from swarm_forage_env.contract.layout import RING_SENSORS
 from swarm_forage_env.contract.types import ActionArray, BitArray, BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.world.kernels.drive import limit_command, sinc_and_cosine
-from swarm_forage_env.world.kernels.kinds import blank
 
 _CELLS = 4096
 _EDGES = np.zeros(_CELLS + 1, np.float32)
@@ -144,7 +143,6 @@ def disturb(
     draws: BitArray,
     factors: ObsArray,
     noise: Noise,
-    blanks: IntArray,
     proximity: int,
     behind_counts: bool,
 ) -> float:
@@ -158,7 +156,6 @@ def disturb(
         draws: (N C or more,) random bits, one number per robot and noisy column, robot by robot.
         factors: (C,) float32, observation units per unit of `standard`.
         noise: Which columns.
-        blanks: (B, 4) what stays zero, as `kinds.blank` takes it: a sensor that is lacking has no noise.
         proximity: First column of the proximity readings.
         behind_counts: Quirk `obstacle_behind_counts`.
 
@@ -181,8 +178,6 @@ def disturb(
             if turned != NOT_NOISY:
                 angle = np.float64(standard(own[turned])) * np.float64(factors[turned])
                 _turn_heading(obs[i], start, angle)
-    blank(obs, blanks)
-    for i in range(obs.shape[0]):
         if active[i]:
             n_active += 1
             n_seeing += sees_obstacle(obs[i, proximity : proximity + RING_SENSORS], behind_counts)

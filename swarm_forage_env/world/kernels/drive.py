@@ -65,7 +65,6 @@ def limit_command(
 def drive(
     actions: ActionArray,
     wheel_gain: FloatArray,
-    speeds: FloatArray,
     active: BoolArray,
     pending_kind: CodeArray,
     facing: FloatArray,
@@ -76,8 +75,7 @@ def drive(
 ) -> int:
     """Fill wheel speeds (N, 2) m/s and twists (N + 1, 3): world velocity x, y in m/s and turn rate in rad/s.
 
-    Wheel speed = limit(limit(command) x gain x speed): a gain above 1 makes no robot faster than its motors are.
-    `speeds` (N,), at most 1, is of a robot's kind. The second limit is as much lower: it drives the same path, slower.
+    Wheel speed = limit(limit(command) x gain): a gain above 1 makes no robot faster than its motors are.
     `limits` holds wheel scale, centre-speed limit, wheel-difference limit (m/s) and wheel base (m). The velocity is
     the chord of the exact arc over one tick, so that free motion is exact however the tick is divided.
     Returns -1, or the first active row with a command or gain that is not finite; then nothing is written.
@@ -99,12 +97,10 @@ def drive(
         right = 0.0
         if active[i] and pending_kind[i] == 0:
             left, right = limit_command(float(actions[i, 0]), float(actions[i, 1]), scale, max_speed, max_difference)
-            left *= wheel_gain[i, 0] * speeds[i]
-            right *= wheel_gain[i, 1] * speeds[i]
-            own_speed = max_speed * speeds[i]
-            own_difference = max_difference * speeds[i]
-            if abs(0.5 * (left + right)) > _MORE * own_speed or abs(right - left) > _MORE * own_difference:
-                left, right = limit_wheels(left, right, own_speed, own_difference)
+            left *= wheel_gain[i, 0]
+            right *= wheel_gain[i, 1]
+            if abs(0.5 * (left + right)) > _MORE * max_speed or abs(right - left) > _MORE * max_difference:
+                left, right = limit_wheels(left, right, max_speed, max_difference)
         wheel_speed[i, 0] = left
         wheel_speed[i, 1] = right
     _drive_arcs(wheel_speed, facing, per_wheel_base, dt_s, twist)

@@ -198,7 +198,6 @@ def line_of_sight(
     shares: ObsArray,
     caches: CacheState,
     half_side: int,
-    half_windows: IntArray,
     obs: ObsArray,
     starts: tuple[int, int, int],
 ) -> None:
@@ -207,9 +206,7 @@ def line_of_sight(
     `changed` = see `Requests`; `kept`: `obs` is as the last call left it, so that only robots that have come to another
     cell, or near a change, or see caches, look again;
     `shares` (M + 1,) = what is written for no object, and for each object (row + 1) / M;
-    `half_side` = (cache side in squares - 1) / 2; `half_windows` (N,) = squares that a robot sees on either side of its
-    own, the others of its window hold nothing;
-    `starts` = first columns of los_cell, los_object, los_cache.
+    `half_side` = (cache side in squares - 1) / 2; `starts` = first columns of los_cell, los_object, los_cache.
     """
     ny, nx = floor.shape
     cell_start, object_start, cache_start = starts
@@ -237,14 +234,12 @@ def line_of_sight(
                 _whole_window(floor, cell_x - _HALF_WINDOW, cell_y - _HALF_WINDOW, shares, window)
             else:
                 _cut_window(floor, cell_x - _HALF_WINDOW, cell_y - _HALF_WINDOW, shares, window)
-            if half_windows[i] < _HALF_WINDOW:
-                _narrow_window(half_windows[i], window)
         if stays and obs[i, cache_start] == 0.0:  # none in sight; a new one, or the end of one, changes many squares
             continue
         for k in range(cache_start, cache_start + CACHE_FIELDS * VISIBLE_CACHES):
             obs[i, k] = 0.0
         if n_slots > 0:
-            reach = half_side + half_windows[i]
+            reach = half_side + _HALF_WINDOW
             _visible_caches(cell_x, cell_y, position, caches, n_slots, reach, i, obs, cache_start, (nx, ny, n_objects))
 
 
@@ -264,15 +259,6 @@ def _cut_window(floor: IntArray, x_low: int, y_low: int, shares: ObsArray, windo
         for x in range(WINDOW_CELLS):
             inside = 0 <= x_low + x < nx and 0 <= y_low + y < ny
             window[y * WINDOW_CELLS + x] = shares[max(floor[y_low + y, x_low + x], CELL_EMPTY)] if inside else 0.0
-
-
-@kernel
-def _narrow_window(half: int, window: ObsArray) -> None:
-    """Empty the cells of a window that are more than `half` cells from its middle along x or y."""
-    for y in range(WINDOW_CELLS):
-        for x in range(WINDOW_CELLS):
-            if max(abs(x - _HALF_WINDOW), abs(y - _HALF_WINDOW)) > half:
-                window[y * WINDOW_CELLS + x] = 0.0
 
 
 @kernel

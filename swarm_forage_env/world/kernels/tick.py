@@ -22,7 +22,7 @@ from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env._internal.prefetching import LARGE
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.types import ActionArray, CodeArray, FloatArray, ObsArray
-from swarm_forage_env.world.kernels import beams, floor, kinds, proprioception
+from swarm_forage_env.world.kernels import beams, floor, proprioception
 from swarm_forage_env.world.kernels.bodies import BodyState, move_bodies, tell_poses
 from swarm_forage_env.world.kernels.contact import press
 from swarm_forage_env.world.kernels.counting import add_task_shares, mark
@@ -117,12 +117,9 @@ def sense(a: ArenaArrays) -> None:
             s.shares,
             a.state.caches,
             s.cache_half_side,
-            s.half_windows,
             s.obs,
             (c.los_cell, c.los_object, c.los_cache),
         )
-    kinds.tell_kinds(s.kinds, present, s.obs, s.kind_start)
-    kinds.blank(s.obs, s.blanks)
 
 
 @kernel
@@ -143,7 +140,6 @@ def set_out(a: ArenaArrays, actions: ActionArray, wheel_gain: FloatArray, tick: 
     bad = drive(
         actions,
         wheel_gain,
-        m.speeds,
         swarm.active,
         swarm.pending_kind,
         swarm.facing,
@@ -251,7 +247,6 @@ def disturb_senses(d: Disturbances, k: int, a: ArenaArrays) -> None:
         d.draws,
         d.factors[k % d.factors.shape[0]],
         d.noise,
-        s.blanks,
         s.columns.proximity,
         s.behind_counts,
     )

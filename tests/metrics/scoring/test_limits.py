@@ -6,7 +6,6 @@ import pytest
 from metrics import CurveError, foraging_limit, limit_of
 from metrics.scoring.limits import share_of_limit
 from swarm_forage_env import World, parse_wrapper, plan_run, run_one, scenario
-from swarm_forage_env.scenarios.robots import RobotKind
 
 TWO_ROBOTS = {"n_robots": 2, "n_objects": 1, "horizon_s": 990.0, "speed_mps": 0.1, "handling_s": 1.0}
 PER_1000_S = {"warehouse_small": 125, "warehouse_medium": 1384, "warehouse_dual": 324, "warehouse_quad": 948}
@@ -111,7 +110,6 @@ def test_first_pickups_are_held_against_all_objects_that_appear():
         (scenario("search_and_rescue", walk_probability=0.0), "power-law clusters"),
         (scenario("warehouse_small", walk_probability=0.1), "objects that move"),
         (scenario("warehouse_small", caches="static"), "static caches"),
-        (scenario("warehouse_small", robot_kinds=(RobotKind(name="slow", speed=0.5),)), "unequal speed"),
         (World(scenario("warehouse_small"), (parse_wrapper("sensor_noise:sigma=0.1"),)), "sensor_noise"),
     ],
 )
