@@ -140,7 +140,6 @@ def ask_and_show(
 
     if picture is not None:
         picture_ending(picture)  # before the work; a place that cannot be written to is told of beside the answer
-    aside = notes()
     if options.dry_run:
         show(summarize_plan(question.plan, out=folder), as_json=options.as_json)
         return
