@@ -26,20 +26,20 @@ def main() -> None:
 
 
 def answer(words: Sequence[str]) -> int:
-    """Carry out a command and return its exit code; whatever error comes is told in one line on stderr."""
+    """Carry out a command and return its exit code; whatever error comes is told on stderr."""
     try:
         from swarm_forage_env.cli.app import carry_out
 
         code = carry_out(words)
         sys.stdout.flush()
         return signals.exit_code() if code == signals.EXIT_INTERRUPTED else code
-    except BaseException as error:  # noqa: BLE001 - the last guard: whatever happens ends in one line
+    except BaseException as error:  # noqa: BLE001 - the last guard: whatever happens is told
         if signals.came or isinstance(error, KeyboardInterrupt):
             return _interrupted()
         signals.end_at_once(signals.exit_code())
         from swarm_forage_env.cli.errors import end
 
-        return end(error, words)
+        return end(error)
 
 
 def _interrupted() -> int:

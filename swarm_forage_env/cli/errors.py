@@ -1,15 +1,13 @@
-"""How a command ends that fails: an error becomes one line on stderr and an exit code, also one that nobody foresaw.
+"""How a command ends that fails: an error becomes one line on stderr and an exit code.
 
-An error that nobody foresaw is a fault of ours, or of a file of the user, such as a callback. Its traceback goes to a
-file, with the command and the versions. The line says where the file is, and whose fault it is.
+An error that nobody foresaw is a fault of ours, or of a file of the user, such as a callback. Its traceback is shown,
+and the line below says whose fault it is.
 """
 
 import os
-import shlex
 import sys
-import tempfile
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -20,8 +18,6 @@ from swarm_forage_env._internal.faults import PACKAGES, place_in_code_of_user
 from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_UNFORESEEN, EXIT_USAGE, complain
 from swarm_forage_env.cli.signals import EXIT_INTERRUPTED
 
-DEBUG_VARIABLE = "SWARM_FORAGE_DEBUG"
-"""Environment variable; if it is set and not empty, an error that nobody foresaw shows its traceback at once."""
 _WANTED = {
     "Input should be a valid integer": "a whole number",
     "Input should be a valid number": "a number",
@@ -31,12 +27,8 @@ _WANTED = {
 """What pydantic says of values, by which typer checks them -> how we say it."""
 
 
-def end(error: BaseException, words: Sequence[str] = ()) -> int:
-    """Say in one line on stderr why the command of these words ends; returns the exit code.
-
-    Raises:
-        BaseException: `error` again, if nobody foresaw it and `DEBUG_VARIABLE` is set.
-    """
+def end(error: BaseException) -> int:
+    """Say in one line on stderr why the command ends, below a traceback if nobody foresaw it; returns the exit code."""
     from swarm_forage_env.runs.workers import WorkerError  # late: only a command that fails needs it
 
     if hasattr(error, "format_message"):  # typer's complaints about words; their common class has no public name
@@ -58,9 +50,10 @@ def end(error: BaseException, words: Sequence[str] = ()) -> int:
             f"Not enough memory{f': {error}' if str(error) else ''}; ask for fewer robots, objects, runs or processes.",
             EXIT_FAILURE,
         )
-    if os.environ.get(DEBUG_VARIABLE):
-        raise error
-    return _end_unforeseen(error, words)
+    traceback.print_exception(error)
+    if place := place_in_code_of_user(error):
+        return complain(f"Your code failed in {place}.", EXIT_FAILURE)
+    return complain("An error that should not happen; please send us the lines above.", EXIT_UNFORESEEN)
 
 
 def _about_words(error: Any) -> str:
@@ -85,40 +78,3 @@ def resumable(folder: Path) -> Iterator[None]:
     except RunsInterrupted as interrupt:
         complain(f"{interrupt} They are in {folder}; the same command does the rest.", EXIT_INTERRUPTED)
         raise typer.Exit(EXIT_INTERRUPTED) from None
-
-
-def _end_unforeseen(error: BaseException, words: Sequence[str]) -> int:
-    summary = "".join(traceback.format_exception_only(error)).strip().splitlines()[-1]
-    place = place_in_code_of_user(error)
-    try:
-        kept = f"Details: {_report(error, words)}"
-        kept += "." if place else "; please send this file to us."
-    except OSError as problem:
-        kept = f"The details cannot be kept ({problem.strerror}); with {DEBUG_VARIABLE}=1 the command shows them."
-    if place:
-        return complain(f"Your code failed in {place}: {summary}. {kept}", EXIT_FAILURE)
-    return complain(f"an error that should not happen: {summary}. {kept}", EXIT_UNFORESEEN)
-
-
-def _report(error: BaseException, words: Sequence[str]) -> Path:
-    """Write what we need to find the fault to a file of its own; returns the file.
-
-    Raises:
-        OSError: there is no place for it.
-    """
-    import platform
-
-    from swarm_forage_env.runs.versions import software_versions
-
-    versions = {"python": platform.python_version(), "system": platform.platform(), **software_versions()}
-    lines = [
-        f"command: {shlex.join(['swarm-forage', *words])}",
-        f"folder: {Path.cwd()}",
-        *(f"{name}: {version}" for name, version in versions.items()),
-        "",
-        "".join(traceback.format_exception(error)),
-    ]
-    handle, name = tempfile.mkstemp(prefix="swarm-forage-error-", suffix=".txt")
-    with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as file:
-        file.write("\n".join(lines))
-    return Path(name)
