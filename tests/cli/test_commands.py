@@ -72,7 +72,7 @@ def test_json_is_the_only_thing_on_stdout(command):
 def test_a_dry_run_plans_and_touches_nothing(command):
     code, out, _ = command("run", "--policy", "random", "--seeds", "3", "--jobs", "2", "--dry-run")
     assert code == 0
-    assert out == "3 runs, 0 stored, 3 to do with 1.13e+07 robot-ticks; records go to results/warehouse_small\n"
+    assert out == "3 runs, 0 stored, 3 to do with 7.5e+06 robot-ticks; records go to results/warehouse_small\n"
     assert not list(Path.cwd().iterdir())
 
 
