@@ -12,7 +12,8 @@ from swarm_forage_env.contract.layout import MESSAGES, NEIGHBOURS, ObservationLa
 from swarm_forage_env.contract.policy import COMMANDS
 from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.scenarios.config import RobotConfig
-from swarm_forage_env.world.kernels.neighbourhood import bin_robots, hear, say, see_neighbours
+from swarm_forage_env.world.kernels.bins import bin_robots
+from swarm_forage_env.world.kernels.neighbourhood import hear, see_neighbours
 from swarm_forage_env.world.state import SwarmState
 
 _CELL_SLACK = 1.0 + 1e-9
@@ -20,13 +21,7 @@ _CELL_SLACK = 1.0 + 1e-9
 
 
 class Neighbourhood:
-    """Sensors of neighbours and messages of one run.
-
-    The proximity sensor has bins, too, of 0.27 m: too small for ranges of metres, so there are others here.
-
-    Attributes:
-        is_used: Whether there is anything to sense.
-    """
+    """Sensors of neighbours and messages of one run, with bins of their own: those of proximity are 0.27 m wide."""
 
     def __init__(self, robots: RobotConfig, layout: ObservationLayout, reads: Collection[str]) -> None:
         """Allocate what the slices need that are read.
@@ -40,6 +35,7 @@ class Neighbourhood:
         self._sees = robots.neighbours_seen > 0 and NEIGHBOURS in reads
         self._hears = robots.message_size > 0 and MESSAGES in reads
         self.is_used = self._sees or self._hears
+        """Whether there is anything to sense."""
         self._starts = tuple(layout.part(name).start if name in layout.names else -1 for name in (NEIGHBOURS, MESSAGES))
         self._neighbour_range_m, self._message_range_m = robots.neighbour_range_m, robots.message_range_m
         ranges = (robots.neighbour_range_m if self._sees else 0.0, robots.message_range_m if self._hears else 0.0)
@@ -63,7 +59,8 @@ class Neighbourhood:
             active: (N,) robots at work; only these say something.
         """
         if self._hears:
-            say(actions, COMMANDS, active, self._said, self._speaks)
+            self._speaks[:] = active
+            self._said[:] = np.where(active[:, None], np.clip(actions[:, COMMANDS:], -1.0, 1.0), 0.0)
 
     def sense(self, swarm: SwarmState, obs: ObsArray) -> None:
         """Write the columns of neighbours and messages in `obs` (N, D), for the robots where they are now."""

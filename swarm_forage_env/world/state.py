@@ -246,7 +246,7 @@ class Columns(NamedTuple):
 
 Bins: TypeAlias = tuple[float, IntArray, IntArray]
 """Present robots by place, as of the last look: side of a bin's cells in m, first_in_bin (bins,), next_in_bin (N,),
--1 = end; see `kernels.neighbourhood`."""
+-1 = end; see `kernels.bins`."""
 
 
 class Sensors(NamedTuple):
@@ -262,7 +262,7 @@ class Sensors(NamedTuple):
     """(1,) whether `obs` is as the last tick left it: only while nobody but the world has it, in `kernels.tick.run`."""
     bins: Bins
     occupied: BitArray
-    """(words,) a bit for each cell of `bins` with a robot, see `kernels.neighbourhood`; one word in small swarms."""
+    """(words,) a bit for each cell of `bins` with a robot, see `kernels.bins`; one word in small swarms."""
     columns: Columns
     interior: FloatArray
     """x low, y low, x high, y high of the free floor in m."""

@@ -8,7 +8,7 @@ from swarm_forage_env.scenarios.config import PHYSICS_ENGINES, ScenarioConfig
 from swarm_forage_env.world.bodies import Bodies
 from swarm_forage_env.world.chipmunk import ChipmunkBodies
 from swarm_forage_env.world.kernels.beams import proximity
-from swarm_forage_env.world.kernels.neighbourhood import bin_robots, mark_cells
+from swarm_forage_env.world.kernels.bins import bin_robots, mark_cells
 from swarm_forage_env.world.sensors import new_sensors
 from swarm_forage_env.world.state import SwarmState
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swarm_forage_env.world.kernels.beams import proximity
-from swarm_forage_env.world.kernels.neighbourhood import bin_robots, mark_cells, may_be_beside
+from swarm_forage_env.world.kernels.bins import bin_robots, mark_cells, may_be_beside
 
 N_ROBOTS, SIDE_M, RADIUS_M, REACH_M = 1500, 40.0, 0.085, 0.1
 CELL_M = 2 * RADIUS_M + REACH_M

@@ -11,7 +11,7 @@ from swarm_forage_env._internal.prefetching import AHEAD, LARGE, prefetch
 from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
 from swarm_forage_env.contract.layout import RING_SENSORS
 from swarm_forage_env.contract.types import BitArray, BoolArray, FloatArray, ObsArray, Row
-from swarm_forage_env.world.kernels.neighbourhood import bin_of, cell_of, may_be_beside, word_of
+from swarm_forage_env.world.kernels.bins import bin_of, cell_of, may_be_beside, word_of
 from swarm_forage_env.world.kernels.obstacles import is_within
 from swarm_forage_env.world.state import Bins
 

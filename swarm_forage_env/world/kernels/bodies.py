@@ -32,8 +32,8 @@ import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray
+from swarm_forage_env.world.kernels.bins import bin_of, cell_of
 from swarm_forage_env.world.kernels.drive import SMALL_RAD, hold_inside, sinc_and_cosine, small_sinc_and_cosine
-from swarm_forage_env.world.kernels.neighbourhood import bin_of, cell_of
 from swarm_forage_env.world.kernels.obstacles import hold_outside, is_within, nearest
 from swarm_forage_env.world.state import Bins
 

@@ -4,7 +4,7 @@ import math
 
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.types import BoolArray, FloatArray
-from swarm_forage_env.world.kernels.neighbourhood import bin_of, cell_of
+from swarm_forage_env.world.kernels.bins import bin_of, cell_of
 from swarm_forage_env.world.state import Bins, Touching
 
 LEAST_SPEED_M_S = 3e-4

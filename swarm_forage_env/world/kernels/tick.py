@@ -23,13 +23,13 @@ from swarm_forage_env._internal.prefetching import LARGE
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.types import ActionArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.world.kernels import beams, floor, proprioception
+from swarm_forage_env.world.kernels.bins import bin_robots, mark_cells
 from swarm_forage_env.world.kernels.bodies import BodyState, move_bodies, tell_poses
 from swarm_forage_env.world.kernels.contact import press
 from swarm_forage_env.world.kernels.counting import add_task_shares, mark
 from swarm_forage_env.world.kernels.disturbances import Disturbances, disturb, disturb_wheels, draw_bits
 from swarm_forage_env.world.kernels.drive import drive
 from swarm_forage_env.world.kernels.interact import serve
-from swarm_forage_env.world.kernels.neighbourhood import bin_robots, mark_cells
 from swarm_forage_env.world.kernels.placement import place_displaced
 from swarm_forage_env.world.kernels.reward import Payment, pay, remember
 from swarm_forage_env.world.kernels.walk import walk
