@@ -59,7 +59,6 @@ from .contract.own_functions import register_sensor as register_sensor
 from .studies.study_file import load_study as load_study
 from .studies.study_folder import run_study as run_study
 from .studies.study_table import read_study as read_study
-from .studies.study_table import unpack_study as unpack_study
 from .studies.study import StudySpec as StudySpec
 from .studies.study_folder import StudyFolder as StudyFolder
 from .studies.study_table import StudyTable as StudyTable

@@ -316,29 +316,6 @@ def pack_study(folder: StudyFolder, chosen: Path | None = None, *, tell: Callabl
     return file
 
 
-def unpack_study(table: StudyTable, folder: StudyFolder) -> int:
-    """Put the finished runs of a table into a folder, so that `run_study` and other functions can continue from there.
-
-    Runs that the folder holds stay as they are. The added records lack the time that each run took, because a packed
-    file leaves it out.
-
-    Args:
-        table: Table of a packed file.
-        folder: Folder of the study; made if it does not exist.
-
-    Returns:
-        Number of runs that were added.
-
-    Raises:
-        RecordError: the folder holds another study.
-    """
-    folder.take(table.spec)
-    lacking = [run_id for run_id in table.records if run_id not in folder.store]
-    for run_id in lacking:
-        folder.store.write(table.records[run_id])
-    return len(lacking)
-
-
 def read_study(path: str | Path) -> StudyTable:
     """Read a study's table from its packed file, or gather it from its folder.
 

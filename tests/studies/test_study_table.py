@@ -13,7 +13,7 @@ from swarm_forage_env.runs.store import FAILURES, MISSING
 from swarm_forage_env.runs.versions import software_versions
 from swarm_forage_env.studies.study import Axis, Place
 from swarm_forage_env.studies.study_folder import StudyFolder, run_study
-from swarm_forage_env.studies.study_table import gather_study, read_study, unpack_study
+from swarm_forage_env.studies.study_table import gather_study, read_study
 from tests.support.tiny_study import NOBODY, RANDOM, tiny_study
 
 STUDY = tiny_study()
@@ -40,23 +40,6 @@ def test_the_file_alone_gives_everything_back(folder, file):
     assert table.versions == gathered.versions
     assert len(table.versions) == 1
     assert read_study(folder.folder).frame.equals(table.frame)
-
-
-def test_runs_of_a_file_become_a_folder_again(folder, file, tmp_path):
-    table, there = read_study(file), StudyFolder(tmp_path / "there")
-    lost = folder.store.run_ids()[3]
-    assert unpack_study(table, there) == 16
-    assert gather_study(there).frame.equals(table.frame)
-    assert gather_study(there).versions == table.versions
-    stored = there.store.look_up(STUDY.plan.specs)
-    assert set(stored.states.values()) == {"done"}
-    assert stored.n_foreign == 0, "the same code made them, so they count"
-    there.store.path(lost).unlink()
-    assert unpack_study(table, there) == 1, "what is there stays as it is"
-    other = StudyFolder(tmp_path / "other")
-    other.take(replace(STUDY, settings={"n_objects": 7}))
-    with pytest.raises(RecordError, match="Give another folder"):
-        unpack_study(table, other)
 
 
 def test_records_of_runs_by_several_versions_say_so(file):
