@@ -20,8 +20,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swarm_forage_env.scenarios.config import WHEEL_SCALE_MPS, ScenarioConfig
-from swarm_forage_env.scenarios.floor import CELL_M, Box, capacity
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.floor import CELL_M, WHEEL_SCALE_MPS, Box, capacity
 from swarm_forage_env.wrappers.world import World, WorldLike, world_of
 
 from ..checks import CurveError, check_size

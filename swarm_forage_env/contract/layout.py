@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TypeAlias
 
-from swarm_forage_env.scenarios.config import WHEEL_SCALE_MPS
+from swarm_forage_env.scenarios.floor import WHEEL_SCALE_MPS
 
 RING_SENSORS = 24
 """Proximity beams, and as many light sensors: on one ring, every 15 degrees, the first at 7.5 degrees to the left."""

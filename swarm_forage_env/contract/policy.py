@@ -21,8 +21,8 @@ from swarm_forage_env.contract.layout import (
 )
 from swarm_forage_env.contract.own_functions import own_sensor
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
-from swarm_forage_env.scenarios.config import WHEEL_SCALE_MPS, ScenarioConfig
-from swarm_forage_env.scenarios.floor import CELL_M, CELLS_PER_M
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.floor import CELL_M, CELLS_PER_M, WHEEL_SCALE_MPS
 from swarm_forage_env.scenarios.quirks import Quirks
 
 COMMANDS = 3

@@ -19,6 +19,7 @@ from swarm_forage_env.scenarios.floor import (
     PLACEMENTS,
     POSITIONS,
     WALL_M,
+    WHEEL_SCALE_MPS,
     Box,
     cache_centre_box,
     capacity,
@@ -32,8 +33,6 @@ from swarm_forage_env.scenarios.quirks import Quirks
 
 CACHE_KINDS = ("none", "static", "dynamic")
 PHYSICS_ENGINES = ("compiled", "chipmunk")
-WHEEL_SCALE_MPS = 0.20
-"""Wheel speed that an action or an observation of 1.0 stands for."""
 MAX_NEIGHBOURS_SEEN = 64
 """Most neighbours in an observation (our choice: 256 columns, twice those of all other sensors)."""
 MAX_MESSAGE_SIZE = 64

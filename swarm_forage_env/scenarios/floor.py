@@ -21,6 +21,8 @@ EAST_WALL_M = 0.4
 NEAR_CACHE_M = 2.0
 """From the centre of a cache: time lost within this distance is lost near it (our choice: robots that use a cache crowd
 at its centre, and most of them within this distance, whatever its size)."""
+WHEEL_SCALE_MPS = 0.20
+"""Wheel speed that an action or an observation of 1.0 stands for."""
 
 Box: TypeAlias = tuple[int, int, int, int]
 

@@ -26,7 +26,8 @@ The rule is `kernels.contact`. The physics comes after that. It stops who still 
 import numpy as np
 
 from swarm_forage_env.contract.types import FloatArray
-from swarm_forage_env.scenarios.config import WHEEL_SCALE_MPS, ScenarioConfig
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.floor import WHEEL_SCALE_MPS
 from swarm_forage_env.world.state import Motion, Touching
 
 TOUCH_SLACK_M = 0.001

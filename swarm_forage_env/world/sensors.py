@@ -21,8 +21,8 @@ from swarm_forage_env.contract.layout import (
 )
 from swarm_forage_env.contract.own_functions import is_own_sensor
 from swarm_forage_env.contract.types import ObsArray
-from swarm_forage_env.scenarios.config import WHEEL_SCALE_MPS, ArenaConfig, ScenarioConfig
-from swarm_forage_env.scenarios.floor import CELL_M
+from swarm_forage_env.scenarios.config import ArenaConfig, ScenarioConfig
+from swarm_forage_env.scenarios.floor import CELL_M, WHEEL_SCALE_MPS
 from swarm_forage_env.world.bodies import obstacle_rows
 from swarm_forage_env.world.state import Columns, ObjectState, Sensors, SwarmState
 

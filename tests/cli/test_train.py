@@ -155,8 +155,7 @@ def test_words_are_arguments_of_the_recipe(tmp_path):
         scenario=str(path),
         objects=60,
         horizon=400.0,
-        caches="static",
-        settings=("first_pickup=0.5",),
+        settings=("first_pickup=0.5", "caches=static"),
         wrappers=("actuator_noise:sigma=0.1",),
     )
     options = {

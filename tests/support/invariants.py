@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from swarm_forage_env.contract.codes import Counter, ObjectStatus
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.scenarios.config import WHEEL_SCALE_MPS
+from swarm_forage_env.scenarios.floor import WHEEL_SCALE_MPS
 from swarm_forage_env.scenarios.obstacles import distances_m
 from swarm_forage_env.world.state import listed
 from swarm_forage_env.wrappers.recorder import TICK_MEANS, TOTALS, RunRecorder

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.scenarios.config import WHEEL_SCALE_MPS
+from swarm_forage_env.scenarios.floor import WHEEL_SCALE_MPS
 from swarm_forage_env.wrappers.recorder import RunRecorder
 from swarm_forage_env.wrappers.throttle import Throttle, ThrottleConfig, sine_throttles, square_throttles
 from swarm_forage_env.wrappers.waveform import Waveform

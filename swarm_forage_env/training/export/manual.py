@@ -20,7 +20,8 @@ from swarm_forage_env.policies.kernels.frames import (
 )
 from swarm_forage_env.policies.kernels.learner import GRIP_COMMANDS, MOTION_WHEELS
 from swarm_forage_env.policies.network import Network, NetworkPolicy
-from swarm_forage_env.scenarios.config import WHEEL_SCALE_MPS, ScenarioConfig
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.floor import WHEEL_SCALE_MPS
 
 WIDTH = 110
 """Characters of a line of formulas or numbers."""
