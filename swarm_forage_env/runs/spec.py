@@ -28,20 +28,6 @@ if TYPE_CHECKING:
 RUN_ID_DIGITS = 16
 """Hexadecimal digits of a run_id: 64 bits, so that a million runs collide with probability 3e-8."""
 _MAX_SEED = 2**63 - 1
-_LATER_FIELDS = (
-    ("robots", "own_sensors"),
-    ("reward", "own_reward"),
-    ("arena", "further_nests"),
-    ("arena", "obstacles"),
-    ("objects", "object_positions_m"),
-    ("quirks", "refusals_not_remembered"),
-    ("quirks", "no_walk_at_site"),
-    ("quirks", "scattered_sites"),
-    ("quirks", "waits_for_cache"),
-    ("quirks", "only_delivering_counts"),
-)
-"""Fields that are no part of an identity where they are empty or off: runs without them are those of before there were
-any."""
 _KEYS = ("scenario", "policy", "parameters", "wrappers", "criterion", "criterion_value", "seed")
 
 
@@ -90,9 +76,6 @@ class RunSpec:
         """Short hexadecimal hash of all that can change a run; equal specifications have equal ids.
 
         `performance` of the scenario is left out: it says how the run is read. So another one finds the stored run.
-        `physics` is left out of runs in Chipmunk, as it was before there were compiled bodies;
-        so are own sensors, an own reward, neighbours, messages, further nests, obstacles and
-        positions of objects where there are none, and quirks of `_LATER_FIELDS` where they are off.
         """
         return identity_of({**self._others(), "scenario": _identifying_fields(self.scenario)})
 
@@ -136,11 +119,8 @@ class RunSpec:
         if missing:
             raise ConfigError(f"Missing key {missing[0]!r} in a run specification.")
         values = dict(mapping)
-        scenario = values.pop("scenario")
-        if isinstance(scenario, Mapping):  # Chipmunk was the only engine when specifications did not name one
-            scenario = {"physics": "chipmunk", **scenario}
         world = World(
-            from_mapping(ScenarioConfig, scenario, where="scenario."),
+            from_mapping(ScenarioConfig, values.pop("scenario"), where="scenario."),
             wrappers_from_list(values.pop("wrappers", ())),
             criterion=values.pop("criterion", UNDISTURBED),
             value=values.pop("criterion_value", 0.0),
@@ -172,15 +152,6 @@ def _identifying_fields(scenario: ScenarioConfig) -> dict[str, Any]:
     """What of a scenario is part of a run's identity, see `RunSpec.run_id`; all seeds of a study share it."""
     mapping = to_mapping(scenario)
     del mapping["performance"]
-    if mapping["physics"] == "chipmunk":
-        del mapping["physics"]
-    for section, name in _LATER_FIELDS:
-        if not mapping[section][name]:
-            del mapping[section][name]
-    robots = mapping["robots"]
-    for size, range_m in (("neighbours_seen", "neighbour_range_m"), ("message_size", "message_range_m")):
-        if not robots[size]:  # likewise; a range then changes nothing
-            del robots[size], robots[range_m]
     return mapping
 
 

@@ -105,13 +105,6 @@ def test_another_engine_is_another_run():
     assert base_in(physics="chipmunk").run_id != BASE.run_id
 
 
-def test_a_specification_without_an_engine_is_one_in_chipmunk():
-    chipmunk = base_in(physics="chipmunk")
-    mapping = chipmunk.to_mapping()
-    assert mapping["scenario"].pop("physics") == "chipmunk"
-    assert RunSpec.from_mapping(mapping) == chipmunk
-
-
 @pytest.mark.parametrize("seed", [-1, 2**63, 1.0, True, "1"])
 def test_bad_seeds_are_refused(seed):
     with pytest.raises(ConfigError, match="Expected seed to be a whole number"):
