@@ -24,7 +24,6 @@ class Stream(IntEnum):
     ACTUATOR_NOISE = 7
     POPULATION = 8
     SCENARIO = 12
-    TURN = 13
 
 
 def stream_rng(seed: int, stream: Stream, level: Iterable[float] = ()) -> np.random.Generator:

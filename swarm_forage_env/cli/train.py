@@ -39,7 +39,7 @@ PICTURE_FILE = "curves.png"
 _HIDDEN = ",".join(map(str, DEFAULT_HIDDEN))
 _OF_SEEDS = ("picture", "as_json", "jobs")
 """Options that go with --seeds only."""
-_OF_PLAN = ("plan", "out", "seed", "turned", "frame_decisions", "seeds", *_OF_SEEDS, "callbacks", "resume")
+_OF_PLAN = ("plan", "out", "seed", "frame_decisions", "seeds", *_OF_SEEDS, "callbacks", "resume")
 """Options that go with --plan."""
 _OF_RESUMING = ("steps", "out", "seeds", *_OF_SEEDS, "callbacks", "resume")
 """Options that say nothing of the plan that is resumed."""
@@ -110,14 +110,6 @@ class RecipeOptions:
             "enough steps.",
         ),
     ] = None
-    turned: Annotated[
-        bool | None,
-        typer.Option(
-            "--turned/--as-drawn",
-            help="Whether to show each episode turned or mirrored, so that the policy cannot learn the compass by "
-            "heart; default turned if samplers draw the worlds.",
-        ),
-    ] = None
     hidden: Annotated[str | None, typer.Option(help=f"Sizes of the hidden layers; default {_HIDDEN}.")] = None
     activation: Annotated[
         str | None,
@@ -148,7 +140,7 @@ class RecipeOptions:
             wrappers=world.wrappers,
             options=dict(map(_argument, self.arguments)),
             evaluation=_given({"every_steps": self.evaluate_every, "horizon_s": self.evaluation_horizon}),
-            **self._chosen("algorithm", "steps", "small_start", "seed", "samples", "turned", "activation"),
+            **self._chosen("algorithm", "steps", "small_start", "seed", "samples", "activation"),
             **_given({"n_arenas": self.arenas, "hidden": None if self.hidden is None else _layers(self.hidden)}),
             **world.fields,
         )
@@ -197,7 +189,7 @@ def train(
         str | None,
         typer.Option(
             help="TOML file with a training plan, or name of a shipped policy; replaces all options below that "
-            "describe the training, but for --seed, --turned and --frame-decisions."
+            "describe the training, but for --seed and --frame-decisions."
         ),
     ] = None,
     asked: RecipeOptions,
@@ -244,7 +236,7 @@ def train(
     several.check(context, asked.seed)
     if plan is not None:
         refuse_others(context, "--plan", _OF_PLAN, "which it decides; write them into its file")
-        chosen = named_plan(plan, seed=asked.seed, turned=asked.turned, frame_decisions=asked.frame_decisions)
+        chosen = named_plan(plan, seed=asked.seed, frame_decisions=asked.frame_decisions)
         name = Path(plan).stem if asked.seed is None else f"{Path(plan).stem}_seed_{asked.seed}"
     else:
         chosen = asked.plan(described)

@@ -90,7 +90,6 @@ def _training(plan: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     learnt, in_runs = _table(plan.get("interface")), _table(plan.get("in_runs"))
     if others := {name: learnt.get(name, "unknown") for name, value in in_runs.items() if learnt.get(name) != value}:
         yield "learnt with", in_words(others)
-    yield "turned", str(plan.get("turned", False))
     for k, stage in enumerate(map(_table, _rows(plan.get("stages"))), start=1):
         own = "in worlds of its own" if "sampler" in stage else in_words(_table(stage.get("scenario")))
         yield f"stage {k}", f"{stage.get('steps', 'unknown')} decisions{', ' if own else ''}{own}"

@@ -30,6 +30,7 @@ from swarm_forage_env.contract.layout import (
 from swarm_forage_env.contract.policy import COMMANDS, ActionError, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.policies.compact_layout import COMPACT_READS, SITE_ROWS, compact_layout
+from swarm_forage_env.policies.frames import check_turned, frames_of
 from swarm_forage_env.policies.kernels.frames import frame_of, leave_frames, take_frames
 from swarm_forage_env.policies.kernels.learner import (
     GRIP_COMMANDS,
@@ -49,7 +50,6 @@ from swarm_forage_env.policies.kernels.learner import (
     show_sites,
 )
 from swarm_forage_env.policies.kernels.network import keep_on
-from swarm_forage_env.policies.turns import check_turned, frames_of
 from swarm_forage_env.scenarios.config import ScenarioConfig
 
 OBSERVATIONS = ("full", "compact")
@@ -114,7 +114,7 @@ class InterfaceConfig:
         if self.own_sensors is not None:
             unique_names("interface.own_sensors", self.own_sensors)
             if self.frame_decisions:
-                check_turned(self.own_sensors, "frames of robots' own; say frame_decisions=0")
+                check_turned(self.own_sensors)
 
     def decisions_in(self, ticks: int) -> int:
         """Return how many decisions there are in so many ticks of a run, with one that its end cuts short."""

@@ -22,7 +22,6 @@ from swarm_forage_env.contract.policy import layout_for
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping, learner_layout
 from swarm_forage_env.policies.network import ACTIVATIONS, TEMPERATURES
 from swarm_forage_env.policies.pretrained import plan_file, plan_names
-from swarm_forage_env.policies.turns import AS_DRAWN, check_turned
 from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.policy_spec import PolicySpec
 from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -45,7 +44,7 @@ MOST_ARENAS, MOST_LAYERS, MOST_UNITS = 10_000, 20, 10_000
 """Sizes of a training that are far beyond sense and still fit into the memory of a machine; our choice."""
 IN_RUNS = {"decision_ticks": 1, "frame_decisions": 0}
 """Fields of an interface that may be others in runs than in training, of the same network -> the least."""
-_OF_THE_WHOLE = ("algorithm", "n_arenas", "hidden", "activation", "samples", "temperature", "in_runs", "turned")
+_OF_THE_WHOLE = ("algorithm", "n_arenas", "hidden", "activation", "samples", "temperature", "in_runs")
 """Keys of a plan that none of its tables has."""
 LEARNING = PolicySpec(label="policy", policy="policy")
 """The policy that is trained, in its evaluations."""
@@ -125,9 +124,6 @@ class TrainingPlan:
     training at the pace of runs would take longer. Frames count decisions, so another pace changes their seconds."""
     sampler: ScenarioSampler | None = None
     """Draws the world of each episode; None = it is always `world`. Then `evaluation` has worlds."""
-    turned: bool | None = None
-    """Whether the learner sees each episode turned or mirrored (`policies.turns`), so that it cannot learn the compass
-    by heart; None = where samplers draw the worlds. Evaluations show their worlds as they are."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "interface", self.interface.for_scenario(self.scenario))
@@ -161,11 +157,6 @@ class TrainingPlan:
         whole("seed", self.seed, at_least=0)
         check_options("options", self.options)
         self._check_worlds()
-        if self.turned is None:
-            object.__setattr__(self, "turned", self.is_sampled)
-        switch("turned", self.turned)
-        if self.turned:
-            check_turned(self.interface.own_sensors or (), AS_DRAWN)
         self.judging(LEARNING)  # refuses horizons that cannot be
 
     def _check_in_runs(self) -> None:
@@ -187,7 +178,7 @@ class TrainingPlan:
         """Return the arguments of the vector environments of a stage, such as `SwarmVecEnv`."""
         sampler = stage.sampler or self.sampler
         worlds = {"sampler": sampler} if sampler else {"scenario": self.scenario, "wrappers": self.wrappers}
-        return {**worlds, "n_arenas": self.n_arenas, "interface": self.interface, "turned": bool(self.turned)}
+        return {**worlds, "n_arenas": self.n_arenas, "interface": self.interface}
 
     def _check_worlds(self) -> None:
         """Refuse worlds that are said twice, that cannot be, or that one policy cannot have in common."""
@@ -372,19 +363,15 @@ def read_plan(path: str | Path) -> TrainingPlan:
     path = Path(path)
     try:
         text = path.read_text(encoding="utf-8")
-        if path.suffix != ".json":
-            return TrainingPlan.from_mapping(parse_toml(text))
-        written = table("the plan", parse_json(text))
-        return TrainingPlan.from_mapping({"turned": False, **written})  # trainings once saw all worlds as they are
+        written = table("the plan", parse_json(text)) if path.suffix == ".json" else parse_toml(text)
+        return TrainingPlan.from_mapping(written)
     except OSError as error:
         raise ConfigError(f"Cannot read the plan {path}: {error.strerror or error}.") from error
     except (ValueError, TypeError) as error:  # ConfigError, and what the two parsers raise
         raise ConfigError(f"Cannot use the plan {path}: {error}") from error
 
 
-def named_plan(
-    name: str, *, seed: int | None = None, turned: bool | None = None, frame_decisions: int | None = None
-) -> TrainingPlan:
+def named_plan(name: str, *, seed: int | None = None, frame_decisions: int | None = None) -> TrainingPlan:
     """Return the plan of a file, or of a shipped policy by its name, with what is given in place of its own.
 
     Raises:
@@ -397,7 +384,7 @@ def named_plan(
             f"neither.{suggestion(name, plan_names())}"
         )
     plan = read_plan(name if shipped is None else shipped)
-    given: dict[str, Any] = {key: value for key, value in (("seed", seed), ("turned", turned)) if value is not None}
+    given: dict[str, Any] = {} if seed is None else {"seed": seed}
     if frame_decisions is not None:
         given["interface"] = dataclasses.replace(plan.interface, frame_decisions=frame_decisions)
         given["in_runs"] = {key: value for key, value in plan.in_runs.items() if key != "frame_decisions"}

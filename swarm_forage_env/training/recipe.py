@@ -79,7 +79,6 @@ def recipe(
     evaluation: EvaluationPlan | Mapping[str, Any] | None = None,
     seed: int = 0,
     samples: bool | None = None,
-    turned: bool | None = None,
     **overrides: Any,
 ) -> TrainingPlan:
     """Return the plan of a training in a scenario, or in many.
@@ -111,8 +110,6 @@ def recipe(
         seed: Seed of everything.
         samples: Whether the trained policy draws its actions, see `TrainingPlan.samples`; default where it
             has probabilities: discrete actions of ppo and a2c.
-        turned: Whether the learner sees each episode turned or mirrored, see `TrainingPlan.turned`; default with a
-            sampler.
         overrides: Scenario fields by name; they go before the recipe's (`nest_progress=0.1`). `horizon_s` is the length
             of the episodes; evaluations last as long as the scenario.
 
@@ -157,7 +154,6 @@ def recipe(
         seed=seed,
         samples=_can_draw(algorithm, chosen) if samples is None else samples,
         sampler=sampler,
-        turned=turned,
     )
 
 

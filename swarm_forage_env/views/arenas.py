@@ -485,7 +485,6 @@ def open_arenas(
     wrappers: Iterable[WrapperConfig | str] = (),
     max_cycles: int | None = None,
     render_mode: str | None = None,
-    turned: bool = False,
     **overrides: Any,
 ) -> ArenaBatch:
     """Build arenas.
@@ -502,7 +501,6 @@ def open_arenas(
             ("population:death_per_tick=0.01").
         max_cycles: Ticks until truncation; default the scenario's horizon.
         render_mode: None or "rgb_array".
-        turned: Show each run turned or mirrored, see `plan_arena`.
         overrides: Scenario fields by name (`n_robots=20`, `nest_progress=0.1`).
 
     Raises:
@@ -516,7 +514,6 @@ def open_arenas(
         wrappers=wrappers,
         max_cycles=max_cycles,
         render_mode=render_mode,
-        turned=turned,
         **overrides,
     )
     if render_mode == "human":

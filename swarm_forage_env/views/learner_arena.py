@@ -21,7 +21,6 @@ from swarm_forage_env.policies.interface import (
 )
 from swarm_forage_env.policies.kernels.learner import SiteMemory
 from swarm_forage_env.policies.kernels.network import keep_on
-from swarm_forage_env.policies.turns import AS_IT_IS, Turn, turn_of
 from swarm_forage_env.scenarios.config import SECTIONS
 from swarm_forage_env.scenarios.overrides import field_sections
 from swarm_forage_env.views.plans import ArenaPlan
@@ -50,8 +49,6 @@ class LearnerSnapshot:
     """Agents of a parallel environment that are left."""
     memory: SiteMemory | None = None
     """What robots remember, where the interface lets them."""
-    turn: Turn = AS_IT_IS
-    """How the learner sees the run."""
 
 
 class LearnerArena:
@@ -65,7 +62,6 @@ class LearnerArena:
         env: Environment and wrappers as one stack.
         forage_env: The ForageEnv at its bottom.
         interface: Translates for the learner; its spaces stay the same, but a reset may make a new object.
-        turn: How the learner sees this run, drawn by its seed where the plan says so.
     """
 
     def __init__(self, plan: ArenaPlan, share: float | None = None) -> None:
@@ -83,7 +79,6 @@ class LearnerArena:
         self.n_rows = plan.world.n_robots
         self._overrides: dict[str, Any] = {}
         self._world: World | None = None
-        self.turn = AS_IT_IS
         self._seeds = np.random.default_rng()
         self._adopt(*self._built({}, None))
 
@@ -95,12 +90,12 @@ class LearnerArena:
     @property
     def shows_all(self) -> bool:
         """Whether the learner sees the rows of the environment as they are."""
-        return self.interface.shows_all and not self._plan.turned
+        return self.interface.shows_all
 
     @property
     def passes_on(self) -> bool:
         """Whether actions are commands of the environment as they are."""
-        return self.interface.passes_on and not self._plan.turned
+        return self.interface.passes_on
 
     def _built(
         self, overrides: Mapping[str, Any], world: World | None
@@ -135,7 +130,6 @@ class LearnerArena:
         sampler = self._plan.sampler
         self._change(overrides, None if sampler is None else sampler.world_of(seed, self._share))
         self._seeds = seeds  # not before the world is known to be possible
-        self.turn = turn_of(seed) if self._plan.turned else AS_IT_IS
         self.env.reset_batch(seed)
         self.interface.forget()
         self.interface.enter(0)
@@ -183,7 +177,7 @@ class LearnerArena:
         """Do what `step` does, in as few calls as wrappers allow."""
         env, interface = self.forage_env, self.interface
         env.require_whole()
-        chosen = self.turn.actions(interface.checked(actions))
+        chosen = interface.checked(actions)
         end = min(env.tick + self._plan.interface.decision_ticks, env.max_cycles)
         if isinstance(self.env, SwarmWrapper):
             self._decide_disturbed(self.env, chosen, end, rewards)
@@ -218,7 +212,7 @@ class LearnerArena:
     def command(self, actions: np.ndarray) -> ActionArray:
         """Return the actions of the next tick, (N, A) in a reused buffer; see `LearnerInterface.command`."""
         checked = self.interface.checked(actions)
-        return self.interface.carry_out(self.turn.actions(checked), self.env.last_obs)
+        return self.interface.carry_out(checked, self.env.last_obs)
 
     def take(self, tick: BatchStep, rewards: np.ndarray) -> tuple[BoolArray, bool, bool]:
         """Take over what a tick of `env` has brought; arguments and result as those of `step`."""
@@ -243,7 +237,6 @@ class LearnerArena:
             seeds=self._seeds.bit_generator.state,
             agents=tuple(agents),
             memory=self.interface.memory(),
-            turn=self.turn,
         )
 
     def restore(self, snapshot: LearnerSnapshot) -> None:
@@ -284,7 +277,6 @@ class LearnerArena:
             before.close()
         self._seeds.bit_generator.state = snapshot.seeds
         self.interface.recall(snapshot.memory)
-        self.turn = snapshot.turn
         self.interface.enter(self._decision)
 
     @property
@@ -300,8 +292,7 @@ class LearnerArena:
         """Return what the learner sees now, (rows, d): a new array, or `out`."""
         if out is None:
             out = np.empty((self.n_rows, self.interface.layout.size), np.float32)
-        seen = self.interface.observe(self.env.last_obs, out[: self.n_robots], decision=self._decision)
-        self.turn.rows(seen, self.interface.layout)
+        self.interface.observe(self.env.last_obs, out[: self.n_robots], decision=self._decision)
         out[self.n_robots :] = 0.0
         return out
 
@@ -310,7 +301,7 @@ class LearnerArena:
 
         Spare rows can stand, because algorithms with masks draw an action for each row.
         """
-        mask = self._with_spare_rows(self.turn.mask(self.interface.mask(self.env.last_obs)))
+        mask = self._with_spare_rows(self.interface.mask(self.env.last_obs))
         mask[self.n_robots :, MOTIONS.index("stand")] = True
         return mask
 

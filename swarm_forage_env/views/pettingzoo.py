@@ -76,7 +76,7 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
 
     def state(self) -> np.ndarray:
         """Return the global view, see `ForageEnv.state`; zeros for robots and objects that this run does not have."""
-        state = self._arena.turn.state(self.forage_env.state(), self._arena.n_robots)
+        state = self.forage_env.state()
         if self._sampler is None:
             return state
         robots, things = np.split(state, [state_size(self._arena.n_robots, 0)])
@@ -176,10 +176,10 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
 def parallel_env(*args: Any, **options: Any) -> ForageEnv | Any:
     """Create a parallel environment; `pettingzoo.make("parallel", id, ...)` calls this function, too.
 
-    It is a `ForageEnv`; with wrappers the outermost of them; with an interface, a sampler or turned worlds a
+    It is a `ForageEnv`; with wrappers the outermost of them; with an interface or a sampler a
     `ParallelLearnerEnv` around them all.
     """
-    if options.get("interface") is not None or options.get("sampler") is not None or options.get("turned"):
+    if options.get("interface") is not None or options.get("sampler") is not None:
         return ParallelLearnerEnv(*args, **options)
     return plan_arena(*args, **options).build({})
 

@@ -6,10 +6,9 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
-from swarm_forage_env._internal.fields import ConfigError, instance, switch
+from swarm_forage_env._internal.fields import ConfigError, instance
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import GivenInterface, InterfaceConfig, chosen_interface
-from swarm_forage_env.policies.turns import AS_DRAWN, check_turned
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import scenario_of_same_size
 from swarm_forage_env.scenarios.presets import chosen_scenario
@@ -35,8 +34,6 @@ class ArenaPlan:
     max_cycles: int | None = None
     """Ticks until truncation; default the scenario's horizon."""
     render_mode: str | None = None
-    turned: bool = False
-    """Whether learners see each run turned or mirrored, see `policies.turns`."""
 
     def build(self, overrides: Mapping[str, Any], world: World | None = None) -> ForageEnv | SwarmWrapper:
         """Build the environment with its wrappers.
@@ -90,7 +87,6 @@ def plan_arena(
     wrappers: Iterable[WrapperConfig | str] = (),
     max_cycles: int | None = None,
     render_mode: str | None = None,
-    turned: bool = False,
     **overrides: Any,
 ) -> ArenaPlan:
     """Plan an arena.
@@ -104,8 +100,6 @@ def plan_arena(
             ("population:death_per_tick=0.01").
         max_cycles: Ticks until truncation; default the scenario's horizon.
         render_mode: None, "rgb_array" or "human"; see `ForageEnv`.
-        turned: Show each run turned by quarter turns or mirrored, one of eight ways that its seed draws, so that a
-            learner cannot learn the compass by heart (`policies.turns`). `ForageEnv` itself shows the world as it is.
         overrides: Scenario fields by name (`n_robots=20`, `n_objects=100`, `caches="static"`).
 
     Raises:
@@ -129,16 +123,12 @@ def plan_arena(
             )
         config = sampler.largest
     chosen = chosen_interface(interface).for_scenario(config)
-    switch("turned", turned)
-    if turned:
-        check_turned(chosen.own_sensors or (), AS_DRAWN)
     return ArenaPlan(
         world=World(config, disturbing),
         sampler=sampler,
         interface=chosen,
         max_cycles=max_cycles,
         render_mode=render_mode,
-        turned=turned,
     )
 
 

@@ -20,7 +20,6 @@ SAMPLED = {
         "scenario": {"horizon_s": {"choice": [1000.0, 4000.0]}},
         "wrappers": {"throttle": {}},
     },
-    "turned": True,
     "stages": [{"steps": 300, "scenario": {}, "sampler": {}}, {"steps": 4000, "scenario": {}}],
 }
 
@@ -51,7 +50,6 @@ def test_it_tells_the_worlds_that_a_sampler_drew():
         ("mine", "width_m 40.0, nest_size_m 4 x 6.4"),
         ("all of them", "horizon_s 1000.0 or 4000.0"),
         ("wrappers", "throttle"),
-        ("turned", "True"),
         ("stage 1", "300 decisions, in worlds of its own"),
         ("stage 2", "4000 decisions"),
     ]

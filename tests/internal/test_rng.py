@@ -18,7 +18,6 @@ def test_stream_numbers_are_stored_history():
         "ACTUATOR_NOISE": 7,
         "POPULATION": 8,
         "SCENARIO": 12,
-        "TURN": 13,
     }
 
 

@@ -7,9 +7,9 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policies.frames import TURNS
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.policies.kernels.frames import N_FRAMES, frame_of
-from swarm_forage_env.policies.turns import TURNS, turn_of
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.plans import plan_arena
@@ -82,26 +82,23 @@ def test_robots_act_in_the_world_as_their_slow_twins(actions):
 
 
 @pytest.mark.parametrize("actions", ["discrete", "continuous"])
-def test_robots_in_turned_worlds_see_and_act_as_their_slow_twins(actions):
-    """All see the world in one turn more, after their frames; the slow twin knows both as one."""
+def test_robots_of_an_arena_see_and_act_as_their_slow_twins(actions):
     world = scenario("warehouse_small", n_robots=6, n_objects=300, physics="compiled")
     choices = {"observation": "compact", "actions": actions, "site_memory": True, "decision_ticks": 2}
-    arena = LearnerArena(plan_arena(world, interface={**choices, "frame_decisions": 3}, turned=True))
+    arena = LearnerArena(plan_arena(world, interface={**choices, "frame_decisions": 3}))
     env, rng = ForageEnv(world), np.random.default_rng(0)
     plain = LearnerInterface(InterfaceConfig(**choices), env.swarm_spec)
-    seeds = {turn_of(seed): seed for seed in range(100)}
-    assert len(seeds) == len(TURNS)
-    for turn, seed in seeds.items():
+    for seed in range(8):
         arena.reset(seed)
         obs = env.reset_batch(seed)
         plain.forget()
         for decision in range(5):
-            seen = frames.seen(plain.observe(obs), plain.layout, decision, 3, turn)
+            seen = frames.seen(plain.observe(obs), plain.layout, decision, 3)
             np.testing.assert_array_equal(arena.observe(), seen)
             wanted = rng.integers(11, size=6) if actions == "discrete" else rng.uniform(-1, 1, (6, 3))
             arena.step(wanted, np.zeros(6))
             for _ in range(2):
-                obs, *_ = env.step_batch(frames.commands(plain.command(wanted, obs), decision, 3, turn))
+                obs, *_ = env.step_batch(frames.commands(plain.command(wanted, obs), decision, 3))
         np.testing.assert_array_equal(arena.env.last_obs, obs)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from swarm_forage_env.contract.layout import ObservationLayout
-from swarm_forage_env.policies.turns import AS_IT_IS, TURNS, Turn
+from swarm_forage_env.policies.frames import TURNS, turned_columns
 
 _BITS = 2**64
 
@@ -17,28 +17,19 @@ def frame(robot: int, decision: int, length: int) -> int:
     return (mixed ^ (mixed >> 31)) >> 61
 
 
-def seen(rows: np.ndarray, layout: ObservationLayout, decision: int, length: int, turn: Turn = AS_IT_IS) -> np.ndarray:
-    """What robots see in their frames, (N, d), from what they would see in the world as it is.
-
-    A `turn` of the whole world comes after the frames: both together are one of the eight ways.
-    """
-    turned = [rows[i : i + 1].copy() for i in range(len(rows))]
-    for robot, row in enumerate(turned):
-        _way(robot, decision, length, turn).rows(row, layout)
-    return np.concatenate(turned)
+def seen(rows: np.ndarray, layout: ObservationLayout, decision: int, length: int) -> np.ndarray:
+    """What robots see in their frames, (N, d), from what they would see in the world as it is."""
+    turned = []
+    for robot, row in enumerate(rows):
+        source, sign = turned_columns(TURNS[frame(robot, decision, length)], layout)
+        turned.append(row[source] * sign)
+    return np.array(turned)
 
 
-def commands(wanted: np.ndarray, decision: int, length: int, turn: Turn = AS_IT_IS) -> np.ndarray:
+def commands(wanted: np.ndarray, decision: int, length: int) -> np.ndarray:
     """What robots do, (N, A), who want this in what they see."""
     done = wanted.copy()
     for robot, row in enumerate(done):
-        if _way(robot, decision, length, turn).is_mirrored:
+        if TURNS[frame(robot, decision, length)].is_mirrored:
             row[:2] = row[1::-1]
     return done
-
-
-def _way(robot: int, decision: int, length: int, turn: Turn) -> Turn:
-    """The frame and then the turn, as one turn: that whose matrix is the product of theirs."""
-    both = turn.matrix @ TURNS[frame(robot, decision, length)].matrix
-    (way,) = (one for one in TURNS if (one.matrix == both).all())
-    return way

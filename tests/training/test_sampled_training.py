@@ -14,7 +14,6 @@ from stable_baselines3 import DQN, PPO
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.network import Network
-from swarm_forage_env.policies.turns import AS_IT_IS
 from swarm_forage_env.runs.table import Table
 from swarm_forage_env.scenarios.presets import warehouse_small
 from swarm_forage_env.training import evaluations
@@ -191,29 +190,12 @@ def test_worlds_to_be_judged_in_fit_the_policy(fields):
         )
 
 
-def test_drawn_worlds_are_turned_unless_the_plan_says_no(tmp_path):
-    assert recipe(sampler=WORLDS).turned is True
-    assert recipe("warehouse_small").turned is False
-    assert recipe("warehouse_small", turned=True).turned is True
+def test_a_plan_may_have_other_frames(tmp_path):
     plan = tmp_path / "plan.toml"
     text = (Path(__file__).parents[1] / "support/tiny_plan.toml").read_text()
     plan.write_text(text)
-    assert read_plan(plan).turned is True
-    assert named_plan(str(plan), turned=False).turned is False
     assert named_plan(str(plan), frame_decisions=9).interface.frame_decisions == 9
     both = "in_runs = { decision_ticks = 2, frame_decisions = 500 }\n"
     plan.write_text(both + text.replace("[interface]", "[interface]\nframe_decisions = 200"))
     assert named_plan(str(plan)).run_interface.frame_decisions == 500
     assert named_plan(str(plan), frame_decisions=9).run_interface.frame_decisions == 9
-    plan.write_text(f"turned = false\n{text}")
-    assert read_plan(plan).turned is False
-
-
-@pytest.mark.parametrize("turned", [True, False])
-def test_a_training_turns_its_arenas(turned):
-    plan = tiny_plan(turned=turned)
-    env = SwarmVecEnv(**plan.arenas_of(plan.stages[0]))
-    env.seed(0)
-    env.reset()
-    turns = {arena.turn for arena in env._arenas.arenas}  # type: ignore[attr-defined] - all in this process
-    assert (turns != {AS_IT_IS}) is turned

@@ -2,8 +2,8 @@
 
 A swarm that shares a network has one taste for directions: where the network tends to the left in doubt, all robots do,
 and search the same part of the arena. With frames of their own they spread, and a robot that takes another frame from
-time to time does not stay where it was (our choice; the eight ways are those in which whole arenas are turned, see
-`policies.turns`). A frame follows from the number of the robot and that of the decision, so nothing has to be stored.
+time to time does not stay where it was (our choice; `policies.frames` has the eight ways). A frame follows from the
+number of the robot and that of the decision, so nothing has to be stored.
 """
 
 from typing import NamedTuple

@@ -1,19 +1,17 @@
-"""Turns: what a learner would see and do if its world were turned by quarter turns, or mirrored.
+"""Frames of robots' own: what a robot would see if its world were turned by quarter turns, or mirrored.
 
 A policy that always sees the nest in the west learns the compass by heart. A world that is turned has the same physics,
 so nothing in it needs to change: it is enough to turn what robots see of it. That moves columns and changes signs, and
-is exact. An arena that is turned by a quarter shows itself as one whose width and height are exchanged.
+is exact. `policies.kernels.frames` says when a robot takes which frame.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.layout import (
     CACHE_FIELDS,
     GROUND_SENSORS,
@@ -24,21 +22,16 @@ from swarm_forage_env.contract.layout import (
     ObservationLayout,
     ObservationSlice,
 )
-from swarm_forage_env.contract.policy import state_size
-from swarm_forage_env.contract.types import BoolArray, IntArray, ObsArray
+from swarm_forage_env.contract.types import IntArray, ObsArray
 from swarm_forage_env.policies.kernels.frames import N_FRAMES, Frames
-from swarm_forage_env.policies.kernels.learner import GRIP_COMMANDS, MOTION_WHEELS
 
-AS_DRAWN = "turned worlds; say turned=False (--as-drawn)"
-"""What turns all that a learner sees, and how to do without, for `check_turned`."""
-_ROBOT_FIELDS, _OBJECT_FIELDS = state_size(1, 0), state_size(0, 1)
 _ABSOLUTE = {"position": (0,), "heading": (0,), "los_cell": (0,), "event_cache": (1,)}
 """Slices with directions or places of the arena: the columns of x, each before its y."""
 _AHEAD_LEFT = ("object", "cache", "pickup_site", "sighting_site")
 """Slices of the learner whose second column is to the left of the robot."""
 
 
-class _Columns(NamedTuple):
+class TurnedColumns(NamedTuple):
     """How columns of a turned row come from those of the row as it is: `row[:, source] * sign`."""
 
     source: IntArray
@@ -53,37 +46,6 @@ class Turn:
     """Quarter turns, 0 to 3."""
     is_mirrored: bool = False
 
-    def rows(self, rows: ObsArray, layout: ObservationLayout) -> None:
-        """Turn what robots see, (N, d) with columns as in `layout`, in place."""
-        if self != AS_IT_IS:
-            source, sign = _columns(self, layout)
-            rows[:] = rows[:, source] * sign
-
-    def actions(self, actions: np.ndarray) -> np.ndarray:
-        """Return actions for the world as it is, from those for the turned one; and the other way round.
-
-        Args:
-            actions: (N,) numbers or (N, k) values, as `LearnerInterface.checked` returns them.
-        """
-        if not self.is_mirrored:
-            return actions
-        if actions.ndim == 1:
-            return _MIRRORED_NUMBERS[actions]
-        return np.concatenate((actions[:, 1::-1], actions[:, 2:]), axis=1)
-
-    def mask(self, mask: BoolArray) -> BoolArray:
-        """Return which actions make sense in the turned world, from those as it is; (N, number of actions)."""
-        return mask[:, _MIRRORED_NUMBERS[: mask.shape[1]]] if self.is_mirrored else mask
-
-    def state(self, state: ObsArray, n_robots: int) -> ObsArray:
-        """Return the global view of the turned world, from that of the world as it is; see `world.sensors`."""
-        turned = state.copy()
-        robots, things = np.split(turned, [state_size(n_robots, 0)])
-        robots, things = robots.reshape(-1, _ROBOT_FIELDS), things.reshape(-1, _OBJECT_FIELDS)
-        for pairs in (robots[:, :2], robots[:, 2:4], things[:, :2]):
-            pairs[:] = pairs @ self.matrix.T
-        return turned
-
     @property
     def matrix(self) -> np.ndarray:
         """(2, 2) float32: what becomes of a vector (x, y)."""
@@ -92,14 +54,8 @@ class Turn:
         return np.array([[cos * mirror, -sin], [sin * mirror, cos]], np.float32)
 
 
-AS_IT_IS = Turn()
 TURNS = tuple(Turn(quarters, is_mirrored) for is_mirrored in (False, True) for quarters in range(4))
 """All ways to lay a rectangle along the axes."""
-
-
-def turn_of(seed: int) -> Turn:
-    """Return the turn of the run with this seed; all are equally likely."""
-    return TURNS[stream_rng(seed, Stream.TURN).integers(len(TURNS))]
 
 
 def frames_of(length: int, layout: ObservationLayout, n_robots: int) -> Frames:
@@ -110,7 +66,7 @@ def frames_of(length: int, layout: ObservationLayout, n_robots: int) -> Frames:
         layout: Columns of what they see.
         n_robots: Number of robots.
     """
-    columns = [_columns(turn, layout) for turn in TURNS]
+    columns = [turned_columns(turn, layout) for turn in TURNS]
     assert len(columns) == N_FRAMES
     return Frames(
         length=length,
@@ -121,33 +77,21 @@ def frames_of(length: int, layout: ObservationLayout, n_robots: int) -> Frames:
     )
 
 
-def check_turned(own_sensors: Sequence[str], what: str) -> None:
+def check_turned(own_sensors: Sequence[str]) -> None:
     """Refuse own sensors, of which only their author knows what a turn does to them; raises ConfigError.
 
     Args:
         own_sensors: Names of own sensors that the learner sees.
-        what: What turns them, and how to do without.
     """
     if own_sensors:
         raise ConfigError(
-            f"Expected worlds as they are where learners see own sensors, got {', '.join(own_sensors)} with {what}. A "
-            "turn would have to turn these sensors, too."
+            f"Expected worlds as they are where learners see own sensors, got {', '.join(own_sensors)} with frames of "
+            "robots' own; say frame_decisions=0. A turn would have to turn these sensors, too."
         )
 
 
-def _mirrored_numbers() -> IntArray:
-    names = (*MOTION_WHEELS, *GRIP_COMMANDS)
-    other = {"left": "right", "right": "left"}
-    mirrored = (" ".join(other.get(word, word) for word in name.split()) for name in names)
-    return np.array([names.index(name) for name in mirrored], np.int32)
-
-
-_MIRRORED_NUMBERS = _mirrored_numbers()
-"""(number of actions,) the action that does the same in a mirrored world."""
-
-
-@lru_cache(maxsize=64)
-def _columns(turn: Turn, layout: ObservationLayout) -> _Columns:
+def turned_columns(turn: Turn, layout: ObservationLayout) -> TurnedColumns:
+    """Return how a row with columns as in `layout` becomes that of the turned world."""
     source, sign = np.arange(layout.size, dtype=np.int32), np.ones(layout.size, np.float32)
     for part in layout:
         own_source, own_sign = source[part.start : part.stop], sign[part.start : part.stop]
@@ -160,7 +104,7 @@ def _columns(turn: Turn, layout: ObservationLayout) -> _Columns:
         elif turn.is_mirrored:
             own_source[:] = own_source[_mirrored_order(part)]
             own_sign[_places_of_left(part)] = -1.0
-    return _Columns(source, sign)
+    return TurnedColumns(source, sign)
 
 
 def _places_of_x(part: ObservationSlice) -> list[int]:
