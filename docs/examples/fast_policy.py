@@ -2,6 +2,8 @@
 
 import math
 
+from numba import njit
+
 from swarm_forage_env import Grip, RobotPolicy
 from swarm_forage_env.contract.detection import ring_sum, sees_nest, sees_object
 
@@ -36,6 +38,7 @@ class SearchNearby(RobotPolicy):
         return 0.5 - 0.5 * turn, 0.5 + 0.5 * turn, Grip.DELIVER if carrying else Grip.GRASP
 
 
-def place_of(see, known):  # called by step, and compiled with it
+@njit
+def place_of(see, known):
     width_m, height_m = known.arena_size_m
     return (see.position[0] + 1.0) * width_m / 2.0, (see.position[1] + 1.0) * height_m / 2.0

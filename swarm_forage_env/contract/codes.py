@@ -14,26 +14,28 @@ A task with two subtasks is the root of a task allocation block (TAB): doing bot
 """
 
 from enum import IntEnum
-from typing import ClassVar
+from typing import NamedTuple
 
 import numpy as np
 
 
-class Grip:
-    """Gripper commands. Send the constant; the environment accepts a band of values around it (`GRIP_LOWER_ENDS`)."""
+class GripperCommands(NamedTuple):
+    """Gripper commands, `Grip.GRASP`. The environment takes a band of values around each (`GRIP_LOWER_ENDS`)."""
 
-    GRASP: ClassVar[float] = 1.0
+    GRASP: float = 1.0
     """Empty: pick up what lies under the centre. Carrying: hold."""
-    RELEASE: ClassVar[float] = -0.125
+    RELEASE: float = -0.125
     """Carrying: let go at this place, never refused. Empty: nothing."""
-    DELIVER: ClassVar[float] = -0.375
+    DELIVER: float = -0.375
     """Carrying: drop only into the nest or a cache."""
-    SITE: ClassVar[float] = -0.625
+    SITE: float = -0.625
     """Carrying: lay on the floor, unless a cache is near."""
-    CREATE_CACHE: ClassVar[float] = -1.0
+    CREATE_CACHE: float = -1.0
     """Carrying: as SITE, then a cache is formed if possible."""
 
 
+Grip = GripperCommands()
+"""Gripper commands; a tuple of numbers, because compiled code can name those of one."""
 GRIP_LOWER_ENDS = (0.0, -0.25, -0.5, -0.75)
 """Commands above these are GRASP, RELEASE, DELIVER and SITE; those that are not above the last are CREATE_CACHE."""
 

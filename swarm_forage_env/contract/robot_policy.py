@@ -1,66 +1,51 @@
 """RobotPolicy: a policy of one function for one robot, which numba compiles and which is called for all of them.
 
-What the robots remember is handed over as bytes. So the compiled tick of the world, which takes much longer to compile
-than such a function, is the same for all of these policies.
+What robots remember is handed over as bytes, so that the world's tick is compiled once for all of these policies.
 """
 
 import dis
 import inspect
-import re
 import traceback
-from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from functools import lru_cache
-from types import FunctionType
 from typing import Any, ClassVar
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import is_compiled, kernel_of_process, type_of
 from swarm_forage_env._internal.fields import ConfigError, known_keys, whole
 from swarm_forage_env._internal.wording import shown
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.contract.kernel_policy import KernelPolicy
-from swarm_forage_env.contract.layout import LIGHT_IF_CARRYING, ObservationLayout
+from swarm_forage_env.contract.layout import ObservationLayout
 from swarm_forage_env.contract.policy import COMMANDS, SwarmSpec
 from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
 
 # isort: split
-from numba import njit, types
+from numba import njit, typeof, types
 
-ACTION = "(left wheel, right wheel, gripper), three finite numbers"
-GRASP, RELEASE = Grip.GRASP, Grip.RELEASE
-_GRIPS = {name: value for name, value in vars(Grip).items() if name.isupper()}
-_INSTEAD = {Grip: namedtuple("Grip", _GRIPS)(**_GRIPS)}
-"""Classes that numba does not know -> what stands for them in compiled code."""
-_WIDTHS = {"b": np.bool_, "i": np.int64, "f": np.float64}
-"""Kind of a number, as numpy names it -> its type in a record."""
-_OF_THE_COMPILER = re.compile(r"Failed in |During: |Enable logging |File |\s*$")
-"""How lines of numba's messages begin that say nothing about the function."""
+_OF_THE_COMPILER = "Failed in ", "During: ", "Enable logging ", "File "  # lines of numba's messages
+_ACTION = "(left wheel, right wheel, gripper), three finite numbers"
 
 
 class StepError(ConfigError):
-    """A `RobotPolicy` whose `step` cannot be compiled, or failed, or whose memory or parameters make no sense."""
+    """A `RobotPolicy` whose `step` cannot be compiled, or failed, or whose memory or parameters are no such numbers."""
 
 
 class RobotPolicy(KernelPolicy):
     """Every robot decides by one function, which is compiled: runs then need no Python between ticks.
 
-    A subclass writes `step` and may state what follows. An instance drives one run.
+    A subclass writes `step`, and `numba.njit` above functions that it calls. It may state what follows. An instance
+    drives one run.
 
     Attributes:
-        memory: Name -> what a robot remembers at the start of a run: a bool, a whole number, a float, or some of one
-            kind. The types stay.
-        parameters: Name -> number or numbers that all robots know; keyword arguments of the class change them. Kinds
-            and shapes stay.
+        memory: Name -> what a robot remembers when a run starts: a truth value or number, or some of one kind.
+        parameters: Name -> what all robots know; keyword arguments of the class change it, of the same kind and shape.
         draws: How many random numbers a robot gets in every tick.
         reads: See `Policy`; `see` has these slices and no others.
 
     Raises:
-        StepError: an argument of another kind or shape than its default; when the class is made, a `step` with other
-            arguments, or memory or parameters that are no numbers; in `reset`, a `step` that cannot be compiled; in
-            `act`, one that raises.
+        StepError: see there; of a `step` that cannot be compiled by `reset`, of one that fails by `act`.
     """
 
     memory: ClassVar[Mapping[str, Any]] = {}
@@ -69,59 +54,46 @@ class RobotPolicy(KernelPolicy):
 
     @staticmethod
     def step(see: Any, robot: Any, chance: Any, known: Any) -> tuple[float, float, float]:
-        """Choose the action of one robot in one tick.
+        """Choose the action of one robot in one tick: left wheel, right wheel and gripper, in [-1, 1].
 
         Args:
             see: What it observes: slices by their names, `see.proximity[0]`; a slice of one column is a number.
             robot: What it remembers, `robot.name`, to be read and written. It is kept while the robot is in repair.
             chance: (draws,) uniform random numbers in [0, 1), the only ones that the seed of a run reaches.
             known: What all robots know: the numbers of `SwarmSpec`, `known.arena_size_m[0]`, and the parameters.
-
-        Returns:
-            Left wheel, right wheel and gripper, in [-1, 1].
         """
         raise NotImplementedError
 
     def __init__(self, **parameters: Any) -> None:
         known_keys(parameters, self.parameters, f"parameter of {type(self).__name__}")
-        cast = {}
         for name, value in parameters.items():
             given, default = np.asarray(value), np.asarray(self.parameters[name])
-            kind = _WIDTHS[default.dtype.kind]
-            if given.shape != default.shape or not np.can_cast(given.dtype, kind):
-                raise StepError(
-                    f"Expected parameter {name} to have the kind and shape of its default {shown(default.tolist())}, "
-                    f"got {shown(value)}."
-                )
-            cast[name] = given.astype(kind)[()]
-        self.parameters = {**self.parameters, **cast}
+            if given.shape != default.shape or not np.can_cast(given.dtype, default.dtype):
+                like = f"the kind and shape of its default {shown(default.tolist())}"
+                raise StepError(f"Expected parameter {name} to have {like}, got {shown(value)}.")
+            self.parameters = {**self.parameters, name: given.astype(default.dtype)[()]}
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
-        asked = tuple(inspect.signature(cls.step).parameters)
-        if len(asked) != 4:
-            raise StepError(
-                f"Expected {cls.__name__}.step to take see, robot, chance and known, got {asked}; it has no self."
-            )
+        cls.step = staticmethod(getattr(cls.step, "py_func", cls.step))  # it may be decorated with `numba.njit`
+        if len(asked := tuple(inspect.signature(cls.step).parameters)) != 4:
+            raise StepError(f"Expected {cls.__name__}.step to take see, robot, chance, known and no self, got {asked}.")
         whole(f"draws of {cls.__name__}", cls.draws, at_least=0)
         _record(cls.memory, "memory")
         _record(cls.parameters, "parameters")
-        taken = cls.parameters.keys() & {field.name for field in fields(SwarmSpec)}
-        if taken:
-            raise StepError(f"Expected parameters of other names than SwarmSpec's, got {min(taken)!r}.")
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run: every robot remembers what `memory` says."""
-        robot, known = _record(self.memory, "memory"), _record(_numbers_of(spec) | dict(self.parameters), "parameters")
+        told = {field.name: getattr(spec, field.name) for field in fields(spec)}
+        numbers = {name: value for name, value in told.items() if isinstance(value, bool | int | float | tuple)}
+        robot, known = _record(self.memory, "memory"), _record({**numbers, **self.parameters}, "parameters")
         self._types = (_see_type(spec.layout, getattr(self, "reads", None)), robot.dtype, known.dtype)
         self._carrying = spec.layout.part("carrying").start
         self._kernel  # noqa: B018 - it is compiled by being asked for
-        robots = np.repeat(robot.view(np.uint8), spec.n_robots, axis=0)
-        failed = np.full(2, -1, np.int64)
-        seen, drawn = np.zeros((1, spec.layout.size), np.float32), np.zeros(self.draws)
+        robots, before = np.repeat(robot.view(np.uint8), spec.n_robots, axis=0), robot.view(np.uint8)
+        seen, failed = np.zeros((1, spec.layout.size), np.float32), np.full(2, -1, np.int64)
         actions = np.zeros((spec.n_robots, COMMANDS), np.float32)
-        before = robot.view(np.uint8)
-        self._start(spec, rng, self.draws, known.view(np.uint8), robots, before, seen, drawn, failed, actions)
+        self._start(spec, rng, self.draws, known.view(np.uint8), robots, before, seen, failed, actions)
 
     @property
     def robots(self) -> np.ndarray:
@@ -133,54 +105,36 @@ class RobotPolicy(KernelPolicy):
         return _kernel_of(type(self).step, self._types, self._carrying)
 
     def check_ticks(self) -> None:
-        """Raise what `step` has raised, found by asking it once more, in Python, with what it was given.
-
-        Raises:
-            StepError: names the policy, the exception, and where and when it was.
-        """
-        known, _, before, seen, drawn, failed, _ = self._state
+        """Raise what `step` has raised as a StepError, found by asking it once more, in Python, with what it got."""
+        known, _, before, seen, failed, _ = self._state
         if failed[0] < 0:
             return
-        see_type, robot_type, known_type = self._types
-        given = seen.view(see_type)[0, 0], before.copy().view(robot_type)[0, 0], drawn, known.view(known_type)[0, 0]
-        cause, step = None, type(self).step
+        see, robot, known = (a.copy().view(of)[0, 0] for a, of in zip((seen, before, known), self._types, strict=True))
+        cause, chance = None, self._chance.row(failed[1])[failed[0]]
         try:
             with np.errstate(divide="raise", invalid="raise"):
-                told = shown(step(*given))
+                told = shown(self.step(see, robot, chance, known))
         except Exception as error:  # noqa: BLE001 - whatever it is, it is told
-            file = step.__code__.co_filename
-            lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
-            cause, told = error, f"{type(error).__name__}: {error} (line {lines[-1]})"
-        raise StepError(
-            f"Expected {type(self).__name__}.step to return {ACTION}, got {told}, for robot_{failed[0]} in tick "
-            f"{failed[1]}."
-        ) from cause
+            frame = traceback.extract_tb(error.__traceback__)[1]
+            cause, told = error, f"{type(error).__name__}: {error} ({frame.filename}:{frame.lineno})"
+        expected = f"Expected {type(self).__name__}.step to return {_ACTION}"
+        raise StepError(f"{expected}, got {told}, for robot_{failed[0]} in tick {failed[1]}.") from cause
 
 
 @lru_cache(64)  # notebooks define classes again and again
 def _kernel_of(step: Any, kinds: tuple[np.dtype[Any], ...], carrying: int) -> Callable[..., None]:
-    """Return one tick of all robots by a step, compiled.
-
-    Args:
-        step: Of a policy.
-        kinds: Types of what it sees, remembers and knows.
-        carrying: Column of the observation that tells whether a robot carries an object.
-    """
+    """Return one tick of all robots, compiled, by a step for these types of what it sees, remembers and knows."""
     see_type, robot_type, known_type = kinds
-    function = _compiled(step, {}) if is_compiled(njit(step)) else step
-    if function is not step:
-        see, robot, known = (np.zeros(1, kind)[0] for kind in kinds)
-        _check_compiles(function, tuple(map(type_of, (see, robot, np.zeros(0), known))))
+    function = _compiled(step, *(typeof(np.zeros(1, kind)[0]) for kind in kinds))
 
     def step_all(obs: ObsArray, active: BoolArray, draws: FloatArray, state: tuple[Any, ...], now: int) -> None:
         """Ask every active robot. Where its step fails, its action is NaN, which no world takes: the run ends there."""
-        known_bytes, memory, before, seen, drawn, failed, actions = state
+        known_bytes, memory, before, seen, failed, actions = state
         see, robots, known = obs.view(see_type), memory.view(robot_type), known_bytes.view(known_type)
         for i in range(active.shape[0]):
             action = actions[i]
-            action[0], action[1] = 0.0, 0.0
-            if not active[i]:
-                action[2] = GRASP if obs[i, carrying] > 0.5 else RELEASE  # it keeps its cargo, see `baselines`
+            if not active[i]:  # it keeps its cargo, see `baselines`
+                action[0], action[1], action[2] = 0.0, 0.0, Grip.GRASP if obs[i, carrying] > 0.5 else Grip.RELEASE
                 continue
             for byte in range(memory.shape[1]):
                 before[0, byte] = memory[i, byte]
@@ -193,84 +147,54 @@ def _kernel_of(step: Any, kinds: tuple[np.dtype[Any], ...], carrying: int) -> Ca
             failed[0], failed[1] = i, now
             for column in range(obs.shape[1]):
                 seen[0, column] = obs[i, column]
-            for column in range(draws.shape[1]):
-                drawn[column] = draws[i, column]
             action[0] = np.nan
             return
 
-    return kernel_of_process(step_all)
+    return njit(error_model="numpy")(step_all)
 
 
-def _compiled(function: Any, done: dict[Any, Any]) -> Any:
-    """Return a function, and those that it calls by their names, to be compiled. As in Python, wrong indices raise."""
-    if function not in done:
-        names = dict(function.__globals__)
-        copy = FunctionType(function.__code__, names, function.__name__, function.__defaults__, function.__closure__)
-        done[function] = njit(error_model="python", boundscheck=True)(copy)
-        for name in function.__code__.co_names:
-            value = names.get(name)
-            if isinstance(value, FunctionType):
-                names[name] = _compiled(value, done)
-            elif isinstance(value, type) and value in _INSTEAD:
-                names[name] = _INSTEAD[value]
-    return done[function]
-
-
-def _check_compiles(function: Any, kinds: tuple[Any, ...]) -> None:
+def _compiled(step: Any, see: Any, robot: Any, known: Any) -> Any:
     """Compile a step for arguments of these types; raises StepError if numba cannot, or for another result."""
-    name, code = function.py_func.__qualname__, function.py_func.__code__
+    function, kinds, code = njit(boundscheck=True)(step), (see, robot, types.float64[::1], known), step.__code__
+    if function is step:  # the compiler is switched off
+        return step
+    expected, line = f"Expected {step.__qualname__} ", code.co_firstlineno
     try:
         function.compile(kinds)
     except Exception as error:  # numba has errors of many kinds; of an unknown field of a record it raises KeyError
-        said = [line.strip() for line in str(error).splitlines() if not _OF_THE_COMPILER.match(line)]
-        lines = re.findall(r'File ".*", line (\d+)', str(error))
+        line = getattr(getattr(error, "loc", None), "line", line)
+        said = [text for text in map(str.strip, str(error).splitlines()) if text]
+        told = " ".join([text for text in said if not text.startswith(_OF_THE_COMPILER)][:2])
         if isinstance(error, KeyError):
-            said = [f"no field {error.args[0]!r}"]
-            lines = [step.positions.lineno for step in dis.get_instructions(code)
-                     if step.argval == error.args[0] and step.positions is not None]  # fmt: skip
-        raise StepError(
-            f"Expected {name} to be Python that numba compiles (docs/policies.md, A fast one), got "
-            f"{' '.join(said[:2])} (line {(lines or [code.co_firstlineno])[0]})."
-        ) from error
+            places = [i.positions for i in dis.get_instructions(code) if i.argval == error.args[0]]
+            told, line = f"no field {error}", getattr(places[0], "lineno", line) if places else line
+        expected += "and what it calls under numba.njit to be Python that numba compiles"
+        raise StepError(f"{expected}, got {told} ({code.co_filename}:{line}).") from error
     result: Any = function.overloads[kinds].signature.return_type
     parts: Any = result if isinstance(result, types.BaseTuple) else ()
-    if len(parts) != COMMANDS or not all(isinstance(p, types.Integer | types.Float | types.Boolean) for p in parts):
-        raise StepError(
-            f"Expected {name} (line {code.co_firstlineno}) to return {ACTION}, got {types.unliteral(result)}."
-        )
+    if len(parts) != COMMANDS or not all(isinstance(part, types.Number | types.Boolean) for part in parts):
+        raise StepError(f"{expected}({code.co_filename}:{line}) to return {_ACTION}, got {types.unliteral(result)}.")
+    return function
 
 
 def _see_type(layout: ObservationLayout, reads: tuple[str, ...] | None) -> np.dtype[Any]:
     """Return the type of one observation as a record of the slices that are read."""
-    wanted = None if reads is None else {*reads} | ({"light"} if LIGHT_IF_CARRYING in reads else set())
+    wanted = None if reads is None else [name.removesuffix(" if carrying") for name in reads]
     parts = [part for part in layout if wanted is None or part.name in wanted]
-    described: Any = {
-        "names": [part.name for part in parts],
-        "formats": [(np.float32, (part.size,) if part.size > 1 else ()) for part in parts],
-        "offsets": [part.start * 4 for part in parts],
-        "itemsize": layout.size * 4,
-    }
+    formats = [(np.float32, (part.size,) if part.size > 1 else ()) for part in parts]
+    names, offsets = [part.name for part in parts], [part.start * 4 for part in parts]
+    described: Any = {"names": names, "formats": formats, "offsets": offsets, "itemsize": layout.size * 4}
     return np.dtype((np.record, described))
 
 
 def _record(values: Mapping[str, Any], what: str) -> np.ndarray:
     """Return (1, 1) a record of values; raises StepError for a name no attribute can have, or what is no number."""
-    arrays = {name: np.asarray(value) for name, value in values.items()}
+    arrays = {name: np.asarray(value) for name, value in (values or {"nothing": False}).items()}
     for name, array in arrays.items():
-        if not name.isidentifier() or hasattr(np.record, name) or array.dtype.kind not in _WIDTHS:
-            raise StepError(
-                f"Expected the {what} to be numbers, or True or False, under names that numpy's records leave free, "
-                f"got {name!r}: {shown(values[name])}."
-            )
-    described = [(name, _WIDTHS[array.dtype.kind], array.shape) for name, array in arrays.items()]
-    kind = np.dtype((np.record, np.dtype(described or [("nothing", np.bool_)], align=True)))
-    record = np.zeros((1, 1), kind)
-    for name, array in arrays.items():
-        record[name] = array
+        if not name.isidentifier() or hasattr(np.record, name) or array.dtype.kind not in "biuf":
+            like = "numbers, or True or False, under names that numpy's records leave free"
+            raise StepError(f"Expected the {what} to be {like}, got {name!r}: {shown(values[name])}.")
+    kind = np.dtype([(name, array.dtype, array.shape) for name, array in arrays.items()], align=True)
+    record = np.zeros((1, 1), np.dtype((np.record, kind)))
+    record[0, 0] = tuple(arrays.values())
     return record
-
-
-def _numbers_of(spec: SwarmSpec) -> dict[str, Any]:
-    """Return the fields of a specification that are numbers."""
-    found = {field.name: getattr(spec, field.name) for field in fields(spec)}
-    return {name: value for name, value in found.items() if isinstance(value, bool | int | float | tuple)}
