@@ -13,10 +13,10 @@ from swarm_forage_env.wrappers.population import (
     death_levels,
     malfunction_levels,
 )
-from swarm_forage_env.wrappers.population_process import simulate_population
 from swarm_forage_env.wrappers.recorder import RunRecorder
 from tests.support import engines
 from tests.support.engines import in_each_engine
+from tests.support.population import simulate_population
 from tests.support.stage import assert_same_world, begin, cell_centre, lay, load, put, snapshot, stand, tidy_world
 
 

@@ -14,10 +14,10 @@ from swarm_forage_env.wrappers.population_process import (
     EventRates,
     PopulationState,
     advance_population,
-    simulate_population,
 )
 from tests.reference.adversity import SlowPopulation
 from tests.reference.population_chain import generator, mean_away_by_exponential
+from tests.support.population import simulate_population
 
 RUN_TICKS = 50_000
 SURE = 0.001
