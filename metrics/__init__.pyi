@@ -59,12 +59,10 @@ from .checks import PopulationError as PopulationError
 from .queues import QueueStats as QueueStats
 from .queues import queue_statistics as queue_statistics
 from .queues import mean_away as mean_away
-from .queues import robots_at_work as robots_at_work
 from .population import population_robustness as population_robustness
 from .population import recorded_population_robustness as recorded_population_robustness
 from .population import population_weight as population_weight
 from .population import availability as availability
-from .population import availability_curves as availability_curves
 from .population import ratio_for_team as ratio_for_team
 
 # the law of swarm sizes
@@ -73,7 +71,6 @@ from .size_law import SizeLaw as SizeLaw
 
 # how near to the limit
 from .scoring import limit_of as limit_of
-from .scoring import foraging_limit as foraging_limit
 from .scoring import ForagingLimit as ForagingLimit
 
 # statistics

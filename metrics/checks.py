@@ -75,49 +75,6 @@ def check_horizon(horizon: float) -> None:
         raise PopulationError(f"Expected a horizon of more than 0 ticks, got {horizon}; pass the run length in ticks.")
 
 
-def check_rate(name: str, rate: float) -> None:
-    """Check a rate of change of the population, per tick.
-
-    Raises:
-        PopulationError: Negative, infinite or not a number.
-    """
-    if not (math.isfinite(rate) and rate >= 0.0):
-        raise PopulationError(f"Expected {name} as a finite rate >= 0 per tick, got {rate}.")
-
-
-def check_ratio(ratio_out: float) -> None:
-    """Check a ratio of leaving over entering; infinity is allowed.
-
-    Raises:
-        PopulationError: Negative or NaN.
-    """
-    if not ratio_out >= 0.0:
-        raise PopulationError(f"Expected ratio_out = lambda / mu >= 0, got {ratio_out}.")
-
-
-def check_team(team: float) -> None:
-    """Check a mean number of robots at work.
-
-    Raises:
-        PopulationError: Not positive and finite.
-    """
-    if not (math.isfinite(team) and team > 0.0):
-        raise PopulationError(f"Expected a mean team of more than 0 robots at work, finite, got {team}.")
-
-
-def check_wave(frequency: float, amplitude: float, offset: float, phase: float) -> None:
-    """Check the parameters of a waveform.
-
-    Raises:
-        ValueError: One is not finite, or the frequency is negative.
-    """
-    if frequency < 0.0 or not all(map(math.isfinite, (frequency, amplitude, offset, phase))):
-        raise ValueError(
-            "Expected finite numbers and frequency >= 0 cycles per tick, got "
-            f"frequency={frequency}, amplitude={amplitude}, offset={offset}, phase={phase}."
-        )
-
-
 def check_level(level: float) -> None:
     """Check a confidence level.
 

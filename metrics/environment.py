@@ -6,7 +6,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .checks import CurveError, check_option, check_wave
+from .checks import CurveError, check_option
 from .curves import FloatArray, as_curve, as_waveforms
 from .distance import dtw
 
@@ -52,7 +52,11 @@ def waveform(
     """
     kind_name = kind.lower()
     check_option("kind", kind_name, WaveformKind)
-    check_wave(frequency, amplitude, offset, phase)
+    if frequency < 0.0 or not all(map(math.isfinite, (frequency, amplitude, offset, phase))):
+        raise ValueError(
+            "Expected finite numbers and frequency >= 0 cycles per tick, got "
+            f"frequency={frequency}, amplitude={amplitude}, offset={offset}, phase={phase}."
+        )
     cycles = np.asarray(ticks, dtype=np.float64) / _period(frequency)
     if kind_name == "constant":
         return np.full_like(cycles, amplitude)[()]

@@ -1,7 +1,6 @@
 """Robustness to a changing population, Eq. (12), and availability of enough robots, Eq. (13)."""
 
 import math
-from collections.abc import Sequence
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -12,9 +11,7 @@ from .checks import (
     PopulationError,
     check_horizon,
     check_option,
-    check_ratio,
     check_size,
-    check_team,
     check_whole,
 )
 from .curves import (
@@ -180,7 +177,8 @@ def availability(n: int, n_min: int, ratio_out: float) -> float:
         PopulationError: A ratio that is negative or NaN.
     """
     n, n_min = check_size("n", n), check_whole("n_min", n_min)
-    check_ratio(ratio_out)
+    if not ratio_out >= 0.0:
+        raise PopulationError(f"Expected ratio_out = lambda / mu >= 0, got {ratio_out}.")
     if n_min <= 0:
         return 1.0
     if n_min > n:
@@ -211,33 +209,9 @@ def ratio_for_team(team: float) -> float:
     Source: our choice of the reading that gives the 0.40 of the paper's availability figure (N = 50, N_min = 5, M = 5);
     the queue length that the paper prints gives 0.454.
     """
-    check_team(team)
+    if not (math.isfinite(team) and team > 0.0):
+        raise PopulationError(f"Expected a mean team of more than 0 robots at work, finite, got {team}.")
     return 1.0 + 1.0 / team
-
-
-def availability_curves(n: int, teams: Sequence[float], n_min: Sequence[int] | None = None) -> FloatArray:
-    """Availability p_v over the number of robots needed, one curve per mean team, Eq. (13).
-
-        p_v = sum_{k=N_min}^{N} q^-k / sum_{k=0}^{N} q^-k,    q = (1 + M) / M
-
-    This is `availability` at the ratio `ratio_for_team(M)`, as in the paper's availability figure.
-
-    Args:
-        n: Swarm size N.
-        teams: Mean numbers of robots at work M, K of them; see `ratio_for_team`.
-        n_min: Numbers of robots needed, J of them. Default: 1, 2, ..., N.
-
-    Returns:
-        p_v in [0, 1], shape (K, J). Higher is better.
-
-    Raises:
-        CurveError: n < 1, or a number in n_min is not whole.
-        PopulationError: A team is not positive and finite.
-    """
-    needed = range(1, check_size("n", n) + 1) if n_min is None else n_min
-    ratios = [ratio_for_team(team) for team in teams]
-    curves = [[availability(n, demand, ratio) for demand in needed] for ratio in ratios]
-    return np.array(curves, dtype=np.float64).reshape(len(ratios), len(needed))
 
 
 def _share_at_work(rates: PopulationRates, horizon: float, n: int | None, weight: PopulationWeight) -> float:

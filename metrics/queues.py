@@ -9,10 +9,9 @@ import math
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.special import pdtrc  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
 
-from .checks import PopulationError, check_horizon, check_rate, check_size
+from .checks import PopulationError, check_horizon, check_size
 from .curves import FloatArray
 
 
@@ -37,7 +36,9 @@ class PopulationRates:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            check_rate(field.name, getattr(self, field.name))
+            rate = getattr(self, field.name)
+            if not (math.isfinite(rate) and rate >= 0.0):
+                raise PopulationError(f"Expected {field.name} as a finite rate >= 0 per tick, got {rate}.")
 
     @property
     def lam(self) -> float:
@@ -151,60 +152,26 @@ def mean_away(rates: PopulationRates, n: int, horizon: float) -> float:
     """
     n = check_size("n", n)
     check_horizon(horizon)
-    return float(_mean_away_until(rates, n, np.array([horizon], dtype=np.float64))[0])
-
-
-def robots_at_work(rates: PopulationRates, n: int, interval_ends: ArrayLike) -> FloatArray:
-    """Expected number of robots at work in each interval of a run that starts with no robot away.
-
-        robots_at_work(PopulationRates(lambda_d=0.001), 50, [1000, 2000])  # [49.5, 48.5], one death per 1000 ticks
-
-    With m_T of `mean_away`, the robots away in the interval from s to t are (t m_t - s m_s) / (t - s) on average.
-
-    Args:
-        rates: Rates per tick. The queue need not be stable.
-        n: Swarm size N.
-        interval_ends: Ends of the intervals in ticks, rising, (T,); the first begins at 0.
-
-    Returns:
-        Robots in [0, n], mean over each interval, (T,).
-
-    Raises:
-        CurveError: n < 1.
-        PopulationError: Ends that do not rise from above 0.
-    """
-    n = check_size("n", n)
-    ends = np.asarray(interval_ends, dtype=np.float64)
-    starts = np.concatenate([[0.0], ends[:-1]]) if ends.ndim == 1 else ends
-    if ends.ndim != 1 or ends.size == 0 or not np.isfinite(ends).all() or not (ends > starts).all():
-        raise PopulationError(f"Expected ends of intervals that rise from above 0 ticks, (T,), got {ends.tolist()}.")
-    away = ends * _mean_away_until(rates, n, ends)
-    return n - np.diff(away, prepend=0.0) / (ends - starts)
-
-
-def _mean_away_until(rates: PopulationRates, n: int, ends: FloatArray) -> FloatArray:
-    """m_T of `mean_away` for several T, (J,)."""
     if rates.lam == 0.0:
-        return np.zeros_like(ends)
+        return 0.0
     leave, back = _chain(rates, n)
     jump_rate = leave[0] + rates.mu  # no state has a larger total rate
-    expected_jumps = jump_rate * ends
-    most = float(expected_jumps[-1])
-    n_jumps = int(most + 12.0 * math.sqrt(most)) + 40  # the tail beyond is below 1e-16
-    more_jumps = pdtrc(np.arange(n_jumps)[:, None], expected_jumps)
+    expected_jumps = jump_rate * horizon
+    n_jumps = int(expected_jumps + 12.0 * math.sqrt(expected_jumps)) + 40  # the tail beyond is below 1e-16
+    more_jumps = pdtrc(np.arange(n_jumps), expected_jumps)
     up, down = leave / jump_rate, back / jump_rate
     stay = 1.0 - up - down
     n_away = np.arange(n + 1.0)
     probability = np.zeros(n + 1)
     probability[0] = 1.0
-    total = np.zeros_like(ends)
+    total = 0.0
     for more in more_jumps:
         total += more * (probability @ n_away)
         after = stay * probability
         after[1:] += up[:-1] * probability[:-1]
         after[:-1] += down[1:] * probability[1:]
         probability = after
-    return total / expected_jumps
+    return float(total / expected_jumps)
 
 
 def _chain(rates: PopulationRates, n: int) -> tuple[FloatArray, FloatArray]:

@@ -2,7 +2,7 @@
 
 from swarm_forage_env.scenarios.performance import Performance
 
-from .limits import ForagingLimit, foraging_limit, limit_of
+from .limits import ForagingLimit, limit_of
 from .plots import draw_scores
 from .policy_scores import ScoreQuestion, compare_policies, score_curves, score_policy, score_question
 from .question import Question, ask
@@ -20,7 +20,6 @@ __all__ = [
     "score_curves",
     "compare_tables",
     "limit_of",
-    "foraging_limit",
     "ForagingLimit",
     "ask",
     "run_question",

@@ -10,7 +10,6 @@ from metrics import (
     PopulationError,
     PopulationRates,
     availability,
-    availability_curves,
     population_robustness,
     population_weight,
     queue_statistics,
@@ -121,41 +120,31 @@ PAPER_TABLE = {
 """(robots, mean team M) -> availability of 1, 5, 10, 20, 40 robots with q = (1 + M) / M."""
 
 
-@pytest.mark.parametrize("n", [50, 200])
-def test_availability_of_the_papers_teams(n):
-    teams = (5, 10, 20)
-    curves = availability_curves(n, teams, (1, 5, 10, 20, 40))
-    assert curves == pytest.approx(np.array([PAPER_TABLE[n, team] for team in teams]), abs=0.0005)
+@pytest.mark.parametrize(("n", "team"), PAPER_TABLE)
+def test_availability_of_the_papers_teams(n, team):
+    found = [availability(n, needed, ratio_for_team(team)) for needed in (1, 5, 10, 20, 40)]
+    assert found == pytest.approx(PAPER_TABLE[n, team], abs=0.0005)
 
 
-def test_availability_curve_by_hand():
+def test_availability_of_a_team_by_hand():
     # M = 1: q = 2. Two robots: weights 1, 1/2, 1/4 of 0, 1, 2 at work.
     assert ratio_for_team(1) == 2.0
-    assert availability_curves(2, [1]) == pytest.approx(np.array([[3 / 7, 1 / 7]]), abs=1e-12)
-    assert availability_curves(2, [1], [0, 1, 3]) == pytest.approx(np.array([[1.0, 3 / 7, 0.0]]), abs=1e-12)
-
-
-def test_availability_curves_fall_with_the_demand_and_rise_with_the_team():
-    curves = availability_curves(50, [2.5, 5, 10])
-    assert curves.shape == (3, 50)
-    assert (np.diff(curves, axis=1) < 0).all()
-    assert (np.diff(curves, axis=0) > 0).all()
-    assert availability_curves(50, [], [1, 2]).shape == (0, 2)
+    assert [availability(2, needed, 2.0) for needed in (0, 1, 2, 3)] == pytest.approx([1.0, 3 / 7, 1 / 7, 0.0])
 
 
 @pytest.mark.parametrize("n", [2, 50, 200])
-def test_the_area_under_an_availability_curve_is_the_mean_number_at_work(n):
+def test_the_sum_of_availabilities_is_the_mean_number_at_work(n):
     # Mean = sum over k >= 1 of the probability of at least k; below M, which a swarm without a size limit would have.
-    queue = queue_statistics(PopulationRates(lambda_bd=ratio_for_team(20), mu_bd=1.0), n)
-    at_work = n - queue.truncated_length
-    assert availability_curves(n, [20]).sum() == pytest.approx(at_work, rel=1e-9)
+    ratio = ratio_for_team(20)
+    at_work = n - queue_statistics(PopulationRates(lambda_bd=ratio, mu_bd=1.0), n).truncated_length
+    assert sum(availability(n, needed, ratio) for needed in range(1, n + 1)) == pytest.approx(at_work, rel=1e-9)
     assert at_work < 20
 
 
 @pytest.mark.parametrize("team", [0.0, -1.0, math.inf, math.nan])
 def test_teams_are_positive_and_finite(team):
     with pytest.raises(PopulationError, match="more than 0 robots at work"):
-        availability_curves(50, [5, team])
+        ratio_for_team(team)
 
 
 def test_the_paper_took_the_queue_length_for_the_number_at_work():

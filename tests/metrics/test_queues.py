@@ -4,14 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
 
 from metrics import (
     PopulationError,
     PopulationRates,
     mean_away,
     queue_statistics,
-    robots_at_work,
 )
 from tests.reference.population_chain import (
     generator,
@@ -159,57 +157,3 @@ def test_rates_are_finite_and_not_negative(rate):
 def test_horizon_is_a_length(horizon):
     with pytest.raises(PopulationError, match="horizon"):
         mean_away(HALF, 10, horizon)
-
-
-def test_deaths_alone_take_one_robot_after_the_other():
-    # Deaths at 0.001 per tick: half a robot is dead on average in the first 1000 ticks, one and a half in the next.
-    found = robots_at_work(PopulationRates(lambda_d=0.001), 50, [1000, 2000])
-    np.testing.assert_allclose(found, [49.5, 48.5], rtol=1e-12)
-
-
-def test_robots_at_work_are_those_of_the_matrix_exponential():
-    rates, n = PopulationRates(lambda_bd=0.02, mu_bd=0.03), 4
-    chain = generator(rates.lam, rates.mu, n)
-    ends = np.array([10.0, 40.0, 200.0])
-    ticks = np.linspace(0.0, 200.0, 4001)
-    step, states = expm(chain * 0.05), [np.eye(n + 1)[0]]
-    for _ in ticks[1:]:
-        states.append(states[-1] @ step)
-    at_work = np.array(states) @ np.arange(n, -1.0, -1.0)
-    expected = [
-        np.trapezoid(at_work[(ticks >= start) & (ticks <= end)], dx=0.05) / (end - start)
-        for start, end in zip((0.0, 10.0, 40.0), ends, strict=True)
-    ]
-    np.testing.assert_allclose(robots_at_work(rates, n, ends), expected, rtol=1e-5)
-
-
-def test_intervals_add_up_to_the_mean_of_the_run():
-    rates = PopulationRates(lambda_bd=0.001, mu_bd=0.001022222)
-    ends = np.arange(1000, 50_001, 1000)
-    assert 50.0 - robots_at_work(rates, 50, ends).mean() == pytest.approx(mean_away(rates, 50, 50_000), rel=1e-9)
-    assert robots_at_work(PopulationRates(), 50, ends).tolist() == [50.0] * 50
-
-
-def test_robots_at_work_are_the_mean_of_drawn_runs():
-    """Runs of the queue itself: 400 of them, drawn event by event."""
-    rates, n, ends, rng = PopulationRates(lambda_bd=0.02, mu_bd=0.01), 5, [50.0, 100.0, 200.0], np.random.default_rng(5)
-    runs = np.array([_drawn_population(rates, n, ends, rng) for _ in range(400)])
-    np.testing.assert_allclose(runs.mean(axis=0), robots_at_work(rates, n, ends), atol=0.25)
-
-
-def _drawn_population(rates, n, ends, rng):
-    """Robots at work, mean over each interval, of one random run."""
-    ticks, at_work, now = [0.0], [n], 0.0
-    while now < ends[-1]:
-        leave, back = rates.lam * (at_work[-1] > 0), rates.mu * (at_work[-1] < n)
-        now += rng.exponential(1.0 / (leave + back))
-        ticks.append(now)
-        at_work.append(at_work[-1] + (1 if rng.random() * (leave + back) < back else -1))
-    inside = [np.clip(ticks, start, end) for start, end in zip((0.0, *ends[:-1]), ends, strict=True)]
-    return [np.diff(clipped) @ at_work[:-1] / (clipped[-1] - clipped[0]) for clipped in inside]
-
-
-@pytest.mark.parametrize("ends", [[], [0, 100], [100, 100], [200, 100], 100, [1.0, np.inf]])
-def test_ends_that_do_not_rise_are_refused(ends):
-    with pytest.raises(PopulationError, match="ends of intervals"):
-        robots_at_work(PopulationRates(lambda_d=0.01), 4, ends)

@@ -1,70 +1,12 @@
 """The estimate of the limit: worked examples, its value in the presets, no run beyond it, and what has no estimate."""
 
-import numpy as np
 import pytest
 
-from metrics import CurveError, foraging_limit, limit_of
+from metrics import CurveError, limit_of
 from metrics.scoring.limits import share_of_limit
 from swarm_forage_env import World, parse_wrapper, plan_run, run_one, scenario
 
-TWO_ROBOTS = {"n_robots": 2, "n_objects": 1, "horizon_s": 990.0, "speed_mps": 0.1, "handling_s": 1.0}
 PER_1000_S = {"warehouse_small": 125, "warehouse_medium": 1384, "warehouse_dual": 324, "warehouse_quad": 948}
-
-
-def test_one_gap_makes_all_trips_equal():
-    # A trip takes 2 * 10 / 0.1 + 1 = 201 s; each robot has 990 s and the 100 s of the way out that it may save.
-    found = foraging_limit([10.0], **TWO_ROBOTS)
-    assert found.deliveries == pytest.approx(2 * 1090.0 / 201.0)
-    assert found.first_pickups == pytest.approx(found.deliveries + 1)
-    assert found.nearest_share == pytest.approx(found.deliveries / (found.deliveries + 1))
-
-
-def test_near_objects_are_fetched_and_far_ones_left():
-    # Trips of 21 s and 181 s, half of the placements each; E[d] / v = 50 s. With 20 objects the share u solves
-    # 20 (0.5 * 21 + (u - 0.5) 181) = 1040 (1 - u): u = 2640 / 4660, of D + 20 = 20 / (1 - u) placements.
-    found = foraging_limit([9.0, 1.0], **TWO_ROBOTS | {"n_robots": 1, "n_objects": 20})
-    assert found.nearest_share == pytest.approx(2640 / 4660)
-    assert found.deliveries == pytest.approx(20 * 2640 / 2020)
-
-
-def test_the_equation_holds_for_any_distribution():
-    rng = np.random.default_rng(5)
-    gaps, weights = rng.gamma(2.0, 4.0, 300), rng.random(300)
-    world = {"n_robots": 40, "n_objects": 150, "horizon_s": 3000.0, "speed_mps": 0.1, "handling_s": 0.4}
-    found = foraging_limit(gaps, weights=weights, **world)
-    order = np.argsort(gaps)
-    share, placed = weights[order] / weights.sum(), found.deliveries + 150
-    fetched = np.clip(found.deliveries / placed - np.concatenate(([0.0], np.cumsum(share)[:-1])), 0.0, share)
-    spent = placed * fetched @ (2.0 * gaps[order] / 0.1 + 0.4)
-    assert spent == pytest.approx(40 * (3000.0 + share @ gaps[order] / 0.1))
-
-
-def test_objects_that_fill_the_far_places_leave_the_near_ones():
-    # 3 of 4 objects lie for ever on 3 of the 4 places: all trips go to the nearest quarter, of 21 s each.
-    world = TWO_ROBOTS | {"n_robots": 1, "n_objects": 4}
-    found = foraging_limit([1.0, 9.0, 9.0, 9.0], **world, n_places=4)
-    assert found.nearest_share == pytest.approx(0.25)
-    assert found.deliveries == pytest.approx((990.0 + 70.0) / 21.0)
-    assert found.deliveries > foraging_limit([1.0, 9.0, 9.0, 9.0], **world).deliveries
-
-
-@pytest.mark.parametrize(
-    ("gaps", "changes", "match"),
-    [
-        ([], {}, "finite gaps"),
-        ([1.0, np.nan], {}, "finite gaps"),
-        ([1.0], {"weights": [1.0, 2.0]}, "finite gaps"),
-        ([-1.0], {}, "0 or more"),
-        ([1.0], {"weights": [0.0]}, "0 or more"),
-        ([1.0], {"speed_mps": 0.0}, "speed_mps > 0"),
-        ([1.0], {"n_robots": 0}, "n_robots >= 1"),
-        ([1.0], {"n_objects": 0}, "1 object or more"),
-        ([1.0], {"n_places": 0.5}, "a place for each"),
-    ],
-)
-def test_what_is_no_world_is_refused(gaps, changes, match):
-    with pytest.raises(CurveError, match=match):
-        foraging_limit(gaps, **TWO_ROBOTS | changes)
 
 
 @pytest.mark.parametrize("name", PER_1000_S)
@@ -72,12 +14,32 @@ def test_the_limits_of_the_warehouses(name):
     assert round(limit_of(name).deliveries / 10.0) == PER_1000_S[name]
 
 
-def test_a_gap_ends_where_cell_and_nest_begin():
-    # One cell, its near edge 2.8 m from the nest that ends at 4.8 m: a trip takes 2 * 2.8 / 0.1 + 0.4 s.
-    world = scenario(
-        "warehouse_small", n_robots=1, n_objects=1, placement="positions", object_positions_m=((7.7, 8.1),)
+def with_objects_at(*x_m: float, n_robots: int):
+    """A warehouse whose objects appear in a cell each, to the right of its nest, which ends at 4.8 m."""
+    places = tuple((x, 8.1) for x in x_m)
+    return scenario(
+        "warehouse_small", n_robots=n_robots, n_objects=len(x_m), placement="positions", object_positions_m=places
     )
-    assert limit_of(world).deliveries == pytest.approx((10_000.0 + 28.0) / 56.4)
+
+
+def test_a_gap_ends_where_cell_and_nest_begin():
+    # One cell, its near edge 2.8 m from the nest: a trip takes 2 * 2.8 / 0.1 + 0.4 s, and E[d] / v is 28 s.
+    limit = limit_of(with_objects_at(7.7, n_robots=1))
+    assert limit.deliveries == pytest.approx((10_000.0 + 28.0) / 56.4)
+    assert limit.first_pickups == pytest.approx(limit.deliveries + 1)
+
+
+def test_near_objects_are_fetched_and_far_ones_left():
+    # Gaps of 2.8 and 12.8 m, trips of 56.4 s and 256.4 s, half of the placements each; E[d] / v is 78 s. The share u
+    # solves 2 (0.5 * 56.4 + (u - 0.5) 256.4) = 2 * 10,078 (1 - u), of D + 2 = 2 / (1 - u) placements.
+    share = (20_156 + 200.0) / (20_156 + 2 * 256.4)
+    limit = limit_of(with_objects_at(7.7, 17.7, n_robots=2))
+    assert limit.deliveries == pytest.approx(2 * share / (1 - share))
+
+
+def test_objects_that_fill_the_far_places_leave_the_near_ones():
+    # One of both objects lies for ever on the far place: all trips go to the near half.
+    assert limit_of(with_objects_at(7.7, 17.7, n_robots=1)).deliveries == pytest.approx(10_078 / 56.4)
 
 
 def test_places_in_a_nest_are_none_and_the_nearest_nest_counts():
