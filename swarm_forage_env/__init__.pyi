@@ -51,9 +51,7 @@ from .rendering.figures import FigureStyle as FigureStyle
 from .views.sampler import ScenarioSampler as ScenarioSampler
 from .views.sampler import SampledWorld as SampledWorld
 from .training.export.exporting import export_policy as export_policy
-from .contract.own_functions import OwnSensor as OwnSensor
-from .contract.own_functions import register_reward as register_reward
-from .contract.own_functions import register_sensor as register_sensor
+from .policies.extras import ExtraFunctionError as ExtraFunctionError
 
 # studies
 from .studies.study_file import load_study as load_study

@@ -10,7 +10,6 @@ from pettingzoo import ParallelEnv
 
 from swarm_forage_env._internal.fields import as_whole, instance
 from swarm_forage_env.contract.layout import ObservationLayout
-from swarm_forage_env.contract.own_functions import OwnFunctionError
 from swarm_forage_env.contract.policy import COMMANDS, ActionError, SwarmSpec
 from swarm_forage_env.contract.reset_and_step import as_actions, checked_gain, is_over, no_options, refuse_not_finite
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
@@ -249,7 +248,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         self.break_off()  # should the reset fail
         obs = self.arena.reset(seed)
         self._rewards = RewardModel(
-            self.scenario.reward, self.scenario.arena.nest_centres_m, self.arena.swarm, self.arena.events, self.arena
+            self.scenario.reward, self.scenario.arena.nest_centres_m, self.arena.swarm, self.arena.events
         )
         self.seed_value = seed
         self._terminated[:] = False
@@ -304,15 +303,10 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
             ActionError: values that are not numbers, a wrong shape, or an action or gain of an active robot that is not
                 finite.
             RuntimeError: before the first reset, or after a step that failed half done.
-            OwnFunctionError: a sensor or reward of the user failed; no step goes on from here, see `break_off`.
         """
         actions, wheel_gain = self.begin_step(actions, wheel_gain)
-        try:
-            self.arena.step(actions, wheel_gain=wheel_gain, tasks=tasks)
-            return self.end_step(tasks)
-        except OwnFunctionError:
-            self.break_off()
-            raise
+        self.arena.step(actions, wheel_gain=wheel_gain, tasks=tasks)
+        return self.end_step(tasks)
 
     def begin_step(
         self, actions: ActionArray, wheel_gain: FloatArray | None = None

@@ -19,7 +19,6 @@ from swarm_forage_env.contract.layout import (
     neighbours_row,
     observation_layout,
 )
-from swarm_forage_env.contract.own_functions import own_sensor
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M, CELLS_PER_M, WHEEL_SCALE_MPS
@@ -153,17 +152,12 @@ def state_size(n_robots: int, n_objects: int) -> int:
 
 
 def layout_for(scenario: ScenarioConfig) -> ObservationLayout:
-    """Return the layout of a scenario's observations, with all slices that only some scenarios have.
-
-    Raises:
-        ConfigError: a sensor that is not known here.
-    """
+    """Return the layout of a scenario's observations, with all slices that only some scenarios have."""
     robots, further = scenario.robots, list[LayoutRow]()
     if robots.neighbours_seen:
         further.append(neighbours_row(robots.neighbours_seen, robots.neighbour_range_m))
     if robots.message_size:
         further.append(messages_row(robots.message_size))
-    further += [own_sensor(name).row for name in robots.own_sensors]
     arena = scenario.arena
     return observation_layout(arena.width_m, arena.height_m, scenario.objects.n_objects, tuple(further))
 

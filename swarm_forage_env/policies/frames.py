@@ -5,13 +5,11 @@ so nothing in it needs to change: it is enough to turn what robots see of it. Th
 is exact. `policies.kernels.frames` says when a robot takes which frame.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.layout import (
     CACHE_FIELDS,
     GROUND_SENSORS,
@@ -75,19 +73,6 @@ def frames_of(length: int, layout: ObservationLayout, n_robots: int) -> Frames:
         taken=np.zeros(n_robots, np.int32),
         row=np.zeros(layout.size, np.float32),
     )
-
-
-def check_turned(own_sensors: Sequence[str]) -> None:
-    """Refuse own sensors, of which only their author knows what a turn does to them; raises ConfigError.
-
-    Args:
-        own_sensors: Names of own sensors that the learner sees.
-    """
-    if own_sensors:
-        raise ConfigError(
-            f"Expected worlds as they are where learners see own sensors, got {', '.join(own_sensors)} with frames of "
-            "robots' own; say frame_decisions=0. A turn would have to turn these sensors, too."
-        )
 
 
 def turned_columns(turn: Turn, layout: ObservationLayout) -> TurnedColumns:

@@ -16,7 +16,7 @@ import numpy as np
 from gymnasium import spaces
 
 from swarm_forage_env._internal.compiling import Callback
-from swarm_forage_env._internal.fields import ConfigError, known_keys, number, one_of, switch, unique_names, whole
+from swarm_forage_env._internal.fields import ConfigError, known_keys, number, one_of, switch, whole
 from swarm_forage_env.contract.kernel_policy import example_of
 from swarm_forage_env.contract.layout import (
     BUILT_IN_SLICES,
@@ -28,9 +28,9 @@ from swarm_forage_env.contract.layout import (
     neighbours_row,
 )
 from swarm_forage_env.contract.policy import COMMANDS, ActionError, SwarmSpec
-from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
+from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, ObsArray
 from swarm_forage_env.policies.compact_layout import COMPACT_READS, SITE_ROWS, compact_layout
-from swarm_forage_env.policies.frames import check_turned, frames_of
+from swarm_forage_env.policies.frames import frames_of
 from swarm_forage_env.policies.kernels.frames import frame_of, leave_frames, take_frames
 from swarm_forage_env.policies.kernels.learner import (
     GRIP_COMMANDS,
@@ -54,6 +54,10 @@ from swarm_forage_env.scenarios.config import ScenarioConfig
 
 OBSERVATIONS = ("full", "compact")
 ACTIONS = ("continuous", "discrete")
+EXTRA = "extra"
+"""Name of the slice with the columns of the user's `extra_observation`."""
+MOST_EXTRA_COLUMNS = 1024
+"""Our choice: an observation of the package itself has about 140."""
 
 MOTIONS = tuple(MOTION_WHEELS)
 """Discrete actions that move, in order."""
@@ -91,9 +95,8 @@ class InterfaceConfig:
     frame_decisions: int = 0
     """Decisions for which each robot sees the world in a frame of its own, turned and mirrored in one of eight ways,
     before it takes another, see `policies.kernels.frames`. 0: all see the world as it is."""
-    own_sensors: tuple[str, ...] | None = None
-    """Names of own sensors that the learner sees beside the columns of the package, in this order. Where nothing is
-    said (None), environments and trainings fill in those of their scenario, and a policy sees none."""
+    extra_columns: int = 0
+    """Columns K of the user's `extra_observation`, which come last; environments and trainings fill them in."""
 
     def __post_init__(self) -> None:
         one_of("interface.observation", self.observation, OBSERVATIONS)
@@ -111,26 +114,26 @@ class InterfaceConfig:
             )
         switch("interface.site_memory", self.site_memory)
         whole("interface.frame_decisions", self.frame_decisions, at_least=0)
-        if self.own_sensors is not None:
-            unique_names("interface.own_sensors", self.own_sensors)
-            if self.frame_decisions:
-                check_turned(self.own_sensors)
+        whole("interface.extra_columns", self.extra_columns, at_least=0, at_most=MOST_EXTRA_COLUMNS)
+        if self.extra_columns and self.frame_decisions:
+            raise ConfigError(
+                f"Expected frame_decisions=0 beside extra_observation, of which only its author knows what a turn does "
+                f"to it, got {self.frame_decisions}."
+            )
 
     def decisions_in(self, ticks: int) -> int:
         """Return how many decisions there are in so many ticks of a run, with one that its end cuts short."""
         return -(-ticks // self.decision_ticks)
 
     def for_scenario(self, scenario: ScenarioConfig) -> "InterfaceConfig":
-        """Return these choices, with what the scenario has of neighbours, messages and own sensors unless told.
+        """Return these choices, with what the scenario has of neighbours and messages unless told.
 
-        What a scenario does not have stays None; own sensors are then empty.
+        What a scenario does not have stays None.
 
         Raises:
             ConfigError: discrete actions in a scenario with messages, of which nothing was said.
         """
         robots, found = scenario.robots, dict[str, Any]()
-        if self.own_sensors is None:
-            found["own_sensors"] = robots.own_sensors
         if self.neighbours_seen is None and robots.neighbours_seen:
             found["neighbours_seen"] = robots.neighbours_seen
         if self.neighbour_range_m is None and found.get("neighbours_seen", self.neighbours_seen):
@@ -141,9 +144,9 @@ class InterfaceConfig:
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """The slices that are seen beside those of every observation: neighbours, messages, own sensors."""
+        """The slices of the environment that are seen beside those of every observation: neighbours, messages."""
         optional = {NEIGHBOURS: self.neighbours_seen, MESSAGES: self.message_size}
-        return (*(name for name, wanted in optional.items() if wanted), *(self.own_sensors or ()))
+        return tuple(name for name, wanted in optional.items() if wanted)
 
     @property
     def reads(self) -> tuple[str, ...] | None:
@@ -198,7 +201,7 @@ class LearnerInterface:
             has_memory=config.site_memory,
             behind_counts=spec.quirks.obstacle_behind_counts,
             decision_ticks=config.decision_ticks,
-            n_shown=self.layout.size - len(own) - (N_SITES * SITE_COLUMNS if config.site_memory else 0),
+            n_shown=self.layout.size - len(own) - config.extra_columns - N_SITES * SITE_COLUMNS * config.site_memory,
             n_driven=2 if config.automatic_gripper else COMMANDS,
             own_columns=np.array(own, np.int32),
             view_starts=tuple(start[name] for name in COMPACT_READS),
@@ -251,18 +254,31 @@ class LearnerInterface:
         if frames.length:
             frames.taken[:] = [frame_of(robot, decision, frames.length) for robot in range(len(frames.taken))]
 
-    def observe(self, obs: ObsArray, out: ObsArray | None = None, *, decision: int | None = None) -> ObsArray:
+    def observe(
+        self,
+        obs: ObsArray,
+        out: ObsArray | None = None,
+        *,
+        decision: int | None = None,
+        extra: FloatArray | None = None,
+    ) -> ObsArray:
         """Return what the learner sees, a new array or `out`; with `site_memory`, robots remember it.
 
         Args:
             obs: (N, D) observations of the environment, in each decision of a run.
             out: (N, d) float32 to write into.
             decision: How many decisions of the run came before; `frame_decisions` needs it.
+            extra: (N, K) what the user's `extra_observation` returned; `extra_columns` needs it.
 
         Raises:
             ValueError: robots have frames of their own, and the decision is not told; or another number of rows than
-                robots, where they have these or memories.
+                robots, where they have these or memories; or other extra columns than `extra_columns`.
         """
+        if self.config.extra_columns and (extra is None or extra.shape[1] != self.config.extra_columns):
+            raise ValueError(
+                f"Expected {self.config.extra_columns} columns of extra_observation, which the learner sees, got "
+                f"{'none' if extra is None else extra.shape[1]}."
+            )
         if self.translation.has_memory or self.config.frame_decisions:
             n_robots = len(self._commands)
             if len(obs) != n_robots:
@@ -285,7 +301,9 @@ class LearnerInterface:
             show_sites(obs, t.pose_starts, t.half, t.sites, out[:, at:])
             at += N_SITES * SITE_COLUMNS
         if len(t.own_columns):
-            out[:, at:] = obs[:, t.own_columns]
+            out[:, at : at + len(t.own_columns)] = obs[:, t.own_columns]
+        if extra is not None:
+            out[:, -extra.shape[1] :] = extra
         take_frames(out, decision or 0, t.frames)
         return out
 
@@ -393,27 +411,19 @@ def learner_layout(source: ObservationLayout, config: InterfaceConfig) -> Observ
         config: The learner's choices.
 
     Raises:
-        ConfigError: the environment lacks a sensor that the learner wants, or one has the name of another slice.
+        ConfigError: the environment lacks a sensor that the learner wants.
     """
     _check_company(source, config)
-    missing = [name for name in config.sensors if name not in source.names]
-    if missing:
-        raise ConfigError(
-            f"Expected a scenario with the own sensors {', '.join(config.own_sensors or ())}, which the policy sees; "
-            f"{missing[0]!r} is missing. Give the scenario own_sensors={config.own_sensors!r}."
-        )
     if config.observation == "compact":
         built_in = [part.row for part in compact_layout(source)]
-    elif source.names == (*BUILT_IN_SLICES, *config.sensors) and not config.site_memory:
+    elif source.names == (*BUILT_IN_SLICES, *config.sensors) and not (config.site_memory or config.extra_columns):
         return source
     else:
         built_in = [part.row for part in source if part.name in BUILT_IN_SLICES]
     if config.site_memory:
         built_in += SITE_ROWS
-    taken = sorted({row[0] for row in built_in}.intersection(config.sensors))
-    if taken:
-        raise ConfigError(f"Expected slices of different names, got {taken[0]!r} twice; rename the own sensor.")
-    return layout_of([*built_in, *(source.part(name).row for name in config.sensors)])
+    extra = [(EXTRA, (1.0,) * config.extra_columns, "", "extra_observation of the user")] * bool(config.extra_columns)
+    return layout_of([*built_in, *(source.part(name).row for name in config.sensors), *extra])
 
 
 def _check_company(source: ObservationLayout, config: InterfaceConfig) -> None:
@@ -474,7 +484,4 @@ def interface_from_mapping(mapping: Mapping[str, Any]) -> InterfaceConfig:
     if isinstance(range_m, str):  # a word of the command line; `number` refuses what is none
         with suppress(ValueError):
             values["neighbour_range_m"] = float(range_m)
-    own = values.get("own_sensors")
-    if isinstance(own, str | list):  # a word of the command line, "one+two", or of JSON, which knows no tuples
-        values["own_sensors"] = tuple(own.split("+")) if isinstance(own, str) else tuple(own)
     return InterfaceConfig(**values)

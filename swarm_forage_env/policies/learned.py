@@ -8,6 +8,7 @@ import numpy as np
 
 from swarm_forage_env.contract.policy import Memories, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
+from swarm_forage_env.policies.extras import ExtraFunction, ExtraFunctionError, extra_columns
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 
 Choose: TypeAlias = Callable[[ObsArray, np.random.Generator], np.ndarray]
@@ -79,6 +80,7 @@ class LearnedPolicy(InterfacePolicy):
         *,
         remember: Remember | None = None,
         caches: str | None = "none",
+        extra_observation: ExtraFunction | None = None,
     ) -> None:
         """Take the controller.
 
@@ -87,6 +89,7 @@ class LearnedPolicy(InterfacePolicy):
             choose: The controller, if it has no memory.
             remember: The controller, if it has one.
             caches: Kind of caches that it was trained with; None = unknown, runs then use those of the scenario.
+            extra_observation: The function that it was trained with, if there was one; see `policies.extras`.
 
         Raises:
             TypeError: both `choose` and `remember`, or neither.
@@ -98,9 +101,20 @@ class LearnedPolicy(InterfacePolicy):
         else:
             raise TypeError("Expected either choose or remember, the controller without or with memory.")
         super().__init__(interface, caches=caches)
+        self._extra = extra_observation
+        if extra_observation is not None:
+            self.see_world = self._see_world
+
+    def _see_world(self, env: Any) -> None:
+        self._arena = env.arena
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
-        """Start a run."""
+        """Start a run.
+
+        Raises:
+            ExtraFunctionError: the policy was trained with `extra_observation`, and has none.
+        """
+        check_extra(self._config, self._extra)
         self._bind(spec)
         self._rng = rng
         self._view = np.empty((spec.n_robots, self.interface.layout.size), np.float32)
@@ -115,13 +129,23 @@ class LearnedPolicy(InterfacePolicy):
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
         """Choose actions; see `Policy.act`. The returned (N, A) array is reused by the next call."""
         if self._ticks_left == 0:
-            view = self.interface.observe(obs, self._view, decision=self._decision)
+            extra = None if self._extra is None else extra_columns(self._extra, self._arena, self._config.extra_columns)
+            view = self.interface.observe(obs, self._view, decision=self._decision, extra=extra)
             self._chosen, self._memory = self._remember(view, self._memory, self._rng)
             self._checked = self.interface.checked(self._chosen)
             self._ticks_left = self._config.decision_ticks
             self._decision += 1
         self._ticks_left -= 1
         return self.interface.carry_out(self._checked, obs)
+
+
+def check_extra(interface: InterfaceConfig, extra: ExtraFunction | None) -> None:
+    """Refuse a policy that was trained with `extra_observation` and does not have it; raises ExtraFunctionError."""
+    if interface.extra_columns and extra is None:
+        raise ExtraFunctionError(
+            f"Expected the extra_observation of {interface.extra_columns} columns that the policy was trained with, "
+            "got none; make it LearnedPolicy(network.about.interface, network.choose, extra_observation=...)."
+        )
 
 
 def _forgetful(choose: Choose, rows: ObsArray, memory: Any, rng: np.random.Generator) -> tuple[np.ndarray, Any]:

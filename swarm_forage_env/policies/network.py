@@ -25,7 +25,7 @@ from swarm_forage_env.contract.types import ObsArray
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping
 from swarm_forage_env.policies.kernels.network import Choice, Layers, forward, step_network
 from swarm_forage_env.policies.kernels.products import LANES, ROWS
-from swarm_forage_env.policies.learned import InterfacePolicy
+from swarm_forage_env.policies.learned import InterfacePolicy, check_extra
 from swarm_forage_env.scenarios.config import CACHE_KINDS
 
 ACTIVATIONS = ("tanh", "relu")
@@ -137,6 +137,15 @@ class Network:
         values = np.empty((n_rows, len(self.biases[-1])), np.float32)
         forward(np.ascontiguousarray(rows, np.float32), self.layers(), np.ones(n_rows, np.bool_), values)
         return values
+
+    def choose(self, rows: ObsArray, rng: np.random.Generator) -> np.ndarray:
+        """Return an action for each row (N, d) of what the network sees, as `LearnerInterface` takes them."""
+        outputs = self.outputs(rows)
+        if self.about.interface.actions != "discrete":
+            return np.clip(outputs, -1.0, 1.0)
+        if self.about.samples:
+            outputs = outputs + rng.gumbel(size=outputs.shape)  # the largest is a draw by the softmax
+        return outputs.argmax(axis=1)
 
     def at_temperature(self, temperature: float) -> "Network":
         """Return a network that draws discrete actions by probabilities to the power of 1 / temperature.
@@ -269,7 +278,9 @@ class NetworkPolicy(KernelPolicy, InterfacePolicy):
 
         Raises:
             NetworkError: the network has another number of columns or actions than its interface.
+            ExtraFunctionError: it was trained with `extra_observation`.
         """
+        check_extra(self._config, None)
         self._bind(spec)
         space, network, layers = self.interface.action_space, self._network, self._network.layers()
         n_actions = int(space.n) if isinstance(space, spaces.Discrete) else space.shape[0]

@@ -193,8 +193,6 @@ class RobotConfig:
     """Limit of right minus left wheel speed."""
     start_margin_m: float = 2.8
     """Robots start at uniform positions at least this far from the arena border."""
-    own_sensors: tuple[str, ...] = ()
-    """Names of further slices of an observation, registered by `contract.own_functions.register_sensor`."""
     neighbours_seen: int = 0
     """How many of the nearest robots a robot observes; 0 = none, as in the paper."""
     neighbour_range_m: float = 2.0
@@ -213,7 +211,6 @@ class RobotConfig:
             self.start_margin_m >= least,
             f"Expected robots.start_margin_m >= {least:.3f} (wall plus radius), got {self.start_margin_m}.",
         )
-        fields.unique_names("robots.own_sensors", self.own_sensors)
         fields.whole("robots.neighbours_seen", self.neighbours_seen, at_least=0, at_most=MAX_NEIGHBOURS_SEEN)
         fields.whole("robots.message_size", self.message_size, at_least=0, at_most=MAX_MESSAGE_SIZE)
         for name in ("neighbour_range_m", "message_range_m"):
@@ -286,14 +283,11 @@ class RewardConfig:
     """Per tick of an active robot; give a negative weight for a cost of living."""
     team: bool = False
     """Every active robot receives the mean over active robots instead of its own reward."""
-    own_reward: str = ""
-    """Name of a function that adds to these terms, of `contract.own_functions.register_reward`; "" = none."""
 
     def __post_init__(self) -> None:
         for name in ("delivery", "first_pickup", "nest_progress", "interference", "tick"):
             fields.number(f"reward.{name}", getattr(self, name))
         fields.switch("reward.team", self.team)
-        fields.instance("reward.own_reward", self.own_reward, str)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -97,12 +97,7 @@ def scenario_of_same_size(scenario: ScenarioConfig, overrides: Mapping[str, Any]
         ConfigError: unknown fields, values that do not fit together, or another number of robots.
     """
     changed = with_overrides(scenario, **overrides)
-    n_robots, own = scenario.robots.n_robots, scenario.robots.own_sensors
-    if changed.robots.own_sensors != own:
-        raise ConfigError(
-            f"Expected own_sensors to stay {own!r}, the columns that spaces promise, got "
-            f"{changed.robots.own_sensors!r}; make another environment."
-        )
+    n_robots = scenario.robots.n_robots
     for name in ("neighbours_seen", "message_size"):
         before, now = getattr(scenario.robots, name), getattr(changed.robots, name)
         if now != before:

@@ -172,7 +172,7 @@ class TrainingPlan:
                 "Expected in_runs.frame_decisions only of robots that learn in frames, too; set "
                 "frame_decisions in the interface."
             )
-        _ = self.run_interface  # refuses frames of own sensors
+        _ = self.run_interface  # refuses frames beside extra columns
 
     def arenas_of(self, stage: Stage) -> dict[str, Any]:
         """Return the arguments of the vector environments of a stage, such as `SwarmVecEnv`."""

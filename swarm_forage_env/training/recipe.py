@@ -243,7 +243,7 @@ def _default_interface(algorithm: str, scenario: ScenarioConfig) -> InterfaceCon
         automatic_gripper=True,
         decision_ticks=DECISION_TICKS,
         site_memory=True,
-        frame_decisions=0 if robots.own_sensors or robots.message_size else FRAME_DECISIONS,
+        frame_decisions=0 if robots.message_size else FRAME_DECISIONS,
     )
 
 

@@ -139,13 +139,12 @@ class SeedTrainings(Answer):
     def command(self) -> str | None:
         """Return the command that scores these networks as one entry of the benchmark.
 
-        None where all failed, or where they need sensors that no world of the benchmark has.
+        None where all failed.
         """
         from metrics.benchmark.entry import entry_command  # late: see training.evaluations
 
         policies = [one.policy for one in self._finished()]
-        is_possible = policies and not self.plan.interface.own_sensors
-        return entry_command(policies, self.folder.resolve().name) if is_possible else None
+        return entry_command(policies, self.folder.resolve().name) if policies else None
 
     @property
     def _columns(self) -> tuple[_Column, ...]:

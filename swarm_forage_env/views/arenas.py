@@ -20,10 +20,10 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import as_whole
 from swarm_forage_env.contract.codes import Counter
-from swarm_forage_env.contract.own_functions import OwnFunctionError
 from swarm_forage_env.contract.policy import COMMANDS
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policies.extras import ExtraFunction, ExtraFunctionError
 from swarm_forage_env.policies.interface import GivenInterface
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.views.bookkeeping import Bookkeeping, can_book_together
@@ -240,12 +240,12 @@ class ArenaBatch:
                 ticks = self._together(lockstep, books, actions, rewards)
             else:
                 ticks = [self._alone(number, actions[number], rewards[number]) for number in range(self.n_arenas)]
-        except OwnFunctionError:
+            n_terminated = self._book(books, ticks, rewards, (flags[0], flags[2]), obs)
+        except ExtraFunctionError:
             self._is_reset = False
             for arena in self.arenas:  # some have been stepped and some not
                 arena.forage_env.break_off()
             raise
-        n_terminated = self._book(books, ticks, rewards, (flags[0], flags[2]), obs)
         endings: _Endings | None = None
         for number, (dead, all_dead, at_horizon) in enumerate(ticks):
             if n_terminated[number] or all_dead or at_horizon:
@@ -291,6 +291,8 @@ class ArenaBatch:
             going = [number for number in going if not any(ticks[number][1:])]
             if not going:
                 break
+        for arena, earned in zip(self.arenas, rewards, strict=True):
+            arena.add_extra(earned)
         return ticks
 
     def _book(
@@ -485,6 +487,8 @@ def open_arenas(
     wrappers: Iterable[WrapperConfig | str] = (),
     max_cycles: int | None = None,
     render_mode: str | None = None,
+    extra_reward: ExtraFunction | None = None,
+    extra_observation: ExtraFunction | None = None,
     **overrides: Any,
 ) -> ArenaBatch:
     """Build arenas.
@@ -501,6 +505,8 @@ def open_arenas(
             ("population:death_per_tick=0.01").
         max_cycles: Ticks until truncation; default the scenario's horizon.
         render_mode: None or "rgb_array".
+        extra_reward: See `plan_arena`.
+        extra_observation: See `plan_arena`.
         overrides: Scenario fields by name (`n_robots=20`, `nest_progress=0.1`).
 
     Raises:
@@ -514,6 +520,8 @@ def open_arenas(
         wrappers=wrappers,
         max_cycles=max_cycles,
         render_mode=render_mode,
+        extra_reward=extra_reward,
+        extra_observation=extra_observation,
         **overrides,
     )
     if render_mode == "human":

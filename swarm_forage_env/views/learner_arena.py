@@ -12,8 +12,9 @@ from swarm_forage_env._internal.compiling import is_compiled
 from swarm_forage_env._internal.fields import ConfigError, table
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.reset_and_step import OPTION_OF_TESTS
-from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
+from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, ObsArray
 from swarm_forage_env.env import BatchStep, ForageEnv
+from swarm_forage_env.policies.extras import ExtraFunctionError, extra_columns, extra_rewards
 from swarm_forage_env.policies.interface import (
     MOTIONS,
     InterfaceConfig,
@@ -155,16 +156,37 @@ class LearnerArena:
         Raises:
             RuntimeError: before the first reset.
             ActionError: actions that the interface or the drive refuses.
+            ExtraFunctionError: see `add_extra`.
         """
         if self.decides_at_once:
             self._decide(actions, rewards)
-            return self.ending
-        tick = np.zeros(0, np.bool_), False, False
-        for _ in range(self._plan.interface.decision_ticks):
-            tick = self.take(self.env.step_batch(self.command(actions)), rewards)
-            if any(tick[1:]):
-                break
+            tick = self.ending
+        else:
+            tick = np.zeros(0, np.bool_), False, False
+            for _ in range(self._plan.interface.decision_ticks):
+                tick = self.take(self.env.step_batch(self.command(actions)), rewards)
+                if any(tick[1:]):
+                    break
+        self.add_extra(rewards)
         return tick
+
+    def add_extra(self, rewards: np.ndarray) -> None:
+        """Add the user's `extra_reward` of a decision to the rewards of the robots (N,).
+
+        Raises:
+            ExtraFunctionError: it failed; the run does not go on from here.
+        """
+        function, env = self._plan.extras.reward, self.forage_env
+        if function is None:
+            return
+        try:
+            values = extra_rewards(function, env.arena)
+        except ExtraFunctionError:
+            env.break_off()
+            raise
+        if env.scenario.reward.team:
+            values = values.sum() / max(1, np.count_nonzero(env.active)) * env.active
+        rewards += values
 
     @property
     def decides_at_once(self) -> bool:
@@ -289,12 +311,28 @@ class LearnerArena:
         return self._plan.interface.decisions_in(self.forage_env.tick)
 
     def observe(self, out: ObsArray | None = None) -> ObsArray:
-        """Return what the learner sees now, (rows, d): a new array, or `out`."""
+        """Return what the learner sees now, (rows, d): a new array, or `out`.
+
+        Raises:
+            ExtraFunctionError: the user's `extra_observation` failed; the run does not go on from here.
+        """
         if out is None:
             out = np.empty((self.n_rows, self.interface.layout.size), np.float32)
-        self.interface.observe(self.env.last_obs, out[: self.n_robots], decision=self._decision)
+        self.interface.observe(
+            self.env.last_obs, out[: self.n_robots], decision=self._decision, extra=self._extra_columns()
+        )
         out[self.n_robots :] = 0.0
         return out
+
+    def _extra_columns(self) -> FloatArray | None:
+        function = self._plan.extras.observation
+        if function is None:
+            return None
+        try:
+            return extra_columns(function, self.forage_env.arena, self._plan.interface.extra_columns)
+        except ExtraFunctionError:
+            self.forage_env.break_off()
+            raise
 
     def mask(self) -> BoolArray:
         """Return which discrete actions make sense now, (rows, number of actions); see `LearnerInterface.mask`.

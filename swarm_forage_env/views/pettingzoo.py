@@ -176,10 +176,10 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
 def parallel_env(*args: Any, **options: Any) -> ForageEnv | Any:
     """Create a parallel environment; `pettingzoo.make("parallel", id, ...)` calls this function, too.
 
-    It is a `ForageEnv`; with wrappers the outermost of them; with an interface or a sampler a
+    It is a `ForageEnv`; with wrappers the outermost of them; with an interface, a sampler or something extra a
     `ParallelLearnerEnv` around them all.
     """
-    if options.get("interface") is not None or options.get("sampler") is not None:
+    if any(options.get(name) is not None for name in ("interface", "sampler", "extra_reward", "extra_observation")):
         return ParallelLearnerEnv(*args, **options)
     return plan_arena(*args, **options).build({})
 

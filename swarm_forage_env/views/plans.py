@@ -2,12 +2,13 @@
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from swarm_forage_env._internal.fields import ConfigError, instance
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policies.extras import ExtraFunction, Extras, extra_columns
 from swarm_forage_env.policies.interface import GivenInterface, InterfaceConfig, chosen_interface
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import scenario_of_same_size
@@ -34,6 +35,8 @@ class ArenaPlan:
     max_cycles: int | None = None
     """Ticks until truncation; default the scenario's horizon."""
     render_mode: str | None = None
+    extras: Extras = field(default_factory=Extras)
+    """What the user adds to rewards and observations."""
 
     def build(self, overrides: Mapping[str, Any], world: World | None = None) -> ForageEnv | SwarmWrapper:
         """Build the environment with its wrappers.
@@ -87,6 +90,8 @@ def plan_arena(
     wrappers: Iterable[WrapperConfig | str] = (),
     max_cycles: int | None = None,
     render_mode: str | None = None,
+    extra_reward: ExtraFunction | None = None,
+    extra_observation: ExtraFunction | None = None,
     **overrides: Any,
 ) -> ArenaPlan:
     """Plan an arena.
@@ -100,11 +105,16 @@ def plan_arena(
             ("population:death_per_tick=0.01").
         max_cycles: Ticks until truncation; default the scenario's horizon.
         render_mode: None, "rgb_array" or "human"; see `ForageEnv`.
+        extra_reward: Function of the world, called after each decision; returns (N,) in [-1, 1], what is added to the
+            reward of each robot at work.
+        extra_observation: Function of the world, called for each observation; returns (N, K) in [-1, 1], the columns
+            of the last slice, "extra". It is called once in a first run to know K.
         overrides: Scenario fields by name (`n_robots=20`, `n_objects=100`, `caches="static"`).
 
     Raises:
         ConfigError: unknown preset, field, wrapper or choice of the interface, values that do not fit together, or a
             sampler beside what it decides.
+        ExtraFunctionError: `extra_observation` failed, or returned something else.
     """
     disturbing = wrapper_configs(wrappers)
     if sampler is None:
@@ -122,14 +132,32 @@ def plan_arena(
                 "into the sampler, where all worlds can share it. By id, make swarm_forage/sampled-v0."
             )
         config = sampler.largest
-    chosen = chosen_interface(interface).for_scenario(config)
-    return ArenaPlan(
+    plan = ArenaPlan(
         world=World(config, disturbing),
         sampler=sampler,
-        interface=chosen,
+        interface=chosen_interface(interface).for_scenario(config),
         max_cycles=max_cycles,
         render_mode=render_mode,
+        extras=Extras(reward=extra_reward, observation=extra_observation),
     )
+    if plan.extras.observation is not None:
+        return _with_extra_columns(plan, plan.extras.observation)
+    if plan.interface.extra_columns:
+        raise ConfigError(
+            f"Expected the extra_observation of the {plan.interface.extra_columns} columns of the interface, got none."
+        )
+    return plan
+
+
+def _with_extra_columns(plan: ArenaPlan, function: ExtraFunction) -> ArenaPlan:
+    """Return the plan with an interface that has the columns which the function returns."""
+    env = ForageEnv(plan.world.scenario)
+    env.reset_batch(seed=0)
+    n_columns = extra_columns(function, env.arena).shape[1]
+    told = plan.interface.extra_columns
+    if told not in (0, n_columns):
+        raise ConfigError(f"Expected extra_observation with {told} columns, as the interface says, got {n_columns}.")
+    return replace(plan, interface=replace(plan.interface, extra_columns=n_columns))
 
 
 def takes(make: Callable[Options, Any]) -> Callable[[Callable[..., Result]], Callable[Options, Result]]:

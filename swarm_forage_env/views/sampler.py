@@ -309,7 +309,7 @@ def _check_columns(built: list[ScenarioConfig], largest: ScenarioConfig) -> None
             raise ConfigError(
                 f"Expected worlds with the same columns of observations, got {_said_columns(expected)} in "
                 f"{largest.name} and {_said_columns(columns_of(config))} in {config.name}; give all worlds the same "
-                "neighbours_seen, neighbour_range_m, message_size and own_sensors."
+                "neighbours_seen, neighbour_range_m and message_size."
             )
 
 

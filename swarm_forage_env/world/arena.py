@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 
 from swarm_forage_env._internal.compiling import Callback
-from swarm_forage_env._internal.fields import ConfigError, whole
+from swarm_forage_env._internal.fields import whole
 from swarm_forage_env._internal.held import hold
 from swarm_forage_env._internal.rng import Stream, TickDraws, stream_rng
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.kernel_policy import CompiledPolicy
 from swarm_forage_env.contract.layout import MESSAGES, NEIGHBOURS
-from swarm_forage_env.contract.own_functions import OwnSensor, own_sensor
 from swarm_forage_env.contract.policy import layout_for, refused_action, refused_tasks
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.scenarios.config import MAX_HANDLING_TICKS, ScenarioConfig
@@ -44,7 +43,7 @@ from swarm_forage_env.world.state import ArenaArrays, Source, listed
 
 UNDISTURBED = Disturbances()
 _NO_TASKS, _NO_SHARES = np.zeros(0, np.int8), np.zeros(1)
-_OF_PROCESS = ("_compiled", "_held", "_own_sensors")
+_OF_PROCESS = ("_compiled", "_held")
 """Attributes of an arena that hold functions and addresses: made when they are needed, for the arrays of a run."""
 
 
@@ -77,9 +76,7 @@ class ForagingArena:
         self.layout = layout_for(config)
         self.reads = read_slices(reads, self.layout)
         self.light_of_carriers_only = light_of_carriers_only(reads)
-        self._own_names = tuple(name for name in config.robots.own_sensors if name in self.reads)
-        further = {NEIGHBOURS, MESSAGES, *config.robots.own_sensors}
-        self._needs_python = not further.isdisjoint(self.reads)
+        self._needs_python = not {NEIGHBOURS, MESSAGES}.isdisjoint(self.reads)
         self._given_reads = reads
         self._static_caches = len(static_cache_centres(config)) if config.caches == "static" else 0
         self._unit_gain = np.ones((config.robots.n_robots, 2))
@@ -145,29 +142,10 @@ class ForagingArena:
         self._sense_further()
         return self.obs
 
-    @cached_property
-    def _own_sensors(self) -> tuple[OwnSensor, ...]:
-        """The user's own sensors of this run.
-
-        Raises:
-            ConfigError: one that has become unknown, or has other columns than when the environment was made.
-        """
-        found = tuple(own_sensor(name) for name in self._own_names)
-        for sensor in found:
-            if sensor.row != self.layout.part(sensor.name).row:
-                raise ConfigError(
-                    f"Expected sensor {sensor.name!r} with {self.layout.part(sensor.name).size} columns, as when the "
-                    f"environment was made, got {sensor.n_columns}; make the environment anew."
-                )
-        return found
-
     def _sense_further(self) -> None:
-        """Fill in neighbours, messages and the user's own sensors; robots that are not in the world sense nothing."""
+        """Fill in neighbours and messages; robots that are not in the world sense nothing."""
         if self._neighbourhood.is_used:
             self._neighbourhood.sense(self.swarm, self.obs)
-        for sensor in self._own_sensors:
-            values = sensor.read(self)
-            self.obs[:, self.layout[sensor.name]] = np.where(self.swarm.present[:, None], values, 0.0)
 
     def _furnish(self) -> Source:
         """Place all objects and create static caches: before the clusters if placement is "power_law", else after.

@@ -1,7 +1,4 @@
-"""Rewards of a swarm for learners: the terms of `kernels.reward`, weighted by `scenarios.config.RewardConfig`.
-
-A function of the user may add to them (`contract.own_functions.register_reward`).
-"""
+"""Rewards of a swarm for learners: the terms of `kernels.reward`, weighted by `scenarios.config.RewardConfig`."""
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -11,13 +8,9 @@ import numpy as np
 
 from swarm_forage_env._internal.compiling import direct
 from swarm_forage_env._internal.held import hold
-from swarm_forage_env.contract.own_functions import OwnFunctionError, OwnReward, called, own_reward
 from swarm_forage_env.scenarios.config import RewardConfig
 from swarm_forage_env.world.kernels.reward import Payment, Weights, rewards
 from swarm_forage_env.world.state import StepEvents, SwarmState
-
-MOST_REWARD = 1e30
-"""Largest reward of a user's function; our choice: sums over long runs are finite in float32, too."""
 
 
 class RewardModel:
@@ -29,7 +22,6 @@ class RewardModel:
         nest_centres_m: Sequence[tuple[float, float]],
         swarm: SwarmState,
         events: StepEvents,
-        world: object,
     ) -> None:
         """Bind the state; its arrays must not be replaced afterwards, only edited.
 
@@ -38,15 +30,7 @@ class RewardModel:
             nest_centres_m: x, y of each nest.
             swarm: Robots.
             events: Happenings of a tick.
-            world: What a function of the user is called with.
-
-        Raises:
-            ConfigError: `config` names a function that is not known here.
         """
-        self._world = world
-        self._own_name = config.own_reward
-        if self._own_name:
-            assert self._own is not None, "an unknown name is told now, not in the first step"
         self._is_progress_paid = bool(config.nest_progress)
         self._is_team = config.team
         self._payment = Payment(
@@ -57,7 +41,7 @@ class RewardModel:
             total=np.zeros(len(swarm.active)),
             reward=np.zeros(len(swarm.active), np.float32),
             weights=Weights(*(float(getattr(config, name)) for name in Weights._fields)),
-            is_dense=bool(config.nest_progress or config.interference or config.tick or config.own_reward),
+            is_dense=bool(config.nest_progress or config.interference or config.tick),
         )
 
     @cached_property
@@ -70,12 +54,12 @@ class RewardModel:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what copies and snapshots are made of: everything but functions and addresses."""
-        return {name: value for name, value in vars(self).items() if name not in {"_held", "_rewards", "_own"}}
+        return {name: value for name, value in vars(self).items() if name not in {"_held", "_rewards"}}
 
     @property
     def payment(self) -> Payment | None:
-        """What `kernels.reward.pay` does the work of `reward` with; None where it cannot: a user's function, `team`."""
-        return None if self._own_name or self._is_team else self._held
+        """What `kernels.reward.pay` does the work of `reward` with; None where it cannot: `team`."""
+        return None if self._is_team else self._held
 
     def remember(self) -> None:
         """Keep the positions before a step, if a term needs them."""
@@ -92,35 +76,7 @@ class RewardModel:
             p.reward[:] = 0.0
             return p.reward
         self._rewards(self._held)
-        if self._own is not None:
-            p.total[:] += self._own_terms(self._own)
-            p.reward[:] = p.total
         if self._is_team:
             active = p.swarm.active
             p.reward[:] = p.total.sum() / max(1, np.count_nonzero(active)) * active
         return p.reward
-
-    @cached_property
-    def _own(self) -> OwnReward | None:
-        return own_reward(self._own_name) if self._own_name else None
-
-    def _own_terms(self, function: OwnReward) -> np.ndarray:
-        """Return what the user's function adds, (N,), zero for robots that are not at work.
-
-        Raises:
-            OwnFunctionError: it failed, or returned another shape or numbers beyond `MOST_REWARD`.
-        """
-        active = self._payment.swarm.active
-        values = called(function, self._world, f"reward {self._own_name!r}")
-        if values.shape != active.shape:
-            raise OwnFunctionError(
-                f"Expected reward {self._own_name!r} to return shape (n_robots,) = {active.shape}, got {values.shape}."
-            )
-        values = np.where(active, values, 0.0)
-        fits = np.abs(values) <= MOST_REWARD
-        if not fits.all():
-            raise OwnFunctionError(
-                f"Expected reward {self._own_name!r} to return numbers in [{-MOST_REWARD}, {MOST_REWARD}], "
-                f"got {values[~fits][0]}."
-            )
-        return values

@@ -19,7 +19,6 @@ from swarm_forage_env.contract.layout import (
     NEIGHBOURS,
     ObservationLayout,
 )
-from swarm_forage_env.contract.own_functions import is_own_sensor
 from swarm_forage_env.contract.types import ObsArray
 from swarm_forage_env.scenarios.config import ArenaConfig, ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M, WHEEL_SCALE_MPS
@@ -49,11 +48,6 @@ def read_slices(reads: Collection[str] | None, layout: ObservationLayout) -> tup
             raise ConfigError(
                 f"Expected a scenario with {what}, because the policy reads the slice {name!r}, got one without; give "
                 f"it {field}."
-            )
-        if name not in layout.names and is_own_sensor(name):
-            raise ConfigError(
-                f"Expected a scenario with the own sensor {name!r}, which the policy reads, got one without; give it "
-                f"own_sensors=({name!r},), on the command line --set own_sensors={name}."
             )
         known_name("entry of reads", name, (*layout.names, LIGHT_IF_CARRYING))
     return tuple("light" if name == LIGHT_IF_CARRYING else name for name in reads)

@@ -145,8 +145,6 @@ def test_frames_need_the_number_of_the_decision():
         own.observe(env.arena.observe())
 
 
-def test_frames_need_a_length_and_no_own_sensors():
+def test_frames_need_a_length():
     with pytest.raises(ConfigError, match=r"interface\.frame_decisions"):
         InterfaceConfig(frame_decisions=-1)
-    with pytest.raises(ConfigError, match=r"gas with frames of robots' own; say frame_decisions=0"):
-        InterfaceConfig(frame_decisions=10, own_sensors=("gas",))

@@ -63,12 +63,10 @@ OTHER_VALUES: dict[str, Any] = {
     "interference": -0.1,
     "tick": -0.001,
     "team": True,
-    "own_sensors": ("nest_distance",),
     "neighbours_seen": 3,
     "neighbour_range_m": 1.5,
     "message_size": 2,
     "message_range_m": 4.0,
-    "own_reward": "near_the_nest",
     **dict.fromkeys((item.name for item in dataclasses.fields(Quirks)), True),
 }
 

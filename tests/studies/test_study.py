@@ -86,14 +86,12 @@ def test_fields_that_hold_lists_can_vary():
     sizes = [spec.world(place).scenario.arena.nest_size_m for place in spec.places]
     assert sizes == [(3.2, 12.8), (3.2, 6.4)]
     assert StudySpec.from_mapping(json.loads(spec.to_json())) == spec
-    spec = study(Axis(name="own_sensors", values=("none", "nest_distance,x")))
-    assert [spec.world(place).scenario.robots.own_sensors for place in spec.places] == [(), ("nest_distance", "x")]
 
 
 @pytest.mark.parametrize(
     ("name", "values", "words"),
     [
-        ("own_sensors", (1, 2), "Expected lists on axis own_sensors, such as"),
+        ("nest_size_m", (1, 2), "Expected lists on axis nest_size_m, such as"),
         ("nest_size_m", ("3.2,wide",), "Expected lists of numbers on axis nest_size_m, got '3.2,wide'"),
     ],
 )

@@ -250,13 +250,13 @@ def test_an_axis_of_lists(tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text(
         'name = "mine"\nscenario = "warehouse_small"\npolicies = ["random"]\nrules = ["described"]\n'
-        '[[axis]]\nfield = "own_sensors"\nvalues = [[], ["nest_distance"], ["nest_distance", "x"]]\nreference = []\n'
-        '[budget.few]\nseeds = 1\nvalues = { own_sensors = [["nest_distance"]] }\n'
+        '[[axis]]\nfield = "further_nests"\nvalues = [[], [[14.0, 1.0, 18.0, 4.0]], [[14.0, 1.0, 18.0, 4.0], [14.0, 12.0, 18.0, 15.0]]]\nreference = []\n'
+        "[budget.few]\nseeds = 1\nvalues = { further_nests = [[[14.0, 1.0, 18.0, 4.0]]] }\n"
     )
     spec = load_study(file)
-    assert spec.axes[0].values == ("none", "nest_distance")
+    assert spec.axes[0].values == ("none", "14.0,1.0,18.0,4.0")
     assert spec.reference == "none"
-    assert [spec.world(place).scenario.robots.own_sensors for place in spec.places] == [(), ("nest_distance",)]
+    assert [spec.world(place).scenario.arena.further_nests for place in spec.places] == [(), ((14.0, 1.0, 18.0, 4.0),)]
 
 
 def test_what_a_budget_leaves_out_of_the_paper_is_told():

@@ -62,7 +62,7 @@ def test_a_network_is_run_and_kept_with_the_interface_that_it_has_in_runs(tmp_pa
     )
     evaluation = Evaluator(replace(plan, in_runs=seen), tmp_path / "plan", {}).evaluate(learnt, 60)
     kept = Network.load(tmp_path / "plan" / "policy.npz")
-    assert kept.about.interface == replace(NUMBERED, **seen, own_sensors=())
+    assert kept.about.interface == replace(NUMBERED, **seen)
     as_asked = replace(plan, interface=often.about.interface)
     same = Evaluator(as_asked, tmp_path / "asked", {}).evaluate(often, 60)
     as_learnt = Evaluator(plan, tmp_path / "as_learnt", {}).evaluate(learnt, 60)

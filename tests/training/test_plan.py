@@ -58,7 +58,7 @@ def test_a_plan_says_what_its_file_says(plan):
     assert plan.hidden == (16,)
     assert plan.scenario == warehouse_small(n_robots=6, nest_centre_m=(4.0, 8.0))
     assert [config.name for config in plan.wrappers] == ["sensor_noise"]
-    assert plan.interface == InterfaceConfig(actions="discrete", decision_ticks=2, own_sensors=())
+    assert plan.interface == InterfaceConfig(actions="discrete", decision_ticks=2)
     assert plan.stages[0] == Stage(steps=100, scenario={"width_m": 20.0, "nest_centre_m": (2.0, 8.0)})
     assert plan.stages[1].options == {"learning_rate": 0.1}
     assert plan.total_steps == 300

@@ -20,7 +20,7 @@ from swarm_forage_env.training.recipe import LATE_OPTIONS, recipe, small_arena
 def test_defaults_are_what_a_driver_needs():
     plan = recipe()
     assert plan.interface == InterfaceConfig(
-        observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5, own_sensors=(),
+        observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5,
         site_memory=True, frame_decisions=200,
     )  # fmt: skip
     assert plan.activation == "relu"
@@ -178,23 +178,19 @@ def test_large_swarms_are_evaluated_less_often():
 
 def test_an_interface_is_given_whole_or_by_what_differs():
     assert recipe(interface={"decision_ticks": 2}).interface == InterfaceConfig(
-        observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=2, own_sensors=(),
+        observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=2,
         site_memory=True, frame_decisions=200,
     )  # fmt: skip
     assert not recipe(interface={"site_memory": False}).interface.site_memory
-    numbered = InterfaceConfig(actions="discrete", own_sensors=())
+    numbered = InterfaceConfig(actions="discrete")
     assert recipe(interface=numbered).interface is numbered
     with pytest.raises(ConfigError, match="Did you mean 'decision_ticks'"):
         recipe(interface={"decision_tick": 2})
 
 
-def test_robots_with_own_sensors_or_messages_see_the_world_as_it_is():
+def test_robots_with_messages_see_the_world_as_it_is():
     assert recipe(neighbours_seen=4).interface.frame_decisions == 200
     assert recipe(message_size=2, interface={"actions": "continuous"}).interface.frame_decisions == 0
-    seen = recipe(own_sensors=("nest_distance",)).interface
-    assert (seen.own_sensors, seen.frame_decisions) == (("nest_distance",), 0)
-    with pytest.raises(ConfigError, match="say frame_decisions=0"):
-        recipe(own_sensors=("nest_distance",), interface={"frame_decisions": 200})
 
 
 def test_the_other_arguments_reach_the_plan():

@@ -14,7 +14,6 @@ import pytest
 pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-baselines3 and torch")
 
 from metrics.statistics import aggregate
-from swarm_forage_env import register_sensor
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.presets import warehouse_small
@@ -238,15 +237,6 @@ def test_the_table_has_what_is_kept_and_its_mean(tmp_path):
     assert mapping["means"]["ratio"]["mean"] == pytest.approx(2.6)
     assert [one["cpu_time_s"] for one in mapping["trainings"]] == [120.0, 180.0, 240.0, 60.0]
     assert mapping["failures"] == {"3": "diverged"}
-
-
-def test_networks_with_sensors_that_the_benchmark_lacks_have_no_command_for_it(tmp_path):
-    register_sensor("mine", lambda world: world.swarm.active * 1.0)
-    world = World(warehouse_small(n_robots=4, n_objects=20, horizon_s=200.0, own_sensors=("mine",)))
-    plan = dataclasses.replace(PLAN, world=world, interface=InterfaceConfig(observation="compact", actions="discrete"))
-    made(tmp_path, 0, {128: 10.0}, plan)
-    assert read_seeds(plan, tmp_path, range(1)).command() is None
-    assert "benchmark" not in read_seeds(plan, tmp_path, range(1)).text()
 
 
 def test_the_interval_of_a_share_ends_at_0(tmp_path):

@@ -33,9 +33,7 @@ from swarm_forage_env.views.pettingzoo import parallel_env
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.world import World
 
-NUMBERED = InterfaceConfig(
-    observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5, own_sensors=()
-)
+NUMBERED = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5)
 DRIVEN = InterfaceConfig(observation="compact", automatic_gripper=True)
 
 
@@ -497,3 +495,18 @@ def test_a_plan_chooses_what_hidden_layers_do(tmp_path, activation, layer):
         assert [type(each) for each in part] == [torch.nn.Linear, layer]
     assert result.policy_file is not None
     assert Network.load(result.policy_file).about.activation == activation
+
+
+def test_extra_columns_and_rewards_reach_training_and_evaluations(tmp_path):
+    seen = set()
+
+    def nest_side(arena):
+        seen.add(arena.tick)
+        return np.sign(arena.swarm.position[:, :1] - 16.0)
+
+    plan = tiny_plan(samples=True, stages=(Stage(steps=128, scenario={}),))
+    result = train(plan, tmp_path, extra_observation=nest_side, extra_reward=lambda arena: 0.5 * arena.swarm.active)
+    kept = Network.load(tmp_path / "policy.npz")
+    assert kept.about.interface.extra_columns == 1
+    assert kept.n_columns == result.model.observation_space.shape[0]
+    assert max(seen) >= 900, "evaluations of whole runs call it, too"

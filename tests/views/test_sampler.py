@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.contract.own_functions import register_sensor
 from swarm_forage_env.scenarios.distributions import Drawn
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.sampler import SampledWorld, ScenarioSampler
@@ -147,8 +146,7 @@ def test_what_is_refused(mapping, reason):
 
 
 def test_worlds_with_other_columns_are_refused():
-    register_sensor("of_sampled_worlds", lambda world: np.zeros(len(world.swarm.active)), meaning="nothing")
-    sensing = {"preset": "warehouse_small", "own_sensors": ("of_sampled_worlds",)}
+    sensing = {"preset": "warehouse_small", "neighbours_seen": 2}
     with pytest.raises(ConfigError, match="same columns"):
         ScenarioSampler(worlds=(SampledWorld(scenario="warehouse_small"), SampledWorld(scenario=sensing)))
 

@@ -95,7 +95,7 @@ def test_snapshots_of_others_are_refused():
     learner = joint()
     with pytest.raises(SnapshotError, match=r"LearnerSnapshot, as .* got Snapshot"):
         learner.restore(started(parallel_env("warehouse_small", physics="compiled")).snapshot())
-    with pytest.raises(SnapshotError, match=r"ticks=3, .*own_sensors=\(\)\), got one with InterfaceConfig\("):
+    with pytest.raises(SnapshotError, match=r"ticks=3, .*extra_columns=0\), got one with InterfaceConfig\("):
         learner.restore(started(joint(interface=None)).snapshot())
     with pytest.raises(SnapshotError, match="scenario, length, reads and wrappers of this one"):
         learner.restore(started(joint(max_cycles=9)).snapshot())

@@ -1,6 +1,6 @@
 """From a trained stable-baselines3 model to a network file that runs without torch, or a zip file that tells more."""
 
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -77,15 +77,13 @@ def note_interface(model: BaseAlgorithm, interface: InterfaceConfig, *, caches: 
         NetworkError: an interface that is not the model's.
     """
     _check_spaces(model, interface)
-    said = replace(interface, own_sensors=interface.own_sensors or ())
-    setattr(model, MODEL_NOTE, {"interface": asdict(said), "caches": caches})
+    setattr(model, MODEL_NOTE, {"interface": asdict(interface), "caches": caches})
 
 
 def _check_interface(model: BaseAlgorithm, interface: InterfaceConfig) -> None:
     _check_spaces(model, interface)
     note = getattr(model, MODEL_NOTE, None)
-    said = replace(interface, own_sensors=interface.own_sensors or ())
-    if note is not None and interface_from_mapping({"own_sensors": (), **note["interface"]}) != said:
+    if note is not None and interface_from_mapping(note["interface"]) != interface:
         raise NetworkError(
             f"Expected the interface that the model was trained with, {note['interface']}, got {interface}."
         )
@@ -94,7 +92,7 @@ def _check_interface(model: BaseAlgorithm, interface: InterfaceConfig) -> None:
 def _check_spaces(model: BaseAlgorithm, interface: InterfaceConfig) -> None:
     """Refuse an interface with other observations or actions than the model has."""
     # Any scenario with these sensors will do: all have the same columns and actions.
-    shown: dict[str, Any] = {"own_sensors": interface.own_sensors or ()}
+    shown: dict[str, Any] = {}
     for name in ("neighbours_seen", "neighbour_range_m", "message_size"):
         if getattr(interface, name) is not None:
             shown[name] = getattr(interface, name)

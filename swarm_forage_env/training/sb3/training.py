@@ -27,6 +27,7 @@ from swarm_forage_env._internal.files import alone_in, check_folder, replacing
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies import trust
+from swarm_forage_env.policies.extras import ExtraFunction, Extras
 from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.policies.model_files import MODEL_FAULTS, deterministic_choice
 from swarm_forage_env.policies.network import Network, NetworkPolicy
@@ -56,6 +57,7 @@ from swarm_forage_env.training.plan import EXPORTABLE, LEARNING, Stage, Training
 from swarm_forage_env.training.sb3.algorithms import ALGORITHM_CLASSES, arguments_of
 from swarm_forage_env.training.sb3.buffers import EmptyRolloutError
 from swarm_forage_env.training.sb3.export import export_network, note_interface
+from swarm_forage_env.views.plans import plan_arena
 from swarm_forage_env.views.stable_baselines3 import SwarmVecEnv
 
 _REPORT_EVERY_S = 1.0
@@ -106,6 +108,8 @@ def train(
     resume: bool = False,
     report: Report | None = None,
     callbacks: Sequence[BaseCallback] = (),
+    extra_reward: ExtraFunction | None = None,
+    extra_observation: ExtraFunction | None = None,
 ) -> TrainingResult:
     """Train, or go on training from the last checkpoint.
 
@@ -121,6 +125,9 @@ def train(
         resume: Go on where the checkpoint in `folder` stopped.
         report: Told the status about once a second, and every evaluation.
         callbacks: Further callbacks of the library; one that returns False ends the training, as the library has it.
+        extra_reward: Function of the world that adds to rewards; see `parallel_env`.
+        extra_observation: Function of the world that gives further columns, in evaluations, too. The kept network says
+            how many; a policy made of it needs the function again.
 
     Raises:
         ConfigError: the algorithm knows no such option, the folder holds a training run and
@@ -128,11 +135,15 @@ def train(
             files; another call that trains in the folder; a stage whose scenario cannot be built; or a training that
             diverged.
     """
+    extras = Extras(reward=extra_reward, observation=extra_observation)
+    if extra_observation is not None:
+        arena = plan_arena(plan.scenario, interface=plan.interface, **extras.as_arguments())
+        plan = replace(plan, interface=arena.interface)
     check_plan(plan)
     check_folder(folder)
     with alone_in(folder, ConfigError):
         check_place(folder, plan, resume=resume)
-        return _train(plan, folder, resume, report or _keep_quiet, callbacks)
+        return _train(plan, folder, resume, report or _keep_quiet, callbacks, extras)
 
 
 def _train(
@@ -141,12 +152,13 @@ def _train(
     resume: bool,
     report: Report,
     callbacks: Sequence[BaseCallback],
+    extras: Extras,
 ) -> TrainingResult:
     """Train in a folder that is checked, and that nobody else writes to."""
     torch.set_num_threads(1)  # networks this small gain nothing from more, and arenas want the cores
-    watch = _Watch(plan, folder, report)
+    watch = _Watch(plan, folder, report, extras)
     together = _Together(watch, callbacks)
-    env = SwarmVecEnv(**plan.arenas_of(plan.stages[0]))
+    env = _arenas(plan, plan.stages[0], extras)
     sampler = plan.stages[0].sampler
     try:
         model = _checkpoint(plan, folder, env) if resume else None
@@ -158,7 +170,7 @@ def _train(
             if done < ends:
                 if stage.sampler != sampler:
                     env.close()
-                    env, sampler = SwarmVecEnv(**plan.arenas_of(stage)), stage.sampler
+                    env, sampler = _arenas(plan, stage, extras), stage.sampler
                 model = _prepared(plan, stage, folder, env, done)
                 _learn(model, ends - done, together, f"stage {number}{_changes(stage)}")
             if together.ended:
@@ -176,6 +188,10 @@ def _train(
         policy_file=policy_file,
         steps=model.num_timesteps - begun,
     )
+
+
+def _arenas(plan: TrainingPlan, stage: Stage, extras: Extras) -> SwarmVecEnv:
+    return SwarmVecEnv(**plan.arenas_of(stage), **extras.as_arguments())
 
 
 def check_plan(plan: TrainingPlan) -> None:
@@ -317,8 +333,9 @@ def _has_diverged(model: BaseAlgorithm) -> bool:
 class _Watch(BaseCallback):
     """Checkpoints, evaluates and reports, over all stages of a training."""
 
-    def __init__(self, plan: TrainingPlan, folder: Path, report: Report) -> None:
+    def __init__(self, plan: TrainingPlan, folder: Path, report: Report, extras: Extras) -> None:
         super().__init__()
+        self._extra_observation = extras.observation
         self.plan = plan
         self._folder = folder
         self._report = report
@@ -455,9 +472,13 @@ class _Watch(BaseCallback):
 
         One that draws its actions does so by the chance of its run, not of the training.
         """
-        if self.plan.samples:
-            return NetworkPolicy(self._network())
-        return LearnedPolicy(self.plan.run_interface, remember=deterministic_choice(self.model))
+        interface, extra = self.plan.run_interface, self._extra_observation
+        if not self.plan.samples:
+            return LearnedPolicy(interface, remember=deterministic_choice(self.model), extra_observation=extra)
+        network = self._network()
+        if extra is None:
+            return NetworkPolicy(network)
+        return LearnedPolicy(interface, network.choose, extra_observation=extra)
 
 
 class _Together(CallbackList):
