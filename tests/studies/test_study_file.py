@@ -250,7 +250,8 @@ def test_an_axis_of_lists(tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text(
         'name = "mine"\nscenario = "warehouse_small"\npolicies = ["random"]\nrules = ["described"]\n'
-        '[[axis]]\nfield = "further_nests"\nvalues = [[], [[14.0, 1.0, 18.0, 4.0]], [[14.0, 1.0, 18.0, 4.0], [14.0, 12.0, 18.0, 15.0]]]\nreference = []\n'
+        '[[axis]]\nfield = "further_nests"\nvalues = [[], [[14.0, 1.0, 18.0, 4.0]], [[14.0, 9.0, 18.0, 12.0]]]\n'
+        "reference = []\n"
         "[budget.few]\nseeds = 1\nvalues = { further_nests = [[[14.0, 1.0, 18.0, 4.0]]] }\n"
     )
     spec = load_study(file)
