@@ -70,7 +70,7 @@ def _is_worker(config: pytest.Config) -> bool:
 def pytest_sessionstart(session: pytest.Session) -> None:
     """Compile what most tests need before several processes begin with them: each would compile it for itself."""
     config = session.config
-    if _is_worker(config) or not config.getoption("numprocesses", None) or os.environ.get("NUMBA_DISABLE_JIT") == "1":
+    if _is_worker(config) or not config.getoption("numprocesses", None):
         return
     command = [sys.executable, "-m", "tests.support.first_kernels"]
     compiling = [subprocess.Popen([*command, engine], cwd=config.rootpath) for engine in ("chipmunk", "compiled")]

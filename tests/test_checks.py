@@ -147,7 +147,6 @@ def test_without_pytest_it_says_what_to_install(monkeypatch):
 # Policies
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("name", sorted({*POLICIES} - {"oracle"}))
 def test_shipped_policies_pass(name):
     check_policy(name, scenario("warehouse_small", n_robots=20, n_objects=300))

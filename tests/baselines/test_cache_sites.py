@@ -142,7 +142,6 @@ def test_quirk_scattered_sites_as_the_slow_twin(seed):
         assert abs(found - expected) < 2e-4, "positions are float32"
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize(("x", "scale_m", "far"), [(24.0, 0.0125, 0.005), (8.0, 0.03, 0.05)], ids=["inside", "border"])
 def test_scattered_sites_have_a_heavy_tail_and_a_share_that_lies_anywhere(x, scale_m, far):
     robot = in_scatter()
@@ -156,7 +155,6 @@ def test_scattered_sites_have_a_heavy_tail_and_a_share_that_lies_anywhere(x, sca
     assert anywhere == pytest.approx(far + scale_m / 3.0, rel=0.25), "few of the tail reach so far"
 
 
-@pytest.mark.compiled
 def test_a_far_site_is_uniform_over_what_is_allowed():
     robot = in_scatter()
     robot.know_cache(1, (72, 40), 5)

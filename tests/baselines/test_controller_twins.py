@@ -129,7 +129,6 @@ def test_detours_are_as_in_the_slow_one():
     assert on_the_way == {-1, 0, 1}
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize(("policy", "caches"), [("crw", "none"), ("dpo", "none"), ("stochm", "static")])
 def test_objects_come_home_round_a_wide_wall(policy, caches):
     """Without detours hardly an object does: light and avoidance cancel before the wall."""

@@ -25,7 +25,6 @@ def counts(scenario_name: str, policy_name: str, ticks: int, seed: int, **overri
     return env.events.counters.copy()
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("policy_name", ["crw", "dpo", "cpfa"])
 @pytest.mark.parametrize(
     ("scenario_name", "ticks", "deliveries", "first_pickups"),
@@ -65,7 +64,6 @@ def test_memory_pays():
         assert min(memory, place) > none
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("physics", PHYSICS_ENGINES)
 def test_cpfa_forages_in_either_engine_while_robots_die(physics):
     world = scenario("warehouse_medium", n_robots=50, horizon_s=400.0, physics=physics)

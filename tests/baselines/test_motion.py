@@ -107,7 +107,6 @@ def turns_deg() -> np.ndarray:
     return turns
 
 
-@pytest.mark.compiled
 def test_turns_of_a_free_walk_have_the_expected_spread_and_bound(turns_deg):
     settled = turns_deg[20:]
     assert settled.std() == pytest.approx(2.56, abs=0.02)
@@ -116,7 +115,6 @@ def test_turns_of_a_free_walk_have_the_expected_spread_and_bound(turns_deg):
     assert settled.mean() == pytest.approx(0.0, abs=0.02)
 
 
-@pytest.mark.compiled
 def test_turns_of_a_free_walk_are_correlated(turns_deg):
     settled = turns_deg[20:]
     variance = settled.var()
@@ -124,7 +122,6 @@ def test_turns_of_a_free_walk_are_correlated(turns_deg):
     assert (settled[2:] * settled[:-2]).mean() / variance == pytest.approx(0.25, abs=0.01)
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize(
     ("seconds", "cosine"), [(5, 0.93), (10, 0.86), (20, 0.75), (40, 0.56), (80, 0.30), (160, 0.10)]
 )

@@ -307,7 +307,6 @@ def test_stationary_shares_of_the_exact_chain(controller, is_integer, generalist
     assert list(shares.values()) == pytest.approx([leaves] * len(shares), abs=5e-5)
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("estimates", [EVEN, UNEVEN], ids=["even", "uneven"])
 @pytest.mark.parametrize("is_integer", [False, True])
 @pytest.mark.parametrize("controller", ["stochm", "stochx"])

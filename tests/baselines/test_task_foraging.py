@@ -45,7 +45,6 @@ class Run:
         return self.env.events.counters.copy()
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("policy_name", CACHES)
 def test_swarms_deliver_and_use_caches(policy_name):
     run = Run("warehouse_medium", policy_name, ticks=2000, seed=1)
@@ -60,7 +59,6 @@ def test_swarms_deliver_and_use_caches(policy_name):
     assert taken == left + held, "every object that is picked up is dropped once"
 
 
-@pytest.mark.compiled
 def test_what_robots_remember_of_caches_was_true_and_is_while_they_see_them():
     run = Run("warehouse_small", "stochm", ticks=3000, seed=6)
     run.policy.act(run.obs, run.env.active)  # takes note of what is seen now

@@ -130,7 +130,6 @@ def twin_of(policy, i: int, task) -> ReferenceTaskRobot:
     )
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("quirks", [Quirks(), AUTHORS_PROGRAM], ids=["as described", "authors' program"])
 @pytest.mark.parametrize("policy_class", [STOCHMPolicy, STOCHXPolicy])
 def test_compiled_controller_acts_like_the_slow_one(policy_class, quirks):

@@ -33,7 +33,6 @@ def training(folder: str, plan: TrainingPlan = PLAN, *, best: float = 40.0) -> N
     write_evaluations(Path(folder, EVALUATIONS_FILE), rows)
 
 
-@pytest.mark.compiled
 def test_trainings_are_drawn_beside_others(command, monkeypatch):
     pytest.importorskip("matplotlib")
     training("first")

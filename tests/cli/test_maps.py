@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 
-@pytest.mark.compiled
 def test_maps_of_policies_need_no_page(command):
     pytest.importorskip("matplotlib")
     words = ("--robots", "3", "--horizon", "4", "--set", "interval_s=2", "--seeds", "2", "--square", "1")

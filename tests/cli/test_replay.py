@@ -9,7 +9,6 @@ from swarm_forage_env.inspect.replay.files import read_replays
 from swarm_forage_env.policies import pretrained
 from swarm_forage_env.runs.store import RunStore
 
-pytestmark = pytest.mark.compiled
 SHORT = ("--robots", "3", "--seconds", "4")
 
 

@@ -20,7 +20,6 @@ def test_the_page_has_examples():
     assert [*FILES] == ["speed", "densities"]
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("name", FILES)
 def test_a_study_file_of_the_page_runs(command, name):
     """With the trained policy beside it, where the page says that one is there."""

@@ -29,7 +29,7 @@ from tests.support.golden_runs import AS_THEN
 from tests.support.pictures import keep_figures
 from tests.support.texts import json_lines, steady_file, steady_json, steady_text
 
-pytestmark = [pytest.mark.compiled, *AS_THEN]
+pytestmark = AS_THEN
 
 TEXTS = Path(__file__).with_name("texts")
 REMAKE = bool(os.environ.get("REMAKE_TEXTS"))

@@ -69,7 +69,6 @@ class Counts(RobotPolicy):
 # Runs
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("wrappers", [(), mild_wrappers()], ids=["plain", "adverse"])
 @pytest.mark.parametrize("name", ["warehouse_small", "search_and_rescue"])
 def test_a_run_without_python_is_the_run_with_it(name, wrappers):
@@ -96,7 +95,6 @@ def test_it_keeps_the_rules_of_policies():
     check_policy(Counts, FEW, ticks=40)
 
 
-@pytest.mark.compiled
 def test_the_example_keeps_them_too():
     check_policy(EXAMPLE, quick_world("warehouse_small"))
 
@@ -324,7 +322,6 @@ def reset_by(step):
     acts(type("Wrong", (RobotPolicy,), {"step": step, "reads": ("proximity",), "memory": {"ticks": 0}})())
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize(
     ("step", "told"),
     [
@@ -344,7 +341,6 @@ def test_code_that_is_not_compiled_is_told_in_one_line_with_its_place(step, told
         reset_by(step)
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize(
     ("step", "told"),
     [

@@ -179,7 +179,6 @@ DISTURBED = (
 )
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize(("policy", "wrappers"), [("crw", ()), ("crw", DISTURBED), ("stochm", DISTURBED)])
 def test_a_film_shows_the_run_that_its_name_promises(filmed, tmp_path, monkeypatch, policy, wrappers):
     spec = plan_run(CROWDED, policy, wrappers=wrappers, seed=5)

@@ -71,7 +71,6 @@ def same(one: Replay, other: Replay) -> bool:
 # What is kept
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize(
     ("policy", "wrappers", "physics"),
     [("stochm", DISTURBED, "chipmunk"), ("dpo", (), "chipmunk"), ("stochx", (), "compiled")],
@@ -86,7 +85,6 @@ def test_a_replay_does_not_change_the_record(policy, wrappers, physics):
         assert kept.counters[-1, counter] == record.columns()[name].sum(), name
 
 
-@pytest.mark.compiled
 def test_frames_show_the_run_within_half_a_step(tmp_path, monkeypatch):
     step, states = ForageEnv.step_batch, {}
 
@@ -120,7 +118,6 @@ def test_frames_show_the_run_within_half_a_step(tmp_path, monkeypatch):
         assert np.array_equal(carried[table[~lies, 1]], np.flatnonzero(~lies))
 
 
-@pytest.mark.compiled
 def test_a_dead_robot_stays_where_it_was_last():
     deadly = (parse_wrapper("population:death_per_tick=0.1"),)
     kept, record = record_replay(spec_of("crw", deadly), frame_s=0.2)
@@ -135,7 +132,6 @@ def test_a_dead_robot_stays_where_it_was_last():
         assert (gone == last).all()
 
 
-@pytest.mark.compiled
 def test_pick_ups_and_drops_are_those_that_were_counted():
     kept, _ = record_replay(spec_of("dpo", (), horizon_s=400.0, physics="compiled"), frame_s=0.2)
     frames, signs, places = kept.handovers
@@ -157,7 +153,6 @@ def places_at(replay: Replay, frame: int, robot: int) -> set[tuple[int, float, f
     return places
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("name", ["dpo", "stochm", "generalist"])
 def test_places_are_those_that_robots_remember(name, tmp_path):
     spec = spec_of(name, ())
@@ -182,7 +177,6 @@ def test_places_are_those_that_robots_remember(name, tmp_path):
     assert (kept.memory_events[:, 2] < 0).any(), "something has been forgotten"
 
 
-@pytest.mark.compiled
 def test_tasks_activities_and_memories_are_those_of_the_policy():
     spec = spec_of("stochm", ())
     kept, _ = record_replay(spec, frame_s=2.0)
@@ -205,13 +199,11 @@ def test_tasks_activities_and_memories_are_those_of_the_policy():
     assert kept.remembered.max() > 0
 
 
-@pytest.mark.compiled
 def test_signals_are_the_waveforms(replay):
     signal = DISTURBED[1].waveform.signal(0.2)
     assert replay.signals["throttle"].tolist() == [np.float32(signal(tick)) for tick in replay.ticks.tolist()]
 
 
-@pytest.mark.compiled
 def test_a_policy_that_tells_nothing_is_shown_all_the_same(tmp_path):
     kept, _ = record_replay(spec_of("random", ()), seconds=4.0)
     (again,) = read_replays(write_replays(tmp_path / "run.html", kept))
@@ -219,7 +211,6 @@ def test_a_policy_that_tells_nothing_is_shown_all_the_same(tmp_path):
     assert same(again, kept)
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize(("most", "expected"), [(12 * 81, 5), (12 * 80, 10), (12 * 20, 25), (12 * 2, 500)])
 def test_many_robots_and_long_runs_get_fewer_frames(monkeypatch, most, expected):
     monkeypatch.setattr(capture, "MOST_POSES", most)
@@ -246,7 +237,6 @@ def test_impossible_wishes_are_refused_before_the_run(monkeypatch, options, erro
 # Files
 
 
-@pytest.mark.compiled
 def test_replays_come_back_from_their_file(replay, tmp_path):
     other, _ = record_replay(spec_of("crw", ()))
     path = write_replays(tmp_path / "new" / "two.html", [replay, other], title="two & two")
@@ -277,7 +267,6 @@ def flip(text: str) -> str:
     return text[:at] + ("A" if text[at] != "A" else "B") + text[at + 1 :]
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize(
     ("damage", "expected"),
     [
@@ -326,7 +315,6 @@ def other_robots(about):
     about["spec"]["scenario"]["robots"]["n_robots"] = 11
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
@@ -355,7 +343,6 @@ def test_a_page_from_a_stranger_is_refused_by_the_name_of_the_field(replay, tmp_
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize(
     ("name", "place", "value"),
     [
@@ -375,7 +362,6 @@ def test_numbers_that_point_nowhere_are_refused(replay, tmp_path, name, place, v
         read_replays(tmp_path / "run.html")
 
 
-@pytest.mark.compiled
 def test_a_write_that_is_interrupted_leaves_the_old_file(replay, tmp_path, monkeypatch):
     path = tmp_path / "run.html"
     path.write_text("an older page")

@@ -17,8 +17,6 @@ from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.support.browser import Browser, chromium
 from tests.support.replay_page import choose, seek
 
-pytestmark = pytest.mark.compiled
-
 WORLD = scenario(
     "warehouse_small",
     n_robots=12,

@@ -74,7 +74,6 @@ def call(folder: Path, program: str) -> str:
     return run.stdout.strip()
 
 
-@pytest.mark.compiled
 def test_an_edit_of_one_module_reaches_what_another_has_compiled_in(package):
     program = "from controllers.outer import outer; print(outer(1.0), sum(outer.stats.cache_hits.values()))"
     (package / "outer.py").write_text(OUTER)
@@ -85,7 +84,6 @@ def test_an_edit_of_one_module_reaches_what_another_has_compiled_in(package):
     assert call(package, program) == "3.0 0"
 
 
-@pytest.mark.compiled
 def test_a_kernel_that_another_has_called_still_answers_python(package):
     """Both versions of it are kept, apart from each other."""
     (package / "outer.py").write_text(OUTER)
@@ -96,7 +94,6 @@ def test_a_kernel_that_another_has_called_still_answers_python(package):
     assert call(package, both.format("inner(1.0), outer(3.0)")) == "2.0 4.0 1"
 
 
-@pytest.mark.compiled
 def test_a_type_that_the_sources_no_longer_have_does_no_harm(package):
     program = "from controllers import pairs; print(pairs.total(pairs.{name}(1.0, 2.0)))"
     for name in ("Pair", "Couple"):
@@ -246,7 +243,6 @@ def hits(function) -> int:
     return sum(function.stats.cache_hits.values())
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("name", ["*.nbi", "*.nbc"])
 def test_damaged_files_of_the_cache_are_made_anew(inner, tmp_path, name, caplog):
     assert hits(inner()) == 0
@@ -259,7 +255,6 @@ def test_damaged_files_of_the_cache_are_made_anew(inner, tmp_path, name, caplog)
     assert caplog.text == ""
 
 
-@pytest.mark.compiled
 def test_a_first_run_is_told_once_and_a_second_one_is_none(inner, caplog):
     with caplog.at_level(logging.INFO, "swarm_forage_env"):
         direct(inner(), 1)  # two types, compiled one after the other
@@ -269,7 +264,6 @@ def test_a_first_run_is_told_once_and_a_second_one_is_none(inner, caplog):
         assert caplog.text == "", "it comes from the cache"
 
 
-@pytest.mark.compiled
 def test_what_is_kept_for_other_types_is_not_taken(inner, tmp_path, caplog):
     function = inner()
     function(np.float32(1.0))
@@ -281,7 +275,6 @@ def test_what_is_kept_for_other_types_is_not_taken(inner, tmp_path, caplog):
     assert "cannot be read and are made anew" in caplog.text
 
 
-@pytest.mark.compiled
 def test_without_a_place_for_compiled_functions_they_are_compiled_in_every_process(inner, monkeypatch, caplog):
     # Not by permissions: whoever runs the tests may be allowed to write everywhere.
     monkeypatch.setattr(CacheImpl, "_locator_classes", [])
@@ -291,7 +284,6 @@ def test_without_a_place_for_compiled_functions_they_are_compiled_in_every_proce
     assert "Set NUMBA_CACHE_DIR" in told
 
 
-@pytest.mark.compiled
 def test_a_full_disk_keeps_no_compiled_functions_and_says_so(inner, full_disk, caplog):
     assert hits(inner()) == 0
     (told,) = [record.getMessage() for record in caplog.records if record.levelname == "WARNING"]
@@ -308,7 +300,6 @@ def beyond(row: object) -> float:
 """
 
 
-@pytest.mark.compiled
 def test_kernels_check_every_index_where_numba_is_told_to(package, monkeypatch):
     (package / "beyond.py").write_text(BEYOND)
     monkeypatch.setenv("NUMBA_BOUNDSCHECK", "1")
@@ -333,7 +324,6 @@ def last(row: object, k: int) -> float:
 """
 
 
-@pytest.mark.compiled
 def test_a_kernel_that_others_call_is_compiled_once_for_all_whole_numbers(package):
     """Its code is kept, and a function of another process is made from it."""
     (package / "shared.py").write_text(SHARED)
@@ -344,7 +334,6 @@ def test_a_kernel_that_others_call_is_compiled_once_for_all_whole_numbers(packag
     assert len(kept) == 1, kept
 
 
-@pytest.mark.compiled
 def test_a_fault_in_a_kernel_that_another_calls_reaches_python(package, monkeypatch):
     (package / "shared.py").write_text(SHARED)
     monkeypatch.setenv("NUMBA_BOUNDSCHECK", "1")

@@ -31,7 +31,6 @@ def bound(env: ForageEnv, **choices) -> LearnerInterface:
     return LearnerInterface(InterfaceConfig(**choices), env.swarm_spec)
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("caches", ["none", "static", "dynamic"])
 @pytest.mark.parametrize(("noise", "behind_counts"), [(0.0, False), (0.05, False), (0.05, True)])
 def test_the_compact_view_matches_its_twin_along_runs(caches, noise, behind_counts):

@@ -43,7 +43,6 @@ def test_shipped_policies_run_by_name_without_torch():
     assert result.stdout.split() == [*SHIPPED], result.stderr
 
 
-@pytest.mark.compiled
 def test_ppo_warehouse_small_forages_better_than_the_random_walk():
     world = warehouse_small(horizon_s=1000.0)
     delivered = {

@@ -92,7 +92,6 @@ def test_path_and_content_are_the_identity_of_its_runs(file):
         load_policy(spec.policy, spec.parameters)
 
 
-@pytest.mark.compiled
 def test_another_process_finds_it(file):
     world = scenario("warehouse_small", n_robots=2, n_objects=10, horizon_s=2.0, interval_s=1.0)
     specs = [plan_run(world, "mine.py:Ahead", seed=seed) for seed in (1, 2)]

@@ -39,7 +39,6 @@ def seen(interface: LearnerInterface, env: ForageEnv, name: str) -> np.ndarray:
     return interface.observe(env.arena.observe())[0, interface.layout[name]]
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("observation", ["compact", "full"])
 def test_sites_match_their_twin_along_a_run(observation):
     env = ForageEnv(scenario("search_and_rescue", n_robots=30, side_m=16.0, physics="compiled"))

@@ -29,13 +29,11 @@ def run_conserved(env: ForageEnv, policy, ticks: int, *, seed: int, population: 
             assert_conserved(env)
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize(("policy", "name", "caches"), RUNS)
 def test_objects_are_conserved(policy, name, caches):
     run_conserved(make(name, caches), fresh(policy), 60, seed=3)
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("name", NEAR)
 def test_objects_are_conserved_while_controllers_forage(name):
     """What is lost or doubled stays so: a look now and then finds it in these long runs."""
@@ -45,7 +43,6 @@ def test_objects_are_conserved_while_controllers_forage(name):
     assert env.events.counters[Counter.OBJECTS_MOVED] > 100
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize(
     ("caches", "side_share"), [("none", 0.2), ("static", 0.03), ("dynamic", 0.03), ("dynamic", 0.2)]
 )
@@ -71,7 +68,6 @@ def test_objects_are_conserved_as_the_authors_program_does_it(caches):
     run_conserved(ForageEnv(config), BusyPolicy(), 150, seed=2, population=True)
 
 
-@pytest.mark.compiled
 def test_the_busy_runs_do_something():
     """The checks above mean little unless caches form and dissolve, objects move and robots deliver."""
     config = scenario(

@@ -30,7 +30,6 @@ def elsewhere() -> dict[str, str]:
     return json.loads(process.stdout)
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize(("policy", "name", "caches"), RUNS)
 def test_a_seed_is_a_run(policy, name, caches, elsewhere):
     env = make(name, caches)
@@ -42,7 +41,6 @@ def test_a_seed_is_a_run(policy, name, caches, elsewhere):
     assert elsewhere[f"{name} {caches} {policy}"] == first, "another process"
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize(("name", "policy"), EPISODES)
 def test_a_seed_is_a_whole_episode_through_all_wrappers(name, policy, elsewhere):
     assert episode_digest(name, policy) == elsewhere[f"{name} {policy}"]

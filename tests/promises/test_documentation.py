@@ -29,7 +29,6 @@ def run_all(blocks, page):
         exec(compile(block, f"{page.name}, example {number}", "exec"), names)  # noqa: S102 - our own documentation
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize(
     "page", [page for page in PAGES if "```python" in page.read_text()], ids=lambda page: page.name
 )
@@ -41,7 +40,6 @@ def test_python_examples_run(page, tmp_path, monkeypatch):
     run_all([block for needs, block in examples(page) if not needs], page)
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize(
     "page", [page for page in PAGES if "<!-- needs " in page.read_text()], ids=lambda page: page.name
 )

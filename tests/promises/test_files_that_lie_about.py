@@ -94,7 +94,6 @@ def command(here: Path, *words: str, **environ: str) -> subprocess.CompletedProc
     return python(here, "-m", "swarm_forage_env.cli", *words, **environ)
 
 
-@pytest.mark.compiled
 def test_a_forged_cache_that_a_file_names_is_not_opened(here, forged, marker):
     ended = command(here, "run", "--policy", "crw", *SHORT, "--jobs", "1")
     assert "swarm-forage: .numba_config.yaml in the current folder is not read" in ended.stderr

@@ -13,8 +13,6 @@ from swarm_forage_env.wrappers.world import World
 from tests.support.random_scenarios import random_scenario
 from tests.support.random_worlds import random_world, visit
 
-pytestmark = pytest.mark.compiled
-
 
 @pytest.mark.parametrize("first", range(0, 18, 6))
 def test_everything_holds_in_random_worlds(first):

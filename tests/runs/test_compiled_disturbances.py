@@ -87,7 +87,6 @@ def assert_same(one: LiveRun, other: LiveRun) -> None:
         np.testing.assert_array_equal(values, theirs[name], err_msg=name)
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("seed", range(12))
 def test_a_run_of_any_stack_is_the_run_tick_by_tick(seed):
     chance = np.random.default_rng(seed)
@@ -145,7 +144,6 @@ def test_a_few_ticks_under_all_wrappers_are_those_tick_by_tick():
     assert_same(fast, slow)
 
 
-@pytest.mark.compiled
 def test_a_run_goes_on_from_a_snapshot_and_from_a_copy():
     run = started("dpo", [parse_wrapper(word) for word in ALL])
     run.advance(to_tick=222)
@@ -167,7 +165,6 @@ def test_a_run_goes_on_from_a_snapshot_and_from_a_copy():
         np.testing.assert_array_equal(stack.last_obs, expected["obs"])
 
 
-@pytest.mark.compiled
 def test_another_level_counts_from_the_next_tick_on():
     runs = [started("dpo", [parse_wrapper(word) for word in ALL], by_ticks=by_ticks) for by_ticks in (False, True)]
     for run in runs:

@@ -9,7 +9,6 @@ from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import LiveRun, build_stack
 from swarm_forage_env.scenarios.presets import scenario
 
-pytestmark = pytest.mark.compiled
 WORLD = scenario("warehouse_small", n_robots=6, n_objects=20, horizon_s=200.0, physics="compiled")
 
 

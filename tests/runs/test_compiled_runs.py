@@ -67,7 +67,6 @@ def test_a_run_without_python_is_the_run_with_it(policy, name, fields):
         assert one.columns()["first_picked"].sum() > 0
 
 
-@pytest.mark.compiled
 def test_in_a_large_swarm_memory_is_asked_ahead_and_nothing_else_changes():
     world = scenario("warehouse_medium", n_robots=LARGE + 100, density=0.1, horizon_s=12.0, interval_s=12.0)
     one, other = recorded(world, CRWPolicy(), 7, 30), recorded(world, tick_by_tick(CRWPolicy()))

@@ -65,7 +65,6 @@ def assert_same_in_pieces(policy: Callable[[], Policy], world: ScenarioConfig, s
             np.testing.assert_array_equal(values, by_ticks[name], err_msg=f"{name} at tick {tick}")
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize(
     ("policy", "fields"),
     [
@@ -79,7 +78,6 @@ def test_scripted_policies_do_the_same_in_pieces(policy, fields):
     assert_same_in_pieces(lambda: load_policy(policy), world, seed=len(policy))
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("fields", WORLDS.values(), ids=WORLDS.keys())
 @pytest.mark.parametrize("decision_ticks", [2, 3, 4, 5, 6])
 def test_networks_that_decide_in_some_ticks_do_the_same_in_pieces(decision_ticks, fields):

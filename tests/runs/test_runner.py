@@ -385,7 +385,6 @@ def test_stored_runs_of_other_versions_are_pointed_out(tmp_path, monkeypatch, ca
     assert "1 of them was made by other code or other versions" in capsys.readouterr().err
 
 
-@pytest.mark.compiled
 def test_local_processes_give_the_same_records(tmp_path):
     pooled = run_specs([*SPECS, UNKNOWN], store=RunStore(tmp_path), jobs=2)
     in_process = run_specs(SPECS, jobs=1)

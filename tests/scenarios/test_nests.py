@@ -69,7 +69,6 @@ def test_every_nest_takes_deliveries_and_holds_no_objects(physics):
         assert (env.arena.objects.floor[y_low:y_high, x_low:x_high] == CELL_NEST).all()
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize(
     ("policy", "caches"), [("crw", "none"), ("dpo", "none"), ("stochm", "static"), ("stochx", "dynamic")]
 )

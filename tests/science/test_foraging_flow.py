@@ -7,7 +7,7 @@ from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import warehouse_medium
 
-pytestmark = [pytest.mark.slow, pytest.mark.compiled]
+pytestmark = pytest.mark.slow
 
 
 @pytest.mark.parametrize("seed", [1, 2])

@@ -19,7 +19,7 @@ TICKS = 50_000
 RADIUS_M = 0.085036758
 TOLERATED_M = 0.05 * 2 * RADIUS_M
 
-pytestmark = [pytest.mark.slow, pytest.mark.compiled]
+pytestmark = pytest.mark.slow
 
 
 def assert_inside(env: ForageEnv) -> None:

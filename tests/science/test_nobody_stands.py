@@ -10,7 +10,7 @@ from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
 from swarm_forage_env.wrappers.registry import parse_wrapper
 
-pytestmark = [pytest.mark.slow, pytest.mark.compiled]
+pytestmark = pytest.mark.slow
 
 CONTROLLERS = ["crw", "dpo", "cpfa", "stochm", "stochx"]
 SMALL = ("warehouse_small", {"horizon_s": 4000.0})

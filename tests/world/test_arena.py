@@ -189,7 +189,6 @@ def test_policies_are_told_the_constants_of_the_world(name, caches):
 # Batch over robots
 
 
-@pytest.mark.compiled
 def test_a_tick_runs_the_same_lines_for_any_number_of_robots():
     def lines_run(n_robots: int) -> int:
         env = ForageEnv(scenario("warehouse_small", n_robots=n_robots, caches="static"))

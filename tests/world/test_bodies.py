@@ -38,7 +38,7 @@ def poses_of(bodies):
 
 
 @pytest.mark.parametrize("at_wall", [False, True])
-@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.compiled)])
+@pytest.mark.parametrize("seed", [0, 1])
 def test_compiled_bodies_are_their_slow_twin(seed, at_wall):
     rng = np.random.default_rng(seed)
     n_robots = 24
@@ -136,7 +136,6 @@ def run_heap(places, twists, present=None, place=MIDDLE):
     return swarm.position - place
 
 
-@pytest.mark.compiled
 def test_a_run_can_be_repeated_bit_for_bit():
     rng = np.random.default_rng(3)
     places, twists = heap(rng, 30), rng.uniform(-0.07, 0.07, (20, 30, 3))
@@ -159,7 +158,6 @@ def test_sine_and_cosine_are_those_of_the_library(angle):
     assert (angle * sinc, cosine) == pytest.approx((math.sin(angle), math.cos(angle)), rel=1e-15, abs=1e-17)
 
 
-@pytest.mark.compiled
 def test_facing_stays_the_direction_of_the_heading_for_a_whole_run():
     bodies, swarm = bodies_at([(16.0, 8.0), (12.0, 8.0)], [3.0, -3.0])
     rng = np.random.default_rng(0)

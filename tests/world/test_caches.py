@@ -137,7 +137,6 @@ def test_missing_caches_are_restored_at_the_published_rate():
     assert abs(restored - expected) < 4 * math.sqrt(expected)
 
 
-@pytest.mark.compiled
 @in_each_engine
 def test_steps_restore_from_the_tasks_that_the_policy_tells():
     actions = np.zeros((15, 3), np.float32)

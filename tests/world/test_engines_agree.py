@@ -9,9 +9,6 @@ from scipy.spatial import KDTree
 
 from swarm_forage_env.world import chipmunk
 
-pytestmark = pytest.mark.compiled
-
-
 SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
 
 

@@ -18,7 +18,6 @@ from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.world.lockstep import Lockstep, can_go_in_lockstep
 from tests.support.branches import pickled
 
-pytestmark = pytest.mark.compiled
 N_ROBOTS = 12
 ADVERSITY = (
     "sensor_noise:sigma=0.03",

@@ -114,7 +114,6 @@ def test_a_message_that_is_not_finite_is_refused():
     assert env.tick == 0
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("physics", ["chipmunk", "compiled"])
 def test_runs_of_scripted_policies_stay_what_they_are(physics):
     small = scenario("warehouse_small", **SMALL | {"physics": physics}, horizon_s=40.0, interval_s=20.0)
@@ -161,7 +160,6 @@ class OneByOne(ArenaBatch):
         return None, None
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("observation", ["full", "compact"])
 def test_arenas_together_are_what_they_are_alone(observation):
     world = scenario("warehouse_small", **SMALL | BOTH)

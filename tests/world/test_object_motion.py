@@ -87,7 +87,6 @@ def test_objects_are_conserved_and_stay_on_their_floor(self_conflict):
     assert np.all(in_x & in_y)
 
 
-@pytest.mark.compiled
 def test_moves_happen_with_the_given_probability():
     objects = world([(5 * x + 2, 5 * y + 2) for x in range(20) for y in range(20)], 100, 100)
     rng = np.random.default_rng(3)
@@ -111,7 +110,6 @@ def test_every_free_neighbour_is_equally_likely(start, n_choices):
     assert chisquare(reached).pvalue > SIGNIFICANCE
 
 
-@pytest.mark.compiled
 def test_the_number_that_triggers_a_move_does_not_bias_its_direction():
     rng = np.random.default_rng(6)
     counts = np.zeros((3, 3), int)
@@ -124,7 +122,6 @@ def test_the_number_that_triggers_a_move_does_not_bias_its_direction():
     assert chisquare(counts).pvalue > SIGNIFICANCE
 
 
-@pytest.mark.compiled
 def test_long_run_visits_are_proportional_to_the_number_of_neighbours():
     # A walk to a uniform choice of neighbours is reversible: its stationary law is the number of neighbours.
     rng = np.random.default_rng(7)

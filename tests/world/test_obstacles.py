@@ -93,7 +93,6 @@ def test_bodies_are_held_out_of_boxes_like_their_slow_twin():
     assert n_moved == np.count_nonzero(np.any(poses[:, :2] != before, axis=1)) > 100
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("physics", ["chipmunk", "compiled"])
 def test_a_crowd_that_pushes_from_both_sides_never_comes_through(physics):
     """Against the thinnest box there can be, and round its end, with everybody pushing to its middle."""

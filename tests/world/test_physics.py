@@ -121,7 +121,6 @@ def test_walls_hold(corner):
             assert room_to_walls(swarm) >= -ROUNDING_M, heading
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("at", [(0, 0), (1, 1), (0.5, 0), (1, 0.5)])  # two corners have all four walls
 def test_a_crowd_does_not_push_anybody_through_a_wall(at):
     x_low, y_low, x_high, y_high = scenario("warehouse_small").arena.interior_m

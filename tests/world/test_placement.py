@@ -107,7 +107,6 @@ def test_place_all_leaves_objects_in_caches_alone():
     assert np.all(objects.floor[14:17, 14:17] == CELL_CACHE)
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("share_free", [0.9, 0.02], ids=["by trying", "by listing"])
 def test_every_free_cell_is_equally_likely(share_free):
     rng = np.random.default_rng(11)
@@ -127,7 +126,6 @@ def test_every_free_cell_is_equally_likely(share_free):
     assert chisquare(counts[free]).pvalue > SIGNIFICANCE
 
 
-@pytest.mark.compiled
 def test_groups_then_regions_are_equally_likely():
     regions = np.array([(0, 0, 4, 4), (5, 0, 9, 4), (10, 0, 14, 4), (15, 0, 25, 10)], np.int32)
     source = Source(regions, np.array([8, 8, 8, 16], np.int32), np.array([0, 3, 4], np.int32))
@@ -141,7 +139,6 @@ def test_groups_then_regions_are_equally_likely():
     assert chisquare(counts, [1_000, 1_000, 1_000, 3_000]).pvalue > SIGNIFICANCE
 
 
-@pytest.mark.compiled
 def test_the_two_sources_are_equally_likely_and_stand_in_for_each_other():
     source = Source(
         np.array([(0, 0, 2, 2), (5, 0, 9, 4)], np.int32), np.full(2, UNLIMITED, np.int32), np.array([0, 2], np.int32)

@@ -130,7 +130,6 @@ def test_preset_counts_always_fit(side, quirks):
         assert source.capacity.sum() >= SEARCH_AND_RESCUE_OBJECTS[side]
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("side", LAW_TABLE)
 @pytest.mark.parametrize("seed", range(3))
 def test_every_object_lies_in_a_cluster_within_its_capacity(side, seed):

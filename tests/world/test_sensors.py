@@ -178,7 +178,6 @@ def test_reads_may_only_skip_slices_that_nobody_reads(reads):
 # Declared bounds
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("caches", CACHE_KINDS)
 @pytest.mark.parametrize("name", NEAR)
 def test_observations_and_state_stay_inside_their_spaces(name, caches):

@@ -28,7 +28,6 @@ def small(**options) -> ForageEnv:
     return parallel_env("warehouse_small", **{"n_robots": 3, "n_objects": 9, "physics": "compiled", **options})
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize(("name", "caches"), [*zip(DENSE, itertools.cycle(CACHES), strict=False)])
 def test_a_run_goes_on_from_a_snapshot(name, caches):
     run = Branch(crowded(name, caches), BusyPolicy()).go_on(150)
@@ -42,7 +41,6 @@ def test_a_run_goes_on_from_a_snapshot(name, caches):
         assert branch.go_on(50).seen == expected.seen
 
 
-@pytest.mark.compiled
 def test_a_heap_of_robots_goes_on_from_a_snapshot():
     """All push into one corner, so that what an engine remembers of contacts matters."""
     world = scenario("warehouse_small", n_robots=60, width_m=8.0, height_m=8.0, nest_centre_m=(2.0, 4.0),

@@ -84,7 +84,6 @@ def test_last_value_and_mean_are_recorded_and_the_mean_is_the_adversity():
     assert recorder.columns()["adversity"].tolist() == contributed["handling_cost_mean"].tolist()
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("policy", ["crw", "dpo", "stochm", "ppo_warehouse_small"])
 def test_policies_wait_and_deliver_less(policy):
     """Pick-ups and drops of 20 s each: policies send their band until the event comes.
@@ -101,7 +100,6 @@ def test_policies_wait_and_deliver_less(policy):
     assert 0 < hard.collected.sum() < easy.collected.sum()
 
 
-@pytest.mark.compiled
 def test_a_world_with_slow_handling_equals_the_wrapper_that_makes_it_slow():
     world = quick_world("warehouse_small", n_robots=20, horizon_s=60.0, interval_s=60.0)
     slow = with_overrides(world, pickup_ticks=7, drop_ticks=7)

@@ -55,7 +55,6 @@ def noisy(world: ForageEnv, obs: np.ndarray, times: int, **fields) -> np.ndarray
 # Sizes and clamps
 
 
-@pytest.mark.compiled
 def test_units_of_sigma(world):
     sigma, obs = 0.05, middling_obs(world)
     seen = noisy(world, obs, 30, sigma=sigma).astype(np.float64)
@@ -85,7 +84,6 @@ def test_position_noise_is_in_metres_along_each_axis():
     assert change[..., 1].std() * 8.0 == pytest.approx(0.5, rel=0.04)
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("sigma", [0.0043, 0.1, 3.0, 1000.0])
 def test_observations_stay_in_their_space(world, sigma):
     space, layout = world.observation_space("robot_0"), world.layout
@@ -135,7 +133,6 @@ def test_only_chosen_groups_are_noisy(world, group):
         assert changed.tolist() == list(range(columns.start, columns.stop))
 
 
-@pytest.mark.compiled
 def test_a_group_may_have_a_sigma_of_its_own(world):
     obs = middling_obs(world)
     seen = noisy(world, obs, 20, sigma=0.02, groups=("proximity", "ground"), sigmas={"ground": 0.1, "light": 0.04})
@@ -259,7 +256,6 @@ STUDY_TABLE = [
 ]
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize(("sigma", "obstacle", "object_seen", "area_seen"), STUDY_TABLE)
 def test_decisions_under_the_noise_of_the_study(world, sigma, obstacle, object_seen, area_seen):
     layout, samples = world.layout, 60
@@ -338,7 +334,6 @@ def test_random_bits_are_those_of_the_twin(n_draws):
         np.testing.assert_array_equal(room, next(twin)[0])
 
 
-@pytest.mark.compiled
 def test_random_bits_are_random():
     lanes, room = new_lanes(stream_rng(0, Stream.SENSOR_NOISE)), room_for_draws(LANES * 20_000)
     draw_bits(lanes, room)

@@ -22,7 +22,6 @@ POLICY_OF = {"none": "dpo", "static": "stochm", "dynamic": "stochx"}
 RUNS = [(name, tuple(POLICY_OF)[place % 3]) for place, name in enumerate(NEAR)]
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize(("name", "caches"), RUNS)
 def test_a_stack_goes_on_from_a_snapshot_to_the_same_record(name, caches):
     stack = whole_stack(name, "compiled", caches)
@@ -52,7 +51,6 @@ for branch in (run.beside(fresh, fresh.restore_batch(snapshot)), run.beside(stac
 """
 
 
-@pytest.mark.compiled
 def test_another_process_goes_on_from_a_file(tmp_path):
     stack = whole_stack("warehouse_small", "compiled", "dynamic")
     run, file = Branch(stack, load_policy("stochx")).go_on(300), tmp_path / "run"
@@ -63,7 +61,6 @@ def test_another_process_goes_on_from_a_file(tmp_path):
     assert child.stdout.splitlines() == expected, child.stderr
 
 
-@pytest.mark.compiled
 def test_a_live_run_is_resumed_from_its_pickle():
     def started() -> LiveRun:
         return LiveRun(whole_stack("warehouse_small", "compiled"), load_policy("crw"), 3)
