@@ -1,6 +1,5 @@
 """Settings shared by all tests, kernels that they share, and rules for skipped tests."""
 
-import os
 import re
 import subprocess
 import sys
