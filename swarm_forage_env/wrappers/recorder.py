@@ -169,7 +169,7 @@ class RunRecorder(SwarmWrapper):
     def contributed(self) -> dict[str, np.ndarray]:
         """Return the columns that not every record has, (T,) each; raises as `columns`.
 
-        They come from other wrappers, from the policy's tasks, and from counters that earlier records lack.
+        They come from other wrappers, from the policy's tasks, and from counters that are no field of a record.
         """
         self._require_complete()
         later = {name: values for name, values in self._counted().items() if name not in INTERVAL_COLUMNS}
