@@ -81,10 +81,10 @@ class HandlingCostConfig(WrapperConfig):
     def __post_init__(self) -> None:
         hint = "; for example Waveform(kind='constant', amplitude=10)"
         instance("handling_cost.waveform", self.waveform, Waveform, hint=hint)
-        if self.waveform.peak > MAX_HANDLING_TICKS:
+        if self.waveform.ends[1] > MAX_HANDLING_TICKS:
             raise ConfigError(
                 f"Expected a handling cost of at most {MAX_HANDLING_TICKS:,} ticks, got a waveform that reaches "
-                f"{self.waveform.peak:g}; lower its amplitude or its offset."
+                f"{self.waveform.ends[1]:g}; lower its amplitude or its offset."
             )
 
     def in_words(self, dt_s: float) -> str:

@@ -106,10 +106,10 @@ class ThrottleConfig(WrapperConfig):
     def __post_init__(self) -> None:
         hint = "; for example Waveform(kind='constant', amplitude=0.1)"
         instance("throttle.waveform", self.waveform, Waveform, hint=hint)
-        if self.waveform.peak > 1.0:
+        if self.waveform.ends[1] > 1.0:
             raise ConfigError(
                 f"Expected a throttle of at most 1 (robots stand still), got a waveform that reaches "
-                f"{self.waveform.peak:g}; lower its amplitude or its offset."
+                f"{self.waveform.ends[1]:g}; lower its amplitude or its offset."
             )
         switch("throttle.carriers", self.carriers)
 

@@ -29,16 +29,16 @@ from swarm_forage_env.scenarios.config import from_mapping
 Signal: TypeAlias = Callable[[int], float]
 """Value at a tick; the first tick of a run is 1."""
 
-_FIELDS_OF_KIND: dict[str, tuple[str, ...]] = {
+_CYCLE = ("amplitude", "offset", "period_s", "phase")
+_USED = {
     "constant": ("amplitude",),
-    "sine": ("amplitude", "offset", "period_s", "phase"),
-    "square": ("amplitude", "offset", "period_s", "phase"),
-    "sawtooth": ("amplitude", "offset", "period_s", "phase"),
+    "sine": _CYCLE,
+    "square": _CYCLE,
+    "sawtooth": _CYCLE,
     "step": ("amplitude", "offset", "start_s"),
     "table": ("times_s", "values"),
 }
-WAVEFORM_KINDS = tuple(_FIELDS_OF_KIND)
-"""Names of the waveforms."""
+"""Kind of a waveform -> the fields that it has."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -50,7 +50,7 @@ class Waveform:
     """
 
     kind: str
-    """One of `WAVEFORM_KINDS`."""
+    """constant, sine, square, sawtooth, step or table."""
     amplitude: float = 0.0
     """A, in the unit of what the waveform drives."""
     offset: float = 0.0
@@ -67,13 +67,12 @@ class Waveform:
     """Values of a table, one per time."""
 
     def __post_init__(self) -> None:
-        one_of("the kind of a waveform", self.kind, WAVEFORM_KINDS)
-        used = ("kind", *_FIELDS_OF_KIND[self.kind])
+        one_of("the kind of a waveform", self.kind, tuple(_USED))
+        used = _USED[self.kind]
         for item in fields(self):
-            if item.name not in used and getattr(self, item.name) != item.default:
+            if item.name not in ("kind", *used) and getattr(self, item.name) != item.default:
                 raise ConfigError(
-                    f"Expected a {self.kind} waveform to be given by {', '.join(used[1:])} only, "
-                    f"got {item.name} as well."
+                    f"Expected a {self.kind} waveform to be given by {', '.join(used)} only, got {item.name} as well."
                 )
         for name in ("amplitude", "offset", "phase"):
             number(f"{name} of a waveform", getattr(self, name))
@@ -82,34 +81,15 @@ class Waveform:
         if "start_s" in used:
             number("start_s of a step waveform", self.start_s, at_least=0.0)
         if self.kind == "table":
-            self._check_table()
-
-    def _check_table(self) -> None:
-        for name in ("times_s", "values"):
-            several(f"{name} of a table waveform", getattr(self, name), "numbers")
-            for value in getattr(self, name):
-                number(f"every one of {name} of a table waveform", value)
-        if len(self.times_s) != len(self.values):
-            raise ConfigError(
-                f"Expected as many values as times_s in a table waveform, got {len(self.values)} values at "
-                f"{len(self.times_s)} times."
-            )
-        if any(later <= earlier for earlier, later in zip(self.times_s, self.times_s[1:], strict=False)):
-            raise ConfigError(f"Expected times_s of a table waveform to rise strictly, got {self.times_s}.")
-
-    @classmethod
-    def sampled(cls, function: Callable[[float], float], *, until_s: float, every_s: float) -> "Waveform":
-        """Tabulate a function of time, so that it can be stored with a run.
-
-        Args:
-            function: Takes a time in seconds.
-            until_s: Last time that is sampled, if it is a multiple of `every_s`.
-            every_s: Distance of the samples.
-        """
-        number("until_s", until_s, at_least=0.0)
-        number("every_s", every_s, above=0.0)
-        times = tuple(index * every_s for index in range(math.floor(until_s / every_s + 1e-9) + 1))
-        return cls(kind="table", times_s=times, values=tuple(float(function(time_s)) for time_s in times))
+            for name in used:
+                several(f"{name} of a table waveform", getattr(self, name), "numbers")
+                for value in getattr(self, name):
+                    number(f"every one of {name} of a table waveform", value)
+            if len(self.times_s) != len(self.values) or (np.diff(self.times_s) <= 0.0).any():
+                raise ConfigError(
+                    f"Expected times_s of a table waveform to rise, and as many values, got {self.times_s} and "
+                    f"{self.values}."
+                )
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "Waveform":
@@ -117,26 +97,16 @@ class Waveform:
         return from_mapping(cls, mapping)
 
     @property
-    def peak(self) -> float:
-        """Largest value that the signal can take."""
-        return self._ends[1]
-
-    @property
-    def trough(self) -> float:
-        """Smallest value that the signal can take."""
-        return self._ends[0]
-
-    @property
-    def _ends(self) -> tuple[float, float]:
+    def ends(self) -> tuple[float, float]:
+        """Smallest and largest value that the signal can take."""
         if self.kind == "constant":
             return self.amplitude, self.amplitude
         if self.kind == "table":
             return min(self.values), max(self.values)
         if self.kind == "step":
             return self.offset + min(0.0, self.amplitude), self.offset + max(0.0, self.amplitude)
-        shift = 2.0 * self.amplitude * self.phase if self.kind == "sawtooth" else 0.0
-        peak = self.offset + shift + abs(self.amplitude)
-        return peak - 2.0 * abs(self.amplitude), peak
+        middle = self.offset + (2.0 * self.amplitude * self.phase if self.kind == "sawtooth" else 0.0)
+        return middle - abs(self.amplitude), middle + abs(self.amplitude)
 
     def in_words(self, unit: str, *, factor: float = 1.0, floor: float = -math.inf) -> str:
         """Return how the value goes, for people: "0 to 40 % (sine, period 200 s)".
@@ -154,24 +124,37 @@ class Waveform:
             return f"{shown(self.amplitude)}{unit}"
         if self.kind == "step":
             return f"{shown(self.offset)}, from {self.start_s:,g} s on {shown(self.offset + self.amplitude)}{unit}"
-        manner = f"table of {len(self.values)} values" if self.kind == "table" else f"period {self.period_s:,g} s"
-        kind = "" if self.kind == "table" else f"{self.kind}, "
-        return f"{shown(self.trough)} to {shown(self.peak)}{unit} ({kind}{manner})"
+        low, high = map(shown, self.ends)
+        manner = f"{self.kind}, period {self.period_s:,g} s" if self.period_s else f"table of {len(self.values)} values"
+        return f"{low} to {high}{unit} ({manner})"
 
     def signal(self, dt_s: float) -> Signal:
         """Return V as a function of the tick, for ticks of `dt_s` seconds; it can be pickled."""
-        amplitude, offset, phase = self.amplitude, self.offset, self.phase
+        return partial(self._at, dt_s)
+
+    def _at(self, dt_s: float, tick: int) -> float:
         if self.kind == "constant":
-            return partial(_constant, amplitude)
-        if self.kind == "table":
-            return partial(_table, [time_s / dt_s for time_s in self.times_s], self.values)
-        if self.kind == "step":
-            assert self.start_s is not None, "checked at construction"
-            # Half a millionth of a tick absorbs the rounding of start_s / dt_s.
-            return partial(_step, self.start_s / dt_s - 5e-7, amplitude, offset)
-        assert self.period_s is not None, "checked at construction"
-        function = {"sine": _sine, "square": _square, "sawtooth": _sawtooth}[self.kind]
-        return partial(function, self.period_s / dt_s, amplitude, offset, phase)
+            return self.amplitude
+        if self.start_s is not None:  # half a millionth of a tick absorbs the rounding of start_s / dt_s
+            return self.offset + self.amplitude if tick >= self.start_s / dt_s - 5e-7 else self.offset
+        if self.period_s is None:
+            return self._between_points(dt_s, tick)
+        cycles = tick / (self.period_s / dt_s)
+        if self.kind == "sawtooth":
+            return self.offset + 2.0 * self.amplitude * (cycles - math.floor(cycles + 0.5) + self.phase)
+        sine = math.sin(2.0 * math.pi * cycles + self.phase)
+        if self.kind == "sine":
+            return self.offset + self.amplitude * sine
+        return self.offset + (self.amplitude if sine >= 0.0 else -self.amplitude)
+
+    def _between_points(self, dt_s: float, tick: int) -> float:
+        """The value of a table."""
+        ticks = [time_s / dt_s for time_s in self.times_s]
+        after = bisect.bisect_right(ticks, tick)
+        if after in (0, len(ticks)):
+            return self.values[0 if after == 0 else -1]
+        share = (tick - ticks[after - 1]) / (ticks[after] - ticks[after - 1])
+        return self.values[after - 1] + share * (self.values[after] - self.values[after - 1])
 
 
 class WaveformAhead:
@@ -190,36 +173,6 @@ class WaveformAhead:
             self._first = tick
             self._values = np.array([self._signal(later) for later in range(tick, tick + self._TICKS)], float)
         return self._values[tick - self._first :]
-
-
-def _constant(amplitude: float, _tick: int) -> float:
-    return amplitude
-
-
-def _sine(period: float, amplitude: float, offset: float, phase: float, tick: int) -> float:
-    return offset + amplitude * math.sin(2.0 * math.pi * (tick / period) + phase)
-
-
-def _square(period: float, amplitude: float, offset: float, phase: float, tick: int) -> float:
-    return offset + (amplitude if math.sin(2.0 * math.pi * (tick / period) + phase) >= 0.0 else -amplitude)
-
-
-def _sawtooth(period: float, amplitude: float, offset: float, phase: float, tick: int) -> float:
-    return offset + 2.0 * amplitude * (tick / period - math.floor(tick / period + 0.5) + phase)
-
-
-def _step(start: float, amplitude: float, offset: float, tick: int) -> float:
-    return offset + amplitude if tick >= start else offset
-
-
-def _table(ticks: list[float], values: tuple[float, ...], tick: int) -> float:
-    after = bisect.bisect_right(ticks, tick)
-    if after == 0:
-        return values[0]
-    if after == len(ticks):
-        return values[-1]
-    share = (tick - ticks[after - 1]) / (ticks[after] - ticks[after - 1])
-    return values[after - 1] + share * (values[after] - values[after - 1])
 
 
 def gather_waveform(mapping: Mapping[str, Any], key: str, owner: type) -> dict[str, Any]:
@@ -246,7 +199,7 @@ def gather_waveform(mapping: Mapping[str, Any], key: str, owner: type) -> dict[s
         beside = {name: values.pop(name) for name in wave_fields if name in values}
         values[key] = Waveform.from_mapping({"kind": given, **beside})
     elif key not in values and not values.keys().isdisjoint(wave_fields):
-        raise ConfigError(f"Missing key {key!r}, the kind of the waveform: one of {', '.join(WAVEFORM_KINDS)}.")
+        raise ConfigError(f"Missing key {key!r}, the kind of the waveform: one of {', '.join(_USED)}.")
     return values
 
 

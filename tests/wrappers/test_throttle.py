@@ -171,4 +171,4 @@ def test_levels_of_the_study():
         for config in configs[1:]:
             assert (config.waveform.kind, config.waveform.period_s) == (kind, period_s)
             assert config.waveform.offset == config.waveform.amplitude
-        assert configs[-1].waveform.peak == pytest.approx(highest)
+        assert configs[-1].waveform.ends[1] == pytest.approx(highest)
