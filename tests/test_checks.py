@@ -7,12 +7,8 @@ import pytest
 from gymnasium import spaces
 from pettingzoo.utils import BaseParallelWrapper
 
-import swarm_forage_env
-from baselines.crw import CRWPolicy
 from swarm_forage_env import CheckError, check_determinism, check_env, check_policy
-from swarm_forage_env._internal.compiling import Callback, kernel
 from swarm_forage_env.contract.codes import Task
-from swarm_forage_env.contract.kernel_policy import example_of
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import POLICIES, from_callable
 from swarm_forage_env.runs.run import build_stack
@@ -324,9 +320,12 @@ class UnknownCaches(Sound):
         (NoAct, "without act; a function from observations to actions becomes a policy by from_callable"),
         (drive, "without reset and act"),
         (RaisesWhenNobodyIsActive, "got IndexError at tick 75, with 0 of 5 robots active"),
-        (ActiveRowsOnly, r"got shape \(3, 3\) at tick 37; return one row per robot, inactive ones included"),
-        (Lists, "got list at tick 0; return a numpy array"),
-        (Double, "got float64 at tick 0"),
+        (
+            ActiveRowsOnly,
+            r"got float32 of shape \(3, 3\) .*at tick 37; return one row per robot, inactive",
+        ),
+        (Lists, "got list at tick 0; return one row"),
+        (Double, "got float64 of shape .* at tick 0"),
         (TooFast, r"in \[-1, 1\], got \[1.5, 1.5, 1.5\] for robot 0"),
         (NotANumber, r"got \[0.0, nan, 0.0\] for robot 2"),
         (WritesIntoObservations, "leave obs and active as they are"),
@@ -349,65 +348,6 @@ class UnknownCaches(Sound):
 def test_each_fault_of_a_policy_is_found(policy, fault):
     with pytest.raises(CheckError, match=fault):
         check_policy(policy, SMALL)
-
-
-@kernel
-def stand(_obs, _active, _draws, state, _now):
-    actions = state[-1]
-    for i in range(actions.shape[0]):
-        actions[i, 0], actions[i, 1], actions[i, 2] = 0.0, 0.0, 0.0
-
-
-@kernel
-def go_nowhere(_obs, _active, _draws, state, _now):
-    actions = state[-1]
-    for i in range(actions.shape[0]):
-        actions[i, 0] = np.nan
-
-
-class StandsWhenCompiled(CRWPolicy):
-    other = staticmethod(stand)
-
-    def compiled(self):
-        script = super().compiled()
-        script.callback = Callback(self.other, *example_of(script.state))
-        return script
-
-
-class FailsWhenCompiled(StandsWhenCompiled):
-    other = staticmethod(go_nowhere)
-
-
-class ForgetsTicksWhenCompiled(CRWPolicy):
-    """Draws the same numbers again and again."""
-
-    def compiled(self):
-        script = super().compiled()
-        script.count_ticks = lambda n_ticks: None
-        return script
-
-
-class NotCompiledToday(CRWPolicy):
-    def compiled(self):
-        return None
-
-
-@pytest.mark.parametrize(
-    ("policy", "fault"),
-    [
-        (StandsWhenCompiled, "do what act does, got another position of the robots at the end in a run of 150 ticks"),
-        (ForgetsTicksWhenCompiled, "do what act does, got another position"),
-        (FailsWhenCompiled, r"drive a run, got ActionError: .* got \[nan, .* for robot_0"),
-    ],
-)
-def test_compiled_must_do_what_act_does(policy, fault):
-    with pytest.raises(CheckError, match=fault):
-        check_policy(policy, SMALL)
-
-
-@pytest.mark.parametrize("policy", [CRWPolicy, NotCompiledToday])
-def test_what_compiles_to_the_same_or_not_at_all_passes(policy):
-    check_policy(policy, SMALL)
 
 
 def test_actions_of_inactive_robots_may_be_anything():
@@ -451,9 +391,3 @@ def test_a_difference_in_the_record_alone_is_found():
 def test_seeds_are_needed():
     with pytest.raises(ValueError, match="Expected seeds to run, got none"):
         check_determinism(BusyPolicy, SMALL, seeds=[])
-
-
-def test_checks_are_public():
-    for name in ("CheckError", "check_env", "check_policy", "check_determinism"):
-        assert name in swarm_forage_env.__all__
-    assert issubclass(CheckError, ValueError)

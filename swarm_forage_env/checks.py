@@ -1,0 +1,452 @@
+"""Checks for environments and policies of your own: do they keep the rules that the package keeps itself?
+
+    check_env(env)                    an environment, alone or in wrappers
+    check_policy(policy)              what a policy returns, reads and remembers
+    check_determinism(policy)         whole runs: equal seeds, equal records
+
+Each returns None if all is well, and otherwise raises a `CheckError` about the first fault.
+"""
+
+import contextlib
+import copy
+import io
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import PurePath
+from typing import Any, NamedTuple
+
+import numpy as np
+from pettingzoo import ParallelEnv
+
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env._internal.wording import install_command, suggestion
+from swarm_forage_env.contract.codes import Task
+from swarm_forage_env.contract.layout import LIGHT_IF_CARRYING, ObservationLayout
+from swarm_forage_env.contract.policy import Policy, SwarmSpec, sees_world
+from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.runs.run import LiveRun, build_stack
+from swarm_forage_env.runs.spec import chosen_caches
+from swarm_forage_env.scenarios.config import CACHE_KINDS, ScenarioConfig
+from swarm_forage_env.scenarios.overrides import with_overrides
+from swarm_forage_env.scenarios.presets import scenario as preset
+from swarm_forage_env.wrappers.base import SwarmWrapper
+
+_INTERVAL_TICKS = 10
+"""Length of a recording interval in compared records. Our choice: short, so that small differences are seen."""
+
+
+class CheckError(ValueError):
+    """An environment or a policy that breaks a promise; the message says what was expected, what came, what to do."""
+
+
+# Environments
+
+
+def check_env(env: ParallelEnv[str, Any, Any], *, ticks: int = 60) -> None:
+    """Check an environment.
+
+    It must pass PettingZoo's own test of parallel environments. Observations and states must lie in their spaces. Equal
+    seeds and actions must give equal runs. For a `ForageEnv` or a stack of `SwarmWrapper`s, the arrays of `reset_batch`
+    and `step_batch` must hold the same values as the dictionaries of `reset` and `step`. The environment is stepped:
+    reset it before you go on.
+
+    Args:
+        env: The environment, with or without wrappers.
+        ticks: Length of the runs that are compared.
+
+    Raises:
+        CheckError: about the first fault that is found.
+        ImportError: pytest is not installed, which PettingZoo's test needs.
+    """
+    if not isinstance(env, ParallelEnv):
+        raise CheckError(
+            f"Expected a parallel environment of PettingZoo, got {env!r}; make one with parallel_env(...), or derive "
+            "yours from pettingzoo.ParallelEnv."
+        )
+    _check_parallel_api(env, ticks)
+    spaces = {agent: copy.deepcopy(env.action_space(agent)) for agent in env.possible_agents}
+    for number, space in enumerate(spaces.values()):
+        space.seed(number)
+    actions = [{agent: space.sample() for agent, space in spaces.items()} for _ in range(ticks)]
+    first, again = _dict_run(env, actions), _dict_run(env, actions)
+    advice = "reset(seed) must set back everything that a run changes, and draw from generators made from that seed."
+    _compare_runs(first, again, "Expected equal seeds and actions to give equal runs", advice)
+    if isinstance(env, ForageEnv | SwarmWrapper):
+        advice = "override hooks, or both step and step_batch: runs use the arrays, PettingZoo the dictionaries."
+        _compare_runs(first, _batch_run(env, actions), "Expected step_batch to give what step gives", advice)
+
+
+def _check_parallel_api(env: ParallelEnv[str, Any, Any], ticks: int) -> None:
+    try:
+        from pettingzoo.test import parallel_api_test
+    except ImportError as error:
+        raise ImportError(f"PettingZoo's tests need pytest: {install_command('test')}.") from error
+    has_horizon, horizon = "max_cycles" in vars(env), getattr(env, "max_cycles", None)
+    try:
+        with warnings.catch_warnings(), contextlib.redirect_stdout(io.StringIO()):
+            warnings.simplefilter("error", UserWarning)  # some faults are only warnings in PettingZoo
+            parallel_api_test(env, num_cycles=ticks)
+    except (AssertionError, UserWarning) as error:
+        reason = str(error) or "an assertion without a message; the traceback shows which"
+        raise CheckError(
+            f"Expected an environment that passes PettingZoo's parallel_api_test, got: {reason}"
+        ) from error
+    finally:  # the test sets a horizon of its own
+        if has_horizon:
+            env.max_cycles = horizon  # pyright: ignore[reportAttributeAccessIssue] - only some environments have one
+        else:
+            vars(env).pop("max_cycles", None)
+
+
+class _Moment(NamedTuple):
+    """What an agent gets in a tick."""
+
+    observation: np.ndarray
+    reward: float = 0.0
+    termination: bool = False
+    truncation: bool = False
+
+
+def _dict_run(env: ParallelEnv[str, Any, Any], actions: Sequence[dict[str, Any]]) -> list[dict[str, _Moment]]:
+    obs, _ = env.reset(seed=1)
+    run = [{agent: _Moment(np.copy(row)) for agent, row in obs.items()}]
+    _check_in_spaces(env, obs, 0)
+    for tick, chosen in enumerate(actions, start=1):
+        if not env.agents:
+            break
+        obs, rewards, ended, cut, _ = env.step({agent: chosen[agent] for agent in env.agents})
+        _check_in_spaces(env, obs, tick)
+        run.append({name: _Moment(np.copy(row), rewards[name], ended[name], cut[name]) for name, row in obs.items()})
+    return run
+
+
+def _batch_run(env: ForageEnv | SwarmWrapper, actions: Sequence[dict[str, Any]]) -> list[dict[str, _Moment]]:
+    """The same with arrays; agents that have left the environment are left out, as in dictionaries."""
+    names = env.possible_agents
+    obs = env.reset_batch(1)
+    run = [{name: _Moment(obs[row].copy()) for row, name in enumerate(names)}]
+    for chosen in actions:
+        staying = {name for name, before in run[-1].items() if not (before.termination or before.truncation)}
+        if not staying:
+            break
+        packed = np.array([chosen[name] if name in staying else np.zeros(3) for name in names], np.float32)
+        obs, rewards, terminated, truncated = env.step_batch(packed)
+        rows = [(row, name) for row, name in enumerate(names) if name in staying]
+        run.append({name: _Moment(obs[row].copy(), rewards[row], terminated[row], truncated) for row, name in rows})
+    return run
+
+
+def _check_in_spaces(env: ParallelEnv[str, Any, Any], obs: dict[str, Any], tick: int) -> None:
+    for agent, row in obs.items():
+        space = env.observation_space(agent)
+        if not space.contains(row):
+            raise CheckError(
+                f"Expected the observation of {agent} in its space {space}, got {_summary(row)} at tick {tick}; "
+                "bring the values into the space, or widen the space."
+            )
+    space = getattr(env, "state_space", None)
+    if space is not None and not space.contains(state := env.state()):
+        raise CheckError(f"Expected state() in state_space {space}, got {_summary(state)} at tick {tick}.")
+
+
+def _compare_runs(
+    run: Sequence[dict[str, _Moment]], other: Sequence[dict[str, _Moment]], expected: str, advice: str
+) -> None:
+    # Terminations and truncations are compared, too, so runs with equal ticks have equal lengths.
+    for tick, (one, two) in enumerate(zip(run, other, strict=False)):
+        if one.keys() != two.keys():
+            raise CheckError(
+                f"{expected}, got other agents at tick {tick}: {sorted(one.keys() ^ two.keys())}; {advice}"
+            )
+        for agent, moment in one.items():
+            for what, mine, theirs in zip(_Moment._fields, moment, two[agent], strict=True):
+                if not np.array_equal(mine, theirs, equal_nan=True):
+                    raise CheckError(f"{expected}, got another {what} of {agent} at tick {tick}; {advice}")
+
+
+def _summary(values: Any) -> str:
+    """Return kind and range of values, for messages."""
+    if not isinstance(values, np.ndarray):
+        return type(values).__name__
+    ends = f" from {values.min():g} to {values.max():g}" if values.size and values.dtype.kind in "fiub" else ""
+    return f"{values.dtype} of shape {values.shape}{ends}"
+
+
+# Policies
+
+
+def check_policy(
+    policy: Any, scenario: str | ScenarioConfig = "warehouse_small", *, seed: int = 0, ticks: int = 150
+) -> None:
+    """Check a policy against `contract.policy.Policy`.
+
+    The policy acts for a while, with some robots away and then with all robots away. Its actions must have the right
+    shape, type and range, and `task` must hold codes of `Task`. Then it gets the same observations again: after a reset
+    it must act in the same way, also if the slices that it does not read hold other values, and if an observation array
+    is overwritten after `act`. Last it gets another number of robots.
+
+    Args:
+        policy: A registered name, the path of a policy file, a class that needs no arguments, or an object (which is
+            copied).
+        scenario: Where it acts; with the caches of `runs.spec.chosen_caches`. Choose one in which your policy meets
+            everything that it reacts to.
+        seed: Seed of the environment and of the policy.
+        ticks: How long it acts.
+
+    Raises:
+        CheckError: about the first fault that is found.
+        ValueError: an unknown name or scenario.
+    """
+    subject = _built(_factory_of(policy))
+    config = _config_for(subject, scenario)
+    world = ForageEnv(config)
+    if sees_world(subject):
+        raise CheckError(
+            "Expected a policy that decides by what robots observe, got one that reads the world (it has see_world): "
+            "it is a yardstick and no contestant, and check_determinism alone says something about it."
+        )
+    reads = _checked_reads(subject, world.layout)
+    scenes = list(_act_in(subject, world, seed, ticks, away=True))
+    act_again = partial(_check_same_actions, subject, world.swarm_spec, seed, scenes)
+    act_again(
+        [scene.obs.copy() for scene in scenes],
+        "Expected reset to begin a new run",
+        "make all memory in reset, and draw random numbers from the generator that reset is given only.",
+    )
+    act_again(
+        _in_one_buffer(scenes),
+        "Expected a policy that keeps no reference to the observation array",
+        "the next step overwrites the array: copy what must be kept.",
+    )
+    if reads is not None:
+        for filling, words in ((0.0, "zeros"), (None, "other numbers")):
+            act_again(
+                [_without_unread(world.layout, reads, filling, scene.obs) for scene in scenes],
+                f"Expected equal actions when the slices that are not in reads = {reads!r} hold {words}",
+                "name every slice that act looks at in reads; the others are not computed in runs.",
+            )
+    n_robots = config.robots.n_robots
+    other = ForageEnv(with_overrides(config, n_robots=n_robots // 2 if n_robots > 1 else 2))
+    for _ in _act_in(subject, other, seed, min(ticks, _INTERVAL_TICKS), away=False):
+        pass
+
+
+class _Scene(NamedTuple):
+    """What a policy saw in a tick, and what it did."""
+
+    obs: ObsArray
+    active: BoolArray
+    actions: ActionArray
+
+
+def _act_in(policy: Policy, world: ForageEnv, seed: int, ticks: int, *, away: bool) -> Iterator[_Scene]:
+    """Let a policy act in an environment; with `away`, robots leave for repair and come back."""
+    obs = world.reset_batch(seed)
+    _reset(policy, world.swarm_spec, seed)
+    rows = np.arange(world.num_agents)
+    everybody = np.ones(len(rows), np.bool_)
+    populations = {ticks // 4: rows % 2 == 0, ticks // 2: ~everybody, 3 * ticks // 4: everybody} if away else {}
+    for tick in range(ticks):
+        if tick in populations:
+            world.set_population(active=populations[tick], present=everybody)
+        scene = _asked(policy, obs.copy(), world.active.copy(), tick, world.swarm_spec)
+        yield scene
+        obs, _, _, truncated = world.step_batch(scene.actions, tasks=_checked_tasks(policy, len(rows), tick))
+        if truncated:
+            return
+
+
+def _asked(policy: Policy, obs: ObsArray, active: BoolArray, tick: int, spec: SwarmSpec) -> _Scene:
+    """Call `act` and check the actions; the scene holds copies, with zeros for inactive robots."""
+    shown, at_work = obs.copy(), active.copy()
+    try:
+        actions: Any = policy.act(obs, active)
+    except Exception as error:
+        where = f"with {np.count_nonzero(at_work)} of {len(at_work)} robots active"
+        raise CheckError(
+            f"Expected act to return actions, got {type(error).__name__} at tick {tick}, {where}: {error}"
+        ) from error
+    if not (np.array_equal(obs, shown) and np.array_equal(active, at_work)):
+        raise CheckError(
+            f"Expected act to leave obs and active as they are, got them changed at tick {tick}; they belong to the "
+            "environment: work on copies."
+        )
+    shapes = spec.action_shapes
+    expected = f"Expected actions as float32 of shape (n_robots, 3) = {' or '.join(map(str, shapes))} in [-1, 1]"
+    if not isinstance(actions, np.ndarray) or actions.dtype != np.float32 or actions.shape not in shapes:
+        raise CheckError(
+            f"{expected}, got {_summary(actions)} at tick {tick}; return one row per robot, inactive ones included."
+        )
+    for row in np.flatnonzero(at_work):
+        if not (np.abs(actions[row]) <= 1.0).all():  # NaN included
+            raise CheckError(f"{expected}, got {actions[row].tolist()} for robot {row} at tick {tick}; np.clip them.")
+    return _Scene(shown, at_work, np.where(at_work[:, None], actions, np.float32(0.0)))
+
+
+def _reset(policy: Policy, spec: SwarmSpec, seed: int) -> None:
+    try:
+        policy.reset(spec, stream_rng(seed, Stream.POLICY))
+    except Exception as error:
+        raise CheckError(
+            f"Expected reset to prepare for a swarm of {spec.n_robots} robots, got {type(error).__name__}: {error}"
+        ) from error
+
+
+def _checked_tasks(policy: Policy, n_robots: int, tick: int) -> Any:
+    """Return `policy.task`, or None if the policy has none."""
+    tasks = getattr(policy, "task", None)
+    if tasks is None:
+        return None
+    expected = f"Expected task as int8 of shape (n_robots,) = ({n_robots},) with codes of Task (0 to {len(Task) - 1})"
+    if not isinstance(tasks, np.ndarray) or tasks.dtype != np.int8 or tasks.shape != (n_robots,):
+        raise CheckError(f"{expected}, got {_summary(tasks)} at tick {tick}; make the array in reset.")
+    if tasks.min() < 0 or tasks.max() >= len(Task):
+        raise CheckError(f"{expected}, got codes {np.unique(tasks).tolist()} at tick {tick}; see contract.codes.Task.")
+    return tasks
+
+
+def _check_same_actions(
+    policy: Policy,
+    spec: SwarmSpec,
+    seed: int,
+    scenes: Sequence[_Scene],
+    shown: Sequence[ObsArray] | Iterator[ObsArray],
+    expected: str,
+    advice: str,
+) -> None:
+    """Give a policy the observations of `scenes` again, as `shown` has them, and compare its actions."""
+    _reset(policy, spec, seed)
+    for tick, (scene, obs) in enumerate(zip(scenes, shown, strict=True)):
+        again = _asked(policy, obs, scene.active.copy(), tick, spec).actions
+        different = np.flatnonzero((again != scene.actions).any(axis=1))
+        if len(different):
+            row = different[0]
+            raise CheckError(
+                f"{expected}, got other actions at tick {tick}: {again[row].tolist()} instead of "
+                f"{scene.actions[row].tolist()} for robot {row}; {advice}"
+            )
+
+
+def _in_one_buffer(scenes: Sequence[_Scene]) -> Iterator[ObsArray]:
+    """One array for all ticks, overwritten in each, as the environment does."""
+    buffer = np.empty_like(scenes[0].obs)
+    for scene in scenes:
+        buffer[:] = scene.obs
+        yield buffer
+
+
+def _without_unread(
+    layout: ObservationLayout, reads: Sequence[str], filling: float | None, observed: ObsArray
+) -> ObsArray:
+    """Return observations in which the slices that are not read hold `filling`; None = random numbers."""
+    obs, rng = observed.copy(), np.random.default_rng(0)
+    for part in layout:
+        if part.name not in reads:
+            unread = obs[:, layout[part.name]]
+            values = rng.uniform(-1.0, 1.0, unread.shape) if filling is None else filling
+            is_read = part.name == "light" and LIGHT_IF_CARRYING in reads
+            np.copyto(unread, values, where=obs[:, layout["carrying"]] < 0.5 if is_read else True)
+    return obs
+
+
+def _checked_reads(policy: Policy, layout: ObservationLayout) -> tuple[str, ...] | None:
+    """Return `reads` of a policy, None = all; raises CheckError when it names no slice."""
+    reads = getattr(policy, "reads", None)
+    if reads is None:
+        return None
+    if isinstance(reads, str):
+        raise CheckError(f"Expected reads as a tuple of names of slices, got {reads!r}; write ({reads!r},).")
+    for name in reads:
+        if name not in (*layout.names, LIGHT_IF_CARRYING):
+            raise CheckError(
+                f"Expected reads to name slices of the observation, got {name!r}.{suggestion(str(name), layout.names)} "
+                f"Known: {', '.join(layout.names)}."
+            )
+    return tuple(reads)
+
+
+# Whole runs
+
+
+def check_determinism(
+    policy: Any,
+    scenario: str | ScenarioConfig = "warehouse_small",
+    *,
+    seeds: Sequence[int] = (0, 1),
+    seconds: float = 60.0,
+) -> None:
+    """Run a policy twice with each seed, in this process, and compare the records and the last positions.
+
+    Args:
+        policy: As in `check_policy`; each run gets a fresh one.
+        scenario: Where it runs; with the caches of `runs.spec.chosen_caches`.
+        seeds: Seeds of the runs.
+        seconds: Simulated length of a run, rounded to recording intervals of ten ticks.
+
+    Raises:
+        CheckError: two runs with one seed differ; names what differs first.
+        ValueError: an unknown name or scenario, or no seeds.
+    """
+    if not len(seeds):
+        raise ValueError("Expected seeds to run, got none; give at least one.")
+    build = _factory_of(policy)
+    config = _config_for(_built(build), scenario)
+    interval_s = _INTERVAL_TICKS * config.dt_s
+    config = replace(config, interval_s=interval_s, horizon_s=max(1, round(seconds / interval_s)) * interval_s)
+    for seed in seeds:
+        run, again = (_results(config, policy, seed) for policy in (_built(build), _built(build)))
+        for name, values in run.items():
+            if not np.array_equal(values, again.get(name, np.empty(0))):
+                raise CheckError(
+                    f"Expected two runs with seed {seed} to be equal, got another {name}; draw random numbers from the "
+                    "generator that reset is given only, and let runs share nothing (class attributes, globals)."
+                )
+
+
+def _results(config: ScenarioConfig, policy: Policy, seed: int) -> dict[str, np.ndarray]:
+    """Make a run; return its columns, and the poses at its end, which show differences first."""
+    recorder = build_stack(config, reads=getattr(policy, "reads", None))
+    run = LiveRun(recorder, policy, seed)
+    run.advance()
+    swarm = run.forage_env.swarm
+    return {
+        "position of the robots at the end": swarm.position.copy(),
+        "heading of the robots at the end": swarm.heading.copy(),
+        **recorder.columns(),
+        **recorder.contributed(),
+    }
+
+
+def _factory_of(policy: Any) -> Callable[[], Any]:
+    """Return what builds a fresh policy: by name, by path, from a class, or as a copy of an object."""
+    if isinstance(policy, str | PurePath):
+        return partial(load_policy, policy)
+    return policy if isinstance(policy, type) else partial(copy.deepcopy, policy)
+
+
+def _built(build: Callable[[], Any]) -> Policy:
+    """Return a fresh policy; raises CheckError for something that is none."""
+    policy = build()
+    missing = [name for name in ("reset", "act") if not callable(getattr(policy, name, None))]
+    if missing:
+        raise CheckError(
+            f"Expected a policy with the methods reset and act, got {policy!r} without {' and '.join(missing)}; a "
+            "function from observations to actions becomes a policy by from_callable(function)."
+        )
+    return policy
+
+
+def _config_for(policy: Policy, scenario: str | ScenarioConfig) -> ScenarioConfig:
+    """Return a scenario with the caches of `chosen_caches`; raises CheckError for caches that there are not."""
+    caches = getattr(policy, "caches", None)
+    if caches is not None and caches not in CACHE_KINDS:
+        raise CheckError(
+            f"Expected caches of the policy to be one of {', '.join(CACHE_KINDS)}, got {caches!r}; leave the attribute "
+            "out where it does not matter."
+        )
+    config = preset(scenario) if isinstance(scenario, str) else scenario
+    return replace(config, caches=chosen_caches(None, policy, config))
