@@ -1,50 +1,119 @@
-"""The console command `swarm-forage`. It may import everything; nothing imports it.
+"""The console command `swarm-forage`. It may import everything; nothing imports it."""
 
-Signals are heard before anything is imported that takes time.
-"""
-
-import atexit
+import logging
 import os
+import signal
 import sys
+import warnings
 from collections.abc import Sequence
+from typing import Any
 
-from swarm_forage_env.cli import signals
+EXIT_FAILURE = 1
+EXIT_USAGE = 2
+EXIT_INTERRUPTED = 130
+"""What shells report for a program ended by Ctrl-C."""
+EXIT_TERMINATED = 143
+"""What shells report for a program ended by SIGTERM, as batch systems and containers send it."""
+AGAIN_S = 0.2
+"""When an interrupt that was lost is raised again; our choice: soon, and late enough to be elsewhere."""
+PACKAGES = ("swarm_forage_env", "baselines", "metrics")
+
+came: list[int] = []
+"""Numbers of the signals that came."""
+
+
+class CommandError(Exception):
+    """What was asked for failed, though the words of the command were right: one line and exit code 1."""
 
 
 def main() -> None:
     """Run the command line and exit, in a process that does nothing else."""
-    try:
-        signals.hear()
-        atexit.register(signals.ignore)  # what is registered first is done last
-        # Or processes that start would look for Python's own modules in the current folder first (SECURITY.md).
-        os.environ["PYTHONSAFEPATH"] = "1"
-        code = answer(sys.argv[1:])
-    except KeyboardInterrupt:
-        code = _interrupted()
-    signals.end_at_once(code)
+    # Or processes that start would look for Python's own modules in the current folder first (SECURITY.md).
+    os.environ["PYTHONSAFEPATH"] = "1"
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _interrupt)
+    sys.unraisablehook = _unraisable
+    warnings.showwarning = lambda message, *_, **__: complain(str(message))
+    logging.basicConfig(format="swarm-forage: %(message)s")
+    for package in PACKAGES:
+        logging.getLogger(package).setLevel(logging.INFO)
+    code = answer(sys.argv[1:])
+    for number in (signal.SIGINT, signal.SIGTERM):  # all is said: from here on nothing is worth a traceback
+        signal.signal(number, signal.SIG_IGN)
     sys.exit(code)
 
 
 def answer(words: Sequence[str]) -> int:
-    """Carry out a command and return its exit code; whatever error comes is told on stderr."""
+    """Carry out a command and return its exit code.
+
+    What a user can mend is told in one line; other errors are raised, once no interrupt is their reason.
+    """
     try:
         from swarm_forage_env.cli.app import carry_out
 
         code = carry_out(words)
         sys.stdout.flush()
-        return signals.exit_code() if code == signals.EXIT_INTERRUPTED else code
-    except BaseException as error:  # noqa: BLE001 - the last guard: whatever happens is told
-        if signals.came or isinstance(error, KeyboardInterrupt):
-            return _interrupted()
-        signals.end_at_once(signals.exit_code())
-        from swarm_forage_env.cli.errors import end
+        return code
+    except KeyboardInterrupt as interrupt:
+        return _interrupted(str(interrupt))
+    except Exception as error:
+        if came:  # it left something half made
+            return _interrupted("")
+        code = _told(error)
+        if code is None:
+            raise
+        return code
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
 
-        return end(error)
+
+def complain(message: str) -> None:
+    """Print one line on stderr."""
+    from swarm_forage_env._internal.wording import printable
+
+    sys.stderr.write(f"swarm-forage: {printable(' '.join(message.split()))}\n")
 
 
-def _interrupted() -> int:
-    """Tell it, where no command has told what is kept; returns the exit code."""
-    code = signals.exit_code()
-    signals.end_at_once(code)
-    sys.stderr.write("swarm-forage: Interrupted. Unfinished work is not kept; run the same command to start again.\n")
-    return code
+def _told(error: Exception) -> int | None:
+    """Tell an error in one line and return the exit code; None where nobody foresaw it."""
+    if isinstance(error, BrokenPipeError):  # whoever read our output has enough, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the last flush fails again
+        return EXIT_FAILURE
+    if isinstance(error, ValueError) and type(error).__module__.partition(".")[0] in PACKAGES:
+        complain(str(error))
+        return EXIT_USAGE
+    if isinstance(error, OSError) and error.strerror and error.filename:
+        complain(f"{error.strerror}: {error.filename}")
+        return EXIT_FAILURE
+    if isinstance(error, CommandError | ImportError | OSError):
+        complain(str(error))
+        return EXIT_FAILURE
+    return None
+
+
+def _interrupt(number: int, _: object = None) -> None:
+    """Raise KeyboardInterrupt for Ctrl-C and SIGTERM, and once more where a library swallows it, as LLVM does."""
+    came.append(number)
+    signal.signal(signal.SIGALRM, _interrupt_again)
+    signal.setitimer(signal.ITIMER_REAL, AGAIN_S, AGAIN_S)
+    raise KeyboardInterrupt
+
+
+def _interrupt_again(*_: object) -> None:
+    """Interrupt once more, unless an interrupt is being handled right now: finished runs may be kept just then."""
+    error = sys.exception()
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__context__
+    if error is None:
+        raise KeyboardInterrupt
+
+
+def _unraisable(unraisable: Any) -> None:
+    """Show what failed where nobody can catch it, unless an interrupt left things half made."""
+    if not came:
+        sys.__unraisablehook__(unraisable)
+
+
+def _interrupted(message: str) -> int:
+    complain(message or "Interrupted. Unfinished work is not kept; run the same command to start again.")
+    return EXIT_TERMINATED if signal.SIGTERM in came else EXIT_INTERRUPTED

@@ -1,95 +1,205 @@
-"""The commands that show what is there, or one run: `list`, `info`, `record`."""
+"""The commands that show what is there, or one run: `list`, `info`, `play`, `record`, `replay`, `maps`."""
 
+import webbrowser
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from cyclopts import Parameter
+from cyclopts.types import PositiveFloat, PositiveInt
 
-from swarm_forage_env._internal.wording import printable
-from swarm_forage_env.cli.options import AsJson, PolicyOptions, Seed, WorldOptions
-from swarm_forage_env.cli.printer import progress_bar, width_of_terminal
+from swarm_forage_env.cli.options import AsJson, Jobs, Picture, Policies, Policy, Seed, Seeds, WorldOptions
+from swarm_forage_env.cli.printer import drawn_or_told, note, progress_bar, say, show
+
+if TYPE_CHECKING:
+    from swarm_forage_env.inspect.replay.frames import Replay
+    from swarm_forage_env.runs.spec import RunSpec
+
+PAGES = (".html", ".htm")
+"""Endings of a page that browsers open."""
 
 
-def list_everything(
-    what: Annotated[
-        str | None, typer.Argument(help="What to list: scenarios, policies, wrappers or columns (of records).")
-    ] = None,
-    as_json: AsJson = False,
-) -> None:
-    """List scenarios and policies, wrappers, or the columns of run records."""
+def list_everything(what: str | None = None, /, *, as_json: AsJson = False) -> None:
+    """List scenarios and policies, wrappers, or the columns of run records.
+
+    Args:
+        what: scenarios, policies, wrappers or columns (of records).
+    """
     from swarm_forage_env.inspect.descriptions import overview
 
-    listed = overview(what)
-    typer.echo(listed.json() if as_json else listed.text(width=width_of_terminal()))
+    show(overview(what), as_json=as_json)
 
 
-def info(
-    name: Annotated[str, typer.Argument(help="A scenario, an environment id, a policy or its file.")],
-    as_json: AsJson = False,
-) -> None:
-    """Describe a scenario, with all its fields and spaces, or a policy."""
+def info(name: str, /, *, as_json: AsJson = False) -> None:
+    """Describe a scenario, with all its fields and spaces, or a policy.
+
+    Args:
+        name: A scenario, an environment id, a policy or its file.
+    """
     from swarm_forage_env.inspect.descriptions import describe
 
-    found = describe(name)
-    text = found.json() if as_json else found.text(width=width_of_terminal())
-    typer.echo(printable(text))  # a file may hold anything
+    show(describe(name), as_json=as_json)
+
+
+def play(
+    policy: Policy = "crw",
+    /,
+    *,
+    world: WorldOptions = WorldOptions(),
+    seed: Seed = 0,
+    port: int = 0,
+    browser: Annotated[bool, Parameter(negative="--no-browser")] = True,
+) -> None:
+    """Steer a run in the browser: move sliders, draw walls, kill robots.
+
+    The page is on this machine only. It needs no further packages. Ctrl-C ends it.
+
+    Args:
+        port: Port of the page on this machine; 0 = any that is free.
+        browser: Open the page in the browser.
+    """
+    from swarm_forage_env.cli.worlds import described_world
+    from swarm_forage_env.inspect.play.server import PlayServer
+    from swarm_forage_env.inspect.play.session import PlaySession, Setting
+
+    chosen, caches = described_world(world)
+    session = PlaySession(Setting(world=chosen, policy=policy, seed=seed, caches=caches))
+    try:
+        server = PlayServer(session, port)
+    except OSError as error:
+        raise OSError(f"{error.strerror or error}: port {port}; leave out --port to get one that is free.") from error
+    say(f"play at {server.address}")
+    note("Ctrl-C ends it.")
+    if browser:
+        webbrowser.open(server.address)
+    try:
+        server.serve_forever(poll_interval=0.2)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"Interrupted. The page has ended; {session.summary()}.") from None
+    finally:
+        server.server_close()
 
 
 def record(
-    policies: PolicyOptions,
-    described: WorldOptions,
-    file: Annotated[
-        Path | None,
-        typer.Option(
-            "--file", help="File to write: .gif or .mp4, or .png with --at; default results/SCENARIO_POLICY.gif."
-        ),
-    ] = None,
-    at: Annotated[
-        float | None,
-        typer.Option(metavar="SECONDS", help="Draw one picture at this simulated time, in place of a film."),
-    ] = None,
-    seconds: Annotated[float, typer.Option(help="Simulated seconds to film.")] = 300.0,
-    speedup: Annotated[float, typer.Option(help="Simulated seconds per second of film.")] = 20.0,
-    fps: Annotated[float, typer.Option(help="Pictures per second.")] = 20.0,
-    size: Annotated[int, typer.Option(help="Longer side of the arena in pixels.")] = 900,
-    theme: Annotated[str, typer.Option(help="dark or light.")] = "dark",
+    policy: Policy = "crw",
+    /,
+    *,
+    world: WorldOptions = WorldOptions(),
     seed: Seed = 0,
+    file: Path | None = None,
+    at: Annotated[float | None, Parameter(help="Draw one picture at this simulated second, in place of a film.")] = None,
+    seconds: float = 300.0,
+    speedup: float = 20.0,
+    size: int = 900,
 ) -> None:
     """Film a run, or draw it at one time.
 
     'swarm-forage record dpo --at 300 --file dpo.png' draws the run after 300 s.
+
+    Args:
+        file: File to write: .gif or .mp4, or .png with --at; default results/SCENARIO_POLICY.gif.
+        seconds: Simulated seconds to film.
+        speedup: Simulated seconds per second of film.
+        size: Longer side of the arena in pixels.
     """
-    from swarm_forage_env._internal.files import as_file_name
-    from swarm_forage_env.cli.scenario_options import described_world
+    from swarm_forage_env.cli.worlds import RESULTS, default_file, described_world
     from swarm_forage_env.inspect.film import picture_run, record_run
-    from swarm_forage_env.policies.model_files import ModelError
-    from swarm_forage_env.policies.network import NetworkError
-    from swarm_forage_env.policies.registry import policy_label
-    from swarm_forage_env.rendering.view import RenderError
 
-    policy = policies.one("crw")
-    world, asked_caches = described_world(described)
-    _refuse_unknown(policy)
-    ending = "gif" if at is None else "png"
-    path = file or Path("results", f"{world.file_name}_{as_file_name(policy_label(policy))}.{ending}")
-    look: dict[str, Any] = {"seed": seed, "size_px": size, "theme": theme, "caches": asked_caches}
-    look["wrappers"] = world.wrappers
+    chosen, caches = described_world(world)
+    path = file or default_file(RESULTS, chosen, [policy], ".gif" if at is None else ".png")
+    look: dict[str, Any] = {"seed": seed, "size_px": size, "caches": caches, "wrappers": chosen.wrappers}
+    if at is not None:
+        written = picture_run(chosen.scenario, policy, path, at_s=at, **look)
+    else:
+        with progress_bar("pictures") as progress:
+            film: dict[str, Any] = {"seconds": seconds, "speedup": speedup, "progress": progress}
+            written = record_run(chosen.scenario, policy, path, **film, **look)
+    say(f"wrote {written}")
+
+
+def replay(
+    policies: Policies,
+    /,
+    *,
+    world: WorldOptions = WorldOptions(),
+    seed: Seed = 0,
+    file: Path | None = None,
+    seconds: float | None = None,
+) -> None:
+    """Write runs as one HTML file, with play, zoom, every robot's state, and curves.
+
+    The page shows several policies side by side, in the same world with the same seed. In place of policies, you can
+    name stored runs (file.parquet), which are made again. The file needs no network.
+
+    Args:
+        file: File to write; default results/SCENARIO_POLICIES.html.
+        seconds: Simulated seconds to keep; default the whole run.
+    """
+    from swarm_forage_env._internal.fields import ConfigError
+    from swarm_forage_env._internal.files import check_file
+    from swarm_forage_env.cli.worlds import RESULTS, default_file
+    from swarm_forage_env.inspect.replay.files import write_replays
+
+    is_stored = [Path(word).suffix == ".parquet" for word in policies]
+    if any(is_stored) and (not all(is_stored) or world != WorldOptions() or seed):
+        raise ConfigError("Expected stored runs alone, which have a world and a seed, got policies or options beside.")
+    specs = _stored(policies) if all(is_stored) else _planned(policies, world, seed)
+    path = file or default_file(RESULTS, specs[0].world, [spec.policy for spec in specs], ".html")
+    if path.suffix.lower() not in PAGES:
+        raise ConfigError(f"Expected a page that ends in {' or '.join(PAGES)}, got {path}; 'record' makes films.")
+    check_file(path)
+    written = write_replays(path, [_recorded(spec, seconds) for spec in specs])
+    say(f"wrote {written} ({written.stat().st_size / 1e6:.1f} MB)")
+
+
+def _stored(files: tuple[str, ...]) -> "list[RunSpec]":
+    from swarm_forage_env.runs.record import RunRecord
+    from swarm_forage_env.runs.spec import RunSpec
+
+    return [RunSpec.from_json(RunRecord.read(file).spec) for file in files]
+
+
+def _planned(policies: tuple[str, ...], world: WorldOptions, seed: int) -> "list[RunSpec]":
+    from swarm_forage_env.cli.worlds import plan_runs
+
+    return [*plan_runs(world, policies, [seed])]
+
+
+def _recorded(spec: "RunSpec", seconds: float | None) -> "Replay":
+    from swarm_forage_env.inspect.replay.capture import record_replay
+
+    with progress_bar(f"{spec.policy}, seed {spec.seed}") as progress:
+        return record_replay(spec, seconds=seconds, progress=progress)[0]
+
+
+def maps(
+    policies: Policies,
+    /,
+    *,
+    world: WorldOptions = WorldOptions(),
+    seeds: Seeds = 1,
+    square: PositiveFloat = 0.4,
+    jobs: Jobs = None,
+    picture: Picture = None,
+) -> None:
+    """Draw where robots were, where they took and left objects, and where they got in each other's way.
+
+    The picture has one row per policy. Further rows show the difference of each from the first. The arrays go to .npz
+    files beside the picture.
+
+    Args:
+        square: Side of the squares in m.
+    """
+    from swarm_forage_env.cli.worlds import RESULTS, default_file, plan_runs
+    from swarm_forage_env.inspect.maps import maps_of_runs
+    from swarm_forage_env.rendering.figures import check_picture
+
+    specs = plan_runs(world, policies, range(seeds))
+    file = picture or default_file(RESULTS, specs[0].world, policies, "_maps.png")
+    check_picture(file)
+    with progress_bar("runs", sum(spec.robot_ticks for spec in specs)) as advance:
+        found = maps_of_runs(specs, side_m=square, jobs=jobs, advance=advance)
     try:
-        if at is not None:
-            written = picture_run(world.scenario, policy, path, at_s=at, **look)
-        else:
-            with progress_bar("pictures") as progress:
-                film: dict[str, Any] = {"seconds": seconds, "speedup": speedup, "fps": fps, "progress": progress}
-                written = record_run(world.scenario, policy, path, **film, **look)
-    except (RenderError, ModelError, NetworkError) as error:
-        raise typer.BadParameter(str(error)) from error
-    typer.echo(f"wrote {written}")
-
-
-def _refuse_unknown(policy: str) -> None:
-    from swarm_forage_env.policies.registry import policy_class
-
-    try:
-        policy_class(policy)
-    except ValueError as error:  # an unknown name is a mistake in the words; a ValueError of the run is not
-        raise typer.BadParameter(str(error)) from error
+        found.write(file)
+    except ImportError as error:
+        note(error)
+    say(f"wrote maps to {file} and .npz files beside it")

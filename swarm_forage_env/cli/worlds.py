@@ -6,15 +6,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, get_origin
 
-from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, whole
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.files import as_file_name
 from swarm_forage_env._internal.wording import suggestion
-from swarm_forage_env.cli.options import PlaceOptions, WorldOptions
-from swarm_forage_env.policies.registry import split_interface
+from swarm_forage_env.cli.options import WorldOptions
+from swarm_forage_env.policies.registry import policy_label, split_interface
 from swarm_forage_env.runs.spec import RunSpec, plan_run
-from swarm_forage_env.scenarios.overrides import checked_density, field_types, parse_tuple
+from swarm_forage_env.scenarios.differences import digest_of, preset_of
+from swarm_forage_env.scenarios.overrides import field_types, parse_tuple
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.world import FILE, World, WorldDescription, describe_file
 
+RESULTS = Path("results")
+LONGEST_NAME = 100
+"""Of a file, in characters; the rest is a digest."""
 _FIELD = re.compile(r"[a-z_]+=[^/\\]*")
 
 _EXAMPLES = {
@@ -46,7 +51,7 @@ def split_names(text: str) -> tuple[str, ...]:
     return names
 
 
-def described_world(options: PlaceOptions) -> tuple[World, str | None]:
+def described_world(options: WorldOptions) -> tuple[World, str | None]:
     """Return the world that options describe, and which caches were asked for (None = nobody asked).
 
     Raises:
@@ -56,7 +61,7 @@ def described_world(options: PlaceOptions) -> tuple[World, str | None]:
     return described.world(), described.fields.get("caches")
 
 
-def described_fields(options: PlaceOptions) -> WorldDescription:
+def described_fields(options: WorldOptions) -> WorldDescription:
     """Return what options describe as a file would say it; they override the fields and wrappers of the file.
 
     Raises:
@@ -64,41 +69,18 @@ def described_fields(options: PlaceOptions) -> WorldDescription:
     """
     is_file = Path(options.scenario).suffix == FILE
     file = describe_file(options.scenario) if is_file else WorldDescription(preset=options.scenario)
-    fields = {**file.fields, **_fields_of(options)}
-    wrappers = tuple(parse_wrapper(word) for word in options.wrappers)
-    named = {wrapper.name for wrapper in wrappers}
-    left = (wrapper for wrapper in file.wrappers if wrapper.name not in named)
-    return WorldDescription(preset=file.preset, fields=fields, wrappers=(*wrappers, *left), name=file.name)
-
-
-def _fields_of(options: PlaceOptions) -> dict[str, Any]:
-    """Return the scenario fields that the options set, by name."""
     fields = dict(parse_setting(word) for word in options.settings)
-    named = {"n_objects": options.objects, "horizon_s": options.horizon, "performance": options.performance}
-    if isinstance(options, WorldOptions):
-        named |= {"n_robots": options.robots, "density": parsed_density(options.density)}
-    for name, value in named.items():
+    for name, value in (("n_robots", options.robots), ("horizon_s", options.horizon)):
         if value is not None and name in fields:
             raise ConfigError(f"Expected {name} once, got it from an option and from --set.")
         if value is not None:
             fields[name] = value
-    return fields
-
-
-def parsed_density(text: str | None) -> float | None:
-    """Return a density in robots per m^2 from "5%" or "0.05"; None = none given.
-
-    Raises:
-        ConfigError: no number, or no share above 0 and at most 1.
-    """
-    if text is None:
-        return None
-    number = text.strip().removesuffix("%")
-    try:
-        value = float(number)
-    except ValueError as error:
-        raise ConfigError(f"Expected --density as a share such as 5% or 0.05, got {text!r}.") from error
-    return checked_density(value / 100.0 if text.strip().endswith("%") else value)
+    wrappers = tuple(parse_wrapper(word) for word in options.wrappers)
+    named = {wrapper.name for wrapper in wrappers}
+    left = (wrapper for wrapper in file.wrappers if wrapper.name not in named)
+    return WorldDescription(
+        preset=file.preset, fields={**file.fields, **fields}, wrappers=(*wrappers, *left), name=file.name
+    )
 
 
 def parse_setting(word: str) -> tuple[str, Any]:
@@ -112,7 +94,7 @@ def parse_setting(word: str) -> tuple[str, Any]:
         raise ConfigError(f"Expected --set key=value, got {word!r}.")
     if name == "quirks":
         return name, text
-    types = {**field_types(), "side_m": float}  # of search_and_rescue
+    types = {**field_types(), "side_m": float, "density": float}  # these two choose the arena
     if name not in types:
         raise ConfigError(f"Unknown scenario field {name!r}.{suggestion(name, types)} See: swarm-forage info SCENARIO.")
     return name, _parse_value(name, text, types[name])
@@ -133,23 +115,32 @@ def _parse_value(name: str, text: str, kind: Any) -> Any:
         raise ConfigError(f"Expected {name} to be {wanted}, got {text!r}.") from error
 
 
-def plan_runs(options: WorldOptions, policies: Sequence[str], *, n_seeds: int, first_seed: int) -> tuple[RunSpec, ...]:
-    """Return one specification per policy and seed.
-
-    Raises:
-        ConfigError: see `described_world`; an unknown policy, or a policy file that cannot be opened.
-    """
-    whole("--seeds", n_seeds, at_least=1, at_most=MOST_SEEDS)
+def plan_runs(options: WorldOptions, policies: Sequence[str], seeds: Sequence[int]) -> tuple[RunSpec, ...]:
+    """Return one specification per policy and seed; raises ConfigError as `described_world`, or of a policy."""
     world, caches = described_world(options)
-    try:
-        planned = [plan_run(world, name, caches=caches) for name in policies]
-    except ValueError as error:  # of a policy or its file
-        raise ConfigError(str(error)) from error
-    return tuple(
-        dataclasses.replace(spec, seed=seed) for spec in planned for seed in range(first_seed, first_seed + n_seeds)
-    )
+    planned = [plan_run(world, name, caches=caches) for name in policies]
+    return tuple(dataclasses.replace(spec, seed=seed) for spec in planned for seed in seeds)
 
 
 def default_folder(world: World) -> Path:
     """Return the default folder for results: one per world, so that repeated runs are found and no others are there."""
-    return Path("results") / world.file_name
+    return RESULTS / world.file_name
+
+
+def default_file(folder: Path, world: World, policies: Sequence[str], ending: str) -> Path:
+    """Return a file named by its world and policies, so that no other question overwrites it.
+
+    Args:
+        folder: Where it lies.
+        world: Where policies act; another performance than the preset's is part of the name.
+        policies: Names and files.
+        ending: Of the name, such as "_scores.png".
+    """
+    preset = preset_of(world.scenario)
+    words = [world.file_name, *map(policy_label, policies)]
+    if preset is not None and world.scenario.performance != preset.performance:
+        words.append(world.scenario.performance)
+    name = as_file_name("_".join(words))
+    if len(name) > LONGEST_NAME:
+        name = f"{name[:LONGEST_NAME]}_{digest_of(words, 6)}"
+    return folder / f"{name}{ending}"

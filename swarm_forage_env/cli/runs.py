@@ -1,0 +1,208 @@
+"""The commands about runs of policies: `run`, `plot`, `score`, `check` and `rerun`."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+from cyclopts.types import PositiveInt
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.cli import CommandError
+from swarm_forage_env.cli.options import (
+    AsJson,
+    Names,
+    Performance,
+    Picture,
+    Policies,
+    RunOptions,
+    Seeds,
+    Style,
+    WorldOptions,
+)
+from swarm_forage_env.cli.printer import ask_and_show, note, say, show
+from swarm_forage_env.rendering.figures import SCREEN
+
+if TYPE_CHECKING:
+    from metrics.scoring import ScoreForms, ScoreQuestion
+
+
+def run(
+    policies: Policies,
+    /,
+    *,
+    world: WorldOptions = WorldOptions(),
+    seeds: Seeds = 1,
+    options: RunOptions = RunOptions(),
+) -> int:
+    """Run policies in a scenario and compare how they perform.
+
+    Makes the runs in parallel, shows a table, stores one record per run and draws performance over time. The command
+    does not repeat runs that the folder already holds, so after an interruption, just enter it again.
+    """
+    from metrics.scoring.summary import run_question
+    from swarm_forage_env.cli.worlds import default_file, default_folder, described_world
+
+    chosen, caches = described_world(world)
+    question = run_question(policies, chosen, seeds=range(seeds), caches=caches)
+    folder = options.out or default_folder(chosen)
+    return ask_and_show(question, folder, options, options.picture or default_file(folder, chosen, policies, ".png"))
+
+
+def plot(
+    folder: Path,
+    /,
+    *,
+    performance: Performance = None,
+    picture: Picture = None,
+    style: Style = SCREEN,
+) -> None:
+    """Draw stored runs anew: performance over time, one curve per policy. Nothing is run.
+
+    'swarm-forage plot results/warehouse_small --width-in 3.5 --no-title --picture figure.pdf' draws it for a column of a
+    paper. 'study plot' draws studies.
+
+    Args:
+        folder: Folder of records that 'run' has stored.
+    """
+    from metrics.scoring.summary import summarize_runs
+    from swarm_forage_env.cli.worlds import default_file
+    from swarm_forage_env.rendering.figures import check_picture
+    from swarm_forage_env.runs.table import read_table
+    from swarm_forage_env.studies.study_folder import StudyFolder
+
+    if folder.suffix == ".parquet" or StudyFolder(folder).study_file.exists():
+        raise ConfigError(f"Expected a folder of runs, got a study; it is 'swarm-forage study plot {folder}'.")
+    table = read_table(folder, performance=performance)
+    found = summarize_runs(table)
+    file = picture or default_file(folder, found.world, [policy.label for policy in table.plan.policies], ".png")
+    check_picture(file)
+    found.draw(file, style=style)
+    say(f"picture {file}")
+
+
+def score(
+    policies: Policies = (),
+    /,
+    *,
+    world: WorldOptions = WorldOptions(),
+    options: RunOptions = RunOptions(),
+    curves: Annotated[Path | None, Parameter(name="--curves")] = None,
+    performance: Performance = None,
+    measures: Names = (),
+    variant: Names = ("corrected",),
+    form: Names = ("marginal",),
+    band: bool = False,
+    budget: str = "standard",
+    seeds: Annotated[PositiveInt | None, Parameter(help="Runs per experiment; default the budget's number.")] = None,
+    disturbance: str = "throttle",
+) -> int:
+    """Run the experiments that the measures of swarm engineering need, and score and compare policies.
+
+    The experiments vary swarm size, throttle, noise and failures. One table shows all scores, with intervals and
+    noise floors. For several policies, the command compares runs with the same seed and shows which differences are
+    significant. It does not repeat runs that the folder already holds. The budget sets the length of runs, unless
+    --horizon does.
+
+    Args:
+        curves: Read curves from a CSV or Parquet file, in place of policies; no runs (docs/scoring.md).
+        measures: Names of measures, separated by commas; default all.
+        variant: Forms of equations: corrected, paper (as printed); separated by commas.
+        form: Compare with the next smaller swarm (marginal), with N lone robots (interactive), or both.
+        band: Show the paper's bands, mean ± 2 standard deviations of single runs.
+        budget: quick, standard or paper: sets the length and number of runs, and the levels.
+        disturbance: Disturbance for reactivity and adaptability: throttle or handling_cost.
+    """
+    from metrics.scoring import ScoreForms
+    from metrics.scoring.policy_scores import score_curves
+    from metrics.scoring.score_tables import side_by_side
+    from swarm_forage_env.cli.worlds import default_file, default_folder
+
+    forms = ScoreForms(variants=variant, forms=form, band=band)
+    if curves is not None:
+        if policies or world != WorldOptions():
+            raise ConfigError("Expected --curves alone, got policies or a world, which are about runs; leave them out.")
+        tables = score_curves(curves, measures=measures or None, performance=performance, forms=forms)
+        show(side_by_side(tables), options.picture, as_json=options.as_json)
+        return 0
+    if not policies:
+        raise ConfigError("Expected policies to run, or a file with --curves; 'swarm-forage list' names policies.")
+    question = asked_scores(
+        policies,
+        world,
+        measures=measures or None,
+        budget=budget,
+        seeds=seeds,
+        disturbance=disturbance,
+        forms=forms,
+    )
+    folder = options.out or default_folder(question.world)
+    file = options.picture or default_file(folder, question.world, policies, "_scores.png")
+    return ask_and_show(question, folder, options, file)
+
+
+_OF_THE_BUDGET = ("horizon_s", "interval_s")
+
+
+def asked_scores(policies: Sequence[str], options: WorldOptions, **how: Any) -> "ScoreQuestion":
+    """Return the question that the words ask; `how` are further arguments of `score_question`.
+
+    Raises:
+        ConfigError: whatever is wrong with the words.
+        ImportError: the policy is a model, and stable-baselines3 is not installed.
+    """
+    from metrics.scoring import score_question
+    from swarm_forage_env.cli.worlds import described_fields, described_world
+
+    for word in options.settings:
+        if word.partition("=")[0] in _OF_THE_BUDGET:
+            raise ConfigError(f"Expected no --set {word}, which the budget sets; --horizon changes the length of runs.")
+    density = described_fields(options).fields.get("density")
+    world, caches = described_world(replace(options, horizon=None))
+    return score_question(policies, world, horizon_s=options.horizon, caches=caches, density=density, **how)
+
+
+def check(policies: Policies, /, *, world: WorldOptions = WorldOptions()) -> None:
+    """Check that policies keep the rules; exit code 1 at the first that breaks one.
+
+    swarm_forage_env.checks.check_policy lists the rules.
+    """
+    from swarm_forage_env.checks import CheckError, check_policy
+    from swarm_forage_env.cli.worlds import plan_runs
+
+    for spec in plan_runs(world, policies, [0]):
+        try:
+            check_policy(spec.policy, spec.scenario)
+        except CheckError as error:
+            raise CommandError(f"{spec.policy} breaks a rule: {error}") from None
+        say(f"{spec.policy} keeps the rules")
+
+
+def rerun(file: Path, /, *, as_json: AsJson = False) -> int:
+    """Repeat a stored run. Compare a record with the new results, or show the traceback of a failure.
+
+    Args:
+        file: A record (.parquet) or a failure (.json).
+    """
+    import traceback
+
+    from swarm_forage_env.policies.trust import UntrustedModelError
+    from swarm_forage_env.runs import runner as again
+    from swarm_forage_env.runs.record import RecordError
+
+    try:
+        answer = again.rerun(file)
+    except (UntrustedModelError, RecordError):
+        raise
+    except Exception as error:  # of a failure it is the run's own, whatever it is, and what its user wants to see
+        if file.suffix != ".json":
+            raise
+        note(traceback.format_exc())
+        raise CommandError("the run failed again") from error
+    say(answer.json() if as_json else answer.record.describe())
+    if answer.is_same is False:
+        raise CommandError(f"the results differ from those in {file}")
+    if answer.is_same and not as_json:
+        say(f"bit for bit the same as {file}")
+    return 0

@@ -1,0 +1,221 @@
+"""The commands of studies: what there is, running them, and what came of them."""
+
+from contextlib import nullcontext
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import App, Parameter
+from cyclopts.types import PositiveInt
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.cli import EXIT_FAILURE, CommandError
+from swarm_forage_env.cli.options import AsJson, DryRun, Jobs, Names, Style
+from swarm_forage_env.cli.printer import note, say, show
+from swarm_forage_env.rendering.figures import SCREEN
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from swarm_forage_env.runs.plan_summary import PlanSummary
+    from swarm_forage_env.studies.study import StudySpec
+    from swarm_forage_env.studies.study_folder import StudyFolder
+    from swarm_forage_env.studies.study_table import StudyTable
+
+app = App(name="study")
+
+Place = Annotated[Path, Parameter(help="Folder of a study, or its packed file.")]
+Places = Annotated[tuple[Path, ...], Parameter(help="Folders of studies, or their packed files.")]
+
+
+@app.command(name="list")
+def list_studies(*, budget: str = "paper", as_json: AsJson = False) -> None:
+    """List the experiment sets of the paper: how many runs they make, and what a budget leaves out.
+
+    Args:
+        budget: smoke, reduced or paper.
+    """
+    from swarm_forage_env.studies.description import paper_sets
+
+    show(paper_sets(budget), as_json=as_json)
+
+
+@app.command
+def run(
+    names: Annotated[tuple[str, ...], Parameter(help="Sets of the paper (S1a to S2d), or study files.")],
+    /,
+    *,
+    budget: str | None = None,
+    out: Path | None = None,
+    seeds: PositiveInt | None = None,
+    rules: str = "file",
+    shard: str = "1/1",
+    jobs: Jobs = None,
+    cluster: str | None = None,
+    dry_run: DryRun = False,
+) -> int:
+    """Make the missing runs of studies, and pack each study into one file.
+
+    Finished runs are kept: after Ctrl-C, or with more seeds, the same command does the rest.
+
+    Args:
+        budget: How much to run; default the first budget of the file.
+        out: Folder; default results/studies/NAME_BUDGET. For several studies, the parent of their folders.
+        seeds: Runs per condition; default the budget's number.
+        rules: described, program (the authors'), both, or file: what the file says.
+        shard: I/N: make only the I-th of N equal parts of the runs.
+        cluster: Run on Dask: local, or the address of a scheduler (docs/studies.md).
+    """
+    from swarm_forage_env.runs.cluster import cluster_executor
+    from swarm_forage_env.runs.workers import WorkerError
+    from swarm_forage_env.studies.study_folder import StudyFolder, parse_shard
+
+    specs = [_chosen(name, budget, seeds, rules) for name in names]
+    part = parse_shard(shard)
+    places = [_folder(spec, out, is_one=len(specs) == 1) for spec in specs]
+    studies = [(spec, StudyFolder(place)) for spec, place in zip(specs, places, strict=True)]
+    if dry_run:
+        say("\n".join(str(_summary(spec, folder, part)) for spec, folder in studies))
+        return 0
+    kept = f"Finished runs are kept in {', '.join(map(str, places))}; the same command does the rest."
+    try:
+        with nullcontext() if cluster is None else cluster_executor(cluster, jobs) as executor:
+            n_failed = sum(_run_all(spec, folder, part, jobs, executor) for spec, folder in studies)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"Interrupted. {kept}") from None
+    except WorkerError as error:
+        raise CommandError(f"{error} {kept}") from None
+    return EXIT_FAILURE if n_failed else 0
+
+
+def _folder(spec: "StudySpec", out: Path | None, *, is_one: bool) -> Path:
+    own = f"{spec.name}_{spec.budget}"
+    return Path("results", "studies", own) if out is None else out if is_one else out / own
+
+
+def _run_all(
+    spec: "StudySpec", folder: "StudyFolder", part: tuple[int, int], jobs: int | None, executor: "Executor | None"
+) -> int:
+    """Run what is missing of a study, and return how many runs failed."""
+    from swarm_forage_env.runs.store import FAILED
+    from swarm_forage_env.studies.description import StudyOutcome
+    from swarm_forage_env.studies.study_folder import run_study
+    from swarm_forage_env.studies.study_table import pack_study
+
+    state = run_study(spec, folder, part=part, jobs=jobs, executor=executor, progress=True)
+    if part == (1, 1):
+        note(f"packed into {pack_study(folder, tell=note)}")
+    say(StudyOutcome(outcomes=state, folder=folder))
+    return state.count(FAILED)
+
+
+def _summary(spec: "StudySpec", folder: "StudyFolder", part: tuple[int, int]) -> "PlanSummary":
+    """Say what is left to run."""
+    from swarm_forage_env.runs.plan_summary import summarize_plan
+    from swarm_forage_env.studies.study_folder import shard
+
+    index, count = part
+    name = f"{spec.name}, budget {spec.budget}" + (f", shard {index} of {count}" if count > 1 else "")
+    only, out = shard(spec.plan.specs, index, count), folder.store.folder
+    return summarize_plan(spec.plan, name=name, only=only, out=out)
+
+
+def _chosen(name: str, budget: str | None, seeds: int | None, rules: str) -> "StudySpec":
+    """Return the study that the options describe."""
+    from swarm_forage_env._internal.fields import known_name
+    from swarm_forage_env.studies.study import RULES_NAMES
+    from swarm_forage_env.studies.study_file import load_study
+
+    known_name("rules", rules, (*RULES_NAMES, "both", "file"))
+    chosen = {"both": tuple(RULES_NAMES), "file": None}.get(rules, (rules,))
+    return load_study(name, budget, seeds=seeds, rules=chosen)
+
+
+@app.command
+def status(place: Place, /, *, as_json: AsJson = False) -> int:
+    """Show which runs of each condition are done, missing or failed; exit code 1 unless all are done."""
+    from swarm_forage_env.studies.description import status as status_of
+
+    found = status_of(_read(place))
+    show(found, as_json=as_json)
+    return 0 if found.is_complete else EXIT_FAILURE
+
+
+def _read(place: Path) -> "StudyTable":
+    """Read a study, and tell of damaged files in its folder."""
+    from swarm_forage_env.studies.study_table import read_study
+
+    table = read_study(place)
+    for line in table.damaged_lines:
+        note(line)
+    return table
+
+
+@app.command
+def verdict(places: Places, /, *, table: bool = False, file: Path | None = None, as_json: AsJson = False) -> None:
+    """Test the claims of the paper with runs of its sets: which claims they support, contradict or leave open.
+
+    First come the counts of each answer and one table of all claims; then the evidence for each answer. The same
+    follows for the paper's intuitions, what the authors expected of each algorithm before the experiments.
+
+    Args:
+        table: Show only the counts and the table of all claims.
+        file: Also write the answer to a file: .txt, .md, .csv or .json, with more numbers.
+    """
+    from metrics import verdict as verdict_of
+    from swarm_forage_env._internal.files import check_file
+    from swarm_forage_env.runs.answer import FORMS
+
+    if file is not None and file.suffix not in FORMS:
+        raise ConfigError(f"Expected --file as a file ending in {', '.join(FORMS)}, got {str(file)!r}.")
+    tables = [_read(place) for place in places]
+    if file is not None:
+        check_file(file)
+    found = replace(verdict_of(*tables, tell=note), is_short=table)
+    for remark in found.remarks:
+        note(f"note: {remark}")
+    if as_json:
+        say(found.json())
+    else:
+        show(replace(found, is_folded=True))
+    if file is not None:
+        found.write(file)
+        note(f"written {file}")
+
+
+@app.command
+def plot(
+    place: Place,
+    /,
+    *,
+    out: Path | None = None,
+    band: bool = False,
+    variant: Names = ("corrected",),
+    formats: Annotated[Names, Parameter(name="--format")] = ("svg", "png"),
+    style: Style = SCREEN,
+) -> None:
+    """Draw the figures of a study, with their numbers as CSV tables: each measure over what the study varies.
+
+    Args:
+        out: Folder; default results/figures/NAME.
+        band: Show the paper's bands, mean ± 2 standard deviations of single runs.
+        variant: Forms of equations: corrected, paper (as printed); separated by commas.
+        formats: svg, png, pdf; separated by commas.
+    """
+    from metrics import plot as plot_study
+    from metrics.scoring import ScoreForms
+
+    forms = ScoreForms(variants=variant, forms=("marginal",))
+    table = _read(place)
+    plotted = plot_study(
+        table,
+        out or Path("results", "figures", table.spec.name),
+        band="sd" if band else "ci",
+        variants=forms.variants,
+        formats=formats,
+        style=style,
+    )
+    for file in plotted.files:
+        say(file)
+    for line in plotted.missing:
+        note(line)
