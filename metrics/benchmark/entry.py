@@ -92,7 +92,7 @@ class Training:
         if n_policies < protocol.n_trainings:
             raise BenchmarkError(
                 f"Expected {protocol.n_trainings} trainings for the track {self.track}, got {n_policies}; give one "
-                f"--policy for each, or choose --track {OPEN}."
+                f"a file for each, or choose --track {OPEN}."
             )
 
 
@@ -337,7 +337,7 @@ def entry_command(policies: Sequence[str], name: str, *, training: Training | No
 
     What a training was is among the words only where its track asks for it.
     """
-    words = [word for policy in policies for word in ("--policy", _from_here(policy))]
+    words = map(_from_here, policies)
     budget: list[str] = []
     if training is not None and training.track != OPEN:
         budget = ["--trained-in", training.worlds, "--track", training.track, "--decisions", str(training.decisions)]

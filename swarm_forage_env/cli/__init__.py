@@ -30,17 +30,30 @@ def main() -> None:
     """Run the command line and exit, in a process that does nothing else."""
     # Or processes that start would look for Python's own modules in the current folder first (SECURITY.md).
     os.environ["PYTHONSAFEPATH"] = "1"
+    try:
+        hear()
+        _tell_news()
+        code = answer(sys.argv[1:])
+    except KeyboardInterrupt as interrupt:
+        code = _interrupted(str(interrupt))
+    for number in (signal.SIGINT, signal.SIGTERM):  # all is said: from here on nothing is worth a traceback
+        signal.signal(number, signal.SIG_IGN)
+    sys.exit(code)
+
+
+def hear() -> None:
+    """Let Ctrl-C and SIGTERM raise KeyboardInterrupt, and raise it again where it is lost."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _interrupt)
     sys.unraisablehook = _unraisable
+
+
+def _tell_news() -> None:
+    """Show warnings, and what our packages tell, such as that they compile, as one line each."""
     warnings.showwarning = lambda message, *_, **__: complain(str(message))
     logging.basicConfig(format="swarm-forage: %(message)s")
     for package in PACKAGES:
         logging.getLogger(package).setLevel(logging.INFO)
-    code = answer(sys.argv[1:])
-    for number in (signal.SIGINT, signal.SIGTERM):  # all is said: from here on nothing is worth a traceback
-        signal.signal(number, signal.SIG_IGN)
-    sys.exit(code)
 
 
 def answer(words: Sequence[str]) -> int:
@@ -64,7 +77,8 @@ def answer(words: Sequence[str]) -> int:
             raise
         return code
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        if hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 
 def complain(message: str) -> None:
@@ -92,10 +106,11 @@ def _told(error: Exception) -> int | None:
 
 
 def _interrupt(number: int, _: object = None) -> None:
-    """Raise KeyboardInterrupt for Ctrl-C and SIGTERM, and once more where a library swallows it, as LLVM does."""
+    """Raise KeyboardInterrupt, and once more where a library swallows it, as LLVM does where it calls Python."""
     came.append(number)
-    signal.signal(signal.SIGALRM, _interrupt_again)
-    signal.setitimer(signal.ITIMER_REAL, AGAIN_S, AGAIN_S)
+    if hasattr(signal, "setitimer"):  # Windows has no such clock: there one presses Ctrl-C again
+        signal.signal(signal.SIGALRM, _interrupt_again)
+        signal.setitimer(signal.ITIMER_REAL, AGAIN_S, AGAIN_S)
     raise KeyboardInterrupt
 
 

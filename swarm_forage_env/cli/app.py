@@ -8,7 +8,6 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from importlib.metadata import version
-from typing import Annotated, Any
 
 from cyclopts import App, CycloptsError, Group, MissingArgumentError, Parameter
 
@@ -44,47 +43,42 @@ COMMANDS: dict[str, dict[str, tuple[str, str]]] = {
 }
 """Heading in `--help` -> name -> place of the function, or of an app with commands below it, and what is said of it."""
 
-app = App(
-    name="swarm-forage",
-    help="Swarm foraging: run, film, train and score policies.",
-    help_format="plaintext",  # others cost half a second
-    version=lambda: f"swarm-forage {version('swarm-forage-env')}",
-    default_parameter=Parameter(negative=(), show_default=lambda value: value or None),
-    print_error=False,
-    exit_on_error=False,
-    suppress_keyboard_interrupt=False,
-    result_action="return_value",
-)
-for _heading, _commands in COMMANDS.items():
-    _group = Group.create_ordered(_heading)
-    for _name, (_place, _about) in _commands.items():
-        app.command(f"swarm_forage_env.cli.{_place}", name=_name, help=_about, group=_group)
 
-
-@app.meta.default
-def _launch(
-    *words: Annotated[str, Parameter(show=False, allow_leading_hyphen=True)],
-    trust_models: bool = False,
-) -> Any:
-    """Carry out a command.
-
-    Args:
-        words: Of the command.
-        trust_models: Open models (.zip) and Python files (.py) that other files name: runs code (SECURITY.md).
-    """
-    from swarm_forage_env.policies.trust import only_typed
-
-    with nullcontext() if trust_models else only_typed(_files_typed(words)):
-        return app(words)
+def made(words: Sequence[str] = ()) -> App:
+    """Return the app; the commands that words name tell of themselves by their docstrings, not by a line."""
+    names = [name for commands in COMMANDS.values() for name in commands]
+    app = App(
+        name="swarm-forage",
+        help="Swarm foraging: run, film, train and score policies.\n\n'swarm-forage --trust-models COMMAND ...' opens "
+        "models (.zip) and Python files (.py) that other files name, too: runs code (SECURITY.md).",
+        help_format="markdown" if words and words[0] in names else "plaintext",  # markdown takes time
+        version=lambda: f"swarm-forage {version('swarm-forage-env')}",
+        default_parameter=Parameter(negative_bool=(), negative_iterable=(), show_default=lambda value: value or None),
+        print_error=False,
+        exit_on_error=False,
+        suppress_keyboard_interrupt=False,
+        result_action="return_value",
+    )
+    for heading, commands in COMMANDS.items():
+        group = Group.create_ordered(heading)
+        for name, (place, about) in commands.items():
+            line = None if name in words else about
+            app.command(f"swarm_forage_env.cli.{place}", name=name, help=line, group=group)
+    return app
 
 
 def carry_out(words: Sequence[str]) -> int:
     """Carry out the command that words name and return its exit code; raises whatever the command raises."""
+    from swarm_forage_env.policies.trust import only_typed
+
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # names of files may hold what their encoding has not
             stream.reconfigure(errors="backslashreplace")
+    trusts = "--trust-models" in words[:1]
+    app, words = made(words), words[trusts:]
     try:
-        return app.meta(words) or 0
+        with nullcontext() if trusts else only_typed(_files_typed(words)):
+            return app(words) or 0
     except CycloptsError as error:
         if isinstance(error, MissingArgumentError) and not any(word.startswith("-") for word in words):
             app.help_print(words)

@@ -51,7 +51,8 @@ def run(
         track: 10M, 40M or open: most decisions of a training.
         decisions: Decisions of the longest training, of all its robots.
     """
-    if name is None and len(policies) > 1:
+    first, *others = policies
+    if name is None and others:
         raise ConfigError("Expected --name for an entry of several policies.")
     if quick and file is not None:
         raise ConfigError("Expected --file without --quick: a quick look is no entry.")
@@ -63,7 +64,7 @@ def run(
     from swarm_forage_env.runs.plan_summary import summarize_plan
 
     protocol = load_protocol(quick=quick)
-    called = name or f"{policy_label(policies[0])}{', quick' if quick else ''}"
+    called = name or f"{policy_label(first)}{', quick' if quick else ''}"
     training = Training(worlds=trained_in, command=training_command, track=track, decisions=decisions)
     question = benchmark_question([*policies], name=called, protocol=protocol, training=training)
     if dry_run:
@@ -85,9 +86,7 @@ def run(
 
 
 @app.command(name="show")
-def show_entries(
-    entries: tuple[Path, ...] = (), /, *, picture: Picture = None, as_json: AsJson = False
-) -> None:
+def show_entries(entries: tuple[Path, ...] = (), /, *, picture: Picture = None, as_json: AsJson = False) -> None:
     """Show the scores of entries, beside the scripted controllers.
 
     Args:

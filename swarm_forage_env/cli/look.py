@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
-from cyclopts.types import PositiveFloat, PositiveInt
+from cyclopts.types import PositiveFloat
 
 from swarm_forage_env.cli.options import AsJson, Jobs, Picture, Policies, Policy, Seed, Seeds, WorldOptions
-from swarm_forage_env.cli.printer import drawn_or_told, note, progress_bar, say, show
+from swarm_forage_env.cli.printer import note, progress_bar, say, show
 
 if TYPE_CHECKING:
     from swarm_forage_env.inspect.replay.frames import Replay
@@ -86,7 +86,9 @@ def record(
     world: WorldOptions = WorldOptions(),
     seed: Seed = 0,
     file: Path | None = None,
-    at: Annotated[float | None, Parameter(help="Draw one picture at this simulated second, in place of a film.")] = None,
+    at: Annotated[
+        float | None, Parameter(help="Draw one picture at this simulated second, in place of a film.")
+    ] = None,
     seconds: float = 300.0,
     speedup: float = 20.0,
     size: int = 900,
@@ -97,6 +99,7 @@ def record(
 
     Args:
         file: File to write: .gif or .mp4, or .png with --at; default results/SCENARIO_POLICY.gif.
+        at: Draw one picture at this simulated second, in place of a film.
         seconds: Simulated seconds to film.
         speedup: Simulated seconds per second of film.
         size: Longer side of the arena in pixels.

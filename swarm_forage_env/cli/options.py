@@ -52,7 +52,7 @@ Performance = Annotated[
 Picture = Annotated[Path | None, Parameter(help="Picture to draw: .png, .svg or .pdf; default beside the results.")]
 AsJson = Annotated[bool, Parameter(name="--json", help="Print the results as JSON.")]
 DryRun = Annotated[bool, Parameter(help="Say how many runs there are, how many are stored, and how large the rest is.")]
-Style = Annotated[FigureStyle, Parameter(name="*")]
+Style = Annotated[FigureStyle, Parameter(name="*", negative_bool="no-")]
 """How figures look."""
 
 

@@ -25,7 +25,7 @@ from swarm_forage_env.cli.printer import ask_and_show, note, say, show
 from swarm_forage_env.rendering.figures import SCREEN
 
 if TYPE_CHECKING:
-    from metrics.scoring import ScoreForms, ScoreQuestion
+    from metrics.scoring import ScoreQuestion
 
 
 def run(
@@ -60,7 +60,7 @@ def plot(
 ) -> None:
     """Draw stored runs anew: performance over time, one curve per policy. Nothing is run.
 
-    'swarm-forage plot results/warehouse_small --width-in 3.5 --no-title --picture figure.pdf' draws it for a column of a
+    'swarm-forage plot results/warehouse_small --width-in 3.5 --no-title --picture a.pdf' draws it for a column of a
     paper. 'study plot' draws studies.
 
     Args:
@@ -88,7 +88,7 @@ def score(
     *,
     world: WorldOptions = WorldOptions(),
     options: RunOptions = RunOptions(),
-    curves: Annotated[Path | None, Parameter(name="--curves")] = None,
+    curves: Path | None = None,
     performance: Performance = None,
     measures: Names = (),
     variant: Names = ("corrected",),
@@ -119,13 +119,16 @@ def score(
     from metrics.scoring.score_tables import side_by_side
     from swarm_forage_env.cli.worlds import default_file, default_folder
 
-    forms = ScoreForms(variants=variant, forms=form, band=band)
+    asked: dict[str, Any] = {"variants": variant, "forms": form}
+    forms = ScoreForms(**asked, band=band)
     if curves is not None:
         if policies or world != WorldOptions():
             raise ConfigError("Expected --curves alone, got policies or a world, which are about runs; leave them out.")
         tables = score_curves(curves, measures=measures or None, performance=performance, forms=forms)
         show(side_by_side(tables), options.picture, as_json=options.as_json)
         return 0
+    if performance is not None:
+        world = replace(world, settings=(*world.settings, f"performance={performance}"))
     if not policies:
         raise ConfigError("Expected policies to run, or a file with --curves; 'swarm-forage list' names policies.")
     question = asked_scores(
@@ -198,7 +201,7 @@ def rerun(file: Path, /, *, as_json: AsJson = False) -> int:
     except Exception as error:  # of a failure it is the run's own, whatever it is, and what its user wants to see
         if file.suffix != ".json":
             raise
-        note(traceback.format_exc())
+        note(traceback.format_exc().rstrip())
         raise CommandError("the run failed again") from error
     say(answer.json() if as_json else answer.record.describe())
     if answer.is_same is False:

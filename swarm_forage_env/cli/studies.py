@@ -3,7 +3,7 @@
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 from cyclopts.types import PositiveInt
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from swarm_forage_env.studies.study_folder import StudyFolder
     from swarm_forage_env.studies.study_table import StudyTable
 
-app = App(name="study")
+app = App(name="study", help="Run the paper's experiments, or your own.")
 
 Place = Annotated[Path, Parameter(help="Folder of a study, or its packed file.")]
 Places = Annotated[tuple[Path, ...], Parameter(help="Folders of studies, or their packed files.")]
@@ -205,7 +205,8 @@ def plot(
     from metrics import plot as plot_study
     from metrics.scoring import ScoreForms
 
-    forms = ScoreForms(variants=variant, forms=("marginal",))
+    asked: dict[str, Any] = {"variants": variant}
+    forms = ScoreForms(**asked)
     table = _read(place)
     plotted = plot_study(
         table,

@@ -2,21 +2,14 @@
 
 import math
 import shlex
-import time
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
 
-import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import Progress, TimeElapsedColumn
 
 from swarm_forage_env._internal.wording import counted
-from swarm_forage_env.cli.options import EXIT_FAILURE, complain, no_picture
-from swarm_forage_env.cli.signals import EXIT_INTERRUPTED
-from swarm_forage_env.runs.progress import duration
-from swarm_forage_env.runs.workers import processes_of
+from swarm_forage_env.cli import EXIT_FAILURE
+from swarm_forage_env.cli.printer import bar, drawn_or_told, note, show
 from swarm_forage_env.training.curves import beside_baseline, place_of
 from swarm_forage_env.training.evaluation_plan import ALL_WORLDS
 from swarm_forage_env.training.evaluations import (
@@ -29,72 +22,55 @@ from swarm_forage_env.training.evaluations import (
     read_evaluations,
 )
 from swarm_forage_env.training.plan import TrainingPlan
-from swarm_forage_env.training.seeds import TrainingFailure, is_finished, read_seeds, seed_folder
+from swarm_forage_env.training.seeds import TrainingFailure, is_finished, seed_folder
 
 PICTURE_FILE = "training.png"
-_TRAINED = "trained policy"
-"""Its label in the picture of a single training."""
-_NOTHING_TO_SEE = "{} scores 0 in such short runs. Longer ones say more (--evaluation-horizon, or that of the plan)."
-LINE_EVERY_S = 60.0
-"""Shortest time between two lines about the progress where stderr is no terminal, s."""
+CURVES_FILE = "curves.png"
+_NOTHING_TO_SEE = "{} scores 0 in such short runs. Longer ones say more (--set evaluation.horizon_s=SECONDS)."
 
 
-def run_training(plan: TrainingPlan, folder: Path, *, resume: bool, callbacks: Sequence[str] = ()) -> None:
+def run_training(plan: TrainingPlan, folder: Path, *, resume: bool, callbacks: Sequence[str] = ()) -> int:
     """Train, show how it goes, and say where the results are; `callbacks` as in `training.sb3.callbacks`.
 
     Raises:
         ImportError: stable-baselines3 is not installed.
         ConfigError: see `training.sb3.training.train` and `training.sb3.callbacks.named_callbacks`.
+        KeyboardInterrupt: Ctrl-C; its message says how to go on.
     """
     from swarm_forage_env.training.sb3.callbacks import named_callbacks
     from swarm_forage_env.training.sb3.training import train
 
     added = named_callbacks(callbacks)
-
-    with _bar() as bar:
-        console = bar.console
+    with bar(TimeElapsedColumn()) as shown:
+        report = _Report(plan, [plan.seed], shown)
         try:
-            report = _reporter(plan, bar, plan.total_steps)
-            result = train(plan, folder, resume=resume, report=report, callbacks=added)
+            result = train(plan, folder, resume=resume, report=lambda news: report(plan.seed, news), callbacks=added)
         except KeyboardInterrupt:
-            _draw(plan, read_evaluations(folder / EVALUATIONS_FILE), folder / PICTURE_FILE, console)
-            words = _farewell(folder, is_kept=(folder / MODEL_FILE).exists())
-            raise typer.Exit(complain(words, EXIT_INTERRUPTED)) from None
+            _draw(plan, folder)
+            raise KeyboardInterrupt(_farewell(folder)) from None
     if not result.steps:
-        console.print(
+        note(
             f"This training was finished: {result.model.num_timesteps:,} of {plan.total_steps:,} decisions. "
             "For more, give --steps beside --resume, or a plan with more."
         )
-    drawn = _draw(plan, result.evaluations, folder / PICTURE_FILE, console)
-    files = {"model": folder / MODEL_FILE, "network": result.policy_file, "picture": drawn}
-    console.print(", ".join(f"{what} {file}" for what, file in files.items() if file is not None), soft_wrap=True)
+    files = {"model": folder / MODEL_FILE, "network": result.policy_file, "picture": _draw(plan, folder)}
+    note(", ".join(f"{what} {file}" for what, file in files.items() if file is not None))
+    return 0
 
 
-def _bar() -> Progress:
-    console = Console(stderr=True, highlight=False, markup=False, emoji=False)
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
-
-
-def _farewell(folder: Path, *, is_kept: bool) -> str:
-    if is_kept:
+def _farewell(folder: Path) -> str:
+    if (folder / MODEL_FILE).exists():
         return f"Stopped. To go on: swarm-forage --trust-models train --out {shlex.quote(str(folder))} --resume"
     return "Stopped before there was anything to keep; the same command starts again."
 
 
-def _draw(plan: TrainingPlan, evaluations: Sequence[Evaluation], path: Path, console: Console) -> Path | None:
-    """Draw the evaluations; returns `path`, None without any or without matplotlib."""
+def _draw(plan: TrainingPlan, folder: Path) -> Path | None:
+    """Draw the evaluations of a training; None without any, or where there can be no picture."""
+    evaluations = read_evaluations(folder / EVALUATIONS_FILE)
     if not evaluations:
         return None
-    try:
-        beside_baseline(TrainingCurve(label=_TRAINED, plan=plan, evaluations=tuple(evaluations))).draw(path)
-    except ImportError as error:
-        console.print(str(error))
-        return None
-    except OSError as error:  # the training is worth more than its picture
-        console.print(no_picture(path, error))
-        return None
-    return path
+    curve = TrainingCurve(label="trained policy", plan=plan, evaluations=tuple(evaluations))
+    return drawn_or_told(beside_baseline(curve), folder / PICTURE_FILE)
 
 
 def run_seeds(
@@ -105,160 +81,74 @@ def run_seeds(
     jobs: int | None,
     resume: bool,
     callbacks: Sequence[str],
-    picture: Path,
-    as_json: bool,
-) -> None:
-    """Train several seeds, show how all go and draw them meanwhile, and print a table; arguments as in `train_seeds`.
+) -> int:
+    """Train several seeds, show how all go, draw them and print a table; arguments as in `train_seeds`.
+
+    Returns:
+        1 if a training failed.
 
     Raises:
         ImportError: stable-baselines3 is not installed.
-        ConfigError: see `training.sb3.seeds.train_seeds` and `rendering.figures.check_picture`.
-        typer.Exit: Ctrl-C, or a training failed.
+        ConfigError: see `training.sb3.seeds.train_seeds`.
+        KeyboardInterrupt: Ctrl-C; its message says how to go on.
     """
-    from swarm_forage_env.cli.printer import show
-    from swarm_forage_env.rendering.figures import check_picture
     from swarm_forage_env.training.sb3.seeds import train_seeds
 
-    check_picture(picture)
-    with _bar() as bar:
-        shown = _SeedsShown(plan, seeds, folder, picture, processes_of(len(seeds), jobs), bar)
+    go_on = f"swarm-forage --trust-models train --out {shlex.quote(str(folder))} --seeds {len(seeds)} --resume"
+    with bar(TimeElapsedColumn()) as shown:
+        report = _Report(plan, seeds, shown)
         try:
-            found = train_seeds(plan, seeds, folder, jobs=jobs, resume=resume, report=shown, callbacks=callbacks)
+            found = train_seeds(plan, seeds, folder, jobs=jobs, resume=resume, report=report, callbacks=callbacks)
         except KeyboardInterrupt:
-            raise typer.Exit(complain(_farewell_of_seeds(plan, seeds, folder), EXIT_INTERRUPTED)) from None
-    show(found, picture if found.has_picture and shown.can_draw else None, as_json=as_json)
-    for seed in found.failures:
-        place = seed_folder(folder, seed)
-        trust, resuming = ("--trust-models ", " --resume") if (place / MODEL_FILE).exists() else ("", "")
-        words = shlex.join(["train", "--plan", str(folder / PLAN_FILE), "--seed", str(seed), "--out", str(place)])
-        further = "".join(f" --callback {shlex.quote(name)}" for name in callbacks)
-        typer.echo(f"again, alone: swarm-forage {trust}{words}{further}{resuming}", err=True)
+            if not (folder / PLAN_FILE).exists():
+                words = "Interrupted before there was anything to keep; the same command starts again."
+            else:
+                finished = sum(is_finished(plan, seed_folder(folder, seed)) for seed in seeds)
+                words = f"Interrupted: {finished} of {counted(len(seeds), 'training')} finished. To go on: {go_on}"
+            raise KeyboardInterrupt(words) from None
+    show(found, folder / CURVES_FILE)
     if found.failures:
-        raise typer.Exit(EXIT_FAILURE)
+        note(f"To go on with those that failed: {go_on}")
+        return EXIT_FAILURE
+    return 0
 
 
-def _farewell_of_seeds(plan: TrainingPlan, seeds: Sequence[int], folder: Path) -> str:
-    if not (folder / PLAN_FILE).exists():
-        return "Interrupted before there was anything to keep; the same command starts again."
-    finished = sum(is_finished(plan, seed_folder(folder, seed)) for seed in seeds)
-    return (
-        f"Interrupted: {finished} of {counted(len(seeds), 'training')} finished. To go on: "
-        f"swarm-forage --trust-models train --out {shlex.quote(str(folder))} --seeds {len(seeds)} --resume"
-    )
+class _Report:
+    """Shows how trainings go: one bar for all of them, and a line per evaluation."""
 
+    def __init__(self, plan: TrainingPlan, seeds: Sequence[int], shown: Progress) -> None:
+        self._plan, self._shown = plan, shown
+        self._n_seeds = len(seeds)
+        self._latest: dict[int, TrainingStatus | Evaluation] = {}
+        self._task = shown.add_task("training", total=plan.total_steps * len(seeds))
+        self._has_begun = False
 
-class _SeedsShown:
-    """Shows how several trainings go, as if they were one, and draws whenever there is a new evaluation.
-
-    Attributes:
-        can_draw: Whether matplotlib is installed, as far as is known.
-    """
-
-    def __init__(
-        self, plan: TrainingPlan, seeds: Sequence[int], folder: Path, picture: Path, n_at_once: int, bar: Progress
-    ) -> None:
-        self._plan, self._seeds, self._folder, self._picture = plan, seeds, folder, picture
-        self._n_at_once = n_at_once
-        self._failures: dict[int, str] = {}
-        self._latest: dict[int, TrainingStatus] = {}
-        for seed, training in read_seeds(plan, folder, seeds).trainings.items():
-            self._note(seed, training.evaluations[-1])
-        total = plan.total_steps * len(seeds)
-        self._report = _reporter(plan, bar, total, begun=self._together().steps, whose=f"{'seed':>6}")
-        self._console = bar.console
-        self.can_draw = True
-
-    def __call__(self, seed: int, news: TrainingStatus | Evaluation | TrainingFailure) -> None:
+    def __call__(self, seed: int, news: "TrainingStatus | Evaluation | TrainingFailure") -> None:
         """Show the news of a training."""
+        print_line = self._shown.console.out
         if isinstance(news, TrainingFailure):
-            self._failures[seed] = news.reason
-            self._console.print(f"Seed {seed} failed: {news.reason}", soft_wrap=True)
+            print_line(f"Seed {seed} failed: {news.reason}")
             return
-        self._note(seed, news)
-        if isinstance(news, Evaluation):
-            self._report(news, f"{seed:>6}")
-            self._draw(seed)
-        else:
-            self._report(self._together())
-
-    def _note(self, seed: int, news: TrainingStatus | Evaluation) -> None:
-        before = self._latest.get(seed)
-        known = math.nan if before is None else before.episode_return
-        self._latest[seed] = TrainingStatus(
-            steps=min(news.steps, self._plan.total_steps),  # the last rollout is a whole one
-            wall_time_s=news.wall_time_s,
-            episode_return=news.episode_return if isinstance(news, TrainingStatus) else known,
-        )
-
-    def _together(self) -> TrainingStatus:
-        """All trainings as one that makes the decisions of all in the time that they take side by side."""
-        known = [one.episode_return for one in self._latest.values() if not math.isnan(one.episode_return)]
-        return TrainingStatus(
-            steps=sum(one.steps for one in self._latest.values()),
-            wall_time_s=sum(one.wall_time_s for one in self._latest.values()) / self._n_at_once,
-            episode_return=sum(known) / len(known) if known else math.nan,
-        )
-
-    def _draw(self, seed: int) -> None:
-        """Draw all trainings, and the one that was evaluated alone."""
-        if not self.can_draw:
+        self._latest[seed] = news
+        steps = sum(min(one.steps, self._plan.total_steps) for one in self._latest.values())
+        self._shown.update(self._task, completed=steps)
+        if isinstance(news, TrainingStatus):
+            if not math.isnan(news.episode_return):
+                self._shown.update(self._task, description=f"mean return {news.episode_return:.2f}")
             return
-        found = read_seeds(self._plan, self._folder, self._seeds, self._failures)
-        one = replace(found.trainings[seed], label=_TRAINED)
-        alone = beside_baseline(one), seed_folder(self._folder, seed) / PICTURE_FILE
-        for what, path in ((found, self._picture), alone):
-            try:
-                what.draw(path)
-            except ImportError as error:
-                self._console.print(str(error))
-                self.can_draw = False
-                return
-            except OSError as error:  # the next picture may find room
-                self._console.print(no_picture(path, error))
+        named = self._n_seeds > 1
+        if not self._has_begun:
+            first, columns = heading(self._plan)
+            print_line(first)
+            print_line(f"{'seed':>6} {columns}" if named else columns)
+        for line in evaluation_lines(news):
+            print_line(f"{seed:>6} {line}" if named else line)
+        if not self._has_begun and news.baseline == 0.0 and not news.worlds:
+            print_line(_NOTHING_TO_SEE.format(self._plan.evaluation.baseline))
+        self._has_begun = True
 
 
-class _Reporter(Protocol):
-    def __call__(self, news: TrainingStatus | Evaluation, whose: str = "") -> None:
-        """Show the news; `whose` evaluation stands before it."""
-
-
-def _reporter(plan: TrainingPlan, bar: Progress, total: int, *, begun: int = 0, whose: str = "") -> _Reporter:
-    """Return what shows how trainings go that make `total` decisions together; `whose` stands above names of them."""
-    task = bar.add_task("training", total=total, completed=begun)
-    *first_words, names = heading(plan).splitlines()
-    first_words += _beside(whose, [names])
-    has_begun = False
-    shorter_s = plan.evaluation.horizon_s
-    is_short = not plan.evaluation.worlds and shorter_s is not None and shorter_s < plan.scenario.horizon_s
-    told: TrainingStatus | None = None
-    told_at = time.monotonic()
-
-    def report(news: TrainingStatus | Evaluation, whose: str = "") -> None:
-        nonlocal first_words, has_begun, told, told_at
-        if bar.disable and not has_begun:
-            bar.console.print(f"At least {total:,} decisions; a line about every minute says how many are done.")
-            has_begun = True
-        if isinstance(news, Evaluation):
-            for line in (*first_words, *_beside(whose, evaluation_lines(news))):
-                bar.console.print(line)
-            if first_words and is_short and news.baseline == 0.0:
-                bar.console.print(_NOTHING_TO_SEE.format(plan.evaluation.baseline))
-            first_words = []
-        elif not bar.disable:
-            bar.update(task, completed=news.steps, description=_returned(news))
-        elif time.monotonic() - told_at >= LINE_EVERY_S:
-            bar.console.print(progress_line(total, news, told))
-            told, told_at = news, time.monotonic()
-
-    return report
-
-
-def _beside(whose: str, lines: Sequence[str]) -> list[str]:
-    """Lines beside the name of a training."""
-    return [f"{whose} {line}" for line in lines] if whose else [*lines]
-
-
-def heading(plan: TrainingPlan) -> str:
+def heading(plan: TrainingPlan) -> tuple[str, str]:
     """Return what stands above the evaluations: their runs, and the names of the columns."""
     horizons = {world.scenario.horizon_s for world in plan.judging_worlds}
     runs = f"Evaluated in {counted(plan.evaluation.n_runs, 'run' if len(horizons) == 1 else 'whole run')}"
@@ -266,11 +156,11 @@ def heading(plan: TrainingPlan) -> str:
         runs += f" of {horizons.pop():,.0f} s"
     if plan.evaluation.worlds:
         return (
-            f"{runs} in each of {place_of(plan)}; what counts is the {plan.evaluation.chosen_by} ratio:\n"
-            f"{'decisions':>10}  {'world':<20} {'per 1,000 s':>11} {'baseline':>13} {'ratio':>6} {'interference':>12}"
+            f"{runs} in each of {place_of(plan)}; what counts is the {plan.evaluation.chosen_by} ratio:",
+            f"{'decisions':>10}  {'world':<20} {'per 1,000 s':>11} {'baseline':>13} {'ratio':>6} {'interference':>12}",
         )
     baseline = plan.evaluation.baseline
-    return f"{runs}:\n{'decisions':>12} {'per 1,000 s':>12} {baseline:>8} {'interference':>13}"
+    return f"{runs}:", f"{'decisions':>12} {'per 1,000 s':>12} {baseline:>8} {'interference':>13}"
 
 
 def evaluation_lines(news: Evaluation) -> list[str]:
@@ -287,17 +177,3 @@ def evaluation_lines(news: Evaluation) -> list[str]:
         *lines,
         f"{news.steps:>10,}  {ALL_WORLDS:<20} {'':>11} {'':>13} {news.performance:>6.2f} {interference:>12.3f}",
     ]
-
-
-def _returned(now: TrainingStatus) -> str:
-    """Say what episodes returned; none has ended at the beginning."""
-    return "no episode has ended" if math.isnan(now.episode_return) else f"mean return {now.episode_return:.2f}"
-
-
-def progress_line(total: int, now: TrainingStatus, before: TrainingStatus | None) -> str:
-    """Say how far a training of `total` decisions is, and how long it takes at the pace since the line before."""
-    steps, seconds = (0, 0.0) if before is None else (before.steps, before.wall_time_s)
-    left_s = (total - now.steps) * (now.wall_time_s - seconds) / max(1, now.steps - steps)
-    return (
-        f"{min(now.steps, total):,} of {total:,} decisions, {_returned(now)}, about {duration(max(0.0, left_s))} left"
-    )

@@ -194,7 +194,7 @@ def policy_class(name: str) -> Callable[..., Policy]:
         return partial(_opened, _imported(opener), name)
     if name in POLICIES:
         return _imported(POLICIES[name])
-    raise ValueError(
+    raise ConfigError(
         f"Unknown policy {name!r}.{suggestion(name, POLICIES)} Known: {', '.join(POLICIES)}. Give one of your own by "
         "its file: policy.npz, model.zip, my_module.py:MyPolicy (docs/policies.md)."
     )

@@ -281,6 +281,25 @@ class TrainingPlan:
         """Return all plain values of the plan by their names with dots, such as "interface.observation"."""
         return dict(_leaves(self.to_mapping()))
 
+    def with_settings(self, settings: Mapping[str, Any]) -> "TrainingPlan":
+        """Return the plan with plain values replaced, by names with dots as in `settings`.
+
+        Example: `plan.with_settings({"n_arenas": 2, "options.learning_rate": 0.001})`.
+
+        Raises:
+            ConfigError: there is no such table or value, or the plan cannot have it.
+        """
+        mapping = self.to_mapping()
+        for name, value in settings.items():
+            *tables, last = name.split(".")
+            place: Any = mapping
+            for key in tables:
+                place = place.get(key) if isinstance(place, dict) else None
+            if not isinstance(place, dict):
+                raise ConfigError(f"Expected a value of the plan, got {name}.{suggestion(name, self.settings())}")
+            place[last] = value
+        return TrainingPlan.from_mapping(mapping)
+
     def differences(self, earlier: "TrainingPlan") -> tuple[str, ...]:
         """Return what keeps this plan from going on with a training by an earlier one, field by field.
 
@@ -371,8 +390,8 @@ def read_plan(path: str | Path) -> TrainingPlan:
         raise ConfigError(f"Cannot use the plan {path}: {error}") from error
 
 
-def named_plan(name: str, *, seed: int | None = None, frame_decisions: int | None = None) -> TrainingPlan:
-    """Return the plan of a file, or of a shipped policy by its name, with what is given in place of its own.
+def named_plan(name: str) -> TrainingPlan:
+    """Return the plan of a file, or of a shipped policy by its name.
 
     Raises:
         ConfigError: there is none, or it cannot be used.
@@ -383,12 +402,7 @@ def named_plan(name: str, *, seed: int | None = None, frame_decisions: int | Non
             f"Expected --plan as a file, or as a shipped policy ({', '.join(plan_names())}), got {name!r}, which is "
             f"neither.{suggestion(name, plan_names())}"
         )
-    plan = read_plan(name if shipped is None else shipped)
-    given: dict[str, Any] = {} if seed is None else {"seed": seed}
-    if frame_decisions is not None:
-        given["interface"] = dataclasses.replace(plan.interface, frame_decisions=frame_decisions)
-        given["in_runs"] = {key: value for key, value in plan.in_runs.items() if key != "frame_decisions"}
-    return dataclasses.replace(plan, **given)
+    return read_plan(name if shipped is None else shipped)
 
 
 def _common(config: ScenarioConfig) -> tuple[Any, ...]:

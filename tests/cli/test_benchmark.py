@@ -34,7 +34,7 @@ def mine(tiny, tmp_path):
 
 
 def test_a_policy_becomes_an_entry_that_can_be_shown(command, tiny):
-    words = ("--policy", "crw", "--name", "again", "--trained-in", "nothing", "--jobs", "1")
+    words = ("crw", "--name", "again", "--trained-in", "nothing", "--jobs", "1")
     code, out, err = command("benchmark", *words)
     assert code == 0, err
     header, *rows = out.splitlines()
@@ -42,7 +42,7 @@ def test_a_policy_becomes_an_entry_that_can_be_shown(command, tiny):
     assert {row.split()[0] for row in rows} == {*PAPER_POLICIES, "again"}
     file = Path("results/benchmark/again.json")
     content = json.loads(file.read_text())
-    assert content["command"] == "swarm-forage benchmark --policy crw --name again"
+    assert content["command"] == "swarm-forage benchmark crw --name again"
     assert content["training"]["worlds"] == "nothing"
     code, shown, _ = command("benchmark", "show", str(file))
     assert (code, shown) == (0, out)
@@ -51,7 +51,7 @@ def test_a_policy_becomes_an_entry_that_can_be_shown(command, tiny):
 
 
 def test_a_quick_look_writes_no_entry(command, tiny):
-    code, out, err = command("benchmark", "--policy", "random", "--quick", "--jobs", "1")
+    code, out, err = command("benchmark", "random", "--quick", "--jobs", "1")
     assert code == 0, err
     assert "random" in out
     assert "no entry" in err

@@ -45,12 +45,9 @@ def test_trainings_are_drawn_beside_others(command, monkeypatch):
     assert cells["first, at its best"] == ["20", "40.0", "0.250"]
     assert cells["second, at its best"] == ["20", "8.0", "0.250"]
     assert cells.keys() >= {"random", "crw"}
-    assert out.endswith("wrote both.png\n")
     assert Path("both.png").read_bytes().startswith(b"\x89PNG")
-    code, out, err = command(*words, "--picture", "both.png", "--json")
-    assert code == 0
-    assert err.endswith("wrote both.png\n")
-    assert json.loads(out)
+    code, out, _ = command(*words, "--picture", "both.png", "--json")
+    assert (code, bool(json.loads(out))) == (0, True)
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     code, _, err = command("train", "curves", "first", "--policy", "none")
     assert code == 1

@@ -1,60 +1,32 @@
-"""How commands end that fail: with a line on stderr."""
+"""How commands end that fail: what a user can mend is a line on stderr, all else a traceback."""
 
 import subprocess
 import sys
-from importlib.util import module_from_spec, spec_from_file_location
-from pathlib import Path
 
 import pytest
 
-from swarm_forage_env.cli.errors import end
-from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_UNFORESEEN
 
-
-@pytest.fixture
-def broken(monkeypatch):
-    """Let `swarm-forage list` fail as nobody foresaw."""
+def test_what_nobody_foresaw_is_raised(command, monkeypatch):
     monkeypatch.setattr("swarm_forage_env.inspect.descriptions.overview", None)  # our code calls it
+    with pytest.raises(TypeError, match="not callable"):
+        command("list")
 
 
-@pytest.mark.usefixtures("broken")
-def test_what_nobody_foresaw_is_told_with_its_traceback(command):
-    code, out, err = command("list")
-    assert (code, out) == (EXIT_UNFORESEEN, "")
-    assert err.startswith("Traceback")
-    assert "TypeError: 'NoneType' object is not callable" in err
-    assert err.endswith("\nswarm-forage: An error that should not happen; please send us the lines above.\n")
+@pytest.mark.parametrize(
+    ("error", "code", "told"),
+    [
+        (OSError(28, "No space left on device", "here"), 1, "No space left on device: here"),
+        (ImportError("No picture without matplotlib"), 1, "No picture without matplotlib"),
+        (KeyboardInterrupt("Interrupted: 3 runs are kept."), 130, "Interrupted: 3 runs are kept."),
+        (KeyboardInterrupt(), 130, "Interrupted. Unfinished work is not kept; run the same command to start again."),
+    ],
+)
+def test_what_happens_to_a_user_is_one_line(command, monkeypatch, error, code, told):
+    def overview(_):
+        raise error
 
-
-def raised_by(file: Path, function: str) -> Exception:
-    """What a function of a file raises that is no package of ours."""
-    spec = spec_from_file_location(file.stem, file)
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    with pytest.raises((ValueError, TypeError, AttributeError)) as caught:
-        getattr(module, function)()
-    return caught.value
-
-
-def test_code_of_a_user_that_fails_is_not_told_as_a_fault_of_ours(tmp_path, capsys):
-    file = tmp_path / "mine.py"
-    file.write_text(
-        "import json\nfrom swarm_forage_env.cli.errors import complain\n"
-        "def on_step():\n    json.loads('{')\n"
-        "def calls_us():\n    complain(None, 1, 2, 3)\n"
-        "def calls_us_wrongly_inside():\n    complain(5, 1)\n"
-    )
-    assert end(raised_by(file, "on_step")) == EXIT_FAILURE
-    told = capsys.readouterr().err
-    assert "json.decoder.JSONDecodeError: " in told
-    assert told.endswith(f"\nswarm-forage: Your code failed in {file}, line 4.\n")
-    assert end(raised_by(file, "calls_us")) == EXIT_FAILURE, "the call was wrong"
-    assert end(raised_by(file, "calls_us_wrongly_inside")) == EXIT_UNFORESEEN, "our code failed last"
-
-
-def test_too_little_memory_is_told(capsys):
-    assert end(MemoryError("Unable to allocate 9 GiB")) == EXIT_FAILURE
-    assert "Not enough memory: Unable to allocate 9 GiB; ask for fewer" in capsys.readouterr().err
+    monkeypatch.setattr("swarm_forage_env.inspect.descriptions.overview", overview)
+    assert command("list") == (code, "", f"swarm-forage: {told}\n")
 
 
 def test_whoever_reads_the_output_may_stop(tmp_path):

@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-WORDS = ("play", "random", "--robots", "3", "--objects", "20")
+WORDS = ("play", "random", "--robots", "3", "--set", "n_objects=20")
 MAIN = "from swarm_forage_env.cli import main; main()"
 
 

@@ -26,7 +26,7 @@ def test_stored_runs_are_the_table_that_made_them(command, folder):
 def test_a_figure_for_a_paper(command, folder, painted):
     from matplotlib import image
 
-    words = ("--width", "3.5", "--no-title", "--picture", "figure.png")
+    words = ("--width-in", "3.5", "--no-title", "--picture", "figure.png")
     assert command("plot", "here", *words) == (0, "picture figure.png\n", "")
     assert image.imread("figure.png").shape[1] == round(3.5 * 150)
 

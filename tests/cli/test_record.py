@@ -10,7 +10,7 @@ from swarm_forage_env.inspect import film
 
 def test_record_films_a_run(command):
     pytest.importorskip("PIL")
-    words = ("--policy", "random", "--robots", "3", "--seconds", "8", "--size", "240", "--fps", "5")
+    words = ("random", "--robots", "3", "--seconds", "8", "--size", "240")
     code, out, _ = command("record", "--file", "film.gif", *words)
     assert (code, out) == (0, "wrote film.gif\n")
     assert Path("film.gif").read_bytes().startswith(b"GIF8")
@@ -26,8 +26,8 @@ def test_record_draws_one_picture_of_the_run_it_films(command, monkeypatch):
         filmed[tick] = render(*args, tick=tick, **options)
         return filmed[tick]
 
-    words = ("--policy", "random", "--robots", "3", "--size", "240")
-    assert command("record", *words, "--seconds", "8", "--fps", "20")[0] == 0
+    words = ("random", "--robots", "3", "--size", "240")
+    assert command("record", *words, "--seconds", "8")[0] == 0
     monkeypatch.setattr(film, "render_frame", note)
     code, out, err = command("record", *words, "--at", "8", "--file", "new/at.png")
     assert (code, out, err) == (0, "wrote new/at.png\n", "")

@@ -32,7 +32,7 @@ def command(command):
 
     def call(text, *words):
         Path("world.toml").write_text(text)
-        return command("run", "--policy", "random", "--jobs", "1", *words)
+        return command("run", "random", "--jobs", "1", *words)
 
     return call
 

@@ -10,9 +10,9 @@ from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import load
 from swarm_forage_env.studies.ladders import BUDGETS, Budget
 
-WORLD = ("--robots", "3", "--objects", "20", "--jobs", "1", "--budget", "tiny")
-SCORE = ("score", "--policy", "random", *WORLD)
-COMPARE = ("score", "--policy", "random,crw", *WORLD)
+WORLD = ("--robots", "3", "--set", "n_objects=20", "--jobs", "1", "--budget", "tiny")
+SCORE = ("score", "random", *WORLD)
+COMPARE = ("score", "random,crw", *WORLD)
 FEW = ("--measures", "t_lost_fraction,adaptability")
 CURVES = "n_robots,seed,interval,performance\n2,0,0,3\n4,0,0,5\n"
 
@@ -32,8 +32,8 @@ def test_score_shows_every_measure_keeps_records_and_draws_a_picture(command, pa
         assert word in out
     folder = Path("results/warehouse_small_3_robots_bcf754")
     assert len(load(folder)) == 14
-    assert (folder / "scores.png").read_bytes().startswith(b"\x89PNG")
-    assert "picture results/warehouse_small_3_robots_bcf754/scores.png" in err
+    assert (folder / f"{folder.name}_random_scores.png").read_bytes().startswith(b"\x89PNG")
+    assert f"picture {folder}/{folder.name}_random_scores.png" in err
 
 
 def test_compare_shows_values_differences_and_the_test(command):
@@ -43,12 +43,12 @@ def test_compare_shows_values_differences_and_the_test(command):
     assert out.splitlines()[1].split() == ["measure", "at", "better", "random", "crw"]
     for word in ("random - crw", "paired t test", "Holm", "adaptability, relative", "throttle 0.4"):
         assert word in out
-    assert Path("here/comparison.png").is_file()
+    assert list(Path("here").glob("*_random_crw_scores.png"))
 
 
 def test_sizes_keep_a_density_if_asked(command):
-    words = ("--robots", "20", "--density", "5%", "--measures", "raw_performance")
-    code, _, _ = command("score", "--policy", "random", "--jobs", "1", "--budget", "tiny", *words)
+    words = ("--robots", "20", "--set", "density=0.05", "--measures", "raw_performance")
+    code, _, _ = command("score", "random", "--jobs", "1", "--budget", "tiny", *words)
     assert code == 0
     arenas = {
         (record.n_robots, RunSpec.from_json(record.spec).scenario.arena.width_m)
@@ -69,7 +69,7 @@ def test_json_is_the_only_thing_on_stdout(command):
     answer = json.loads(out)
     assert [table["policy"] for table in answer["tables"]] == ["random", "crw"]
     assert {difference["first"] for difference in answer["differences"]} == {"random"}
-    assert answer["picture"].endswith("comparison.png")
+    assert answer["picture"].endswith("_random_crw_scores.png")
 
 
 def test_a_dry_run_shows_the_experiments_and_runs_nothing(command):
@@ -90,34 +90,30 @@ def test_a_dry_run_shows_the_experiments_and_runs_nothing(command):
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
-        (("score",), "Expected a policy, by name or file"),
-        (("score", "crw", "--curves", "x.csv"), "Expected --curves without POLICY, which are about runs"),
-        (
-            ("score", "--curves", "x.csv", "--seeds", "3", "--dry-run"),
-            "Expected --curves without --dry-run, --seeds, which are about runs",
-        ),
-        (("score", "--policy", "crww"), "Unknown policy 'crww'. Did you mean 'crw'?"),
-        (("score", "--policy", "gone.zip"), "Cannot read the policy file"),
-        (("score", "--policy", "bad.npz"), "Expected"),
-        (("score", "--policy", "crw", "--scenario", "warehouse"), "Unknown scenario 'warehouse'"),
-        (("score", "--policy", "crw", "--measures", "reactivty"), "Did you mean 'reactivity'?"),
-        (("score", "--policy", "crw", "--measures", ","), "Expected one or more names"),
-        (("score", "--policy", "crw", "--disturbance", "noise"), "one of throttle, handling_cost, got 'noise'"),
-        (("score", "--policy", "crw", "--variant", "papr"), "Unknown variant 'papr'. Did you mean 'paper'?"),
-        (("score", "--policy", "crw,dpo", "--form", "single"), "Unknown form 'single'"),
+        (("score",), "Expected policies to run, or a file with --curves"),
+        (("score", "crw", "--curves", "x.csv"), "Expected --curves alone"),
+        (("score", "crww"), "Unknown policy 'crww'. Did you mean 'crw'?"),
+        (("score", "gone.zip"), "Cannot read the policy file"),
+        (("score", "bad.npz"), "Expected"),
+        (("score", "crw", "--scenario", "warehouse"), "Unknown scenario 'warehouse'"),
+        (("score", "crw", "--measures", "reactivty"), "Did you mean 'reactivity'?"),
+        (("score", "crw", "--measures", ","), "Expected one or more names"),
+        (("score", "crw", "--disturbance", "noise"), "one of throttle, handling_cost, got 'noise'"),
+        (("score", "crw", "--variant", "papr"), "Unknown variant 'papr'. Did you mean 'paper'?"),
+        (("score", "crw,dpo", "--form", "single"), "Unknown form 'single'"),
         (("score", "--curves", "curves.csv", "--form", "single"), "Unknown form 'single'"),
-        (("score", "--policy", "crw", "--budget", "huge"), "Unknown budget 'huge'"),
-        (("score", "--policy", "crw", "--performance", "n_carying"), "Did you mean 'n_carrying'?"),
-        (("score", "--policy", "crw,dpo", "--set", "performance=colected"), "Did you mean 'collected'?"),
+        (("score", "crw", "--budget", "huge"), "Unknown budget 'huge'"),
+        (("score", "crw", "--performance", "n_carying"), "Did you mean 'n_carrying'?"),
+        (("score", "crw,dpo", "--set", "performance=colected"), "Did you mean 'collected'?"),
         (
             ("score", "--curves", "curves.csv", "--performance", "x"),
             "Expected a column x for performance in curves.csv",
         ),
-        (("score", "--policy", "crw", "--seeds", "0"), "seeds"),
-        (("score", "--policy", "crw", "--horizon", "150"), "whole number of intervals"),
-        (("score", "--policy", "crw", "--robots", "1"), "at least 2 robots"),
-        (("score", "--policy", "crw", "--set", "interval_s=2"), "which the budget sets"),
-        (("score", "--policy", "crw,dpoo"), "Unknown policy 'dpoo'"),
+        (("score", "crw", "--seeds", "0"), "seeds"),
+        (("score", "crw", "--horizon", "150"), "whole number of intervals"),
+        (("score", "crw", "--robots", "1"), "at least 2 robots"),
+        (("score", "crw", "--set", "interval_s=2"), "which the budget sets"),
+        (("score", "crw,dpoo"), "Unknown policy 'dpoo'"),
         (("score", "--curves", "gone.csv"), "Cannot read gone.csv: No such file"),
         (("score", "--curves", "curves.csv", "--measures", "scalability"), "Expected the columns seed, interval"),
     ],

@@ -9,38 +9,42 @@ from contextlib import suppress
 
 import pytest
 
-from swarm_forage_env.cli import signals
-from tests.support.console import answer, heard
+from swarm_forage_env import cli
+from tests.support.console import answer
 
 TOLD = "swarm-forage: Interrupted. Unfinished work is not kept; run the same command to start again.\n"
-RUN = ("run", "--policy", "crw", "--robots", "2", "--objects", "10", "--horizon", "4", "--set", "interval_s=2")
+RUN = ("run", "crw", "--robots", "2", "--set", "n_objects=10", "--horizon", "4", "--set", "interval_s=2")
 HEARS = """
 import sys
 from swarm_forage_env import cli
-from swarm_forage_env.cli import signals
 
 def hear():
     usual()
     print("heard", file=sys.stderr, flush=True)
 
-usual, signals.hear = signals.hear, hear
+usual, cli.hear = cli.hear, hear
 cli.main()
 """
 """Says when the command has begun to hear: before, Python itself answers."""
 
 
-COMMANDS = (RUN, ("list",), ("study", "list"))
-DELAYS_S = (0.0, 0.05, 0.4)
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
-GIVEN = [
-    pytest.param(words, after_s, SIGNALS[(i + j) % 2], id=f"{words[0]}-{after_s}-{SIGNALS[(i + j) % 2].name}")
-    for i, words in enumerate(COMMANDS)
-    for j, after_s in enumerate(DELAYS_S)
-]
-"""Each command and each delay meets both signals; `scripts/fuzz signals` gives as many as fit into a time."""
+@pytest.fixture
+def heard():
+    """Signals are heard as the command hears them."""
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    hook = sys.unraisablehook
+    cli.hear()
+    yield
+    cli.came.clear()
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+    sys.unraisablehook = hook
 
 
-@pytest.mark.parametrize(("words", "after_s", "sent"), GIVEN)
+@pytest.mark.parametrize(("words", "after_s", "sent"), [
+    (RUN, 0.0, signal.SIGINT), (RUN, 0.4, signal.SIGTERM), (("list",), 0.05, signal.SIGTERM),
+    (("study", "list"), 0.4, signal.SIGINT),
+])  # fmt: skip
 def test_a_signal_ends_a_command_in_one_line(tmp_path, words, after_s, sent):
     with subprocess.Popen([sys.executable, "-c", HEARS, *words], cwd=tmp_path, text=True, stdout=subprocess.PIPE,
                           stderr=subprocess.PIPE) as started:  # fmt: skip
@@ -57,18 +61,18 @@ def test_a_signal_ends_a_command_in_one_line(tmp_path, words, after_s, sent):
         assert [line[:25] for line in err.splitlines() if "nterrupt" in line] == ["swarm-forage: Interrupted"], err
 
 
-def test_what_a_library_swallows_is_raised_again(monkeypatch, capsys):
+def test_what_a_library_swallows_is_raised_again(heard, monkeypatch, capsys):
     def careless(_):
         with suppress(BaseException):  # as some libraries do around imports
             os.kill(os.getpid(), signal.SIGTERM)
         time.sleep(60)
 
     monkeypatch.setattr("swarm_forage_env.cli.app.carry_out", careless)
-    assert answer("list") == signals.EXIT_TERMINATED
+    assert answer("list") == cli.EXIT_TERMINATED
     assert capsys.readouterr().err == TOLD
 
 
-def test_what_an_interrupt_breaks_is_no_error_of_ours(monkeypatch, capsys):
+def test_what_an_interrupt_breaks_is_no_error_of_ours(heard, monkeypatch, capsys):
     def broken(_):
         try:
             os.kill(os.getpid(), signal.SIGINT)
@@ -76,33 +80,18 @@ def test_what_an_interrupt_breaks_is_no_error_of_ours(monkeypatch, capsys):
             raise ImportError("half a module") from None
 
     monkeypatch.setattr("swarm_forage_env.cli.app.carry_out", broken)
-    assert answer("list") == signals.EXIT_INTERRUPTED
+    assert answer("list") == cli.EXIT_INTERRUPTED
     assert capsys.readouterr().err == TOLD
 
 
-class HalfMade:
-    def __del__(self):
-        raise AttributeError("something that it never had")
-
-
-def test_what_an_interrupt_leaves_half_made_goes_without_a_word(monkeypatch):
-    shown = []
-    monkeypatch.setattr(sys, "unraisablehook", shown.append)
-    with heard():
-        HalfMade()
-        with suppress(KeyboardInterrupt):
-            os.kill(os.getpid(), signal.SIGINT)
-        HalfMade()
-    assert len(shown) == 1
-
-
-def test_whoever_keeps_something_is_left_in_peace():
-    with heard():
+def test_whoever_keeps_something_is_left_in_peace(heard):
+    try:
+        os.kill(os.getpid(), signal.SIGINT)
+    except KeyboardInterrupt:
         try:
-            os.kill(os.getpid(), signal.SIGINT)
-        except KeyboardInterrupt:
-            try:
-                raise ValueError("another error, while the interrupt is handled")
-            except ValueError:
-                time.sleep(3 * signals.AGAIN_S)
-        assert signals.came == [signal.SIGINT]
+            raise ValueError("another error, while the interrupt is handled")
+        except ValueError:
+            time.sleep(3 * cli.AGAIN_S)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+    assert cli.came == [signal.SIGINT]

@@ -73,7 +73,7 @@ def test_figures_are_drawn_with_their_numbers(ran):
 
 
 def test_figures_for_a_paper_have_its_width_and_no_headline(ran):
-    style = ("--format", "svg", "--width", "3.5", "--font-size", "8", "--no-title")
+    style = ("--format", "svg", "--width-in", "3.5", "--font-size", "8", "--no-title")
     assert ran("study", "plot", "done", "--out", "paper", *style)[0] == 0
     endings = {path.suffix for path in Path("paper").iterdir()}
     assert endings == {".svg", ".csv"}

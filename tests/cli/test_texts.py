@@ -41,13 +41,13 @@ SMALL = (
 )
 ROOM = f"--robots 6 {SMALL} --jobs 1"
 SECONDS = "--horizon 400 --set interval_s=100"
-RUN = f"run --policy crw,dpo --seeds 2 {ROOM} {SECONDS}"
-SCORE = f"score --policy crw --budget quick --seeds 2 --horizon 400 {ROOM}"
+RUN = f"run crw,dpo --seeds 2 {ROOM} {SECONDS}"
+SCORE = f"score crw --budget quick --seeds 2 --horizon 400 {ROOM}"
 FORMS = "--variant corrected,paper --form marginal,interactive --band --measures spatial_emergence,scalability"
 CURVES = "score --curves curves.csv"
-COMPARE = f"score --policy crw,dpo --budget quick --seeds 2 --horizon 400 {ROOM}"
+COMPARE = f"score crw,dpo --budget quick --seeds 2 --horizon 400 {ROOM}"
 STUDY = "study run S1a.toml --jobs 1 --out done"
-BENCHMARK = "benchmark --policy crw --name again --trained-in nothing --jobs 1"
+BENCHMARK = "benchmark crw --name again --trained-in nothing --jobs 1"
 
 CASES = {
     "run.txt": RUN,

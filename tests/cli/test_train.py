@@ -4,6 +4,7 @@ import builtins
 import json
 import re
 import sys
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -11,16 +12,16 @@ import pytest
 
 from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.cli import training_report
-from swarm_forage_env.cli.options import WorldOptions
-from swarm_forage_env.cli.train import RecipeOptions
 from swarm_forage_env.training.evaluation_plan import EvaluationPlan
 from swarm_forage_env.training.evaluations import Evaluation, write_evaluations
-from swarm_forage_env.training.plan import read_plan
+from swarm_forage_env.training.plan import named_plan, read_plan
 from swarm_forage_env.training.recipe import recipe
 
 TRUSTING = ("--trust-models", "train")
-TINY = ("--robots", "4", "--objects", "20", "--steps", "128", "--arenas", "2", "--arg", "n_steps=16", "--arg",
-        "batch_size=64", "--small-start", "--evaluate-every", "128", "--evaluation-horizon", "200")  # fmt: skip
+SETTINGS = ("n_objects=20", "n_arenas=2", "options.n_steps=16", "options.batch_size=64", "small_start=true",
+            "evaluation.every_steps=128", "evaluation.horizon_s=200")  # fmt: skip
+ELSE = ("--robots", "4", *(word for setting in SETTINGS for word in ("--set", setting)))
+TINY = (*ELSE, "--steps", "128")
 
 
 needs_training = pytest.mark.skipif(
@@ -29,14 +30,11 @@ needs_training = pytest.mark.skipif(
 
 
 @needs_training
-def test_trains_shows_evaluations_and_goes_on(command, painted, monkeypatch):
-    monkeypatch.setattr(training_report, "LINE_EVERY_S", 0.0)
+def test_trains_shows_evaluations_and_goes_on(command, painted):
     words = ("train", *TINY, "--set", "nest_progress=0.07")
     code, _, err = command(*words)
     assert code == 0, err
     assert "Evaluated in 1 run of 200 s:" in err
-    assert err.count("At least 128 decisions; a line about every minute says how many are done.") == 1
-    assert re.search(r"^128 of 128 decisions, no episode has ended, about \d+ s left$", err, re.MULTILINE)
     folder = Path("results/training/warehouse_small_ppo")
     assert "decisions  per 1,000 s" in err
     assert str(folder / "policy.npz") in err
@@ -55,7 +53,7 @@ def test_trains_shows_evaluations_and_goes_on(command, painted, monkeypatch):
     assert "This training was finished: 128 of 128 decisions" in err
 
     both = f"{folder / 'policy.npz'},{folder / 'model.zip'}"
-    code, out, _ = command("run", "--policy", both, "--robots", "3", "--objects", "20", "--horizon", "4", "--set",
+    code, out, _ = command("run", both, "--robots", "3", "--set", "n_objects=20", "--horizon", "4", "--set",
                            "interval_s=2", "--jobs", "1", "--json")  # fmt: skip
     assert code == 0
     assert len(json.loads(out)["runs"]) == 2
@@ -79,9 +77,9 @@ def test_a_training_is_resumed_by_its_folder_alone(command):
     assert (code, "at least the 256 steps" in err) == (2, True)
 
     # The same options divide 384 steps into other stages; those that began stay.
-    assert command(*TRUSTING, *TINY, "--steps", "384", "--out", "a", "--resume")[0] == 0
+    assert command(*TRUSTING, *ELSE, "--steps", "384", "--out", "a", "--resume")[0] == 0
     assert read_plan(Path("a/plan.json")) == begun.longer(384)
-    code, _, err = command(*TRUSTING, *TINY, "--steps", "400", "--seed", "3", "--out", "a", "--resume")
+    code, _, err = command(*TRUSTING, *ELSE, "--steps", "400", "--seed", "3", "--out", "a", "--resume")
     assert (code, len(err.splitlines())) == (2, 1)
     assert "got others: seed: 0 before, 3 now. Without options" in err
 
@@ -148,47 +146,30 @@ def test_a_callback_of_the_user_runs_beside_the_training_and_can_end_it(command)
     assert "allback" not in Path("stopped/plan.json").read_text()  # a plan from elsewhere can name no code
 
 
-def test_words_are_arguments_of_the_recipe(tmp_path):
-    path = tmp_path / "world.toml"
-    path.write_text("[set]\nn_robots = 7\nnest_progress = 0.0\n[wrappers.sensor_noise]\nsigma = 0.01\n")
-    words = WorldOptions(
-        scenario=str(path),
-        objects=60,
-        horizon=400.0,
-        settings=("first_pickup=0.5", "caches=static"),
-        wrappers=("actuator_noise:sigma=0.1",),
+def planned(monkeypatch, command, *words):
+    """The plan that words of the command describe; nothing is trained."""
+    plans = []
+    monkeypatch.setattr(training_report, "run_training", lambda plan, folder, **_: plans.append(plan))
+    assert command("train", *words)[0] == 0
+    return plans[0]
+
+
+def test_words_are_arguments_of_the_recipe(command, monkeypatch):
+    Path("world.toml").write_text("[set]\nn_robots = 7\nnest_progress = 0.0\n[wrappers.sensor_noise]\nsigma = 0.01\n")
+    words = "--scenario world.toml --horizon 400 --wrapper actuator_noise:sigma=0.1 --algo sac --steps 300 --seed 4"
+    settings = (
+        "n_objects=60 first_pickup=0.5 caches=static n_arenas=3 interface.observation=full samples=false hidden=128,32 "
+        "interface.decision_ticks=2 evaluation.every_steps=50 evaluation.horizon_s=200 small_start=false "
+        "activation=tanh options.batch_size=8 options.gamma=0.9"
     )
-    options = {
-        "algorithm": "sac",
-        "steps": 300,
-        "arenas": 3,
-        "seed": 4,
-        "observation": "full",
-        "automatic_gripper": False,
-        "decision_ticks": 2,
-        "site_memory": False,
-        "frame_decisions": 30,
-        "samples": False,
-        "evaluate_every": 50,
-        "evaluation_horizon": 200.0,
-        "small_start": False,
-        "hidden": "128,32",
-        "activation": "tanh",
-        "arguments": ("batch_size=8", "gamma=0.9"),
-    }
-    assert RecipeOptions(**options).plan(words) == recipe(
+    each = (word for setting in settings.split() for word in ("--set", setting))
+    assert planned(monkeypatch, command, *words.split(), *each) == recipe(
         "warehouse_small",
         algorithm="sac",
         steps=300,
         n_arenas=3,
         seed=4,
-        interface={
-            "observation": "full",
-            "automatic_gripper": False,
-            "decision_ticks": 2,
-            "site_memory": False,
-            "frame_decisions": 30,
-        },
+        interface={"observation": "full", "decision_ticks": 2},
         samples=False,
         wrappers=["actuator_noise:sigma=0.1", "sensor_noise:sigma=0.01"],
         evaluation=EvaluationPlan(every_steps=50, horizon_s=200.0),
@@ -203,3 +184,26 @@ def test_words_are_arguments_of_the_recipe(tmp_path):
         nest_progress=0.0,
         horizon_s=400.0,
     )
+
+
+def test_fields_of_a_plan_are_set_by_name(command, monkeypatch):
+    settings = ("n_arenas=2", "hidden=32,16", "options.learning_rate=0.01", "evaluation.n_runs=2")
+    each = (word for setting in settings for word in ("--set", setting))
+    plan = planned(monkeypatch, command, "--plan", "ppo_warehouse_small", "--seed", "3", *each)
+    shipped = named_plan("ppo_warehouse_small")
+    assert plan == replace(
+        shipped,
+        seed=3,
+        n_arenas=2,
+        hidden=(32, 16),
+        options={**shipped.options, "learning_rate": 0.01},
+        evaluation=replace(shipped.evaluation, n_runs=2),
+    )
+    for words, told in (
+        (("--set", "n_arenass=2"), "Did you mean 'n_arenas'"),
+        (("--set", "interfac.observation=full"), "Did you mean 'interface.observation'"),
+        (("--robots", "3"), "Expected --plan without a world"),
+    ):
+        code, _, err = command("train", "--plan", "ppo_warehouse_small", *words)
+        assert (code, err.count("\n")) == (2, 1)
+        assert told in err

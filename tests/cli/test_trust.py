@@ -14,7 +14,7 @@ from swarm_forage_env.runs.store import RunFailure, RunStore
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.world import World
 
-TINY = ("--robots", "2", "--objects", "10", "--horizon", "200")
+TINY = ("--robots", "2", "--set", "n_objects=10", "--horizon", "200")
 NOTE = {"interface": {"observation": "compact"}, "caches": "static"}
 
 
@@ -43,7 +43,7 @@ def model(tmp_path):
 
 def test_a_typed_model_is_opened(command, model):
     pytest.importorskip("stable_baselines3")
-    assert command("run", "--policy", f"crw,{model.name}", *TINY)[0] == 2
+    assert command("run", f"crw,{model.name}", *TINY)[0] == 2
     assert Path("owned").exists()
 
 

@@ -22,12 +22,12 @@ from tests.support.console import answer
 from tests.support.small_files import small_file
 from tests.support.tiny_study import RANDOM, tiny_study
 
-SMALL = ("--robots", "2", "--objects", "10", "--horizon", "4", "--set", "interval_s=2")
+SMALL = ("--robots", "2", "--set", "n_objects=10", "--horizon", "4", "--set", "interval_s=2")
 SPEC = plan_run(scenario("warehouse_small", n_robots=2, n_objects=10, horizon_s=4.0, interval_s=2.0), "random")
 STUDY = tiny_study(policies=(RANDOM,), axes=(), reference=None)
 
 
-@pytest.mark.parametrize("command", ["train --steps 128 --arenas 1", "dataset --policy random"])
+@pytest.mark.parametrize("command", ["train --steps 128 --set n_arenas=1", "dataset random"])
 def test_who_needs_a_folder_alone_is_refused_in_one_line(command, tmp_path, capsys):
     pytest.importorskip("fcntl")
     if command.startswith("train") and find_spec("stable_baselines3") is None:
@@ -41,7 +41,7 @@ def test_who_needs_a_folder_alone_is_refused_in_one_line(command, tmp_path, caps
 
 
 def test_two_runs_into_one_folder_leave_what_one_leaves(tmp_path):
-    words = [sys.executable, "-m", "swarm_forage_env.cli", "run", "--policy", "random", *SMALL, "--seeds", "3"]
+    words = [sys.executable, "-m", "swarm_forage_env.cli", "run", "random", *SMALL, "--seeds", "3"]
     both = [
         subprocess.Popen([*words, "--jobs", "1", "--out", tmp_path / "both"], cwd=tmp_path, stdout=subprocess.DEVNULL)
         for _ in range(2)

@@ -8,7 +8,7 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.options import WorldOptions
-from swarm_forage_env.cli.scenario_options import plan_runs
+from swarm_forage_env.cli.worlds import plan_runs
 from swarm_forage_env.policies import model_files
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.model_files import file_digest

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.cli.scenario_options import parse_setting
+from swarm_forage_env.cli.worlds import parse_setting
 from swarm_forage_env.scenarios.obstacles import MAX_BOXES, blocked_cells, covered_area_m2, distances_m
 from swarm_forage_env.scenarios.presets import at_density, scenario
 from swarm_forage_env.wrappers.world import describe_file

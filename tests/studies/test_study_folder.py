@@ -174,7 +174,7 @@ def test_a_folder_without_a_study_is_refused(tmp_path):
 KILLED_RUN = """
 import sys, time
 sys.path.insert(0, sys.argv[2])
-from swarm_forage_env.cli.signals import hear
+from swarm_forage_env.cli import hear
 from swarm_forage_env.studies.study_folder import StudyFolder, run_study
 from swarm_forage_env.runs.store import RunStore
 from tests.support.tiny_study import tiny_study

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -112,7 +111,7 @@ def test_an_entry_names_its_track(protocol):
     with pytest.raises(BenchmarkError, match="Expected 2 trainings"):
         benchmark_question(["crw"], name="one", protocol=protocol, training=in_short)
     assert entry_command(["crw", "dpo"], "two", training=in_short) == (
-        "swarm-forage benchmark --policy crw --policy dpo --name two --trained-in given --track short --decisions 100"
+        "swarm-forage benchmark crw dpo --name two --trained-in given --track short --decisions 100"
     )
 
 
@@ -120,9 +119,8 @@ def test_a_file_with_its_whole_path_is_told_from_the_current_folder(tmp_path, mo
     """Another machine has other folders; words about the interface go on to fit."""
     monkeypatch.chdir(tmp_path)
     given = ("runs/a.npz", f"{tmp_path}/runs/a.npz", f"{tmp_path}/m.zip:decision_ticks=5", "dpo")
-    words = entry_command(given, "x").split()
-    told = [word for before, word in pairwise(words) if before == "--policy"]
-    assert told == ["runs/a.npz", "runs/a.npz", "m.zip:decision_ticks=5", "dpo"]
+    told = "runs/a.npz runs/a.npz m.zip:decision_ticks=5 dpo"
+    assert entry_command(given, "x") == f"swarm-forage benchmark {told} --name x"
 
 
 def test_one_network_in_two_files_is_no_two_trainings(protocol, tmp_path):
