@@ -45,12 +45,13 @@ ROOMS = {
 """Room -> its places; a file belongs to the first room that has it, and what no room has is "elsewhere"."""
 PAGES = "pages (js, css, html)"
 SURFACE = """
-from swarm_forage_env.cli.app import loaded
-from swarm_forage_env.cli.commands import COMMANDS
+from swarm_forage_env.cli.app import made
 import metrics, swarm_forage_env
-commands = [loaded(each) for group in COMMANDS.values() for each in group if each.place]
-shown = [one.opts[0] for each in commands for one in each.params if not getattr(one, "hidden", False)]
-options = [word for word in shown if word.startswith("-") and word != "--help"]
+def below(app):
+    return [app, *(one for name in app if name[0] != "-" for one in below(app[name]))]
+commands = [app for app in below(made()) if app.default_command is not None]
+arguments = [one for app in commands for one in app.assemble_argument_collection() if not one.children]
+options = [one.names[0] for one in arguments if one.names[0].startswith("--")]
 print(len(commands), len(options), len(set(options)), len(swarm_forage_env.__all__) + len(metrics.__all__))
 """
 SURFACE_NAMES = ("commands", "options", "distinct names of options", "public names of the two packages")

@@ -36,7 +36,6 @@ def train(
     out: Path | None = None,
     jobs: Jobs = None,
     resume: bool = False,
-    callbacks: Annotated[tuple[str, ...], Parameter(name="--callback")] = (),
 ) -> int:
     """Train one policy that every robot shares, and compare it with a scripted controller meanwhile.
 
@@ -57,8 +56,6 @@ def train(
         seeds: Train so many seeds, from 0 or the plan's upwards, into --out/seed_0 and so on, and show a table.
         out: Folder of the training; default results/training/NAME.
         resume: Continue from the checkpoint in --out (needs --trust-models).
-        callbacks: MODULE:CLASS: your own callback of stable-baselines3, whose code runs during the training; may be
-            repeated.
     """
     from swarm_forage_env.cli.training_report import run_seeds, run_training
     from swarm_forage_env.training.evaluations import resumed_plan
@@ -78,10 +75,8 @@ def train(
         says_more = world != WorldOptions() or algo or seed is not None
         chosen = resumed_plan(folder, chosen if says_more else None, steps, is_shared=seeds is not None)
     if seeds is None:
-        return run_training(chosen, folder, resume=resume, callbacks=callbacks)
-    return run_seeds(
-        chosen, range(chosen.seed, chosen.seed + seeds), folder, jobs=jobs, resume=resume, callbacks=callbacks
-    )
+        return run_training(chosen, folder, resume=resume)
+    return run_seeds(chosen, range(chosen.seed, chosen.seed + seeds), folder, jobs=jobs, resume=resume)
 
 
 def _by_recipe(options: WorldOptions, algo: str | None, steps: int | None, seed: int | None) -> "TrainingPlan":

@@ -29,22 +29,20 @@ CURVES_FILE = "curves.png"
 _NOTHING_TO_SEE = "{} scores 0 in such short runs. Longer ones say more (--set evaluation.horizon_s=SECONDS)."
 
 
-def run_training(plan: TrainingPlan, folder: Path, *, resume: bool, callbacks: Sequence[str] = ()) -> int:
-    """Train, show how it goes, and say where the results are; `callbacks` as in `training.sb3.callbacks`.
+def run_training(plan: TrainingPlan, folder: Path, *, resume: bool) -> int:
+    """Train, show how it goes, and say where the results are.
 
     Raises:
         ImportError: stable-baselines3 is not installed.
-        ConfigError: see `training.sb3.training.train` and `training.sb3.callbacks.named_callbacks`.
+        ConfigError: see `training.sb3.training.train`.
         KeyboardInterrupt: Ctrl-C; its message says how to go on.
     """
-    from swarm_forage_env.training.sb3.callbacks import named_callbacks
     from swarm_forage_env.training.sb3.training import train
 
-    added = named_callbacks(callbacks)
     with bar(TimeElapsedColumn()) as shown:
         report = _Report(plan, [plan.seed], shown)
         try:
-            result = train(plan, folder, resume=resume, report=lambda news: report(plan.seed, news), callbacks=added)
+            result = train(plan, folder, resume=resume, report=lambda news: report(plan.seed, news))
         except KeyboardInterrupt:
             _draw(plan, folder)
             raise KeyboardInterrupt(_farewell(folder)) from None
@@ -80,7 +78,6 @@ def run_seeds(
     *,
     jobs: int | None,
     resume: bool,
-    callbacks: Sequence[str],
 ) -> int:
     """Train several seeds, show how all go, draw them and print a table; arguments as in `train_seeds`.
 
@@ -98,7 +95,7 @@ def run_seeds(
     with bar(TimeElapsedColumn()) as shown:
         report = _Report(plan, seeds, shown)
         try:
-            found = train_seeds(plan, seeds, folder, jobs=jobs, resume=resume, report=report, callbacks=callbacks)
+            found = train_seeds(plan, seeds, folder, jobs=jobs, resume=resume, report=report)
         except KeyboardInterrupt:
             if not (folder / PLAN_FILE).exists():
                 words = "Interrupted before there was anything to keep; the same command starts again."

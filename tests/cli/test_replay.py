@@ -3,8 +3,6 @@
 import shutil
 from pathlib import Path
 
-import pytest
-
 from swarm_forage_env.inspect.replay.files import read_replays
 from swarm_forage_env.policies import pretrained
 from swarm_forage_env.runs.record import RunRecord

@@ -2,7 +2,6 @@
 
 import builtins
 import json
-import re
 import sys
 from dataclasses import replace
 from importlib.util import find_spec
@@ -122,28 +121,6 @@ def test_ctrl_c_says_how_to_go_on(command, monkeypatch):
     assert f"To go on: swarm-forage --trust-models train --out {folder} --resume" in command("train", *TINY)[2]
     if find_spec("matplotlib"):
         assert (folder / "training.png").read_bytes().startswith(b"\x89PNG")
-
-
-CALLBACK = """
-from stable_baselines3.common.callbacks import BaseCallback
-
-class Stop(BaseCallback):
-    def _on_step(self):
-        print("seen", self.num_timesteps)
-        return self.num_timesteps < 64
-"""
-
-
-@needs_training
-def test_a_callback_of_the_user_runs_beside_the_training_and_can_end_it(command):
-    Path("my_callbacks.py").write_text(CALLBACK)
-    code, out, err = command("train", *TINY, "--callback", "my_callbacks:Stop", "--out", "stopped")
-    assert code == 0, err
-    assert [line.split()[0] for line in out.splitlines()] == ["seen"] * 8  # 8 robots decide in each step
-    assert out.splitlines()[-1] == "seen 64"
-    assert re.search(r"^\s+64 ", err, re.MULTILINE), err  # the last evaluation took place
-    assert Path("stopped/policy.npz").is_file()
-    assert "allback" not in Path("stopped/plan.json").read_text()  # a plan from elsewhere can name no code
 
 
 def planned(monkeypatch, command, *words):

@@ -5,7 +5,7 @@ import pytest
 from tests.support.frozen import FROZEN, batch_with_deaths, score_values, stored, training_weights, verdict_answers
 from tests.support.golden_runs import AS_THEN
 
-pytestmark = AS_THEN
+pytestmark = [*AS_THEN]
 
 
 def test_all_files_are_tested():

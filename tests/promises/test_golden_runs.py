@@ -13,7 +13,7 @@ CHANGED = (
     "Results have changed. If they were meant to: python -m tests.support.golden_runs and a line in the changelog."
 )
 
-pytestmark = AS_THEN
+pytestmark = [*AS_THEN]
 
 
 def test_every_run_has_a_fingerprint():
