@@ -42,7 +42,7 @@ def verify_entry(
     entry, protocol = read_entry(file), load_protocol()
     names = [policy.name for policy in entry.policies]
     if not policies and not set(names) <= set(POLICIES):
-        raise BenchmarkError(f"Expected --policy FILE for each of {', '.join(names)}, in this order, got none.")
+        raise BenchmarkError(f"Expected --policy FILE,... for each of {', '.join(names)}, in this order, got none.")
     specs = policy_specs(policies or names)
     if [policy_origin(spec.policy)[0] for spec in specs] != [policy.digest for policy in entry.policies]:
         raise BenchmarkError(f"Expected the policies of {file} in their order ({', '.join(names)}), got others.")

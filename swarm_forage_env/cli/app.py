@@ -7,7 +7,6 @@ import io
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
-from importlib.metadata import version
 
 from cyclopts import App, CycloptsError, Group, MissingArgumentError, Parameter
 
@@ -44,6 +43,12 @@ COMMANDS: dict[str, dict[str, tuple[str, str]]] = {
 """Heading in `--help` -> name -> place of the function, or of an app with commands below it, and what is said of it."""
 
 
+def _version() -> str:
+    from importlib.metadata import version  # slow to import and rarely asked for
+
+    return f"swarm-forage {version('swarm-forage-env')}"
+
+
 def made(words: Sequence[str] = ()) -> App:
     """Return the app; the commands that words name tell of themselves by their docstrings, not by a line."""
     names = [name for commands in COMMANDS.values() for name in commands]
@@ -52,7 +57,7 @@ def made(words: Sequence[str] = ()) -> App:
         help="Swarm foraging: run, film, train and score policies.\n\n'swarm-forage --trust-models COMMAND ...' opens "
         "models (.zip) and Python files (.py) that other files name, too: runs code (SECURITY.md).",
         help_format="markdown" if words and words[0] in names else "plaintext",  # markdown takes time
-        version=lambda: f"swarm-forage {version('swarm-forage-env')}",
+        version=_version,
         default_parameter=Parameter(negative_bool=(), negative_iterable=(), show_default=lambda value: value or None),
         print_error=False,
         exit_on_error=False,
@@ -64,6 +69,7 @@ def made(words: Sequence[str] = ()) -> App:
         for name, (place, about) in commands.items():
             line = None if name in words else about
             app.command(f"swarm_forage_env.cli.{place}", name=name, help=line, group=group)
+    app.register_install_completion_command(help="Let the shell complete commands and options.")
     return app
 
 

@@ -302,7 +302,7 @@ def _fitting_small_arena(scenario: ScenarioConfig) -> dict[str, Any]:
     if scenario.objects.object_positions_m:
         raise ConfigError(
             "Expected no object_positions_m where a training begins in a smaller arena (small_start), which may not "
-            "hold these places; train in the whole arena from the beginning: small_start=False (--no-small-start)."
+            "hold these places; train in the whole arena from the start: small_start=False (--set small_start=false)."
         )
     small = small_arena(scenario)
     try:
@@ -310,7 +310,7 @@ def _fitting_small_arena(scenario: ScenarioConfig) -> dict[str, Any]:
     except ConfigError as error:
         raise ConfigError(
             f"Cannot begin in a smaller arena (small_start) of {small['width_m']} x {small['height_m']} m: {error} "
-            "Or train in the whole arena from the beginning: small_start=False (--no-small-start)."
+            "Or train in the whole arena from the beginning: small_start=False (--set small_start=false)."
         ) from error
     return small
 

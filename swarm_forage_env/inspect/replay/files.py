@@ -282,7 +282,7 @@ def _replays_of(header: dict[str, Any], blocks: list[bytes]) -> tuple[Replay, ..
     if in_all > MOST_BYTES:
         raise ReplayError(
             f"Expected arrays of at most {MOST_BYTES:,} bytes in all, got {in_all:,}; write the replay with fewer "
-            "frames (--frame, --seconds)."
+            "frames (frame_s, or --seconds)."
         )
     return tuple(_replay_of(run, spec, block) for run, spec, block in zip(runs, specs, blocks, strict=True))
 

@@ -234,7 +234,7 @@ def _check_learns(plan: TrainingPlan) -> None:
             return
     raise ConfigError(
         f"Expected more steps than the {starts:,} after which {plan.algorithm} begins to learn (learning_starts), "
-        f"got {done:,}; give more, or a smaller learning_starts (--arg learning_starts=NUMBER)."
+        f"got {done:,}; give more, or a smaller learning_starts (--set options.learning_starts=NUMBER)."
     )
 
 

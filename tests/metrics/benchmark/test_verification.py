@@ -57,5 +57,5 @@ def test_policies_must_be_those_of_the_entry(entry, tmp_path):
         with pytest.raises(BenchmarkError, match=r"Expected the policies of .* \(crw, random\), got others"):
             verify_entry(tmp_path / "two.json", policies)
     made_up_entry(load_protocol(TINY), "mine", lambda k: 1.0).write(tmp_path / "mine.json")
-    with pytest.raises(BenchmarkError, match=r"Expected --policy FILE for each of mine_0.npz"):
+    with pytest.raises(BenchmarkError, match=r"Expected --policy FILE,... for each of mine_0.npz"):
         verify_entry(tmp_path / "mine.json")
