@@ -195,7 +195,7 @@ def test_outcomes_come_in_the_order_of_their_specifications(tmp_path):
 def test_a_failed_run_says_why_and_how_to_run_it_again(tmp_path):
     store = RunStore(tmp_path)
     (failure,) = run_specs([UNKNOWN], store=store).failures.values()
-    assert failure.error.startswith("ValueError: Unknown policy 'nobody'")
+    assert failure.error.startswith("ConfigError: Unknown policy 'nobody'")
     assert "load_policy" in failure.traceback
     assert store.failures() == (failure,)
 
@@ -390,7 +390,7 @@ def test_local_processes_give_the_same_records(tmp_path):
     in_process = run_specs(SPECS, jobs=1)
     assert same(pooled.records, in_process.records)
     (failure,) = pooled.failures.values()
-    assert failure.error.startswith("ValueError: Unknown policy '")
+    assert failure.error.startswith("ConfigError: Unknown policy '")
     assert "load_policy" in failure.traceback
 
 
