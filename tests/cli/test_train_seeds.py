@@ -30,7 +30,7 @@ def calls(monkeypatch):
     """Trainings are made in no time; returns their seeds, and whether they were resumed. Seed 3 fails."""
     found = []
 
-    def train(plan, folder, *, resume, report, **_):
+    def train(plan, folder, *, resume, report):
         found.append((plan.seed, resume))
         report(TrainingStatus(steps=64, wall_time_s=1.0, episode_return=2.0 + plan.seed))
         folder.mkdir(parents=True, exist_ok=True)

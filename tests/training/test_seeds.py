@@ -73,7 +73,7 @@ def fake(monkeypatch, *, fails=()) -> list[tuple[int, bool]]:
     """Trainings are made in no time, or fail; returns seeds, and whether they were resumed."""
     calls: list[tuple[int, bool]] = []
 
-    def train(plan, folder, *, resume, report, callbacks):
+    def train(plan, folder, *, resume, report):
         calls.append((plan.seed, resume))
         if plan.seed in fails:
             raise MemoryError("too large")
@@ -154,8 +154,6 @@ def test_what_cannot_begin_is_refused_before_anything_is_trained(tmp_path, monke
     )
     with pytest.raises(ConfigError, match="more steps than the 150 after which"):
         train_seeds(late, range(2), tmp_path)
-    with pytest.raises(ConfigError, match="No module named 'nothing'"):
-        train_seeds(PLAN, range(2), tmp_path, callbacks=["nothing:Mine"])
     assert not list(tmp_path.iterdir())
     made(tmp_path, 1, {64: 4.0})
     with pytest.raises(ConfigError, match=r"an unused folder, got .*seed_1 with a training run; resume it"):

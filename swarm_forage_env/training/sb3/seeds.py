@@ -33,7 +33,6 @@ from swarm_forage_env.runs.workers import (
 )
 from swarm_forage_env.training.evaluations import MODEL_FILE, PLAN_FILE, Evaluation, TrainingStatus
 from swarm_forage_env.training.plan import TrainingPlan, read_plan
-from swarm_forage_env.training.sb3.callbacks import check_callbacks, named_callbacks
 from swarm_forage_env.training.sb3.training import check_place, check_plan, train
 from swarm_forage_env.training.seeds import SeedTrainings, TrainingFailure, is_finished, read_seeds, seed_folder
 
@@ -51,7 +50,6 @@ class _Job(NamedTuple):
     plan: TrainingPlan
     folder: Path
     resume: bool
-    callbacks: tuple[str, ...]
 
 
 def train_seeds(
@@ -62,7 +60,6 @@ def train_seeds(
     jobs: int | None = None,
     resume: bool = False,
     report: SeedReport | None = None,
-    callbacks: Sequence[str] = (),
 ) -> SeedTrainings:
     """Train one plan with several seeds, each as `train` does.
 
@@ -76,7 +73,6 @@ def train_seeds(
             after the other. A script must start processes under `if __name__ == "__main__":`.
         resume: Leave finished trainings as they are, go on with others from their checkpoints, and begin the rest.
         report: Told the seed with the status of its training about once a second, every evaluation, and failures.
-        callbacks: Names of further callbacks, as `training.sb3.callbacks.named_callbacks` takes them.
 
     Raises:
         ConfigError: jobs below 1; no seeds, or equal ones; what `train` refuses before it begins, for any of the seeds;
@@ -88,7 +84,6 @@ def train_seeds(
     if len(set(seeds)) < len(seeds):
         raise ConfigError(f"Expected different seeds, got {', '.join(map(str, seeds))}.")
     check_plan(plan)
-    check_callbacks(callbacks)
     check_folder(folder)
     failures: dict[int, str] = {}
 
@@ -100,7 +95,7 @@ def train_seeds(
 
     with alone_in(folder, ConfigError):
         _check_shared(folder, plan)
-        todo = _todo(plan, seeds, folder, resume, tuple(callbacks))
+        todo = _todo(plan, seeds, folder, resume)
         plan.write(folder / PLAN_FILE)
         n_processes = processes_of(len(todo), jobs)
         if n_processes == 1:
@@ -129,13 +124,11 @@ def _check_shared(folder: Path, plan: TrainingPlan) -> None:
             )
 
 
-def _todo(
-    plan: TrainingPlan, seeds: Sequence[int], folder: Path, resume: bool, callbacks: tuple[str, ...]
-) -> list[_Job]:
+def _todo(plan: TrainingPlan, seeds: Sequence[int], folder: Path, resume: bool) -> list[_Job]:
     """Return the trainings that are not finished; raises ConfigError if one of them cannot begin."""
     todo: list[_Job] = []
     for seed in seeds:
-        job = _Job(replace(plan, seed=seed), seed_folder(folder, seed), resume, callbacks)
+        job = _Job(replace(plan, seed=seed), seed_folder(folder, seed), resume)
         if resume and not (job.folder / MODEL_FILE).exists():  # it had nothing to keep yet
             job = job._replace(resume=False)
         check_place(job.folder, job.plan, resume=job.resume)
@@ -150,7 +143,7 @@ def _todo(
 def _train(job: _Job, report: _JobReport) -> None:
     """Train, and report a failure instead of raising it."""
     try:
-        train(job.plan, job.folder, resume=job.resume, report=report, callbacks=named_callbacks(job.callbacks))
+        train(job.plan, job.folder, resume=job.resume, report=report)
     except Exception as error:  # noqa: BLE001 - whatever a training raises is its failure
         report(TrainingFailure(" ".join(str(error).split()) if isinstance(error, ConfigError) else in_words(error)))
 
