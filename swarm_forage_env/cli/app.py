@@ -49,6 +49,11 @@ def _version() -> str:
     return f"swarm-forage {version('swarm-forage-env')}"
 
 
+def _shown(default: object) -> object:
+    """Return a default as a user would type it, None where help leaves it out."""
+    return (",".join(default) if isinstance(default, tuple) else default) or None
+
+
 def made(words: Sequence[str] = ()) -> App:
     """Return the app; the commands that words name tell of themselves by their docstrings, not by a line."""
     names = [name for commands in COMMANDS.values() for name in commands]
@@ -58,7 +63,7 @@ def made(words: Sequence[str] = ()) -> App:
         "models (.zip) and Python files (.py) that other files name, too: runs code (SECURITY.md).",
         help_format="markdown" if words and words[0] in names else "plaintext",  # markdown takes time
         version=_version,
-        default_parameter=Parameter(negative_bool=(), negative_iterable=(), show_default=lambda value: value or None),
+        default_parameter=Parameter(negative_bool=(), negative_iterable=(), show_default=_shown),
         print_error=False,
         exit_on_error=False,
         suppress_keyboard_interrupt=False,

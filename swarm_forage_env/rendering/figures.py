@@ -59,7 +59,7 @@ class FigureStyle:
     """What differs between a screen and a paper."""
 
     width_in: float | None = None
-    """Width in inches, exactly; None = what the panels want. Heights follow, and long words are wrapped."""
+    """Width in inches, exactly; default what the panels want. Heights follow, and long words are wrapped."""
     font_size: float = 9.0
     """Size of texts in points."""
     title: bool = True
