@@ -9,7 +9,7 @@ from cyclopts.types import NonNegativeInt, PositiveInt
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli import EXIT_FAILURE
-from swarm_forage_env.cli.options import AsJson, DryRun, Jobs, Names, Picture, Policies
+from swarm_forage_env.cli.options import AsJson, Jobs, Names, Picture, Policies
 from swarm_forage_env.cli.printer import note, resumable, say
 
 if TYPE_CHECKING:
@@ -33,7 +33,6 @@ def run(
     track: str = "open",
     decisions: NonNegativeInt | None = None,
     jobs: Jobs = None,
-    dry_run: DryRun = False,
     as_json: AsJson = False,
 ) -> None:
     """Run policies in all worlds of the benchmark, write one entry file, and show its score.
@@ -61,15 +60,11 @@ def run(
     from metrics.scoring.question import ask
     from swarm_forage_env._internal.files import as_file_name, check_file
     from swarm_forage_env.policies.registry import policy_label
-    from swarm_forage_env.runs.plan_summary import summarize_plan
 
     protocol = load_protocol(quick=quick)
     called = name or f"{policy_label(first)}{', quick' if quick else ''}"
     training = Training(worlds=trained_in, command=training_command, track=track, decisions=decisions)
     question = benchmark_question([*policies], name=called, protocol=protocol, training=training)
-    if dry_run:
-        say(summarize_plan(question.plan, out=out))
-        return
     entry_file = None if quick else file or FOLDER / f"{as_file_name(called)}.json"
     if entry_file is not None:
         check_file(entry_file)

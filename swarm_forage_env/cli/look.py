@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
-from cyclopts.types import PositiveFloat
 
 from swarm_forage_env.cli.options import AsJson, Jobs, Picture, Policies, Policy, Seed, Seeds, WorldOptions
 from swarm_forage_env.cli.printer import note, progress_bar, say, show
@@ -180,7 +179,6 @@ def maps(
     *,
     world: WorldOptions = WorldOptions(),
     seeds: Seeds = 1,
-    square: PositiveFloat = 0.4,
     jobs: Jobs = None,
     picture: Picture = None,
 ) -> None:
@@ -188,9 +186,6 @@ def maps(
 
     The picture has one row per policy. Further rows show the difference of each from the first. The arrays go to .npz
     files beside the picture.
-
-    Args:
-        square: Side of the squares in m.
     """
     from swarm_forage_env.cli.worlds import RESULTS, default_file, plan_runs
     from swarm_forage_env.inspect.maps import maps_of_runs
@@ -200,7 +195,7 @@ def maps(
     file = picture or default_file(RESULTS, specs[0].world, policies, "_maps.png")
     check_picture(file)
     with progress_bar("runs", sum(spec.robot_ticks for spec in specs)) as advance:
-        found = maps_of_runs(specs, side_m=square, jobs=jobs, advance=advance)
+        found = maps_of_runs(specs, jobs=jobs, advance=advance)
     try:
         found.write(file)
     except ImportError as error:

@@ -35,6 +35,9 @@ Policies = Annotated[
     ),
 ]
 Policy = Annotated[str, Parameter(help="Name, file of a trained policy, or class in a Python file.")]
+Scenario = Annotated[
+    str, Parameter(help="A preset (see 'swarm-forage list'), or a .toml file with fields and wrappers.")
+]
 Seeds = Annotated[
     int, Parameter(help="Runs of each policy, with seeds from 0.", validator=Number(gte=1, lte=MOST_SEEDS))
 ]
@@ -61,9 +64,7 @@ Style = Annotated[FigureStyle, Parameter(name="*", negative_bool="no-")]
 class WorldOptions:
     """Options that describe a world; None = the scenario's own value."""
 
-    scenario: Annotated[
-        str, Parameter(help="A preset (see 'swarm-forage list'), or a .toml file with fields and wrappers.")
-    ] = "warehouse_small"
+    scenario: Scenario = "warehouse_small"
     robots: Annotated[PositiveInt | None, Parameter(help="Number of robots.")] = None
     horizon: Annotated[float | None, Parameter(help="Simulated seconds per run, a multiple of 200.")] = None
     settings: Annotated[

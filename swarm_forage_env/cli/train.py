@@ -11,7 +11,7 @@ from cyclopts.types import NonNegativeInt, PositiveInt
 
 from swarm_forage_env._internal.fields import ConfigError, as_tuples
 from swarm_forage_env.cli import CommandError
-from swarm_forage_env.cli.options import AsJson, Jobs, Names, Picture, Policy, Seeds, WorldOptions
+from swarm_forage_env.cli.options import AsJson, Jobs, Names, Picture, Policy, Scenario, Seeds, WorldOptions
 from swarm_forage_env.cli.printer import progress_bar, say
 
 if TYPE_CHECKING:
@@ -134,7 +134,6 @@ def curves(
         Names, Parameter(help="Policies to compare with, separated by commas, or none; default the paper's.")
     ] = (),
     picture: Picture = None,
-    jobs: Jobs = None,
     as_json: AsJson = False,
 ) -> None:
     """Draw the progress of trainings, with the scripted controllers on the same axes.
@@ -148,7 +147,7 @@ def curves(
     file = picture or folders[0] / PICTURE_FILE
     read_trainings(folders)  # refuses folders before it looks at the place of the picture
     check_picture(file)
-    found = curves_of(folders, beside=() if policy == ("none",) else policy or None, jobs=jobs)
+    found = curves_of(folders, beside=() if policy == ("none",) else policy or None)
     say(found.json() if as_json else found.text())
     try:
         found.draw(file)
@@ -204,16 +203,16 @@ def dataset(
         say(f"wrote the Minari data set {export_minari(folder, minari).spec.dataset_id}")
 
 
-def export(policy: Policy, /, *, file: Path, world: WorldOptions = WorldOptions()) -> None:
+def export(policy: Policy, /, *, file: Path, scenario: Scenario = "warehouse_small") -> None:
     """Write a network as a C header, or as ONNX, for robots and other simulators.
 
     The file says in words what goes in and what comes out; docs/export.md says what a robot must sense. The policy is a
-    shipped network, or an .npz file of a training. The world says how large the arena is.
+    shipped network, or an .npz file of a training. The scenario says how large the arena is.
 
     Args:
         file: File to write, .h (C99) or .onnx.
     """
-    from swarm_forage_env.cli.worlds import described_world
     from swarm_forage_env.training.export.exporting import export_policy
+    from swarm_forage_env.wrappers.world import world_of
 
-    say(f"wrote {export_policy(policy, file, described_world(world)[0].scenario)}")
+    say(f"wrote {export_policy(policy, file, world_of(scenario).scenario)}")

@@ -10,7 +10,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import as_file_name
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.cli.options import WorldOptions
-from swarm_forage_env.policies.registry import policy_label, split_interface
+from swarm_forage_env.policies.registry import policy_label
 from swarm_forage_env.runs.spec import RunSpec, plan_run
 from swarm_forage_env.scenarios.differences import digest_of, preset_of
 from swarm_forage_env.scenarios.overrides import field_types, parse_tuple
@@ -20,7 +20,8 @@ from swarm_forage_env.wrappers.world import FILE, World, WorldDescription, descr
 RESULTS = Path("results")
 LONGEST_NAME = 100
 """Of a file, in characters; the rest is a digest."""
-_FIELD = re.compile(r"[a-z_]+=[^/\\]*")
+_COMMA = re.compile(r",(?!\s*[a-z_]+=[^,/\\]*(?:,|$))")
+"""Between names; one before a word field=value is part of a name."""
 
 _EXAMPLES = {
     "further_nests": "boxes such as 20,4,24,12 (x low, y low, x high, y high in m)",
@@ -39,13 +40,7 @@ def split_names(text: str) -> tuple[str, ...]:
     Raises:
         ConfigError: there is no name in it.
     """
-    words: list[str] = []
-    for word in filter(None, map(str.strip, text.split(","))):
-        if words and split_interface(words[-1])[1] and _FIELD.fullmatch(word):
-            words[-1] += f",{word}"
-        else:
-            words.append(word)
-    names = tuple(dict.fromkeys(words))
+    names = tuple(dict.fromkeys(filter(None, map(str.strip, _COMMA.split(text)))))
     if not names:
         raise ConfigError(f"Expected one or more names separated by commas, got {text!r}.")
     return names

@@ -77,26 +77,16 @@ def test_a_dry_run_plans_and_touches_nothing(command):
 
 
 def test_set_changes_any_field_with_its_type(command):
-    words = (
-        "--set",
-        "team=true",
-        "--set",
-        "nest_size_m=2,4",
-        "--set",
-        "walk_probability=0.5",
-        "--set",
-        "static_size=3",
-        "--set",
-        "name=depot",
-    )
-    _, out, _ = command(*RUN, *words, "--set", "physics_substeps=0.2,0.2,0.2,0.2,0.2", "--dry-run", "--json")
+    settings = "team=true nest_size_m=2,4 walk_probability=0.5 static_size=3 name=depot physics_substeps=0.5,0.5"
+    each = (word for setting in settings.split() for word in ("--set", setting))
+    _, out, _ = command(*RUN, *each, "--dry-run", "--json")
     world = json.loads(out)["runs"][0]["spec"]["scenario"]
     assert world["reward"]["team"] is True
     assert world["arena"]["nest_size_m"] == [2.0, 4.0]
     assert world["objects"]["walk_probability"] == 0.5
     assert world["cache"]["static_size"] == 3
     assert world["name"] == "depot"
-    assert world["physics_substeps"] == [0.2] * 5
+    assert world["physics_substeps"] == [0.5] * 2
 
 
 def test_a_density_chooses_the_arena(command):
@@ -213,11 +203,6 @@ def test_info_describes_a_network_by_its_name_or_file(command, name):
     assert re.search(r"stable-baselines3 +\d", out)
 
 
-def test_check_says_who_keeps_the_rules(command):
-    code, out, _ = command("check", "crw", "dpo", "--robots", "3", "--horizon", "200")
-    assert (code, out) == (0, "crw keeps the rules\ndpo keeps the rules\n")
-
-
 def test_list_names_everything(command):
     code, out, _ = command("list")
     assert code == 0
@@ -239,29 +224,16 @@ def test_list_names_everything(command):
         (("run", "crw", "--robot", "3"), "Unknown option: --robot. Did you mean --robots?"),
         (("list", "columns", "extra"), "Unused Tokens: ['extra']"),
         (("list", "colums"), "Did you mean 'columns'?"),
-        (("run", "extra"), "Unknown policy 'extra'"),
         (("run", "crw", "--seeds", "0"), 'Invalid value "0" for --seeds. Must be >= 1'),
         (("run", "crw", "--seeds", "many"), 'Invalid value for --seeds: unable to convert "many" into int'),
-        (("run", "crw", "--robots", "100000"), "Expected at most"),
         (("run", "crw", "--set", "n_objects=100000"), "Expected at most"),
-        (("run", "crw", "--horizon", "100"), "Expected a horizon of a whole number of intervals of 200 s, got 100 s"),
-        (("run", "crw", "--horizon", "-200"), "horizon_s to be a finite number > 0"),
-        (("run", "crw", "--set", "side_m=32"), "Expected side_m with search_and_rescue only"),
-        (("run", "crw", "--scenario", "search_and_rescue", "--set", "side_m=33"), "Expected side_m to be one of"),
-        (("run", "crw", "--set", "density=5"), "density (robots per m^2; 0.05 is 5 %)"),
         (
             ("run", "crw", "--set", "density=0.05", "--set", "width_m=64"),
             "either density, which chooses the arena",
         ),
-        (("run", "crw", "--set", "caches=foo"), "Expected caches to be one of none, static, dynamic, got 'foo'"),
         (("run", "crw", "--set", "n_robot=5"), "Unknown scenario field 'n_robot'. Did you mean 'n_robots'?"),
-        (("run", "crw", "--set", "quirks=PROGRAM"), "Unknown rules 'PROGRAM'. Did you mean 'AUTHORS_PROGRAM'?"),
         (("run", "crw", "--set", "n_robots"), "Expected --set key=value, got 'n_robots'"),
         (("run", "crw", "--set", "n_robots=x"), "Expected n_robots to be a whole number, got 'x'"),
-        (("run", "crw", "--set", "dt_s=fast"), "Expected dt_s to be a number, got 'fast'"),
-        (("run", "crw", "--set", "dt_s=nan"), "finite number"),
-        (("run", "crw", "--set", "width_m=1e9"), "at most 1,073,741,824 cells"),
-        (("run", "crw", "--set", "team=maybe"), "Expected team to be true or false, got 'maybe'"),
         (("run", "crw", "--set", "nest_size_m=1"), "Expected nest_size_m to be numbers separated by commas"),
         (("run", "crw", "--set", "n_robots=3", "--robots", "4"), "Expected n_robots once"),
         (("run", "crw", "--wrapper", "throtle:amplitude=1"), "Unknown wrapper 'throtle'. Did you mean 'throttle'?"),
@@ -272,7 +244,6 @@ def test_list_names_everything(command):
         (("record", "--file", "x.avi"), "to end in .gif or .mp4"),
         (("info", "crv"), "Did you mean 'crw'?"),
         (("record", "crv"), "Did you mean 'crw'?"),
-        (("record", *("--wrapper", "throttle:waveform=constant,amplitude=0.2") * 2), "each wrapper at most once"),
         (("rerun", "missing.parquet"), "Cannot read missing.parquet: No such file or directory"),
         (("rerun", "file"), "Cannot read file: it is no Parquet file or a damaged one"),
         (("rnu",), 'Unknown command "rnu". Did you mean "run"?'),

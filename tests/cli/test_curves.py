@@ -37,7 +37,7 @@ def test_trainings_are_drawn_beside_others(command, monkeypatch):
     pytest.importorskip("matplotlib")
     training("first")
     training("second", dataclasses.replace(PLAN, algorithm="a2c"), best=8.0)
-    words = ("train", "curves", "first", "second", "--policy", "random,crw", "--jobs", "1")
+    words = ("train", "curves", "first", "second", "--policy", "random,crw")
     code, out, _ = command(*words, "--picture", "both.png")
     assert code == 0
     rows = [re.split(r" {2,}", line) for line in out.splitlines()]

@@ -7,7 +7,7 @@ import pytest
 
 def test_maps_of_policies_need_no_page(command):
     pytest.importorskip("matplotlib")
-    words = ("--robots", "3", "--horizon", "4", "--set", "interval_s=2", "--seeds", "2", "--square", "1")
+    words = ("--robots", "3", "--horizon", "4", "--set", "interval_s=2", "--seeds", "2")
     code, out, err = command("maps", "random", "crw", *words)
     assert (code, err) == (0, "")
     name = "warehouse_small_3_robots_4_s_20cdbe_random_crw_maps"
