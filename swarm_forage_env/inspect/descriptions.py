@@ -3,7 +3,8 @@
 import dataclasses
 import inspect
 import re
-from collections.abc import Callable, Iterable, Iterator
+import textwrap
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,6 @@ from typing import Any
 from swarm_forage_env._internal.fields import ConfigError, known_name
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.policy import SwarmSpec
-from swarm_forage_env.inspect.networks import in_words, network_lines
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.pretrained import network_file
@@ -24,6 +24,9 @@ from swarm_forage_env.scenarios import presets
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.wrappers.registry import WRAPPERS, wrapper_config_class
 from swarm_forage_env.wrappers.world import FILE, read_world
+
+_MOST_LETTERS = 160
+"""Of an entry of a network's card."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -200,7 +203,32 @@ def _file_lines(file: Path) -> Iterator[str]:
         network = Network.load(file)
     except ValueError as error:
         raise ConfigError(str(error)) from error
-    yield from network_lines(file, network)
+    yield from _network_lines(file, network)
+
+
+def _network_lines(file: Path, network: Network) -> Iterator[str]:
+    """The lines about a network file; its card may hold anything, and long entries are cut."""
+    about = network.about
+    sizes = [len(network.weights[0]), *(weight.shape[1] for weight in network.weights)]
+    yield f"{file}: a network of {' x '.join(map(str, sizes))} units ({about.activation})"
+    for part, values in {
+        "interface": {**dataclasses.asdict(about.interface), "samples": about.samples, "caches": about.caches},
+        **about.card,
+    }.items():
+        yield ""
+        yield f"  [{part}]"
+        for name, value in values.items() if isinstance(values, Mapping) else (("", values),):
+            yield f"    {name:<24}{textwrap.shorten(in_words(value), _MOST_LETTERS, placeholder=' ...')}".rstrip()
+
+
+def in_words(value: Any) -> str:
+    """Return a value as readers like it: sizes as "4 x 6", fields after their names."""
+    if isinstance(value, Mapping):
+        return ", ".join(f"{name} {in_words(inner)}" for name, inner in value.items())
+    if isinstance(value, tuple | list):
+        is_size = all(isinstance(part, int | float) for part in value)
+        return " x ".join(f"{part:g}" for part in value) if is_size else ", ".join(map(in_words, value))
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _first_paragraph(documented: Any) -> str:
