@@ -228,7 +228,7 @@ def in_words(value: Any) -> str:
     if isinstance(value, tuple | list):
         is_size = all(isinstance(part, int | float) for part in value)
         return " x ".join(f"{part:g}" for part in value) if is_size else ", ".join(map(in_words, value))
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+    return f"{value:.9g}" if isinstance(value, float) else str(value)
 
 
 def _first_paragraph(documented: Any) -> str:
