@@ -93,16 +93,13 @@ def _told(error: Exception) -> int | None:
     if isinstance(error, BrokenPipeError):  # whoever read our output has enough, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the last flush fails again
         return EXIT_FAILURE
-    if isinstance(error, ValueError) and type(error).__module__.partition(".")[0] in PACKAGES:
-        complain(str(error))
-        return EXIT_USAGE
     if isinstance(error, OSError) and error.strerror and error.filename:
         complain(f"{error.strerror}: {error.filename}")
-        return EXIT_FAILURE
-    if isinstance(error, CommandError | ImportError | OSError):
+    elif isinstance(error, ImportError | OSError) or type(error).__module__.partition(".")[0] in PACKAGES:
         complain(str(error))
-        return EXIT_FAILURE
-    return None
+    else:
+        return None
+    return EXIT_USAGE if isinstance(error, ValueError) else EXIT_FAILURE
 
 
 def _interrupt(number: int, _: object = None) -> None:

@@ -6,10 +6,10 @@ Names of policies, files and scenarios are shown as they are: no console reads m
 import json
 import shutil
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from swarm_forage_env._internal.wording import counted, printable
 from swarm_forage_env.cli import CommandError
@@ -37,27 +37,19 @@ def note(text: object) -> None:
     sys.stderr.write(f"{printable(str(text))}\n")
 
 
-class Advance(Protocol):
-    """Told how much is done, and of how much in all where that was not known before."""
-
-    def __call__(self, done: float, total: float | None = None) -> None:
-        """Show it."""
-
-
-def bar(*columns: Any) -> "Progress":
+def bar() -> "Progress":
     """Return a bar on stderr that shows how long the rest will take; nothing without a terminal."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     screen = Console(stderr=True, highlight=False, markup=False, emoji=False)
-    words = TextColumn("{task.description}", markup=False)
-    all_columns = (words, BarColumn(), *columns, TimeRemainingColumn())
-    return Progress(*all_columns, console=screen, transient=True, disable=not screen.is_terminal)
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
+    return Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal)
 
 
 @contextmanager
-def progress_bar(text: str, total: float | None = None) -> Iterator[Advance]:
-    """Show on stderr how much is done."""
+def progress_bar(text: str, total: float | None = None) -> "Iterator[Callable[..., None]]":
+    """Show on stderr how much is done; what it yields is told so, and of how much where `total` was not known."""
     with bar() as shown:
         task = shown.add_task(text, total=total)
         yield lambda done, total=None: shown.update(task, completed=done, total=total)
@@ -126,14 +118,7 @@ def width_of_terminal() -> int | None:
     return shutil.get_terminal_size().columns if sys.stdout.isatty() else None
 
 
-class Drawn(Protocol):
-    """What has a picture."""
-
-    def draw(self, path: Path) -> Any:
-        """Draw it into a file."""
-
-
-def drawn_or_told(answer: Drawn, picture: Path) -> Path | None:
+def drawn_or_told(answer: "Answer", picture: Path) -> Path | None:
     """Draw an answer, which is worth more than its picture; where that fails, say why and return None."""
     try:
         answer.draw(picture)

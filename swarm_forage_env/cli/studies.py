@@ -9,14 +9,12 @@ from cyclopts import App, Parameter
 from cyclopts.types import PositiveInt
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.cli import EXIT_FAILURE, CommandError
+from swarm_forage_env.cli import EXIT_FAILURE
 from swarm_forage_env.cli.options import AsJson, DryRun, Jobs, Names, Style
-from swarm_forage_env.cli.printer import note, say, show
+from swarm_forage_env.cli.printer import note, resumable, say, show
 from swarm_forage_env.rendering.figures import SCREEN
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor
-
     from swarm_forage_env.runs.plan_summary import PlanSummary
     from swarm_forage_env.studies.study import StudySpec
     from swarm_forage_env.studies.study_folder import StudyFolder
@@ -42,7 +40,7 @@ def list_studies(*, budget: str = "paper", as_json: AsJson = False) -> None:
 
 @app.command
 def run(
-    names: Annotated[tuple[str, ...], Parameter(help="Sets of the paper (S1a to S2d), or study files.")],
+    name: Annotated[str, Parameter(help="A set of the paper (S1a to S2d), or a study file.")],
     /,
     *,
     budget: str | None = None,
@@ -54,59 +52,41 @@ def run(
     cluster: str | None = None,
     dry_run: DryRun = False,
 ) -> int:
-    """Make the missing runs of studies, and pack each study into one file.
+    """Make the missing runs of a study, and pack it into one file.
 
     Finished runs are kept: after Ctrl-C, or with more seeds, the same command does the rest.
 
     Args:
         budget: How much to run; default the first budget of the file.
-        out: Folder; default results/studies/NAME_BUDGET. For several studies, the parent of their folders.
+        out: Folder; default results/studies/NAME_BUDGET.
         seeds: Runs per condition; default the budget's number.
         rules: described, program (the authors'), both, or file: what the file says.
         shard: I/N: make only the I-th of N equal parts of the runs.
         cluster: Run on Dask: local, or the address of a scheduler (docs/studies.md).
     """
+    from swarm_forage_env._internal.fields import known_name
     from swarm_forage_env.runs.cluster import cluster_executor
-    from swarm_forage_env.runs.workers import WorkerError
-    from swarm_forage_env.studies.study_folder import StudyFolder, parse_shard
-
-    specs = [_chosen(name, budget, seeds, rules) for name in names]
-    part = parse_shard(shard)
-    places = [_folder(spec, out, is_one=len(specs) == 1) for spec in specs]
-    studies = [(spec, StudyFolder(place)) for spec, place in zip(specs, places, strict=True)]
-    if dry_run:
-        say("\n".join(str(_summary(spec, folder, part)) for spec, folder in studies))
-        return 0
-    kept = f"Finished runs are kept in {', '.join(map(str, places))}; the same command does the rest."
-    try:
-        with nullcontext() if cluster is None else cluster_executor(cluster, jobs) as executor:
-            n_failed = sum(_run_all(spec, folder, part, jobs, executor) for spec, folder in studies)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"Interrupted. {kept}") from None
-    except WorkerError as error:
-        raise CommandError(f"{error} {kept}") from None
-    return EXIT_FAILURE if n_failed else 0
-
-
-def _folder(spec: "StudySpec", out: Path | None, *, is_one: bool) -> Path:
-    own = f"{spec.name}_{spec.budget}"
-    return Path("results", "studies", own) if out is None else out if is_one else out / own
-
-
-def _run_all(
-    spec: "StudySpec", folder: "StudyFolder", part: tuple[int, int], jobs: int | None, executor: "Executor | None"
-) -> int:
-    """Run what is missing of a study, and return how many runs failed."""
     from swarm_forage_env.runs.store import FAILED
     from swarm_forage_env.studies.description import StudyOutcome
-    from swarm_forage_env.studies.study_folder import run_study
+    from swarm_forage_env.studies.study import RULES_NAMES
+    from swarm_forage_env.studies.study_file import load_study
+    from swarm_forage_env.studies.study_folder import StudyFolder, parse_shard, run_study
     from swarm_forage_env.studies.study_table import pack_study
 
-    state = run_study(spec, folder, part=part, jobs=jobs, executor=executor, progress=True)
+    known_name("rules", rules, (*RULES_NAMES, "both", "file"))
+    chosen = {"both": tuple(RULES_NAMES), "file": None}.get(rules, (rules,))
+    study = load_study(name, budget, seeds=seeds, rules=chosen)
+    part = parse_shard(shard)
+    folder = StudyFolder(out or Path("results", "studies", f"{study.name}_{study.budget}"))
+    if dry_run:
+        say(_summary(study, folder, part))
+        return 0
+    with resumable(folder.folder), nullcontext() if cluster is None else cluster_executor(cluster, jobs) as executor:
+        state = run_study(study, folder, part=part, jobs=jobs, executor=executor, progress=True)
     if part == (1, 1):
         note(f"packed into {pack_study(folder, tell=note)}")
     say(StudyOutcome(outcomes=state, folder=folder))
-    return state.count(FAILED)
+    return EXIT_FAILURE if state.count(FAILED) else 0
 
 
 def _summary(spec: "StudySpec", folder: "StudyFolder", part: tuple[int, int]) -> "PlanSummary":
@@ -118,17 +98,6 @@ def _summary(spec: "StudySpec", folder: "StudyFolder", part: tuple[int, int]) ->
     name = f"{spec.name}, budget {spec.budget}" + (f", shard {index} of {count}" if count > 1 else "")
     only, out = shard(spec.plan.specs, index, count), folder.store.folder
     return summarize_plan(spec.plan, name=name, only=only, out=out)
-
-
-def _chosen(name: str, budget: str | None, seeds: int | None, rules: str) -> "StudySpec":
-    """Return the study that the options describe."""
-    from swarm_forage_env._internal.fields import known_name
-    from swarm_forage_env.studies.study import RULES_NAMES
-    from swarm_forage_env.studies.study_file import load_study
-
-    known_name("rules", rules, (*RULES_NAMES, "both", "file"))
-    chosen = {"both": tuple(RULES_NAMES), "file": None}.get(rules, (rules,))
-    return load_study(name, budget, seeds=seeds, rules=chosen)
 
 
 @app.command

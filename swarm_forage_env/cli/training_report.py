@@ -5,7 +5,7 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
-from rich.progress import Progress, TimeElapsedColumn
+from rich.progress import Progress
 
 from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.cli import EXIT_FAILURE
@@ -39,7 +39,7 @@ def run_training(plan: TrainingPlan, folder: Path, *, resume: bool) -> int:
     """
     from swarm_forage_env.training.sb3.training import train
 
-    with bar(TimeElapsedColumn()) as shown:
+    with bar() as shown:
         report = _Report(plan, [plan.seed], shown)
         try:
             result = train(plan, folder, resume=resume, report=lambda news: report(plan.seed, news))
@@ -92,7 +92,7 @@ def run_seeds(
     from swarm_forage_env.training.sb3.seeds import train_seeds
 
     go_on = f"swarm-forage --trust-models train --out {shlex.quote(str(folder))} --seeds {len(seeds)} --resume"
-    with bar(TimeElapsedColumn()) as shown:
+    with bar() as shown:
         report = _Report(plan, seeds, shown)
         try:
             found = train_seeds(plan, seeds, folder, jobs=jobs, resume=resume, report=report)

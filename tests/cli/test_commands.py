@@ -77,9 +77,7 @@ def test_a_dry_run_plans_and_touches_nothing(command):
 
 
 def test_set_changes_any_field_with_its_type(command):
-    settings = (
-        "team=true nest_size_m=2,4 walk_probability=0.5 static_size=3 physics_substeps=0.2,0.2,0.2,0.2,0.2"
-    )
+    settings = "team=true nest_size_m=2,4 walk_probability=0.5 static_size=3 physics_substeps=0.2,0.2,0.2,0.2,0.2"
     each = (word for setting in settings.split() for word in ("--set", setting))
     _, out, _ = command(*RUN, *each, "--dry-run", "--json")
     world = json.loads(out)["runs"][0]["spec"]["scenario"]

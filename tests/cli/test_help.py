@@ -60,3 +60,9 @@ def test_a_command_that_lacks_its_words_shows_its_help(command):
 
 def test_only_what_is_asked_for_is_imported():
     assert imported("--help") == imported("study", "-h") == imported("run", "--help") == set()
+
+
+def test_shells_can_complete_commands_and_options():
+    script = made().generate_completion(shell="bash")
+    assert "curves" in script
+    assert "--wrapper" in script
