@@ -251,7 +251,7 @@ def shoot(film: Film) -> None:
     (exhibit,) = (one for one in EXHIBITS if one.name == film.exhibit)
     spec = exhibit.specs()[film.run]
     path = record_run(
-        spec.scenario,
+        spec.world,
         spec.policy,
         FOLDER / f"{film.name}.gif",
         seconds=film.seconds,
@@ -260,7 +260,6 @@ def shoot(film: Film) -> None:
         fps=FILM_FPS,
         size_px=FILM_PX,
         trail_s=FILM_TRAIL_S,
-        wrappers=spec.wrappers,
     )
     size = path.stat().st_size
     print(f"{path.name}: {size / 1e3:.0f} kB", flush=True)

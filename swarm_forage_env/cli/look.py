@@ -104,18 +104,17 @@ def record(
         size: Longer side of the arena in pixels.
     """
     from swarm_forage_env.cli.worlds import RESULTS, default_file, described_world
-    from swarm_forage_env.inspect.film import picture_run, record_run
+    from swarm_forage_env.inspect.film import record_run
 
     chosen, caches = described_world(world)
     path = file or default_file(RESULTS, chosen, [policy], ".gif" if at is None else ".png")
-    look: dict[str, Any] = {"seed": seed, "size_px": size, "caches": caches, "wrappers": chosen.wrappers}
+    look: dict[str, Any] = {"seed": seed, "size_px": size, "caches": caches}
     if at is not None:
-        written = picture_run(chosen.scenario, policy, path, at_s=at, **look)
+        record_run(chosen, policy, path, at_s=at, **look)
     else:
         with progress_bar("pictures") as progress:
-            film: dict[str, Any] = {"seconds": seconds, "speedup": speedup, "progress": progress}
-            written = record_run(chosen.scenario, policy, path, **film, **look)
-    say(f"wrote {written}")
+            record_run(chosen, policy, path, seconds=seconds, speedup=speedup, progress=progress, **look)
+    say(f"wrote {path}")
 
 
 def replay(

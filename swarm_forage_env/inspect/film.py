@@ -5,10 +5,10 @@ so filming does not change a run.
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from swarm_forage_env._internal.fields import ConfigError, number
 from swarm_forage_env._internal.files import check_file
@@ -20,17 +20,15 @@ from swarm_forage_env.rendering.view import RenderError, arena_view, refusing
 from swarm_forage_env.runs.run import LiveRun, build_env
 from swarm_forage_env.runs.spec import chosen_caches, pin_policy
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.wrappers.world import World
-
-if TYPE_CHECKING:
-    from swarm_forage_env.wrappers.base import WrapperConfig
+from swarm_forage_env.wrappers.world import World, WorldLike, world_of
 
 
 def record_run(
-    scenario: ScenarioConfig,
+    world: WorldLike,
     policy: str | Policy,
     path: str | Path,
     *,
+    at_s: float | None = None,
     seconds: float = 300.0,
     seed: int = 0,
     speedup: float = 20.0,
@@ -40,15 +38,15 @@ def record_run(
     theme: str = "dark",
     caches: str | None = None,
     parameters: Mapping[str, Any] | None = None,
-    wrappers: "Iterable[WrapperConfig]" = (),
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
-    """Run a policy and film it.
+    """Run a policy and film it, or draw it at one time.
 
     Args:
-        scenario: The scenario; its horizon need not be whole recording intervals.
+        world: A `World`, a configuration or the name of a preset; its horizon need not be whole recording intervals.
         policy: Name of an installed policy, path of a policy file, or a fresh policy object.
-        path: File to write, .gif or .mp4.
+        path: File to write, .gif or .mp4; with `at_s` .png.
+        at_s: Simulated time of the only picture.
         seconds: Simulated time to film.
         seed: Seed of the run; `run_one` with the same seed makes the same run.
         speedup: Simulated seconds per second of film.
@@ -59,8 +57,7 @@ def record_run(
         caches: "none", "static" or "dynamic"; default what the policy states in `caches`, or what the scenario has if
             the policy states nothing (`runs.spec.chosen_caches`).
         parameters: Keyword arguments of a policy that is given by name or path.
-        wrappers: Configurations of noise, throttling and population dynamics, in any order.
-        progress: Called with (pictures done, pictures in all) after each picture.
+        progress: Called with (pictures done, pictures in all) after each picture of a film.
 
     Returns:
         The path written.
@@ -72,101 +69,43 @@ def record_run(
         ImportError: Pillow, or for .mp4 imageio with ffmpeg, is not installed.
         ValueError: unknown policy name, or a policy file that cannot be opened or does not fit the scenario.
     """
-    ticks = _picture_ticks(scenario, seconds, speedup, fps)
+    given = world_of(world)
+    scenario = given.scenario
     with refusing():
         number("trail_s", trail_s, at_least=0.0)
-    path = check_film(path, fps, len(ticks))
+    if at_s is None:
+        ticks = _picture_ticks(scenario, seconds, speedup, fps)
+        path, n_samples = check_film(path, fps, len(ticks)), round(trail_s * fps / speedup) + 1
+    else:
+        path, ticks = check_picture(path), _trail_ticks(scenario, at_s, trail_s)
+        n_samples = len(ticks)
     arena_view(scenario, size_px, theme)  # refuses a bad size or theme before the run starts
     policy, name, scenario = cast_policy(policy, scenario, caches, parameters)
-    disturbed = tuple(wrappers)
-    title = World(scenario, disturbed).title(name, size_words(scenario), digests=False)
-    stack = build_env(scenario, disturbed, reads=getattr(policy, "reads", None))
-    n_samples = round(trail_s * fps / speedup) + 1
+    arena_words = f"{scenario.arena.width_m:g} x {scenario.arena.height_m:g} m"
+    title = World(scenario, given.wrappers).title(name, arena_words, digests=False)
+    stack = build_env(scenario, given.wrappers, reads=getattr(policy, "reads", None))
     check_file(path)
     trails = Trails(scenario.robots.n_robots, n_samples) if n_samples > 1 else None
 
     def frames() -> Iterator[Frame]:
         run = LiveRun(stack, policy, seed)
-        world = run.forage_env
+        env = run.forage_env
         for done, tick in enumerate(ticks, start=1):
             run.advance(to_tick=tick)  # a run that has ended stays as it is
             if trails is not None:
-                trails.add(world.swarm)
-            state = (world.swarm, world.objects, world.caches, world.events)
+                trails.add(env.swarm)
+            if at_s is not None and done < len(ticks):
+                continue
+            state = (env.swarm, env.objects, env.caches, env.events)
             yield render_frame(
-                scenario, *state, tick=world.tick, size_px=size_px, trails=trails, title=title, theme=theme
+                scenario, *state, tick=env.tick, size_px=size_px, trails=trails, title=title, theme=theme
             )
             if progress is not None:
                 progress(done, len(ticks))
 
+    if at_s is not None:
+        return write_picture(next(frames()), path)
     return write_film(frames(), path, fps=fps, n_frames=len(ticks), theme=theme)
-
-
-def picture_run(
-    scenario: ScenarioConfig,
-    policy: str | Policy,
-    path: str | Path,
-    *,
-    at_s: float,
-    seed: int = 0,
-    size_px: int = 900,
-    trail_s: float = 20.0,
-    theme: str = "dark",
-    caches: str | None = None,
-    parameters: Mapping[str, Any] | None = None,
-    wrappers: "Iterable[WrapperConfig]" = (),
-) -> Path:
-    """Run a policy up to a time and draw one picture.
-
-    Args:
-        scenario: The scenario; its horizon need not be whole recording intervals.
-        policy: Name of an installed policy, path of a policy file, or a fresh policy object.
-        path: File to write, .png.
-        at_s: Simulated time of the picture.
-        seed: Seed of the run.
-        size_px: Longer side of the drawn arena.
-        trail_s: Simulated time over which the robots' trails fade; 0 for none.
-        theme: "dark" or "light".
-        caches: As in `record_run`, and so are the next two.
-        parameters: Keyword arguments of a policy that is given by name or path.
-        wrappers: Configurations of noise, throttling and population dynamics.
-
-    Returns:
-        The path written.
-
-    Raises:
-        RenderError: a value out of range; then nothing has been run or written.
-        OSError: the file cannot be written; then nothing has been run.
-        ImportError: Pillow is not installed.
-        ValueError: unknown policy name, or a policy file that cannot be opened or does not fit the scenario.
-    """
-    path = check_picture(path)
-    with refusing():
-        number("at_s", at_s, at_least=0.0, at_most=scenario.horizon_s)
-        number("trail_s", trail_s, at_least=0.0)
-    arena_view(scenario, size_px, theme)  # refuses a bad size or theme before the run starts
-    policy, name, scenario = cast_policy(policy, scenario, caches, parameters)
-    disturbed = tuple(wrappers)
-    run = LiveRun(build_env(scenario, disturbed, reads=getattr(policy, "reads", None)), policy, seed)
-    check_file(path)
-    end = round(at_s / scenario.dt_s)
-    samples = [tick for tick in range(end, -1, -round(1.0 / scenario.dt_s)) if (end - tick) * scenario.dt_s <= trail_s]
-    trails = Trails(scenario.robots.n_robots, len(samples)) if len(samples) > 1 else None
-    for tick in reversed(samples):
-        run.advance(to_tick=tick)  # a run that has ended stays as it is
-        if trails is not None:
-            trails.add(run.forage_env.swarm)
-    world = run.forage_env
-    state = (world.swarm, world.objects, world.caches, world.events)
-    title = World(scenario, disturbed).title(name, size_words(scenario), digests=False)
-    return write_picture(
-        render_frame(scenario, *state, tick=world.tick, size_px=size_px, trails=trails, title=title, theme=theme), path
-    )
-
-
-def size_words(scenario: ScenarioConfig) -> str:
-    """Return the sides of the arena for a title."""
-    return f"{scenario.arena.width_m:g} x {scenario.arena.height_m:g} m"
 
 
 def cast_policy(
@@ -186,6 +125,15 @@ def cast_policy(
     else:
         name = getattr(policy, "name", type(policy).__name__)
     return policy, name, replace(scenario, caches=chosen_caches(caches, stating, scenario))
+
+
+def _trail_ticks(scenario: ScenarioConfig, at_s: float, trail_s: float) -> list[int]:
+    """Return the ticks of the trail of one picture, one per second, the last that of the picture."""
+    with refusing():
+        number("at_s", at_s, at_least=0.0, at_most=scenario.horizon_s)
+    end = round(at_s / scenario.dt_s)
+    back = range(end, -1, -round(1.0 / scenario.dt_s))
+    return [tick for tick in back if (end - tick) * scenario.dt_s <= trail_s][::-1]
 
 
 def _picture_ticks(scenario: ScenarioConfig, seconds: float, speedup: float, fps: float) -> list[int]:

@@ -19,6 +19,7 @@ from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.recorder import TOTALS
 from swarm_forage_env.wrappers.registry import parse_wrapper
+from swarm_forage_env.wrappers.world import World
 from tests.support.drivers import tick_by_tick
 
 Image = pytest.importorskip("PIL.Image")
@@ -192,8 +193,8 @@ def test_a_film_shows_the_run_that_its_name_promises(filmed, tmp_path, monkeypat
     with monkeypatch.context() as patch:
         patch.setattr(ForageEnv, "step_batch", note)
         record = run_policy(tick_by_tick(load_policy(policy)), spec)
-    options = {"seconds": 80.0, "speedup": 40.0, "fps": 20.0, "wrappers": wrappers, "seed": 5}
-    record_run(CROWDED, policy, tmp_path / "run.gif", **options)
+    options = {"seconds": 80.0, "speedup": 40.0, "fps": 20.0, "seed": 5}
+    record_run(World(CROWDED, wrappers), policy, tmp_path / "run.gif", **options)
     assert [tick for tick, *_ in filmed] == list(range(0, 401, 10))
     for tick, *state in filmed[1:]:
         for mine, theirs in zip(state, states[tick], strict=True):
@@ -205,8 +206,8 @@ def test_a_film_shows_the_run_that_its_name_promises(filmed, tmp_path, monkeypat
 
 
 def test_a_run_that_is_over_stays_as_it_ended(filmed, tmp_path):
-    deadly = (parse_wrapper("population:death_per_tick=0.9"),)
-    record_run(scenario("warehouse_small", n_robots=2), "random", tmp_path / "run.gif", seconds=40.0, wrappers=deadly)
+    deadly = World(scenario("warehouse_small", n_robots=2), (parse_wrapper("population:death_per_tick=0.9"),))
+    record_run(deadly, "random", tmp_path / "run.gif", seconds=40.0)
     ticks = [tick for tick, *_ in filmed]
     assert len(ticks) == 41
     assert ticks[-1] == ticks[-2] < 200
