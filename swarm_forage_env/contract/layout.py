@@ -159,5 +159,3 @@ def messages_row(message_size: int) -> LayoutRow:
 
 BUILT_IN_SLICES = observation_layout(1.0, 1.0, 1).names
 """Names of the slices that every observation has."""
-OPTIONAL_SLICES = (NEIGHBOURS, MESSAGES)
-"""Names of the slices of the package that come after those, where a scenario asks for them."""

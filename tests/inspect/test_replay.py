@@ -293,73 +293,32 @@ def test_damaged_files_are_told_in_one_line(replay, tmp_path, damage, expected):
     assert "\n" not in str(caught.value)
 
 
-def forged(replay: Replay, change) -> str:
+def forged(replay: Replay, values) -> str:
     """The page of a replay with another header, and the digest that goes with it."""
     header, (block,) = files_module.take_replay_page_apart(files_module.page_of([replay]))
     about = header["runs"][0]
     del about["digest"]
-    change(about)
+    about.update(values)
     about["digest"] = files_module._digest(about, block)
     return build_replay_page("forged", header, [block])
 
 
-def put(**values):
-    return lambda about: about.update(values)
-
-
-def of_array(array, **values):
-    return lambda about: next(place for place in about["arrays"] if place["name"] == array).update(values)
-
-
-def other_robots(about):
-    about["spec"]["scenario"]["robots"]["n_robots"] = 11
-
-
 @pytest.mark.parametrize(
-    ("change", "expected"),
+    ("values", "expected"),
     [
-        (put(frame_ticks=0), r"runs\[0\].frame_ticks to be a whole number >= 1"),
-        (put(frame_ticks=10**12), r"Expected position to be an array \(2, 12, 2\) of uint16"),
-        (put(end_tick=401), "end_tick of at most 400"),
-        (put(label="\x1b[31m"), "label to be a non-empty text without control"),
-        (put(activities=["one"]), "Expected activity below 1"),
-        (put(arrays=[]), "Expected one array position, got 0"),
-        (put(spec={}), "Missing key 'scenario'"),
-        (other_robots, r"Expected position to be an array \(81, 11, 2\) of uint16, got \(81, 12, 2\)"),
-        (of_array("activity", name="beauty"), "Unknown array 'beauty'"),
-        (of_array("position", shape=[10**9, 10**9]), "Expected position to be an array"),
-        (of_array("position", dtype="O"), "the type of position to be one of u1, u2"),
-        (of_array("position", offset=-1), "offset to be a whole number >= 0"),
-        (of_array("position", size=3), "cut short"),
-        (of_array("deliveries", shape=[2**40, 4]), "at most 2,147,483,648 bytes in all, got"),
+        ({"frame_ticks": 0}, r"runs\[0\].frame_ticks to be a whole number >= 1"),
+        ({"label": "\x1b[31m"}, "label to be a non-empty text without control"),
+        ({"arrays": []}, "Expected an array position, got none"),
+        ({"spec": {}}, "Missing key 'scenario'"),
     ],
 )
-def test_a_page_from_a_stranger_is_refused_by_the_name_of_the_field(replay, tmp_path, change, expected):
-    (tmp_path / "run.html").write_text(forged(replay, change))
+def test_a_page_from_a_stranger_is_refused_by_the_name_of_the_field(replay, tmp_path, values, expected):
+    (tmp_path / "run.html").write_text(forged(replay, values))
     with pytest.raises(
         ReplayError, match=rf"^Cannot read .*run\.html: its content is damaged .*({expected})"
     ) as caught:
         read_replays(tmp_path / "run.html")
     assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("name", "place", "value"),
-    [
-        ("object_events", (5, 0), 10**6),
-        ("object_events", (5, 4), 10**6),
-        ("deliveries", (0, 1), 12),
-        ("cache_events", (0, 2), -1),
-        ("memory_events", (0, 1), 12),
-        ("activity", (0, 0), 200),
-    ],
-)
-def test_numbers_that_point_nowhere_are_refused(replay, tmp_path, name, place, value):
-    array = getattr(replay, name).copy()
-    array[place] = value
-    write_replays(tmp_path / "run.html", dataclasses.replace(replay, **{name: array}))
-    with pytest.raises(ReplayError, match=rf"Expected (the cells in )?{name} (to be from|below)"):
-        read_replays(tmp_path / "run.html")
 
 
 def test_a_write_that_is_interrupted_leaves_the_old_file(replay, tmp_path, monkeypatch):

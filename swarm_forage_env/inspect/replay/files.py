@@ -6,7 +6,6 @@ and which array lies where in the run's block of bytes (`coding` says how). `doc
 
 import hashlib
 import json
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,13 +13,12 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError, known_keys, one_of
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import replacing
-from swarm_forage_env._internal.typed import Count, Name, Within, check_kind, typed
+from swarm_forage_env._internal.typed import Count, Name, Within, typed
 from swarm_forage_env._internal.wording import shown
 from swarm_forage_env.contract.codes import Counter, Task
-from swarm_forage_env.inspect.replay.checking import MOST_BYTES, check_numbers, n_frames, shapes
-from swarm_forage_env.inspect.replay.coding import DTYPES, pack, unpack
+from swarm_forage_env.inspect.replay.coding import pack, unpack
 from swarm_forage_env.inspect.replay.frames import Replay, ReplayError
 from swarm_forage_env.rendering.pages import PageError, build_replay_page, take_replay_page_apart
 from swarm_forage_env.runs.spec import RunSpec
@@ -241,11 +239,6 @@ class _Place:
     offset: Count
     size: Count
 
-    @property
-    def n_bytes(self) -> int:
-        """Bytes of the array, unpacked."""
-        return math.prod(self.shape) * int(self.dtype[1:])
-
 
 @dataclass(frozen=True, kw_only=True)
 class _Run:
@@ -275,45 +268,21 @@ def _replays_of(header: dict[str, Any], blocks: list[bytes]) -> tuple[Replay, ..
     for run, about, block in zip(runs, given, blocks, strict=True):
         if _digest({name: value for name, value in about.items() if name != "digest"}, block) != run.digest:
             raise ReplayError("it does not match its digest")
-    specs = [RunSpec.from_mapping(run.spec) for run in runs]
-    for run, spec in zip(runs, specs, strict=True):  # before anything is unpacked
-        _check_places(run, spec.scenario)
-    in_all = sum(place.n_bytes for run in runs for place in run.arrays)
-    if in_all > MOST_BYTES:
-        raise ReplayError(
-            f"Expected arrays of at most {MOST_BYTES:,} bytes in all, got {in_all:,}; write the replay with fewer "
-            "frames (frame_s, or --seconds)."
-        )
-    return tuple(_replay_of(run, spec, block) for run, spec, block in zip(runs, specs, blocks, strict=True))
+    return tuple(map(_replay_of, runs, blocks))
 
 
-def _check_places(run: _Run, scenario: ScenarioConfig) -> None:
-    """Refuse arrays that a replay of this run does not have."""
-    if run.end_tick > scenario.horizon_ticks:
-        raise ReplayError(f"Expected end_tick of at most {scenario.horizon_ticks:,}, got {run.end_tick:,}.")
-    frames = n_frames(run.frame_ticks, run.end_tick)
-    wanted = shapes(scenario, frames, run.remembered_frames)
-    of_signals = {f"{_SIGNAL}{name}": (frames,) for name in _SIGNALS}
-    names = [place.name for place in run.arrays]
-    for name in (*_ALWAYS, *names):
-        if names.count(name) != 1:
-            raise ReplayError(f"Expected one array {name}, got {names.count(name)}.")
-    known_keys(dict.fromkeys(names), (*wanted, *of_signals), "array")
-    for place in run.arrays:
-        one_of(f"the type of {place.name}", place.dtype, DTYPES)
-        dtype = _ARRAYS.get(place.name, "f4")
-        check_kind(place.name, place.dtype, place.shape, dtype, (wanted | of_signals)[place.name])
-
-
-def _replay_of(run: _Run, spec: RunSpec, block: bytes) -> Replay:
+def _replay_of(run: _Run, block: bytes) -> Replay:
     arrays = {
         place.name: unpack(block[place.offset : place.offset + place.size], place.dtype, place.shape)
         for place in run.arrays
     }
+    missing = [name for name in _ALWAYS if name not in arrays]
+    if missing:
+        raise ReplayError(f"Expected an array {missing[0]}, got none.")
     own: dict[str, Any] = {name: arrays.get(name) for name in _ARRAYS}
     signals = {name.removeprefix(_SIGNAL): array for name, array in arrays.items() if name not in _ARRAYS}
-    replay = Replay(
-        spec=spec,
+    return Replay(
+        spec=RunSpec.from_mapping(run.spec),
         label=run.label,
         frame_ticks=run.frame_ticks,
         end_tick=run.end_tick,
@@ -324,8 +293,6 @@ def _replay_of(run: _Run, spec: RunSpec, block: bytes) -> Replay:
         signals=signals,
         **own,
     )
-    check_numbers(replay)
-    return replay
 
 
 def _digest(about: dict[str, Any], block: bytes) -> str:
