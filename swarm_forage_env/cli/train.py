@@ -1,6 +1,5 @@
 """The commands `train`, `train curves`, `dataset` and `export`: policies that learn, and what others learn from."""
 
-import tomllib
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import App, Parameter
 from cyclopts.types import NonNegativeInt, PositiveInt
 
-from swarm_forage_env._internal.fields import ConfigError, as_tuples
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli import CommandError
 from swarm_forage_env.cli.options import AsJson, Jobs, Names, Picture, Policy, Scenario, Seeds, WorldOptions
 from swarm_forage_env.cli.printer import progress_bar, say
@@ -81,7 +80,7 @@ def train(
 
 def _by_recipe(options: WorldOptions, algo: str | None, steps: int | None, seed: int | None) -> "TrainingPlan":
     """Return the plan of a training in the world that is described; raises ConfigError where it cannot be."""
-    from swarm_forage_env.cli.worlds import described_fields
+    from swarm_forage_env.cli.worlds import described_fields, parse_setting
     from swarm_forage_env.scenarios.presets import scenario
     from swarm_forage_env.training.recipe import recipe
 
@@ -90,12 +89,12 @@ def _by_recipe(options: WorldOptions, algo: str | None, steps: int | None, seed:
     world = described_fields(replace(options, settings=others))
     scenario(world.preset, **world.fields)  # or the recipe could take unknown fields for its own arguments
     given: dict[str, Any] = {}
-    for name, value in _settings(of_recipe):
+    for name, value in map(parse_setting, of_recipe):
         argument, dot, field = name.partition(".")
         if dot:
             given.setdefault(argument, {})[field] = value
         else:
-            given[argument] = as_tuples(value)
+            given[argument] = value
     words = {"algorithm": algo, "steps": steps, "seed": seed}
     given |= {name: value for name, value in words.items() if value is not None}
     return recipe(world.preset, wrappers=world.wrappers, **given, **world.fields)
@@ -103,26 +102,11 @@ def _by_recipe(options: WorldOptions, algo: str | None, steps: int | None, seed:
 
 def _of_file(name: str, settings: Iterable[str], seed: int | None) -> "TrainingPlan":
     """Return the plan of a file or of a shipped policy, with fields set."""
+    from swarm_forage_env.cli.worlds import parse_setting
     from swarm_forage_env.training.plan import named_plan
 
-    chosen = named_plan(name).with_settings(dict(_settings(settings)))
+    chosen = named_plan(name).with_settings(dict(map(parse_setting, settings)))
     return chosen if seed is None else replace(chosen, seed=seed)
-
-
-def _settings(words: Iterable[str]) -> Iterable[tuple[str, Any]]:
-    """Yield names and values of words KEY=VALUE: values as in TOML; several between commas are a list."""
-    for word in words:
-        name, equals, text = word.partition("=")
-        if not equals:
-            raise ConfigError(f"Expected --set key=value, got {word!r}.")
-        for form in (text, f"[{text}]"):
-            try:
-                yield name, tomllib.loads(f"value = {form}")["value"]
-                break
-            except tomllib.TOMLDecodeError:
-                continue
-        else:
-            yield name, text
 
 
 @app.command

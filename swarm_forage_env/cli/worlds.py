@@ -2,18 +2,17 @@
 
 import dataclasses
 import re
+import tomllib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, get_origin
+from typing import Any
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import ConfigError, as_tuples
 from swarm_forage_env._internal.files import as_file_name
-from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.cli.options import WorldOptions
 from swarm_forage_env.policies.registry import policy_label
 from swarm_forage_env.runs.spec import RunSpec, plan_run
 from swarm_forage_env.scenarios.differences import digest_of, preset_of
-from swarm_forage_env.scenarios.overrides import field_types, parse_tuple
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.world import FILE, World, WorldDescription, describe_file
 
@@ -22,13 +21,8 @@ LONGEST_NAME = 100
 """Of a file, in characters; the rest is a digest."""
 _COMMA = re.compile(r",(?!\s*[a-z_]+=[^,/\\]*(?:,|$))")
 """Between names; one before a word field=value is part of a name."""
-
-_EXAMPLES = {
-    "further_nests": "boxes such as 20,4,24,12 (x low, y low, x high, y high in m)",
-    "obstacles": "boxes such as 10,4,11,12 or 10,4,11,12+20,4,21,12 (x low, y low, x high, y high in m)",
-    "object_positions_m": "places such as 10,4 or 10,4+20,4 (x, y in m)",
-}
-_TRUTH = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
+LISTS_OF_PLACES = ("further_nests", "obstacles", "object_positions_m")
+"""Fields that are written as boxes or places between plus signs: obstacles=10,4,11,12+20,4,21,12."""
 
 
 def split_names(text: str) -> tuple[str, ...]:
@@ -79,35 +73,28 @@ def described_fields(options: WorldOptions) -> WorldDescription:
 
 
 def parse_setting(word: str) -> tuple[str, Any]:
-    """Turn "key=value" into a scenario field and its value, by the field's type.
+    """Turn "key=value" into a name and a value: as TOML says it, several between commas, else a text.
 
     Raises:
-        ConfigError: no "=", an unknown field (with the nearest known one), or a value of another type.
+        ConfigError: no "=".
     """
     name, equals, text = word.partition("=")
     if not equals:
         raise ConfigError(f"Expected --set key=value, got {word!r}.")
-    if name == "quirks":
-        return name, text
-    types = {**field_types(), "side_m": float, "density": float}  # these two choose the arena
-    if name not in types:
-        raise ConfigError(f"Unknown scenario field {name!r}.{suggestion(name, types)} See: swarm-forage info SCENARIO.")
-    return name, _parse_value(name, text, types[name])
+    if name in LISTS_OF_PLACES:
+        return name, tuple(
+            as_tuples([_value(number) for number in place.split(",")]) for place in text.split("+") if place
+        )
+    return name, as_tuples(_value(text))
 
 
-def _parse_value(name: str, text: str, kind: Any) -> Any:
-    try:
-        if get_origin(kind) is tuple:
-            return parse_tuple(text, kind)
-        if kind is bool:
-            return _TRUTH[text.lower()]
-        return kind(text)
-    except ConfigError:
-        raise
-    except (KeyError, ValueError) as error:
-        words = {bool: "true or false", int: "a whole number", float: "a number"}
-        wanted = words.get(kind, _EXAMPLES.get(name, "numbers separated by commas, like its default"))
-        raise ConfigError(f"Expected {name} to be {wanted}, got {text!r}.") from error
+def _value(text: str) -> Any:
+    for form in (text, f"[{text}]"):
+        try:
+            return tomllib.loads(f"value = {form}")["value"]
+        except tomllib.TOMLDecodeError:
+            continue
+    return text
 
 
 def plan_runs(options: WorldOptions, policies: Sequence[str], seeds: Sequence[int]) -> tuple[RunSpec, ...]:

@@ -40,7 +40,17 @@ def differences(config: ScenarioConfig) -> dict[str, Any]:
     if config == base:
         return {}
     here, there = _flat(config), {} if base is None else _flat(base)
-    return {name: value for name, value in here.items() if name not in there or value != there[name]}
+    changed = {name: value for name, value in here.items() if name not in there or value != there[name]}
+    return {name: _alike(value, there.get(name)) for name, value in changed.items()}
+
+
+def _alike(value: Any, usual: Any) -> Any:
+    """Return a value with floats where the usual one has them: 2 m are 2.0 m, and names tell no difference."""
+    if isinstance(value, tuple):
+        first = cast("tuple[Any, ...]", usual)[0] if usual else 0.0
+        return tuple(_alike(part, first) for part in cast("tuple[Any, ...]", value))
+    is_whole = isinstance(value, int) and not isinstance(value, bool)
+    return float(value) if is_whole and isinstance(usual, float) else value
 
 
 def difference_words(config: ScenarioConfig, *, digests: bool = True) -> tuple[str, ...]:

@@ -232,8 +232,12 @@ def test_list_names_everything(command):
         ),
         (("run", "crw", "--set", "n_robot=5"), "Unknown scenario field 'n_robot'. Did you mean 'n_robots'?"),
         (("run", "crw", "--set", "n_robots"), "Expected --set key=value, got 'n_robots'"),
-        (("run", "crw", "--set", "n_robots=x"), "Expected n_robots to be a whole number, got 'x'"),
-        (("run", "crw", "--set", "nest_size_m=1"), "Expected nest_size_m to be numbers separated by commas"),
+        (("run", "crw", "--set", "n_robots=x"), "Expected robots.n_robots to be a whole number >= 1, got 'x'"),
+        (
+            ("run", "crw", "--set", "obstacles=a,b,c,d"),
+            "Expected arena.obstacles[0][0] to be a finite number",
+        ),
+        (("run", "crw", "--set", "nest_size_m=1"), "Expected arena.nest_size_m to be (x, y), got 1"),
         (("run", "crw", "--set", "n_robots=3", "--robots", "4"), "Expected n_robots once"),
         (("run", "crw", "--wrapper", "throtle:amplitude=1"), "Unknown wrapper 'throtle'. Did you mean 'throttle'?"),
         (

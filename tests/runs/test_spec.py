@@ -270,5 +270,5 @@ def test_runs_of_a_file_open_it_once(tmp_path, monkeypatch):
     opened = []
     monkeypatch.setattr(model_files, "file_digest", lambda path: opened.append(path) or file_digest(path))
     path = str(network_file(tmp_path / "net.npz"))
-    plan_runs(WorldOptions(), [path], n_seeds=3, first_seed=5)
+    plan_runs(WorldOptions(), [path], range(3))
     assert opened == [path, path]  # once to pin it, once to try it

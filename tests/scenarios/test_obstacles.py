@@ -62,9 +62,6 @@ def test_obstacles_come_from_the_command_line_and_from_files(tmp_path):
     assert parse_setting("obstacles=14,4,14.4,12 + 18,7.5,19,8.5") == ("obstacles", (WALL, PILLAR))
     assert parse_setting("obstacles=") == ("obstacles", ())
     assert parse_setting("object_positions_m=20,8+21,8") == ("object_positions_m", ((20.0, 8.0), (21.0, 8.0)))
-    for word in ("obstacles=1,2", "obstacles=a,b,c,d", "obstacles=1,2,3,4,5"):
-        with pytest.raises(ConfigError, match=r"Expected obstacles to be boxes such as 10,4,11,12 or"):
-            parse_setting(word)
     file = tmp_path / "world.toml"
     file.write_text("[set]\nobstacles = [[14.0, 4.0, 14.4, 12.0], [18.0, 7.5, 19.0, 8.5]]\n")
     assert describe_file(file).fields == {"obstacles": (WALL, PILLAR)}
