@@ -146,31 +146,24 @@ def _fields_of(kind: Any) -> Mapping[str, tuple[Any, bool]]:
 
 
 def check_array(where: str, given: np.ndarray, dtype: Any, shape: tuple[int | None, ...]) -> None:
-    """Refuse an array of another type or shape, or one of numbers that are not finite; see `check_kind`."""
-    check_kind(where, given.dtype, given.shape, dtype, shape)
-    if given.dtype.kind == "f" and not np.isfinite(given).all():
-        raise ConfigError(f"Expected {where} to hold finite numbers, got some that are none.")
-
-
-def check_kind(
-    where: str, dtype: Any, shape: tuple[int, ...], wanted_dtype: Any, wanted_shape: tuple[int | None, ...]
-) -> None:
-    """Refuse the type or shape of an array, which may be still to be read.
+    """Refuse an array of another type or shape, or one of numbers that are not finite.
 
     Args:
         where: Name of the array, for the message.
-        dtype: Its type.
-        shape: Its shape.
-        wanted_dtype: What it must be, byte order included; nothing is converted.
-        wanted_shape: The same; None = any length.
+        given: The array.
+        dtype: What it must be, byte order included; nothing is converted.
+        shape: The same; None = any length.
 
     Raises:
         ConfigError: see above.
     """
-    found, wanted = np.dtype(dtype), np.dtype(wanted_dtype)
-    fits = len(shape) == len(wanted_shape) and all(
-        length is None or length == there for length, there in zip(wanted_shape, shape, strict=True)
+    fits = given.ndim == len(shape) and all(
+        length in (None, there) for length, there in zip(shape, given.shape, strict=True)
     )
-    if not fits or found != wanted:
-        lengths = ", ".join("any" if length is None else str(length) for length in wanted_shape)
-        raise ConfigError(f"Expected {where} to be an array ({lengths}) of {wanted.name}, got {shape} of {found.name}.")
+    if not fits or given.dtype != dtype:
+        lengths, wanted = ", ".join("any" if length is None else str(length) for length in shape), np.dtype(dtype).name
+        raise ConfigError(
+            f"Expected {where} to be an array ({lengths}) of {wanted}, got {given.shape} of {given.dtype.name}."
+        )
+    if given.dtype.kind == "f" and not np.isfinite(given).all():
+        raise ConfigError(f"Expected {where} to hold finite numbers, got some that are none.")

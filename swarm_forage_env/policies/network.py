@@ -7,7 +7,6 @@ A file is an `.npz` of plain arrays: the layers of the network ("weight_0", "bia
 import dataclasses
 import itertools
 import json
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,7 +15,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from swarm_forage_env._internal.archives import ArchiveError, open_arrays, read_array
+from swarm_forage_env._internal.archives import ArchiveError, read_arrays
 from swarm_forage_env._internal.fields import ConfigError, known_keys, number, one_of, switch, table
 from swarm_forage_env._internal.files import parse_json, replacing
 from swarm_forage_env.contract.kernel_policy import KernelPolicy
@@ -32,13 +31,9 @@ ACTIVATIONS = ("tanh", "relu")
 TEMPERATURES = (0.0001, 100.0)
 """Least and largest temperature; our choice: further out, actions are drawn as by the likeliest or by chance. Values of
 actions (DQN) lie closer together than logits, and need a lower one."""
-_MOST_BYTES = 2**28
-"""Bytes that a network may have, in the file and unpacked; our choice: a network of ours has a thousandth of it."""
 _MOST_NUMBERS = 2**26
 """Numbers of all layers where each is as wide as the widest, as kernels take them; our choice: 256 MiB."""
 _LAYER_PARTS = ("weight", "bias")
-_OWN_NAME = re.compile(r"(about|(weight|bias)_\d+)\.npy")
-"""Arrays that a file may hold."""
 
 
 class NetworkError(ValueError):
@@ -235,15 +230,13 @@ class Network:
             NetworkError: it does not hold a network.
         """
         try:
-            stored = open_arrays(Path(path), _MOST_BYTES)
-            n_layers = sum(name.startswith("weight_") for name in stored.namelist())
-            weights = tuple(read_array(stored, f"weight_{k}") for k in range(n_layers))
-            biases = tuple(read_array(stored, f"bias_{k}") for k in range(n_layers))
-            text = str(read_array(stored, "about"))
-            foreign = [name for name in stored.namelist() if not _OWN_NAME.fullmatch(name)]
-            if foreign:
-                raise NetworkError(f"Unknown parts: {', '.join(map(repr, foreign))}.")
-            return cls(weights, biases, NetworkAbout.from_json(text))
+            stored = read_arrays(Path(path))
+            n_layers = sum(name.startswith("weight_") for name in stored)
+            names = [f"{part}_{k}" for part in _LAYER_PARTS for k in range(n_layers)]
+            if {*stored} != {"about", *names}:
+                raise NetworkError(f"Expected the arrays {', '.join(['about', *names])}, got {', '.join(stored)}.")
+            weights, biases = ([stored[f"{part}_{k}"] for k in range(n_layers)] for part in _LAYER_PARTS)
+            return cls(tuple(weights), tuple(biases), NetworkAbout.from_json(str(stored["about"])))
         except (ArchiveError, NetworkError) as error:
             raise NetworkError(f"Expected {path} to hold a network: {error}") from error
 

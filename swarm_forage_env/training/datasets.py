@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env._internal.archives import ArchiveError, open_arrays, read_array
+from swarm_forage_env._internal.archives import ArchiveError, read_arrays
 from swarm_forage_env._internal.fields import ConfigError, known_keys, several, whole
 from swarm_forage_env._internal.files import alone_in, check_folder, read_json, replacing
 from swarm_forage_env._internal.rng import Stream, stream_rng
@@ -39,8 +39,6 @@ from swarm_forage_env.runs.workers import Tell, map_runs
 CARD_FILE = "dataset.json"
 ARRAYS = ("observations", "actions", "rewards", "terminated", "truncated", "active")
 _LONGER_BY_ONE = ("observations", "active")
-_MOST_BYTES = 2**32
-"""That a run may have unpacked: 50 robots for 10,000 ticks take 80 MB."""
 
 
 class DatasetError(ValueError):
@@ -126,20 +124,17 @@ class Dataset:
 def read_steps(file: str | Path) -> Steps:
     """Read a run; raises DatasetError for a file that is damaged or holds other arrays."""
     try:
-        stored = open_arrays(Path(file), _MOST_BYTES)
-        rewards = read_array(stored, "rewards", (np.float64, (None, None)))
-        steps = rewards.shape
+        arrays: dict[str, Any] = read_arrays(Path(file))
+        if {*arrays} != {*ARRAYS}:
+            raise ArchiveError(f"Expected the arrays {', '.join(ARRAYS)}, got {', '.join(arrays)}.")
+        check_array("rewards", arrays["rewards"], np.float64, (None, None))
+        steps = arrays["rewards"].shape
         longer = (steps[0] + 1, steps[1])
-        arrays: dict[str, Any] = {
-            "observations": read_array(stored, "observations", (np.float32, (*longer, None))),
-            "actions": read_array(stored, "actions"),
-            "rewards": rewards,
-            "terminated": read_array(stored, "terminated", (np.bool_, steps)),
-            "truncated": read_array(stored, "truncated", (np.bool_, steps)),
-            "active": read_array(stored, "active", (np.bool_, longer)),
-        }
+        check_array("observations", arrays["observations"], np.float32, (*longer, None))
         wanted = (np.int64, steps) if arrays["actions"].ndim == len(steps) else (np.float32, (*steps, None))
         check_array("actions", arrays["actions"], *wanted)
+        for name, shape in (("terminated", steps), ("truncated", steps), ("active", longer)):
+            check_array(name, arrays[name], np.bool_, shape)
     except OSError as error:
         raise DatasetError(f"Cannot read {file}: {error.strerror or error}.") from error
     except (ArchiveError, ConfigError) as error:
