@@ -11,7 +11,6 @@ from swarm_forage_env.cli.printer import note, progress_bar, say, show
 
 if TYPE_CHECKING:
     from swarm_forage_env.inspect.replay.frames import Replay
-    from swarm_forage_env.runs.spec import RunSpec
 
 PAGES = (".html", ".htm")
 """Endings of a page that browsers open."""
@@ -137,39 +136,29 @@ def replay(
     """
     from swarm_forage_env._internal.fields import ConfigError
     from swarm_forage_env._internal.files import check_file
-    from swarm_forage_env.cli.worlds import RESULTS, default_file
+    from swarm_forage_env.cli.worlds import RESULTS, default_file, plan_runs
+    from swarm_forage_env.inspect.replay.capture import record_replay
     from swarm_forage_env.inspect.replay.files import write_replays
+    from swarm_forage_env.runs.record import RunRecord
+    from swarm_forage_env.runs.spec import RunSpec
 
     is_stored = [Path(word).suffix == ".parquet" for word in policies]
     if any(is_stored) and (not all(is_stored) or world != WorldOptions() or seed):
         raise ConfigError("Expected stored runs alone, which have a world and a seed, got policies or options beside.")
-    specs = _stored(policies) if all(is_stored) else _planned(policies, world, seed)
+    if all(is_stored):
+        specs = tuple(RunSpec.from_json(RunRecord.read(file).spec) for file in policies)
+    else:
+        specs = plan_runs(world, policies, [seed])
     path = file or default_file(RESULTS, specs[0].world, [spec.policy for spec in specs], ".html")
     if path.suffix.lower() not in PAGES:
         raise ConfigError(f"Expected a page that ends in {' or '.join(PAGES)}, got {path}; 'record' makes films.")
     check_file(path)
-    written = write_replays(path, [_recorded(spec, seconds) for spec in specs])
+    replays: list[Replay] = []
+    for spec in specs:
+        with progress_bar(f"{spec.policy}, seed {spec.seed}") as progress:
+            replays.append(record_replay(spec, seconds=seconds, progress=progress)[0])
+    written = write_replays(path, replays)
     say(f"wrote {written} ({written.stat().st_size / 1e6:.1f} MB)")
-
-
-def _stored(files: tuple[str, ...]) -> "list[RunSpec]":
-    from swarm_forage_env.runs.record import RunRecord
-    from swarm_forage_env.runs.spec import RunSpec
-
-    return [RunSpec.from_json(RunRecord.read(file).spec) for file in files]
-
-
-def _planned(policies: tuple[str, ...], world: WorldOptions, seed: int) -> "list[RunSpec]":
-    from swarm_forage_env.cli.worlds import plan_runs
-
-    return [*plan_runs(world, policies, [seed])]
-
-
-def _recorded(spec: "RunSpec", seconds: float | None) -> "Replay":
-    from swarm_forage_env.inspect.replay.capture import record_replay
-
-    with progress_bar(f"{spec.policy}, seed {spec.seed}") as progress:
-        return record_replay(spec, seconds=seconds, progress=progress)[0]
 
 
 def maps(
