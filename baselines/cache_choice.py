@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.compiling import kernel, part
 from swarm_forage_env.contract.types import Row
 
 from .cache_memory import NOT_TO_ADD, NOT_TO_TAKE, OneTaskMemory, covers, is_listed, keep_away_m
@@ -37,13 +37,13 @@ def cache_utility(
     return math.exp(pheromone) * count / math.sqrt(product)
 
 
-@kernel
+@part
 def is_large_enough(cache: np.record, c: np.record) -> bool:
     """Whether a cache is remembered with enough objects to take one."""
     return cache.count >= c.smallest_cache
 
 
-@kernel
+@part
 def from_nest_m(x: float, y: float, c: np.record) -> float:
     """Distance of a point (m) from the centre of the nearest nest, m."""
     nest_x, nest_y = nearest_nest(x, y, c)
@@ -90,7 +90,7 @@ def select_cache(robot: np.record, senses: Senses, c: np.record, draws: Row, mem
     return True
 
 
-@kernel
+@part
 def cache_of_goal(robot: np.record, c: np.record, memory: OneTaskMemory) -> int:
     """List entry of the remembered cache in which the goal lies, or -1.
 
@@ -103,7 +103,7 @@ def cache_of_goal(robot: np.record, c: np.record, memory: OneTaskMemory) -> int:
     return -1
 
 
-@kernel
+@part
 def cache_is_known(robot: np.record, c: np.record, memory: OneTaskMemory) -> bool:
     """Whether the goal still lies in a remembered cache, which has enough objects if the robot wants one."""
     entry = cache_of_goal(robot, c, memory)
@@ -132,7 +132,7 @@ def isolated_object_utility(
     return math.exp(pheromone) / math.sqrt(max(product, 1e-12))
 
 
-@kernel
+@part
 def is_isolated(robot: np.record, entry: int, c: np.record, memory: OneTaskMemory) -> bool:
     """Whether an object is remembered without another one within the proximity distance, and far enough from caches."""
     objects = memory.objects

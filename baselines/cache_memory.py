@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.compiling import kernel, part
 from swarm_forage_env.contract.layout import CACHE_FIELDS, SERIAL_SCALE, VISIBLE_CACHES, WINDOW_CELLS
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import IntArray, Row
@@ -81,7 +81,7 @@ def new_task_memory(spec: SwarmSpec) -> TaskMemory:
     )
 
 
-@kernel
+@part
 def task_memory_of(memory: TaskMemory, robot_index: int) -> OneTaskMemory:
     """Return views of one robot's memory."""
     return OneTaskMemory(
@@ -92,13 +92,13 @@ def task_memory_of(memory: TaskMemory, robot_index: int) -> OneTaskMemory:
     )
 
 
-@kernel
+@part
 def cell_of(share: float, half_extent_m: float, c: np.record) -> int:
     """Cell along one axis of a coordinate in observation units."""
     return int((share + 1.0) * half_extent_m / c.cell_m)
 
 
-@kernel
+@part
 def find_cache(robot: np.record, caches: Row, cell_x: int, cell_y: int) -> int:
     """List entry of the cache remembered at a centre cell, or -1."""
     for entry in range(robot.n_caches):
@@ -107,7 +107,7 @@ def find_cache(robot: np.record, caches: Row, cell_x: int, cell_y: int) -> int:
     return -1
 
 
-@kernel
+@part
 def covers(cache: np.record, x: float, y: float, c: np.record) -> bool:
     """Whether a point (m) lies in a remembered cache's square."""
     dx = abs((cache.cell_x + 0.5) * c.cell_m - x)
@@ -147,7 +147,7 @@ def remember_cache(robot: np.record, memory: OneTaskMemory, fields: Row, c: np.r
     cache.seen = robot.clock
 
 
-@kernel
+@part
 def _new_entry(robot: np.record, caches: Row) -> int:
     """A list entry for a new cache; if the list is full, the entry of the cache that was last seen longest ago."""
     if robot.n_caches < caches.shape[0]:
@@ -162,7 +162,7 @@ def _new_entry(robot: np.record, caches: Row) -> int:
     return entry
 
 
-@kernel
+@part
 def _forget_objects_under(robot: np.record, objects: OneMemory, cache: np.record, c: np.record) -> None:
     """Forget objects on the square of a cache: they are inside it now."""
     half = c.cell_m / 2.0
@@ -173,7 +173,7 @@ def _forget_objects_under(robot: np.record, objects: OneMemory, cache: np.record
             forget(robot, objects, objects.row[entry])
 
 
-@kernel
+@part
 def _keep_last_place(robot: np.record, cache: np.record, c: np.record) -> None:
     """Remember a cache's centre as the place where a search for caches begins."""
     robot.last_cache_x_m = (cache.cell_x + 0.5) * c.cell_m
@@ -181,7 +181,7 @@ def _keep_last_place(robot: np.record, cache: np.record, c: np.record) -> None:
     robot.knows_last_cache = True
 
 
-@kernel
+@part
 def forget_cache(robot: np.record, caches: Row, entry: int, c: np.record) -> None:
     """Remove a cache; the last list entry takes its place. If none is left, its position stays known."""
     last = robot.n_caches - 1
@@ -191,7 +191,7 @@ def forget_cache(robot: np.record, caches: Row, entry: int, c: np.record) -> Non
     robot.n_caches = last
 
 
-@kernel
+@part
 def _should_be_visible(robot: np.record, cache: np.record, c: np.record) -> bool:
     """Whether a remembered cache's square meets the window."""
     left = robot.window_x
@@ -209,7 +209,7 @@ def _should_be_visible(robot: np.record, cache: np.record, c: np.record) -> bool
     return in_x and in_y
 
 
-@kernel
+@part
 def look_for_caches(robot: np.record, row: Row, c: np.record, memory: OneTaskMemory) -> None:
     """One tick of the memory rule above, after `memory.look_around`."""
     visible = row[c.los_cache : c.los_cache + VISIBLE_CACHES * CACHE_FIELDS]
@@ -223,7 +223,7 @@ def look_for_caches(robot: np.record, row: Row, c: np.record, memory: OneTaskMem
         remember_cache(robot, memory, visible[place * CACHE_FIELDS :], c)
 
 
-@kernel
+@part
 def _is_visible(cache: np.record, visible: Row, c: np.record) -> bool:
     """Whether a remembered cache is among the visible ones, by its centre cell."""
     for place in range(VISIBLE_CACHES):
@@ -236,7 +236,7 @@ def _is_visible(cache: np.record, visible: Row, c: np.record) -> bool:
     return False
 
 
-@kernel
+@part
 def shun_object(robot: np.record, memory: OneTaskMemory, object_row: int) -> None:
     """Leave an object alone until `stop_shunning_objects`; nothing happens for row -1."""
     if object_row >= 0:
@@ -244,13 +244,13 @@ def shun_object(robot: np.record, memory: OneTaskMemory, object_row: int) -> Non
         robot.shunned_in_task = True
 
 
-@kernel
+@part
 def stop_shunning_objects(robot: np.record) -> None:
     """Make every object selectable again."""
     robot.shun_round += 1
 
 
-@kernel
+@part
 def is_listed(serial: int, serials: Row) -> bool:
     """Whether a serial is among those of a list that ends at its first 0."""
     for known in serials:
@@ -261,7 +261,7 @@ def is_listed(serial: int, serials: Row) -> bool:
     return False
 
 
-@kernel
+@part
 def shun_cache(robot: np.record, serials: Row, serial: int) -> None:
     """Leave a cache alone until `stop_shunning_caches`, also when it is forgotten meanwhile and seen again.
 
@@ -280,20 +280,20 @@ def shun_cache(robot: np.record, serials: Row, serial: int) -> None:
     serials[0] = serial
 
 
-@kernel
+@part
 def stop_shunning_caches(serials: np.ndarray) -> None:
     """Make every cache selectable again."""
     serials[:] = 0
 
 
-@kernel
+@part
 def forgive_refusals(robot: np.record, caches: Row) -> None:
     """Forget which caches have refused."""
     for entry in range(robot.n_caches):
         caches[entry].has_refused = False
 
 
-@kernel
+@part
 def keep_away_m(cache: np.record, c: np.record) -> float:
     """How far from a remembered cache's centre a new one may be started.
 
@@ -304,7 +304,7 @@ def keep_away_m(cache: np.record, c: np.record) -> float:
     return c.refusal_m if cache.has_refused else c.proximity_m
 
 
-@kernel
+@part
 def event_cache_entry(robot: np.record, row: Row, c: np.record, caches: Row) -> int:
     """List entry of the cache that this step's event names; -1 if there is none or it is not remembered."""
     if row[c.event_cache] <= 0.0:
@@ -317,13 +317,13 @@ def event_cache_entry(robot: np.record, row: Row, c: np.record, caches: Row) -> 
     )
 
 
-@kernel
+@part
 def event_cache_serial(row: Row, c: np.record) -> int:
     """Serial of the cache that this step's event names, or 0."""
     return int(row[c.event_cache] * SERIAL_SCALE + 0.5)
 
 
-@kernel
+@part
 def event_object_row(row: Row, c: np.record) -> int:
     """Object row that this step's event names, or -1."""
     return object_row_of(row[c.event_object], c)

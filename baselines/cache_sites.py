@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.compiling import kernel, part
 
 from .cache_memory import OneTaskMemory, keep_away_m
 from .robots import Senses, nearest_nest
@@ -42,7 +42,7 @@ class Best(NamedTuple):
     """Squared; infinite while none was allowed."""
 
 
-@kernel
+@part
 def _disc(k: int, c: np.record, memory: OneTaskMemory) -> tuple[float, float, float]:
     """Centre and radius of forbidden disc k: every nest, then every remembered cache."""
     nests = c.nests_m
@@ -66,7 +66,7 @@ def is_allowed(robot: np.record, x: float, y: float, c: np.record, memory: OneTa
     return True
 
 
-@kernel
+@part
 def _better(
     best: Best,
     robot: np.record,
@@ -86,7 +86,7 @@ def _better(
     return best
 
 
-@kernel
+@part
 def _edge_crossings(
     best: Best, robot: np.record, k: int, middle_x: float, middle_y: float, c: np.record, memory: OneTaskMemory
 ) -> Best:
@@ -109,7 +109,7 @@ def _edge_crossings(
     return best
 
 
-@kernel
+@part
 def _disc_crossings(
     best: Best,
     robot: np.record,
@@ -177,7 +177,7 @@ def nearest_allowed(
     return best  # a corner of the box is nearest only to a midpoint that was put into the box there
 
 
-@kernel
+@part
 def scattered_site(
     robot: np.record, best: Best, turn: float, u: float, c: np.record, memory: OneTaskMemory
 ) -> tuple[float, float]:
@@ -209,7 +209,7 @@ def scattered_site(
     return best.x, best.y
 
 
-@kernel
+@part
 def _random_site(
     robot: np.record, best: Best, u: float, v: float, c: np.record, memory: OneTaskMemory
 ) -> tuple[float, float]:

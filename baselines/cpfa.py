@@ -20,7 +20,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.compiling import kernel, part
 from swarm_forage_env.contract.detection import sees_object
 from swarm_forage_env.contract.layout import GROUND_SENSORS, WINDOW_CELLS
 from swarm_forage_env.contract.policy import Memories, RobotStates, SwarmSpec
@@ -168,7 +168,7 @@ def normal(u: float, v: float) -> float:
     return math.sqrt(-2.0 * math.log(1.0 - u)) * math.cos(2.0 * math.pi * v)
 
 
-@kernel
+@part
 def _way_to(place: float, direction: float, side: float, margin: float) -> float:
     """How far a robot can go along one axis, m: to `margin` before the wall that it heads for."""
     if direction == 0.0:
@@ -187,7 +187,7 @@ def aim_at_wall(robot: np.record, senses: Senses, angle_rad: float, c: np.record
     robot.goal_y_m = senses.y + way * ahead_y
 
 
-@kernel
+@part
 def set_out(robot: np.record, senses: Senses, c: np.record, draws: Row) -> None:
     """Choose where the next trip goes: to the site with the probability POIS(c, lambda_sf), else in any direction."""
     robot.is_informed = robot.has_site and poisson_cdf(robot.n_nearby, c.site_fidelity_rate) > draws[DRAW_DECISION]
@@ -201,13 +201,13 @@ def set_out(robot: np.record, senses: Senses, c: np.record, draws: Row) -> None:
     start_vector(robot)
 
 
-@kernel
+@part
 def heading_rad(row: Row, c: np.record) -> float:
     """Heading of a robot, rad counter-clockwise from +x."""
     return math.atan2(float(row[c.heading + 1]), float(row[c.heading]))
 
 
-@kernel
+@part
 def start_search(robot: np.record, row: Row, c: np.record) -> None:
     """Begin to search straight ahead."""
     robot.stage = SEARCH
@@ -215,7 +215,7 @@ def start_search(robot: np.record, row: Row, c: np.record) -> None:
     keep_course(robot, row, c)
 
 
-@kernel
+@part
 def keep_course(robot: np.record, row: Row, c: np.record) -> None:
     """Search on straight ahead, with a new step."""
     robot.course_rad = heading_rad(row, c)
@@ -223,7 +223,7 @@ def keep_course(robot: np.record, row: Row, c: np.record) -> None:
     stop_vector(robot)
 
 
-@kernel
+@part
 def give_up(robot: np.record, senses: Senses, c: np.record) -> None:
     """Go home with nothing, and forget the site."""
     robot.stage = GIVE_UP
@@ -233,7 +233,7 @@ def give_up(robot: np.record, senses: Senses, c: np.record) -> None:
     start_vector(robot)
 
 
-@kernel
+@part
 def remember_site(robot: np.record, senses: Senses, row: Row, c: np.record) -> None:
     """Remember where the robot has just picked up an object, and how many others it sees there."""
     robot.has_site = True
@@ -245,7 +245,7 @@ def remember_site(robot: np.record, senses: Senses, row: Row, c: np.record) -> N
             robot.n_nearby += 1
 
 
-@kernel
+@part
 def aim_at_object(robot: np.record, senses: Senses, row: Row, c: np.record) -> bool:
     """Make the goal the middle of the cell of the nearest object in view; returns whether there is one."""
     left = (float(row[c.los_cell]) + 1.0) * c.half_width_m - _REACH * c.cell_m
@@ -264,7 +264,7 @@ def aim_at_object(robot: np.record, senses: Senses, row: Row, c: np.record) -> b
     return least < math.inf
 
 
-@kernel
+@part
 def walk(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -> tuple[float, float]:
     """One tick of the random walk of a search; returns the force.
 
@@ -286,7 +286,7 @@ def walk(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -
     return c.wander_speed_mps * math.cos(offset), c.wander_speed_mps * math.sin(offset)
 
 
-@kernel
+@part
 def search(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -> tuple[bool, float, float]:
     """One tick of a search; returns whether the robot stands over an object, and the force."""
     robot.search_ticks += 1
@@ -304,7 +304,7 @@ def search(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row)
     return False, x, y
 
 
-@kernel
+@part
 def go_on_a_trip(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -> tuple[bool, float, float]:
     """One tick without cargo; returns whether the robot stands over an object that it searched for, and the force."""
     if robot.stage == GIVE_UP and in_nest(row, c):

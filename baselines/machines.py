@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import inline_kernel, kernel
+from swarm_forage_env._internal.compiling import inline_kernel, kernel, part
 from swarm_forage_env.contract.codes import Event, Grip
 from swarm_forage_env.contract.detection import sees_object
 from swarm_forage_env.contract.layout import GROUND_SENSORS, RING_SENSORS
@@ -61,7 +61,7 @@ def restart_acquiring(robot: np.record) -> None:
     stop_vector(robot)
 
 
-@kernel
+@part
 def start_carrying(robot: np.record, activity: int) -> None:
     """Begin to carry the cargo to its destination: HOMING, or TRANSPORT with no goal and exploration not started."""
     robot.activity = activity
@@ -70,7 +70,7 @@ def start_carrying(robot: np.record, activity: int) -> None:
     stop_vector(robot)
 
 
-@kernel
+@part
 def follow_cargo(robot: np.record, senses: Senses, row: Row, c: np.record, loaded: int, emptied: int) -> bool:
     """Before the robot acts, adapt its activity to what happened since its last tick.
 
@@ -107,7 +107,7 @@ def follow_cargo(robot: np.record, senses: Senses, row: Row, c: np.record, loade
     return False
 
 
-@kernel
+@part
 def after_delivery(c: np.record) -> int:
     """Activity of CRW and DPO after a delivery: look for the next object at once, as the other two do.
 
@@ -116,7 +116,7 @@ def after_delivery(c: np.record) -> int:
     return LEAVE_NEST if c.nest_left_at_random else ACQUIRE
 
 
-@kernel
+@part
 def avoid(senses: Senses, c: np.record) -> tuple[float, float]:
     """Avoidance force if there is an obstacle, else zero."""
     if senses.obstacle:
@@ -124,7 +124,7 @@ def avoid(senses: Senses, c: np.record) -> tuple[float, float]:
     return 0.0, 0.0
 
 
-@kernel
+@part
 def random_walk(robot: np.record, senses: Senses, c: np.record, u: float) -> tuple[float, float]:
     """One tick of the correlated random walk: wander, and avoid what is in the way."""
     wander_x, wander_y = wander(robot, c, u)
@@ -132,7 +132,7 @@ def random_walk(robot: np.record, senses: Senses, c: np.record, u: float) -> tup
     return wander_x + away_x, wander_y + away_y
 
 
-@kernel
+@part
 def start_exploring(robot: np.record, senses: Senses, c: np.record, draws: Row) -> tuple[float, float]:
     """Start a random walk unless one is under way; returns the force that starting adds."""
     if robot.explore_ticks == NOT_EXPLORING:
@@ -142,7 +142,7 @@ def start_exploring(robot: np.record, senses: Senses, c: np.record, draws: Row) 
     return 0.0, 0.0
 
 
-@kernel
+@part
 def explore(robot: np.record, senses: Senses, c: np.record, draws: Row) -> tuple[float, float]:
     """One tick of a random walk that ends only when the robot sees what it looks for; returns the force."""
     x, y = start_exploring(robot, senses, c, draws)
@@ -151,7 +151,7 @@ def explore(robot: np.record, senses: Senses, c: np.record, draws: Row) -> tuple
     return x + walk_x, y + walk_y
 
 
-@kernel
+@part
 def explore_for_object(
     robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row
 ) -> tuple[bool, float, float]:
@@ -167,7 +167,7 @@ def explore_for_object(
     return False, x + walk_x, y + walk_y
 
 
-@kernel
+@part
 def explore_freely(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row, action: Row) -> bool:
     """Do one tick of `explore_for_object` and `command`, quickly, for a robot that does nothing but wander on.
 
@@ -189,7 +189,7 @@ def explore_freely(robot: np.record, senses: Senses, row: Row, c: np.record, dra
     return True
 
 
-@kernel
+@part
 def start_vector(robot: np.record) -> None:
     """Start going to the robot's goal; follow with `go_to_goal` in the same tick."""
     robot.vector_state = VECTOR
@@ -197,7 +197,7 @@ def start_vector(robot: np.record) -> None:
     robot.is_searching = False
 
 
-@kernel
+@part
 def stop_vector(robot: np.record) -> None:
     """Give up the goal."""
     robot.vector_state = VECTOR_IDLE
@@ -205,7 +205,7 @@ def stop_vector(robot: np.record) -> None:
     robot.is_searching = False
 
 
-@kernel
+@part
 def go_to_goal(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -> tuple[bool, float, float]:
     """One tick on the way to the goal: arrival force, avoidance, then 2 s straight on before turning back.
 
@@ -313,7 +313,7 @@ def acquire(
     return found, x + search_x, y + search_y
 
 
-@kernel
+@part
 def begin_detour(robot: np.record, senses: Senses, c: np.record, u: float) -> None:
     """Begin a detour where a robot has not come further for long; `u`, uniform in [0, 1), decides side and length."""
     dx = senses.x - robot.rest_x_m
@@ -330,7 +330,7 @@ def begin_detour(robot: np.record, senses: Senses, c: np.record, u: float) -> No
         robot.rest_ticks = 0
 
 
-@kernel
+@part
 def go_round(robot: np.record, senses: Senses, x: float, y: float, c: np.record) -> tuple[float, float]:
     """One tick of a detour; returns the force, where (x, y) is the one towards the light.
 
@@ -345,7 +345,7 @@ def go_round(robot: np.record, senses: Senses, x: float, y: float, c: np.record)
     return side * away_y + _OFF_THE_WALL * away_x, -side * away_x + _OFF_THE_WALL * away_y
 
 
-@kernel
+@part
 def home(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -> tuple[bool, float, float]:
     """One tick of carrying an object into the nest: towards the light, then deeper by a random amount.
 
@@ -384,7 +384,7 @@ def home(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -
     return False, x + walk_x, y + walk_y
 
 
-@kernel
+@part
 def deliver_and_leave(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -> tuple[float, float]:
     """One tick of homing or of leaving the nest; returns the force."""
     x = 0.0
@@ -398,7 +398,7 @@ def deliver_and_leave(robot: np.record, senses: Senses, row: Row, c: np.record, 
     return x, y
 
 
-@kernel
+@part
 def hold(row: Row, c: np.record, action: Row) -> None:
     """Write the action of a robot that is not at work: it stands and keeps its cargo.
 
@@ -409,13 +409,13 @@ def hold(row: Row, c: np.record, action: Row) -> None:
     action[2] = GRASP if row[c.carrying] > 0.5 else RELEASE
 
 
-@kernel
+@part
 def _count_turning(robot: np.record, action: Row) -> None:
     """Count the ticks in a row in which a robot is told to turn on the spot or to stand."""
     robot.turn_ticks = 0 if action[0] + action[1] > 0.0 else robot.turn_ticks + 1
 
 
-@kernel
+@part
 def command(robot: np.record, x: float, y: float, c: np.record, drop_grip: float, action: Row) -> None:
     """Write the action: wheels for the summed force (x, y), gripper for the activity (`drop_grip` asks to drop)."""
     activity = robot.activity

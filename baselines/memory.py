@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.compiling import kernel, part
 from swarm_forage_env.contract.layout import WINDOW_CELLS
 from swarm_forage_env.contract.policy import Memories
 from swarm_forage_env.contract.types import CodeArray, IntArray, ObsArray, Row
@@ -100,7 +100,7 @@ def new_memory(n_robots: int, n_objects: int) -> ObjectMemory:
     )
 
 
-@kernel
+@part
 def memory_of(memory: ObjectMemory, robot_index: int) -> OneMemory:
     """Return views of one robot's memory."""
     return OneMemory(
@@ -114,7 +114,7 @@ def memory_of(memory: ObjectMemory, robot_index: int) -> OneMemory:
     )
 
 
-@kernel
+@part
 def object_row_of(reading: float, c: np.record) -> int:
     """Object row that a reading (row + 1) / M stands for; -1 = none."""
     return int(reading * c.n_objects + 0.5) - 1
@@ -134,7 +134,7 @@ def remember(robot: np.record, memory: OneMemory, object_row: int, cell_x: int, 
     memory.seen[entry] = robot.clock
 
 
-@kernel
+@part
 def forget(robot: np.record, memory: OneMemory, object_row: int) -> None:
     """Remove an object; nothing happens if it is not remembered. The last list entry takes its place."""
     entry = memory.entry[object_row] - 1
@@ -150,7 +150,7 @@ def forget(robot: np.record, memory: OneMemory, object_row: int) -> None:
     robot.n_known = last
 
 
-@kernel
+@part
 def _sees_the_same(row: Row, c: np.record, memory: OneMemory) -> bool:
     """Whether the robot's cell and the window are those seen last."""
     window = row[c.los_object : c.los_object + _WINDOW].view(np.uint32)
@@ -163,7 +163,7 @@ def _sees_the_same(row: Row, c: np.record, memory: OneMemory) -> bool:
     return changes == 0 and same_x and same_y
 
 
-@kernel
+@part
 def look_around(robot: np.record, row: Row, c: np.record, memory: OneMemory) -> None:
     """One tick of the memory rule above, from the window in observation `row`. Advances the robot's clock."""
     robot.clock += 1
@@ -186,7 +186,7 @@ def look_around(robot: np.record, row: Row, c: np.record, memory: OneMemory) -> 
         remember(robot, memory, object_row, robot.window_x + k % WINDOW_CELLS, robot.window_y + k // WINDOW_CELLS)
 
 
-@kernel
+@part
 def _forget_what_is_gone(robot: np.record, c: np.record, memory: OneMemory) -> None:
     """Forget objects whose remembered cell is in the window, but does not show them.
 

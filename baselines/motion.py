@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.compiling import kernel, part
 from swarm_forage_env.contract.detection import ring_sum
 from swarm_forage_env.contract.types import Row
 
@@ -29,7 +29,7 @@ _EVEN_TERMS = _TERMS[0::2].copy()
 _ODD_TERMS = _TERMS[1::2].copy()
 
 
-@kernel
+@part
 def _arctangent(slope: float) -> float:
     """Sum t - t^3/3 + t^5/5 - ... up to t^23, even and odd terms apart, which a processor adds at the same time."""
     square = slope * slope
@@ -42,7 +42,7 @@ def _arctangent(slope: float) -> float:
     return slope * (even + square * odd)
 
 
-@kernel
+@part
 def _drive_arc(size: float, is_left: bool, speed: float, c: np.record, wheels: Row) -> bool:
     """Write the wheel commands of a soft turn; see `drive`.
 
@@ -71,7 +71,7 @@ def _drive_arc(size: float, is_left: bool, speed: float, c: np.record, wheels: R
     return True
 
 
-@kernel
+@part
 def _next_wander_deg(angle_deg: float, c: np.record, u: float) -> float:
     """Angle of the next wander force: fmod(w + U(-m, m), m)."""
     most = c.wander_max_change_deg
@@ -130,7 +130,7 @@ def wander_freely(robot: np.record, c: np.record, u: float, wheels: Row) -> bool
     return True
 
 
-@kernel
+@part
 def avoidance(x: float, y: float, c: np.record) -> tuple[float, float]:
     """Avoidance force: exactly opposite to the summed proximity vector (x, y), which must not be zero."""
     share = -c.avoidance_speed_mps / math.sqrt(x * x + y * y)
@@ -176,13 +176,13 @@ def arrival(robot: np.record, x: float, y: float, cos: float, sin: float, c: np.
     return share * (dx * cos + dy * sin), share * (dy * cos - dx * sin)
 
 
-@kernel
+@part
 def recovery(c: np.record) -> tuple[float, float]:
     """Recovery force: straight ahead."""
     return c.recovery_speed_mps, 0.0
 
 
-@kernel
+@part
 def is_standing(wheel_speed: Row, c: np.record) -> bool:
     """Return whether the mean of two wheel readings means standing, spinning on the spot or driving backwards."""
     return 0.5 * (wheel_speed[0] + wheel_speed[1]) * c.wheel_scale_mps <= c.standing_speed_mps

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import inline_kernel, kernel
+from swarm_forage_env._internal.compiling import inline_kernel, kernel, part
 from swarm_forage_env.contract.detection import sees_object
 from swarm_forage_env.contract.layout import GROUND_SENSORS
 from swarm_forage_env.contract.types import Row
@@ -104,24 +104,24 @@ def select_best_object(
     return True
 
 
-@kernel
+@part
 def _never(_robot: np.record, _memory: OneMemory, _object_row: int) -> bool:
     return False
 
 
-@kernel
+@part
 def select_object(robot: np.record, senses: Senses, c: np.record, _draws: Row, memory: OneMemory) -> bool:
     """Choose the best remembered object, as `select_best_object`; no object is left out."""
     return select_best_object(robot, senses, c, memory, memory, _never)
 
 
-@kernel
+@part
 def object_is_known(robot: np.record, _c: np.record, memory: OneMemory) -> bool:
     """Whether the target object is still remembered."""
     return memory.entry[robot.target] > 0
 
 
-@kernel
+@part
 def object_is_reached(_robot: np.record, _senses: Senses, row: Row, c: np.record, _memory: OneMemory) -> bool:
     """Whether the ground sensors see an object."""
     return sees_object(row[c.ground : c.ground + GROUND_SENSORS])

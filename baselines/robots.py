@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.compiling import kernel, part
 from swarm_forage_env._internal.prefetching import AHEAD, LARGE, LINE, prefetch
 from swarm_forage_env.contract.detection import is_obstacle_vector, ring_is_empty, ring_sum, sees_nest
 from swarm_forage_env.contract.layout import EVENT_SCALE, GROUND_SENSORS, RING_SENSORS
@@ -161,7 +161,7 @@ def activity_codes(robots: np.ndarray) -> CodeArray:
     return codes
 
 
-@kernel
+@part
 def fetch_ahead(obs: ObsArray, robots: np.ndarray, i: int, c: np.record) -> None:
     """Ask the memory for a robot that is some rows further on, in a swarm that no cache of a processor holds."""
     if obs.shape[0] < LARGE:
@@ -210,7 +210,7 @@ def sense(row: Row, c: np.record) -> Senses:
     )
 
 
-@kernel
+@part
 def nearest_nest(x: float, y: float, c: np.record) -> tuple[float, float]:
     """Centre of the nest whose centre is nearest to a point, all in m. Our choice where there are several nests."""
     nests = c.nests_m
@@ -222,7 +222,7 @@ def nearest_nest(x: float, y: float, c: np.record) -> tuple[float, float]:
     return nests[nearest, 0], nests[nearest, 1]
 
 
-@kernel
+@part
 def in_nest(row: Row, c: np.record) -> bool:
     """Whether the ground sensors see the nest."""
     return sees_nest(row[c.ground : c.ground + GROUND_SENSORS])

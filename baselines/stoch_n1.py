@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.compiling import kernel, part
 from swarm_forage_env.contract.codes import SOURCE, TAB_CHILDREN, TAB_ROOT, Goal, Tab, Task
 from swarm_forage_env.contract.types import BoolArray, CodeArray, FloatArray, IntArray, Row
 from swarm_forage_env.scenarios.quirks import Quirks
@@ -55,7 +55,7 @@ class Allocation(NamedTuple):
     """(N, N_TASKS) whether the robot is where the task meets another one: at or on the way to a cache or its site."""
 
 
-@kernel
+@part
 def logistic(x: float) -> float:
     """1 / (1 + exp(-x)), without overflow."""
     small = math.exp(-abs(x))
@@ -89,7 +89,7 @@ def partition_probability(
     return min(1.0, gamma * logistic(reactivity * truncated(bracket, is_integer)))
 
 
-@kernel
+@part
 def truncated(value: float, is_integer: bool) -> float:
     """Return `value`, or its whole part under the quirk `integer_estimates`."""
     return float(int(value)) if is_integer else value
@@ -114,7 +114,7 @@ def switch_probability(last: float, other: float, reactivity: float, offset: flo
     return gamma * logistic(reactivity * (ratio - offset))
 
 
-@kernel
+@part
 def imbalance(root: float, subtasks: float, is_integer: bool) -> float:
     """Imbalance of a block: rho = |(T - S) / T|, truncated under the quirk; `root` must not be 0."""
     return truncated(abs(root - subtasks) / root, is_integer)
@@ -238,7 +238,7 @@ def new_allocation(
     )
 
 
-@kernel
+@part
 def _subtask_sum(a: Allocation, i: int, tab: int) -> float:
     return a.estimate[i, TAB_CHILDREN[tab, 0]] + a.estimate[i, TAB_CHILDREN[tab, 1]]
 
@@ -261,7 +261,7 @@ def end_task(a: Allocation, i: int, now: int, c: Row) -> None:
     )
 
 
-@kernel
+@part
 def move_tab(a: Allocation, i: int, c: Row, u: float) -> None:
     """Decide whether the active block moves by one level, after the task that has just ended.
 
@@ -290,7 +290,7 @@ def move_tab(a: Allocation, i: int, c: Row, u: float) -> None:
         a.tab[i] = candidate
 
 
-@kernel
+@part
 def choose_task(a: Allocation, i: int, c: Row, u_partition: float, u_switch: float) -> None:
     """Choose the next task inside the active block: its root or one of its subtasks."""
     tab = a.tab[i]
@@ -311,7 +311,7 @@ def choose_task(a: Allocation, i: int, c: Row, u_partition: float, u_switch: flo
     a.task[i] = TAB_CHILDREN[tab, last]
 
 
-@kernel
+@part
 def start_task(a: Allocation, i: int, now: int, c: Row) -> None:
     """Start the execution of the task that was chosen."""
     task = a.task[i]

@@ -15,7 +15,7 @@ Source: STOCHM and STOCHX of the paper, section "Candidate Algorithms".
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import inline_kernel, kernel
+from swarm_forage_env._internal.compiling import inline_kernel, kernel, part
 from swarm_forage_env.contract.codes import DESTINATION, SOURCE, Event, Goal, Task
 from swarm_forage_env.contract.detection import sees_cache
 from swarm_forage_env.contract.layout import CACHE_FIELDS, GROUND_SENSORS
@@ -119,12 +119,12 @@ def new_task_robots(n_robots: int) -> np.ndarray:
     return robots
 
 
-@kernel
+@part
 def _is_shunned(robot: np.record, memory: OneTaskMemory, object_row: int) -> bool:
     return memory.shunned[object_row] == robot.shun_round
 
 
-@kernel
+@part
 def select_goal(robot: np.record, senses: Senses, c: np.record, draws: Row, memory: OneTaskMemory) -> bool:
     """Choose the best goal of the kind that the robot acquires; see `machines.acquire`."""
     if robot.goal_kind == _OBJECT:
@@ -136,7 +136,7 @@ def select_goal(robot: np.record, senses: Senses, c: np.record, draws: Row, memo
     return select_isolated_object(robot, senses, c, memory)
 
 
-@kernel
+@part
 def goal_is_known(robot: np.record, c: np.record, memory: OneTaskMemory) -> bool:
     """Whether the goal is still worth going to."""
     if robot.goal_kind == _OBJECT:
@@ -144,7 +144,7 @@ def goal_is_known(robot: np.record, c: np.record, memory: OneTaskMemory) -> bool
     return robot.goal_kind != _CACHE or cache_is_known(robot, c, memory)
 
 
-@kernel
+@part
 def goal_is_reached(robot: np.record, senses: Senses, row: Row, c: np.record, memory: OneTaskMemory) -> bool:
     """Whether what the robot came for is there."""
     if robot.goal_kind == _OBJECT:
@@ -154,7 +154,7 @@ def goal_is_reached(robot: np.record, senses: Senses, row: Row, c: np.record, me
     return robot.goal_kind == _SITE or object_is_near(robot, senses, c, memory.objects)
 
 
-@kernel
+@part
 def search_for_goal(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -> tuple[bool, float, float]:
     """One tick of the search that suits the goal.
 
@@ -172,7 +172,7 @@ def search_for_goal(robot: np.record, senses: Senses, row: Row, c: np.record, dr
     return False, x, y
 
 
-@kernel
+@part
 def search_from_last_cache(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -> tuple[float, float]:
     """One tick of looking for caches: first to where the last known one was, if any, then at random."""
     x = 0.0
@@ -192,7 +192,7 @@ def search_from_last_cache(robot: np.record, senses: Senses, row: Row, c: np.rec
     return x + step_x, y + step_y
 
 
-@kernel
+@part
 def _search_step(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row, u: float) -> tuple[float, float]:
     if not robot.is_searching:
         return random_walk(robot, senses, c, u)
@@ -265,7 +265,7 @@ def manage_task(
     return True
 
 
-@kernel
+@part
 def stands_at_site(robot: np.record, senses: Senses, c: np.record, draws: Row, memory: OneTaskMemory) -> bool:
     """Quirk `no_walk_at_site`: choose a site; whether the robot is so near that it drifts there and chooses again.
 
@@ -297,7 +297,7 @@ def run_machine(
     return x, y
 
 
-@kernel
+@part
 def wanders_on(robot: np.record, senses: Senses, c: np.record, draws: Row, memory: OneTaskMemory) -> bool:
     """Whether a robot that walks at random, in search of an object or a cache, has found nothing to go to.
 

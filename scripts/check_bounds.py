@@ -24,7 +24,6 @@ TESTS = (
     "tests/promises/test_conservation.py",
     "tests/rendering/test_paint.py",
     "tests/world/test_neighbourhood.py",
-    "tests/world/test_lockstep.py",
     "tests/wrappers/test_noise.py",
 )
 CHOICE = (

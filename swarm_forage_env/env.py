@@ -313,8 +313,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
     ) -> tuple[ActionArray, FloatArray | None]:
         """Do what comes before the arena's step, and return what the arena is to be stepped with.
 
-        `begin_step`, the arena's step and `end_step` are `step_batch`; this is for arenas that are stepped together
-        (`world.lockstep`).
+        `begin_step`, the arena's step and `end_step` are `step_batch`.
         """
         actions = self.checked_actions(actions)
         wheel_gain = checked_gain(wheel_gain, len(actions))
@@ -362,7 +361,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         arena, seed = self._world, self.seed_value
         assert seed is not None, "there is a world"
         own = {name: getattr(self, name) for name in _STATE}
-        states = [own, arena.__getstate__(), *(wrapper.__getstate__() for wrapper in wrappers)]
+        states = [own, dict(vars(arena)), *(wrapper.__getstate__() for wrapper in wrappers)]
         return take(self._origin(wrappers), seed, self.tick, states, self._parts(wrappers))
 
     def restore_through(self, snapshot: Snapshot, wrappers: Sequence[Any]) -> None:
@@ -370,7 +369,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         own, of_arena, *of_wrappers = read(snapshot, self._origin(wrappers), self._parts(wrappers))
         vars(self).update(own)
         self._is_half_done = False
-        self.arena.__setstate__(of_arena)
+        vars(self.arena).update(of_arena)
         for wrapper, state in zip(wrappers, of_wrappers, strict=True):
             wrapper.__setstate__(state)
 

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.compiling import kernel, part
 from swarm_forage_env.contract.layout import GROUND_SENSORS, RING_SENSORS
 from swarm_forage_env.contract.types import ObsArray
 
@@ -79,7 +79,7 @@ def sees_obstacle(proximity: ObsArray, behind_counts: bool) -> bool:
     return is_obstacle_vector(x, y, behind_counts)
 
 
-@kernel
+@part
 def _count_in_band(ground: ObsArray, low: float, high: float) -> int:
     count = 0
     for k in range(GROUND_SENSORS):

@@ -1,12 +1,11 @@
 """KernelPolicy: a policy whose tick is one kernel, called by Python or by the compiled tick of the world."""
 
 from collections.abc import Callable
-from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import Callback, direct
+from swarm_forage_env._internal.compiling import Callback, Calls
 from swarm_forage_env._internal.rng import TickDraws
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
@@ -50,6 +49,7 @@ class CompiledPolicy:
         state: What the kernel edits; the last are the actions, (N, A) float32.
         task: (N,) `Task` codes that the kernel keeps up to date, None for a policy without tasks.
         decision_ticks: See `KernelPolicy`.
+        call: Calls of the compiled loop of the world, whose types depend on `state`.
     """
 
     def __init__(
@@ -59,6 +59,7 @@ class CompiledPolicy:
         self.state = state
         self.task: CodeArray | None = getattr(policy, "task", None)
         self.decision_ticks = policy.decision_ticks
+        self.call = Calls()
         self._policy = policy
         self._chance = chance
         self.callback = Callback(kernel, *example_of(state))
@@ -114,12 +115,7 @@ class KernelPolicy:
         self._actions: ActionArray = state[-1]
         self.n_ticks = 0
         self._compiled = None
-        self.__dict__.pop("_step", None)
-
-    @cached_property
-    def _step(self) -> Callable[..., None]:
-        """The compiled version of the kernel, found once and not in every tick."""
-        return direct(self._kernel, *example_of(self._state))
+        self._call = Calls()
 
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
         """Choose actions; see `Policy.act`. The returned (N, A) array is reused by the next call."""
@@ -129,7 +125,7 @@ class KernelPolicy:
         obs, active = np.ascontiguousarray(obs, np.float32), np.ascontiguousarray(active, np.bool_)
         self.n_ticks += 1
         self._draws = self._chance.row(self.n_ticks)
-        self._step(obs, active, self._draws, self._state, self.n_ticks)
+        self._call(self._kernel, obs, active, self._draws, self._state, self.n_ticks)
         self.check_ticks()
         return self._actions
 
@@ -150,7 +146,7 @@ class KernelPolicy:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what copies are made of: everything but the compiled version, which cannot be stored."""
-        return {name: value for name, value in self.__dict__.items() if name not in ("_step", "_compiled")}
+        return {name: value for name, value in self.__dict__.items() if name != "_compiled"}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)

@@ -24,7 +24,7 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any, TypeAlias, TypeVar
 
-from swarm_forage_env._internal.compiling import tell_of_first_run
+from swarm_forage_env._internal.compiling import is_kept, tell_of_first_run
 from swarm_forage_env._internal.fields import as_whole
 from swarm_forage_env._internal.files import check_folder
 from swarm_forage_env.policies import trust
@@ -33,7 +33,7 @@ from swarm_forage_env.runs.record import RecordError, RunRecord
 from swarm_forage_env.runs.run import run_one, warm_up
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import RunFailure, RunStore
-from swarm_forage_env.world.compiled import is_first
+from swarm_forage_env.world.kernels.tick import observe
 
 Outcome: TypeAlias = RunRecord | RunFailure
 Result = TypeVar("Result")
@@ -311,10 +311,7 @@ def _warm_up_workers(pool: Executor, specs: Iterable[RunSpec]) -> None:
         WorkerError: a worker was killed.
     """
     kinds = tuple({_kernel_kind(spec): spec for spec in specs}.values())
-    asked = pool.submit(is_first, kinds[0].scenario)
-    if _is_broken_by(asked):
-        raise WorkerError(KILLED)
-    if asked.exception() is None and asked.result():
+    if not is_kept(observe):
         tell_of_first_run()  # workers have nobody to tell
     for spec in kinds:
         if _is_broken_by(pool.submit(warm_up, spec)):

@@ -20,20 +20,16 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import as_whole
 from swarm_forage_env.contract.codes import Counter
-from swarm_forage_env.contract.policy import COMMANDS
-from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env.contract.types import BoolArray, IntArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.extras import ExtraFunction, ExtraFunctionError
 from swarm_forage_env.policies.interface import GivenInterface
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.views.bookkeeping import Bookkeeping, can_book_together
 from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.plans import ArenaPlan, plan_arena
 from swarm_forage_env.views.sampler import ScenarioSampler
-from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.world.kernels.reward import book_rows
-from swarm_forage_env.world.lockstep import Lockstep, can_go_in_lockstep
-from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig, steps_as_made
+from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -169,16 +165,12 @@ class ArenaBatch:
         self.n_rows = n_arenas * self.n_robots
         self.render_mode = plan.render_mode
         self._is_reset = self._is_closed = False
-        self._is_sampled = plan.sampler is not None
         self._absent = np.zeros((n_arenas, self.n_robots), np.bool_)
         self._present = np.zeros((n_arenas, self.n_robots), np.bool_)
         self._returns = np.zeros((n_arenas, self.n_robots), np.float64)
         self._lengths = np.zeros((n_arenas, self.n_robots), np.int32)
         self._n_columns = self.interface.layout.size
-        action_size = COMMANDS + plan.world.scenario.robots.message_size
-        self._commands = np.zeros((n_arenas, self.n_robots, action_size), np.float32)
         self._rows = self._absent, self._present, self._returns, self._lengths
-        self._ways: tuple[list[ForagingArena], Lockstep | None, Bookkeeping | None] | None = None
         self._no_endings = _Endings().joined(self._n_columns)
 
     def reset(
@@ -233,14 +225,11 @@ class ArenaBatch:
         obs = np.empty((*shape, columns), np.float32)
         rewards = np.zeros(shape, np.float32)
         flags = np.zeros((3, *shape), np.bool_)
-        lockstep, books = self._chosen_ways()
         actions = actions.reshape(*shape, *actions.shape[1:])
         try:
-            if lockstep is not None:
-                ticks = self._together(lockstep, books, actions, rewards)
-            else:
-                ticks = [self._alone(number, actions[number], rewards[number]) for number in range(self.n_arenas)]
-            n_terminated = self._book(books, ticks, rewards, (flags[0], flags[2]), obs)
+            ticks = [self._alone(number, actions[number], rewards[number]) for number in range(self.n_arenas)]
+            for arena, out in zip(self.arenas, obs, strict=True):
+                arena.observe(out)
         except ExtraFunctionError:
             self._is_reset = False
             for arena in self.arenas:  # some have been stepped and some not
@@ -248,7 +237,12 @@ class ArenaBatch:
             raise
         endings: _Endings | None = None
         for number, (dead, all_dead, at_horizon) in enumerate(ticks):
-            if n_terminated[number] or all_dead or at_horizon:
+            n_robots = self.arenas[number].n_robots
+            booked: Any = (rewards, *self._rows, flags[0], flags[2])
+            n_terminated = book_rows(
+                self.arenas[number].forage_env.swarm, dead, *(rows[number, :n_robots] for rows in booked)
+            )
+            if n_terminated or all_dead or at_horizon:
                 endings = endings or _Endings()
                 out = obs[number], *flags[:, number]
                 self._conclude(number, dead, all_dead or at_horizon, out, endings)
@@ -258,88 +252,6 @@ class ArenaBatch:
         return ArenaStep(
             obs=obs, rewards=rewards.ravel(), terminated=rows[0], truncated=rows[1], active=rows[2], **ended
         )
-
-    def _together(
-        self, lockstep: Lockstep, books: Bookkeeping | None, actions: np.ndarray, rewards: np.ndarray
-    ) -> list[tuple[BoolArray, bool, bool]]:
-        """Carry out a decision in all arenas; returns what `LearnerArena.step` does, for each.
-
-        Args:
-            lockstep: What steps them.
-            books: What works out their rewards, if it can.
-            actions: (A, N) or (A, N, k).
-            rewards: (A, N), to be added to.
-        """
-        payer = books if books is not None and books.pays else None
-        ticks: list[tuple[BoolArray, bool, bool]] = [(_NOBODY, False, False)] * self.n_arenas
-        going = list(range(self.n_arenas))
-        for _ in range(self.interface.config.decision_ticks):
-            if payer is not None and self.arenas[0].passes_on and actions.shape == self._commands.shape:
-                np.copyto(self._commands, actions, casting="same_kind")
-                payer.remember(going)
-                gains: dict[int, FloatArray | None] = dict.fromkeys(going)
-            else:
-                gains = {number: self._begin(number, actions[number]) for number in going}
-            for number, error in lockstep.step(gains, self._commands).items():
-                self._note(error, number)
-                raise error
-            if payer is not None:
-                payer.pay(going, rewards)
-            for number in going:
-                arena = self.arenas[number]
-                ticks[number] = arena.ending if payer else arena.take(arena.env.end_step(), rewards[number])
-            going = [number for number in going if not any(ticks[number][1:])]
-            if not going:
-                break
-        for arena, earned in zip(self.arenas, rewards, strict=True):
-            arena.add_extra(earned)
-        return ticks
-
-    def _book(
-        self,
-        books: Bookkeeping | None,
-        ticks: Sequence[tuple[BoolArray, bool, bool]],
-        rewards: np.ndarray,
-        flags: tuple[BoolArray, BoolArray],
-        obs: ObsArray,
-    ) -> list[int]:
-        """Book a decision of every arena, see `book_rows`, and write what learners see.
-
-        Args:
-            books: What does it for all at once, if there is something.
-            ticks: What the last tick of each arena has brought, see `LearnerArena.step`.
-            rewards: (A, N)
-            flags: terminated, active, each (A, N), are written.
-            obs: (A, N, d) is written.
-
-        Returns:
-            How many rows of each arena terminate.
-        """
-        if books is not None:
-            n_terminated = books.book(rewards, self._rows, flags, obs)
-        else:
-            n_terminated = [
-                book_rows(
-                    arena.forage_env.swarm,
-                    ticks[number][0],
-                    *(row[: arena.n_robots] for row in rows),
-                )
-                for number, (arena, *rows) in enumerate(zip(self.arenas, rewards, *self._rows, *flags, strict=True))
-            ]
-        if books is None or not books.copies:
-            for arena, out in zip(self.arenas, obs, strict=True):
-                arena.observe(out)
-        return n_terminated
-
-    def _begin(self, number: int, actions: np.ndarray) -> FloatArray | None:
-        """Write the commands of an arena's next tick; returns the gains on the wheels' speeds, if there are any."""
-        arena = self.arenas[number]
-        try:
-            self._commands[number], gain = arena.env.begin_step(arena.command(actions))
-        except ValueError as error:
-            self._note(error, number)
-            raise
-        return gain
 
     def _alone(self, number: int, actions: np.ndarray, rewards: np.ndarray) -> tuple[BoolArray, bool, bool]:
         arena = self.arenas[number]
@@ -355,21 +267,6 @@ class ArenaBatch:
             f"This was in arena {number}, which was not stepped. Other arenas may have been "
             "stepped already; where there are others, reset before going on."
         )
-
-    def _chosen_ways(self) -> tuple[Lockstep | None, Bookkeeping | None]:
-        """Return what steps all arenas together and what books a step of all together.
-
-        Either is None where arenas have to be taken one by one.
-        """
-        worlds = [arena.forage_env.arena for arena in self.arenas]
-        if self._ways is None or worlds != self._ways[0]:  # by identity
-            in_parts = not self._is_sampled and all(map(_steps_in_parts, self.arenas))
-            alone = not self.interface.passes_on and all(arena.decides_at_once for arena in self.arenas)
-            lockstep = Lockstep(worlds) if in_parts and not alone and can_go_in_lockstep(worlds) else None
-            self._ways = worlds, lockstep, Bookkeeping(self.arenas) if in_parts and can_book_together() else None
-        elif self._ways[2] is not None:
-            self._ways[2].follow()
-        return self._ways[1:]
 
     def _conclude(
         self,
@@ -460,17 +357,6 @@ class ArenaBatch:
         self._is_closed = True
         for arena in self.arenas:
             arena.env.close()
-
-
-def _steps_in_parts(arena: LearnerArena) -> bool:
-    """Whether a step of the stack is `begin_step`, the arena's step and `end_step`, and nobody has replaced it.
-
-    The outermost layer and the environment are asked; `step_batch` of what is between them is never called.
-    """
-    return steps_as_made(arena.env) and steps_as_made(arena.forage_env)
-
-
-_NOBODY: BoolArray = np.zeros(0, np.bool_)
 
 
 def _joined(parts: list[np.ndarray], nothing: np.ndarray) -> np.ndarray:

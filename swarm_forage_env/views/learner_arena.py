@@ -88,16 +88,6 @@ class LearnerArena:
         """Robots of this run, at most as many as there are rows."""
         return self.forage_env.scenario.robots.n_robots
 
-    @property
-    def shows_all(self) -> bool:
-        """Whether the learner sees the rows of the environment as they are."""
-        return self.interface.shows_all
-
-    @property
-    def passes_on(self) -> bool:
-        """Whether actions are commands of the environment as they are."""
-        return self.interface.passes_on
-
     def _built(
         self, overrides: Mapping[str, Any], world: World | None
     ) -> tuple[ForageEnv | SwarmWrapper, LearnerInterface]:

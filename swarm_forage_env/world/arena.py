@@ -2,14 +2,12 @@
 
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import Callback
+from swarm_forage_env._internal.compiling import Callback, Calls
 from swarm_forage_env._internal.fields import whole
-from swarm_forage_env._internal.held import hold
 from swarm_forage_env._internal.rng import Stream, TickDraws, stream_rng
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.kernel_policy import CompiledPolicy
@@ -21,8 +19,7 @@ from swarm_forage_env.scenarios.floor import CELLS_PER_M
 from swarm_forage_env.world.allocation import new_arrays, new_state
 from swarm_forage_env.world.bodies import Bodies
 from swarm_forage_env.world.caches import create_dynamic_caches, create_static_caches, restore_static_caches
-from swarm_forage_env.world.compiled import CompiledTick, tasks_of
-from swarm_forage_env.world.kernels.bodies import BodyState
+from swarm_forage_env.world.kernels import tick as kernels
 from swarm_forage_env.world.kernels.disturbances import Disturbances
 from swarm_forage_env.world.kernels.interact import drop_cargo
 from swarm_forage_env.world.kernels.tick import DONE, NO_ROOM, TO_PLACE
@@ -39,12 +36,10 @@ from swarm_forage_env.world.placement import (
 )
 from swarm_forage_env.world.rewards import RewardModel
 from swarm_forage_env.world.sensors import light_of_carriers_only, new_sensors, read_slices
-from swarm_forage_env.world.state import ArenaArrays, Source, listed
+from swarm_forage_env.world.state import Source, listed
 
 UNDISTURBED = Disturbances()
 _NO_TASKS, _NO_SHARES = np.zeros(0, np.int8), np.zeros(1)
-_OF_PROCESS = ("_compiled", "_held")
-"""Attributes of an arena that hold functions and addresses: made when they are needed, for the arrays of a run."""
 
 
 class ForagingArena:
@@ -109,36 +104,14 @@ class ForagingArena:
         self.obs = sensors.obs
         twist = self._physics.twist
         self._arrays = new_arrays(config, state, sensors, twist, source, placement_draws, self._static_caches)
-        self._forget_addresses()
+        self._call = Calls()
         self._neighbourhood = Neighbourhood(config.robots, self.layout, self.reads)
         self.has_changed = False
         return self.observe()
 
-    def _forget_addresses(self) -> None:
-        """Forget what belongs to the arrays of the run before."""
-        for name in _OF_PROCESS:
-            vars(self).pop(name, None)
-
-    @cached_property
-    def _held(self) -> ArenaArrays:
-        """The arrays, as compiled code takes them from Python."""
-        return hold(self._arrays)
-
-    @cached_property
-    def _compiled(self) -> CompiledTick:
-        return CompiledTick(self._arrays, self._physics.state if isinstance(self._physics, Bodies) else None)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return what copies and snapshots are made of: everything but functions and addresses."""
-        return {name: value for name, value in vars(self).items() if name not in _OF_PROCESS}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state)
-        self._forget_addresses()
-
     def observe(self) -> ObsArray:
         """Return the observation (N, D) of the world as it is now; only needed after a change between two steps."""
-        self._compiled.observe(self._held)
+        self._call(kernels.observe, self._arrays)
         self._sense_further()
         return self.obs
 
@@ -183,16 +156,16 @@ class ForagingArena:
         """
         tick = self.tick + 1
         gain = self._unit_gain if wheel_gain is None else np.ascontiguousarray(wheel_gain, np.float64)
-        held, compiled, physics = self._held, self._compiled, self._physics
+        call, arrays, physics = self._call, self._arrays, self._physics
         picks, walks = self.draws(tick)
         draws = picks[0], walks[0]
         if isinstance(physics, Bodies):
-            outcome = compiled.whole(held, physics.held, actions, gain, tick, self.has_changed, *draws)
+            outcome = call(kernels.whole, arrays, physics.state, actions, gain, tick, self.has_changed, *draws)
         else:
-            outcome = compiled.set_out(held, actions, gain, tick, self.has_changed)
+            outcome = call(kernels.set_out, arrays, actions, gain, tick, self.has_changed)
             if outcome == DONE:
                 physics.advance(self.swarm)
-                outcome = compiled.meet_and_close(held, actions, tick, *draws)
+                outcome = call(kernels.meet_and_close, arrays, actions, tick, *draws)
         self.conclude(outcome, actions, gain, tasks)
         return self.obs
 
@@ -234,13 +207,13 @@ class ForagingArena:
         picks, walks = self.draws(self.tick)
         if outcome == NO_ROOM:
             self._physics.advance(self.swarm)
-            outcome = self._compiled.meet_and_close(self._held, actions, self.tick, picks[0], walks[0])
+            outcome = self._call(kernels.meet_and_close, self._arrays, actions, self.tick, picks[0], walks[0])
         if outcome == TO_PLACE:
             self._create_dynamic_caches()
             self._replace_displaced()
             self._restore_caches(tasks)
             self._arrays.sensors.kept[0] = False  # nobody has listed which squares of the floor have changed
-            self._compiled.close(self._held, walks[0])
+            self._call(kernels.close, self._arrays, walks[0])
 
     def run(
         self,
@@ -275,15 +248,17 @@ class ForagingArena:
             ValueError: task codes that cannot be counted; their tick has happened.
             RuntimeError: bodies that are not compiled.
         """
-        first, tasks = self.tick + 1, tasks_of(policy) if task_shares is not None else _NO_TASKS
+        first = self.tick + 1
+        tasks = _NO_TASKS if task_shares is None or policy.task is None else policy.task
         gain = self._unit_gain if wheel_gain is None else np.ascontiguousarray(wheel_gain, np.float64)
         now, policy_draws = policy.next_ticks()
         picks, walks = self.draws(first)
         n_drawn = min(len(rows) for rows in (policy_draws, picks, walks) if rows is not self._nothing)
         with self._observation_kept(kept):
-            n_begun, outcome, tasks_counted = self._compiled.run(
-                policy,
-                *self.parts,
+            n_begun, outcome, tasks_counted = policy.call(
+                kernels.run,
+                self._arrays,
+                self._bodies.state,
                 disturbances,
                 gain,
                 first,
@@ -333,8 +308,10 @@ class ForagingArena:
         first = self.tick + 1
         picks, walks = self.draws(first)
         n_drawn = min((len(rows) for rows in (picks, walks) if rows is not self._nothing), default=n_ticks)
-        n_begun, outcome = self._compiled.decide(
-            *self.parts,
+        n_begun, outcome = self._call(
+            kernels.decide,
+            self._arrays,
+            self._bodies.state,
             disturbances,
             rewards.payment,
             self._unit_gain,
@@ -368,19 +345,12 @@ class ForagingArena:
         """Whether Python is needed in every tick: for neighbours, messages or sensors of the user."""
         return self._needs_python
 
-    # For `world.lockstep`
-
     @property
-    def bodies(self) -> Bodies:
+    def _bodies(self) -> Bodies:
         """The compiled bodies of the run; raises RuntimeError where Chipmunk has them."""
         if not isinstance(self._physics, Bodies):
             raise RuntimeError('Expected physics "compiled", got "chipmunk".')
         return self._physics
-
-    @property
-    def parts(self) -> tuple[ArenaArrays, BodyState]:
-        """What the compiled tick works on, held; other objects after a reset, and where bodies need more room."""
-        return self._held, self.bodies.held
 
     def _create_dynamic_caches(self) -> None:
         creators = listed(self._requests.creators)

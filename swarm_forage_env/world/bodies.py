@@ -5,14 +5,11 @@ proximity sensing found. Only robots that can touch something within the tick ar
 `swarm_forage_env/world/kernels/bodies.py` says how contacts are resolved.
 """
 
-from collections.abc import Callable
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import direct
-from swarm_forage_env._internal.held import hold
+from swarm_forage_env._internal.compiling import Calls
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.world.kernels.bodies import WALLS, BodyState, move_bodies, tell_poses
@@ -56,6 +53,7 @@ class Bodies:
         poses = np.zeros((n_robots + 1, 3))
         poses[:-1, :2], poses[:-1, 2] = position, heading
         self._dt_s = float(config.dt_s)
+        self._call = Calls()
         obstacles = obstacle_rows(config)
         self.state = BodyState(
             poses=poses,
@@ -67,24 +65,6 @@ class Bodies:
             n_substeps=len(config.physics_substeps),
             **_room_for(n_robots, PAIRS_PER_ROBOT * n_robots, WALLS + len(obstacles)),
         )
-
-    @cached_property
-    def held(self) -> BodyState:
-        """`state`, as compiled code takes it from Python; another object where there is more room."""
-        return hold(self.state)
-
-    @cached_property
-    def _move(self) -> Callable[[BodyState, FloatArray, BoolArray, float], bool]:
-        return direct(move_bodies, self.held, self.twist, self.state.near, self._dt_s)
-
-    @cached_property
-    def _tell(self) -> Callable[[FloatArray, BoolArray, FloatArray, FloatArray, FloatArray], None]:
-        poses = self.state.poses
-        return direct(tell_poses, poses, self.state.near, poses, np.zeros(len(poses) - 1), poses)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return what copies and snapshots are made of: everything but compiled functions, which cannot be stored."""
-        return {name: value for name, value in vars(self).items() if name not in ("held", "_move", "_tell")}
 
     @property
     def n_pairs(self) -> int:
@@ -99,13 +79,12 @@ class Bodies:
         n_contacts[:] = before[0]
         contacts[: len(before[1])] = before[1]
         self.state = self.state._replace(**more)
-        vars(self).pop("held", None)
 
     def advance(self, swarm: SwarmState) -> None:
         """Move all bodies by one tick along `twist` and write position, heading and facing of present robots."""
-        while not self._move(self.held, self.twist, swarm.present, self._dt_s):
+        while not self._call(move_bodies, self.state, self.twist, swarm.present, self._dt_s):
             self.make_room()
-        self._tell(self.state.poses, swarm.present, swarm.position, swarm.heading, swarm.facing)
+        self._call(tell_poses, self.state.poses, swarm.present, swarm.position, swarm.heading, swarm.facing)
 
     def poses(self) -> FloatArray:
         """Poses of all bodies, (N + 1, 3): x, y in m and unwrapped angle in rad; `advance` edits them."""

@@ -1,13 +1,10 @@
 """Rewards of a swarm for learners: the terms of `kernels.reward`, weighted by `scenarios.config.RewardConfig`."""
 
-from collections.abc import Callable, Sequence
-from functools import cached_property
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import direct
-from swarm_forage_env._internal.held import hold
+from swarm_forage_env._internal.compiling import Calls
 from swarm_forage_env.scenarios.config import RewardConfig
 from swarm_forage_env.world.kernels.reward import Payment, Weights, rewards
 from swarm_forage_env.world.state import StepEvents, SwarmState
@@ -33,6 +30,7 @@ class RewardModel:
         """
         self._is_progress_paid = bool(config.nest_progress)
         self._is_team = config.team
+        self._call = Calls()
         self._payment = Payment(
             swarm=swarm,
             events=events,
@@ -44,22 +42,10 @@ class RewardModel:
             is_dense=bool(config.nest_progress or config.interference or config.tick),
         )
 
-    @cached_property
-    def _held(self) -> Payment:
-        return hold(self._payment)
-
-    @cached_property
-    def _rewards(self) -> Callable[[Payment], None]:
-        return direct(rewards, self._held)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return what copies and snapshots are made of: everything but functions and addresses."""
-        return {name: value for name, value in vars(self).items() if name not in {"_held", "_rewards"}}
-
     @property
     def payment(self) -> Payment | None:
         """What `kernels.reward.pay` does the work of `reward` with; None where it cannot: `team`."""
-        return None if self._is_team else self._held
+        return None if self._is_team else self._payment
 
     def remember(self) -> None:
         """Keep the positions before a step, if a term needs them."""
@@ -75,7 +61,7 @@ class RewardModel:
         if not (p.events.happened[0] or p.is_dense):
             p.reward[:] = 0.0
             return p.reward
-        self._rewards(self._held)
+        self._call(rewards, p)
         if self._is_team:
             active = p.swarm.active
             p.reward[:] = p.total.sum() / max(1, np.count_nonzero(active)) * active

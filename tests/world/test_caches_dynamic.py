@@ -220,7 +220,6 @@ def clustered_world(clusters=EVERYWHERE, *, n_objects: int = 4, **overrides) -> 
         np.array(clusters, np.int32), np.full(n_clusters, 16, np.int32), np.array([0, n_clusters], np.int32)
     )
     env.arena._arrays = env.arena._arrays._replace(source=source)
-    env.arena._forget_addresses()
     return env
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.compiling import kernel, part
 from swarm_forage_env.contract.types import ActionArray, IntArray, ObsArray
 
 N_FRAMES = 8
@@ -38,7 +38,7 @@ class Frames(NamedTuple):
     """(d,) room to work in."""
 
 
-@kernel
+@part
 def _sum(a: np.uint64, b: np.uint64) -> np.uint64:
     """Return a + b modulo 2^64, half by half: numpy warns of overflow where this is not compiled."""
     low = (a & _HALF) + (b & _HALF)
@@ -46,7 +46,7 @@ def _sum(a: np.uint64, b: np.uint64) -> np.uint64:
     return (high << _HALF_BITS) | (low & _HALF)
 
 
-@kernel
+@part
 def _product(a: np.uint64, b: np.uint64) -> np.uint64:
     """Return a * b modulo 2^64, in the same way."""
     low = (a & _HALF) * (b & _HALF)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.compiling import kernel, part
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.contract.detection import is_obstacle_vector, ring_sum, sees_cache, sees_nest
 from swarm_forage_env.contract.layout import GROUND_SENSORS, RING_SENSORS, WINDOW_CELLS
@@ -67,13 +67,13 @@ _GRASP, _RELEASE, _DELIVER = _NUMBERS["grasp"], _NUMBERS["release"], _NUMBERS["d
 _SITE, _CREATE_CACHE = _NUMBERS["site"], _NUMBERS["create_cache"]
 
 
-@kernel
+@part
 def is_over_object(row: ObsArray, object_start: int) -> bool:
     """Return whether a free object lies in the robot's own cell, the centre of its line-of-sight window."""
     return row[object_start + _OWN_CELL] > 0.0
 
 
-@kernel
+@part
 def nearest_object(row: ObsArray, starts: tuple[int, int, int], half_x: float, half_y: float) -> tuple[float, float]:
     """Vector in m, along the axes of the arena, to the nearest object in view; (inf, inf) when there is none.
 
@@ -99,7 +99,7 @@ def nearest_object(row: ObsArray, starts: tuple[int, int, int], half_x: float, h
     return best_x, best_y
 
 
-@kernel
+@part
 def nearest_cache(row: ObsArray, starts: tuple[int, int], half_x: float, half_y: float) -> tuple[float, float]:
     """Vector in m, along the axes of the arena, to the centre of the nearest visible cache; (inf, inf) without one.
 
@@ -111,7 +111,7 @@ def nearest_cache(row: ObsArray, starts: tuple[int, int], half_x: float, half_y:
     return (row[caches + 1] - row[position]) * half_x, (row[caches + 2] - row[position + 1]) * half_y
 
 
-@kernel
+@part
 def write_direction(out: ObsArray, at: int, x: float, y: float, cos: float, sin: float) -> None:
     """Write a vector into three columns: forward and left over VIEW_REACH_M, cut to length 1; whether there is one."""
     if x == math.inf:
@@ -221,7 +221,7 @@ class Translation(NamedTuple):
     """(N_GRIPS,)."""
 
 
-@kernel
+@part
 def is_near(place: FloatArray, x: float, y: float) -> bool:
     """Return whether a place lies in the window of a robot at (x, y), wherever in its cell the robot is."""
     return abs(place[0] - x) < _NEAR_M and abs(place[1] - y) < _NEAR_M
@@ -296,7 +296,7 @@ def show_sites(
             out[i, at + 3] = min(1.0, math.sqrt(x * x + y * y) / FAR_M)
 
 
-@kernel
+@part
 def idle_grip(row: ObsArray, carrying: int) -> float:
     """Gripper command without a request: hold when carrying, release when empty."""
     return GRASP if row[carrying] > 0.5 else RELEASE

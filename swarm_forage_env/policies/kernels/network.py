@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.compiling import kernel, part
 from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, IntArray, ObsArray, Row
 from swarm_forage_env.policies.kernels.frames import leave_frames, take_frames
 from swarm_forage_env.policies.kernels.learner import (
@@ -65,7 +65,7 @@ class Choice(NamedTuple):
     """(N,) whether the robot was in the world; others stand until the next decision."""
 
 
-@kernel
+@part
 def _tanh(values: Row, n: int) -> None:
     """Tanh of the first `n` values, at most 4e-7 of its value from the true one.
 
@@ -85,7 +85,7 @@ def _tanh(values: Row, n: int) -> None:
         values[j] = np.divide(above, below)  # unlike /, it does not look for a zero, which is never there
 
 
-@kernel
+@part
 def _activate(values: ObsArray, n: int, is_tanh: bool) -> None:
     for r in range(values.shape[0]):
         if is_tanh:
@@ -95,7 +95,7 @@ def _activate(values: ObsArray, n: int, is_tanh: bool) -> None:
                 values[r, j] = values[r, j] if values[r, j] > 0.0 else np.float32(0.0)
 
 
-@kernel
+@part
 def _through(layers: Layers, n_taken: int, outputs: ObsArray) -> None:
     """Take the rows in `before` through the perceptron, and write what comes out to the first `n_taken` of `places`."""
     sizes, x, y = layers.sizes, layers.before, layers.after
@@ -170,7 +170,7 @@ def pick(logits: Row, samples: bool, chance: float, powers: FloatArray) -> int:
     return n - 1
 
 
-@kernel
+@part
 def see(obs: ObsArray, decision: int, t: Translation, view: ObsArray) -> None:
     """Write what robots see (N, d), as `LearnerInterface.observe` does, and let them remember it."""
     if t.is_compact:
@@ -190,7 +190,7 @@ def see(obs: ObsArray, decision: int, t: Translation, view: ObsArray) -> None:
     take_frames(view, decision, t.frames)
 
 
-@kernel
+@part
 def decide(obs: ObsArray, draws: FloatArray, decision: int, t: Translation, layers: Layers, choice: Choice) -> None:
     """Make the decision of every robot that is in the world; `decision` = how many were made before."""
     see(obs, decision, t, choice.seen)
@@ -210,7 +210,7 @@ def decide(obs: ObsArray, draws: FloatArray, decision: int, t: Translation, laye
             choice.number[i] = pick(outputs, layers.samples, chance, layers.powers)
 
 
-@kernel
+@part
 def carry_out(obs: ObsArray, t: Translation, number: IntArray, values: ObsArray, actions: ActionArray) -> None:
     """Write the commands (N, A) of actions by number (N,), or by value (N, m) where they are continuous."""
     if t.is_discrete:

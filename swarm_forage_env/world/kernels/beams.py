@@ -6,7 +6,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import inline_kernel, kernel
+from swarm_forage_env._internal.compiling import inline_kernel, kernel, part
 from swarm_forage_env._internal.prefetching import AHEAD, LARGE, prefetch
 from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
 from swarm_forage_env.contract.layout import RING_SENSORS
@@ -35,7 +35,7 @@ def proximity_reading(gap_m: float) -> float:
     return _READING_NUMERATOR / (gap_m + _READING_OFFSET_M)
 
 
-@kernel
+@part
 def _beam_to_disc(centre: tuple[float, float], cos: float, sin: float, radius: float) -> float:
     """Free distance of a disc along (cos, sin) to a disc of equal radius, whose centre is so far away along x and y."""
     dx, dy = centre
@@ -49,7 +49,7 @@ def _beam_to_disc(centre: tuple[float, float], cos: float, sin: float, radius: f
     return along - math.sqrt(room) - radius
 
 
-@kernel
+@part
 def _beam_to_wall(to_low: float, to_high: float, direction: float, radius: float) -> float:
     """Free distance to the wall ahead on one axis; to_low and to_high are centre-to-wall distances."""
     if direction > 1e-12:
@@ -59,14 +59,14 @@ def _beam_to_wall(to_low: float, to_high: float, direction: float, radius: float
     return math.inf
 
 
-@kernel
+@part
 def _beam_to_walls(gaps: Sides, cos: float, sin: float, radius: float) -> float:
     """Free distance of a disc along (cos, sin); `gaps` = distance of its centre to west, south, east, north wall."""
     west, south, east, north = gaps
     return min(_beam_to_wall(west, east, cos, radius), _beam_to_wall(south, north, sin, radius))
 
 
-@kernel
+@part
 def _beam_to_box(sides: Sides, cos: float, sin: float, radius: float) -> float:
     """Free distance of a disc along (cos, sin) to a box: the beam is in the box while it is in both slabs.
 
@@ -106,7 +106,7 @@ def _see(
             row[k] = max(row[k], proximity_reading(gap))
 
 
-@kernel
+@part
 def _see_what_stands(
     position: FloatArray,
     facing: FloatArray,

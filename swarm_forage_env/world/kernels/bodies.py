@@ -30,7 +30,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.compiling import kernel, part
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray
 from swarm_forage_env.world.kernels.bins import bin_of, cell_of
 from swarm_forage_env.world.kernels.drive import SMALL_RAD, hold_inside, sinc_and_cosine, small_sinc_and_cosine
@@ -131,7 +131,7 @@ def find_pairs(
     return n_pairs
 
 
-@kernel
+@part
 def insert_pair(i: int, j: int, first: int, end: int, pairs: IntArray) -> None:
     """Put a pair among those of i, which are rows `first` to `end` of `pairs`, so that they stay sorted by j."""
     at = end
@@ -143,7 +143,7 @@ def insert_pair(i: int, j: int, first: int, end: int, pairs: IntArray) -> None:
     pairs[at, 1] = j
 
 
-@kernel
+@part
 def top_speed(twist: FloatArray) -> float:
     """Greatest speed in `twist` (N + 1, 3), m/s."""
     greatest = 0.0
@@ -152,7 +152,7 @@ def top_speed(twist: FloatArray) -> float:
     return math.sqrt(greatest)
 
 
-@kernel
+@part
 def list_busy(b: BodyState, present: BoolArray, wall_m: float, n_pairs: int) -> int:
     """List the rows of robots that are in a pair, or within `wall_m` of where a wall or a box holds them.
 
@@ -177,7 +177,7 @@ def list_busy(b: BodyState, present: BoolArray, wall_m: float, n_pairs: int) -> 
     return n_busy
 
 
-@kernel
+@part
 def add_contact(
     n: int, i: int, j: int, number: float, normal: tuple[float, float], gap_m: float, substep_s: float, work: Work
 ) -> int:
@@ -198,7 +198,7 @@ def add_contact(
     return n + 1
 
 
-@kernel
+@part
 def find_contacts(
     poses: FloatArray,
     pairs: IntArray,
@@ -249,7 +249,7 @@ def find_contacts(
     return n
 
 
-@kernel
+@part
 def push_discs(velocity: FloatArray, i: int, j: int, contact: FloatArray, k: int, radius: float) -> float:
     """One round of the contact k of two discs; returns the largest change of an impulse, m/s."""
     nx, ny = contact[k, 0], contact[k, 1]
@@ -269,7 +269,7 @@ def push_discs(velocity: FloatArray, i: int, j: int, contact: FloatArray, k: int
     return max(abs(more), abs(more_across), abs(more_push))
 
 
-@kernel
+@part
 def push_wall(velocity: FloatArray, i: int, contact: FloatArray, k: int, radius: float) -> float:
     """One round of the contact k of a disc and a wall or a box; returns the largest change of an impulse, m/s."""
     nx, ny = contact[k, 0], contact[k, 1]
@@ -286,7 +286,7 @@ def push_wall(velocity: FloatArray, i: int, contact: FloatArray, k: int, radius:
     return max(abs(more), abs(more_across), abs(more_push))
 
 
-@kernel
+@part
 def give(
     velocity: FloatArray,
     i: int,
@@ -306,7 +306,7 @@ def give(
     velocity[i, 4] += sign * push * ny
 
 
-@kernel
+@part
 def settle(n_contacts: int, radius: float, work: Work) -> None:
     """Work out impulses and pushes of all contacts, in rounds, and change the velocities by them."""
     velocity, touching, contact = work[0], work[3], work[4]
@@ -322,7 +322,7 @@ def settle(n_contacts: int, radius: float, work: Work) -> None:
             return
 
 
-@kernel
+@part
 def recall(n_contacts: int, radius: float, work: Work, memory: Memory) -> None:
     """Start contacts that were there in the tick before with their impulses."""
     velocity, touching, contact = work[0], work[3], work[4]
@@ -340,7 +340,7 @@ def recall(n_contacts: int, radius: float, work: Work, memory: Memory) -> None:
                 give(velocity, touching[k, 1], 1.0, contact, k, given, radius)
 
 
-@kernel
+@part
 def remember(n_contacts: int, work: Work, memory: Memory) -> None:
     """Keep the impulses of all contacts for the next tick."""
     contact = work[4]
@@ -352,7 +352,7 @@ def remember(n_contacts: int, work: Work, memory: Memory) -> None:
         before[k, 2] = contact[k, 4]
 
 
-@kernel
+@part
 def move_busy(poses: FloatArray, n_busy: int, substep_s: float, work: Work) -> None:
     """Move busy robots by one substep; pushes are spent by it."""
     velocity, busy = work[0], work[1]
@@ -412,13 +412,13 @@ def tell_poses(
                 facing[i, 1] = y * stretch
 
 
-@kernel
+@part
 def _wrapped(angle: float) -> float:
     """An angle in (-pi, pi]."""
     return angle - 2.0 * math.pi * np.ceil((angle - math.pi) * (0.5 / math.pi))
 
 
-@kernel
+@part
 def _turn_to(wrapped: float, heading: float) -> float:
     """Turn from one heading to another one; past the back, where headings jump by a full turn, the short way."""
     turn = wrapped - heading

@@ -2,7 +2,7 @@
 
 import math
 
-from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.compiling import kernel, part
 from swarm_forage_env.contract.types import BoolArray, FloatArray
 from swarm_forage_env.world.kernels.bins import bin_of, cell_of
 from swarm_forage_env.world.state import Bins, Touching
@@ -12,7 +12,7 @@ LEAST_SPEED_M_S = 3e-4
 speed a pair leaves the point between them within 1,400 ticks of 0.2 s."""
 
 
-@kernel
+@part
 def common_speed(closing_i: float, closing_j: float, before: float, tie: float) -> float:
     """Speed of a pressing pair along the line from i to j, m/s, seen from i.
 
@@ -27,13 +27,13 @@ def common_speed(closing_i: float, closing_j: float, before: float, tie: float) 
     return min(closing_i, max(-closing_j, speed))
 
 
-@kernel
+@part
 def east_or_north(dx: float, dy: float) -> float:
     """Sign of a direction: of its x, of its y if that is 0. The opposite direction has the opposite sign."""
     return dx if dx != 0.0 else dy
 
 
-@kernel
+@part
 def remembered(memory: Touching, i: int, j: int) -> float:
     """Common speed of the pair i, j in the tick before, seen from i, m/s; NaN if they did not press."""
     n_partners, partner, speed = memory

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtri
 
-from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.compiling import kernel, part
 from swarm_forage_env.contract.detection import sees_obstacle
 from swarm_forage_env.contract.layout import RING_SENSORS
 from swarm_forage_env.contract.types import ActionArray, BitArray, BoolArray, FloatArray, IntArray, ObsArray
@@ -127,7 +127,7 @@ def standard(bits: np.uint32) -> np.float32:
     return _between_edges(bits)
 
 
-@kernel
+@part
 def _between_edges(bits: np.uint32) -> np.float32:
     cell = np.uint32(bits >> _OF_CELL)
     within = np.float32(np.int32((bits >> _WITHIN) & _LAST)) * _STEP
@@ -184,7 +184,7 @@ def disturb(
     return n_seeing / n_active if n_active > 0 else 0.0
 
 
-@kernel
+@part
 def _add_noise(row: ObsArray, bits: BitArray, factors: ObsArray, lows: ObsArray) -> None:
     """Add random numbers times their factors to the columns of one run and clamp them to [low, 1]."""
     one, least, most = np.float32(1.0), bits[0], bits[0]
@@ -198,7 +198,7 @@ def _add_noise(row: ObsArray, bits: BitArray, factors: ObsArray, lows: ObsArray)
             row[k] = min(one, max(lows[k], row[k] + _between_edges(bits[k]) * factors[k]))
 
 
-@kernel
+@part
 def _turn_heading(obs: ObsArray, start: int, angle: float) -> None:
     """Turn the heading (cos, sin), two columns of one row from `start`, by an angle in rad."""
     sinc, cos = sinc_and_cosine(angle)
@@ -256,7 +256,7 @@ def noisy_gain(draws: BitArray, factor: float, outer_gain: FloatArray, wheel_gai
             wheel_gain[i, wheel] = outer_gain[i, wheel] * (1.0 + noise)
 
 
-@kernel
+@part
 def disturb_wheels(
     d: Disturbances, k: int, actions: ActionArray, carried_object: IntArray, limits: FloatArray, outer_gain: FloatArray
 ) -> None:

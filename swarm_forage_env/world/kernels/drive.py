@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.compiling import kernel, part
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray
 
 _MORE = 1.0 + 1e-12
@@ -26,7 +26,7 @@ def sinc_and_cosine(angle: float) -> tuple[float, float]:
     return small_sinc_and_cosine(angle)
 
 
-@kernel
+@part
 def small_sinc_and_cosine(angle: float) -> tuple[float, float]:
     """The same for small angles only: without a branch, so that loops take several robots at once.
 
@@ -40,7 +40,7 @@ def small_sinc_and_cosine(angle: float) -> tuple[float, float]:
     return sinc, low + t * t * high
 
 
-@kernel
+@part
 def limit_wheels(left: float, right: float, max_speed: float, max_difference: float) -> tuple[float, float]:
     """Left and right wheel speed with centre speed and difference each clipped, all in m/s."""
     speed = min(max_speed, max(-max_speed, 0.5 * (left + right)))
@@ -48,7 +48,7 @@ def limit_wheels(left: float, right: float, max_speed: float, max_difference: fl
     return speed - 0.5 * difference, speed + 0.5 * difference
 
 
-@kernel
+@part
 def limit_command(
     command_left: float, command_right: float, scale: float, max_speed: float, max_difference: float
 ) -> tuple[float, float]:
@@ -61,7 +61,7 @@ def limit_command(
     return limit_wheels(wanted_left, wanted_right, max_speed, max_difference)
 
 
-@kernel
+@part
 def drive(
     actions: ActionArray,
     wheel_gain: FloatArray,
@@ -116,7 +116,7 @@ def drive(
     return -1
 
 
-@kernel
+@part
 def _drive_arcs(
     wheel_speed: FloatArray, facing: FloatArray, per_wheel_base: float, dt_s: float, twist: FloatArray
 ) -> None:

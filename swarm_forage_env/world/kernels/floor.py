@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.compiling import kernel, part
 from swarm_forage_env._internal.prefetching import AHEAD, LARGE, prefetch
 from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_OBJECT
 from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
@@ -42,7 +42,7 @@ _ARC_ODD = np.array([-0.2122063918863, -0.0908738576302, -0.0554741666688, -0.02
 _HALF_WINDOW = WINDOW_CELLS // 2
 
 
-@kernel
+@part
 def ground(
     position: FloatArray, facing: FloatArray, present: BoolArray, floor: IntArray, obs: ObsArray, start: int
 ) -> None:
@@ -70,7 +70,7 @@ def ground(
             obs[i, start + k] = _GREYS[min(CELL_OBJECT, max(code, CELL_CACHE)) - CELL_CACHE]
 
 
-@kernel
+@part
 def light(
     position: FloatArray,
     facing: FloatArray,
@@ -108,7 +108,7 @@ def light(
                     row[k] = min(1.0, row[k] + base * max(0.0, 1.0 - away))
 
 
-@kernel
+@part
 def _look_at(
     position: FloatArray,
     facing: FloatArray,
@@ -169,7 +169,7 @@ def quarter_turns(x: float, y: float) -> float:
     return 4.0 - turn if y < 0.0 else turn
 
 
-@kernel
+@part
 def note_change(changed: IntArray, x: int, y: int) -> None:
     """Add a square to the list `Requests.changed`."""
     n_changed = changed[-1, 0]
@@ -179,7 +179,7 @@ def note_change(changed: IntArray, x: int, y: int) -> None:
     changed[-1, 0] = n_changed + 1
 
 
-@kernel
+@part
 def _is_near_change(changed: IntArray, cell_x: int, cell_y: int) -> bool:
     """Whether a square in the window around a cell has changed."""
     for k in range(changed[-1, 0]):
@@ -188,7 +188,7 @@ def _is_near_change(changed: IntArray, cell_x: int, cell_y: int) -> bool:
     return False
 
 
-@kernel
+@part
 def line_of_sight(
     position: FloatArray,
     present: BoolArray,
@@ -243,7 +243,7 @@ def line_of_sight(
             _visible_caches(cell_x, cell_y, position, caches, n_slots, reach, i, obs, cache_start, (nx, ny, n_objects))
 
 
-@kernel
+@part
 def _whole_window(floor: IntArray, x_low: int, y_low: int, shares: ObsArray, window: ObsArray) -> None:
     """Write the objects of a window inside of the floor. Without a branch: where objects lie cannot be foreseen."""
     for y in range(WINDOW_CELLS):
@@ -251,7 +251,7 @@ def _whole_window(floor: IntArray, x_low: int, y_low: int, shares: ObsArray, win
             window[y * WINDOW_CELLS + x] = shares[max(floor[y_low + y, x_low + x], CELL_EMPTY)]
 
 
-@kernel
+@part
 def _cut_window(floor: IntArray, x_low: int, y_low: int, shares: ObsArray, window: ObsArray) -> None:
     """Write the objects of a window at the border; cells outside of the floor hold none."""
     ny, nx = floor.shape
@@ -261,7 +261,7 @@ def _cut_window(floor: IntArray, x_low: int, y_low: int, shares: ObsArray, windo
             window[y * WINDOW_CELLS + x] = shares[max(floor[y_low + y, x_low + x], CELL_EMPTY)] if inside else 0.0
 
 
-@kernel
+@part
 def _visible_caches(
     cell_x: int,
     cell_y: int,
@@ -304,7 +304,7 @@ def _visible_caches(
         last_slot = best
 
 
-@kernel
+@part
 def write_cache(
     obs: ObsArray, i: int, start: int, fields: tuple[int, int, int, int], sizes: tuple[int, int, int]
 ) -> None:

@@ -5,7 +5,7 @@ If it holds, an interaction starts. It takes effect some ticks later (usually on
 possible in every tick until then. A RELEASE onto open floor acts at once.
 """
 
-from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.compiling import kernel, part
 from swarm_forage_env.contract.codes import (
     CELL_CACHE,
     CELL_EMPTY,
@@ -51,7 +51,7 @@ _FLOOR_DROPS, _DISPLACED = int(Counter.FLOOR_DROPS), int(Counter.DISPLACED_DROPS
 _DEPLETED = int(Counter.CACHES_DEPLETED)
 
 
-@kernel
+@part
 def clear_events(swarm: SwarmState, events: StepEvents, gripper: ActionArray) -> bool:
     """Forget last tick's events; returns whether any robot asks for or is in an interaction."""
     busy = False
@@ -67,7 +67,7 @@ def clear_events(swarm: SwarmState, events: StepEvents, gripper: ActionArray) ->
     return busy
 
 
-@kernel
+@part
 def _square(position: FloatArray, floor: IntArray, i: int) -> tuple[int, int]:
     ny, nx = floor.shape
     return (
@@ -76,13 +76,13 @@ def _square(position: FloatArray, floor: IntArray, i: int) -> tuple[int, int]:
     )
 
 
-@kernel
+@part
 def _floor_code(position: FloatArray, floor: IntArray, i: int) -> int:
     x, y = _square(position, floor, i)
     return floor[y, x]
 
 
-@kernel
+@part
 def _in_nest(position: FloatArray, rules: Rules, i: int) -> bool:
     x = position[i, 0]
     y = position[i, 1]
@@ -92,7 +92,7 @@ def _in_nest(position: FloatArray, rules: Rules, i: int) -> bool:
     return False
 
 
-@kernel
+@part
 def _cache_too_near(caches: CacheState, rules: Rules, position: FloatArray, i: int) -> int:
     """Slot of the nearest cache whose centre is within the proximity distance of robot i, or -1."""
     nearest = -1
@@ -117,7 +117,7 @@ def band_of(grip: float) -> int:
     return CREATE_CACHE
 
 
-@kernel
+@part
 def request_of(state: WorldState, rules: Rules, band: int, i: int) -> tuple[int, int]:
     """What robot i asks for at its place, and which object row or cache slot is meant (-1 = none)."""
     position = state.swarm.position
@@ -146,7 +146,7 @@ def request_of(state: WorldState, rules: Rules, band: int, i: int) -> tuple[int,
     return (SITE_DROP if band == SITE else CREATE_DROP), -1
 
 
-@kernel
+@part
 def _report(events: StepEvents, caches: CacheState, i: int, event: int, row: int, slot: int) -> None:
     events.code[i] = event
     events.event_object[i] = row
@@ -158,7 +158,7 @@ def _report(events: StepEvents, caches: CacheState, i: int, event: int, row: int
         events.event_cache[i, 3] = caches.count[slot]
 
 
-@kernel
+@part
 def _forget_pending(swarm: SwarmState, i: int) -> None:
     swarm.pending_kind[i] = NO_REQUEST
     swarm.pending_band[i] = 0
@@ -166,7 +166,7 @@ def _forget_pending(swarm: SwarmState, i: int) -> None:
     swarm.pending_until[i] = 0
 
 
-@kernel
+@part
 def _empty_hands(swarm: SwarmState, i: int) -> int:
     row = swarm.carried_object[i]
     swarm.carried_object[i] = -1
@@ -174,7 +174,7 @@ def _empty_hands(swarm: SwarmState, i: int) -> int:
     return row
 
 
-@kernel
+@part
 def _append(entries: IntArray, value: int) -> None:
     """Add a value to a list, see `world.state`."""
     last = entries.shape[0] - 1
@@ -182,7 +182,7 @@ def _append(entries: IntArray, value: int) -> None:
     entries[last] += 1
 
 
-@kernel
+@part
 def _displace(objects: ObjectState, displaced: IntArray, row: int) -> None:
     """List an object that is placed again later in this tick."""
     objects.status[row] = _WAITING
@@ -190,7 +190,7 @@ def _displace(objects: ObjectState, displaced: IntArray, row: int) -> None:
     _append(displaced, row)
 
 
-@kernel
+@part
 def deliver(state: WorldState, i: int) -> None:
     """Robot i leaves its object in the nest; the object is placed again later in this tick."""
     events = state.events
@@ -200,7 +200,7 @@ def deliver(state: WorldState, i: int) -> None:
     _report(events, state.caches, i, _DELIVERED, row, -1)
 
 
-@kernel
+@part
 def drop_into_cache(state: WorldState, i: int, slot: int) -> None:
     """Robot i adds its object to the cache it stands in."""
     objects, caches, events = state.objects, state.caches, state.events
@@ -214,7 +214,7 @@ def drop_into_cache(state: WorldState, i: int, slot: int) -> None:
     _report(events, caches, i, _JOINED_CACHE, row, slot)
 
 
-@kernel
+@part
 def lay_on_floor(state: WorldState, rules: Rules, i: int) -> bool:
     """Robot i lays its object on its square if that is free, else it is placed again; returns whether it lies there."""
     objects, events = state.objects, state.events
@@ -236,7 +236,7 @@ def lay_on_floor(state: WorldState, rules: Rules, i: int) -> bool:
     return False
 
 
-@kernel
+@part
 def _lift(swarm: SwarmState, objects: ObjectState, events: StepEvents, i: int, row: int) -> None:
     objects.status[row] = _CARRIED
     objects.cell[row, :] = -1
@@ -247,7 +247,7 @@ def _lift(swarm: SwarmState, objects: ObjectState, events: StepEvents, i: int, r
     objects.carriers[row] += 1
 
 
-@kernel
+@part
 def take_from_floor(state: WorldState, i: int, row: int) -> None:
     """Robot i picks up the free object under its centre."""
     objects, events = state.objects, state.events
@@ -260,7 +260,7 @@ def take_from_floor(state: WorldState, i: int, row: int) -> None:
     _report(events, state.caches, i, _PICKED_UP, row, -1)
 
 
-@kernel
+@part
 def take_from_cache(state: WorldState, rules: Rules, i: int, slot: int, chance: float) -> None:
     """Robot i takes an object, uniform among the cache's contents (`chance` in [0, 1)); a last pair dissolves it."""
     objects, caches, events = state.objects, state.caches, state.events
@@ -284,7 +284,7 @@ def take_from_cache(state: WorldState, rules: Rules, i: int, slot: int, chance: 
         events.counters[_DEPLETED] += 1
 
 
-@kernel
+@part
 def _dissolve(objects: ObjectState, caches: CacheState, slot: int, half: int) -> None:
     """Remove a cache with one object left; this object lies free on the centre square."""
     cx = caches.cell[slot, 0]
@@ -313,7 +313,7 @@ def drop_cargo(state: WorldState, rules: Rules, i: int) -> None:
         lay_on_floor(state, rules, i)
 
 
-@kernel
+@part
 def _handler_of(kind: int) -> int:
     if kind == FLOOR_PICKUP:
         return FREE_PICKUP_HANDLER
@@ -326,7 +326,7 @@ def _handler_of(kind: int) -> int:
     return CACHE_HANDLER
 
 
-@kernel
+@part
 def _target_identity(caches: CacheState, kind: int, target: int) -> int:
     """Identity of the target, which must stay the same while an interaction runs: object row or cache serial."""
     if kind == CACHE_DROP or kind == CACHE_PICKUP:
@@ -334,7 +334,7 @@ def _target_identity(caches: CacheState, kind: int, target: int) -> int:
     return target
 
 
-@kernel
+@part
 def _take_effect(state: WorldState, rules: Rules, i: int, kind: int, target: int, chance: float) -> None:
     if kind == DELIVER:
         deliver(state, i)
@@ -348,7 +348,7 @@ def _take_effect(state: WorldState, rules: Rules, i: int, kind: int, target: int
         _append(state.requests.creators, i)
 
 
-@kernel
+@part
 def _continue(state: WorldState, rules: Rules, i: int, kind: int, target: int, tick: int, chance: float) -> None:
     """Wait on, or finish the interaction that robot i has in progress, or report that its condition is lost."""
     swarm, handler_used = state.swarm, state.requests.handler_used
@@ -368,7 +368,7 @@ def _continue(state: WorldState, rules: Rules, i: int, kind: int, target: int, t
         _report(state.events, state.caches, i, _VANISHED, -1, -1)
 
 
-@kernel
+@part
 def _serve(state: WorldState, rules: Rules, band: int, i: int, tick: int, chance: float) -> None:
     """Start, continue, refuse or cancel what robot i asks, by the state of the arrays at its turn."""
     swarm, caches = state.swarm, state.caches
@@ -391,7 +391,7 @@ def _serve(state: WorldState, rules: Rules, band: int, i: int, tick: int, chance
         swarm.pending_until[i] = tick + state.requests.handling_ticks[0 if band == GRASP else 1]
 
 
-@kernel
+@part
 def _phase_of(kind: int, band: int) -> int:
     """Order within a tick: deliver 0, cache drop 1, floor drops 2, pick-ups 3 (also those with nothing to pick up)."""
     if kind == DELIVER:
@@ -403,7 +403,7 @@ def _phase_of(kind: int, band: int) -> int:
     return 2
 
 
-@kernel
+@part
 def _band_now(swarm: SwarmState, gripper: ActionArray, i: int) -> int:
     """Band that robot i sends; a robot in repair keeps sending the band of its running interaction."""
     if swarm.active[i]:
@@ -411,7 +411,7 @@ def _band_now(swarm: SwarmState, gripper: ActionArray, i: int) -> int:
     return swarm.pending_band[i]
 
 
-@kernel
+@part
 def interact(state: WorldState, rules: Rules, gripper: ActionArray, tick: int, chance: FloatArray) -> None:
     """Serve all requests of one tick, phase by phase; within a phase, robots by (row - tick) mod N, lowest first.
 

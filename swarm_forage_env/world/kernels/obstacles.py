@@ -5,14 +5,14 @@ Boxes are rows of `obstacles` (B, 4): x low, y low, x high, y high in m; there m
 
 import math
 
-from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.compiling import kernel, part
 from swarm_forage_env.contract.types import BoolArray, FloatArray
 
 PASSES = 4
 """Most times that a body is moved out of all boxes: out of one it may come into another."""
 
 
-@kernel
+@part
 def nearest(x: float, y: float, obstacles: FloatArray, b: int) -> tuple[float, float, float]:
     """Return the direction (x, y) from a place to the nearest point of box b, and its distance in m.
 
@@ -36,7 +36,7 @@ def nearest(x: float, y: float, obstacles: FloatArray, b: int) -> tuple[float, f
     return 0.0, -1.0, -depth
 
 
-@kernel
+@part
 def is_within(x: float, y: float, obstacles: FloatArray, b: int, reach: float) -> bool:
     """Return whether a place is in box b grown by `reach` on all sides; corners stay square."""
     in_x = obstacles[b, 0] - reach < x < obstacles[b, 2] + reach

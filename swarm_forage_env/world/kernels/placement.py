@@ -5,7 +5,7 @@ Floor codes are those of `contract.codes`.
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.compiling import kernel, part
 from swarm_forage_env.contract.codes import CELL_EMPTY, CELL_OBJECT, ObjectStatus
 from swarm_forage_env.contract.types import FloatArray, IntArray
 from swarm_forage_env.world.kernels.floor import note_change
@@ -31,7 +31,7 @@ def count_objects(floor: IntArray, x_low: int, y_low: int, x_high: int, y_high: 
     return count
 
 
-@kernel
+@part
 def draw_free_cell(
     floor: IntArray, x_low: int, y_low: int, x_high: int, y_high: int, draws: FloatArray
 ) -> tuple[int, int]:
@@ -64,7 +64,7 @@ def draw_free_cell(
     return -1, -1
 
 
-@kernel
+@part
 def draw_source_cell(
     floor: IntArray,
     regions: IntArray,

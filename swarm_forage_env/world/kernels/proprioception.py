@@ -1,13 +1,13 @@
 """What a robot knows of itself: wheels, pose, cargo, and the event of this tick."""
 
-from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.compiling import part
 from swarm_forage_env._internal.prefetching import AHEAD, LARGE, LINE, prefetch
 from swarm_forage_env.contract.layout import EVENT_SCALE
 from swarm_forage_env.contract.types import BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.world.kernels.floor import write_cache
 
 
-@kernel
+@part
 def own_motion(
     position: FloatArray,
     facing: FloatArray,
@@ -39,7 +39,7 @@ def own_motion(
         obs[i, start + 5] = facing[i, 1]
 
 
-@kernel
+@part
 def own_status(
     carried_object: IntArray,
     pending_kind: CodeArray,

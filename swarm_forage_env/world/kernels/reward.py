@@ -6,7 +6,7 @@ The terms of a reward are one small function each, for one robot.
 import math
 from typing import NamedTuple
 
-from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.compiling import kernel, part
 from swarm_forage_env.contract.codes import Event
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.world.state import StepEvents, SwarmState
@@ -42,19 +42,19 @@ class Payment(NamedTuple):
     """Whether there may be a reward in a tick in which nothing happened."""
 
 
-@kernel
+@part
 def delivered(p: Payment, i: int) -> float:
     """1 for a robot that delivered an object to the nest in this tick."""
     return 1.0 if p.events.code[i] == _DELIVERED else 0.0
 
 
-@kernel
+@part
 def picked_first(p: Payment, i: int) -> float:
     """1 for a robot that picked up an object that no robot had carried since it was placed."""
     return 1.0 if p.events.first_picked[i] else 0.0
 
 
-@kernel
+@part
 def came_nearer(p: Payment, i: int) -> float:
     """Metres that a carrying robot came closer to the centre of the nearest nest in this tick."""
     if p.swarm.carried_object[i] < 0:
@@ -63,7 +63,7 @@ def came_nearer(p: Payment, i: int) -> float:
     return before - _to_nearest(p.swarm.position, p.nest_centres_m, i)
 
 
-@kernel
+@part
 def _to_nearest(position: FloatArray, places: FloatArray, i: int) -> float:
     nearest = math.inf
     for k in range(places.shape[0]):
@@ -73,7 +73,7 @@ def _to_nearest(position: FloatArray, places: FloatArray, i: int) -> float:
     return nearest
 
 
-@kernel
+@part
 def lost_time(p: Payment, i: int) -> float:
     """1 for a robot in interference."""
     return 1.0 if p.events.interfering[i] else 0.0
@@ -94,7 +94,7 @@ def rewards(p: Payment) -> None:
         p.reward[i] = p.total[i]
 
 
-@kernel
+@part
 def remember(p: Payment) -> None:
     """Keep the positions before a tick, if a term needs them."""
     if p.weights.nest_progress != 0.0:
@@ -103,7 +103,7 @@ def remember(p: Payment) -> None:
             p.previous_position[i, 1] = p.swarm.position[i, 1]
 
 
-@kernel
+@part
 def pay(p: Payment, paid: ObsArray) -> None:
     """Work out the rewards of a tick, where no function of Python adds to them, and add them to `paid` (N,) float32."""
     if p.events.happened[0] or p.is_dense:

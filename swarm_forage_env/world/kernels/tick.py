@@ -18,7 +18,7 @@ sense           the rest of the observation
 from collections.abc import Callable
 from typing import Any
 
-from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env._internal.compiling import kernel, part
 from swarm_forage_env._internal.prefetching import LARGE
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.types import ActionArray, CodeArray, FloatArray, ObsArray
@@ -68,7 +68,7 @@ def look(a: ArenaArrays) -> None:
     )
 
 
-@kernel
+@part
 def sense(a: ArenaArrays) -> None:
     """Complete the observation after `look`; slices that are not read may stay zero."""
     swarm, objects, events, s = a.state.swarm, a.state.objects, a.state.events, a.sensors
@@ -157,7 +157,7 @@ def set_out(a: ArenaArrays, actions: ActionArray, wheel_gain: FloatArray, tick: 
     return DONE
 
 
-@kernel
+@part
 def meet(a: ArenaArrays, actions: ActionArray, tick: int, chance: FloatArray) -> bool:
     """After the bodies have moved: who is near, who is in interference, who picks up and drops.
 
@@ -174,7 +174,7 @@ def meet(a: ArenaArrays, actions: ActionArray, tick: int, chance: FloatArray) ->
     return is_to_place or (a.n_static_caches > 0 and _alive(state.caches) < a.n_static_caches)
 
 
-@kernel
+@part
 def _alive(caches: CacheState) -> int:
     n_alive = 0
     for slot in range(caches.alive.shape[0]):
@@ -232,7 +232,7 @@ def whole(
     return meet_and_close(a, actions, tick, chance, walk_chance)
 
 
-@kernel
+@part
 def disturb_senses(d: Disturbances, k: int, a: ArenaArrays) -> None:
     """Write noise into the observation after tick `k` of `d`, if there is any."""
     if d.lanes.shape[0] == 0:
