@@ -13,8 +13,6 @@ from swarm_forage_env.contract.policy import ActionError, SwarmSpec
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
 from swarm_forage_env.policies.registry import from_callable
 from swarm_forage_env.training.datasets import Dataset, record_dataset
-from swarm_forage_env.views.arenas import ArenaBatch
-from swarm_forage_env.views.plans import plan_arena
 from tests.reference import neighbourhood
 from tests.support.branches import pickled
 
@@ -151,28 +149,6 @@ def test_snapshots_and_copies_go_on_alike():
     assert part(env, "messages").any()
     before = env.last_obs.copy()
     np.testing.assert_array_equal(env.arena.observe(), before)
-
-
-class OneByOne(ArenaBatch):
-    """Arenas that are never taken together."""
-
-    def _chosen_ways(self) -> tuple[None, None]:
-        return None, None
-
-
-@pytest.mark.parametrize("observation", ["full", "compact"])
-def test_arenas_together_are_what_they_are_alone(observation):
-    world = scenario("warehouse_small", **SMALL | BOTH)
-    plan = plan_arena(world, interface={"observation": observation}, max_cycles=12)
-    batches = ArenaBatch(plan, 2), OneByOne(plan, 2)
-    first = [batch.reset([3, 4], [None, None])[0] for batch in batches]
-    np.testing.assert_array_equal(*first)
-    assert batches[0]._chosen_ways()[0] is not None
-    for actions in drawn(20).reshape(10, 2 * N_ROBOTS, 5):
-        together, alone = (batch.step(actions) for batch in batches)
-        np.testing.assert_array_equal(together.obs, alone.obs)
-        np.testing.assert_array_equal(together.rewards, alone.rewards)
-    assert together.obs[:, -1].any()
 
 
 @pytest.mark.parametrize("observation", ["full", "compact"])
