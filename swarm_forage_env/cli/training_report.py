@@ -10,8 +10,7 @@ from rich.progress import Progress
 from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.cli import EXIT_FAILURE
 from swarm_forage_env.cli.printer import bar, drawn_or_told, note, show
-from swarm_forage_env.training.curves import beside_baseline, place_of
-from swarm_forage_env.training.evaluation_plan import ALL_WORLDS
+from swarm_forage_env.training.curves import beside_baseline, counted_in, place_of
 from swarm_forage_env.training.evaluations import (
     EVALUATIONS_FILE,
     MODEL_FILE,
@@ -114,63 +113,33 @@ class _Report:
     """Shows how trainings go: one bar for all of them, and a line per evaluation."""
 
     def __init__(self, plan: TrainingPlan, seeds: Sequence[int], shown: Progress) -> None:
-        self._plan, self._shown = plan, shown
-        self._n_seeds = len(seeds)
-        self._latest: dict[int, TrainingStatus | Evaluation] = {}
+        self._plan, self._seeds, self._shown = plan, seeds, shown
+        self._steps: dict[int, int] = {}
         self._task = shown.add_task("training", total=plan.total_steps * len(seeds))
         self._has_begun = False
 
     def __call__(self, seed: int, news: "TrainingStatus | Evaluation | TrainingFailure") -> None:
         """Show the news of a training."""
-        print_line = self._shown.console.out
         if isinstance(news, TrainingFailure):
-            print_line(f"Seed {seed} failed: {news.reason}")
+            self._shown.console.out(f"Seed {seed} failed: {news.reason}")
             return
-        self._latest[seed] = news
-        steps = sum(min(one.steps, self._plan.total_steps) for one in self._latest.values())
-        self._shown.update(self._task, completed=steps)
-        if isinstance(news, TrainingStatus):
-            if not math.isnan(news.episode_return):
-                self._shown.update(self._task, description=f"mean return {news.episode_return:.2f}")
-            return
-        named = self._n_seeds > 1
+        self._steps[seed] = min(news.steps, self._plan.total_steps)
+        self._shown.update(self._task, completed=sum(self._steps.values()))
+        if isinstance(news, Evaluation):
+            self._show(f"{seed:>6} " if len(self._seeds) > 1 else "", news)
+        elif not math.isnan(news.episode_return):
+            self._shown.update(self._task, description=f"mean return {news.episode_return:.2f}")
+
+    def _show(self, seed: str, news: Evaluation) -> None:
+        what, lines = counted_in(self._plan), list[str]()
         if not self._has_begun:
-            first, columns = heading(self._plan)
-            print_line(first)
-            print_line(f"{'seed':>6} {columns}" if named else columns)
-        for line in evaluation_lines(news):
-            print_line(f"{seed:>6} {line}" if named else line)
+            runs = counted(self._plan.evaluation.n_runs, "run")
+            columns = f"{'decisions':>12}  {what}  {'baseline':>8}  interference"
+            lines += [f"Evaluated in {runs} in {place_of(self._plan)}:", f"{'seed':>6} {columns}" if seed else columns]
+        baseline = "" if news.worlds else f"{news.baseline:.1f}"
+        found = f"{news.performance:>{len(what)}.2f}  {baseline:>8}  {news.interference_fraction:>12.3f}"
+        lines.append(f"{seed}{news.steps:>12,}  {found}")
         if not self._has_begun and news.baseline == 0.0 and not news.worlds:
-            print_line(_NOTHING_TO_SEE.format(self._plan.evaluation.baseline))
+            lines.append(_NOTHING_TO_SEE.format(self._plan.evaluation.baseline))
         self._has_begun = True
-
-
-def heading(plan: TrainingPlan) -> tuple[str, str]:
-    """Return what stands above the evaluations: their runs, and the names of the columns."""
-    horizons = {world.scenario.horizon_s for world in plan.judging_worlds}
-    runs = f"Evaluated in {counted(plan.evaluation.n_runs, 'run' if len(horizons) == 1 else 'whole run')}"
-    if len(horizons) == 1:
-        runs += f" of {horizons.pop():,.0f} s"
-    if plan.evaluation.worlds:
-        return (
-            f"{runs} in each of {place_of(plan)}; what counts is the {plan.evaluation.chosen_by} ratio:",
-            f"{'decisions':>10}  {'world':<20} {'per 1,000 s':>11} {'baseline':>13} {'ratio':>6} {'interference':>12}",
-        )
-    baseline = plan.evaluation.baseline
-    return f"{runs}:", f"{'decisions':>12} {'per 1,000 s':>12} {baseline:>8} {'interference':>13}"
-
-
-def evaluation_lines(news: Evaluation) -> list[str]:
-    """Return the lines of an evaluation below `heading`."""
-    interference = news.interference_fraction
-    if not news.worlds:
-        return [f"{news.steps:>12,} {news.performance:>12.1f} {news.baseline:>8.1f} {interference:>13.3f}"]
-    lines = [
-        f"{'':>10}  {world.world:<20} {world.performance:>11.1f} {f'{world.baseline_policy} {world.baseline:.1f}':>13} "
-        f"{world.ratio:>6.2f} {world.interference_fraction:>12.3f}"
-        for world in news.worlds
-    ]
-    return [
-        *lines,
-        f"{news.steps:>10,}  {ALL_WORLDS:<20} {'':>11} {'':>13} {news.performance:>6.2f} {interference:>12.3f}",
-    ]
+        self._shown.console.out("\n".join(lines))

@@ -33,9 +33,9 @@ def test_trains_shows_evaluations_and_goes_on(command, painted):
     words = ("train", *TINY, "--set", "nest_progress=0.07")
     code, _, err = command(*words)
     assert code == 0, err
-    assert "Evaluated in 1 run of 200 s:" in err
+    assert "Evaluated in 1 run in warehouse_small, 4 robots" in err
     folder = Path("results/training/warehouse_small_ppo")
-    assert "decisions  per 1,000 s" in err
+    assert "decisions  deliveries per 1,000 s" in err
     assert str(folder / "policy.npz") in err
     if find_spec("matplotlib"):
         assert (folder / "training.png").read_bytes().startswith(b"\x89PNG")

@@ -69,8 +69,8 @@ def test_seeds_are_trained_drawn_and_told(command, calls, pictures):
     assert code == 0, err
     assert calls == [(0, False), (1, False)]
     assert pictures == [("all/curves.png", ["seed_0", "seed_1"])]
-    assert re.search(r"^  seed +decisions +per 1,000 s", err, re.MULTILINE)
-    assert re.search(r"^     1 +140 +5\.0 +10\.0 +0\.100$", err, re.MULTILINE)
+    assert re.search(r"^  seed +decisions +deliveries per 1,000 s", err, re.MULTILINE)
+    assert re.search(r"^     1 +140 +5\.00 +10\.0 +0\.100$", err, re.MULTILINE)
     assert err.endswith("picture all/curves.png\n")
     assert re.search(r"^mean +4\.5 +0\.45 +0\.100$", out, re.MULTILINE)
     policies = "all/seed_0/policy.npz all/seed_1/policy.npz"
