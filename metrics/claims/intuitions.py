@@ -5,9 +5,9 @@ is a comparison with the other algorithms. "High" means better than all three ot
 STOCHX, and for one of these two worse than both others. "Modest" lies between. This is our choice.
 """
 
-from .checking import Claim, Place, Statement
-from .predicates import is_not_higher, stays_alike
-from .statements import E_T, SIMPLE, STEADY, UNSTEADY, A, C, D, N, P, R, best_of, better, spatial, states
+from .claim import Claim, Place, Statement
+from .experiments import E_T, SIMPLE, STEADY, UNSTEADY, A, C, D, N, P, R, best_of, better, spatial, states
+from .rules import is_not_higher, stays_alike
 
 _SPATIAL = (spatial("S1a"), spatial("S1b"))
 _FLEXIBLE = tuple((experiment, measure) for measure in (R, A) for experiment in ("S1c", "S1d"))
@@ -120,9 +120,7 @@ _WRITTEN: tuple[tuple[int, str, str, tuple[Statement, ...]], ...] = (
 )
 
 INTUITIONS: dict[str, Claim] = {
-    f"H{number}": Claim(
-        name=f"H{number}", text=f"{policy}: {text}", figure=f"scenario {scenario}, intuitions", statements=statements
-    )
+    f"H{number}": Claim(f"H{number}", f"{policy}: {text}", f"scenario {scenario}, intuitions", statements)
     for number, (scenario, policy, text, statements) in enumerate(_WRITTEN, 1)
 }
 """Name -> intuition; H as in hypothesis."""

@@ -244,7 +244,8 @@ def resampled_means(values: FloatArray, confidence: float = CONFIDENCE) -> tuple
     `widening` stretches the distances of the resampled means from the means.
     """
     complete = complete_runs(values)
-    return _widened(values, mean_over_runs(complete), mean_over_runs(resampled_runs(values)), confidence)
+    found, drawn = mean_over_runs(complete), mean_over_runs(resampled_runs(values))
+    return found, found + widening(np.isfinite(complete).sum(axis=-1), confidence) * (drawn - found)
 
 
 def resampled_deviations(values: FloatArray, confidence: float = CONFIDENCE) -> tuple[FloatArray, FloatArray]:
@@ -259,15 +260,8 @@ def resampled_deviations(values: FloatArray, confidence: float = CONFIDENCE) -> 
     with np.errstate(divide="ignore", invalid="ignore"):  # a single run has no deviation
         share = np.sqrt(2.0 / (n_runs - 1.0)) * np.exp(gammaln(0.5 * n_runs) - gammaln(0.5 * n_runs - 0.5))
         drawn = std_over_runs(resampled_runs(values)) * np.sqrt(n_runs / (n_runs - 1.0)) / share
-    found, widened = _widened(values, std_over_runs(complete) / share, drawn, confidence)
-    return found, 2.0 * found - widened
-
-
-def _widened(
-    values: FloatArray, found: FloatArray, drawn: FloatArray, confidence: float
-) -> tuple[FloatArray, FloatArray]:
-    n_runs = np.isfinite(complete_runs(values)).sum(axis=-1)
-    return found, found + widening(n_runs, confidence) * (drawn - found)
+    found = std_over_runs(complete) / share
+    return found, 2.0 * found - (found + widening(n_runs, confidence) * (drawn - found))
 
 
 def bounds(resampled: FloatArray) -> tuple[float, float]:
@@ -276,13 +270,12 @@ def bounds(resampled: FloatArray) -> tuple[float, float]:
     return float(lower), float(upper)
 
 
-def signs(panel: Panel, first: str, second: str, rule: Rule, n_tests: int = 1) -> FloatArray:
-    """Which of two policies is higher at each level: 1 the first, -1 the second, 0 a tie, NaN open; (L,).
+def order(panel: Panel, pairs: Iterable[tuple[str, str]], rule: Rule, n_tests: int = 1) -> FloatArray:
+    """Which policy of each pair is higher at each level: 1 the first, -1 the second, 0 a tie, NaN open; (pairs, L).
 
     Args:
         panel: The scores.
-        first: One policy.
-        second: The other.
+        pairs: Of policies.
         rule: The rule that compares them.
         n_tests: Number of tests that together are wrong by chance once in twenty times (Bonferroni); does not affect
             ties.
@@ -292,14 +285,18 @@ def signs(panel: Panel, first: str, second: str, rule: Rule, n_tests: int = 1) -
         ValueError: An unknown rule.
     """
     check_option("rule", rule, Rule)
-    a, b = panel.of((first, second))
+    return np.array([_order(panel, pair, rule, n_tests) for pair in pairs])
+
+
+def _order(panel: Panel, pair: tuple[str, str], rule: Rule, n_tests: int) -> FloatArray:
+    first, second = panel.of(pair)
     if rule == "bands":
-        gap = mean_over_runs(a) - mean_over_runs(b)
-        reach = 2.0 * (std_over_runs(a) + std_over_runs(b))
+        gap = mean_over_runs(first) - mean_over_runs(second)
+        reach = 2.0 * (std_over_runs(first) + std_over_runs(second))
         return np.where(np.isnan(gap + reach), np.nan, np.sign(gap) * (np.abs(gap) > reach))
     found = [
-        _sign(of_a[np.isfinite(of_a)], of_b[np.isfinite(of_b)], margin, 1.0 - panel.confidence, n_tests)
-        for of_a, of_b, margin in zip(a, b, panel.tie_margins, strict=True)
+        _sign(a[np.isfinite(a)], b[np.isfinite(b)], margin, 1.0 - panel.confidence, n_tests)
+        for a, b, margin in zip(first, second, panel.tie_margins, strict=True)
     ]
     return np.array(found)
 

@@ -1,23 +1,23 @@
-"""Statements about the shape of curves: where they begin to change, how steep and how straight they are."""
+"""Rules about the shape of curves: where they begin to change, how steep and how straight they are; see `rules`."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import inf
 
 import numpy as np
 
 from ..checks import CurveError
 from ..curves import FloatArray
-from .outcomes import Answer, Outcome, all_of, where_scored
 from .panel import CONFIDENCE, Panel, Rule, bounds, mean_over_runs, resampled_means, std_over_runs
+from .rules import Answer, Names, Outcome, of_curves
 
-ROUNDING = 1e-9
-"""Share by which rounding may move a level from its place in the ladder."""
-ZERO = "zero"
-"""Name of the policy that `with_zero` adds."""
 LINEAR = 0.9
 """Share of the variance between levels that a line explains if growth is nearly linear (our choice)."""
 MIN_LEVELS = 4
 """A broken line needs two levels on either side of its bend, which may share one, and one more that tests it."""
+ROUNDING = 1e-9
+"""Share by which rounding may move a level from its place in the ladder."""
+ZERO = "zero"
+"""Name of the policy that `with_zero` adds."""
 
 
 def rise_of(panel: Panel) -> Panel:
@@ -27,9 +27,7 @@ def rise_of(panel: Panel) -> Panel:
 
 def slope_of(panel: Panel) -> Panel:
     """Return a panel of one level: the slope of the line through the scores of each run, times the span of levels."""
-    x = panel.levels - panel.levels.mean()
-    span = panel.levels[-1] - panel.levels[0]
-    return panel.reduced({name: span * (x @ values) / (x @ x) for name, values in panel.scores.items()})
+    return panel.reduced({name: _slope(panel, slice(None), values) for name, values in panel.scores.items()})
 
 
 def bend_of(panel: Panel) -> Panel:
@@ -40,17 +38,18 @@ def bend_of(panel: Panel) -> Panel:
     Raises:
         CurveError: Fewer than three levels.
     """
-    half = (panel.levels.size + 1) // 2
     if panel.levels.size < 3:
         raise CurveError(f"Expected three or more levels for a bend, got {panel.levels.size}.")
-    span = panel.levels[-1] - panel.levels[0]
-
-    def slope(kept: slice, values: FloatArray) -> FloatArray:
-        x = panel.levels[kept] - panel.levels[kept].mean()
-        return span * (x @ values[kept]) / (x @ x)
-
+    half = (panel.levels.size + 1) // 2
     upper, lower = slice(panel.levels.size - half, None), slice(None, half)
-    return panel.reduced({name: slope(upper, v) - slope(lower, v) for name, v in panel.scores.items()})
+    return panel.reduced({name: _slope(panel, upper, v) - _slope(panel, lower, v) for name, v in panel.scores.items()})
+
+
+def _slope(panel: Panel, kept: slice, values: FloatArray) -> FloatArray:
+    """Slope of the line through some levels of each run, times the span of all levels, (R,)."""
+    x = panel.levels[kept] - panel.levels[kept].mean()
+    span = panel.levels[-1] - panel.levels[0]
+    return span * (x @ values[kept]) / (x @ x)
 
 
 def with_zero(panel: Panel) -> Panel:
@@ -64,15 +63,68 @@ def from_undisturbed(panel: Panel) -> Panel:
     if panel.undisturbed is None:
         return panel
     scores = {name: np.vstack([panel.undisturbed[name], values]) for name, values in panel.scores.items()}
-    margins = np.concatenate([panel.tie_margins[:1], panel.tie_margins])
-    return replace(
-        panel, levels=np.concatenate([[0.0], panel.levels]), scores=scores, margins=margins, undisturbed=None
-    )
+    margins, levels = (np.concatenate([[first], of]) for first, of in
+                       ((panel.tie_margins[0], panel.tie_margins), (0.0, panel.levels)))  # fmt: skip
+    return replace(panel, levels=levels, scores=scores, margins=margins, undisturbed=None)
 
 
-def changes_within(
-    panel: Panel, *, policies: Sequence[str], between: tuple[float, float], rule: Rule = "intervals"
-) -> Outcome:
+# ------------------------------------------------------------------------------------------------------ single curves
+
+
+def is_linear(panel: Panel, *, policies: Names, rule: Rule = "intervals") -> Outcome:
+    """Whether each policy grows nearly linearly with the level.
+
+    A rising line explains `LINEAR` of the variance between the means; by intervals, with its interval. Contradicted if
+    it explains less, or surely rises by less than a tie over all levels. By bands, the rule looks at the means alone,
+    however little they rise. If no two levels have bands that are apart, no growth is visible: undecided.
+    """
+
+    def judge(part: Panel, scores: FloatArray, names: Names) -> Outcome:
+        (values,), (policy,) = scores, names
+        means, drawn = resampled_means(values, part.confidence)
+        rest, total, rise = (float(one[0]) for one in _line(part.levels, means[None]))
+        explained, rise = 1.0 - rest / total if total > 0.0 else 0.0, rise / part.scale
+        if rule == "bands":
+            reach = 2.0 * std_over_runs(values)
+            is_seen = float((means - reach).max()) > float((means + reach).min())
+            is_line = explained >= LINEAR and rise > 0.0
+            answer: Answer = "undecided" if not is_seen else "supported" if is_line else "contradicted"
+            words = "" if is_seen else f"no two bands of {policy} are apart; "
+        else:
+            rests, totals, _ = (np.quantile(one, CONFIDENCE) for one in _line(part.levels, drawn - means))
+            lower, upper = bounds(_line(part.levels, drawn)[2] / part.scale)
+            # Square roots of sums of squares are lengths: what chance adds changes them by its own length at most.
+            most = _ratio(rest**0.5 + rests**0.5, total**0.5 - totals**0.5)
+            least = _ratio(rest**0.5 - rests**0.5, total**0.5 + totals**0.5)
+            answer = "supported" if 1.0 - most >= LINEAR and lower > 0.0 else "undecided"
+            answer = "contradicted" if 1.0 - least < LINEAR or upper <= _tie(part) else answer
+            words = f"{1.0 - most:.2f} to {1.0 - least:.2f} with its interval; "
+        why = f"a line explains {explained:.2f} of the variance of {policy} ({words}{LINEAR:g} is nearly linear)"
+        why = f"{why} and rises by {rise:.2f} of the scale" + ("" if rise > 0.0 else ": it does not grow")
+        return Outcome(answer, explained, rise, why=why)
+
+    return of_curves(panel, [(policy,) for policy in policies], rule, judge)
+
+
+def _ratio(above: float, below: float) -> float:
+    """Square of the ratio of two lengths, from 0 to 1; a length below 0 counts as 0."""
+    return min(1.0, (max(0.0, above) / below) ** 2) if below > 0.0 else 1.0
+
+
+def _line(levels: FloatArray, means: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Fit lines to curves (B, L): residual sum of squares, total sum of squares, and rise over the span; (B,) each."""
+    x, y = levels - levels.mean(), means - means.mean(axis=1, keepdims=True)
+    slope = y @ x / (x @ x)
+    total = (y**2).sum(axis=1)
+    return np.maximum(0.0, total - slope**2 * (x @ x)), total, slope * (levels[-1] - levels[0])
+
+
+def _tie(panel: Panel) -> float:
+    """Margin of a tie, mean of levels, as a share of the scale."""
+    return float(panel.tie_margins.mean()) / panel.scale
+
+
+def changes_within(panel: Panel, *, policies: Names, between: tuple[float, float], rule: Rule = "intervals") -> Outcome:
     """Whether the behaviour of each policy begins to change at a level between two values, both included.
 
     By intervals: the rule fits two lines that meet at one of the inner levels to the means. The change must be real
@@ -84,25 +136,63 @@ def changes_within(
     possible at a level below the two values and at one above; to contradict it, at one between them. If the first level
     is 0, undisturbed, no level below is needed: a curve that changes from there on is a straight line without a bend.
     """
-    return all_of([_change(panel, policy, between, rule) for policy in policies])
+    low, high = between[0] * (1.0 - ROUNDING), between[1] * (1.0 + ROUNDING)
+
+    def judge(part: Panel, _: FloatArray, names: Names) -> Outcome:
+        (policy,) = names
+        if rule == "bands":
+            onset = _onset(part, policy)
+            if onset == inf:
+                return Outcome("contradicted", onset, why=f"band of {policy} never leaves that of the first level")
+            answer, reason = _located(low <= onset <= high, part.levels, part.levels[1:], (low, high))
+            return Outcome(answer, onset, why=f"band of {policy} leaves that of the first level at {onset:.3g}{reason}")
+        if part.levels.size < MIN_LEVELS:
+            return _too_few(part, names)
+        found = _bends(part, policy)
+        middle, inside = float(np.median(found.places)), float(((found.places >= low) & (found.places <= high)).mean())
+        why = f"slope of {policy} changes by {found.change:.2f} of the scale, by chance alone up to {found.chance:.2f}"
+        answer = "undecided"
+        if found.is_none:
+            answer, why = "contradicted", f"{why}: no change, {found.tie:.2g} would be one"
+        elif found.is_real:
+            answer, reason = _located(_mostly(inside), part.levels, part.levels[1:-1], (low, high))
+            where = f"in {inside:.0%} of the resamples between {between[0]:.3g} and {between[1]:.3g}"
+            why = f"slope of {policy} changes at {middle:.3g}, {where}{reason}"
+        return Outcome(answer, middle, found.change, why=why)
+
+    return of_curves(panel, [(policy,) for policy in policies], rule, judge)
 
 
-def changes_before(panel: Panel, *, first: str, others: Sequence[str], rule: Rule = "intervals") -> Outcome:
+def changes_before(panel: Panel, *, first: str, others: Names, rule: Rule = "intervals") -> Outcome:
     """Whether a policy changes at a lower level than each of others; `changes_within` says where a policy changes.
 
     Undecided if one of the two does not surely change.
     """
-    return all_of([_earlier(panel, first, other, rule) for other in others])
+
+    def judge(part: Panel, _: FloatArray, names: Names) -> Outcome:
+        if rule == "bands":
+            mine, theirs = (_onset(part, name) for name in names)
+            if inf in (mine, theirs):
+                still = [name for name, onset in zip(names, (mine, theirs), strict=True) if onset == inf]
+                return Outcome("undecided", mine, why=f"bands of {' and '.join(still)} never leave the first level's")
+            why = f"band of {first} leaves that of the first level at {mine:.3g}, that of {names[1]} at {theirs:.3g}"
+            return Outcome("supported" if mine < theirs else "contradicted", mine, why=why)
+        if part.levels.size < MIN_LEVELS:
+            return _too_few(part, names)
+        bends = [_bends(part, name) for name in names]
+        before = float((bends[0].places < bends[1].places).mean())
+        if unsure := [name for name, found in zip(names, bends, strict=True) if not found.is_real]:
+            return Outcome("undecided", before, why=f"no change of {' and '.join(unsure)} that chance could not make")
+        sure = _mostly(before)
+        answer: Answer = "undecided" if sure is None else "supported" if sure else "contradicted"
+        return Outcome(answer, before, why=f"{first} changes before {names[1]} in {before:.0%} of the resamples")
+
+    return of_curves(panel, [(first, other) for other in others], rule, judge)
 
 
-def is_linear(panel: Panel, *, policies: Sequence[str], rule: Rule = "intervals") -> Outcome:
-    """Whether each policy grows nearly linearly with the level.
-
-    A rising line explains `LINEAR` of the variance between the means; by intervals, with its interval. Contradicted if
-    it explains less, or surely rises by less than a tie over all levels. By bands, the rule looks at the means alone,
-    however little they rise. If no two levels have bands that are apart, no growth is visible: undecided.
-    """
-    return all_of([_straightness(panel, policy, rule) for policy in policies])
+def _mostly(share: float) -> bool | None:
+    """Whether a share of resamples is surely most (True) or surely few (False) of them."""
+    return True if share >= CONFIDENCE else False if share <= 1.0 - CONFIDENCE else None
 
 
 def broken_line(levels: FloatArray, means: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -131,7 +221,7 @@ def _onset(panel: Panel, policy: str) -> float:
     (values,) = panel.of((policy,))
     means, deviations = mean_over_runs(values), std_over_runs(values)
     apart = np.abs(means - means[0]) > 2.0 * (deviations + deviations[0])
-    return float(panel.levels[apart][0]) if apart.any() else np.inf
+    return float(panel.levels[apart][0]) if apart.any() else inf
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -168,140 +258,28 @@ def _bends(panel: Panel, policy: str) -> _Bends:
     return _Bends(places=places, change=float(change[0]) * unit, chance=chance, tie=_tie(panel))
 
 
-def _tie(panel: Panel) -> float:
-    """Margin of a tie, mean of levels, as a share of the scale."""
-    return float(panel.tie_margins.mean()) / panel.scale
-
-
-def _few_levels(panel: Panel, policies: Sequence[str]) -> Outcome | None:
-    """The outcome if there are too few levels for a broken line."""
-    if panel.levels.size >= MIN_LEVELS:
-        return None
+def _too_few(panel: Panel, policies: Names) -> Outcome:
     why = f"{panel.levels.size} levels of {' and '.join(policies)}, {MIN_LEVELS} are needed for a bend"
-    n_runs = panel.n_runs(policies)
-    return Outcome(answer="undecided", statistic=np.nan, effect=np.nan, n_runs=n_runs, why=why)
+    return Outcome("undecided", why=why)
 
 
 def _located(
-    answer: Answer, levels: FloatArray, possible: FloatArray, between: tuple[float, float]
+    is_between: bool | None, levels: FloatArray, possible: FloatArray, between: tuple[float, float]
 ) -> tuple[Answer, str]:
-    """Return the answer, or undecided with the reason if `possible`, the levels that can show a change, are too few."""
+    """Return whether a change lies between two values, or undecided and why if the levels cannot show it.
+
+    Args:
+        is_between: What the runs say; None if they leave it open.
+        levels: Of the panel, (L,).
+        possible: Those at which a change could be seen.
+        between: The two values.
+    """
     low, high = between
     where = f"{low:.3g} to {high:.3g}"
-    if answer == "contradicted" and not ((possible >= low) & (possible <= high)).any():
-        return "undecided", f"no level that was run could show a change at {where}"
+    if is_between is False and not ((possible >= low) & (possible <= high)).any():
+        return "undecided", f"; no level that was run could show a change at {where}"
     has_below, has_above = bool((possible < low).any()) or levels[0] == 0.0, bool((possible > high).any())
     lacking = [word for word, has in (("below", has_below), ("above", has_above)) if not has]
-    if answer == "supported" and lacking:
-        return "undecided", f"no level that was run could show a change {' or '.join(lacking)} {where}"
-    return answer, ""
-
-
-def _rounded(between: tuple[float, float]) -> tuple[float, float]:
-    """Bounds, moved apart by as much as rounding may move a level."""
-    return between[0] * (1.0 - ROUNDING), between[1] * (1.0 + ROUNDING)
-
-
-def _change(panel: Panel, policy: str, between: tuple[float, float], rule: Rule) -> Outcome:
-    low, high = _rounded(between)
-
-    def by_bands(part: Panel) -> Outcome:
-        onset = _onset(part, policy)
-        answer: Answer = "supported" if low <= onset <= high else "contradicted"
-        why = f"band of {policy} leaves that of the first level at {onset:.3g}"
-        if np.isinf(onset):
-            why = f"band of {policy} never leaves that of the first level"
-        else:
-            answer, reason = _located(answer, part.levels, part.levels[1:], (low, high))
-            why = f"{why}; {reason}" if reason else why
-        n_runs = part.n_runs((policy,))
-        return Outcome(answer=answer, statistic=onset, effect=np.nan, n_runs=n_runs, why=why)
-
-    def by_intervals(part: Panel) -> Outcome:
-        if few := _few_levels(part, (policy,)):
-            return few
-        found = _bends(part, policy)
-        middle, n_runs = float(np.median(found.places)), part.n_runs((policy,))
-        inside = float(((found.places >= low) & (found.places <= high)).mean())
-        reason = ""
-        answer: Answer = "undecided"
-        why = f"slope of {policy} changes by {found.change:.2f} of the scale, by chance alone up to {found.chance:.2f}"
-        if found.is_none:
-            answer, why = "contradicted", f"{why}: no change, {found.tie:.2g} would be one"
-        elif found.is_real:
-            answer = "supported" if inside >= CONFIDENCE else answer
-            answer = "contradicted" if inside <= 1.0 - CONFIDENCE else answer
-            answer, reason = _located(answer, part.levels, part.levels[1:-1], (low, high))
-            where = f"at {middle:.3g}, in {inside:.0%} of the resamples between {between[0]:.3g} and {between[1]:.3g}"
-            why = f"slope of {policy} changes {where}" + (f"; {reason}" if reason else "")
-        return Outcome(answer=answer, statistic=middle, effect=found.change, n_runs=n_runs, why=why)
-
-    return where_scored(panel, (policy,), rule, by_bands if rule == "bands" else by_intervals)
-
-
-def _earlier(panel: Panel, first: str, second: str, rule: Rule) -> Outcome:
-    def by_bands(part: Panel) -> Outcome:
-        mine, theirs = _onset(part, first), _onset(part, second)
-        n_runs = part.n_runs((first, second))
-        answer: Answer = "supported" if mine < theirs else "contradicted"
-        why = f"band of {first} leaves that of the first level at {mine:.3g}, that of {second} at {theirs:.3g}"
-        if still := [name for name, onset in ((first, mine), (second, theirs)) if np.isinf(onset)]:
-            answer, why = "undecided", f"bands of {' and '.join(still)} never leave that of the first level"
-        return Outcome(answer=answer, statistic=mine, effect=np.nan, n_runs=n_runs, why=why)
-
-    def by_intervals(part: Panel) -> Outcome:
-        if few := _few_levels(part, (first, second)):
-            return few
-        mine, theirs = _bends(part, first), _bends(part, second)
-        before, n_runs = float((mine.places < theirs.places).mean()), part.n_runs((first, second))
-        answer: Answer = "undecided"
-        if unsure := [name for name, found in ((first, mine), (second, theirs)) if not found.is_real]:
-            why = f"no change of {' and '.join(unsure)} that chance could not make"
-        else:
-            answer = "supported" if before >= CONFIDENCE else "contradicted" if before <= 1.0 - CONFIDENCE else answer
-            why = f"{first} changes before {second} in {before:.0%} of the resamples"
-        return Outcome(answer=answer, statistic=before, effect=np.nan, n_runs=n_runs, why=why)
-
-    return where_scored(panel, (first, second), rule, by_bands if rule == "bands" else by_intervals)
-
-
-def _straightness(panel: Panel, policy: str, rule: Rule) -> Outcome:
-    def judge(part: Panel) -> Outcome:
-        (values,) = part.of((policy,))
-        means, drawn = resampled_means(values, part.confidence)
-        rest, total, rise = (float(one[0]) for one in _line(part.levels, means[None]))
-        explained = 1.0 - rest / total if total > 0.0 else 0.0
-        rise, n_runs = rise / part.scale, part.n_runs((policy,))
-        if rule == "bands":
-            reach = 2.0 * std_over_runs(values)
-            is_seen = float((means - reach).max()) > float((means + reach).min())
-            is_line = explained >= LINEAR and rise > 0.0
-            answer: Answer = "undecided" if not is_seen else "supported" if is_line else "contradicted"
-            words = "" if is_seen else f"no two bands of {policy} are apart; "
-        else:
-            rests, totals, _ = (np.quantile(one, CONFIDENCE) for one in _line(part.levels, drawn - means))
-            lower, upper = bounds(_line(part.levels, drawn)[2] / part.scale)
-            # Square roots of sums of squares are lengths: what chance adds changes them by its own length at most.
-            most = _ratio(rest**0.5 + rests**0.5, total**0.5 - totals**0.5)
-            least = _ratio(rest**0.5 - rests**0.5, total**0.5 + totals**0.5)
-            answer = "supported" if 1.0 - most >= LINEAR and lower > 0.0 else "undecided"
-            answer = "contradicted" if 1.0 - least < LINEAR or upper <= _tie(part) else answer
-            words = f"{1.0 - most:.2f} to {1.0 - least:.2f} with its interval; "
-        why = f"a line explains {explained:.2f} of the variance of {policy} ({words}{LINEAR:g} is nearly linear)"
-        why = f"{why} and rises by {rise:.2f} of the scale" + ("" if rise > 0.0 else ": it does not grow")
-        return Outcome(answer=answer, statistic=explained, effect=rise, n_runs=n_runs, why=why)
-
-    return where_scored(panel, (policy,), rule, judge)
-
-
-def _ratio(above: float, below: float) -> float:
-    """Square of the ratio of two lengths, from 0 to 1; a length below 0 counts as 0."""
-    return min(1.0, (max(0.0, above) / below) ** 2) if below > 0.0 else 1.0
-
-
-def _line(levels: FloatArray, means: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Fit lines to curves (B, L): residual sum of squares, total sum of squares, and rise over the span; (B,) each."""
-    x, y = levels - levels.mean(), means - means.mean(axis=1, keepdims=True)
-    slope = y @ x / (x @ x)
-    total = (y**2).sum(axis=1)
-    return np.maximum(0.0, total - slope**2 * (x @ x)), total, slope * (levels[-1] - levels[0])
+    if is_between and lacking:
+        return "undecided", f"; no level that was run could show a change {' or '.join(lacking)} {where}"
+    return "undecided" if is_between is None else "supported" if is_between else "contradicted", ""

@@ -12,7 +12,7 @@ import numpy as np
 from ..catalog import METRICS
 from ..checks import CurveError
 from ..claims import Panel, PanelName
-from ..claims.checking import DISTANCES
+from ..claims.claim import DISTANCES
 from ..claims.panel import CONFIDENCE, TIE
 from ..curves import FloatArray, Form, Variant
 from .measures import SHARES, score_study

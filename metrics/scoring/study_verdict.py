@@ -13,9 +13,9 @@ from swarm_forage_env.studies.study_file import PAPER, is_set_of_paper, load_stu
 from ..catalog import METRICS
 from ..checks import CurveError
 from ..claims import CLAIMS, INTUITIONS, Claim, PanelName, Verdict, check_claim
-from ..claims.checking import RELATIVE, read_otherwise
-from ..claims.outcomes import Answer as ClaimAnswer
-from ..claims.statements import POLICIES
+from ..claims.claim import RELATIVE, read_otherwise
+from ..claims.experiments import POLICIES
+from ..claims.rules import Answer as ClaimAnswer
 from ..curves import Variant
 from .scores import label_of
 from .study_numbers import StudyPanel, StudyPanels, study_panels

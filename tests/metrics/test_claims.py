@@ -5,7 +5,7 @@ import pytest
 
 from metrics import CLAIMS, METRICS, Panel, check_claim
 from metrics.claims import EXPERIMENTS, INTUITIONS, PanelName
-from metrics.claims.checking import read_otherwise
+from metrics.claims.claim import read_otherwise
 from tests.support.panels import N_RUNS, panel
 
 X = np.linspace(0.0, 1.0, 8)

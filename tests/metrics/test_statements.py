@@ -8,10 +8,10 @@ import pytest
 
 from metrics import CurveError, Panel
 from metrics.claims import orders, shapes
-from metrics.claims import predicates as general
-from metrics.claims.outcomes import Outcome, all_of, most_of
-from metrics.claims.panel import interval_of, resampled_means, signs
-from metrics.claims.statements import ONSET, SIGMAS
+from metrics.claims import rules as general
+from metrics.claims.experiments import ONSET, SIGMAS
+from metrics.claims.panel import interval_of, order, resampled_means
+from metrics.claims.rules import Outcome, all_of, most_of
 from tests.support.panels import SIX, panel
 
 
@@ -29,27 +29,27 @@ UP = {"upper": ("a",), "lower": ("b", "c")}
 LEAD = {"leader": "a", "others": ("b", "c")}
 
 
-def test_signs_by_hand():
+def test_orders_by_hand():
     scores = {"a": [[1.0, 1.2, 1.1, 0.9]] * 3, "b": [[3.0, 3.1, 3.2, 2.9], [1.0, 1.2, 1.1, 0.9], [1.0, 1.3, 0.7, 2.0]]}
     found = Panel(levels=[1, 2, 3], scores=scores)
     # Means 1.05 +- 0.065 and 3.05 +- 0.065; 1.05 each, so that Welch's t of six degrees reaches 0.18 to either side;
     # and 1.05 +- 0.065 and 1.25 +- 0.278, which leaves anything open.
-    assert signs(replace(found, margins=[0.2] * 3), "a", "b", "intervals").tolist()[:2] == [-1.0, 0.0]
-    assert np.isnan(signs(replace(found, margins=[0.17] * 3), "a", "b", "intervals")[1:]).all()
+    assert order(replace(found, margins=[0.2] * 3), AB["pairs"], "intervals")[0].tolist()[:2] == [-1.0, 0.0]
+    assert np.isnan(order(replace(found, margins=[0.17] * 3), AB["pairs"], "intervals")[0][1:]).all()
     # Means 1.05 and 1.25 with standard deviations 0.129 and 0.557: 0.2 is less than twice their sum.
-    assert signs(found, "a", "b", "bands").tolist() == [-1.0, 0.0, 0.0]
+    assert order(found, AB["pairs"], "bands")[0].tolist() == [-1.0, 0.0, 0.0]
 
 
 def test_a_difference_too_small_to_see_is_a_tie_however_significant():
     found = panel({"a": 1.0, "b": 1.05}, sd=0.001)
-    assert (signs(found, "a", "b", "intervals") == 0.0).all()
-    assert (signs(found, "a", "b", "bands") == -1.0).all()
+    assert (order(found, AB["pairs"], "intervals")[0] == 0.0).all()
+    assert (order(found, AB["pairs"], "bands")[0] == -1.0).all()
 
 
 @pytest.mark.parametrize("rule", ["intervals", "bands"])
 @pytest.mark.parametrize("n_runs", [4, 8, 16])
 def test_equal_policies_seldom_differ(rule, n_runs):
-    found = [signs(panel({"a": 1.0, "b": 1.0}, sd=0.5, n_runs=n_runs, seed=k), "a", "b", rule) for k in range(200)]
+    found = [order(panel({"a": 1.0, "b": 1.0}, sd=0.5, n_runs=n_runs, seed=k), AB["pairs"], rule) for k in range(200)]
     assert (np.abs(found) == 1.0).mean() < 0.065
 
 
@@ -69,7 +69,7 @@ def test_runs_without_scatter_decide_once_most_runs_surely_score_so(n_runs, foun
     # By chance all runs of one or the other lie on one side of its median: 2 / 2^5 = 6.25 %, 2 / 2^6 = 3.1 %. Ties are
     # tested at 10 %.
     equal = Panel(levels=[1, 2], scores={"a": np.ones((2, n_runs)), "b": [[0.0] * n_runs, [1.0] * n_runs]})
-    np.testing.assert_equal(signs(equal, "a", "b", "intervals"), found)
+    np.testing.assert_equal(order(equal, AB["pairs"], "intervals")[0], found)
     assert interval_of(np.ones(6), np.zeros(6)) == (1.0, 1.0)
     assert np.isnan(interval_of(np.ones(6), np.zeros(6), 0.99)).all(), "an early look asks for more"
 
@@ -246,19 +246,19 @@ def test_what_does_not_change_changes_before_nothing():
 
 def test_which_panel_has_more_differences():
     apart, alike = panel({"a": 1.0, "b": 2.0}), panel({"a": 1.0, "b": 1.0})
-    assert answers(general.differs_more, alike, apart, **AB) == BOTH
-    assert answers(general.differs_more, apart, alike, **AB) == NEITHER
-    assert answers(general.differs_more, apart, apart, **AB) == ("contradicted", "undecided"), "surely no more"
-    assert answers(general.differs_more, alike, panel({"a": 1.0, "b": 2.0}, n_runs=1), **AB) == OPEN
+    assert answers(orders.differs_more, alike, apart, **AB) == BOTH
+    assert answers(orders.differs_more, apart, alike, **AB) == NEITHER
+    assert answers(orders.differs_more, apart, apart, **AB) == ("contradicted", "undecided"), "surely no more"
+    assert answers(orders.differs_more, alike, panel({"a": 1.0, "b": 2.0}, n_runs=1), **AB) == OPEN
 
 
 def test_differences_are_counted_in_equally_many_runs():
     few, many = panel({"a": 1.0, "b": 2.0}, n_runs=4), panel({"a": 1.0, "b": 2.0}, n_runs=8)
-    outcome = general.differs_more(few, many, pairs=AB["pairs"])
+    outcome = orders.differs_more(few, many, pairs=AB["pairs"])
     assert (outcome.answer, outcome.n_runs) == ("contradicted", 4)
     assert "of 4 runs each" in outcome.why
     alike = panel({"a": 1.0, "b": 1.0}, n_runs=8)
-    assert answers(general.differs_more, alike, few, **AB) == BOTH
+    assert answers(orders.differs_more, alike, few, **AB) == BOTH
 
 
 def test_more_runs_alone_do_not_make_more_differences():
@@ -267,7 +267,7 @@ def test_more_runs_alone_do_not_make_more_differences():
     close = Panel(levels=[1.0], scores={"a": np.full((1, 8), 5.0), "b": [5.0 + runs]})
     assert general.differ(close, pairs=AB["pairs"]).answer == "supported"
     four = Panel(levels=[1.0], scores={name: scores[:, :4] for name, scores in close.scores.items()})
-    outcome = general.differs_more(four, close, pairs=AB["pairs"])
+    outcome = orders.differs_more(four, close, pairs=AB["pairs"])
     assert (outcome.answer, outcome.statistic) == ("undecided", 0.0)
 
 
@@ -340,9 +340,9 @@ def test_one_score_that_is_not_finite_costs_its_level_alone():
 def test_a_level_without_scores_does_not_keep_others_from_being_compared():
     alike, apart = panel({"a": 1.0, "b": 1.0}), panel({"a": 1.0, "b": 3.0})
     alike.scores["a"][0] = math.nan
-    assert answers(general.differs_more, alike, apart, **AB) == BOTH
+    assert answers(orders.differs_more, alike, apart, **AB) == BOTH
     alike.scores["a"][1:] = math.nan
-    assert general.differs_more(alike, apart, **AB).answer == "no scores"
+    assert orders.differs_more(alike, apart, **AB).answer == "no scores"
 
 
 def test_one_wild_level_says_nothing_about_the_others():
@@ -364,7 +364,7 @@ def test_nothing_to_judge_has_its_own_answer():
         general.leads_by_little(made, **LEAD),
         general.is_constant(made, policies=("a", "b")),
         general.is_wider(made, upper="a", lower="b"),
-        general.differs_more(made, made, **AB),
+        orders.differs_more(made, made, **AB),
         shapes.changes_within(made, policies=("b",), between=(2.0, 3.0)),
         shapes.is_linear(made, policies=("b",)),
         orders.unrelated(made, made, policies=("a", "b")),

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from metrics import noise_robustness
 from metrics.claims import orders, shapes
-from metrics.claims import predicates as general
-from metrics.claims.outcomes import Outcome
+from metrics.claims import rules as general
 from metrics.claims.panel import Panel
+from metrics.claims.rules import Outcome
 from metrics.scoring.run_curves import RunCurves
 from metrics.scoring.scores import pseudo_values
 
@@ -166,11 +166,11 @@ RULES: dict[str, Rule] = {
         wrong=("supported", "contradicted"), holds=fixed(APART), fails=fixed({"a": 1.0, "b": 2.0}),
     ),
     "differ more, of equal policies": Rule(
-        predicate=general.differs_more, parameters=PAIR, border=fixed(ALIKE, ALIKE), wrong=("supported",),
+        predicate=orders.differs_more, parameters=PAIR, border=fixed(ALIKE, ALIKE), wrong=("supported",),
         holds=fixed(ALIKE, {"a": 3.0, "b": 1.0}), fails=fixed({"a": 3.0, "b": 1.0}, ALIKE),
     ),
     "differ more, of equal differences": Rule(
-        predicate=general.differs_more, parameters=PAIR, border=fixed(APART, APART), wrong=("supported",),
+        predicate=orders.differs_more, parameters=PAIR, border=fixed(APART, APART), wrong=("supported",),
         holds=fixed(ALIKE, {"a": 3.0, "b": 1.0}), fails=fixed({"a": 3.0, "b": 1.0}, ALIKE),
     ),
     "the same order, of random ones": Rule(

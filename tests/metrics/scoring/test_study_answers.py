@@ -6,7 +6,7 @@ import pytest
 
 from metrics import CLAIMS, CurveError, verdict
 from metrics.claims import INTUITIONS
-from metrics.claims.checking import READINGS
+from metrics.claims.claim import READINGS
 from swarm_forage_env.studies.description import paper_sets, status
 from swarm_forage_env.studies.study import Axis
 from tests.support.made_tables import made_study, made_table

@@ -1,22 +1,21 @@
-"""Short ways to write statements: experiments, levels, policies, measures, and the most frequent statements."""
+"""Short words for statements: experiments, policies, measures, levels, and the most frequent statements."""
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from itertools import combinations
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from ..controllers import PAPER_POLICIES as POLICIES
 from ..curves import Form
-from .checking import Place, Statement, named
-from .outcomes import Outcome
+from .claim import Claim, Place, Statement, named
 from .panel import Panel
-from .predicates import every_pair, is_higher
+from .rules import Outcome, is_higher, ties
 
 SIMPLE, COMPLEX = ("crw", "dpo"), ("stochm", "stochx")
 STEADY, UNSTEADY = ("crw", "stochx"), ("dpo", "stochm")
 E_S, E_T, C, P = "spatial_emergence", "task_emergence", "scalability", "raw_performance"
 R, A, N, D = "reactivity", "adaptability", "noise_robustness", "population_robustness"
-ALL_PAIRS = every_pair(POLICIES)
 
 EXPERIMENTS: dict[str, str] = {
     "S1a": "small warehouse, 1 to 128 robots",
@@ -49,16 +48,19 @@ LARGER = (0.01, 0.05)
 """Standard deviations between which noise changes behaviour in search and rescue."""
 
 
+def pairs_of(policies: Sequence[str]) -> tuple[tuple[str, str], ...]:
+    """Return all pairs of policies."""
+    return tuple(combinations(policies, 2))
+
+
+ALL_PAIRS = pairs_of(POLICIES)
+
+
 def states(
-    predicate: Callable[..., Outcome],
-    *panels: Place,
-    views: tuple[Callable[[Panel], Panel], ...] = (),
-    **parameters: Any,
+    rule: Callable[..., Outcome], *panels: Place, views: tuple[Callable[[Panel], Panel], ...] = (), **parameters: Any
 ) -> Statement:
-    """Statement that a predicate makes about panels, with these parameters; panels without a form are marginal."""
-    return Statement(
-        predicate=predicate, panels=tuple(named(name) for name in panels), views=views, parameters=parameters
-    )
+    """Statement that panels satisfy a rule with these parameters; panels without a form are marginal."""
+    return Statement(rule, tuple(named(name) for name in panels), parameters, views)
 
 
 def spatial(experiment: str) -> tuple[str, str, Form]:
@@ -81,12 +83,7 @@ def others_of(policy: str) -> tuple[str, ...]:
     return tuple(name for name in POLICIES if name != policy)
 
 
-def better(
-    panel: Place,
-    winners: tuple[str, ...],
-    losers: tuple[str, ...],
-    levels: str = "all",
-) -> Statement:
+def better(panel: Place, winners: tuple[str, ...], losers: tuple[str, ...], levels: str = "all") -> Statement:
     """Statement that each of some policies is better than each of others; distances are better where they are lower."""
     upper, lower = (losers, winners) if direction_of(panel[1]) < 0 else (winners, losers)
     return states(is_higher, panel, upper=upper, lower=lower, levels=levels)
@@ -95,3 +92,53 @@ def better(
 def direction_of(measure: str) -> int:
     """1 if higher is better, -1 if lower is."""
     return -1 if measure in (R, A, N) else 1
+
+
+Says: TypeAlias = Callable[[Place], Statement]
+"""What a claim says of each panel of its figure."""
+
+
+def about(
+    words: str,
+    panels: tuple[Place, ...],
+    claims: Mapping[str, tuple[Any, ...]],
+    otherwise: Mapping[str, Place] | None = None,
+) -> list[Claim]:
+    """Return the claims about a figure.
+
+    Args:
+        words: What the figure shows.
+        panels: Its panels; each claim is about all of them.
+        claims: Name -> text, and what it says (`Says`) of each panel.
+        otherwise: Another panel that the claims may mean, by words.
+    """
+    return [
+        Claim(
+            name,
+            text,
+            words,
+            tuple(say(panel) for say in said for panel in panels),
+            otherwise={told: tuple(say(panel) for say in said) for told, panel in (otherwise or {}).items()},
+        )
+        for name, (text, *said) in claims.items()
+    ]
+
+
+def says(rule: Callable[..., Outcome], **given: Any) -> Says:
+    """What a claim says by a rule with these parameters, and views."""
+    return lambda panel: states(rule, panel, **given)
+
+
+def tie(*pairs: tuple[str, str], **given: Any) -> Says:
+    """Pairs of policies tie."""
+    return says(ties, pairs=pairs, **given)
+
+
+def best(policy: str, levels: str = "all") -> Says:
+    """A policy is better than the three others."""
+    return lambda panel: best_of(panel, policy, levels)
+
+
+def above(winners: tuple[str, ...], losers: tuple[str, ...], levels: str = "all") -> Says:
+    """Each of some policies is better than each of others."""
+    return lambda panel: better(panel, winners, losers, levels)

@@ -2,13 +2,12 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import nan
 from typing import Any, Literal, NamedTuple, TypeAlias, cast
 
 from ..controllers import PAPER_POLICIES
 from ..curves import Form
-from .outcomes import Answer, Outcome, all_of, most_of, without_scores
 from .panel import Panel, Rule, judged_together
+from .rules import Answer, Outcome, all_of, most_of
 
 
 class PanelName(NamedTuple):
@@ -74,11 +73,11 @@ READINGS: Mapping[str, Callable[[PanelName], PanelName]] = {
 It returns the same name if the panel does not have this reading."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Statement:
     """One statement about one or two panels."""
 
-    predicate: Callable[..., Outcome]
+    rule: Callable[..., Outcome]
     """Called with the panels and the parameters."""
     panels: tuple[PanelName, ...]
     parameters: Mapping[str, Any] = field(default_factory=dict[str, Any])
@@ -94,12 +93,12 @@ class Statement:
         """Return the answer to it; the reason names the panels."""
         absent = [name.words for name in self.panels if name not in panels]
         if absent:
-            return without_scores(", ".join(absent))
+            return Outcome("no scores", why=f"no scores of {', '.join(absent)}")
         seen = judged_together([panels[name] for name in self.panels], self.policies)
         for view in self.views:
             seen = [view(panel) for panel in seen]
         rules = {"rule": rule} if seen else {}  # what follows from formulas alone has no runs to compare
-        outcome = self.predicate(*seen, **self.parameters, **rules)
+        outcome = self.rule(*seen, **self.parameters, **rules)
         return _placed(outcome, " and ".join(name.words for name in self.panels)) if seen else outcome
 
 
@@ -116,7 +115,7 @@ def _placed(outcome: Outcome, where: str) -> Outcome:
     return replace(outcome, parts=parts, why=outcome.why if parts else f"{where}: {outcome.why}")
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Claim:
     """One claim: the statements that it consists of."""
 
@@ -193,7 +192,7 @@ def check_claim(claim: Claim, panels: Mapping[PanelName, Panel] | Mapping[tuple[
         CurveError: A panel lacks a policy that the claim names.
     """
     if claim.vague:
-        return _told(claim, Outcome(answer="too vague", statistic=nan, effect=nan, n_runs=0, why=claim.vague))
+        return _told(claim, Outcome("too vague", why=claim.vague))
     by_name = {named(name): panel for name, panel in panels.items()}
     others = {words: _verdict(claim, statements, by_name) for words, statements in claim.otherwise.items()}
     others |= {words: _verdict(claim, read.statements, by_name) for words, read in read_otherwise(claim).items()}
@@ -201,14 +200,10 @@ def check_claim(claim: Claim, panels: Mapping[PanelName, Panel] | Mapping[tuple[
     return replace(_verdict(claim, claim.statements, by_name), otherwise=scored)
 
 
-def joined(claim: Claim, outcomes: Sequence[Outcome]) -> Outcome:
-    """Return the outcome of a claim from the outcomes of its statements."""
-    return all_of(outcomes) if claim.needs == "all" else most_of(outcomes)
-
-
 def _verdict(claim: Claim, statements: tuple[Statement, ...], panels: Mapping[PanelName, Panel]) -> Verdict:
     rules: tuple[Rule, Rule] = ("intervals", "bands")
-    ours, bands = (joined(claim, [statement.outcome(panels, rule) for statement in statements]) for rule in rules)
+    joined = all_of if claim.needs == "all" else most_of
+    ours, bands = (joined([statement.outcome(panels, rule) for statement in statements]) for rule in rules)
     return _told(claim, ours, bands)
 
 
