@@ -154,14 +154,18 @@ class InterfaceConfig:
         return (*COMPACT_READS, *self.sensors) if self.observation == "compact" else None
 
 
+def _check_rows(name: str, rows: np.ndarray, shape: tuple[int, int]) -> None:
+    """Refuse an array of another shape or type than compiled code takes."""
+    if rows.shape != shape or rows.dtype != np.float32:
+        raise ValueError(f"Expected {name} as float32 of shape {shape}, got {rows.dtype} of shape {rows.shape}.")
+
+
 class LearnerInterface:
     """Translates between a swarm and a learner that controls all robots in the same way.
 
     Attributes:
         config: The choices.
         layout: Columns of what the learner sees.
-        shows_all: Whether that is the row of the environment as it is.
-        passes_on: Whether actions are commands of the environment as they are.
         translation: What kernels need for both ways.
         observation_space: Box of one robot's row, (d,) float32 in [-1, 1].
         action_space: Box or Discrete of one robot's action.
@@ -188,10 +192,7 @@ class LearnerInterface:
         )
         self._commands = np.zeros((spec.n_robots, spec.action_size), np.float32)
         self.layout = learner_layout(source, config)
-        self.shows_all = self.layout == source and config.frame_decisions == 0
-        says_all = (config.message_size or 0) == spec.message_size
-        is_driven = config.actions != "discrete" and not config.automatic_gripper
-        self.passes_on = says_all and is_driven and config.frame_decisions == 0
+        self._n_columns = source.size
         own = [column for name in config.sensors for column in range(source[name].start, source[name].stop)]
         half_x, half_y = source.part("position").scale
         self.translation = Translation(
@@ -271,9 +272,13 @@ class LearnerInterface:
             extra: (N, K) what the user's `extra_observation` returned; `extra_columns` needs it.
 
         Raises:
-            ValueError: robots have frames of their own, and the decision is not told; or another number of rows than
-                robots, where they have these or memories; or other extra columns than `extra_columns`.
+            ValueError: arrays of another shape or type; robots have frames of their own, and the decision is not told;
+                another number of rows than robots, where they have these or memories; or other extra columns than
+                `extra_columns`.
         """
+        _check_rows("observations", obs, (len(obs), self._n_columns))
+        if out is not None:
+            _check_rows("out", out, (len(obs), self.layout.size))
         if self.config.extra_columns and (extra is None or extra.shape[1] != self.config.extra_columns):
             raise ValueError(
                 f"Expected {self.config.extra_columns} columns of extra_observation, which the learner sees, got "

@@ -13,22 +13,22 @@ rows (`LearnerArena`) are absent from the first step of the run to the last. The
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Protocol, cast
 
 import numpy as np
 
 from swarm_forage_env._internal.fields import as_whole
 from swarm_forage_env.contract.codes import Counter
+from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.contract.types import BoolArray, IntArray, ObsArray
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policies.extras import ExtraFunction, ExtraFunctionError
+from swarm_forage_env.policies.extras import ExtraFunction
 from swarm_forage_env.policies.interface import GivenInterface
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.plans import ArenaPlan, plan_arena
 from swarm_forage_env.views.sampler import ScenarioSampler
-from swarm_forage_env.world.kernels.reward import book_rows
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 
 
@@ -109,29 +109,6 @@ def _owner(env: ForageEnv | SwarmWrapper, name: str) -> ForageEnv | SwarmWrapper
     return env
 
 
-@dataclass(slots=True)
-class _Endings:
-    """What ended in a step, arena by arena."""
-
-    rows: list[IntArray] = field(default_factory=list)
-    final_obs: list[ObsArray] = field(default_factory=list)
-    is_episode: list[BoolArray] = field(default_factory=list)
-    returns: list[np.ndarray] = field(default_factory=list)
-    lengths: list[IntArray] = field(default_factory=list)
-    outcomes: list[RunOutcome] = field(default_factory=list)
-
-    def joined(self, columns: int) -> dict[str, Any]:
-        """Return the fields of an `ArenaStep` with the same names; `columns` = columns of an observation."""
-        return {
-            "ended": _joined(self.rows, np.zeros(0, np.int32)),
-            "final_obs": _joined(self.final_obs, np.zeros((0, columns), np.float32)),
-            "is_episode": _joined(self.is_episode, np.zeros(0, np.bool_)),
-            "returns": _joined(self.returns, np.zeros(0, np.float64)),
-            "lengths": _joined(self.lengths, np.zeros(0, np.int32)),
-            "outcomes": tuple(self.outcomes),
-        }
-
-
 class ArenaBatch:
     """Arenas of one kind in this process, stepped together.
 
@@ -155,23 +132,16 @@ class ArenaBatch:
             ConfigError: n_arenas below 1, or a plan that cannot be built.
         """
         n_arenas = as_whole("n_arenas", n_arenas, at_least=1)
-        shares: list[float | None] = [None] * n_arenas
-        if plan.sampler is not None:
-            shares = plan.sampler.shares(n_arenas)
+        shares = [None] * n_arenas if plan.sampler is None else plan.sampler.shares(n_arenas)
         self.arenas = [LearnerArena(plan, share) for share in shares]
         self.interface = self.arenas[0].interface
-        self.n_arenas = n_arenas
-        self.n_robots = plan.world.n_robots
+        self.n_arenas, self.n_robots = n_arenas, plan.world.n_robots
         self.n_rows = n_arenas * self.n_robots
         self.render_mode = plan.render_mode
         self._is_reset = self._is_closed = False
-        self._absent = np.zeros((n_arenas, self.n_robots), np.bool_)
-        self._present = np.zeros((n_arenas, self.n_robots), np.bool_)
-        self._returns = np.zeros((n_arenas, self.n_robots), np.float64)
-        self._lengths = np.zeros((n_arenas, self.n_robots), np.int32)
-        self._n_columns = self.interface.layout.size
-        self._rows = self._absent, self._present, self._returns, self._lengths
-        self._no_endings = _Endings().joined(self._n_columns)
+        shape = self._shape = n_arenas, self.n_robots
+        self._absent, self._present, self._dead, self._active = np.zeros((4, *shape), np.bool_)
+        self._returns, self._lengths = np.zeros(shape), np.zeros(shape, np.int32)
 
     def reset(
         self, seeds: Sequence[int | None], options: Sequence[Mapping[str, Any] | None]
@@ -187,12 +157,12 @@ class ArenaBatch:
         """
         if self._is_closed:
             raise closed_error()
-        obs = np.empty((self.n_arenas, self.n_robots, self._n_columns), np.float32)
         self._is_reset = False  # and stays False if a seed or an option is refused before every arena has started
+        obs = np.empty((*self._shape, self.interface.layout.size), np.float32)
         for number, (seed, option) in enumerate(zip(seeds, options, strict=True)):
             self._start(number, obs[number], seed, option)
         self._is_reset = True
-        return obs.reshape(self.n_rows, -1), np.concatenate([arena.active for arena in self.arenas])
+        return obs.reshape(self.n_rows, -1), self._active.flatten()
 
     def _start(
         self, number: int, out: ObsArray, seed: int | None = None, options: Mapping[str, Any] | None = None
@@ -200,14 +170,17 @@ class ArenaBatch:
         """Start a run in one arena; writes the learner's observations to `out`."""
         arena = self.arenas[number]
         arena.reset(seed, options)
-        n_robots = arena.n_robots
-        self._present[number, :n_robots] = arena.forage_env.swarm.present
-        self._present[number, n_robots:] = False
-        self._absent[number, :n_robots] = False
-        self._absent[number, n_robots:] = True
-        self._returns[number] = 0.0
-        self._lengths[number] = 0
-        arena.observe(out)
+        for rows in (self._present, self._active, self._returns, self._lengths):
+            rows[number] = 0
+        self._absent[number] = np.arange(self.n_robots) >= arena.n_robots
+        self._look(number, out)
+
+    def _look(self, number: int, out: ObsArray) -> None:
+        """Note which robots of an arena are there, at work and dead, and write what they see to `out`."""
+        env = self.arenas[number].forage_env
+        for rows, now in ((self._present, env.swarm.present), (self._active, env.active), (self._dead, env.terminated)):
+            rows[number, : len(now)] = now
+        self.arenas[number].observe(out)
 
     def step(self, actions: np.ndarray) -> ArenaStep:
         """Step every arena by one decision.
@@ -216,89 +189,50 @@ class ArenaBatch:
             actions: (R,) or (R, k), one action of the interface per row; those of absent rows are ignored.
 
         Raises:
-            RuntimeError: not reset yet, or closed.
+            RuntimeError: not reset yet, closed, or a step before this one failed half done.
             ValueError: wrong shape, or actions that the interface or the drive refuses. A note names the arena.
         """
         self._require_reset("step")
         actions = checked_rows(actions, self)
-        shape, columns = (self.n_arenas, self.n_robots), self._n_columns
-        obs = np.empty((*shape, columns), np.float32)
-        rewards = np.zeros(shape, np.float32)
-        flags = np.zeros((3, *shape), np.bool_)
-        actions = actions.reshape(*shape, *actions.shape[1:])
-        try:
-            ticks = [self._alone(number, actions[number], rewards[number]) for number in range(self.n_arenas)]
-            for arena, out in zip(self.arenas, obs, strict=True):
-                arena.observe(out)
-        except ExtraFunctionError:
-            self._is_reset = False
-            for arena in self.arenas:  # some have been stepped and some not
-                arena.forage_env.break_off()
-            raise
-        endings: _Endings | None = None
-        for number, (dead, all_dead, at_horizon) in enumerate(ticks):
-            n_robots = self.arenas[number].n_robots
-            booked: Any = (rewards, *self._rows, flags[0], flags[2])
-            n_terminated = book_rows(
-                self.arenas[number].forage_env.swarm, dead, *(rows[number, :n_robots] for rows in booked)
-            )
-            if n_terminated or all_dead or at_horizon:
-                endings = endings or _Endings()
-                out = obs[number], *flags[:, number]
-                self._conclude(number, dead, all_dead or at_horizon, out, endings)
-        obs = obs.reshape(self.n_rows, columns)
-        rows = flags.reshape(3, self.n_rows)
-        ended = endings.joined(columns) if endings else self._no_endings
-        return ArenaStep(
-            obs=obs, rewards=rewards.ravel(), terminated=rows[0], truncated=rows[1], active=rows[2], **ended
+        obs = np.empty((*self._shape, self.interface.layout.size), np.float32)
+        rewards = np.zeros(self._shape, np.float32)
+        present = self._present.copy()
+        for number, chosen in enumerate(actions.reshape(*self._shape, *actions.shape[1:])):
+            arena = self.arenas[number]
+            try:
+                arena.step(chosen[: arena.n_robots], rewards[number, : arena.n_robots])
+                self._look(number, obs[number])
+            except BaseException as error:
+                # Where the first arena refuses its actions, nothing has happened.
+                self._is_reset = number == 0 and isinstance(error, ActionError)
+                error.add_note(f"This was in arena {number}{'' if self._is_reset else '; reset before going on'}.")
+                raise
+        self._lengths += present
+        self._returns += rewards
+        over = [number for number, arena in enumerate(self.arenas) if arena.is_over]
+        terminated, truncated = self._dead & ~self._absent, np.zeros(self._shape, np.bool_)
+        terminated[over] |= self._absent[over]
+        truncated[over] = ~terminated[over]
+        obs = obs.reshape(self.n_rows, -1)
+        ended = np.flatnonzero(terminated | truncated).astype(np.int32)
+        step = ArenaStep(
+            obs=obs,
+            rewards=rewards.ravel(),
+            terminated=terminated.ravel(),
+            truncated=truncated.ravel(),
+            active=self._active.flatten(),
+            ended=ended,
+            final_obs=obs[ended],
+            is_episode=~self._absent.ravel()[ended],
+            returns=self._returns.ravel()[ended],
+            lengths=self._lengths.ravel()[ended],
+            outcomes=tuple(map(self._outcome, over)),
         )
-
-    def _alone(self, number: int, actions: np.ndarray, rewards: np.ndarray) -> tuple[BoolArray, bool, bool]:
-        arena = self.arenas[number]
-        try:
-            return arena.step(actions[: arena.n_robots], rewards[: arena.n_robots])
-        except ValueError as error:
-            self._note(error, number)
-            raise
-
-    def _note(self, error: ValueError, number: int) -> None:
-        """Add to a refusal of actions in which arena it was."""
-        error.add_note(
-            f"This was in arena {number}, which was not stepped. Other arenas may have been "
-            "stepped already; where there are others, reset before going on."
-        )
-
-    def _conclude(
-        self,
-        number: int,
-        dead: BoolArray,
-        over: bool,
-        out: tuple[ObsArray, BoolArray, BoolArray, BoolArray],
-        endings: _Endings,
-    ) -> None:
-        """Conclude episodes of one arena; rewrites its rows of what `step` returns and appends to `endings`.
-
-        `out` is its observations, terminated, truncated, active.
-        """
-        obs, terminated, truncated, active = out
-        absent = self._absent[number]
-        if over:
-            terminated |= absent
-            np.logical_not(terminated, out=truncated)
-            self._note_endings(number, np.arange(self.n_robots), obs, endings)
-            endings.outcomes.append(self._outcome(number))
-            self._start(number, obs)
-            active[:] = self.arenas[number].active
-        else:
-            self._note_endings(number, np.flatnonzero(terminated), obs, endings)
-            absent[: len(dead)] |= dead
-
-    def _note_endings(self, number: int, robots: np.ndarray, obs: ObsArray, endings: _Endings) -> None:
-        endings.rows.append((robots + number * self.n_robots).astype(np.int32))
-        endings.final_obs.append(obs[robots])
-        endings.is_episode.append(~self._absent[number, robots])
-        endings.returns.append(self._returns[number, robots])
-        endings.lengths.append(self._lengths[number, robots])
+        self._absent |= self._dead
+        for number in over:
+            self._start(number, obs.reshape(*self._shape, -1)[number])
+            step.active.reshape(self._shape)[number] = self._active[number]
+        return step
 
     def _outcome(self, number: int) -> RunOutcome:
         env = self.arenas[number].forage_env
@@ -327,9 +261,7 @@ class ArenaBatch:
         if self._is_closed:
             raise closed_error()
         if not self._is_reset:
-            for arena in self.arenas:
-                arena.forage_env.require_whole()
-            raise RuntimeError(f"Call reset before {what}.")
+            raise RuntimeError(f"Call reset before {what}; after a step that failed half done, too.")
 
     def render(self) -> list[np.ndarray | None]:
         """Return one picture per arena."""
@@ -357,10 +289,6 @@ class ArenaBatch:
         self._is_closed = True
         for arena in self.arenas:
             arena.env.close()
-
-
-def _joined(parts: list[np.ndarray], nothing: np.ndarray) -> np.ndarray:
-    return np.concatenate(parts) if parts else nothing
 
 
 def open_arenas(

@@ -84,7 +84,9 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
             if chosen.shape[:1] != (n_rows,):
                 raise ActionError(f"Expected actions for {n_rows} rows, got shape {chosen.shape}.")
             chosen = chosen[:n_robots]
-        _, terminated, truncated = self._arena.step(chosen, rewards)
+        self._arena.step(chosen, rewards)
+        env = self.forage_env
+        terminated, truncated = bool(env.terminated.all()), env.tick >= env.max_cycles
         return self._arena.observe(), float(rewards.sum()), terminated, truncated, self._info()
 
     def snapshot(self) -> LearnerSnapshot:

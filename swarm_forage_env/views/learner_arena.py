@@ -3,28 +3,23 @@
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
 
 from swarm_forage_env._internal.compiling import is_compiled
 from swarm_forage_env._internal.fields import ConfigError, table
-from swarm_forage_env._internal.wording import suggestion
+from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.contract.reset_and_step import OPTION_OF_TESTS
-from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, ObsArray
-from swarm_forage_env.env import BatchStep, ForageEnv
+from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
+from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.extras import ExtraFunctionError, extra_columns, extra_rewards
-from swarm_forage_env.policies.interface import (
-    MOTIONS,
-    InterfaceConfig,
-    LearnerInterface,
-)
+from swarm_forage_env.policies.interface import MOTIONS, InterfaceConfig, LearnerInterface
 from swarm_forage_env.policies.kernels.learner import SiteMemory
 from swarm_forage_env.policies.kernels.network import keep_on
-from swarm_forage_env.scenarios.config import SECTIONS
-from swarm_forage_env.scenarios.overrides import field_sections
 from swarm_forage_env.views.plans import ArenaPlan
+from swarm_forage_env.world.arena import UNDISTURBED
+from swarm_forage_env.world.kernels.disturbances import Disturbances
 from swarm_forage_env.world.snapshots import Snapshot, SnapshotError
 from swarm_forage_env.wrappers.base import SwarmWrapper, needs_no_python
 from swarm_forage_env.wrappers.world import World
@@ -133,111 +128,68 @@ class LearnerArena:
             self._overrides, self._world = overrides, world
             before.close()
 
-    def step(self, actions: np.ndarray, rewards: np.ndarray) -> tuple[BoolArray, bool, bool]:
+    def step(self, actions: np.ndarray, rewards: np.ndarray) -> None:
         """Carry out a decision: step until its ticks are done or the run ends.
 
+        Ticks of which wrappers tell ahead what they do are one compiled call; Python steps where something needs it.
+        There is at least one tick: where all died between two decisions, it ends the run.
+
         Args:
-            actions: One action of the interface per robot, see `LearnerInterface.command`.
+            actions: One action of the interface per robot, see `LearnerInterface.checked`.
             rewards: (N,) the rewards of the robots are added to this array.
 
-        Returns:
-            Dead robots (N,), whether all robots are dead, and whether the horizon is reached.
-
         Raises:
-            RuntimeError: before the first reset.
-            ActionError: actions that the interface or the drive refuses.
-            ExtraFunctionError: see `add_extra`.
+            RuntimeError: before the first reset, or after a step that failed half done.
+            ActionError: actions that the interface or the drive refuses; nothing has happened.
+            ExtraFunctionError: the user's `extra_reward` failed; the run does not go on from here.
         """
-        if self.decides_at_once:
-            self._decide(actions, rewards)
-            tick = self.ending
-        else:
-            tick = np.zeros(0, np.bool_), False, False
-            for _ in range(self._plan.interface.decision_ticks):
-                tick = self.take(self.env.step_batch(self.command(actions)), rewards)
-                if any(tick[1:]):
-                    break
-        self.add_extra(rewards)
-        return tick
-
-    def add_extra(self, rewards: np.ndarray) -> None:
-        """Add the user's `extra_reward` of a decision to the rewards of the robots (N,).
-
-        Raises:
-            ExtraFunctionError: it failed; the run does not go on from here.
-        """
-        function, env = self._plan.extras.reward, self.forage_env
-        if function is None:
-            return
-        try:
-            values = extra_rewards(function, env.arena)
-        except ExtraFunctionError:
-            env.break_off()
-            raise
-        if env.scenario.reward.team:
-            values = values.sum() / max(1, np.count_nonzero(env.active)) * env.active
-        rewards += values
-
-    @property
-    def decides_at_once(self) -> bool:
-        """Whether the ticks of a decision are one compiled call, but for those in which a wrapper has to act."""
-        env = self.forage_env
-        layers = self.env.stack if isinstance(self.env, SwarmWrapper) else ()
-        return is_compiled(keep_on) and env.reward_model.payment is not None and needs_no_python(env, layers)
-
-    def _decide(self, actions: np.ndarray, rewards: np.ndarray) -> None:
-        """Do what `step` does, in as few calls as wrappers allow."""
         env, interface = self.forage_env, self.interface
         env.require_whole()
-        chosen = interface.checked(actions)
-        end = min(env.tick + self._plan.interface.decision_ticks, env.max_cycles)
-        if isinstance(self.env, SwarmWrapper):
-            self._decide_disturbed(self.env, chosen, end, rewards)
-            return
-        act = interface.keeping_on(chosen)
-        while env.tick < end:
-            env.arena.decide(*act, end - env.tick, env.reward_model, rewards)
-
-    def _decide_disturbed(self, wrapped: SwarmWrapper, chosen: np.ndarray, end: int, rewards: np.ndarray) -> None:
-        """Do what `_decide` does until tick `end` or the death of all; a wrapper that has to act gets its tick.
-
-        There is at least one tick: where all died between two decisions, it ends the run.
-        """
-        env, interface = self.forage_env, self.interface
-        env.refuse_bad_step(env.checked_actions(interface.carry_out(chosen, wrapped.last_obs)), None)
-        act = interface.keeping_on(chosen)
+        chosen, start = interface.checked(actions), env.tick
+        if isinstance(self.env, SwarmWrapper):  # wrappers may draw numbers before the world looks at actions
+            env.refuse_bad_step(env.checked_actions(interface.carry_out(chosen, self.env.last_obs)), None)
+        end = min(start + self._plan.interface.decision_ticks, env.max_cycles)
         try:
             while True:
                 before = env.tick
-                n_ahead, disturbances = wrapped.told_ahead(end - before)
+                n_ahead, disturbances = self._told_ahead(end - before)
                 if n_ahead == 0:
-                    rewards += wrapped.step_batch(interface.carry_out(chosen, wrapped.last_obs))[1]
+                    rewards += self.env.step_batch(interface.carry_out(chosen, self.env.last_obs))[1]
                 else:
+                    act = interface.keeping_on(chosen)
                     n_observed = env.arena.decide(*act, n_ahead, env.reward_model, rewards, disturbances)
-                    wrapped.pass_ticks(env.tick - before, n_observed)
-                if env.tick >= end or env.terminated.all():
+                    if isinstance(self.env, SwarmWrapper):
+                        self.env.pass_ticks(env.tick - before, n_observed)
+                if self.is_over or env.tick >= end:
                     break
-        except Exception:
-            env.break_off()  # wrappers have drawn numbers for ticks that have not happened
+            self._add_extra(rewards)
+        except BaseException as error:
+            if not isinstance(error, ActionError) or env.tick > start:
+                env.break_off()
             raise
 
-    def command(self, actions: np.ndarray) -> ActionArray:
-        """Return the actions of the next tick, (N, A) in a reused buffer; see `LearnerInterface.command`."""
-        checked = self.interface.checked(actions)
-        return self.interface.carry_out(checked, self.env.last_obs)
-
-    def take(self, tick: BatchStep, rewards: np.ndarray) -> tuple[BoolArray, bool, bool]:
-        """Take over what a tick of `env` has brought; arguments and result as those of `step`."""
-        _, reward, dead, truncated = tick
-        rewards += reward
-        return dead, bool(dead[0] and dead.all()), truncated
+    def _told_ahead(self, n_ticks: int) -> tuple[int, Disturbances]:
+        """Return how many ticks can be one compiled call, and what wrappers do in them; 0 = Python steps one."""
+        env = self.forage_env
+        layers = self.env.stack if isinstance(self.env, SwarmWrapper) else ()
+        if not is_compiled(keep_on) or env.reward_model.payment is None or not needs_no_python(env, layers):
+            return 0, UNDISTURBED
+        return self.env.told_ahead(n_ticks) if isinstance(self.env, SwarmWrapper) else (n_ticks, UNDISTURBED)
 
     @property
-    def ending(self) -> tuple[BoolArray, bool, bool]:
-        """What `step` returns, after a tick of the environment itself."""
+    def is_over(self) -> bool:
+        """Whether the horizon is reached or all robots are dead."""
         env = self.forage_env
-        dead = env.terminated
-        return dead, bool(dead[0] and dead.all()), env.arena.tick >= env.max_cycles
+        return env.tick >= env.max_cycles or bool(env.terminated.all())
+
+    def _add_extra(self, rewards: np.ndarray) -> None:
+        """Add the user's `extra_reward` of a decision to the rewards of the robots (N,)."""
+        function, env = self._plan.extras.reward, self.forage_env
+        if function is not None:
+            values = extra_rewards(function, env.arena)
+            if env.scenario.reward.team:
+                values = values.sum() / max(1, np.count_nonzero(env.active)) * env.active
+            rewards += values
 
     def snapshot(self, *, agents: Sequence[str] = ()) -> LearnerSnapshot:
         """Return the state of the run and of the sequence of seeds; see `ForageEnv.snapshot`."""
@@ -339,39 +291,14 @@ class LearnerArena:
         return padded
 
 
-_FIXED = ("interface", "wrappers")
-"""Arguments that a reset cannot change, although users may expect it."""
-
-
 def _scenario_overrides(options: Mapping[str, Any] | None) -> dict[str, Any] | None:
     """Return the overridden fields that `options` asks for, None when it has no such key."""
-    if not options:
-        return None
-    for key in options:
+    for key in options or {}:
         if key not in (SCENARIO_OPTION, OPTION_OF_TESTS):
-            raise _misplaced(key, options[key])
-    if SCENARIO_OPTION not in options:
+            raise ConfigError(
+                f"Expected the reset option {SCENARIO_OPTION!r} only, with fields of the scenario, such as "
+                f"options={{'scenario': {{'n_objects': 100}}}}, got {key!r}."
+            )
+    if not options or SCENARIO_OPTION not in options:
         return None
     return dict(table("the reset option 'scenario'", options[SCENARIO_OPTION]))
-
-
-def _misplaced(key: Any, value: Any) -> ConfigError:
-    """Return the error for a reset option that would have no effect, with what was probably meant."""
-    if key in _FIXED:
-        return ConfigError(
-            f"Expected {key} when the environment is made, not at a reset, which changes the scenario only."
-        )
-    known = (*field_sections(), *SECTIONS)
-    if key in known:
-        return ConfigError(
-            f"Expected the scenario field {key!r} inside of the reset option 'scenario': "
-            f"options={{'scenario': {{{key!r}: {value!r}}}}}."
-        )
-    nearest = suggestion(str(key), (SCENARIO_OPTION,))
-    # A closer match than `suggestion` asks for: options of others, such as "high", are not misspelt fields.
-    for name in [] if nearest else get_close_matches(str(key), known, n=1, cutoff=0.8):
-        return ConfigError(
-            f"Unknown reset option {key!r}. If the scenario field {name!r} is meant: "
-            f"options={{'scenario': {{{name!r}: {value!r}}}}}."
-        )
-    return ConfigError(f"Unknown reset option {key!r}.{nearest} The only one is {SCENARIO_OPTION!r}.")

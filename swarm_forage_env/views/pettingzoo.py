@@ -115,7 +115,8 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
             raise ValueError(f"Expected an action for each of the {len(self.agents)} agents, missing {missing[:3]}.")
         chosen = self._chosen(actions)
         rewards = np.zeros(self._arena.n_robots)
-        dead, _, truncated = self._arena.step(chosen, rewards)
+        self._arena.step(chosen, rewards)
+        dead, truncated = self.forage_env.terminated, self.forage_env.tick >= self.forage_env.max_cycles
         results = (
             self._per_agent(self._arena.observe()),
             self._per_agent(rewards.tolist()),

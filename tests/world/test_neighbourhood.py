@@ -229,12 +229,6 @@ def test_a_data_set_has_the_columns_of_messages(tmp_path):
     assert "messages" in dataset.columns
 
 
-def test_a_learner_without_messages_passes_no_actions_on():
-    spec = SwarmSpec.of(scenario("warehouse_small", **SMALL | BOTH))
-    passes_on = {size: LearnerInterface(InterfaceConfig(message_size=size), spec).passes_on for size in (None, 0, 2)}
-    assert passes_on == {None: False, 0: False, 2: True}
-
-
 def test_a_random_policy_says_something():
     policy = load_policy("random")
     policy.reset(SwarmSpec.of(scenario("warehouse_small", **SMALL | BOTH)), np.random.default_rng(0))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from swarm_forage_env._internal.compiling import kernel, part
 from swarm_forage_env.contract.codes import Event
-from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env.contract.types import FloatArray, ObsArray
 from swarm_forage_env.world.state import StepEvents, SwarmState
 
 _DELIVERED = int(Event.DELIVERED)
@@ -112,39 +112,3 @@ def pay(p: Payment, paid: ObsArray) -> None:
         p.reward[:] = 0.0
     for i in range(paid.shape[0]):
         paid[i] += p.reward[i]
-
-
-@kernel
-def book_rows(
-    swarm: SwarmState,
-    dead: BoolArray,
-    reward: ObsArray,
-    absent: BoolArray,
-    present: BoolArray,
-    returns: FloatArray,
-    lengths: IntArray,
-    terminated: BoolArray,
-    active: BoolArray,
-) -> int:
-    """Book a step of one arena; returns how many rows terminate.
-
-    Args:
-        swarm: Robots after the step.
-        dead: (N,) robots that are dead for good after the step.
-        reward: (N,) float32, of this step.
-        absent: (N,) rows that had terminated before.
-        present: (N,) robots in the world before the step; becomes who is in it now.
-        returns: (N,) the sums of rewards grow by `reward`.
-        lengths: (N,) int32, grow by 1 where the robot was in the world before the step: if it died, it had begun it.
-        terminated: (N,) is written.
-        active: (N,) is written.
-    """
-    n_terminated = 0
-    for i in range(dead.shape[0]):
-        lengths[i] += present[i]
-        returns[i] += reward[i]
-        present[i] = swarm.present[i]
-        active[i] = swarm.active[i]
-        terminated[i] = dead[i] and not absent[i]
-        n_terminated += terminated[i]
-    return n_terminated
