@@ -207,7 +207,7 @@ def test_a_reset_can_change_the_scenario(view):
     assert env.observation_space == space
     with pytest.raises(ConfigError, match="n_robots to stay 3"):
         env.reset(options={"scenario": {"n_robots": 4}})
-    with pytest.raises(ConfigError, match="the reset option 'scenario' only, .* got 'width_m'"):
+    with pytest.raises(ConfigError, match=r"the reset option 'scenario' only, .* got 'width_m'"):
         env.reset(options={"width_m": 24.0})
 
 
