@@ -2,7 +2,7 @@
 
 Every measure is a function of curves, arrays of shape (..., T) over recording intervals; it knows nothing of robots,
 files or policies. `docs/metrics.md` explains inputs and variants, `docs/errata.md` the errors in the paper.
-`score_policy` runs a policy in all experiments that the measures need and makes one table (`docs/scoring.md`).
+`score` runs policies in all experiments that the measures need, and says which is better at what (`docs/scoring.md`).
 
 Public names stand in `__init__.pyi`. They load on first use, so importing the package compiles nothing. No public name
 equals the name of a module: a module that loads later would replace it.

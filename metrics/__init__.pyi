@@ -5,14 +5,9 @@ from .scoring import summarize_runs as summarize_runs
 from .scoring import RunSummary as RunSummary
 
 # from policies and files of curves to tables of scores
-from .scoring import score_policy as score_policy
-from .scoring import compare_policies as compare_policies
+from .scoring import score as score
 from .scoring import score_curves as score_curves
-from .scoring import compare_tables as compare_tables
-from .scoring import Score as Score
-from .scoring import ScoreTable as ScoreTable
-from .scoring import ScoreForms as ScoreForms
-from .scoring import Comparison as Comparison
+from .scoring import Scores as Scores
 from .scoring import Performance as Performance
 
 # what studies say
@@ -92,6 +87,6 @@ from .claims import Panel as Panel
 from .claims import Verdict as Verdict
 
 # overview and errors
-from .catalog import METRICS as METRICS
-from .catalog import Measure as Measure
+from .scoring import MEASURES as MEASURES
+from .scoring import Measure as Measure
 from .checks import CurveError as CurveError

@@ -16,7 +16,7 @@ class PanelName(NamedTuple):
     experiment: str
     """Name in `EXPERIMENTS`."""
     measure: str
-    """Name in `METRICS`."""
+    """Name of the measure."""
     form: Form = "marginal"
     """Form of a measure that compares two sizes: with the next smaller swarm, or with lone robots."""
     is_relative: bool = False

@@ -2,23 +2,26 @@
 
 from swarm_forage_env.scenarios.performance import Performance
 
+from .frame import differences, scores, summarized
 from .limits import ForagingLimit, limit_of
+from .measures import MEASURES, Measure
 from .plots import draw_scores
-from .policy_scores import ScoreQuestion, compare_policies, score_curves, score_policy, score_question
+from .policy_scores import ScoreQuestion, Scores, score, score_curves, score_question
 from .question import Question, ask
 from .run_curves import StudyLine, study_lines
-from .score_tables import Comparison, ScoreTable, compare_tables
-from .scores import Score, ScoreForms
 from .study_numbers import StudyPanel, StudyPanels, study_panels
 from .study_plots import PlottedStudy, StudyFigure, draw_figure, plot, study_figures
 from .study_verdict import Judged, StudyVerdict, Waiting, judge_claims, verdict
 from .summary import RunQuestion, RunSummary, run_question, summarize_runs
 
 __all__ = [
-    "score_policy",
-    "compare_policies",
+    "MEASURES",
+    "Measure",
+    "score",
     "score_curves",
-    "compare_tables",
+    "scores",
+    "summarized",
+    "differences",
     "limit_of",
     "ForagingLimit",
     "ask",
@@ -33,10 +36,7 @@ __all__ = [
     "verdict",
     "plot",
     "draw_scores",
-    "Score",
-    "ScoreTable",
-    "ScoreForms",
-    "Comparison",
+    "Scores",
     "Question",
     "ScoreQuestion",
     "RunQuestion",

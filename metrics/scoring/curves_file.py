@@ -276,7 +276,10 @@ def _study(frame: "pl.DataFrame", where: str, controller: str) -> StudyCurves:
             f"Expected the swarm sizes of {whose} in rising order, got {', '.join(map(str, sizes))}; sort the table by "
             "n_robots, and look whether each size stands beside its own curve."
         )
-    return StudyCurves(controller=controller, experiments=experiments, t_end_s=_clock(experiments, whose), where=where)
+    clock = _clock(experiments, whose)
+    if clock is not None:
+        experiments = tuple(replace(experiment, horizon_s=float(clock[-1])) for experiment in experiments)
+    return StudyCurves(controller=controller, experiments=experiments, t_end_s=clock, where=where)
 
 
 def _runs(frame: "pl.DataFrame", whose: str) -> RunCurves:

@@ -1,10 +1,26 @@
-"""Scores of policies: what `score_policy` and `compare_policies` ask, and the scores of curves from a file."""
+"""Score policies: the runs that measures need, their scores, who is better at what, and whether that is certain.
 
-from collections.abc import Mapping, Sequence
+    found = score(["crw", "dpo"], "warehouse_small", budget="quick", out="results/small")
+    print(found)                # sentences, then a table
+    found.frame                 # one row per policy, measure, level and seed
+    found.summary               # means with intervals
+    found.differences           # pairs of policies, tested
+
+`score_curves` does the same with curves of other simulators and of real robots.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
+import polars as pl
+
+from swarm_forage_env._internal.wording import counted, limits, number, percent, plain, suggestion
+from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
+from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.policy_spec import PolicyLike, policy_specs
 from swarm_forage_env.runs.table import Table
@@ -14,21 +30,282 @@ from swarm_forage_env.studies.ladders import Budget
 from swarm_forage_env.wrappers.world import SIZE, World, WorldLike, world_of
 
 from ..checks import CurveError, chosen_seeds
+from ..curves import Form, Variant
+from ..significance import ROUNDING
 from .curves_file import read_curves
-from .limits import share_of_limit
-from .measures import score_study
+from .frame import ROW, differences, label_of, scores, summarized, words_of
+from .measures import MEASURES, PICTURED, check_measures, criteria_of
+from .plots import draw_scores
 from .question import Question, ask
 from .run_curves import THROTTLE, PerformanceLike, own_performance, policy_curves
-from .score_tables import Comparison, ScoreTable, side_by_side
-from .scores import Score, ScoreForms, check_measures, criteria_of
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
+TEST = (
+    "Differences: first policy minus second, runs paired by seed, mean with half of Student's 95 % interval; * = "
+    "certain: two-sided paired t test, p at most 0.05 after Holm's correction over all levels and pairs of a measure."
+)
+"""How differences are tested, as a text for readers."""
+VALUES = "± half of Student's 95 % interval over seeds; %: share of the performance compared with"
+MARKS = {"!": "runs are missing or have no value", "?": "misleads, see below"}
+_PAIRS_PER_TABLE = 6
+_NO_AMOUNT = 1e-12
+"""Smaller amounts are rounding errors and are shown as zero."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ScoreQuestion(Question[Comparison]):
-    """The runs that score policies, and that compare them if there are several."""
+class Scores(Answer):
+    """Scores of policies in one world, or of curves."""
+
+    frame: pl.DataFrame
+    """One row per policy, measure, level and seed; `metrics.scoring.frame.SCHEMA` says what the columns are."""
+    policies: tuple[str, ...]
+    world: str = ""
+    """The world for people: the scenario, and what differs from its preset; empty for curves."""
+    missing: Mapping[tuple[str, str], str] = field(default_factory=dict[tuple[str, str], str])
+    """Policy and measure -> why it could not be computed."""
+    failures: Mapping[str, Sequence[str]] = field(default_factory=dict[str, Sequence[str]])
+    """Policy -> why runs failed, a line per reason."""
+    settings: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    """How the runs were made: budget, length, seeds, folder."""
+    notes: tuple[str, ...] = ()
+    """What else is to be known."""
+    against: str | None = None
+    """The policy that all others are compared with; None = all pairs are compared."""
+    is_full: bool = False
+    """Whether the text has all levels, numbers and differences."""
+
+    @cached_property
+    def summary(self) -> pl.DataFrame:
+        """Means with intervals, one row per policy and level; see `summarized`."""
+        return summarized(self.frame)
+
+    @cached_property
+    def differences(self) -> pl.DataFrame:
+        """Differences of policies, one row per pair and level; see `frame.differences`."""
+        against = self.against
+        pairs = None if against is None else [(name, against) for name in self.policies if name != against]
+        return differences(self.frame, pairs)
+
+    def sentences(self) -> list[str]:
+        """Return who is best at what, by how much, and whether that is certain; at the last level of each measure."""
+        if len(self.policies) < 2 or self.differences.is_empty():
+            return []
+        return [text for rows in self._strongest() if (text := self._sentence(rows))]
+
+    def _strongest(self) -> Iterator[pl.DataFrame]:
+        """Yield the rows of all policies at the last level of each measure that is shown."""
+        shown = self.summary.filter(pl.col("runs") > 0, pl.col("variant") == "corrected", pl.col("form") == "marginal")
+        if set(shown["measure"]) >= {*PICTURED} and not self.is_full:
+            shown = shown.filter(pl.col("measure").is_in(PICTURED))
+        for _, rows in shown.group_by("measure", "criterion", maintain_order=True):
+            yield rows.filter(pl.col("at") == rows.sort("n_robots", "x")["at"][-1])
+
+    def _sentence(self, rows: pl.DataFrame) -> str:
+        first = rows.row(0, named=True)
+        column = "mean" if rows["relative"].is_nan().all() else "relative"
+        measure = MEASURES[first["measure"]]
+        ranked = rows.filter(pl.col(column).is_finite()).sort(column, descending=measure.higher_is_better)["policy"]
+        if len(ranked) < 2:
+            return ""
+        best, other = ranked[0], ranked[1]
+        if self.against is not None and self.against in ranked:
+            other = self.against if best != self.against else other
+        pair = [best, other]
+        at = self.differences.filter(
+            *(pl.col(name) == first[name] for name in ROW),
+            pl.col("is_relative") == (column == "relative"),
+            pl.col("first").is_in(pair),
+            pl.col("second").is_in(pair),
+        )
+        if at.is_empty():
+            return ""
+        of = at.row(0, named=True)
+        gap = spread(abs(of["difference"]), of["upper"] - of["difference"], is_share=column == "relative")
+        about = f"{words_of(first['measure'])} at {first['at']}"
+        if not of["better"]:
+            return f"{about}: {best} and {other} cannot be told apart ({gap} between them)."
+        side = "ahead of" if measure.higher_is_better else "below"
+        return f"{about}: {best} is best, {gap} {side} {other}; this is certain."
+
+    def sheets(self) -> tuple[Sheet, ...]:
+        """Return sentences, a table and notes; with `is_full`, all levels and differences."""
+        said = Sheet(title=self._title(), notes=self.sentences())
+        tables = (*self._long(), *self._pairs()) if self.is_full else (self._short(),)
+        return said, *tables, Sheet(notes=self._notes())
+
+    def _title(self) -> str:
+        words = ", ".join(self.policies) + (f" in {self.world}" if self.world else "")
+        if self.settings.get("performance", "collected") != "collected":
+            words += f", performance {self.settings['performance']}"
+        if "budget" in self.settings:
+            seeds = counted(len(self.settings["seeds"]), "seed")
+            words += f", budget {self.settings['budget']}, {seeds}, {self.settings['horizon_s']:,g} s"
+        return words
+
+    def _short(self) -> Sheet:
+        """The strongest level of each measure, policies side by side."""
+        rows: list[list[str]] = []
+        for part in self._strongest():
+            first = part.row(0, named=True)
+            arrow = "higher" if MEASURES[first["measure"]].higher_is_better else "lower"
+            of = {row["policy"]: row for row in part.iter_rows(named=True)}
+            cells = [_cell(of[name]) if name in of else "-" for name in self.policies]
+            rows.append([words_of(first["measure"]), first["at"], arrow, *cells])
+        marks = [f"{mark} = {words}" for mark, words in MARKS.items() if any(mark in "".join(row) for row in rows)]
+        notes = ["; ".join([VALUES, *marks])] if rows else []
+        return Sheet(header=["measure", "at", "better", *self.policies], rows=rows, notes=notes)
+
+    def _long(self) -> Iterator[Sheet]:
+        """All levels, a row per policy."""
+        header = [
+            "measure",
+            "at",
+            "policy",
+            "value",
+            "95 % interval",
+            "noise floor",
+            "relative",
+            "runs",
+            "better",
+            "unit",
+        ]
+        rows: list[tuple[str, ...]] = []
+        for _, part in self.summary.group_by(*ROW, maintain_order=True):
+            for row in part.iter_rows(named=True):
+                floor, share = row["floor"], row["relative"]
+                rows.append(
+                    (
+                        label_of(row["measure"], row["variant"], row["form"]),
+                        row["at"],
+                        row["policy"],
+                        number(row["mean"]) + _marks(row),
+                        limits(row["lower"], row["upper"]),
+                        "" if floor is None else number(floor),
+                        "" if math.isnan(share) else percent(share),
+                        str(row["runs"]),
+                        "higher" if MEASURES[row["measure"]].higher_is_better else "lower",
+                        row["unit"],
+                    )
+                )
+        yield Sheet(header=header, rows=rows)
+
+    def _pairs(self) -> Iterator[Sheet]:
+        """All differences, pairs side by side."""
+        if self.differences.is_empty():
+            return
+        pairs = self.differences.select("first", "second").unique(maintain_order=True).rows()
+        for start in range(0, len(pairs), _PAIRS_PER_TABLE):
+            shown = pairs[start : start + _PAIRS_PER_TABLE]
+            rows: list[list[str]] = []
+            for (measure, variant, form, at, *_, is_relative), part in self.differences.group_by(
+                *ROW, "is_relative", maintain_order=True
+            ):
+                of = {(row["first"], row["second"]): row for row in part.iter_rows(named=True)}
+                name = label_of(measure, variant, form) + (", relative" if is_relative else "")
+                rows.append([name, at, *(_gap(of[pair]) if pair in of else "-" for pair in shown)])
+            is_last = start + _PAIRS_PER_TABLE >= len(pairs)
+            header = ["measure", "at", *(f"{first} - {second}" for first, second in shown)]
+            yield Sheet(header=header, rows=rows, notes=(TEST,) if is_last else ())
+
+    def _notes(self) -> list[str]:
+        remarks: dict[str, list[str]] = {}
+        for row in self.summary.filter(pl.col("remark") != "").iter_rows(named=True):
+            where = remarks.setdefault(row["remark"], [])
+            place = f"{words_of(label_of(row['measure'], row['variant'], row['form']))}, {row['at']}"
+            if place not in where:
+                where.append(place)
+        absent: dict[tuple[str, str], list[str]] = {}
+        for (policy, label), reason in self.missing.items():
+            absent.setdefault((label, reason), []).append(policy)
+        return [
+            *self.notes,
+            *(f"{'; '.join(where)}: {remark}" for remark, where in remarks.items()),
+            *(f"{label} is not computed: {reason}" for label, reason in absent),
+            *(f"failed: {line}" for lines in self.failures.values() for line in lines),
+        ]
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return everything as plain values, ready for JSON; numbers that do not exist are None."""
+        per_seed: dict[tuple[Any, ...], dict[str, float | None]] = {}
+        for row in self.frame.filter(pl.col("seed").is_not_null()).iter_rows(named=True):
+            of_level = per_seed.setdefault(_key(row), {})
+            of_level[str(row["seed"])] = plain(row["value"])
+        rows = [
+            {**_plain(row), **_about(row["measure"]), "per_seed": per_seed.get(_key(row), {})}
+            for row in self.summary.iter_rows(named=True)
+        ]
+        missing: dict[str, dict[str, str]] = {}
+        for (policy, label), reason in self.missing.items():
+            missing.setdefault(policy, {})[label] = reason
+        return {
+            "policies": list(self.policies),
+            "world": self.world,
+            "settings": dict(self.settings),
+            "sentences": self.sentences(),
+            "scores": rows,
+            "differences": [_plain(row) for row in self.differences.iter_rows(named=True)],
+            "missing": missing,
+            "failures": {policy: list(lines) for policy, lines in self.failures.items()},
+        }
+
+    @property
+    def has_picture(self) -> bool:
+        """Whether a score has runs."""
+        return self.frame["seed"].count() > 0
+
+    def draw(self, path: str | Path, *, style: FigureStyle = SCREEN) -> None:
+        """Draw the scores, see `draw_scores`."""
+        draw_scores(self.summary, path, title=self.world, style=style)
+
+
+def _key(row: Mapping[str, Any]) -> tuple[Any, ...]:
+    return tuple(row[name] for name in ("policy", *ROW))
+
+
+def _plain(row: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: plain(value) if isinstance(value, float) else value for name, value in row.items()}
+
+
+def _about(name: str) -> dict[str, Any]:
+    measure = MEASURES[name]
+    return {"symbol": measure.symbol, "higher_is_better": measure.higher_is_better, "neutral": measure.neutral}
+
+
+def _marks(row: Mapping[str, Any]) -> str:
+    is_partial = row["lost"] or row["undefined"] or row["idle"]
+    return (" !" if is_partial else "") + (" ?" if row["misleads"] else "")
+
+
+def _cell(row: Mapping[str, Any]) -> str:
+    """Return a value with half of its interval, as a share where there are shares."""
+    if math.isnan(row["relative"]):
+        return spread(row["mean"], row["upper"] - row["mean"]) + _marks(row)
+    return spread(row["relative"], row["relative_upper"] - row["relative"], is_share=True) + _marks(row)
+
+
+def _gap(row: Mapping[str, Any]) -> str:
+    half = row["upper"] - row["difference"]
+    return spread(row["difference"], half, is_share=row["is_relative"]) + (" *" if row["better"] else "")
+
+
+def spread(mean: float, half: float, *, is_share: bool = False) -> str:
+    """Return a mean with half of its interval, to two digits of the latter."""
+    factor, unit = (100.0, " %") if is_share else (1.0, "")
+    mean, half = factor * mean, factor * half
+    if not (math.isfinite(mean) and math.isfinite(half)):
+        return number(mean) + (unit if math.isfinite(mean) else "")
+    if half <= max(ROUNDING * abs(mean), _NO_AMOUNT):
+        return f"{number(0.0 if abs(mean) <= _NO_AMOUNT else mean)} ± 0{unit}"
+    decimals = max(0, 1 - math.floor(math.log10(half)))
+    mean = round(mean, decimals) + 0.0  # no "-0"
+    return f"{mean:.{decimals}f} ± {half:.{decimals}f}{unit}"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ScoreQuestion(Question[Scores]):
+    """The runs that score policies."""
 
     world: World
     """What the worlds of the plan are variants of."""
@@ -37,52 +314,49 @@ class ScoreQuestion(Question[Comparison]):
     """Name of the budget, "custom" for one of the user's own."""
     performance: Performance | None = None
     """A function of records that is the performance; None = what the scenario names."""
-    forms: ScoreForms = field(default_factory=ScoreForms)
+    variants: tuple[Variant, ...] = ("corrected",)
+    forms: tuple[Form, ...] = ("marginal",)
+    against: str | None = None
+    is_full: bool = False
 
-    @property
-    def read_as(self) -> Performance:
-        """What the performance is: its name and unit, and whether it is a total and adds up over robots."""
-        return self.performance or performance_of(self.world.scenario.performance)
-
-    def answer(self, table: Table) -> Comparison:
-        """Return one table of scores per policy, and their differences."""
-        return side_by_side([self._scores(table, policy.label) for policy in self.plan.policies])
-
-    def _scores(self, table: Table, policy: str) -> ScoreTable:
-        study = policy_curves(table, policy, self.performance)
-        scores, missing = score_study(study, self.measures, self.forms)
-        scores = tuple(self._beside_limit(score, policy) for score in scores)
+    def answer(self, table: Table) -> Scores:
+        """Return the scores of all policies."""
+        policies = tuple(policy.label for policy in self.plan.policies)
+        studies = [policy_curves(table, policy, self.performance) for policy in policies]
+        frame, missing = scores(studies, self.measures, variants=self.variants, forms=self.forms)
         scenario = self.plan.conditions[0].world.scenario
-        return ScoreTable(
-            policy=policy,
-            scenario=self.world.title(),
-            scores=scores,
+        read_as = self.performance or performance_of(self.world.scenario.performance)
+        return Scores(
+            frame=frame,
+            policies=policies,
+            world=self.world.title(),
             missing=missing,
-            failures=table.failure_lines(policy),
+            failures={policy: lines for policy in policies if (lines := table.failure_lines(policy))},
             settings={
                 "budget": self.budget,
                 "horizon_s": scenario.horizon_s,
                 "interval_s": scenario.interval_s,
                 "seeds": list(self.plan.seeds),
-                "performance": self.read_as.name,
+                "performance": read_as.name,
                 "n_robots": self.world.n_robots,
                 "out": None if table.folder is None else str(table.folder),
             },
-            band=self.forms.band,
+            notes=tuple(self._other_objects()),
+            against=self.against,
+            is_full=self.is_full,
         )
 
-    def _beside_limit(self, score: Score, policy: str) -> Score:
-        """Return the performance of a swarm size with its share of the limit; other scores as they are."""
-        if score.measure != "raw_performance" or self.performance is not None:
-            return score
-        sizes = [self.plan.specs_of(one)[0].world for one in self.plan.of_policy(policy) if one.world.criterion == SIZE]
-        world = next(each for each in sizes if each.n_robots == score.x)
-        share = share_of_limit(world, score.summary.mean)
-        return score if share is None else replace(score, beside={"of_limit": share})
+    def _other_objects(self) -> Iterator[str]:
+        """Yield how worlds over swarm sizes differ from the world that was named, where they do."""
+        there = {c.world.scenario.objects.n_objects for c in self.plan.conditions if c.world.criterion == SIZE}
+        here = self.world.scenario.objects.n_objects
+        if there - {here}:
+            objects = " or ".join(f"{n:,}" for n in sorted(there))
+            yield f"rows over N have {objects} objects, enough for large swarms; 'run' has the {here:,} of the scenario"
 
 
-def score_policy(
-    policy: PolicyLike,
+def score(
+    policies: PolicyLike | Sequence[PolicyLike] | Mapping[str, PolicyLike],
     world: WorldLike = "warehouse_small",
     *,
     measures: Sequence[str] | None = None,
@@ -90,25 +364,26 @@ def score_policy(
     seeds: int | Sequence[int] | None = None,
     horizon_s: float | None = None,
     performance: PerformanceLike | None = None,
-    name: str | None = None,
     parameters: Mapping[str, Any] | None = None,
     caches: str | None = None,
     density: float | None = None,
     disturbance: str = THROTTLE,
-    forms: ScoreForms | None = None,
+    variants: Sequence[Variant] = ("corrected",),
+    forms: Sequence[Form] = ("marginal",),
+    against: str | None = None,
     out: str | Path | None = None,
     jobs: int | None = None,
     executor: "Executor | None" = None,
     progress: bool = True,
-) -> ScoreTable:
-    """Run a policy in all experiments that the measures need, and score it.
+) -> Scores:
+    """Run policies in all experiments that the measures need, score them, and compare them seed by seed.
 
     Args:
-        policy: See `PolicyLike`. Objects, classes and functions run in this process, one run at a time; each run gets
-            its own copy of an object.
+        policies: One (see `PolicyLike`), several, or a mapping from names to policies. Objects, classes and functions
+            run in this process, one run at a time, each with its own copy of an object. With `out` they need a name.
         world: Name of a preset, a complete configuration, or a world with wrappers, which then act in all runs. The
             budget sets horizon and interval.
-        measures: Names out of `MEASURE_CRITERIA`; default all.
+        measures: Names in `MEASURES`; default all.
         budget: "quick", "standard", "paper" (`swarm_forage_env.studies.ladders.BUDGETS`), or one of your own.
         seeds: Their number, or a list; default those of the budget. All experiments use the same seeds, so runs are
             paired.
@@ -117,23 +392,20 @@ def score_policy(
             ("1/interference_fraction"), "task_balance", "cache_load", or a function of a record (`Performance`).
             Default: the performance of the scenario. It only changes how runs are read, so runs in `out` are not
             repeated.
-        name: Name in tables and stored runs. A policy that is an object or a function needs a name for `out`. Give
-            another name when its code has changed.
         parameters: Keyword arguments of a registered policy or a class.
         caches: "none", "static", "dynamic"; default see `swarm_forage_env.runs.spec.chosen_caches`.
         density: Robots per m^2 at all swarm sizes: the arena grows with the swarm, and one robot is in the smallest
             arena. Default: all sizes are in the scenario's arena (in search and rescue: at its density).
         disturbance: Disturbance for reactivity and adaptability: "throttle" (robots lose speed) or "handling_cost"
             (picking up and dropping take longer).
-        forms: Variants and forms of the measures; default the corrected marginal one.
+        variants: Of the measures, "corrected" or "paper"; a measure without these is scored in the corrected one.
+        forms: "marginal" compares a swarm size with the next smaller one, "interactive" with as many lone robots.
+        against: Label of a policy that all others are compared with; default all pairs are compared.
         out: Folder for run records. Runs that it already holds are not made again, so you can repeat an interrupted
             call.
         jobs: Processes; default one per core.
         executor: Makes the runs in place of the processes, for example Dask's `client.get_executor()`.
         progress: Show progress and an estimate on stderr.
-
-    Returns:
-        The table. The note of a score says if runs are missing, and `failures` says why runs failed.
 
     Raises:
         CurveError: unknown measures, or a performance that is negative or not a number.
@@ -142,7 +414,7 @@ def score_policy(
         swarm_forage_env.runs.runner.RunsInterrupted: Ctrl-C; finished runs are in `out`.
     """
     question = score_question(
-        {name: policy} if name else [policy],
+        policies,
         world,
         measures=measures,
         budget=budget,
@@ -153,54 +425,15 @@ def score_policy(
         caches=caches,
         density=density,
         disturbance=disturbance,
+        variants=variants,
         forms=forms,
+        against=against,
     )
-    return ask(question, out=out, jobs=jobs, executor=executor, progress=progress).tables[0]
-
-
-def compare_policies(
-    policies: Sequence[PolicyLike] | Mapping[str, PolicyLike],
-    world: WorldLike = "warehouse_small",
-    *,
-    measures: Sequence[str] | None = None,
-    budget: str | Budget = "standard",
-    seeds: int | Sequence[int] | None = None,
-    horizon_s: float | None = None,
-    performance: PerformanceLike | None = None,
-    caches: str | None = None,
-    density: float | None = None,
-    disturbance: str = THROTTLE,
-    forms: ScoreForms | None = None,
-    out: str | Path | None = None,
-    jobs: int | None = None,
-    executor: "Executor | None" = None,
-    progress: bool = True,
-) -> Comparison:
-    """Score policies in the same experiments and compare them seed by seed.
-
-    Args and errors as in `score_policy`; `policies` are two or more, or a mapping from names to policies.
-    """
-    question = score_question(
-        policies,
-        world,
-        measures=measures,
-        budget=budget,
-        seeds=seeds,
-        horizon_s=horizon_s,
-        performance=performance,
-        caches=caches,
-        density=density,
-        disturbance=disturbance,
-        forms=forms,
-    )
-    names = [policy.label for policy in question.plan.policies]
-    if len(names) < 2:
-        raise CurveError(f"Expected two or more policies to compare, got {', '.join(names)}.")
     return ask(question, out=out, jobs=jobs, executor=executor, progress=progress)
 
 
 def score_question(
-    policies: Sequence[PolicyLike] | Mapping[str, PolicyLike],
+    policies: PolicyLike | Sequence[PolicyLike] | Mapping[str, PolicyLike],
     world: WorldLike = "warehouse_small",
     *,
     measures: Sequence[str] | None = None,
@@ -212,9 +445,12 @@ def score_question(
     caches: str | None = None,
     density: float | None = None,
     disturbance: str = THROTTLE,
-    forms: ScoreForms | None = None,
+    variants: Sequence[Variant] = ("corrected",),
+    forms: Sequence[Form] = ("marginal",),
+    against: str | None = None,
+    is_full: bool = False,
 ) -> ScoreQuestion:
-    """Return the question of `score_policy` and `compare_policies`; arguments and errors as there."""
+    """Return the question of `score`; arguments and errors as there."""
     wanted = check_measures(measures)
     allowed = ladders.budget(budget) if isinstance(budget, str) else budget
     if horizon_s is not None:
@@ -222,16 +458,25 @@ def score_question(
     chosen = world_of(world)
     if isinstance(performance, str):
         chosen = replace(chosen, scenario=replace(chosen.scenario, performance=performance))
+    if not isinstance(policies, Mapping | list | tuple):
+        policies = [policies]
+    specs = policy_specs(cast("Sequence[PolicyLike]", policies), parameters=parameters, caches=caches)
+    labels = [spec.label for spec in specs]
+    if against is not None and against not in labels:
+        raise CurveError(
+            f"Expected one of {', '.join(labels)} to compare against, got {against!r}.{suggestion(against, labels)}"
+        )
     worlds = ladders.plan_worlds(chosen, criteria_of(wanted, disturbance), allowed, density=density)
     return ScoreQuestion(
-        plan=Plan.product(
-            policy_specs(policies, parameters=parameters, caches=caches), worlds, chosen_seeds(seeds, allowed.n_seeds)
-        ),
+        plan=Plan.product(specs, worlds, chosen_seeds(seeds, allowed.n_seeds)),
         world=chosen,
         measures=wanted,
         budget=budget if isinstance(budget, str) else "custom",
         performance=own_performance(performance),
-        forms=forms or ScoreForms(),
+        variants=tuple(variants),
+        forms=tuple(forms),
+        against=against,
+        is_full=is_full,
     )
 
 
@@ -240,38 +485,40 @@ def score_curves(
     *,
     measures: Sequence[str] | None = None,
     performance: PerformanceLike | None = None,
-    forms: ScoreForms | None = None,
-) -> tuple[ScoreTable, ...]:
-    """Score curves from any simulator, one table per policy in the file.
+    variants: Sequence[Variant] = ("corrected",),
+    forms: Sequence[Form] = ("marginal",),
+    against: str | None = None,
+    is_full: bool = False,
+) -> Scores:
+    """Score curves from any simulator, or of real robots.
 
     Args:
         path: CSV or Parquet file with the columns of `CURVE_COLUMNS`.
-        measures: Names of measures; default all that the columns allow. The table says which others are missing, and
-            why.
+        measures: Names of measures; default all that the columns allow. `missing` says why others are not computed.
         performance: A column of the file in place of `performance`, "1/" and a column, or a function of the rows of a
             run (`Performance`).
-        forms: As in `score_policy`.
+        variants: As in `score`.
+        forms: As in `score`.
+        against: As in `score`.
+        is_full: Whether the text has all levels, numbers and differences.
 
     Raises:
         CurveError: a file with an error, or a measure that you name and that cannot be computed.
     """
-    wanted = check_measures(measures)
     own = own_performance(performance)
     told = {} if performance is None else {"performance": performance if own is None else own.name}
-    tables: list[ScoreTable] = []
-    for study in read_curves(path, performance):
-        scores, missing = score_study(study, wanted, forms)
-        if missing and (measures is not None or not scores):
-            measure, reason = next(iter(missing.items()))
-            raise CurveError(f"Cannot compute {measure} for {study.controller} from {path}: {reason}.")
-        tables.append(
-            ScoreTable(
-                policy=study.controller,
-                scenario="",
-                scores=scores,
-                missing=missing,
-                settings={"curves": str(path), "horizon_s": study.horizon_s, **told},
-                band=forms is not None and forms.band,
-            )
-        )
-    return tuple(tables)
+    studies = read_curves(path, performance)
+    frame, missing = scores(studies, measures, variants=variants, forms=forms)
+    for study in studies:
+        reasons = {label: why for (policy, label), why in missing.items() if policy == study.controller}
+        if reasons and (measures is not None or frame.filter(policy=study.controller).is_empty()):
+            label, reason = next(iter(reasons.items()))
+            raise CurveError(f"Cannot compute {label} for {study.controller} from {path}: {reason}.")
+    return Scores(
+        frame=frame,
+        policies=tuple(study.controller for study in studies),
+        missing=missing,
+        settings={"curves": str(path), "horizon_s": studies[0].horizon_s, **told},
+        against=against,
+        is_full=is_full,
+    )

@@ -157,6 +157,8 @@ class RunCurves:
     """Rates of change of the population, per second."""
     n_planned: int | None = None
     """How many runs were planned; None = as many as there are."""
+    horizon_s: float | None = None
+    """Length of a run, s, where known."""
 
     @property
     def performance(self) -> FloatArray:
@@ -177,11 +179,6 @@ class RunCurves:
         """Return the experiment in a few words."""
         size = f"N = {self.n_robots}"
         return size if self.criterion == SIZE else f"{self.criterion} {self.value:g}, {size}"
-
-    def averaged(self, performance: FloatArray) -> "RunCurves":
-        """Return the experiment with another performance, (..., T), and the mean over runs of all other curves."""
-        means: dict[str, FloatArray] = {name: curve.mean(axis=0) for name, curve in self.curves.items()}
-        return replace(self, curves=means | {"performance": performance})
 
     def without_each(self) -> "RunCurves":
         """Return means over all runs but one, (R, T): row i leaves out run i."""
@@ -281,6 +278,7 @@ def curves_in_worlds(
                 curves={name: curve for name, curve in columns.items() if name in INTERVAL_COLUMNS},
                 rates=rates_of(world),
                 n_planned=n_planned,
+                horizon_s=scenario.horizon_s,
             )
             for world, (seeds, columns) in runs
         ),

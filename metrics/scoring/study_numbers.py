@@ -5,19 +5,19 @@ A panel has the scores of every run. It is drawn as it is, and the claims of the
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, get_args
 
 import numpy as np
+import polars as pl
 
-from ..catalog import METRICS
 from ..checks import CurveError
 from ..claims import Panel, PanelName
 from ..claims.claim import DISTANCES
 from ..claims.panel import CONFIDENCE, TIE
 from ..curves import FloatArray, Form, Variant
-from .measures import SHARES, score_study
+from .frame import SCHEMA, check_words, label_of, scores
+from .measures import DISTURBANCES, MEASURES
 from .run_curves import THROTTLE, StudyCurves, StudyLine, study_lines
-from .scores import DISTURBANCES, MEASURE_CRITERIA, Score, ScoreForms, label_of
 
 if TYPE_CHECKING:
     from swarm_forage_env.studies.study import Value
@@ -74,7 +74,7 @@ class StudyPanel:
     words: Mapping[str, str]
     """How these values are shown."""
     measure: str
-    """Name in `METRICS`."""
+    """Name in `MEASURES`."""
     variant: Variant
     form: Form
     """With what a swarm size is compared; "marginal" for measures that compare none."""
@@ -124,18 +124,13 @@ class StudyPanel:
     @property
     def higher_is_better(self) -> bool:
         """Direction of the measure."""
-        return METRICS[self.measure].higher_is_better
-
-    @property
-    def shares(self) -> Mapping[str, FloatArray]:
-        """`relative`, or the scores where they are shares of performance already; else empty."""
-        return self.scores if self.unit == SHARES else self.relative
+        return MEASURES[self.measure].higher_is_better
 
     def scores_of(self, name: PanelName) -> Mapping[str, FloatArray]:
         """Return the scores that a panel of claims shows, (L, R) each; empty where it has none."""
         if name.of_mean_curves:
             return self.relative_of_mean_curves if name.is_relative else self.of_mean_curves
-        return self.shares if name.is_relative else self.scores
+        return self.relative if name.is_relative else self.scores
 
     def for_claims(self, name: PanelName | None = None) -> Panel:
         """Return the scores as claims want them, or those of this name: shares of performance, of mean curves.
@@ -144,7 +139,7 @@ class StudyPanel:
         compared with, a tenth of 1 for scalability, 0.02 for fractions. Else, and at levels where nothing was
         delivered, they are shares of the scores.
         """
-        measure, n_levels = METRICS[self.measure], len(self.levels)
+        measure, n_levels = MEASURES[self.measure], len(self.levels)
         total = self.compared_with
         panel = Panel(levels=self.levels, scores=self.scores, n_runs_of=self.n_runs_of, confidence=self.confidence)
         if self.measure == "scalability":
@@ -186,12 +181,12 @@ def study_panels(
     Args:
         table: From `swarm_forage_env.read_study`.
         variants: Variants of the measures; a measure has a panel in each that it has.
-        measures: Names in `METRICS`; those of another criterion than the study's are left out.
+        measures: Names in `MEASURES`; those of another criterion than the study's are left out.
 
     Raises:
         CurveError: an unknown measure or variant.
     """
-    ScoreForms(variants=tuple(variants))  # refuses unknown ones
+    check_words("variant", variants, get_args(Variant))
     lines: dict[tuple[Any, ...], list[StudyLine]] = {}
     for line in study_lines(table):
         lines.setdefault((line.rules, *line.others.values()), []).append(line)
@@ -206,8 +201,8 @@ def study_panels(
         for variant in variants:
             for measure, form in _measures_in(measures, variant, together[0].curves):
                 scored = {line.policy: _scores(line.curves, measure, variant, form) for line in together}
-                found = {policy: scores for policy, (scores, _) in scored.items()}
-                if any(found.values()):
+                found = {policy: frame for policy, (frame, _) in scored.items()}
+                if any(len(each) for each in found.values()):
                     panels.append(replace(_score_panel(table, together[0], variant, form, found), **about))
                 else:
                     reasons = dict.fromkeys(why for _, why in scored.values() if why)
@@ -232,17 +227,17 @@ def _measures_in(measures: Sequence[str], variant: Variant, curves: StudyCurves)
         for measure in measures
         for form in FIGURE_FORMS.get(measure, ("marginal",))
         if form == "marginal" or has_lone_robot
-        if MEASURE_CRITERIA[measure] in varied and variant in METRICS[measure].variants
+        if MEASURES[measure].varies in varied and variant in MEASURES[measure].variants
     ]
 
 
-def _scores(curves: StudyCurves, measure: str, variant: Variant, form: Form) -> tuple[tuple[Score, ...], str]:
-    """Return the scores of one line, or why there are none."""
+def _scores(curves: StudyCurves, measure: str, variant: Variant, form: Form) -> tuple[pl.DataFrame, str]:
+    """Return the scores of one line, and why there are none."""
     try:
-        scores, missing = score_study(curves, (measure,), ScoreForms(variants=(variant,), forms=(form,)))
+        found, missing = scores([curves], [measure], variants=[variant], forms=[form])
     except CurveError as error:
-        return (), str(error)
-    return scores, "; ".join(missing.values())
+        return pl.DataFrame(schema=SCHEMA), str(error)
+    return found, "; ".join(missing.values())
 
 
 def _panel(
@@ -293,40 +288,44 @@ def _arrays(values: _ByLevel, seeds: Sequence[int]) -> dict[str, FloatArray]:
 
 
 def _score_panel(
-    table: "StudyTable", line: StudyLine, variant: Variant, form: Form, found: Mapping[str, Sequence[Score]]
+    table: "StudyTable", line: StudyLine, variant: Variant, form: Form, found: Mapping[str, pl.DataFrame]
 ) -> StudyPanel:
-    scores = [score for of_policy in found.values() for score in of_policy]
-    kinds = ("per_seed", "relative_per_seed", "mean_curves_per_seed", "relative_mean_curves_per_seed")
-    values, shares, means, mean_shares = of_kinds = [
-        {policy: dict[float, dict[int, float]]() for policy in found} for _ in kinds
-    ]
-    totals: dict[float, list[float]] = {}
-    for policy, of_policy in found.items():
-        for score in of_policy:
-            for kind, of_kind in zip(kinds, of_kinds, strict=True):
-                of_kind[policy].setdefault(score.x, {}).update(getattr(score, kind))
-            totals.setdefault(score.x, []).append(score.compared_total)
-    far = "environment_distance"
-    distances = {score.x: score.beside[far] for score in scores if far in score.beside}
-    first, seeds = scores[0], sorted(table.spec.seeds)
-    about: dict[str, Any] = {"measure": first.measure, "criterion": first.criterion, "unit": first.unit}
-    if any(score.relative_per_seed for score in scores):
-        about["relative"] = _arrays(shares, seeds)
-        about["compared_with"] = np.array([_mean(np.array(totals[level])) for level in sorted(totals)])
-    elif first.measure == "raw_performance":  # an amount that is compared with itself
-        about["compared_with"] = np.array([_mean(_flat(values, level)) for level in sorted(totals)])
-    if first.measure in DISTANCES:
-        about["of_mean_curves"] = _arrays(means, seeds)
-        about["relative_of_mean_curves"] = _arrays(mean_shares, seeds)
-    floors = {policy: of_policy[0].floor_per_seed for policy, of_policy in found.items() if of_policy}
+    frame, seeds = pl.concat(found.values()), sorted(table.spec.seeds)
+    first = frame.row(0, named=True)
+    about: dict[str, Any] = {name: first[name] for name in ("measure", "criterion", "unit")}
+    if first["measure"] == "raw_performance":  # an amount that is compared with itself
+        about["compared_with"] = frame.group_by("x").agg(pl.col("value").mean()).sort("x")["value"].to_numpy()
+    elif frame["total"].count():
+        means = frame.group_by("policy", "x").agg(pl.col("total").mean())
+        about["compared_with"] = means.group_by("x").agg(pl.col("total").mean()).sort("x")["total"].to_numpy()
+    of = {column: _by_level(found, column) for column in ("value", "relative", "mean_curve", "relative_mean_curve")}
+    if frame["relative"].count():
+        about["relative"] = _arrays(of["relative"], seeds)
+    if first["measure"] in DISTANCES:
+        about["of_mean_curves"] = _arrays(of["mean_curve"], seeds)
+        about["relative_of_mean_curves"] = _arrays(of["relative_mean_curve"], seeds)
+    floors = {policy: _floors(each) for policy, each in found.items() if len(each)}
     if all(floors.values()):
-        about["floors"] = {name: np.array([of.get(seed, np.nan) for seed in seeds]) for name, of in floors.items()}
-    return _panel(table, line, values, distances, variant=variant, form=form, **about)
+        about["floors"] = {policy: np.array([of.get(seed, np.nan) for seed in seeds]) for policy, of in floors.items()}
+    distances = dict(frame.select("x", "distance").drop_nulls().iter_rows())
+    return _panel(table, line, of["value"], distances, variant=variant, form=form, **about)
 
 
-def _flat(values: _ByLevel, level: float) -> FloatArray:
-    """Return the values of all policies and seeds at a level."""
-    return np.array([value for of_policy in values.values() for value in of_policy.get(level, {}).values()])
+def _floors(frame: pl.DataFrame) -> dict[int, float]:
+    """Return seed -> distance of undisturbed runs, of the first level; those of others are the same runs."""
+    first = frame.filter(pl.col("x") == frame["x"][0])
+    return dict(first.select("seed", "floor_of_seed").drop_nulls().iter_rows())
+
+
+def _by_level(found: Mapping[str, pl.DataFrame], column: str) -> _ByLevel:
+    """Return the values of a column, policy -> level -> seed; levels whose runs all failed have none."""
+    values: dict[str, dict[float, dict[int, float]]] = {policy: {} for policy in found}
+    for policy, frame in found.items():
+        for x, seed, value in frame.select("x", "seed", column).iter_rows():
+            of_level = values[policy].setdefault(x, {})
+            if value is not None:
+                of_level[seed] = value
+    return values
 
 
 def _performance_panels(table: "StudyTable", groups: Sequence[Sequence[StudyLine]]) -> list[StudyPanel]:
@@ -351,8 +350,3 @@ def _performance_panels(table: "StudyTable", groups: Sequence[Sequence[StudyLine
         about |= {"criterion": table.spec.axes[-1].name, "unit": f"{first.read_as.amount} {over}"}
         panels.append(_panel(table, lines[0], values, {}, **about))
     return panels
-
-
-def _mean(values: FloatArray) -> float:
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if known.size else np.nan

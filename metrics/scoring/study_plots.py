@@ -23,13 +23,13 @@ from swarm_forage_env.rendering.figures import (
 )
 from swarm_forage_env.wrappers.world import SIZE
 
-from ..catalog import METRICS
 from ..checks import CurveError
 from ..claims import PanelName
 from ..curves import FloatArray, Variant
 from ..statistics import Summary, aggregate
+from .frame import label_of, words_of
+from .measures import MEASURES
 from .plots import FEWEST_RUNS, X_LABELS
-from .scores import label_of, words_of
 from .study_numbers import StudyPanel, StudyPanels, study_panels
 
 if TYPE_CHECKING:
@@ -163,14 +163,14 @@ def _draw_panel(place: Panel, panel: StudyPanel, band: Band, *, is_log: bool) ->
     for (look, x, _), of_means in zip(_beside(panel), panel.of_mean_curves.values(), strict=False):
         style = {"color": look.colour, "marker": look.marker, "markerfacecolor": "w", "linestyle": "", "zorder": 4}
         place.plot(x, [_mean_of(runs) for runs in of_means], **style)
-    neutral = METRICS[panel.measure].neutral
+    neutral = MEASURES[panel.measure].neutral
     if neutral is not None and panel.variant == "corrected":
         place.axhline(neutral, color="0.5", linewidth=0.8, zorder=0)
     if panel.others:
         words = ", ".join(f"{name.replace('_', ' ')} {word}" for name, word in panel.words.items())
         place.set_title(words)
     place.set_xlabel(_x_label(panel))
-    symbol = METRICS[panel.measure].symbol
+    symbol = MEASURES[panel.measure].symbol
     place.set_ylabel(f"{symbol.replace('N1, N2', '1, N') if panel.form == 'interactive' else symbol}, {panel.unit}")
 
 
@@ -214,7 +214,7 @@ def _band(panel: StudyPanel, summaries: Sequence[Summary], band: Band) -> tuple[
     """Return the lower and upper edges at each level, within the range of the measure; NaN without a band."""
     edges = np.array([_edges(summary, band) for summary in summaries]).T
     if panel.variant == "corrected":  # other forms have other ranges
-        about = METRICS[panel.measure]
+        about = MEASURES[panel.measure]
         edges = np.clip(edges, about.lowest, about.highest)
     return edges[0], edges[1]
 

@@ -10,14 +10,14 @@ from swarm_forage_env._internal.wording import number, percent, plain
 from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.studies.study_file import PAPER, is_set_of_paper, load_study
 
-from ..catalog import METRICS
 from ..checks import CurveError
 from ..claims import CLAIMS, INTUITIONS, Claim, PanelName, Verdict, check_claim
 from ..claims.claim import RELATIVE, read_otherwise
 from ..claims.experiments import POLICIES
 from ..claims.rules import Answer as ClaimAnswer
 from ..curves import Variant
-from .scores import label_of
+from .frame import label_of
+from .measures import MEASURES
 from .study_numbers import StudyPanel, StudyPanels, study_panels
 
 if TYPE_CHECKING:
@@ -170,7 +170,7 @@ class _Found:
 
 def _variant_of(measure: str, variant: Variant) -> Variant:
     """Return the variant of a measure that is used: this one if it has it, else the corrected one."""
-    return variant if variant in METRICS[measure].variants else "corrected"
+    return variant if variant in MEASURES[measure].variants else "corrected"
 
 
 def _judge(claim: Claim, rules: str, variant: Variant, found: _Found) -> Judged | Waiting:

@@ -29,7 +29,6 @@ from ..statistics import Summary, aggregate
 from .limits import ABOUT_LIMIT, share_of_limit
 from .plots import FEWEST_RUNS
 from .question import Question
-from .scores import bounds
 
 LEVEL = 0.95
 """Confidence level of all intervals."""
@@ -285,7 +284,7 @@ def _condition_mapping(row: ConditionSummary) -> dict[str, Any]:
 
 
 def _ends(summary: Summary) -> dict[str, float | None]:
-    return dict(zip(_ENDS, bounds(summary) or (None, None, None), strict=True))
+    return dict(zip(_ENDS, map(plain, (summary.mean, summary.lower, summary.upper)), strict=True))
 
 
 def _about_bands(curves: Sequence[Curve]) -> str:

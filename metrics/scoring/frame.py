@@ -1,0 +1,293 @@
+"""Scores: runs of policies as one tidy frame, a row per policy, measure, level and seed.
+
+    frame, missing = scores(studies)
+    summarized(frame)                  # means with intervals: one row per policy and level
+    differences(frame)                 # pairs of policies: paired t tests with Holm's correction
+
+Tables, figures, verdicts and files are made of these three.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import combinations
+from typing import Any, get_args
+
+import numpy as np
+import polars as pl
+
+from swarm_forage_env._internal.wording import suggestion
+from swarm_forage_env.wrappers.world import SIZE
+
+from ..checks import CurveError
+from ..curves import FloatArray, Form, Variant
+from ..significance import SIGNIFICANT, holm, paired_p
+from ..statistics import Summary, aggregate
+from .measures import MEASURES, Compared, Level, Measure, Uncomputable, check_measures, levels, remark_on, unit_of
+from .run_curves import RunCurves, StudyCurves
+
+SCHEMA: dict[str, Any] = {
+    "policy": pl.String,
+    "measure": pl.String,
+    "variant": pl.String,
+    "form": pl.String,
+    "at": pl.String,
+    "criterion": pl.String,
+    "x": pl.Float64,
+    "n_robots": pl.Int64,
+    "seed": pl.Int64,
+    "value": pl.Float64,
+    "relative": pl.Float64,
+    "floor": pl.Float64,
+    "floor_of_seed": pl.Float64,
+    "mean_curve": pl.Float64,
+    "relative_mean_curve": pl.Float64,
+    "total": pl.Float64,
+    "distance": pl.Float64,
+    "lost": pl.Int64,
+    "misleads": pl.Boolean,
+    "unit": pl.String,
+    "remark": pl.String,
+}
+"""Columns of the frame. `seed` is null where no run tells the value: availability, and levels whose runs all failed.
+
+`relative` is the value as a share of the performance that it is compared with, `total`; null for measures without
+shares. `floor` is the noise floor of a distance, `floor_of_seed` a sample of it: the distance of the undisturbed run of
+this seed to that of the next. `mean_curve` is the pseudo-value of the distance of mean curves, `relative_mean_curve`
+that of its share. `distance` is that of the conditions from the ideal ones. `lost` counts runs that are missing.
+"""
+ROW = ("measure", "variant", "form", "at", "criterion", "x", "n_robots")
+"""Columns that tell the levels of a policy apart."""
+
+
+def scores(
+    studies: Sequence[StudyCurves],
+    measures: Sequence[str] | None = None,
+    *,
+    variants: Sequence[Variant] = ("corrected",),
+    forms: Sequence[Form] = ("marginal",),
+) -> tuple[pl.DataFrame, dict[tuple[str, str], str]]:
+    """Score the runs of policies.
+
+    Args:
+        studies: Runs, one study per policy.
+        measures: Names in `MEASURES`; default all.
+        variants: Variants as in docs/metrics.md; a measure that has none of them is scored in the corrected one.
+        forms: With what swarm sizes are compared.
+
+    Returns:
+        A frame with the columns of `SCHEMA`, and for each policy and measure (`label_of`) without scores the reason.
+
+    Raises:
+        CurveError: an unknown measure, variant or form, or curves that a measure refuses.
+    """
+    check_words("variant", variants, get_args(Variant))
+    check_words("form", forms, get_args(Form))
+    parts: list[pl.DataFrame] = []
+    missing: dict[tuple[str, str], str] = {}
+    for study in studies:
+        for name in check_measures(measures):
+            measure = MEASURES[name]
+            wanted: list[Variant] = [each if each in measure.variants else "corrected" for each in variants]
+            compared: Sequence[Form] = forms if measure.compares else ("marginal",)
+            for variant in dict.fromkeys(wanted):
+                for form in dict.fromkeys(compared):
+                    try:
+                        parts += [_rows(name, study, form, level) for level in levels(name, study, variant, form)]
+                    except Uncomputable as reason:
+                        missing[study.controller, label_of(name, variant, form)] = str(reason)
+    return pl.concat([pl.DataFrame(schema=SCHEMA), *parts]), missing
+
+
+def check_words(what: str, words: Sequence[str], known: Sequence[str]) -> None:
+    """Refuse unknown words, or none; raises CurveError."""
+    for word in words:
+        if word not in known:
+            raise CurveError(f"Unknown {what} {word!r}.{suggestion(word, known)} Known: {', '.join(known)}.")
+    if not words:
+        raise CurveError(f"Expected one or more {what}s of {', '.join(known)}, got none.")
+
+
+def _rows(name: str, study: StudyCurves, form: Form, level: Level) -> pl.DataFrame:
+    """Return the rows of one level."""
+    measure, (one, base, runs, variant) = MEASURES[name], level.compared
+    told: dict[str, Any] = {
+        "policy": study.controller,
+        "measure": name,
+        "variant": variant,
+        "form": form,
+        "at": level.at,
+        "criterion": runs.criterion,
+        "x": float(level.x),
+        "n_robots": runs.n_robots,
+        "floor": level.floor,
+        "distance": level.distance,
+        "misleads": level.misleads,
+        "unit": unit_of(name, study, variant),
+        "remark": remark_on(name, study, variant, misleads=level.misleads),
+    }
+    if name == "availability":
+        return _frame({**told, "value": measure.of(level.compared)})
+    paired = level.paired()
+    seeds = paired.runs.seeds
+    told["lost"] = max(each.n_lost + len(each.seeds) for each in (one, base, runs) if each is not None) - len(seeds)
+    if not seeds:
+        return _frame(told)
+    values = measure.of(paired)
+    columns: dict[str, Any] = {"seed": seeds, "value": values}
+    if measure.is_amount:
+        total = (paired.runs if measure.varies == SIZE else paired.base).performance.sum(axis=-1)
+        columns |= {"total": total, "relative": _share(values, total)}
+    if measure.is_distance and len(seeds) > 1:
+        columns |= dict(zip(("mean_curve", "relative_mean_curve"), pseudo_values(measure, paired), strict=True))
+        columns["floor_of_seed"] = _floors(measure, level.compared, seeds)
+    return _frame({**told, **columns})
+
+
+def _frame(columns: Mapping[str, Any]) -> pl.DataFrame:
+    """Return rows with all columns; single values are the same in each row."""
+    given: dict[str, Any] = {name: value for name, value in columns.items() if isinstance(value, np.ndarray | tuple)}
+    frame = pl.DataFrame(given or {"seed": [None]})
+    return frame.select(
+        (pl.col(name) if name in frame.columns else pl.lit(columns.get(name))).cast(kind).alias(name)
+        for name, kind in SCHEMA.items()
+    )
+
+
+def _share(values: FloatArray, total: FloatArray) -> FloatArray:
+    """Return values over the performance that they are compared with; NaN where that is zero."""
+    return np.divide(values, total, out=np.full(values.shape, math.nan), where=total > 0.0)
+
+
+def _floors(measure: Measure, compared: Compared, seeds: Sequence[int]) -> FloatArray:
+    """Return the distance of each undisturbed run to the next, the last one's to the first, (R,)."""
+    ideal = compared.base
+    # What is held beside the undisturbed runs is of the level's criterion.
+    curves = {name: np.roll(curve, -1, axis=0) for name, curve in ideal.curves.items()}
+    moved = replace(ideal, criterion=compared.runs.criterion, curves=curves)
+    found = measure.of(compared._replace(runs=moved))
+    return found[[ideal.seeds.index(seed) for seed in seeds]]
+
+
+def pseudo_values(measure: Measure, paired: Compared) -> tuple[FloatArray, FloatArray]:
+    """Return the pseudo-values of the distance of mean curves, (R,), and of its share of the base's performance.
+
+    With R runs, v of all and v_i without run i they are v + (R - 1) (m - v_i), where m is the mean of all v_i. Their
+    mean is v, and they scatter like R independent values of which v is the mean (Miller 1974), on average no less than
+    v does (Efron and Stein 1981). The usual ones, R v - (R - 1) v_i, have a mean with less bias. But a distance has
+    bends, where curves cross and where its path through time turns, and at these that mean varies several times as much
+    as the pseudo-values tell.
+    """
+    whole = paired._replace(base=_mean_run(paired.base), runs=_mean_run(paired.runs))
+    parts = paired._replace(base=paired.base.without_each(), runs=paired.runs.without_each())
+    of_all, without = measure.of(whole), measure.of(parts)
+    totals = [each.base.performance.sum(axis=-1) for each in (whole, parts)]
+    return _pseudo(of_all, without), _pseudo(_share(of_all, totals[0]), _share(without, totals[1]))
+
+
+def _mean_run(runs: RunCurves) -> RunCurves:
+    return replace(runs, curves={name: curve.mean(axis=0, keepdims=True) for name, curve in runs.curves.items()})
+
+
+def _pseudo(of_all: FloatArray, without: FloatArray) -> FloatArray:
+    with np.errstate(invalid="ignore"):  # infinite without each run
+        return of_all + (without.size - 1) * (without.mean() - without)
+
+
+def summarized(frame: pl.DataFrame) -> pl.DataFrame:
+    """Return one row per policy and level: what all its seeds have in common, means and intervals.
+
+    Columns besides those of a level: mean, lower, upper, sd, runs, undefined of the values (Student's 95 % interval
+    over seeds); relative, relative_lower, relative_upper, idle of the shares; floor, relative_floor, distance, lost,
+    misleads, unit, remark. `undefined` and `idle` count runs without a value, and without a share.
+    """
+    rows: list[dict[str, Any]] = []
+    for (policy, *key), part in frame.group_by("policy", *ROW, maintain_order=True):
+        of = _summary(part["value"])
+        shares = _summary(part["relative"])
+        first = part.row(0, named=True)
+        total = part["total"].mean()
+        rows.append(
+            {
+                "policy": policy,
+                **dict(zip(ROW, key, strict=True)),
+                "mean": of.mean,
+                "lower": of.lower,
+                "upper": of.upper,
+                "sd": of.std,
+                "runs": of.n_used if first["seed"] is not None else 0,
+                "undefined": of.n_nan,
+                "relative": shares.mean,
+                "relative_lower": shares.lower,
+                "relative_upper": shares.upper,
+                "idle": shares.n_nan,
+                "relative_floor": first["floor"] / total if first["floor"] is not None and total else None,
+                **{name: first[name] for name in ("floor", "distance", "lost", "misleads", "unit", "remark")},
+            }
+        )
+    return pl.DataFrame(rows, infer_schema_length=None)
+
+
+def _summary(values: pl.Series) -> Summary:
+    """Return mean and interval of values, without nulls; NaN is a run in which there is none."""
+    known = values.drop_nulls().to_numpy()
+    return aggregate(known) if known.size else Summary.without_interval()
+
+
+def differences(frame: pl.DataFrame, pairs: Sequence[tuple[str, str]] | None = None) -> pl.DataFrame:
+    """Return one row per pair of policies and level: first minus second, runs paired by seed.
+
+    Columns besides those of a level: first, second, is_relative (whether shares are compared), difference, lower,
+    upper, pairs, p (two-sided paired t test), p_holm (after Holm's correction over all levels and pairs of a measure,
+    shares and values apart), better (the better policy if p_holm is at most `SIGNIFICANT`, else empty).
+
+    Args:
+        frame: Scores.
+        pairs: Policies to compare; default all pairs.
+    """
+    names = frame["policy"].unique(maintain_order=True).to_list()
+    rows: list[dict[str, Any]] = []
+    for first, second in combinations(names, 2) if pairs is None else pairs:
+        mine, theirs = (frame.filter(pl.col("policy") == name) for name in (first, second))
+        joined = mine.join(theirs, on=[*ROW, "seed"], suffix="_other", maintain_order="left")
+        for key, part in joined.group_by(*ROW, maintain_order=True):
+            for column in ("value", "relative"):
+                both = part.select(column, f"{column}_other").drop_nulls()
+                if len(both):
+                    of = _difference(*(both[name].to_numpy() for name in both.columns))
+                    about = {"first": first, "second": second, "is_relative": column == "relative"}
+                    rows.append({**dict(zip(ROW, key, strict=True)), **about, **of})
+    if not rows:
+        return pl.DataFrame()
+    corrected = (
+        pl.col("p")
+        .map_batches(lambda p: pl.Series(holm(p.to_numpy())), return_dtype=pl.Float64)
+        .over("measure", "variant", "form", "is_relative")
+    )
+    found = pl.DataFrame(rows, infer_schema_length=None).with_columns(p_holm=corrected)
+    higher = pl.col("measure").replace_strict({name: each.higher_is_better for name, each in MEASURES.items()})
+    winner = pl.when((pl.col("difference") > 0.0) == higher).then("first").otherwise("second")
+    is_certain = pl.col("p_holm").fill_nan(1.0) <= SIGNIFICANT
+    return found.with_columns(better=pl.when(is_certain).then(winner).otherwise(pl.lit("")))
+
+
+def _difference(mine: FloatArray, theirs: FloatArray) -> dict[str, Any]:
+    with np.errstate(invalid="ignore"):
+        gaps = mine - theirs
+    gaps = gaps[~(np.isnan(mine) | np.isnan(theirs))]
+    is_known = gaps.size > 0 and bool(np.isfinite(gaps).all())
+    of = aggregate(gaps) if is_known else Summary.without_interval(n_used=gaps.size)
+    return {"difference": of.mean, "lower": of.lower, "upper": of.upper, "pairs": of.n_used, "p": paired_p(gaps)}
+
+
+def label_of(measure: str, variant: Variant, form: Form) -> str:
+    """Return the name of a measure with what differs from the usual form: "spatial_emergence, interactive, paper"."""
+    words = (measure, "interactive" if form == "interactive" else "", "" if variant == "corrected" else variant)
+    return ", ".join(word for word in words if word)
+
+
+def words_of(label: str) -> str:
+    """Return a name of `label_of` in words for people: "spatial emergence, against lone robots"."""
+    measure, comma, rest = label.partition(",")
+    words = "time lost" if measure == "t_lost_fraction" else measure.replace("_", " ")
+    return words + comma + rest.replace("interactive", "against lone robots")
