@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, cast, get_args
 
 import polars as pl
 
@@ -33,7 +33,7 @@ from ..checks import CurveError, chosen_seeds
 from ..curves import Form, Variant
 from ..significance import ROUNDING
 from .curves_file import read_curves
-from .frame import ROW, differences, label_of, scores, summarized, words_of
+from .frame import ROW, check_words, differences, label_of, scores, summarized, words_of
 from .measures import MEASURES, PICTURED, check_measures, criteria_of
 from .plots import draw_scores
 from .question import Question, ask
@@ -92,7 +92,10 @@ class Scores(Answer):
         """Return who is best at what, by how much, and whether that is certain; at the last level of each measure."""
         if len(self.policies) < 2 or self.differences.is_empty():
             return []
-        return [text for rows in self._strongest() if (text := self._sentence(rows))]
+        found = [self._sentence(rows) for rows in self._strongest()]
+        open_ones = [words for words, is_certain in found if words and not is_certain]
+        certain = [words for words, is_certain in found if is_certain]
+        return [*certain, *([f"No certain difference: {', '.join(open_ones)}."] if open_ones else [])]
 
     def _strongest(self) -> Iterator[pl.DataFrame]:
         """Yield the rows of all policies at the last level of each measure that is shown."""
@@ -102,13 +105,14 @@ class Scores(Answer):
         for _, rows in shown.group_by("measure", "criterion", maintain_order=True):
             yield rows.filter(pl.col("at") == rows.sort("n_robots", "x")["at"][-1])
 
-    def _sentence(self, rows: pl.DataFrame) -> str:
+    def _sentence(self, rows: pl.DataFrame) -> tuple[str, bool]:
+        """Return what is told of the best policy and the next, and whether it is certain; nothing of fewer than two."""
         first = rows.row(0, named=True)
         column = "mean" if rows["relative"].is_nan().all() else "relative"
         measure = MEASURES[first["measure"]]
         ranked = rows.filter(pl.col(column).is_finite()).sort(column, descending=measure.higher_is_better)["policy"]
         if len(ranked) < 2:
-            return ""
+            return "", False
         best, other = ranked[0], ranked[1]
         if self.against is not None and self.against in ranked:
             other = self.against if best != self.against else other
@@ -120,14 +124,15 @@ class Scores(Answer):
             pl.col("second").is_in(pair),
         )
         if at.is_empty():
-            return ""
+            return "", False
         of = at.row(0, named=True)
         gap = spread(abs(of["difference"]), of["upper"] - of["difference"], is_share=column == "relative")
-        about = f"{words_of(first['measure'])} at {first['at']}"
+        if "{amount}" in measure.unit and column == "mean":
+            gap += f" {first['unit']}"
         if not of["better"]:
-            return f"{about}: {best} and {other} cannot be told apart ({gap} between them)."
+            return words_of(first["measure"]), False
         side = "ahead of" if measure.higher_is_better else "below"
-        return f"{about}: {best} is best, {gap} {side} {other}; this is certain."
+        return f"{words_of(first['measure'])} at {first['at']}: {best} is best, {gap} {side} {other}.", True
 
     def sheets(self) -> tuple[Sheet, ...]:
         """Return sentences, a table and notes; with `is_full`, all levels and differences."""
@@ -154,7 +159,7 @@ class Scores(Answer):
             cells = [_cell(of[name]) if name in of else "-" for name in self.policies]
             rows.append([words_of(first["measure"]), first["at"], arrow, *cells])
         marks = [f"{mark} = {words}" for mark, words in MARKS.items() if any(mark in "".join(row) for row in rows)]
-        notes = ["; ".join([VALUES, *marks])] if rows else []
+        notes = [VALUES, *(["; ".join(marks)] if marks else [])] if rows else []
         return Sheet(header=["measure", "at", "better", *self.policies], rows=rows, notes=notes)
 
     def _long(self) -> Iterator[Sheet]:
@@ -211,7 +216,8 @@ class Scores(Answer):
 
     def _notes(self) -> list[str]:
         remarks: dict[str, list[str]] = {}
-        for row in self.summary.filter(pl.col("remark") != "").iter_rows(named=True):
+        shown = self.summary if self.is_full else pl.concat([self.summary.clear(), *self._strongest()])
+        for row in shown.filter(pl.col("remark") != "").iter_rows(named=True):
             where = remarks.setdefault(row["remark"], [])
             place = f"{words_of(label_of(row['measure'], row['variant'], row['form']))}, {row['at']}"
             if place not in where:
@@ -452,6 +458,8 @@ def score_question(
 ) -> ScoreQuestion:
     """Return the question of `score`; arguments and errors as there."""
     wanted = check_measures(measures)
+    check_words("variant", variants, get_args(Variant))
+    check_words("form", forms, get_args(Form))
     allowed = ladders.budget(budget) if isinstance(budget, str) else budget
     if horizon_s is not None:
         allowed = replace(allowed, horizon_s=horizon_s)
@@ -505,6 +513,8 @@ def score_curves(
     Raises:
         CurveError: a file with an error, or a measure that you name and that cannot be computed.
     """
+    check_words("variant", variants, get_args(Variant))
+    check_words("form", forms, get_args(Form))
     own = own_performance(performance)
     told = {} if performance is None else {"performance": performance if own is None else own.name}
     studies = read_curves(path, performance)

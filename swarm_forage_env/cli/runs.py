@@ -93,16 +93,16 @@ def score(
     measures: Names = (),
     variant: Names = ("corrected",),
     form: Names = ("marginal",),
-    band: bool = False,
+    against: str | None = None,
+    show_all: Annotated[bool, Parameter(name="--all", negative="")] = False,
     budget: str = "standard",
     seeds: Annotated[PositiveInt | None, Parameter(help="Runs per experiment; default the budget's number.")] = None,
     disturbance: str = "throttle",
 ) -> int:
-    """Run the experiments that the measures of swarm engineering need, and score and compare policies.
+    """Say which policy is better at what: performance, self-organization, scalability, flexibility, robustness.
 
-    The experiments vary swarm size, throttle, noise and failures. One table shows all scores, with intervals and
-    noise floors. For several policies, the command compares runs with the same seed and shows which differences are
-    significant. It does not repeat runs that the folder already holds. The budget sets the length of runs, unless
+    Makes the runs that the measures need, which vary swarm size, throttle, noise and failures, and compares runs with
+    the same seed. It does not repeat runs that the folder already holds. The budget sets the length of runs, unless
     --horizon does.
 
     Args:
@@ -110,36 +110,32 @@ def score(
         measures: Names of measures, separated by commas; default all.
         variant: Forms of equations: corrected, paper (as printed); separated by commas.
         form: Compare with the next smaller swarm (marginal), with N lone robots (interactive), or both.
-        band: Show the paper's bands, mean ± 2 standard deviations of single runs.
+        against: Compare all policies with this one alone; default all pairs.
+        show_all: Show all levels, numbers and differences.
         budget: quick, standard or paper: sets the length and number of runs, and the levels.
         disturbance: Disturbance for reactivity and adaptability: throttle or handling_cost.
     """
-    from metrics.scoring import ScoreForms
-    from metrics.scoring.policy_scores import score_curves
-    from metrics.scoring.score_tables import side_by_side
+    from metrics.scoring import score_curves
     from swarm_forage_env.cli.worlds import default_file, default_folder
 
-    asked: dict[str, Any] = {"variants": variant, "forms": form}
-    forms = ScoreForms(**asked, band=band)
+    asked: dict[str, Any] = {
+        "measures": measures or None,
+        "variants": variant,
+        "forms": form,
+        "against": against,
+        "is_full": show_all,
+    }
     if curves is not None:
         if policies or world != WorldOptions():
             raise ConfigError("Expected --curves alone, got policies or a world, which are about runs; leave them out.")
-        tables = score_curves(curves, measures=measures or None, performance=performance, forms=forms)
-        show(side_by_side(tables), options.picture, as_json=options.as_json)
+        found = score_curves(curves, performance=performance, **asked)
+        show(found, options.picture, as_json=options.as_json)
         return 0
     if performance is not None:
         world = replace(world, settings=(*world.settings, f"performance={performance}"))
     if not policies:
         raise ConfigError("Expected policies to run, or a file with --curves; 'swarm-forage list' names policies.")
-    question = asked_scores(
-        policies,
-        world,
-        measures=measures or None,
-        budget=budget,
-        seeds=seeds,
-        disturbance=disturbance,
-        forms=forms,
-    )
+    question = asked_scores(policies, world, budget=budget, seeds=seeds, disturbance=disturbance, **asked)
     folder = options.out or default_folder(question.world)
     file = options.picture or default_file(folder, question.world, policies, "_scores.png")
     return ask_and_show(question, folder, options, file)

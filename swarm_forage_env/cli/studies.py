@@ -3,7 +3,7 @@
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, cast
 
 from cyclopts import App, Parameter
 from cyclopts.types import PositiveInt
@@ -15,6 +15,9 @@ from swarm_forage_env.cli.printer import note, resumable, say, show
 from swarm_forage_env.rendering.figures import SCREEN
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from metrics.curves import Variant
     from swarm_forage_env.runs.plan_summary import PlanSummary
     from swarm_forage_env.studies.study import StudySpec
     from swarm_forage_env.studies.study_folder import StudyFolder
@@ -172,16 +175,13 @@ def plot(
         formats: svg, png, pdf; separated by commas.
     """
     from metrics import plot as plot_study
-    from metrics.scoring import ScoreForms
 
-    asked: dict[str, Any] = {"variants": variant}
-    forms = ScoreForms(**asked)
     table = _read(place)
     plotted = plot_study(
         table,
         out or Path("results", "figures", table.spec.name),
         band="sd" if band else "ci",
-        variants=forms.variants,
+        variants=cast("Sequence[Variant]", variant),
         formats=formats,
         style=style,
     )

@@ -34,12 +34,12 @@ def test_unknown_names_are_refused():
 def test_functions_and_modules_are_what_they_are_in_any_order_of_imports():
     code = (
         "import importlib, sys\n"
-        "for first in ('metrics.scaling', 'metrics.catalog', 'metrics.population', 'metrics'):\n"
+        "for first in ('metrics.scaling', 'metrics.scoring', 'metrics.population', 'metrics'):\n"
         "    for name in [name for name in sys.modules if name.split('.')[0] == 'metrics']:\n"
         "        del sys.modules[name]\n"
         "    importlib.import_module(first)\n"
         "    from metrics import scalability\n"
-        "    import metrics.scaling, metrics.catalog\n"
+        "    import metrics.scaling, metrics.scoring\n"
         "    print(scalability([1], 1, [2], 2), type(metrics.scaling).__name__)"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

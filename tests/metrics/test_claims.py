@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from metrics import CLAIMS, METRICS, Panel, check_claim
+from metrics import CLAIMS, MEASURES, Panel, check_claim
 from metrics.claims import EXPERIMENTS, INTUITIONS, PanelName
 from metrics.claims.claim import read_otherwise
 from tests.support.panels import N_RUNS, panel
@@ -214,7 +214,7 @@ def test_a_panel_is_named_by_experiment_and_measure_and_by_a_form_if_it_has_one(
 
 def test_claims_speak_of_known_experiments_and_measures():
     named = {panel._replace(is_relative=False) for claim in CLAIMS.values() for panel in claim.panels}
-    assert {name.measure for name in named} <= set(METRICS)
+    assert {name.measure for name in named} <= set(MEASURES)
     assert {name.experiment for name in named} == set(EXPERIMENTS)
     assert set(SHOWN) == named | {e_s("S2a fast")}
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 import metrics
-from metrics import METRICS, PopulationRates
+from metrics import MEASURES, PopulationRates
 from tests.reference.naive_dtw import dtw_by_matrix
 
 N_INTERVALS = 6
@@ -59,7 +59,7 @@ NOT_LISTED = {
 
 
 def test_every_measure_is_in_a_list_or_left_out_for_a_reason():
-    assert sorted([*COMPARISONS, *SIZE_MEASURES, *NOT_LISTED]) == sorted(METRICS)
+    assert sorted([*COMPARISONS, *SIZE_MEASURES, *NOT_LISTED]) == sorted(MEASURES)
 
 
 @pytest.mark.parametrize("name", COMPARISONS)
@@ -77,7 +77,7 @@ def test_comparisons_scale_with_the_unit_of_performance(name, ideal, observed, f
     assert measure(factor * ideal, factor * observed) == pytest.approx(factor * measure(ideal, observed), **close)
 
 
-@pytest.mark.parametrize("name", [name for name in COMPARISONS if METRICS[name].is_distance])
+@pytest.mark.parametrize("name", [name for name in COMPARISONS if MEASURES[name].is_distance])
 @law
 @given(ideal=working, observed=performance, factor=scale)
 def test_relative_distances_do_not_depend_on_the_unit(name, ideal, observed, factor):
@@ -86,7 +86,7 @@ def test_relative_distances_do_not_depend_on_the_unit(name, ideal, observed, fac
     assert measure(factor * ideal, factor * observed, relative=True) == pytest.approx(value, **close)
 
 
-@pytest.mark.parametrize("name", [name for name in COMPARISONS if METRICS[name].is_distance])
+@pytest.mark.parametrize("name", [name for name in COMPARISONS if MEASURES[name].is_distance])
 @law
 @given(ideal=performance, observed=performance)
 def test_distances_are_symmetric_and_not_negative(name, ideal, observed):
@@ -135,7 +135,7 @@ def test_independent_robots_are_neutral_at_any_pair_of_sizes(name, lone, lost, n
         "undisturbed_gain": lambda: metrics.undisturbed_gain(small, 0.9 * lost, n[0], large, 0.9 * lost, n[1]),
         "scalability": lambda: metrics.scalability(small, n[0], large, n[1]),
     }[name]()
-    assert value == pytest.approx(METRICS[name].neutral, rel=1e-9, abs=1e-6)
+    assert value == pytest.approx(MEASURES[name].neutral, rel=1e-9, abs=1e-6)
 
 
 @law

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from metrics import score_policy
+from metrics import score
 from metrics.scoring import score_question
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import model_files
@@ -388,10 +388,10 @@ def test_files_are_scored_under_the_name_of_the_file_in_the_world_they_are_made_
     assert {spec.scenario.caches for spec in plan.specs} == {"static"}
     assert all(spec.parameters == {"digest": file_digest(network_file)} for spec in plan.specs)
     assert all(RunSpec.from_json(spec.to_json()) == spec for spec in plan.specs)
-    found = score_policy(
+    found = score(
         str(network_file), world, budget=TINY, measures=["efficiency"], out=tmp_path / "runs", jobs=1, progress=False
     )
-    assert (found.policy, found.failures) == ("straight", ())
+    assert (found.policies, found.failures) == (("straight",), {})
 
 
 @pytest.mark.parametrize(("folders", "labels"), [(("a", "b"), "short"), (("a/same", "b/same"), "whole")])

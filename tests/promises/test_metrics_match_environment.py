@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from metrics import waveform
+from metrics import MEASURES, waveform
 from metrics.scoring.curves_file import study_curves
 from metrics.scoring.run_curves import CRITERIA, CURVE_COLUMNS
-from metrics.scoring.scores import MEASURE_CRITERIA
 from swarm_forage_env.runs.record import RunRecord
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import RunSpec
@@ -41,7 +40,7 @@ def test_constant_waveforms_agree():
 def test_criteria_have_the_same_names():
     assert {*ladders.CRITERIA, worlds.UNDISTURBED} == set(CRITERIA)
     assert worlds.UNDISTURBED == UNDISTURBED
-    assert set(MEASURE_CRITERIA.values()) <= set(ladders.CRITERIA)
+    assert {measure.varies for measure in MEASURES.values()} <= set(ladders.CRITERIA)
 
 
 @pytest.fixture(scope="module")

@@ -5,9 +5,8 @@ from typing import Any
 
 import polars as pl
 
-from metrics import ScoreForms
 from metrics.scoring.curves_file import study_curves
-from metrics.scoring.measures import score_study
+from metrics.scoring.frame import scores
 
 
 def rows(
@@ -45,10 +44,15 @@ CLOCK = [100.0, 200.0, 300.0, 400.0]
 SIGNAL = [0.1, 0.1, 0.6, 0.6]
 
 
-def scored(*parts, measures=None, **forms):
-    """Scores of the one study in these rows."""
-    (study,) = study_curves(table(*parts))
-    return score_study(study, measures, ScoreForms(**forms))[0]
+def scored(*parts: Sequence[Mapping[str, Any]], measures: Sequence[str] | None = None, **how: Any) -> pl.DataFrame:
+    """Scores of the studies in these rows."""
+    return scores(study_curves(table(*parts)), measures, **how)[0]
+
+
+def missing(*parts: Sequence[Mapping[str, Any]], measures: Sequence[str], **how: Any) -> str:
+    """Why the one measure of the one study in these rows is not computed."""
+    ((_, reason),) = scores(study_curves(table(*parts)), measures, **how)[1].items()
+    return reason
 
 
 def throttled(ideal=IDEAL, slowed=SLOWED):

@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 
-from metrics import ScoreForms, compare_policies, verdict
+from metrics import score, verdict
 from swarm_forage_env import scenario
 from swarm_forage_env.studies.ladders import Budget
 from swarm_forage_env.studies.study import Axis
@@ -44,14 +45,14 @@ def score_values() -> dict[str, dict[str, list[float]]]:
     world = scenario("warehouse_small", **CROWDED)
     values: dict[str, dict[str, list[float]]] = {policy: {} for policy in FOUR}
     for variant in ("corrected", "paper"):
-        found = compare_policies(
-            list(FOUR), world, budget=budget, forms=ScoreForms(variants=(variant,)), jobs=1, progress=False
-        )
-        for table in found.tables:
-            for score in table.scores:
-                key = f"{score.measure} {score.variant} {score.form} {score.criterion} {score.x:g}"
-                values[table.policy][key] = list(score.per_seed.values())
-                values[table.policy][f"{key} relative"] = list(score.relative_per_seed.values())
+        found = score(list(FOUR), world, budget=budget, variants=[variant], jobs=1, progress=False).frame
+        for (policy, *key), rows in found.group_by(
+            "policy", "measure", "variant", "form", "criterion", "x", maintain_order=True
+        ):
+            name = "{} {} {} {} {:g}".format(*key)
+            given = rows.filter(pl.col("seed").is_not_null())
+            values[policy][name] = given["value"].to_list()
+            values[policy][f"{name} relative"] = given["relative"].drop_nulls().to_list()
     return values
 
 

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics import noise_robustness
 from metrics.claims import orders, shapes
 from metrics.claims import rules as general
 from metrics.claims.panel import Panel
 from metrics.claims.rules import Outcome
+from metrics.scoring.frame import pseudo_values
+from metrics.scoring.measures import MEASURES, Compared
 from metrics.scoring.run_curves import RunCurves
-from metrics.scoring.scores import pseudo_values
 
 LEVELS = np.arange(1.0, 8.0)
 ABOVE_ZERO = 4.0
@@ -76,10 +76,12 @@ def of_mean_curves(panel: Panel) -> Panel:
             criterion="noise", value=1.0, n_robots=1, seeds=tuple(range(len(curves))), curves={"performance": curves}
         )
 
-    def apart(ideal: RunCurves, noisy: RunCurves) -> NDArray[np.float64]:
-        return noise_robustness(ideal.performance, noisy.performance)
-
-    scores = {name: next(pseudo_values(apart, (runs(f"ideal {name}"), runs(name)), None))[None] for name in "ab"}
+    scores = {
+        name: pseudo_values(
+            MEASURES["noise_robustness"], Compared(None, runs(f"ideal {name}"), runs(name), "corrected")
+        )[0][None]
+        for name in "ab"
+    }
     return Panel(levels=LEVELS[:1], scores=scores, confidence=panel.confidence)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import metrics
-from metrics import CurveError, Performance, compare_policies, compare_tables, score_curves, score_policy
+from metrics import CurveError, Performance, score, score_curves
 from metrics.scoring.run_curves import checked_performance
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.runs import workers
@@ -31,16 +31,14 @@ def folder(tmp_path_factory):
 
 def scored(policy="stochm", world=WORLD, **options):
     """Score in this process, quietly, in the tiny budget."""
-    return score_policy(
+    return score(
         policy, world, **{"budget": TINY, "jobs": 1, "progress": False, "measures": ["raw_performance"], **options}
     )
 
 
 def values(found) -> dict[tuple[int, int], float]:
     """(Robots, seed) -> raw performance."""
-    return {
-        (score.n_robots[0], seed): value for score in found["raw_performance"] for seed, value in score.per_seed.items()
-    }
+    return {(n, seed): value for n, seed, value in found.frame.select("n_robots", "seed", "value").iter_rows()}
 
 
 @pytest.fixture
@@ -82,7 +80,12 @@ def test_scenario_and_argument_mean_the_same(folder, no_runs):
 def test_units_follow(folder, no_runs):
     def units(**options):
         measures = ["raw_performance", "efficiency"]
-        return [score.unit for score in scored(out=folder, measures=measures, **options).scores[1:3]]
+        return (
+            scored(out=folder, measures=measures, **options)
+            .summary.group_by("measure", maintain_order=True)
+            .first()["unit"]
+            .to_list()
+        )
 
     assert units() == ["objects in 4 s", "objects per robot in 4 s"]
     assert units(performance="deaths") == ["robots in 4 s", "robots per robot in 4 s"]
@@ -98,7 +101,7 @@ def test_shares_are_noted_where_growth_in_proportion_is_the_scale(folder, no_run
 
     def noted(performance):
         found = scored(out=folder, measures=measures, performance=performance)
-        return {score.measure for score in found.scores if "no sum over robots" in score.note}
+        return {row["measure"] for row in found.summary.iter_rows(named=True) if "no sum over robots" in row["remark"]}
 
     assert noted("task_balance") == noted("1/n_active") == {"efficiency", "task_emergence", "scalability"}
     assert noted("n_active") == noted("collected") == noted(lambda record: record["n_active"]) == set()
@@ -108,7 +111,7 @@ def test_shares_are_noted_where_growth_in_proportion_is_the_scale(folder, no_run
 
 def test_units_of_measures_of_adversity_follow():
     found = scored("random", measures=["noise_robustness", "population_robustness"], performance="n_active")
-    assert {score.unit for score in found.scores} == {"robots (DTW)", "robots summed over intervals"}
+    assert set(found.frame["unit"]) == {"robots (DTW)", "robots summed over intervals"}
 
 
 def test_a_function_of_the_record_is_a_performance(folder, no_runs):
@@ -119,11 +122,11 @@ def test_a_function_of_the_record_is_a_performance(folder, no_runs):
     found = scored(out=folder, performance=at_work)
     assert values(found) == {(1, 0): 4.0, (1, 1): 4.0, (4, 0): 16.0, (4, 1): 16.0}
     assert found.settings["performance"] == "at_work"
-    assert found["raw_performance"][0].unit == "at_work summed over intervals"
+    assert found.frame["unit"][0] == "at_work summed over intervals"
 
 
 def test_policies_are_compared_by_a_function():
-    compared = compare_policies(
+    compared = score(
         ["random", "crw"],
         WORLD,
         budget=TINY,
@@ -133,16 +136,7 @@ def test_policies_are_compared_by_a_function():
         performance=Performance(function=lambda record: record["n_present"], name="bodies", unit="robots"),
     )
     assert "performance bodies" in str(compared).splitlines()[0]
-    assert {score.summary.mean for each in compared.tables for score in each.scores} == {2.0, 8.0}
-
-
-def test_tables_of_different_performances_are_not_compared(folder, no_runs):
-    tables = [
-        scored(out=folder),
-        dataclasses.replace(scored(out=folder, performance="n_active"), policy="other"),
-    ]
-    with pytest.raises(CurveError, match="one performance to compare, got collected of stochm, n_active of other"):
-        compare_tables(tables)
+    assert set(compared.summary["mean"]) == {2.0, 8.0}
 
 
 @pytest.mark.parametrize(
@@ -188,23 +182,22 @@ CURVES = table(
 )
 def test_curves_from_a_file_have_any_performance(performance, expected, tmp_path):
     CURVES.sample(fraction=1.0, shuffle=True, seed=2).sort("n_robots").drop("performance").write_csv(tmp_path / "c.csv")
-    (found,) = score_curves(tmp_path / "c.csv", measures=["raw_performance"], performance=performance)
-    assert [score.summary.mean for score in found.scores] == expected
-    assert [score.summary.std for score in found.scores] == [0.0, 0.0]
+    found = score_curves(tmp_path / "c.csv", measures=["raw_performance"], performance=performance).summary
+    assert found.select("mean", "sd").rows() == [(value, 0.0) for value in expected]
 
 
 def test_units_of_known_columns_of_a_file_follow(tmp_path):
     frame = table(*(rows(n, [[9.0]], n_active=float(n), interference_fraction=0.5) for n in (1, 2)))
     frame.write_csv(tmp_path / "c.csv")
 
-    def score(performance):
-        (found,) = score_curves(tmp_path / "c.csv", measures=["task_emergence"], performance=performance)
+    def told(performance):
+        found = score_curves(tmp_path / "c.csv", measures=["task_emergence"], performance=performance)
         assert found.settings["performance"] == performance
-        return found.scores[0].unit, "no sum over robots" in found.scores[0].note
+        return found.frame["unit"][0], "no sum over robots" in found.frame["remark"][0]
 
-    assert score("n_active") == ("robots summed over intervals", False)
-    assert score("interference_fraction") == ("interference_fraction summed over intervals", True)
-    assert score("1/n_active") == ("1/n_active summed over intervals", True)
+    assert told("n_active") == ("robots summed over intervals", False)
+    assert told("interference_fraction") == ("interference_fraction summed over intervals", True)
+    assert told("1/n_active") == ("1/n_active summed over intervals", True)
 
 
 def test_a_function_does_not_hide_what_a_file_lacks(tmp_path):

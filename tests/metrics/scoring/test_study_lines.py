@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from metrics import ScoreForms
-from metrics.scoring.measures import score_study
+from metrics.scoring.frame import scores
 from metrics.scoring.run_curves import study_lines
 from swarm_forage_env import StudyFolder, read_study, run_study
 from swarm_forage_env.studies.study import Axis
@@ -34,16 +33,15 @@ def test_a_line_is_what_differs_on_the_last_axis(made):
         assert [place.values[-1] for place in line.places] == [0.0, 0.02, 0.03]
         pairs = line.curves.levels("noise")
         assert [(reference.criterion, level.value) for reference, level in pairs] == [("none", 0.02), ("none", 0.03)]
-        scores, missing = score_study(line.curves, ["noise_robustness"])
-        assert [score.x for score in scores] == [0.02, 0.03]
-        assert [sorted(score.per_seed) for score in scores] == [[0, 1], [0, 1]]
+        found, missing = scores([line.curves], ["noise_robustness"])
+        assert found.select("x", "seed").rows() == [(0.02, 0), (0.02, 1), (0.03, 0), (0.03, 1)]
         assert missing == {}
 
 
 def test_sizes_are_scored_from_the_smallest(made):
     (line,) = study_lines(made(Axis(name="population_size", values=(1, 2)), reference=1))
-    scores, missing = score_study(line.curves, ["scalability", "time_emergence", "raw_performance"])
-    assert {score.measure for score in scores} == {"scalability", "time_emergence", "raw_performance"}
+    found, missing = scores([line.curves], ["scalability", "time_emergence", "raw_performance"])
+    assert set(found["measure"]) == {"scalability", "time_emergence", "raw_performance"}
     assert missing == {}
     assert line.curves.horizon_s == 4.0
 
@@ -55,11 +53,8 @@ def test_the_lowest_rates_may_be_the_reference(made):
     pairs = line.curves.levels("population_dynamics")
     assert [(reference.value, level.value) for reference, level in pairs] == [(1.0, 2.0), (1.0, 4.0)]
     assert all(reference.rates.lambda_bd == pytest.approx(0.005) for reference, _ in pairs), "0.001 per tick of 0.2 s"
-    scores, _ = score_study(
-        line.curves, ["population_robustness"], ScoreForms(variants=("corrected",), forms=("marginal",))
-    )
-    assert [(score.variant, score.x) for score in scores] == [
-        ("corrected", 2.0), ("corrected", 4.0)]  # fmt: skip
+    found, _ = scores([line.curves], ["population_robustness"])
+    assert found["x"].unique(maintain_order=True).to_list() == [2.0, 4.0]
 
 
 def test_lost_runs_are_counted_and_another_performance_is_read(made, tmp_path):

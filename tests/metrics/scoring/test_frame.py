@@ -1,0 +1,230 @@
+"""The frame of scores: pairs of runs, shares, summaries, and which differences are certain."""
+
+import math
+from typing import Any
+
+import numpy as np
+import polars as pl
+import pytest
+
+import metrics
+from metrics import CurveError
+from metrics.scoring.frame import SCHEMA, differences, pseudo_values, scores, summarized
+from metrics.scoring.measures import MEASURES, Compared
+from metrics.scoring.run_curves import RunCurves, StudyCurves
+from metrics.significance import holm, paired_p
+from tests.support.curve_tables import CLOCK, IDEAL, SLOWED, rows, scored, throttled
+
+NAN = math.nan
+
+
+def test_one_row_per_run_and_students_interval_over_them():
+    found = scored(rows(3, IDEAL), measures=["raw_performance"])
+    assert found.columns == list(SCHEMA)
+    assert dict(found.select("seed", "value").iter_rows()) == {0: 21.0, 1: 21.0, 2: 20.0}
+    assert found["unit"].unique().to_list() == ["objects per run"]
+    expected = metrics.aggregate([21.0, 21.0, 20.0])
+    row = summarized(found).row(0, named=True)
+    assert [row[name] for name in ("mean", "lower", "upper", "sd")] == [
+        expected.mean,
+        expected.lower,
+        expected.upper,
+        expected.std,
+    ]
+    assert (row["runs"], row["lost"], math.isnan(row["relative"])) == (3, 0, True)
+
+
+def test_the_unit_names_the_length_of_a_run_where_it_is_known():
+    found = scored(rows(3, IDEAL, t_end_s=CLOCK), measures=["efficiency"])
+    assert found["unit"][0] == "objects per robot in 400 s"
+
+
+def test_amounts_are_shares_of_the_performance_that_they_are_compared_with():
+    found = scored(*throttled(), measures=["adaptability"])
+    np.testing.assert_allclose(found["relative"], metrics.adaptability(IDEAL, SLOWED) / np.sum(IDEAL, axis=1))
+    row = summarized(found).row(0, named=True)
+    assert row["relative_floor"] == pytest.approx(metrics.noise_floor(IDEAL).mean() / np.sum(IDEAL, axis=1).mean())
+    gains = scored(rows(2, SLOWED), rows(4, IDEAL), measures=["task_emergence"])
+    np.testing.assert_allclose(gains["relative"], metrics.task_emergence(SLOWED, 2, IDEAL, 4, relative=True))
+
+
+def test_pseudo_values_by_hand():
+    ideal, runs = (
+        RunCurves(criterion="noise", value=1.0, n_robots=1, seeds=(0, 1), curves={"performance": np.array(values)})
+        for values in ([[4.0], [4.0]], [[1.0], [3.0]])
+    )
+    # Of means 4 and 2 the distance is 2; without the first run 4 - 3 = 1, without the second 4 - 1 = 3, 2 on average.
+    distances, shares = pseudo_values(MEASURES["adaptability"], Compared(None, ideal, runs, "corrected"))
+    assert distances.tolist() == [2.0 + (2.0 - 1.0), 2.0 + (2.0 - 3.0)]
+    assert shares.tolist() == [0.75, 0.25]
+
+
+def test_distances_of_mean_curves_have_that_of_the_means_as_their_mean():
+    found = scored(*throttled(), measures=["adaptability"])
+    expected = metrics.adaptability(np.mean(IDEAL, axis=0), np.mean(SLOWED, axis=0))
+    assert found["mean_curve"].mean() == pytest.approx(float(expected))
+    np.testing.assert_allclose(found["floor_of_seed"], metrics.adaptability(IDEAL, np.roll(IDEAL, -1, axis=0)))
+
+
+def test_one_reference_run_has_no_noise_floor():
+    row = summarized(scored(*throttled(IDEAL[:1], SLOWED[:1]), measures=["adaptability"])).row(0, named=True)
+    assert row["floor"] is None
+    assert math.isnan(row["lower"])
+
+
+def test_doing_nothing_is_not_praised():
+    found = summarized(scored(*throttled([[0.0] * 4] * 2, [[0.0] * 4] * 2), measures=["adaptability"]))
+    assert found.select("mean", "idle").rows() == [(0.0, 2)]
+    assert math.isnan(found["relative"][0])
+
+
+def test_undefined_and_infinite_scalability_is_counted():
+    found = scored(rows(2, [[0.0], [1.0], [2.0]]), rows(4, [[0.0], [0.0], [3.0]]), measures=["scalability"])
+    assert summarized(found).select("runs", "undefined").rows() == [(2, 1)]
+
+
+@pytest.mark.parametrize(
+    ("how", "message"),
+    [
+        ({"variants": ["papr"]}, "Unknown variant 'papr'. Did you mean 'paper'"),
+        ({"variants": []}, "one or more variants of paper"),
+        ({"forms": ["both"]}, "Unknown form 'both'"),
+    ],
+)
+def test_unknown_variants_and_forms_are_refused(how, message):
+    with pytest.raises(CurveError, match=message):
+        scored(rows(3, IDEAL), **how)
+
+
+def test_a_measure_without_the_asked_variants_is_scored_once():
+    found = scored(rows(1, IDEAL), rows(2, IDEAL), measures=["task_emergence"], variants=["paper", "corrected"])
+    assert found.select("variant", "x").unique().rows() == [("corrected", 2.0)]
+
+
+def lossy(n_planned: int | None, seeds: tuple[int, ...]) -> StudyCurves:
+    """A study of two sizes, of which the larger has lost runs."""
+    whole, larger = (
+        RunCurves(
+            criterion="population_size",
+            value=float(n),
+            n_robots=n,
+            seeds=of,
+            curves={"performance": np.ones((len(of), 2))} if of else {},
+            n_planned=n_planned,
+        )
+        for n, of in ((1, (0, 1, 2)), (4, seeds))
+    )
+    return StudyCurves(controller="mine", experiments=(whole, larger), t_end_s=np.array([1.0, 2.0]))
+
+
+@pytest.mark.parametrize("n_planned", [3, None])
+def test_runs_without_a_partner_are_counted(n_planned):
+    found, _ = scores([lossy(n_planned, (0, 2))], ["task_emergence"])
+    assert found["seed"].to_list() == [0, 2]
+    assert found["lost"].to_list() == [1, 1]
+
+
+def test_a_level_without_a_run_keeps_its_row():
+    found, missing = scores([lossy(3, ())], ["raw_performance", "scalability"])
+    assert missing == {}
+    told = summarized(found).select("x", "runs", "lost").rows()
+    assert told == [(1.0, 3, 0), (4.0, 0, 3), (4.0, 0, 3)]
+
+
+def frame(**policies: Any) -> pl.DataFrame:
+    """Scores made by hand: policy -> values by seed at N = 4, or level -> such values."""
+    parts: list[dict[str, Any]] = []
+    for policy, levels in policies.items():
+        for (measure, at), values in (
+            levels if isinstance(levels, dict) else {("raw_performance", "N = 4"): levels}
+        ).items():
+            given = values if isinstance(values, tuple) else (values, [None] * len(values))
+            parts += [
+                {"policy": policy, "measure": measure, "variant": "corrected", "form": "marginal", "at": at, "x": 4.0}
+                | {"criterion": "population_size", "n_robots": 4, "seed": seed, "value": value, "relative": share}
+                for seed, (value, share) in enumerate(zip(*given, strict=True))
+                if value is not None
+            ]
+    return pl.DataFrame(parts, schema={name: SCHEMA[name] for name in parts[0]})
+
+
+def test_differences_pair_runs_by_seed():
+    found = differences(frame(a=[5.0, 7.0, None, 9.0], b=[3.0, 4.0, 100.0]))
+    assert found.select("difference", "pairs").rows() == [(2.5, 2)]
+
+
+def test_rounding_does_not_make_equal_differences_certain():
+    """6/50 - 5/50 and 5/50 - 4/50 differ in the last bit, which is no spread that a test could trust."""
+    gaps = np.array([6 / 50 - 5 / 50, 5 / 50 - 4 / 50, 3 / 50 - 2 / 50])
+    assert gaps.std(ddof=1) > 0.0
+    assert paired_p(gaps) == 0.25
+    assert differences(frame(a=[6 / 50, 5 / 50, 3 / 50], b=[5 / 50, 4 / 50, 2 / 50]))["better"].to_list() == [""]
+
+
+@pytest.mark.parametrize(("measure", "better"), [("raw_performance", "a"), ("adaptability", "b"), ("scalability", "a")])
+def test_the_better_policy_is_named_by_the_direction_of_the_measure(measure, better):
+    high, low = [10.0, 11.0, 10.5, 10.2], [1.0, 1.2, 0.9, 1.1]
+    assert differences(frame(a={(measure, "x"): high}, b={(measure, "x"): low}))["better"].to_list() == [better]
+    assert differences(frame(a=[1.0, 2.0, 3.0], b=[2.0, 1.0, 3.5]))["better"].to_list() == [""]
+
+
+def test_the_correction_is_over_levels_and_pairs_of_a_measure_and_nothing_else():
+    rng = np.random.default_rng(1)
+    made = {name: [rng.normal(size=6).tolist() for _ in range(2)] for name in "abc"}
+    found = differences(
+        frame(
+            **{
+                name: {
+                    ("raw_performance", "N = 2"): runs[0],
+                    ("raw_performance", "N = 4"): runs[1],
+                    ("scalability", "N = 4"): runs[0],
+                }
+                for name, runs in made.items()
+            }
+        )
+    )
+    for measure, n_tests in (("raw_performance", 6), ("scalability", 3)):
+        mine = found.filter(measure=measure)
+        assert len(mine) == n_tests
+        np.testing.assert_allclose(mine["p_holm"], holm(mine["p"].to_numpy()))
+    against = differences(frame(a=made["a"][0], b=made["b"][0], c=made["c"][0]), [("a", "c"), ("b", "c")])
+    assert against.select("first", "second").rows() == [("a", "c"), ("b", "c")]
+    np.testing.assert_allclose(against["p_holm"], holm(against["p"].to_numpy()))
+
+
+def test_nobody_is_better_by_a_difference_that_the_correction_takes_away():
+    clear, nothing, zero = [1.0, 1.6, 0.4, 1.2], [0.1, -0.1, 0.2, -0.2], [0.0] * 4
+    levels = [("raw_performance", f"N = {n}") for n in range(4, 9)]
+    found = differences(
+        frame(a=dict(zip(levels, [clear, *[nothing] * 4], strict=True)), b=dict.fromkeys(levels, zero))
+    ).row(0, named=True)
+    assert found["p"] <= 0.05 < found["p_holm"]
+    assert found["better"] == ""
+
+
+def test_shares_are_tested_on_their_own():
+    level = ("adaptability", "throttle 0.3")
+    found = differences(
+        frame(
+            a={level: ([10.0, 11.0, 12.0], [0.5, 0.6, 0.4])},
+            b={level: ([1.0, 2.2, 2.9], [0.4, 0.6, 0.5])},
+        )
+    )
+    assert found.select("is_relative", "better").rows() == [(False, "b"), (True, "")]
+
+
+def test_undefined_runs_do_not_count_and_infinite_ones_forbid_the_test():
+    assert differences(frame(a=[1.0, NAN, 3.0], b=[0.0, 1.0, 1.5]))["pairs"].to_list() == [2]
+    found = differences(frame(a=[1.0, -math.inf], b=[0.0, 1.0])).row(0, named=True)
+    assert math.isnan(found["p"])
+    assert found["better"] == ""
+
+
+def test_false_alarms_are_as_rare_as_promised():
+    """Three equal policies at two levels: any certain difference in at most 5 % of studies, up to chance."""
+    rng = np.random.default_rng(3)
+    alarms = 0
+    for _ in range(400):
+        made = {n: {("raw_performance", at): rng.normal(size=5).tolist() for at in "xy"} for n in "abc"}
+        alarms += (differences(frame(**made))["better"] != "").any()
+    assert alarms <= 32  # 20 expected at most; 32 is exceeded by chance in 0.4 % of such tests
