@@ -34,6 +34,7 @@ from swarm_forage_env.training.evaluator import Evaluator
 from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.seeds import seed_folder
 from swarm_forage_env.views.gymnasium import SwarmVectorEnv
+from swarm_forage_env.views.sampler import ScenarioSampler
 
 WIDTH = 0.5
 """Standard deviation of the weights of the first generation, around 0."""
@@ -91,10 +92,11 @@ def worlds_of(plan: TrainingPlan, stage: Stage, seed: int) -> list[World]:
     """Return the worlds of a stage, with as many of the plan's arenas as their weights say, at least one each."""
     arenas = plan.arenas_of(stage)
     sampler = arenas["sampler"]
-    share = plan.n_arenas / sum(world.weight for world in sampler.worlds)
+    weights = [world.get("weight", 1.0) for world in sampler.table["worlds"]]
     worlds = []
-    for k, world in enumerate(sampler.worlds):
-        kind = {"sampler": replace(sampler, worlds=(world,)), "n_arenas": max(1, round(share * world.weight))}
+    for k, (world, weight) in enumerate(zip(sampler.table["worlds"], weights, strict=True)):
+        alone = ScenarioSampler({**sampler.table, "worlds": [world]})
+        kind = {"sampler": alone, "n_arenas": max(1, round(plan.n_arenas * weight / sum(weights)))}
         env = SwarmVectorEnv(**{**arenas, **kind})
         obs, infos = env.reset(seed=seed + 1000 * k, options={"scenario": dict(stage.scenario)})
         if not infos["active"].all():

@@ -49,7 +49,6 @@ from .rendering.figures import FigureStyle as FigureStyle
 
 # training
 from .views.sampler import ScenarioSampler as ScenarioSampler
-from .views.sampler import SampledWorld as SampledWorld
 from .training.export.exporting import export_policy as export_policy
 from .policies.extras import ExtraFunctionError as ExtraFunctionError
 

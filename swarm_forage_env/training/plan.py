@@ -71,7 +71,7 @@ class Stage:
     def to_mapping(self) -> dict[str, Any]:
         """Return the stage as plain values; `sampler` only where there is one."""
         plain: dict[str, Any] = {"steps": self.steps, "scenario": dict(self.scenario), "options": dict(self.options)}
-        return plain if self.sampler is None else {**plain, "sampler": self.sampler.to_mapping()}
+        return plain if self.sampler is None else {**plain, "sampler": dict(self.sampler.table)}
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "Stage":
@@ -82,7 +82,7 @@ class Stage:
             raise ConfigError(f"Expected a stage with its steps, such as steps = 1_000_000, got {dict(mapping)}.")
         values["scenario"] = tuples(table("stages.scenario", values.get("scenario", {})))
         if "sampler" in values:
-            values["sampler"] = ScenarioSampler.from_mapping(values["sampler"])
+            values["sampler"] = ScenarioSampler(values["sampler"])
         return cls(**values)
 
 
@@ -201,7 +201,7 @@ class TrainingPlan:
         performances: dict[str, str] = {}
         for stage in self.stages:
             sampler = stage.sampler or self.sampler
-            for config in (self.scenario,) if sampler is None else sampler.corners:
+            for config in (self.scenario,) if sampler is None else sampler.ends:
                 one_of("performance of a scenario to train in", config.performance, COUNTED)
                 if is_sampled and _common(config) != _common(self.scenario):
                     raise ConfigError(
@@ -275,7 +275,7 @@ class TrainingPlan:
             del plain["sampler"]
             return {**plain, **nested}
         del plain["scenario"], plain["wrappers"], nested["scenario"], nested["wrappers"]
-        return {**plain, **nested, "sampler": self.sampler.to_mapping()}
+        return {**plain, **nested, "sampler": dict(self.sampler.table)}
 
     def settings(self) -> dict[str, Any]:
         """Return all plain values of the plan by their names with dots, such as "interface.observation"."""
@@ -349,7 +349,7 @@ class TrainingPlan:
             given = [name for name in ("scenario", "wrappers") if name in values]
             if given:
                 raise ConfigError(f"Expected a plan with either sampler or {' and '.join(given)}, got both.")
-            values["sampler"] = ScenarioSampler.from_mapping(values["sampler"])
+            values["sampler"] = ScenarioSampler(values["sampler"])
             values["scenario"] = values["sampler"].largest
         else:
             values["scenario"] = scenario_of(values.get("scenario"))

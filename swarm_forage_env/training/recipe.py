@@ -229,7 +229,7 @@ def _evaluation(
 def _largest_worlds(sampler: ScenarioSampler) -> tuple[EvaluationWorld, ...]:
     """Return the world with the most robots of each name that a sampler draws, undisturbed."""
     largest: dict[str, ScenarioConfig] = {}
-    for config in sorted(sampler.corners, key=lambda config: config.robots.n_robots):
+    for config in sorted(sampler.ends, key=lambda config: config.robots.n_robots):
         largest[config.name] = config
     return tuple(EvaluationWorld(scenario=config) for config in largest.values())
 

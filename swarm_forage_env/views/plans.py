@@ -124,7 +124,7 @@ def plan_arena(
             )
         config = chosen_scenario(scenario or DEFAULT_SCENARIO, overrides)
     else:
-        instance("sampler", sampler, ScenarioSampler, hint="; ScenarioSampler.from_mapping reads a table")
+        instance("sampler", sampler, ScenarioSampler, hint="; ScenarioSampler takes a table")
         given = ["scenario"] * (scenario not in (None, SAMPLED)) + ["wrappers"] * bool(disturbing) + list(overrides)
         if given:
             raise ConfigError(

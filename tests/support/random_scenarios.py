@@ -9,7 +9,7 @@ from swarm_forage_env.scenarios.obstacles import MIN_SIDE_M
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, QUIRK_NAMES, Quirks
-from swarm_forage_env.views.sampler import SampledWorld, ScenarioSampler
+from swarm_forage_env.views.sampler import ScenarioSampler
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.handling import HandlingCostConfig
 from swarm_forage_env.wrappers.noise import (
@@ -208,7 +208,7 @@ def random_sampler(random: Random, config: ScenarioConfig, most_ticks: int) -> S
         ConfigError: what was drawn does not fit together; draw again.
     """
     first = {
-        "preset": random.choice((config, to_mapping(config))),
+        "preset": to_mapping(config),
         "n_robots": {random.choice(("uniform", "log_uniform")): [1, config.robots.n_robots]},
         "n_objects": {"uniform": [1, config.objects.n_objects]},
         "physics": {"choice": list(PHYSICS_ENGINES)},
@@ -225,10 +225,13 @@ def random_sampler(random: Random, config: ScenarioConfig, most_ticks: int) -> S
         "throttle": {"waveform": "constant", "amplitude": {"choice": [0.1, 0.4]}},
     }
     named = random.sample(list(wrappers), random.randint(0, len(wrappers)))
+    noisy = {"actuator_noise": {"probability": 0.3, "sigma": 0.1}}
     return ScenarioSampler(
-        worlds=(
-            SampledWorld(scenario=first, weight=random.choice((0.5, 3))),
-            SampledWorld(scenario=other, wrappers={"actuator_noise": {"probability": 0.3, "sigma": 0.1}}),
-        ),
-        wrappers={name: wrappers[name] for name in named},
+        {
+            "worlds": [
+                {"scenario": first, "weight": random.choice((0.5, 3))},
+                {"scenario": {"preset": to_mapping(other)}, "wrappers": noisy},
+            ],
+            "wrappers": {name: wrappers[name] for name in named},
+        }
     )

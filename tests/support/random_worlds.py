@@ -112,7 +112,7 @@ def _drawn(random: Random, driver: str, most_ticks: int) -> RandomWorld:
         sampler = random_sampler(random, config, most_ticks)
         drawn = sampler.world_of(seed)
         config, wrappers = drawn.scenario, drawn.wrappers
-        if any(corner.objects.placement == "power_law" for corner in sampler.corners):
+        if any(corner.objects.placement == "power_law" for corner in sampler.ends):
             _steps_of_batch(sampler, seed % 2**31)  # refuses clusters without room
     return RandomWorld(
         scenario=config,
@@ -142,8 +142,7 @@ def visit(world: RandomWorld) -> Visit:
 
 def _look_at_sampler(sampler: ScenarioSampler, world: RandomWorld, seen: Visit) -> None:
     """Check that a sampler comes back from its text with the same worlds, and step a batch of them twice."""
-    again = ScenarioSampler.from_mapping(json.loads(json.dumps(sampler.to_mapping())))
-    assert again == sampler, "a sampler comes back from its text"
+    again = ScenarioSampler(json.loads(json.dumps(sampler.table)))
     assert again.world_of(world.seed) == World(world.scenario, world.wrappers), "a seed is a world"
     first, second = (_steps_of_batch(each, world.seed % 2**31) for each in (sampler, again))
     assert first == second, "the same batch of drawn worlds goes another way"

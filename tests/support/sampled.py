@@ -8,13 +8,7 @@ TWO_WORLDS: dict[str, Any] = {
     "scenario": {"horizon_s": 200.0, "physics": "compiled"},
     "wrappers": {
         "sensor_noise": {"probability": 0.5, "sigma": {"uniform": [0.0, 0.1]}},
-        "throttle": {
-            "probability": 0.5,
-            "waveform": "square",
-            "amplitude": {"uniform": [0.1, 0.4]},
-            "offset": {"same_as": "amplitude"},
-            "period_s": 50.0,
-        },
+        "throttle": {"probability": 0.5, "waveform": "constant", "amplitude": {"uniform": [0.1, 0.4]}},
     },
     "worlds": [
         {
@@ -34,4 +28,4 @@ TWO_WORLDS: dict[str, Any] = {
 
 def sampler() -> ScenarioSampler:
     """Return the sampler of `TWO_WORLDS`."""
-    return ScenarioSampler.from_mapping(TWO_WORLDS)
+    return ScenarioSampler(TWO_WORLDS)

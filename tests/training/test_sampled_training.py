@@ -98,7 +98,7 @@ def test_a_replay_memory_never_samples_rows_to_spare():
 
 def test_a_plan_with_a_sampler_is_carried_out_and_tells_world_by_world(tmp_path):
     narrow = {"preset": "warehouse_small", "n_robots": 3, "n_objects": 10, "horizon_s": 200.0, "physics": "compiled"}
-    first = type(WORLDS).from_mapping({"worlds": [{"scenario": narrow}]})  # other rows than in the next stage
+    first = type(WORLDS)({"worlds": [{"scenario": narrow}]})  # other rows than in the next stage
     plan = tiny_plan(stages=(Stage(steps=48, sampler=first), Stage(steps=192)))
     result = train(plan, tmp_path)
     assert result.model.num_timesteps == 240
@@ -110,7 +110,7 @@ def test_a_plan_with_a_sampler_is_carried_out_and_tells_world_by_world(tmp_path)
     assert read_evaluations(tmp_path / "evaluations.csv") == list(result.evaluations)
     assert read_plan(tmp_path / "plan.json") == plan
     card = Network.load(tmp_path / "policy.npz").about.card
-    assert card["plan"]["sampler"] == json.loads(json.dumps(WORLDS.to_mapping()))
+    assert card["plan"]["sampler"] == json.loads(json.dumps(WORLDS.table))
     assert len(card["evaluation"]["worlds"]) == 2
     assert train(plan, tmp_path, resume=True).steps == 0
 

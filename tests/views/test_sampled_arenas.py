@@ -12,7 +12,7 @@ from swarm_forage_env.views.arenas import ArenaBatch
 from swarm_forage_env.views.gymnasium import JointForageEnv, SwarmVectorEnv
 from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv
 from swarm_forage_env.views.plans import plan_arena
-from swarm_forage_env.views.sampler import SampledWorld, ScenarioSampler
+from swarm_forage_env.views.sampler import ScenarioSampler
 from tests.support.sampled import sampler
 
 WORLDS = sampler()
@@ -37,7 +37,7 @@ def sizes(seeds=SEEDS):
 def worlds_of(**fields):
     """A sampler of one small world."""
     world = {"preset": "warehouse_small", "n_robots": 2, "n_objects": 10, "physics": "compiled", **fields}
-    return ScenarioSampler(worlds=(SampledWorld(scenario=world),))
+    return ScenarioSampler({"worlds": [{"scenario": world}]})
 
 
 def test_the_seeds_of_these_tests_leave_rows_to_spare():

@@ -347,7 +347,7 @@ class _Watch(BaseCallback):
         self._counted = {
             config.name: config.performance
             for sampler in (plan.sampler, *(stage.sampler for stage in plan.stages))
-            for config in (() if sampler is None else sampler.corners)
+            for config in (() if sampler is None else sampler.ends)
         }
         last = self.evaluations[-1] if self.evaluations else None
         self._spent_s, self._spent_cpu_s = (0.0, 0.0) if last is None else (last.wall_time_s, last.cpu_time_s)
