@@ -351,7 +351,7 @@ class StudyLine:
     places: "tuple[Place, ...]"
     """In the order of the last axis."""
     curves: StudyCurves
-    """One experiment per condition, in the same order; `score_study` takes it."""
+    """One experiment per condition, in the same order; `scores` takes it."""
 
 
 def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[StudyLine, ...]:
@@ -360,7 +360,7 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
     Args:
         table: From `swarm_forage_env.read_study`. Failed and missing runs count as planned and lost. Of a study that
             was judged several times, lines have the first runs that all of their conditions have.
-        performance: What P(N, t) is, by a name as in `score_policy`; default that of the scenario.
+        performance: What P(N, t) is, by a name as in `score`; default that of the scenario.
 
     Raises:
         ValueError: no such performance.

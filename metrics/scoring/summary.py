@@ -201,11 +201,11 @@ def run_question(
     """Return the question what policies achieve in worlds, which `summarize_runs` answers.
 
     Args:
-        policies: As in `compare_policies`.
+        policies: As in `score`.
         worlds: Each is a `World`, a configuration or the name of a preset.
         seeds: Their number, or a list.
-        parameters: As in `score_policy`.
-        caches: As in `score_policy`.
+        parameters: As in `score`.
+        caches: As in `score`.
 
     Raises:
         ValueError: an unknown policy or scenario, or values that describe no run.
