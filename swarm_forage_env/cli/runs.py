@@ -94,7 +94,7 @@ def score(
     variant: Names = ("corrected",),
     form: Names = ("marginal",),
     against: str | None = None,
-    show_all: Annotated[bool, Parameter(name="--all", negative="")] = False,
+    show_all: Annotated[bool, Parameter(name="--all")] = False,
     budget: str = "standard",
     seeds: Annotated[PositiveInt | None, Parameter(help="Runs per experiment; default the budget's number.")] = None,
     disturbance: str = "throttle",
