@@ -1,23 +1,29 @@
-"""Curves from a CSV or Parquet file as arrays, with every check that a table of curves needs.
+"""Curves of other simulators and of real robots: a table of theirs as the arrays that measures take.
 
-Whatever is wrong with a table raises a `CurveError` that names the file, the row or the run, and what was expected.
+    read_curves("theirs.csv", columns={"n_robots": "swarm", "performance": "items"})
+    read_curves("log.csv", events=True, interval_s=100.0)          # a row per delivery, with its time
+
+Whatever is wrong with a table is one line: its place in the file, what was expected, and what is there.
 """
 
-import difflib
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+import csv
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any, NoReturn
 
 import numpy as np
+import polars as pl
 
-from swarm_forage_env.runs.parquet import ParquetError, read_parquet
-from swarm_forage_env.scenarios.performance import INVERTED, Performance
-from swarm_forage_env.wrappers.world import SIZE
+from swarm_forage_env._internal.wording import shown, suggestion
+from swarm_forage_env.scenarios.columns import Column
+from swarm_forage_env.scenarios.performance import INVERTED, PERFORMANCE_COLUMNS, Performance
+from swarm_forage_env.wrappers.world import SIZE, UNDISTURBED
 
 from ..checks import CurveError
-from ..curves import FRACTION_TOLERANCE, FloatArray
+from ..curves import FRACTION_TOLERANCE
 from ..queues import PopulationRates
+from .clocks import TIME, Experiment, Run, binned, on_one_clock
 from .run_curves import (
     CRITERIA,
     CURVE_COLUMNS,
@@ -27,53 +33,176 @@ from .run_curves import (
     NOISE,
     POPULATION,
     RATE_COLUMNS,
-    REQUIRED_COLUMNS,
     THROTTLE,
-    PerformanceLike,
     RunCurves,
     StudyCurves,
-    checked_performance,
-    own_curve,
-    own_performance,
     shared_seeds,
 )
 
-if TYPE_CHECKING:
-    import polars as pl
-
-
-RUN_KEYS = ("controller", "criterion", "criterion_value", "n_robots", "seed")
-"""Columns that tell the runs of a table apart, where it has them."""
-_ROW = "row of the table"
-"""Column for the order of rows; no table of curves has one of this name."""
+EVENT_COLUMNS: Mapping[str, Column] = {
+    **{name: column for name, column in CURVE_COLUMNS.items() if name not in (*INTERVAL_COLUMNS, "interval")},
+    TIME: Column("amount", "s", "when the delivery was, from the start of the run; or its date and time"),
+    "performance": Column("amount", "", "how much was delivered; default 1"),
+}
+"""Columns of event logs -> what they hold. Further columns are ignored."""
 MOST = 1e15
 """Largest number in a table; our choice: sums of squares of such numbers are finite, and whole ones are exact."""
 MOST_ROBOTS = 10_000_000
 """Largest swarm in a table; our choice: some measures need an array of this length."""
-_STEERING = "[\\p{Cc}\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]"
-"""Characters that steer a terminal or the direction of writing, which a name must not."""
+_KINDS: Mapping[str, tuple[str, Callable[[pl.Series], pl.Series]]] = {
+    "whole": ("a whole number >= 0", lambda values: (values >= 0) & (values == values.floor())),
+    "amount": ("a number >= 0", lambda values: values >= 0),
+    "fraction": ("a fraction in [0, 1]", lambda values: (values >= 0) & (values <= 1 + FRACTION_TOLERANCE)),
+    "number": ("a number", lambda values: values.is_finite()),
+}
+"""Kind of a column -> what its values are, and which are that."""
+_IN_EACH_ROW = ("n_robots", "seed", "interval", "t_end_s", "performance", TIME)
+_EXPERIMENT = ("controller", "criterion", "criterion_value", "n_robots")
+_LINE = "line of the file"
+"""Column for places in messages; no table of curves has one of this name."""
 
 
-def read_curves(path: str | Path, performance: PerformanceLike | None = None) -> tuple[StudyCurves, ...]:
-    """Read curves from a CSV or Parquet file with the columns of `CURVE_COLUMNS`; one study per policy in it.
+def read_curves(path: str | Path, performance: str | None = None, **how: Any) -> tuple[StudyCurves, ...]:
+    """Read a file of curves; one study per policy in it.
 
     Args:
-        path: The file.
-        performance: What is read as performance; default the column of that name. See `with_performance`.
+        path: A Parquet file; or a text with a line of column names, and with commas, semicolons or tabs between values.
+            Beside semicolons and tabs, commas in numbers are decimal.
+        performance: As in `study_curves`.
+        how: Further arguments of `study_curves`.
 
     Raises:
-        CurveError: whatever is wrong with the file, in one line: as `study_curves`, a file that cannot be read, no
-            reference run for what is varied, no runs that can be paired.
+        CurveError: as `study_curves`, or the file cannot be read.
     """
     file = Path(path)
-    frame = _read_frame(file)
-    read_as = DELIVERIES
+    try:
+        frame = _read_parquet(file) if file.suffix.lower() == ".parquet" else _read_text(file)
+    except OSError as error:
+        raise CurveError(f"Cannot read {file}: {error.strerror or error}.") from error
+    return study_curves(frame, performance, where=str(file), controller=file.stem, **how)
+
+
+def _read_parquet(file: Path) -> pl.DataFrame:
+    try:
+        return pl.read_parquet(file)
+    except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
+        raise CurveError(f"Cannot read {file} as Parquet: {str(error).splitlines()[0]}.") from error
+
+
+def _read_text(file: Path) -> pl.DataFrame:
+    """Return the values of a text as texts, with decimal points, and the line of each row."""
+    content = file.read_bytes()
+    try:
+        text = content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise CurveError(f"Expected {file} to be text in UTF-8, got other bytes from byte {error.start} on.") from error
+    lines = text.splitlines(keepends=True)
+    separator = max(",;\t", key=next(filter(str.strip, lines), "").count)
+    reader = csv.reader(lines, delimiter=separator)
+    rows: list[list[str]] = []
+    try:
+        rows = [[str(reader.line_num), *map(str.strip, cells)] for cells in reader if any(map(str.strip, cells))]
+    except csv.Error as error:
+        raise CurveError(f"Cannot read line {reader.line_num} of {file}: {error}.") from error
+    if not rows:
+        raise CurveError(f"Expected curves in {file}, but the file is empty.")
+    (first, *names), *values = rows
+    for name in names:
+        if names.count(name) > 1:
+            raise CurveError(f"Expected a name per column in line {first} of {file}, got {name!r} more than once.")
+    for line, *cells in values:
+        if len(cells) != len(names):
+            between = {",": "commas", ";": "semicolons", "\t": "tabs"}[separator]
+            raise CurveError(f"Expected {len(names)} values with {between} in line {line} of {file}, got {len(cells)}.")
+    frame = pl.DataFrame(values, schema=dict.fromkeys([_LINE, *names], pl.String), orient="row")
+    if separator == ",":
+        return frame
+    return frame.with_columns(pl.all().str.replace(r"^([+-]?\d*),(\d+(?:[eE][+-]?\d+)?)$", "$1.$2"))
+
+
+def study_curves(
+    frame: pl.DataFrame,
+    performance: str | None = None,
+    *,
+    columns: Mapping[str, str] | None = None,
+    events: bool = False,
+    interval_s: float | None = None,
+    where: str = "the table",
+    controller: str = "curves",
+) -> tuple[StudyCurves, ...]:
+    """Turn a table of curves into arrays on one clock, one study per policy in it.
+
+    Args:
+        frame: Rows in any order, one per interval of a run with columns as in `CURVE_COLUMNS`, or one per delivery with
+            those of `EVENT_COLUMNS`. Runs of unequal lengths and steps are resampled; `StudyCurves.notes` say so.
+        performance: Column that is read as performance, or "1/" and a column in which less is better; default
+            "performance".
+        columns: Our name of a column -> its name in the table, or a number, which then stands in each row.
+        events: Whether a row is a delivery.
+        interval_s: Length of an interval, s. Needed for events; of curves, the step of the clock that all get.
+        where: Name of the table in messages.
+        controller: Name of the policy where the table has no such column.
+
+    Raises:
+        CurveError: columns are missing or hold what they may not, runs are incomplete, there is no reference run for
+            what is varied, or no runs that can be paired.
+    """
+    if interval_s is None and events:
+        raise CurveError(f"Expected the length of an interval for the deliveries in {where}, got none (--interval S).")
+    if interval_s is not None and not 0.0 < interval_s <= MOST:
+        raise CurveError(f"Expected an interval of more than 0 s, got {interval_s:g} s.")
+    names = dict(columns or {})
     if performance is not None:
-        frame, read_as = with_performance(frame, performance, str(file))
-    studies = study_curves(frame, where=str(file), controller=file.stem)
+        names["performance"] = performance.removeprefix(INVERTED)
+    known = EVENT_COLUMNS if events else CURVE_COLUMNS
+    given = _Given.named(frame, names, known, where)
+    if events:
+        given.require("n_robots", "seed", TIME)
+    else:
+        clock = "t_end_s" if "t_end_s" in given.frame.columns else "interval"
+        given.require("n_robots", "seed", clock, "performance")
+    table = _with_experiments(given.typed(known), given, controller)
+    if performance is not None and performance.startswith(INVERTED):  # 1/0 is 0: distances need finite curves
+        inverse = pl.when(pl.col("performance") != 0.0).then(1.0 / pl.col("performance")).otherwise(0.0)
+        table = table.with_columns(performance=inverse)
+    read_as, is_total = _performance(performance)
+    experiments = table.partition_by(*_EXPERIMENT, as_dict=True, maintain_order=True)
+    if events and interval_s is not None:
+        logs = [run for key, part in experiments.items() for run in _events(key, part)]
+        runs, clock, note = binned(logs, interval_s, where)
+    else:
+        curves = [run for key, part in experiments.items() for run in _curves(key, part, given)]
+        runs, clock, note = on_one_clock(curves, interval_s, is_total=is_total, where=where)
+    rates = {key: _rates(part, given) for key, part in experiments.items()}
+    studies = [
+        StudyCurves(
+            controller=name,
+            experiments=tuple(
+                _experiment([run for run in runs if run.experiment == key], rates[key])
+                for key in experiments
+                if key[0] == name
+            ),
+            t_end_s=clock,
+            read_as=read_as,
+            where=where,
+            note=note,
+        )
+        for name in table["controller"].unique(maintain_order=True)
+    ]
     for study in studies:
         _check_comparable(study)
-    return tuple(replace(study, read_as=read_as) for study in studies)
+    return tuple(studies)
+
+
+def _performance(name: str | None) -> tuple[Performance, bool]:
+    """Return what a column is as performance, and whether it is a total over its interval."""
+    if name is None:
+        return DELIVERIES, True
+    # Nobody knows what a column of one's own is; it is taken for a total. An inverse is none, and does not add up.
+    known = PERFORMANCE_COLUMNS.get(name, Performance(name, is_total=True, adds_up=True))
+    is_inverse = name.startswith(INVERTED)
+    unit = known.unit if name in PERFORMANCE_COLUMNS else "1"
+    return Performance(name, unit, adds_up=known.adds_up and not is_inverse), known.is_total and not is_inverse
 
 
 def _check_comparable(study: StudyCurves) -> None:
@@ -87,266 +216,167 @@ def _check_comparable(study: StudyCurves) -> None:
         )
 
 
-def _read_frame(file: Path) -> "pl.DataFrame":
-    import polars as pl
+@dataclass(frozen=True, kw_only=True)
+class _Given:
+    """A table with our names of columns, and what messages tell of a place in it."""
 
-    reader = {".csv": pl.read_csv, ".parquet": _read_parquet}.get(file.suffix.lower())
-    if reader is None:
-        raise CurveError(f"Expected curves as a .csv or .parquet file, got {file}.")
-    try:
-        if not file.read_bytes().strip():
-            raise CurveError(f"Expected curves in {file}, but the file is empty.")
-        return reader(file)
-    except OSError as error:
-        raise CurveError(f"Cannot read {file}: {error.strerror or error}.") from error
-    except (ParquetError, pl.exceptions.PolarsError, pl.exceptions.PanicException, UnicodeDecodeError) as error:
-        reason = str(error).splitlines()[0]
-        raise CurveError(f"Cannot read {file} as {file.suffix.lower()[1:].upper()}: {reason}.") from error
+    frame: pl.DataFrame
+    theirs: Mapping[str, str]
+    """Our name of a column -> theirs, where it is another."""
+    where: str
 
+    @classmethod
+    def named(cls, frame: pl.DataFrame, names: Mapping[str, str], known: Mapping[str, Column], where: str) -> "_Given":
+        """Give columns our names; arguments and errors as in `study_curves`."""
+        there = [name for name in frame.columns if name != _LINE]
+        if _LINE not in frame.columns:
+            frame = frame.with_row_index(_LINE, offset=1)
+        for ours, theirs in names.items():
+            if ours not in known:
+                raise CurveError(
+                    f"Expected one of {', '.join(known)} before '=', got {ours!r}.{suggestion(ours, known)}"
+                )
+            if theirs not in there and not _is_number(theirs):
+                hint = suggestion(theirs, there)
+                raise CurveError(f"Expected a column {theirs} for {ours} in {where}, got {', '.join(there)}.{hint}")
+        chosen = [(pl.col(theirs) if theirs in there else pl.lit(theirs)).alias(ours) for ours, theirs in names.items()]
+        return cls(frame=frame.with_columns(chosen), theirs=names, where=where)
 
-def _read_parquet(file: Path) -> "pl.DataFrame":
-    return read_parquet(file)[1]
-
-
-def with_performance(frame: "pl.DataFrame", given: PerformanceLike, where: str) -> tuple["pl.DataFrame", Performance]:
-    """Replace the column `performance` of a table of curves.
-
-    Args:
-        frame: One row per interval and run.
-        given: A column of the table, "1/" and a column, or a function of the rows of one run in the order of intervals.
-        where: Name of the table in error messages.
-
-    Returns:
-        The table with its rows in the same order, and what its performance is now.
-
-    Raises:
-        CurveError: there is no such column, or no such numbers.
-    """
-    import polars as pl
-
-    own = own_performance(given)
-    if own is None:
-        assert isinstance(given, str), "own_performance returns None for names only"
-        curve, read_as = _column(frame, given, where)
-        return frame.with_columns(pl.Series("performance", curve)), read_as
-    keys = [name for name in RUN_KEYS if name in frame.columns]
-    ordered = frame.with_row_index(_ROW).sort("interval") if "interval" in frame.columns else frame.with_row_index(_ROW)
-    parts = ordered.partition_by(keys, maintain_order=True) if keys else [ordered]
-    runs = [
-        part.with_columns(pl.Series("performance", own_curve(own, part.drop(_ROW), _run(part, keys, where))))
-        for part in parts
-    ]
-    return pl.concat(runs).sort(_ROW).drop(_ROW), own
-
-
-def _run(part: "pl.DataFrame", keys: list[str], where: str) -> str:
-    """Return the name of a run for error messages."""
-    first = part.row(0, named=True)
-    return f"{', '.join(f'{key} {first[key]}' for key in keys)} in {where}"
-
-
-def _column(frame: "pl.DataFrame", name: str, where: str) -> tuple[FloatArray, Performance]:
-    import polars as pl
-
-    own = name.removeprefix(INVERTED)
-    if own not in frame.columns:
-        close = difflib.get_close_matches(own, frame.columns, n=1)
-        hint = f" Did you mean {close[0]!r}?" if close else ""
-        raise CurveError(f"Expected a column {own} for performance in {where}, got {', '.join(frame.columns)}.{hint}")
-    given = frame[own].cast(pl.Float64, strict=False)
-    curve = given.fill_null(np.nan).to_numpy()
-    if own != name:
-        curve = np.divide(1.0, curve, out=np.zeros_like(curve), where=curve != 0.0)
-    curve = checked_performance(curve, name, len(frame), where)
-    known = CURVE_COLUMNS.get(name)
-    # Of a column of one's own nobody knows whether it is a total, or adds up; a share and an inverse do not.
-    adds_up = own == name and (known is None or known.kind == "amount")
-    return curve, Performance(name, (known and known.unit) or "1", is_total=False, adds_up=adds_up)
-
-
-def study_curves(frame: "pl.DataFrame", *, where: str = "the table", controller: str = "") -> tuple[StudyCurves, ...]:
-    """Turn a table of curves into arrays, one study per policy in it.
-
-    Args:
-        frame: Columns as in `CURVE_COLUMNS`, rows in any order within a run.
-        where: Name of the table in error messages.
-        controller: Name of the policy where the table has no such column.
-
-    Raises:
-        CurveError: columns are missing or hold what they may not, runs are incomplete or of unequal length, or sizes
-            are in the wrong order.
-    """
-    frame = _checked_frame(frame, where, controller)
-    return tuple(
-        _study(part, where, str(key[0]))
-        for key, part in frame.partition_by("controller", as_dict=True, maintain_order=True).items()
-    )
-
-
-def _checked_frame(frame: "pl.DataFrame", where: str, controller: str) -> "pl.DataFrame":
-    """Return the known columns, of the right types, with the optional keys filled in."""
-    import polars as pl
-
-    missing = [name for name in REQUIRED_COLUMNS if name not in frame.columns]
-    if missing:
-        close = difflib.get_close_matches(missing[0], frame.columns, n=1)
-        hint = f" Is {close[0]!r} meant to be {missing[0]!r}?" if close else ""
-        raise CurveError(
-            f"Expected the column{'s' if len(missing) > 1 else ''} {', '.join(missing)} in {where}, got "
-            f"{', '.join(frame.columns)}.{hint}"
-        )
-    if frame.is_empty():
-        raise CurveError(f"Expected curves in {where}, got column names without a row.")
-    frame = frame.select(_checked_column(frame, name, where) for name in CURVE_COLUMNS if name in frame.columns)
-    has_values = "criterion_value" in frame.columns
-    defaults = {"controller": controller, "criterion": SIZE, "criterion_value": 0.0}
-    frame = frame.with_columns(
-        pl.lit(value).alias(name) for name, value in defaults.items() if name not in frame.columns
-    )
-    for name in frame["criterion"].unique().sort().to_list():
-        if name not in CRITERIA:
-            raise CurveError(f"Expected criterion in {where} to be one of {', '.join(CRITERIA)}, got {name!r}.")
-    is_level = frame["criterion"] != SIZE
-    if is_level.any() and not has_values:
-        raise CurveError(f"Expected the column criterion_value beside criterion in {where}.")
-    values = frame["criterion_value"]
-    _refuse(values, values.is_null() & is_level, "criterion_value", where, "a number")
-    return frame.with_columns(values.fill_null(0.0))
-
-
-def _checked_column(frame: "pl.DataFrame", name: str, where: str) -> "pl.Series":
-    import polars as pl
-
-    column, given = CURVE_COLUMNS[name], frame[name]
-    if not _is_plain(given.dtype):
-        wanted = "texts" if column.kind == "text" else "numbers"
-        raise CurveError(f"Expected {wanted} in column {name} of {where}, got values of type {given.dtype}.")
-    if isinstance(given.dtype, pl.Categorical | pl.Enum):
-        given = given.cast(pl.String)
-    if column.kind == "text":
-        values = given.cast(pl.String)
-        _refuse(values, values.is_null(), name, where, "a text")
-        _refuse(values, values.str.contains(_STEERING), name, where, "a text without control characters")
-        return values
-    values = given.cast(pl.Float64, strict=False)
-    is_required = name in REQUIRED_COLUMNS
-    unread = values.is_null() & (pl.repeat(True, len(given), eager=True) if is_required else given.is_not_null())
-    _refuse(given, unread | values.is_nan().fill_null(False), name, where, "a number")
-    _refuse(given, values.is_infinite().fill_null(False), name, where, "a finite number")
-    _refuse(given, (values.abs() > MOST).fill_null(False), name, where, f"a number of at most {MOST:g} in size")
-    if column.kind == "whole":
-        _refuse(given, (values != values.floor()) | (values < 0), name, where, "a whole number >= 0")
-        return values.cast(pl.Int64)
-    if column.kind in ("amount", "fraction"):
-        _refuse(given, (values < 0).fill_null(False), name, where, "no negative number")
-    if column.kind == "fraction":
-        _refuse(given, (values > 1 + FRACTION_TOLERANCE).fill_null(False), name, where, "a fraction in [0, 1]")
-    return values
-
-
-def _is_plain(kind: "pl.DataType") -> bool:
-    """Whether a column holds one text or number per row, and no bytes, dates, lists or tables."""
-    import polars as pl
-
-    return kind.is_numeric() or isinstance(kind, pl.String | pl.Categorical | pl.Enum | pl.Boolean | pl.Null)
-
-
-def _refuse(given: "pl.Series", is_bad: "pl.Series", name: str, where: str, wanted: str) -> None:
-    rows = is_bad.arg_true()
-    if len(rows):
-        value = given[int(rows[0])]
-        shown = "nothing" if value is None else repr(value)
-        raise CurveError(
-            f"Expected {wanted} in column {name} of {where}, got {shown} in row {int(rows[0]) + 1}"
-            + (f" and {len(rows) - 1} more rows." if len(rows) > 1 else ".")
-        )
-
-
-def _study(frame: "pl.DataFrame", where: str, controller: str) -> StudyCurves:
-    keys = ("criterion", "criterion_value", "n_robots")
-    whose = f"{controller} in {where}"
-    experiments = tuple(_runs(part, whose) for part in frame.partition_by(keys, maintain_order=True))
-    lengths = {experiment.performance.shape[1]: experiment for experiment in experiments}
-    if len(lengths) > 1:
-        told = ", ".join(f"{length} at {experiment.describe()}" for length, experiment in lengths.items())
-        raise CurveError(f"Expected runs of equally many intervals of {whose}, got {told}.")
-    sizes = [experiment.n_robots for experiment in experiments if experiment.criterion == SIZE]
-    if sizes != sorted(sizes):
-        raise CurveError(
-            f"Expected the swarm sizes of {whose} in rising order, got {', '.join(map(str, sizes))}; sort the table by "
-            "n_robots, and look whether each size stands beside its own curve."
-        )
-    clock = _clock(experiments, whose)
-    if clock is not None:
-        experiments = tuple(replace(experiment, horizon_s=float(clock[-1])) for experiment in experiments)
-    return StudyCurves(controller=controller, experiments=experiments, t_end_s=clock, where=where)
-
-
-def _runs(frame: "pl.DataFrame", whose: str) -> RunCurves:
-    """Return the runs of one experiment as arrays."""
-    frame = frame.sort("seed", "interval")
-    first = frame.row(0, named=True)
-    criterion, value, n_robots = first["criterion"], float(first["criterion_value"]), int(first["n_robots"])
-    if not 1 <= n_robots <= MOST_ROBOTS:
-        raise CurveError(f"Expected n_robots from 1 to {MOST_ROBOTS:,} in {whose}, got {n_robots}.")
-    if criterion == SIZE and value not in (0.0, float(n_robots)):
-        raise CurveError(
-            f"Expected criterion_value = n_robots for criterion {SIZE} of {whose}, got {value:g} and {n_robots}."
-        )
-    bare = RunCurves(criterion=criterion, value=value, n_robots=n_robots, seeds=(), curves={})
-    seeds, counts = np.unique(frame["seed"].to_numpy(), return_counts=True)
-    _check_intervals(frame["interval"].to_numpy(), seeds.tolist(), counts.tolist(), f"{bare.describe()} of {whose}")
-    shape = (len(seeds), int(counts[0]))
-    curves: dict[str, FloatArray] = {}
-    for name in _present(frame, INTERVAL_COLUMNS, f"{bare.describe()} of {whose}"):
-        curves[name] = frame[name].to_numpy().astype(np.float64).reshape(shape)
-    return replace(
-        bare, seeds=tuple(int(seed) for seed in seeds), curves=curves, rates=_rates(frame, bare.describe(), whose)
-    )
-
-
-def _check_intervals(interval: np.ndarray, seeds: list[int], counts: list[int], whose: str) -> None:
-    """Check that each run has the intervals 0, 1, ..., T - 1, each once, with one T for all."""
-    start = 0
-    for seed, count in zip(seeds, counts, strict=True):
-        own = interval[start : start + count]
-        if not np.array_equal(own, np.arange(count)):
+    def require(self, *names: str) -> None:
+        """Check that there are columns, and rows in them."""
+        there = [name for name in self.frame.columns if name != _LINE]
+        missing = [name for name in names if name not in there]
+        if missing:
             raise CurveError(
-                f"Expected the intervals 0, 1, 2, ... once each for seed {seed}, {whose}, got "
-                f"{', '.join(map(str, own[:12]))}{', ...' if count > 12 else ''}."
+                f"Expected the column{'s' if len(missing) > 1 else ''} {', '.join(missing)} in {self.where}, got "
+                f"{', '.join(there)}; --columns {missing[0]}=NAME names another one.{suggestion(missing[0], there)}"
             )
-        start += count
-    if len(set(counts)) > 1:
-        told = ", ".join(f"{count} for seed {seed}" for seed, count in zip(seeds, counts, strict=True))
-        raise CurveError(f"Expected curves of equal length, {whose}, got {told}.")
+        if self.frame.is_empty():
+            raise CurveError(f"Expected curves in {self.where}, got column names without a row.")
+
+    def typed(self, known: Mapping[str, Column]) -> pl.DataFrame:
+        """Return the known columns with values of their kinds, beside the row of each."""
+        names = [name for name in known if name in self.frame.columns]
+        return pl.DataFrame([self._typed(name, known[name].kind) for name in names]).with_row_index("row")
+
+    def _typed(self, name: str, kind: str) -> pl.Series:
+        given = self.frame[name]
+        if given.dtype.is_nested() or isinstance(given.dtype, pl.Binary | pl.Object | pl.Date | pl.Duration):
+            raise CurveError(f"Expected texts or numbers in column {name} of {self.where}, got {given.dtype}.")
+        texts = given.cast(pl.String).replace("", None)
+        if kind == "text":
+            self.refuse(texts.is_null(), name, "a text")
+            return texts
+        values = texts.cast(pl.Float64, strict=False)
+        if name == TIME and values.null_count() == len(values):
+            return self._dates(texts)
+        wanted, is_right = _KINDS[kind]
+        is_known = (values.is_finite() & (values.abs() <= MOST) & is_right(values)).fill_null(False)
+        self.refuse(~is_known & (texts.is_not_null() | (name in _IN_EACH_ROW)), name, wanted)
+        return values.cast(pl.Int64) if kind == "whole" else values
+
+    def _dates(self, texts: pl.Series) -> pl.Series:
+        try:
+            dates = texts.str.to_datetime(strict=False)
+        except pl.exceptions.ComputeError:  # no form of dates fits the first ones
+            dates = texts.cast(pl.Null, strict=False)
+        self.refuse(dates.is_null(), TIME, "a number of seconds, or a date and time")
+        return dates
+
+    def refuse(self, is_bad: pl.Series, name: str, wanted: str) -> None:
+        """Raise an error about the first row that is bad, if there is one."""
+        row = is_bad.arg_max()
+        if row is not None and is_bad[row]:
+            self.refuse_row(row, name, wanted)
+
+    def refuse_row(self, row: int, name: str, wanted: str) -> NoReturn:
+        """Raise an error about one cell."""
+        theirs = self.theirs.get(name, name)
+        got = self.frame[name][row]
+        raise CurveError(
+            f"Expected {wanted} in line {self.frame[_LINE][row]} of {self.where}, column {theirs}"
+            f"{'' if theirs == name else f' ({name})'}, got {'nothing' if got in (None, '') else shown(got)}."
+        )
 
 
-def _present(frame: "pl.DataFrame", names: Iterable[str], whose: str) -> Iterator[str]:
-    """Names of the columns that hold values here; a column with some values only is refused."""
+def _is_number(text: str) -> bool:
+    try:
+        return bool(np.isfinite(float(text)))
+    except ValueError:
+        return False
+
+
+def _with_experiments(table: pl.DataFrame, given: _Given, controller: str) -> pl.DataFrame:
+    """Return the table with all columns that tell experiments apart; values of a criterion that has none are alike."""
+    if "criterion" not in table.columns:
+        table = table.with_columns(criterion=pl.lit(SIZE))
+    if "controller" not in table.columns:
+        table = table.with_columns(controller=pl.lit(controller))
+    given.refuse(~table["criterion"].is_in(CRITERIA), "criterion", f"one of {', '.join(CRITERIA)}")
+    given.refuse(~table["n_robots"].is_between(1, MOST_ROBOTS), "n_robots", f"1 to {MOST_ROBOTS:,} robots")
+    value = pl.when(criterion=SIZE).then(pl.col("n_robots").cast(pl.Float64)).when(criterion=UNDISTURBED).then(0.0)
+    if not table["criterion"].is_in((SIZE, UNDISTURBED)).all():
+        given.require("criterion_value")
+        value = value.otherwise("criterion_value")
+    table = table.with_columns(value.alias("criterion_value"))
+    given.refuse(table["criterion_value"].is_null(), "criterion_value", "a number")
+    return table
+
+
+def _experiment(runs: Sequence[Run], rates: PopulationRates | None) -> RunCurves:
+    """Return the runs of one experiment, in the order of their numbers."""
+    runs = sorted(runs, key=lambda run: run.seed)
+    _, criterion, value, n_robots = runs[0].experiment
+    return RunCurves(
+        criterion=criterion,
+        value=value,
+        n_robots=n_robots,
+        seeds=tuple(run.seed for run in runs),
+        curves={name: np.stack([run.curves[name] for run in runs]) for name in runs[0].curves},
+        rates=rates,
+    )
+
+
+def _curves(key: Experiment, part: pl.DataFrame, given: _Given) -> Iterator[Run]:
+    """Yield the runs of an experiment, with those columns that it has."""
+    names = [name for name in (*INTERVAL_COLUMNS, "interval") if name in part.columns and part[name].count()]
     for name in names:
-        if name not in frame.columns or frame[name].null_count() == len(frame):
-            continue
-        if frame[name].null_count():
-            raise CurveError(f"Expected column {name} in every interval or in none, {whose}, got gaps.")
-        yield name
+        _refuse_rows(part, pl.col(name).is_null(), given, name, f"a value, as in other intervals with N = {key[-1]}")
+    for (seed,), run in part.sort("t_end_s" if "t_end_s" in names else "interval").group_by(
+        "seed", maintain_order=True
+    ):
+        if "interval" in names:
+            wrong = pl.col("interval") != pl.int_range(pl.len()) + min(run["interval"][0], 1)
+            _refuse_rows(run, wrong, given, "interval", f"the next interval of run {seed}, each once")
+        if "t_end_s" in names:
+            wrong = pl.col("t_end_s").diff().fill_null(pl.col("t_end_s").first()) <= 0.0
+            _refuse_rows(run, wrong, given, "t_end_s", f"a later end of an interval of run {seed}")
+        curves = {name: run[name].to_numpy() for name in names if name != "interval"}
+        yield Run(key, int(str(seed)), curves.get("t_end_s"), curves)
 
 
-def _rates(frame: "pl.DataFrame", experiment: str, whose: str) -> PopulationRates | None:
+def _refuse_rows(part: pl.DataFrame, is_bad: pl.Expr, given: _Given, name: str, wanted: str) -> None:
+    """Raise an error about the first bad row of a part of the table, if there is one."""
+    for row in part.filter(is_bad)["row"]:
+        given.refuse_row(row, name, wanted)
+
+
+def _events(key: Experiment, part: pl.DataFrame) -> Iterator[Run]:
+    """Yield the deliveries of the runs of an experiment."""
+    for (seed,), run in part.group_by("seed", maintain_order=True):
+        times = run[TIME]
+        if times.dtype.is_temporal():  # from the first one on
+            times = (times - times.min()).dt.total_microseconds() / 1e6
+        delivered = run["performance"].to_numpy() if "performance" in run.columns else np.ones(len(run))
+        yield Run(key, int(str(seed)), times.to_numpy(), {"performance": delivered})
+
+
+def _rates(part: pl.DataFrame, given: _Given) -> PopulationRates | None:
     rates: dict[str, float] = {}
     for rate, name in RATE_COLUMNS.items():
-        for present in _present(frame, (name,), f"{experiment} of {whose}"):
-            values = frame[present].unique().to_list()
-            if len(values) > 1:
-                raise CurveError(f"Expected one {name} for {experiment} of {whose}, got {sorted(values)}.")
-            rates[rate] = float(values[0])
+        if name in part.columns and part[name].count():
+            first = part[name][0]
+            wanted = f"the same rate in each row of {part['criterion'][0]} {part['criterion_value'][0]:g}"
+            _refuse_rows(part, pl.col(name).ne_missing(first), given, name, wanted)
+            rates[rate] = first
     return PopulationRates(**rates) if rates else None
-
-
-def _clock(experiments: Sequence[RunCurves], whose: str) -> FloatArray | None:
-    clocks = [experiment.curves["t_end_s"] for experiment in experiments if "t_end_s" in experiment.curves]
-    if not clocks:
-        return None
-    clock = clocks[0][0]
-    if any((times != clock).any() for times in clocks) or (np.diff(clock, prepend=0.0) <= 0.0).any():
-        raise CurveError(f"Expected the same rising t_end_s in all runs of {whose}.")
-    return clock

@@ -206,6 +206,8 @@ class StudyCurves:
     """Value of a criterion at its reference runs; the authors compare population dynamics with the lowest level."""
     where: str = "the table"
     """Name of the table in error messages."""
+    note: str = ""
+    """How a table became curves, for readers, where that changed numbers."""
 
     @property
     def horizon_s(self) -> float | None:

@@ -1,216 +1,245 @@
-"""Curves from a file: a documented file gives a table, a wrong one gives one clear error."""
+"""Curves of others: tables of many forms become the same arrays, and a wrong one gets one line that says where."""
 
 import re
 from pathlib import Path
 
+import numpy as np
 import polars as pl
 import pytest
 
-from metrics import CurveError, score_curves
-from metrics.scoring.run_curves import CURVE_COLUMNS, REQUIRED_COLUMNS
+from metrics import CurveError, PopulationRates
+from metrics.scoring.curves_file import EVENT_COLUMNS, read_curves, study_curves
+from metrics.scoring.run_curves import CURVE_COLUMNS, common_runs
 from tests.support.curve_tables import CROWDING, rows, table
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "scoring.md"
-
-THROTTLED = table(
-    rows(5, [[2.0, 2.0], [3.0, 1.0]], criterion="throttle", criterion_value=0.0, adversity=0.1, t_end_s=[10.0, 20.0]),
-    rows(5, [[1.0, 2.0], [1.0, 1.0]], criterion="throttle", criterion_value=0.4, adversity=0.6, t_end_s=[10.0, 20.0]),
-)
+TWO_SIZES = table(rows(1, [[1.5, 2.0], [3.0, 1.0]]), rows(4, [[5.0, 6.5], [7.0, 8.0]]))
 
 
-def written(frame: pl.DataFrame, path: Path) -> Path:
-    if path.suffix == ".csv":
-        frame.write_csv(path)
-    else:
-        frame.write_parquet(path)
-    return path
+def only(frame, **how):
+    (study,) = study_curves(frame, **how)
+    return study
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".parquet", ".CSV"])
-def test_a_crowding_swarm_scores_as_computed_by_hand(tmp_path, suffix):
-    if suffix == ".CSV":
-        path = tmp_path / "crowding.CSV"
-        path.write_bytes(CROWDING.write_csv().encode())
-    else:
-        path = written(CROWDING, tmp_path / f"crowding{suffix}")
-    (scored,) = score_curves(path)
-    assert scored.policy == "crowding"
-    means = {(score.measure, score.at): score.summary.mean for score in scored.scores}
-    assert means["performance_lost", "N = 2"] == pytest.approx(0.16)
-    assert means["performance_lost", "N = 4"] == pytest.approx(0.56)
-    assert means["spatial_emergence", "N = 1 to 2"] == pytest.approx(-0.16)
-    assert means["spatial_emergence", "N = 2 to 4"] == pytest.approx(-0.24)
-    assert means["task_emergence", "N = 2 to 4"] == pytest.approx(-0.4)
-    assert means["scalability", "N = 2 to 4"] == pytest.approx(2.0 * (1.0 - 1.8 / 3.2))
-    assert means["efficiency", "N = 4"] == pytest.approx(0.8)
-    assert means["t_lost_fraction", "N = 4"] == pytest.approx(0.3)
+def by_size(study):
+    return {runs.n_robots: runs.performance.tolist() for runs in study.sizes()}
 
 
-def test_what_the_columns_do_not_allow_is_told_with_the_reason(tmp_path):
-    (scored,) = score_curves(written(CROWDING, tmp_path / "curves.csv"))
-    assert scored.missing.keys() == {
-        "reactivity",
-        "adaptability",
-        "noise_robustness",
-        "population_robustness",
-        "recorded_population_robustness",
-        "availability",
-    }
-    assert "criterion throttle" in scored.missing["reactivity"]
-    with pytest.raises(KeyError, match="criterion noise"):
-        scored["noise_robustness"]
-    assert any(note.startswith("reactivity is not computed: there are no runs") for note in scored.notes())
+def written(place, name, text):
+    file = place / name
+    file.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return file
 
 
-def test_missing_sizes_are_told(tmp_path):
-    path = written(CROWDING.filter(pl.col("n_robots") == 4), tmp_path / "curves.csv")
-    assert "one swarm size only, N = 4" in score_curves(path)[0].missing["scalability"]
-    with pytest.raises(CurveError, match=r"Cannot compute scalability.*one swarm size only, N = 4"):
-        score_curves(path, measures=["scalability"])
+PLAIN = "n_robots,seed,interval,performance\n1,0,0,1.5\n1,0,1,2\n4,0,0,5\n4,0,1,6.5\n"
+FORMS = {
+    "plain.csv": PLAIN,
+    "semicolons.csv": PLAIN.replace(",", ";").replace(".", ","),
+    "tabs.tsv": PLAIN.replace(",", "\t"),
+    "decimal_commas_and_tabs.txt": PLAIN.replace(",", "\t").replace(".", ","),
+    "mark_and_carriage_returns.csv": ("\ufeff" + PLAIN).replace("\n", "\r\n"),
+    "utf_16.csv": PLAIN.encode("utf-16"),
+    "spaces_and_empty_lines.csv": "\n" + PLAIN.replace(",", " , ").replace("\n", "\n\n"),
+    "quotes.csv": re.sub(r"(\w+(\.5)?)", r'"\1"', PLAIN),
+    "shuffled.csv": "n_robots,seed,interval,performance\n4,0,1,6.5\n1,0,1,2\n4,0,0,5\n1,0,0,1.5\n",
+    "counted_from_1.csv": "n_robots,seed,interval,performance\n1,0,1,1.5\n1,0,2,2\n4,0,1,5\n4,0,2,6.5\n",
+}
 
 
-@pytest.mark.parametrize(
-    ("column", "measure", "reason"),
-    [
-        ("interference_fraction", "t_lost_fraction", "no column interference_fraction"),
-        ("adversity", "reactivity", "no column adversity"),
-    ],
-)
-def test_missing_optional_columns_are_told(tmp_path, column, measure, reason):
-    frame = CROWDING if column in CROWDING.columns else THROTTLED
-    (scored,) = score_curves(written(frame.drop(column), tmp_path / "curves.csv"))
-    assert reason in scored.missing[measure]
+@pytest.mark.parametrize("name", FORMS)
+def test_texts_of_many_forms_are_the_same_curves(tmp_path, name):
+    (study,) = read_curves(written(tmp_path, name, FORMS[name]))
+    assert by_size(study) == {1: [[1.5, 2.0]], 4: [[5.0, 6.5]]}
+    assert (study.controller, study.note, study.t_end_s) == (Path(name).stem, "", None)
 
 
-def test_population_measures_need_rates_and_a_clock(tmp_path):
-    levels = table(
-        rows(10, [[2.0, 2.0]], criterion="none", criterion_value=0.0, t_end_s=[10.0, 20.0]),
-        rows(10, [[1.0, 2.0]], criterion="population_dynamics", criterion_value=1.0, t_end_s=[10.0, 20.0]),
+def test_parquet_is_read(tmp_path):
+    TWO_SIZES.write_parquet(tmp_path / "curves.parquet")
+    (study,) = read_curves(tmp_path / "curves.parquet")
+    assert by_size(study) == {1: [[1.5, 2.0], [3.0, 1.0]], 4: [[5.0, 6.5], [7.0, 8.0]]}
+
+
+def test_columns_have_other_names_or_one_value():
+    frame = TWO_SIZES.filter(seed=0).rename({"n_robots": "swarm", "performance": "items"}).drop("seed")
+    named = {"n_robots": "swarm", "performance": "items", "seed": "7"}
+    assert by_size(only(frame, columns=named)) == {1: [[1.5, 2.0]], 4: [[5.0, 6.5]]}
+    assert only(frame, columns=named).experiments[0].seeds == (7,)
+
+
+def test_performance_is_another_column_or_its_inverse():
+    frame = TWO_SIZES.filter(n_robots=1, seed=0).with_columns(wait=pl.Series([4.0, 0.0]))
+    assert by_size(only(frame, performance="wait")) == {1: [[4.0, 0.0]]}
+    inverse = only(frame, performance="1/wait")
+    assert by_size(inverse) == {1: [[0.25, 0.0]]}
+    assert not inverse.read_as.adds_up
+
+
+def test_experiments_and_policies_are_told_apart():
+    frame = table(
+        rows(5, [[3.0]], criterion="none", controller="a"),
+        rows(5, [[4.0]], criterion="noise", criterion_value=0.1, controller="a"),
+        rows(5, [[5.0]], criterion="noise", criterion_value=0.2, controller="a"),
+        rows(5, [[2.0]], criterion="throttle", criterion_value=0.0, controller="a"),
+        rows(5, [[6.0]], criterion="throttle", criterion_value=0.4, controller="a"),
+        rows(1, [[7.0]], criterion="population_size", controller="b"),
     )
-    wanted = ["population_robustness"]
-    with pytest.raises(CurveError, match="no rates"):
-        score_curves(written(levels, tmp_path / "a.csv"), measures=wanted)
-    rated = levels.with_columns(deaths_per_s=pl.when(pl.col("criterion") == "none").then(None).otherwise(0.01))
-    with pytest.raises(CurveError, match="no column t_end_s"):
-        score_curves(written(rated.drop("t_end_s"), tmp_path / "b.csv"), measures=wanted)
-    (scored,) = score_curves(written(rated, tmp_path / "c.csv"), measures=wanted)
-    assert scored.scores[0].summary.n_used == 1
-    assert 0.98 < scored.scores[0].beside["weight"] < 1.0
+    a, b = study_curves(frame.sample(fraction=1.0, shuffle=True, seed=3).sort("controller"))
+    assert (a.controller, b.controller) == ("a", "b")
+    assert [(base.criterion, runs.performance.item()) for base, runs in a.levels("noise")] == [
+        ("none", 4.0),
+        ("none", 5.0),
+    ]
+    assert [(base.criterion, base.value) for base, _ in a.levels("throttle")] == [("throttle", 0.0)]
 
 
-def test_swarm_sizes_need_no_criterion_value(tmp_path):
-    sizes = CROWDING.drop("criterion_value", strict=False).with_columns(criterion=pl.lit("population_size"))
-    expected = score_curves(written(CROWDING, tmp_path / "curves.csv"))[0].to_frame()
-    assert score_curves(written(sizes, tmp_path / "curves.csv"))[0].to_frame().equals(expected)
-    empty = sizes.with_columns(criterion_value=pl.lit(None, pl.Float64))
-    assert score_curves(written(empty, tmp_path / "curves.csv"))[0].to_frame().equals(expected)
-    undisturbed = empty.with_columns(criterion=pl.lit("none"))
-    with pytest.raises(CurveError, match=r"Expected a number in column criterion_value .*, got nothing in row 1"):
-        score_curves(written(undisturbed, tmp_path / "curves.csv"))
+def test_columns_of_some_experiments_are_there_for_those_only():
+    frame = table(
+        rows(2, [[1.0, 2.0]], criterion="none"),
+        rows(2, [[1.0, 2.0]], criterion="throttle", criterion_value=0.2, adversity=[0.0, 0.4], deaths_per_s=0.01),
+    )
+    undisturbed, throttled = only(frame).experiments
+    assert (undisturbed.curves.keys(), undisturbed.rates) == ({"performance"}, None)
+    assert throttled.curves["adversity"].tolist() == [[0.0, 0.4]]
+    assert throttled.rates == PopulationRates(lambda_d=0.01)
 
 
-def test_a_file_may_hold_several_policies(tmp_path):
-    frame = pl.concat([CROWDING.with_columns(controller=pl.lit(name)) for name in ("mine", "theirs")])
-    assert [scored.policy for scored in score_curves(written(frame, tmp_path / "both.csv"))] == ["mine", "theirs"]
+def test_runs_are_paired_by_their_number():
+    frame = table(rows(1, [[1.0], [2.0], [3.0]], first_seed=0), rows(2, [[20.0], [30.0], [40.0]], first_seed=1))
+    few, many = common_runs(*only(frame).experiments)
+    assert few.seeds == many.seeds == (1, 2)
+    np.testing.assert_array_equal(many.performance / few.performance, [[10.0], [10.0]])
 
 
-def edited(frame: pl.DataFrame, **columns: object) -> pl.DataFrame:
-    return frame.with_columns(**{name: pl.lit(value) for name, value in columns.items()})
+def test_longer_runs_are_cut_and_it_is_said():
+    study = only(table(rows(1, [[1.0, 2.0, 3.0]]), rows(2, [[4.0, 5.0]])))
+    assert by_size(study) == {1: [[1.0, 2.0]], 2: [[4.0, 5.0]]}
+    assert study.note == "runs have from 2 to 3 intervals and are cut to the first 2"
 
 
-def in_row(frame: pl.DataFrame, row: int, **cells: object) -> pl.DataFrame:
+def test_unequal_steps_are_resampled_with_the_same_totals_and_means():
+    fine = rows(
+        1, [[1.0, 3.0, 2.0, 2.0, 9.0]], t_end_s=[5.0, 10.0, 15.0, 20.0, 25.0], n_active=[1.0, 0.0, 1.0, 1.0, 1.0]
+    )
+    coarse = rows(2, [[4.0, 6.0]], t_end_s=[10.0, 20.0], n_active=[2.0, 1.0])
+    study = only(table(fine, coarse))
+    assert by_size(study) == {1: [[4.0, 4.0]], 2: [[4.0, 6.0]]}
+    assert study.sizes()[0].curves["n_active"].tolist() == [[0.5, 1.0]]
+    assert study.t_end_s.tolist() == [10.0, 20.0]
+    assert study.note == (
+        "runs with intervals of 5 to 10 s are resampled to 2 intervals of 10 s: totals of performance are kept"
+    )
+    means = only(table(fine, coarse), performance="n_active")
+    assert by_size(means) == {1: [[0.5, 1.0]], 2: [[2.0, 1.0]]}
+
+
+def test_an_interval_is_chosen_and_splits_steps_evenly():
+    study = only(table(rows(1, [[4.0, 6.0]], t_end_s=[10.0, 20.0], throttle=[0.1, 0.2])), interval_s=5.0)
+    assert by_size(study) == {1: [[2.0, 2.0, 3.0, 3.0]]}
+    assert study.experiments[0].curves["throttle"].tolist() == [[0.1, 0.1, 0.2, 0.2]]
+    assert only(TWO_SIZES, interval_s=10.0).horizon_s == 20.0
+
+
+LOG = pl.DataFrame({"n_robots": [2, 2, 2, 1, 1], "seed": 0, "time_s": [12.0, 3.0, 40.0, 0.0, 25.0]})
+
+
+def test_deliveries_are_counted_in_intervals():
+    study = only(LOG, events=True, interval_s=10.0)
+    assert by_size(study) == {1: [[1.0, 0.0, 1.0, 0.0]], 2: [[1.0, 1.0, 0.0, 1.0]]}
+    assert study.t_end_s.tolist() == [10.0, 20.0, 30.0, 40.0]
+    assert study.note.startswith("deliveries are counted in 4 intervals of 10 s; all runs are taken to last 40 s")
+    amounts = LOG.with_columns(performance=pl.Series([1.0, 2.0, 0.0, 0.5, 1.0]))
+    assert by_size(only(amounts, events=True, interval_s=40.0)) == {1: [[1.5]], 2: [[3.0]]}
+
+
+@pytest.mark.parametrize("form", ["%Y-%m-%d %H:%M:%S", "%Y-%m-%dT%H:%M:%SZ", None])
+def test_dates_count_from_the_first_delivery_of_a_run(form):
+    times = pl.datetime(2026, 3, 1, 12) + pl.duration(seconds="time_s")
+    frame = LOG.with_columns(time_s=times.dt.strftime(form) if form else times)
+    assert by_size(only(frame, events=True, interval_s=20.0)) == {1: [[1.0, 1.0]], 2: [[2.0, 1.0]]}
+
+
+def in_row(frame, row, **cells):
     """Change cells of one row, counted from 1."""
-    changed = frame.with_row_index("row", offset=1)
-    for name, value in cells.items():
-        changed = changed.with_columns(
-            pl.when(pl.col("row") == row).then(pl.lit(value)).otherwise(pl.col(name)).alias(name)
-        )
-    return changed.drop("row")
+    is_row = pl.int_range(1, pl.len() + 1) == row
+    return frame.with_columns(
+        pl.when(is_row).then(pl.lit(value)).otherwise(pl.col(name)).alias(name) for name, value in cells.items()
+    )
 
 
-NAN, INF = float("nan"), float("inf")
+LEVELS = table(rows(5, [[2.0]], criterion="none"), rows(5, [[1.0]], criterion="noise", criterion_value=0.4))
 BAD_TABLES = {
-    "NaN": (in_row(CROWDING, 2, performance=NAN), r"Expected a number in column performance .* got nan in row 2\."),
-    "nothing": (in_row(CROWDING, 2, performance=None), "Expected a number in column performance .* got nothing in row"),
-    "a word": (
-        edited(CROWDING, performance="many"),
-        "Expected a number in column performance .* 'many' in row 1 and",
-    ),
-    "infinity": (in_row(CROWDING, 1, performance=INF), "Expected a finite number in column performance .* got inf"),
-    "negative": (
-        in_row(CROWDING, 3, performance=-1.0),
-        "Expected no negative number in column performance .* -1.0",
-    ),
-    "interference above 1": (in_row(CROWDING, 3, interference_fraction=30.0), r"a fraction in \[0, 1\] .* got 30.0"),
-    "half a robot": (edited(CROWDING, n_robots=2.5), "Expected a whole number >= 0 in column n_robots .* got 2.5"),
-    "no robots": (edited(CROWDING, n_robots=0), "Expected n_robots from 1 to 10,000,000 .* got 0"),
-    "missing columns": (CROWDING.drop("seed", "performance"), "Expected the columns seed, performance in"),
+    "NaN": (in_row(CROWDING, 2, performance=float("nan")), "a number >= 0 in line 2 of .*performance, got nan"),
+    "nothing": (in_row(CROWDING, 2, performance=None), "line 2 .*, column performance, got nothing"),
+    "a word": (CROWDING.with_columns(performance=pl.lit("many")), "line 1 .*, column performance, got 'many'"),
+    "infinity": (in_row(CROWDING, 1, performance=float("inf")), "got inf"),
+    "huge": (in_row(CROWDING, 1, performance=1e300), "got 1e"),
+    "negative": (in_row(CROWDING, 3, performance=-1.0), "a number >= 0 in line 3 .* got -1.0"),
+    "percent": (in_row(CROWDING, 3, interference_fraction=30.0), r"a fraction in \[0, 1\] in line 3 .* got 30.0"),
+    "half a robot": (CROWDING.with_columns(n_robots=2.5), "a whole number >= 0 in line 1 .*n_robots, got 2.5"),
+    "no robots": (CROWDING.with_columns(n_robots=0), "1 to 10,000,000 robots in line 1 .* got 0"),
+    "lists": (CROWDING.with_columns(seed=pl.Series([[1]] * 3)), "texts or numbers in column seed"),
+    "missing columns": (CROWDING.drop("seed", "performance"), "the columns seed, performance in"),
     "misspelt column": (
         CROWDING.rename({"performance": "performence"}),
-        "Expected the column performance in .* Is 'performence' meant to be 'performance'",
+        "--columns performance=NAME names another one. Did you mean 'performence'",
     ),
     "no rows": (CROWDING.clear(), "column names without a row"),
-    "unequal lengths of runs": (
-        table(rows(2, [[1.0, 1.0], [1.0]])),
-        "Expected curves of equal length, N = 2 of .*, got 2 for seed 0, 1 for seed 1",
-    ),
-    "unequal lengths of sizes": (
-        table(rows(1, [[1.0]]), rows(2, [[1.0, 2.0]])),
-        "Expected runs of equally many intervals .* got 1 at N = 1, 2 at N = 2",
-    ),
     "gap in a run": (
         table(rows(2, [[1.0, 1.0, 1.0]])).filter(pl.col("interval") != 1),
-        "Expected the intervals 0, 1, 2, ... once each for seed 0, N = 2 of .* got 0, 2",
+        "the next interval of run 0, each once in line 2 .* got 2",
     ),
-    "doubled rows": (pl.concat([CROWDING, CROWDING]), "once each for seed 0, N = 1 of .* got 0, 0"),
-    "sizes in falling order": (CROWDING.reverse(), "Expected the swarm sizes of .* in rising order, got 4, 2, 1"),
-    "value of a size": (
-        edited(CROWDING, criterion="population_size", criterion_value=7.0),
-        "Expected criterion_value = n_robots .* got 7 and 1",
-    ),
-    "criterion without value": (
-        edited(CROWDING, criterion="noise"),
-        "Expected the column criterion_value beside criterion",
-    ),
-    "clock that goes back": (
-        table(rows(2, [[1.0, 1.0]], t_end_s=[20.0, 10.0])),
-        "Expected the same rising t_end_s in all runs",
-    ),
-    "unknown criterion": (
-        edited(CROWDING, criterion="weather", criterion_value=1.0),
-        "Expected criterion in .* to be one of population_size, .* got 'weather'",
-    ),
-    "missing reference run": (
-        THROTTLED.filter(pl.col("criterion_value") > 0.0),
-        "Expected a reference run for throttle 0.4, N = 5 .* got neither",
-    ),
-    "nothing to pair": (
-        table(rows(1, [[1.0]], first_seed=0), rows(2, [[1.0]], first_seed=5)),
-        "Expected runs with numbers in common",
-    ),
+    "doubled rows": (pl.concat([CROWDING, CROWDING]), "the next interval of run 0, each once in line 4 .* got 0"),
+    "clock that stands": (table(rows(2, [[1.0, 1.0]], t_end_s=[10.0, 10.0])), "a later end .* line 2"),
+    "begin of an interval": (table(rows(2, [[1.0, 1.0]], t_end_s=[0.0, 10.0])), "a later end .* line 1"),
+    "criterion without value": (CROWDING.with_columns(criterion=pl.lit("noise")), "the column criterion_value"),
+    "criterion with some values": (in_row(LEVELS, 2, criterion_value=None), "a number in line 2 .*criterion_value"),
+    "unknown criterion": (CROWDING.with_columns(criterion=pl.lit("weather")), "one of population_size, .* in line 1"),
+    "missing reference run": (LEVELS.tail(1), r"a reference run for noise 0\.4, N = 5 .* got neither"),
+    "reference of another size": (in_row(LEVELS, 1, n_robots=9), r"a reference run for noise 0\.4, N = 5"),
+    "nothing to pair": (table(rows(1, [[1.0]]), rows(2, [[1.0]], first_seed=5)), "runs with numbers in common"),
     "column with gaps": (
         table(rows(1, [[1.0, 2.0]], adversity=[0.5, None])),
-        "Expected column adversity in every interval or in none, N = 1 of .* got gaps",
-    ),
-    "different clocks": (
-        table(rows(1, [[1.0]], t_end_s=10.0), rows(2, [[1.0]], t_end_s=20.0)),
-        "Expected the same rising t_end_s in all runs",
+        "a value, as in other intervals with N = 1 in line 2 .*, column adversity, got nothing",
     ),
     "two rates in a level": (
-        table(rows(2, [[1.0, 1.0]], criterion="population_dynamics", criterion_value=1.0, deaths_per_s=[0.1, 0.2])),
-        r"Expected one deaths_per_s for population_dynamics 1, N = 2 of .* got \[0.1, 0.2\]",
+        table(rows(2, [[1.0, 1.0]], criterion="none", deaths_per_s=[0.1, 0.2])),
+        "the same rate in each row of none 0 in line 2 .*, column deaths_per_s, got 0.2",
     ),
 }
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
 @pytest.mark.parametrize(("frame", "message"), BAD_TABLES.values(), ids=BAD_TABLES)
-def test_bad_curves_get_one_clear_error(tmp_path, frame, message, suffix):
-    path = written(frame, tmp_path / f"curves{suffix}")
-    with pytest.raises(CurveError, match=message) as caught:
-        score_curves(path)
-    assert str(path) in str(caught.value)
+def test_bad_tables_get_one_line_that_says_where(frame, message):
+    with pytest.raises(CurveError, match=f"^Expected .*{message}") as caught:
+        study_curves(frame, where="theirs.csv")
+    assert "theirs.csv" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+BAD_REQUESTS = {
+    "unknown column": ({"columns": {"performance": "itms"}}, "a column itms for performance .* Did you mean 'items'"),
+    "unknown name of ours": ({"columns": {"performence": "items"}}, "Did you mean 'performance'"),
+    "place of a named column": ({"performance": "items"}, r"line 1 of .*, column items \(performance\), got 'x'"),
+    "no interval for events": ({"events": True}, "the length of an interval"),
+    "interval of 0 s": ({"interval_s": 0.0}, "an interval of more than 0 s"),
+    "events without time": ({"events": True, "interval_s": 1.0}, "the column time_s"),
+}
+
+
+@pytest.mark.parametrize(("how", "message"), BAD_REQUESTS.values(), ids=BAD_REQUESTS)
+def test_bad_requests_get_one_line(how, message):
+    with pytest.raises(CurveError, match=message):
+        study_curves(CROWDING.with_columns(items=pl.lit("x")), **how)
+
+
+def test_times_that_are_no_times_of_a_run_are_refused():
+    with pytest.raises(CurveError, match=r"at most 5 s, the shortest run of the table, got 10 s"):
+        only(table(rows(1, [[1.0]], t_end_s=5.0)), interval_s=10.0)
+    with pytest.raises(CurveError, match=r"from the start of each run .* got 1\.7e\+09 s"):
+        only(LOG.with_columns(time_s=1.7e9), events=True, interval_s=10.0)
+    for time in ("noon", "2026-13-01"):
+        with pytest.raises(CurveError, match=r"a number of seconds, or a date and time in line 1 .*, column time_s"):
+            only(LOG.with_columns(time_s=pl.lit(time)), events=True, interval_s=10.0)
 
 
 @pytest.mark.parametrize(
@@ -218,86 +247,24 @@ def test_bad_curves_get_one_clear_error(tmp_path, frame, message, suffix):
     [
         ("curves.csv", b"", "the file is empty"),
         ("curves.csv", b" \n\n", "the file is empty"),
-        ("curves.parquet", b"", "the file is empty"),
-        ("curves.parquet", b"PAR1 not really", "Cannot read .* as PARQUET"),
-        ("curves.parquet", b"n_robots,seed\n1,2\n", "Cannot read .* as PARQUET"),
-        ("curves.csv", b"n_robots,seed\n1,2,3,4\n", "Cannot read .* as CSV|Expected the columns"),
-        ("curves.csv", b"PAR1\x00\x80\xff\x15\x00\n\x80\x81", "Cannot read .* as CSV|Expected the columns"),
-        ("curves.txt", b"n_robots\n1\n", r"Expected curves as a \.csv or \.parquet file"),
+        ("curves.csv", b"\xff\x80", "text in UTF-8, got other bytes from byte 0"),
+        ("curves.csv", b"seed,interval\n\n1,2,3\n", "2 values with commas in line 3 of .*, got 3"),
+        ("curves.csv", b"seed;seed\n1;2\n", "a name per column in line 1 of .*, got 'seed' more than once"),
+        ("curves.csv", PLAIN.encode() + b"4,0,2,x\n", "a number >= 0 in line 6 of .*, column performance, got 'x'"),
+        ("curves.parquet", b"", "as Parquet"),
+        ("curves.parquet", b"PAR1 not really", "as Parquet"),
+        ("gone.csv", None, "Cannot read .*: No such file"),
     ],
 )
-def test_files_of_another_kind_are_refused(tmp_path, name, content, message):
-    path = tmp_path / name
-    path.write_bytes(content)
+def test_files_that_hold_no_curves_are_refused(tmp_path, name, content, message):
+    if content is not None:
+        written(tmp_path, name, content)
     with pytest.raises(CurveError, match=message) as caught:
-        score_curves(path)
+        read_curves(tmp_path / name)
     assert "\n" not in str(caught.value)
 
 
-def test_a_missing_file_and_a_folder_are_refused(tmp_path):
-    with pytest.raises(CurveError, match=r"Cannot read .*: No such file"):
-        score_curves(tmp_path / "curves.csv")
-    (tmp_path / "folder.csv").mkdir()
-    with pytest.raises(CurveError, match=r"Cannot read .*folder\.csv"):
-        score_curves(tmp_path / "folder.csv")
-
-
 def test_the_page_lists_every_column():
-    _, _, section = PAGE.read_text().partition("## Curves from other sources")
-    listed = re.findall(r"^\| `(\w+)`( \\\*)? \|", section, re.MULTILINE)
-    assert [name for name, _ in listed] == list(CURVE_COLUMNS)
-    assert {name for name, star in listed if star} == set(REQUIRED_COLUMNS)
-
-
-COLUMNS_OF_ODD_TYPES = {
-    "lists": lambda n: pl.Series([[1]] * n),
-    "tables": lambda n: pl.Series([{"a": 1}] * n),
-    "bytes": lambda n: pl.Series([b"\xff"] * n),
-    "fixed lists": lambda n: pl.Series([[1, 2]] * n, dtype=pl.Array(pl.Int64, 2)),
-    "dates": lambda n: pl.Series([0] * n).cast(pl.Date),
-    "beyond 64 bits": lambda n: pl.Series([1e20] * n),
-    "unsigned": lambda n: pl.Series([2**63] * n, dtype=pl.UInt64),
-    "huge": lambda n: pl.Series([1e308] * n),
-    "escape sequences": lambda n: pl.Series(["\x1b[31m"] * n),
-    "text from right to left": lambda n: pl.Series(["\u202ecrw"] * n),
-}
-
-
-@pytest.mark.parametrize("column", ["n_robots", "seed", "interval", "performance", "interference_fraction"])
-@pytest.mark.parametrize("kind", COLUMNS_OF_ODD_TYPES)
-def test_columns_of_types_that_no_curve_has_are_refused(tmp_path, column, kind):
-    odd = CROWDING.with_columns(COLUMNS_OF_ODD_TYPES[kind](len(CROWDING)).alias(column))
-    with pytest.raises(CurveError, match=f"Expected .* in column {column} of "):
-        score_curves(written(odd, tmp_path / "odd.parquet"))
-
-
-def test_names_in_all_languages_are_read(tmp_path):
-    name = "\u0645\u06cc\u200c\u062e\u0648"
-    (scored,) = score_curves(written(CROWDING.with_columns(controller=pl.lit(name)), tmp_path / "named.csv"))
-    assert scored.policy == name
-
-
-@pytest.mark.parametrize("kind", ["lists", "bytes", "dates", "escape sequences", "text from right to left"])
-def test_names_of_types_that_no_name_has_are_refused(tmp_path, kind):
-    odd = CROWDING.with_columns(COLUMNS_OF_ODD_TYPES[kind](len(CROWDING)).alias("controller"))
-    with pytest.raises(CurveError, match=r"Expected .*text.* in column controller of "):
-        score_curves(written(odd, tmp_path / "odd.parquet"))
-
-
-def test_categories_are_texts(tmp_path):
-    named = CROWDING.with_columns(pl.lit("crowd", dtype=pl.Categorical).alias("controller"))
-    (scored,) = score_curves(written(named, tmp_path / "named.parquet"))
-    assert scored.policy == "crowd"
-
-
-def test_no_changed_byte_leads_to_another_error_or_to_a_word_on_stderr(tmp_path, capfd):
-    path = written(CROWDING, tmp_path / "curves.csv")
-    content, told = path.read_bytes(), list[str]()
-    for at in range(12, len(content), 14):
-        path.write_bytes(content[:at] + bytes((content[at] ^ 0x55,)) + content[at + 1 :])
-        try:
-            score_curves(path)
-        except CurveError as error:
-            told.append(str(error))
-    assert [text for text in told if len(text.splitlines()) > 1] == []
-    assert capfd.readouterr().err == ""
+    section = PAGE.read_text().partition("## Curves from other sources")[2]
+    listed = re.findall(r"^\| `(\w+)`", section, re.MULTILINE)
+    assert listed == [*CURVE_COLUMNS, *(name for name in EVENT_COLUMNS if name not in CURVE_COLUMNS)]
