@@ -25,7 +25,7 @@ from swarm_forage_env.rendering.figures import (
     policy_words,
     saved_figure,
 )
-from swarm_forage_env.runs.answer import Answer, Sheet
+from swarm_forage_env.sheet import Answer, Sheet
 
 from ..controllers import PAPER_POLICIES
 from ..distributions import performance_profile
@@ -132,7 +132,7 @@ def board_sheet(standings: Sequence[Standing]) -> Sheet:
         )
         for standing in standings
     ]
-    return Sheet(header=header, rows=rows)
+    return Sheet.of(header, rows)
 
 
 def bounded(estimate: Estimate) -> str:

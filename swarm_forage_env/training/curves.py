@@ -17,9 +17,9 @@ import numpy as np
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.wording import counted, plain
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
-from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.policy_spec import policy_specs
 from swarm_forage_env.scenarios.performance import performance_of
+from swarm_forage_env.sheet import Answer, Sheet
 from swarm_forage_env.training.evaluations import (
     TrainingCurve,
     chosen,
@@ -64,7 +64,7 @@ class TrainingCurves(Answer):
         ]
         rows += [(name, "", f"{value:.{digits}f}", f"{lost:.3f}") for name, (value, lost) in self.beside.items()]
         heading = counted_in(self.plan) if in_worlds else "per 1,000 s"
-        return (Sheet(header=("policy", "decisions", heading, "interference"), rows=rows),)
+        return (Sheet.of(("policy", "decisions", heading, "interference"), rows),)
 
     def _best(self) -> list[tuple[str, int, float, float]]:
         best = [(one.label, chosen(one.evaluations)) for one in self.trainings]

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from swarm_forage_env._internal.wording import counted, plain
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
-from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.progress import duration
+from swarm_forage_env.sheet import Answer, Sheet
 from swarm_forage_env.training.curves import TrainingCurves, beside_baseline, counted_in, place_of
 from swarm_forage_env.training.evaluations import (
     EVALUATIONS_FILE,
@@ -180,10 +180,10 @@ class SeedTrainings(Answer):
             notes.append("These evaluations chose the networks and flatter them. To score all in runs of their own:")
             notes.append(command)
         return (
-            Sheet(
+            Sheet.of(
+                ("seed", "decisions", *(column.heading for column in columns), "processor time"),
+                rows,
                 title=f"{counted(len(self.trainings), 'training')} by {self.plan.algorithm} in {place_of(self.plan)}",
-                header=("seed", "decisions", *(column.heading for column in columns), "processor time"),
-                rows=rows,
                 notes=notes,
             ),
         )
