@@ -21,7 +21,7 @@ from swarm_forage_env.scenarios.performance import INVERTED, PERFORMANCE_COLUMNS
 from swarm_forage_env.wrappers.world import SIZE, UNDISTURBED
 
 from ..checks import CurveError
-from ..curves import FRACTION_TOLERANCE
+from ..curves import FRACTION_TOLERANCE, FloatArray
 from ..queues import PopulationRates
 from .clocks import TIME, Experiment, Run, binned, on_one_clock
 from .run_curves import (
@@ -178,7 +178,7 @@ def study_curves(
         StudyCurves(
             controller=name,
             experiments=tuple(
-                _experiment([run for run in runs if run.experiment == key], rates[key])
+                _experiment([run for run in runs if run.experiment == key], rates[key], clock)
                 for key in experiments
                 if key[0] == name
             ),
@@ -323,7 +323,7 @@ def _with_experiments(table: pl.DataFrame, given: _Given, controller: str) -> pl
     return table
 
 
-def _experiment(runs: Sequence[Run], rates: PopulationRates | None) -> RunCurves:
+def _experiment(runs: Sequence[Run], rates: PopulationRates | None, clock: FloatArray | None) -> RunCurves:
     """Return the runs of one experiment, in the order of their numbers."""
     runs = sorted(runs, key=lambda run: run.seed)
     _, criterion, value, n_robots = runs[0].experiment
@@ -334,6 +334,7 @@ def _experiment(runs: Sequence[Run], rates: PopulationRates | None) -> RunCurves
         seeds=tuple(run.seed for run in runs),
         curves={name: np.stack([run.curves[name] for run in runs]) for name in runs[0].curves},
         rates=rates,
+        horizon_s=None if clock is None else float(clock[-1]),
     )
 
 

@@ -16,6 +16,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast, get_args
 
+import numpy as np
 import polars as pl
 
 from swarm_forage_env._internal.wording import counted, limits, number, percent, plain, suggestion
@@ -23,6 +24,8 @@ from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.policy_spec import PolicyLike, policy_specs
+from swarm_forage_env.runs.runner import run_plan
+from swarm_forage_env.runs.store import RunStore
 from swarm_forage_env.runs.table import Table
 from swarm_forage_env.scenarios.performance import Performance, performance_of
 from swarm_forage_env.studies import ladders
@@ -37,7 +40,7 @@ from .frame import ROW, check_words, differences, label_of, scores, summarized, 
 from .measures import MEASURES, PICTURED, check_measures, criteria_of
 from .plots import draw_scores
 from .question import Question, ask
-from .run_curves import THROTTLE, PerformanceLike, own_performance, policy_curves
+from .run_curves import THROTTLE, PerformanceLike, StudyCurves, own_performance, policy_curves
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -490,45 +493,103 @@ def score_question(
 
 def score_curves(
     path: str | Path,
+    policies: PolicyLike | Sequence[PolicyLike] | Mapping[str, PolicyLike] = (),
+    world: WorldLike = "warehouse_small",
     *,
+    columns: Mapping[str, str] | None = None,
+    events: bool = False,
+    interval_s: float | None = None,
+    performance: str | None = None,
     measures: Sequence[str] | None = None,
-    performance: PerformanceLike | None = None,
     variants: Sequence[Variant] = ("corrected",),
     forms: Sequence[Form] = ("marginal",),
     against: str | None = None,
     is_full: bool = False,
+    out: str | Path | None = None,
+    jobs: int | None = None,
+    executor: "Executor | None" = None,
+    progress: bool = True,
 ) -> Scores:
-    """Score curves from any simulator, or of real robots.
+    """Score curves of any simulator or of real robots, beside those of policies that are run here.
 
     Args:
-        path: CSV or Parquet file with the columns of `CURVE_COLUMNS`.
+        path: A file as `read_curves` reads it.
+        policies: As in `score`. They run in `world` with the swarm sizes, numbers of runs and clock of the file.
+        world: As in `score`; where policies run.
+        columns: Our name of a column -> its name in the file, or a number for all rows.
+        events: Whether a row is a delivery with a time, and not an interval.
+        interval_s: Length of an interval, s; needed for events.
+        performance: Column of the file that is its performance, or "1/" and a column; default "performance".
         measures: Names of measures; default all that the columns allow. `missing` says why others are not computed.
-        performance: A column of the file in place of `performance`, "1/" and a column, or a function of the rows of a
-            run (`Performance`).
         variants: As in `score`.
         forms: As in `score`.
         against: As in `score`.
         is_full: Whether the text has all levels, numbers and differences.
+        out: As in `score`.
+        jobs: As in `score`.
+        executor: As in `score`.
+        progress: As in `score`.
 
     Raises:
-        CurveError: a file with an error, or a measure that you name and that cannot be computed.
+        CurveError: a file with an error, a measure that you name and that cannot be computed, or a clock or swarm sizes
+            that no policy can be run with.
+        ValueError: as `score`.
     """
     check_words("variant", variants, get_args(Variant))
     check_words("form", forms, get_args(Form))
-    own = own_performance(performance)
-    told = {} if performance is None else {"performance": performance if own is None else own.name}
-    studies = read_curves(path, performance)
+    given = read_curves(path, performance, columns=columns, events=events, interval_s=interval_s)
+    chosen = world_of(world)
+    plan = _plan_beside(given, policies, chosen) if policies else None
+    made = (
+        None
+        if plan is None
+        else run_plan(
+            plan, store=None if out is None else RunStore(out), jobs=jobs, executor=executor, progress=progress
+        )
+    )
+    simulated = [] if plan is None or made is None else [policy_curves(made, each.label) for each in plan.policies]
+    studies = [*simulated, *given]
     frame, missing = scores(studies, measures, variants=variants, forms=forms)
-    for study in studies:
+    for study in given:
         reasons = {label: why for (policy, label), why in missing.items() if policy == study.controller}
         if reasons and (measures is not None or frame.filter(policy=study.controller).is_empty()):
             label, reason = next(iter(reasons.items()))
             raise CurveError(f"Cannot compute {label} for {study.controller} from {path}: {reason}.")
+    told = {} if performance is None else {"performance": performance}
     return Scores(
         frame=frame,
         policies=tuple(study.controller for study in studies),
+        world=chosen.title() if policies else "",
         missing=missing,
-        settings={"curves": str(path), "horizon_s": studies[0].horizon_s, **told},
+        settings={"curves": str(path), "horizon_s": given[0].horizon_s, **told},
+        notes=(f"{path}: {given[0].note}",) if given[0].note else (),
         against=against,
         is_full=is_full,
     )
+
+
+def _plan_beside(
+    given: Sequence[StudyCurves], policies: PolicyLike | Sequence[PolicyLike] | Mapping[str, PolicyLike], world: World
+) -> Plan:
+    """Return the runs of policies in a world with the swarm sizes, numbers of runs and clock of curves."""
+    clock, where = given[0].t_end_s, given[0].where
+    sizes = {size.n_robots: size.seeds for study in given for size in study.sizes()}
+    if clock is None or not np.allclose(np.diff(clock, prepend=0.0), clock[0]):
+        raise CurveError(
+            f"Expected equal intervals of known length in {where} to run policies alike; tell their length in s."
+        )
+    if not sizes:
+        raise CurveError(f"Expected curves of several swarm sizes in {where} to run policies alike, got none.")
+    scenario = replace(world.scenario, horizon_s=float(clock[-1]), interval_s=float(clock[0]))
+    worlds = [
+        World(replace(scenario, robots=replace(scenario.robots, n_robots=n)), world.wrappers, criterion=SIZE, value=n)
+        for n in sorted(sizes)
+    ]
+    named = policies if isinstance(policies, Mapping | list | tuple) else [policies]
+    specs = policy_specs(named)
+    twice = {spec.label for spec in specs} & {study.controller for study in given}
+    if twice:
+        raise CurveError(
+            f"Expected other names in {where} than those of the policies beside it, got {min(twice)} in both."
+        )
+    return Plan.product(specs, worlds, sorted({seed for seeds in sizes.values() for seed in seeds}))
