@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import polars as pl
+import polars.selectors as cs
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import replacing
@@ -32,7 +33,9 @@ class Answer(ABC):
 
     def to_mapping(self) -> dict[str, Any]:
         """Return everything as plain values, ready for JSON; numbers that do not exist are None."""
-        rows = {sheet.title or "rows": sheet.frame.to_dicts() for sheet in self.sheets() if len(sheet.frame)}
+        tables = {sheet.title or "rows": sheet.frame for sheet in self.sheets() if len(sheet.frame)}
+        is_number = pl.when(cs.float().is_finite()).then(cs.float())
+        rows = {title: frame.with_columns(is_number).to_dicts() for title, frame in tables.items()}
         notes = [note for sheet in self.sheets() for note in sheet.notes]
         return {**rows, "notes": notes} if notes else rows
 
