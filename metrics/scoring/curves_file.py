@@ -72,14 +72,18 @@ def read_curves(path: str | Path, performance: str | None = None, **how: Any) ->
         how: Further arguments of `study_curves`.
 
     Raises:
-        CurveError: as `study_curves`, or the file cannot be read.
+        CurveError: as `study_curves`; the file cannot be read, there is no reference run for what is varied, or there are
+            no runs that can be paired.
     """
     file = Path(path)
     try:
         frame = _read_parquet(file) if file.suffix.lower() == ".parquet" else _read_text(file)
     except OSError as error:
         raise CurveError(f"Cannot read {file}: {error.strerror or error}.") from error
-    return study_curves(frame, performance, where=str(file), controller=file.stem, **how)
+    studies = study_curves(frame, performance, where=str(file), controller=file.stem, **how)
+    for study in studies:
+        _check_comparable(study)
+    return studies
 
 
 def _read_parquet(file: Path) -> pl.DataFrame:
@@ -144,8 +148,7 @@ def study_curves(
         controller: Name of the policy where the table has no such column.
 
     Raises:
-        CurveError: columns are missing or hold what they may not, runs are incomplete, there is no reference run for
-            what is varied, or no runs that can be paired.
+        CurveError: columns are missing or hold what they may not, or runs are incomplete.
     """
     if interval_s is None and events:
         raise CurveError(f"Expected the length of an interval for the deliveries in {where}, got none (--interval S).")
@@ -174,7 +177,7 @@ def study_curves(
         curves = [run for key, part in experiments.items() for run in _curves(key, part, given)]
         runs, clock, note = on_one_clock(curves, interval_s, is_total=is_total, where=where)
     rates = {key: _rates(part, given) for key, part in experiments.items()}
-    studies = [
+    return tuple(
         StudyCurves(
             controller=name,
             experiments=tuple(
@@ -188,10 +191,7 @@ def study_curves(
             note=note,
         )
         for name in table["controller"].unique(maintain_order=True)
-    ]
-    for study in studies:
-        _check_comparable(study)
-    return tuple(studies)
+    )
 
 
 def _performance(name: str | None) -> tuple[Performance, bool]:

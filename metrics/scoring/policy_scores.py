@@ -23,7 +23,7 @@ from swarm_forage_env._internal.wording import counted, limits, number, percent,
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.plan import Plan
-from swarm_forage_env.runs.policy_spec import PolicyLike, policy_specs
+from swarm_forage_env.runs.policy_spec import PolicyLike, PolicySpec, policy_specs
 from swarm_forage_env.runs.runner import run_plan
 from swarm_forage_env.runs.store import RunStore
 from swarm_forage_env.runs.table import Table
@@ -493,7 +493,7 @@ def score_question(
 
 def score_curves(
     path: str | Path,
-    policies: PolicyLike | Sequence[PolicyLike] | Mapping[str, PolicyLike] = (),
+    policies: Sequence[PolicyLike] | Mapping[str, PolicyLike] = (),
     world: WorldLike = "warehouse_small",
     *,
     columns: Mapping[str, str] | None = None,
@@ -514,7 +514,7 @@ def score_curves(
 
     Args:
         path: A file as `read_curves` reads it.
-        policies: As in `score`. They run in `world` with the swarm sizes, numbers of runs and clock of the file.
+        policies: As in `score`. They run in `world` with swarm sizes, numbers of runs and clock of the file.
         world: As in `score`; where policies run.
         columns: Our name of a column -> its name in the file, or a number for all rows.
         events: Whether a row is a delivery with a time, and not an interval.
@@ -539,15 +539,14 @@ def score_curves(
     check_words("form", forms, get_args(Form))
     given = read_curves(path, performance, columns=columns, events=events, interval_s=interval_s)
     chosen = world_of(world)
-    plan = _plan_beside(given, policies, chosen) if policies else None
-    made = (
-        None
-        if plan is None
-        else run_plan(
-            plan, store=None if out is None else RunStore(out), jobs=jobs, executor=executor, progress=progress
-        )
-    )
-    simulated = [] if plan is None or made is None else [policy_curves(made, each.label) for each in plan.policies]
+    simulated: list[StudyCurves] = []
+    failures: dict[str, Sequence[str]] = {}
+    if policies:
+        plan = _plan_beside(given, policy_specs(policies), chosen)
+        store = None if out is None else RunStore(out)
+        table = run_plan(plan, store=store, jobs=jobs, executor=executor, progress=progress)
+        simulated = [policy_curves(table, each.label) for each in plan.policies]
+        failures = {each.label: lines for each in plan.policies if (lines := table.failure_lines(each.label))}
     studies = [*simulated, *given]
     frame, missing = scores(studies, measures, variants=variants, forms=forms)
     for study in given:
@@ -559,8 +558,9 @@ def score_curves(
     return Scores(
         frame=frame,
         policies=tuple(study.controller for study in studies),
-        world=chosen.title() if policies else "",
+        world=chosen.title() if simulated else "",
         missing=missing,
+        failures=failures,
         settings={"curves": str(path), "horizon_s": given[0].horizon_s, **told},
         notes=(f"{path}: {given[0].note}",) if given[0].note else (),
         against=against,
@@ -568,9 +568,7 @@ def score_curves(
     )
 
 
-def _plan_beside(
-    given: Sequence[StudyCurves], policies: PolicyLike | Sequence[PolicyLike] | Mapping[str, PolicyLike], world: World
-) -> Plan:
+def _plan_beside(given: Sequence[StudyCurves], policies: Sequence[PolicySpec], world: World) -> Plan:
     """Return the runs of policies in a world with the swarm sizes, numbers of runs and clock of curves."""
     clock, where = given[0].t_end_s, given[0].where
     sizes = {size.n_robots: size.seeds for study in given for size in study.sizes()}
@@ -585,11 +583,9 @@ def _plan_beside(
         World(replace(scenario, robots=replace(scenario.robots, n_robots=n)), world.wrappers, criterion=SIZE, value=n)
         for n in sorted(sizes)
     ]
-    named = policies if isinstance(policies, Mapping | list | tuple) else [policies]
-    specs = policy_specs(named)
-    twice = {spec.label for spec in specs} & {study.controller for study in given}
+    twice = {policy.label for policy in policies} & {study.controller for study in given}
     if twice:
         raise CurveError(
             f"Expected other names in {where} than those of the policies beside it, got {min(twice)} in both."
         )
-    return Plan.product(specs, worlds, sorted({seed for seeds in sizes.values() for seed in seeds}))
+    return Plan.product(policies, worlds, sorted({seed for seeds in sizes.values() for seed in seeds}))

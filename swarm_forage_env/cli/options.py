@@ -13,7 +13,7 @@ from cyclopts import Parameter, Token
 from cyclopts.types import NonNegativeInt, PositiveInt
 from cyclopts.validators import Number
 
-from swarm_forage_env._internal.fields import MOST_SEEDS
+from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError
 from swarm_forage_env.rendering.figures import FigureStyle
 
 
@@ -95,3 +95,32 @@ class RunOptions:
     dry_run: DryRun = False
     as_json: AsJson = False
     picture: Picture = None
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True, slots=True)
+class CurveOptions:
+    """Curves of other simulators or of real robots, beside those of policies (docs/scoring.md)."""
+
+    curves: Annotated[
+        Path | None, Parameter(help="Score the curves of a .csv or .parquet file; policies run as long as these.")
+    ] = None
+    columns: Annotated[
+        str, Parameter(help="OURS=THEIRS,...: what columns of the file are called, or a number for all rows.")
+    ] = ""
+    events: Annotated[bool, Parameter(negative="", help="A row of the file is a delivery with its time_s.")] = False
+    interval: Annotated[
+        float | None, Parameter(help="Length of an interval, s: counts events, or resamples curves.")
+    ] = None
+
+    def named_columns(self) -> dict[str, str]:
+        """Return our name of a column -> theirs.
+
+        Raises:
+            ConfigError: a word without a name on each side.
+        """
+        words = [word.partition("=") for word in self.columns.split(",")] if self.columns else []
+        for ours, _, theirs in words:
+            if not (ours.strip() and theirs.strip()):
+                raise ConfigError(f"Expected --columns OURS=THEIRS,..., got {self.columns!r}.")
+        return {ours.strip(): theirs.strip() for ours, _, theirs in words}

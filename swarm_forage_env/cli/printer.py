@@ -19,9 +19,12 @@ if TYPE_CHECKING:
 
     from metrics.scoring.question import Question
     from swarm_forage_env.cli.options import RunOptions
-    from swarm_forage_env.runs.answer import Answer
+    from swarm_forage_env.runs.answer import Answer as FoundAnswer
     from swarm_forage_env.runs.store import RunStore
     from swarm_forage_env.runs.table import Table
+    from swarm_forage_env.sheet import Answer as PrintedAnswer
+
+    Answer = FoundAnswer | PrintedAnswer
 
 FAILURES_SHOWN = 10
 """Reasons of failures for which the command that makes the first run again is told; the folder has those of all."""

@@ -12,6 +12,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli import CommandError
 from swarm_forage_env.cli.options import (
     AsJson,
+    CurveOptions,
     Names,
     Performance,
     Picture,
@@ -88,7 +89,7 @@ def score(
     *,
     world: WorldOptions = WorldOptions(),
     options: RunOptions = RunOptions(),
-    curves: Path | None = None,
+    curves: CurveOptions = CurveOptions(),
     performance: Performance = None,
     measures: Names = (),
     variant: Names = ("corrected",),
@@ -106,7 +107,6 @@ def score(
     --horizon does.
 
     Args:
-        curves: Read curves from a CSV or Parquet file, in place of policies; no runs (docs/scoring.md).
         measures: Names of measures, separated by commas; default all.
         variant: Forms of equations: corrected, paper (as printed); separated by commas.
         form: Compare with the next smaller swarm (marginal), with N lone robots (interactive), or both.
@@ -115,7 +115,6 @@ def score(
         budget: quick, standard or paper: sets the length and number of runs, and the levels.
         disturbance: Disturbance for reactivity and adaptability: throttle or handling_cost.
     """
-    from metrics.scoring import score_curves
     from swarm_forage_env.cli.worlds import default_file, default_folder
 
     asked: dict[str, Any] = {
@@ -125,12 +124,12 @@ def score(
         "against": against,
         "is_full": show_all,
     }
-    if curves is not None:
-        if policies or world != WorldOptions():
-            raise ConfigError("Expected --curves alone, got policies or a world, which are about runs; leave them out.")
-        found = score_curves(curves, performance=performance, **asked)
-        show(found, options.picture, as_json=options.as_json)
-        return 0
+    if curves != CurveOptions():
+        if (budget, seeds, disturbance) != ("standard", None, "throttle"):
+            raise ConfigError(
+                "Expected no --budget, --seeds or --disturbance beside --curves: runs are as in the file."
+            )
+        return _score_curves(policies, world, options, curves, performance=performance, **asked)
     if performance is not None:
         world = replace(world, settings=(*world.settings, f"performance={performance}"))
     if not policies:
@@ -139,6 +138,36 @@ def score(
     folder = options.out or default_folder(question.world)
     file = options.picture or default_file(folder, question.world, policies, "_scores.png")
     return ask_and_show(question, folder, options, file)
+
+
+def _score_curves(
+    policies: Sequence[str], world: WorldOptions, options: RunOptions, curves: CurveOptions, **how: Any
+) -> int:
+    """Score curves of a file beside those of policies, and draw a picture beside the file."""
+    from metrics.scoring import score_curves
+    from swarm_forage_env.cli.worlds import default_folder, described_world
+
+    file = curves.curves
+    if file is None:
+        raise ConfigError("Expected a file with --curves for --columns, --events and --interval, got none.")
+    if not policies and world != WorldOptions():
+        raise ConfigError("Expected policies to run in a world beside --curves, got a world alone.")
+    chosen, _ = described_world(replace(world, horizon=None))
+    folder = options.out or default_folder(chosen)
+    columns, events, interval_s = curves.named_columns(), curves.events, curves.interval
+    found = score_curves(
+        file,
+        policies,
+        chosen,
+        columns=columns,
+        events=events,
+        interval_s=interval_s,
+        out=folder,
+        jobs=options.jobs,
+        **how,
+    )
+    show(found, options.picture or file.with_name(f"{file.stem}_scores.png"), as_json=options.as_json)
+    return int(bool(found.failures))
 
 
 _OF_THE_BUDGET = ("horizon_s", "interval_s")

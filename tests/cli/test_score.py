@@ -93,7 +93,12 @@ def test_a_dry_run_shows_the_experiments_and_runs_nothing(command):
     ("words", "reason"),
     [
         (("score",), "Expected policies to run, or a file with --curves"),
-        (("score", "crw", "--curves", "x.csv"), "Expected --curves alone"),
+        (("score", "crw", "--curves", "x.csv", "--budget", "quick"), "Expected no --budget"),
+        (("score", "--curves", "x.csv", "--robots", "3"), "Expected policies to run in a world beside --curves"),
+        (("score", "--columns", "seed=0"), "Expected a file with --curves for --columns"),
+        (("score", "--curves", "curves.csv", "--columns", "seed:0"), "Expected --columns OURS=THEIRS"),
+        (("score", "--curves", "curves.csv", "--events"), "the length of an interval"),
+        (("score", "crw", "--curves", "good.csv"), "Expected equal intervals of known length in good.csv"),
         (("score", "crww"), "Unknown policy 'crww'. Did you mean 'crw'?"),
         (("score", "gone.zip"), "Cannot read the policy file"),
         (("score", "bad.npz"), "Expected"),
@@ -103,7 +108,7 @@ def test_a_dry_run_shows_the_experiments_and_runs_nothing(command):
         (("score", "crw", "--disturbance", "noise"), "one of throttle, handling_cost, got 'noise'"),
         (("score", "crw", "--variant", "papr"), "Unknown variant 'papr'. Did you mean 'paper'?"),
         (("score", "crw,dpo", "--form", "single"), "Unknown form 'single'"),
-        (("score", "--curves", "curves.csv", "--form", "single"), "Unknown form 'single'"),
+        (("score", "--curves", "good.csv", "--form", "single"), "Unknown form 'single'"),
         (("score", "crw", "--budget", "huge"), "Unknown budget 'huge'"),
         (("score", "crw", "--performance", "n_carying"), "Did you mean 'n_carrying'?"),
         (("score", "crw,dpo", "--set", "performance=colected"), "Did you mean 'collected'?"),
@@ -123,6 +128,7 @@ def test_a_dry_run_shows_the_experiments_and_runs_nothing(command):
 def test_what_a_person_gets_wrong_is_one_line(command, words, reason):
     Path("bad.npz").write_bytes(b"no network")
     Path("curves.csv").write_text("n_robots,performance\n1,2\n")
+    Path("good.csv").write_text(CURVES)
     code, out, err = command(*words)
     assert (code, out) == (2, "")
     assert len(err.splitlines()) == 1
@@ -142,6 +148,28 @@ def test_curves_from_elsewhere_are_scored(command):
     code, out, err = command("score", "--curves", "curves.csv", "--measures", "reactivity")
     assert (code, out) == (2, "")
     assert "Cannot compute reactivity for curves" in err
+
+
+def test_real_robots_stand_beside_policies_in_one_table_and_picture(command, painted):
+    times = [(n, run, 2.0 * k + n / 8) for n in (1, 3) for run in (0, 1) for k in range(2)]
+    Path("real.csv").write_text(
+        "robots;run;stamp\n" + "".join(f"{n};{run};{t:g}\n".replace(".", ",") for n, run, t in times)
+    )
+    words = ("--columns", "n_robots=robots,seed=run,time_s=stamp", "--events", "--interval", "2", "--jobs", "1")
+    code, out, err = command(
+        "score", "random", "--curves", "real.csv", *words, "--set", "n_objects=20", "--out", "here"
+    )
+    assert code == 0
+    assert out.splitlines()[0] == "random, real in warehouse_small with 20 objects"
+    header, first = [line.split() for line in out.splitlines() if line.startswith(("measure ", "raw performance  "))]
+    assert header == ["measure", "at", "better", "random", "real"]
+    assert first[-3:] == ["2", "±", "0"]
+    assert "real.csv: deliveries are counted in 2 intervals of 2 s" in out
+    assert {(record.n_robots, record.seed, record.horizon_s) for record in load(Path("here"))} == {
+        (n, run, 4.0) for n in (1, 3) for run in (0, 1)
+    }
+    assert "picture real_scores.png" in err
+    assert Path("real_scores.png").exists()
 
 
 def test_failed_runs_are_told_and_the_exit_code_says_so(command, monkeypatch):

@@ -194,9 +194,6 @@ BAD_TABLES = {
     "criterion without value": (CROWDING.with_columns(criterion=pl.lit("noise")), "the column criterion_value"),
     "criterion with some values": (in_row(LEVELS, 2, criterion_value=None), "a number in line 2 .*criterion_value"),
     "unknown criterion": (CROWDING.with_columns(criterion=pl.lit("weather")), "one of population_size, .* in line 1"),
-    "missing reference run": (LEVELS.tail(1), r"a reference run for noise 0\.4, N = 5 .* got neither"),
-    "reference of another size": (in_row(LEVELS, 1, n_robots=9), r"a reference run for noise 0\.4, N = 5"),
-    "nothing to pair": (table(rows(1, [[1.0]]), rows(2, [[1.0]], first_seed=5)), "runs with numbers in common"),
     "column with gaps": (
         table(rows(1, [[1.0, 2.0]], adversity=[0.5, None])),
         "a value, as in other intervals with N = 1 in line 2 .*, column adversity, got nothing",
@@ -206,6 +203,20 @@ BAD_TABLES = {
         "the same rate in each row of none 0 in line 2 .*, column deaths_per_s, got 0.2",
     ),
 }
+
+
+INCOMPARABLE = {
+    "missing reference run": (LEVELS.tail(1), r"a reference run for noise 0\.4, N = 5 .* got neither"),
+    "reference of another size": (in_row(LEVELS, 1, n_robots=9), r"a reference run for noise 0\.4, N = 5"),
+    "nothing to pair": (table(rows(1, [[1.0]]), rows(2, [[1.0]], first_seed=5)), "runs with numbers in common"),
+}
+
+
+@pytest.mark.parametrize(("frame", "message"), INCOMPARABLE.values(), ids=INCOMPARABLE)
+def test_runs_that_compare_with_nothing_are_refused(tmp_path, frame, message):
+    frame.write_csv(tmp_path / "theirs.csv")
+    with pytest.raises(CurveError, match=message):
+        read_curves(tmp_path / "theirs.csv")
 
 
 @pytest.mark.parametrize(("frame", "message"), BAD_TABLES.values(), ids=BAD_TABLES)
