@@ -72,8 +72,8 @@ def read_curves(path: str | Path, performance: str | None = None, **how: Any) ->
         how: Further arguments of `study_curves`.
 
     Raises:
-        CurveError: as `study_curves`; the file cannot be read, there is no reference run for what is varied, or there are
-            no runs that can be paired.
+        CurveError: as `study_curves`; or the file cannot be read, there is no reference run for what is varied, or no
+            runs can be paired.
     """
     file = Path(path)
     try:

@@ -169,23 +169,6 @@ def test_a_name_of_a_record_is_checked_like_a_function():
         checked_performance([1.0, -0.5], "adversity", 2, "run 7")
 
 
-CURVES = table(
-    rows(1, [[9.0, 9.0], [9.0, 9.0]], carried=[1.0, 3.0], lost=[0.5, 0.0]),
-    rows(2, [[9.0, 9.0], [9.0, 9.0]], carried=[4.0, 4.0], lost=[0.25, 0.25]),
-)
-
-
-@pytest.mark.parametrize(
-    ("performance", "expected"),
-    [("carried", [4.0, 8.0]), ("1/lost", [2.0, 8.0]), (lambda run: run["carried"].cum_sum(), [5.0, 12.0])],
-    ids=["column", "inverse", "function of a run"],
-)
-def test_curves_from_a_file_have_any_performance(performance, expected, tmp_path):
-    CURVES.sample(fraction=1.0, shuffle=True, seed=2).sort("n_robots").drop("performance").write_csv(tmp_path / "c.csv")
-    found = score_curves(tmp_path / "c.csv", measures=["raw_performance"], performance=performance).summary
-    assert found.select("mean", "sd").rows() == [(value, 0.0) for value in expected]
-
-
 def test_units_of_known_columns_of_a_file_follow(tmp_path):
     frame = table(*(rows(n, [[9.0]], n_active=float(n), interference_fraction=0.5) for n in (1, 2)))
     frame.write_csv(tmp_path / "c.csv")
@@ -198,25 +181,6 @@ def test_units_of_known_columns_of_a_file_follow(tmp_path):
     assert told("n_active") == ("robots summed over intervals", False)
     assert told("interference_fraction") == ("interference_fraction summed over intervals", True)
     assert told("1/n_active") == ("1/n_active summed over intervals", True)
-
-
-def test_a_function_does_not_hide_what_a_file_lacks(tmp_path):
-    CURVES.select("carried").write_csv(tmp_path / "c.csv")
-    with pytest.raises(CurveError, match="Expected the columns n_robots, seed, interval in"):
-        score_curves(tmp_path / "c.csv", performance=lambda run: run["carried"])
-
-
-@pytest.mark.parametrize(
-    ("performance", "message"),
-    [
-        ("carred", "Expected a column carred for performance in .*Did you mean 'carried'"),
-        (lambda run: run["carried"] - 2.0, "of n_robots 1, seed 0 in .* got -1.0 in interval 0"),
-    ],
-)
-def test_what_is_wrong_with_the_performance_of_a_file_is_told(performance, message, tmp_path):
-    CURVES.write_csv(tmp_path / "c.csv")
-    with pytest.raises(CurveError, match=message):
-        score_curves(tmp_path / "c.csv", performance=performance)
 
 
 def test_the_class_is_public():
