@@ -97,7 +97,7 @@ def recipe(
             in all.
         interface: What a learner sees and does: an `InterfaceConfig`, or fields by name that differ from the
             recipe's (compact observations, discrete actions or for sac continuous ones, an automatic gripper,
-            `DECISION_TICKS`, site memory, `FRAME_DECISIONS` unless robots have own sensors or send messages).
+            `DECISION_TICKS`, site memory, `FRAME_DECISIONS` unless robots send messages).
         wrappers: What disturbs the swarm, in training and in evaluations: configurations, or words as on the command
             line ("population:death_per_tick=0.01").
         hidden: Sizes of the hidden layers.

@@ -421,8 +421,8 @@ def steps_as_made(layer: ForageEnv | SwarmWrapper) -> bool:
 def needs_no_python(env: ForageEnv, layers: Iterable[SwarmWrapper]) -> bool:
     """Whether several ticks can be one compiled call, but for those in which a layer has to act.
 
-    They cannot with Chipmunk, an open window, neighbours, messages or an own sensor that the policy reads, a layer that
-    does not tell what it does ahead, or a method that was replaced.
+    They cannot with Chipmunk, an open window, neighbours or messages that the policy reads, a layer that does not tell
+    what it does ahead, or a method that was replaced.
     """
     layers = tuple(layers)
     return (

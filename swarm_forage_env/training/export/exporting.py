@@ -27,7 +27,7 @@ def export_policy(policy: str | Path, file: str | Path, scenario: str | Scenario
         policy: Name of a shipped network, or path of an .npz file.
         file: To write, .h or .onnx; an existing one is replaced.
         scenario: World in which the network is used. The words say how large it is, since positions are shares of
-            the arena. It must have what the network sees: neighbours, messages, own sensors.
+            the arena. It must have what the network sees: neighbours, messages.
 
     Returns:
         The path of the file.
