@@ -10,13 +10,11 @@ only reads. Rows of robots that are away are not used.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
 
 from swarm_forage_env._internal.faults import in_words
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.types import BoolArray, FloatArray
 
 ExtraFunction: TypeAlias = Callable[[Any], np.ndarray]
@@ -28,44 +26,19 @@ class ExtraFunctionError(ValueError):
     """A function of the user that failed, or returned what no observation or reward can be."""
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Extras:
-    """What users add to an environment.
-
-    Raises:
-        ConfigError: not a function.
-    """
-
-    reward: ExtraFunction | None = None
-    observation: ExtraFunction | None = None
-
-    def __post_init__(self) -> None:
-        for name, given in (("extra_reward", self.reward), ("extra_observation", self.observation)):
-            if given is not None and not callable(given):
-                raise ConfigError(f"Expected {name} to be a function of the world, got {given!r}.")
-
-    def as_arguments(self) -> dict[str, Any]:
-        """Return them as environments take them."""
-        return {"extra_reward": self.reward, "extra_observation": self.observation}
-
-
 def extra_columns(function: ExtraFunction, arena: Any, n_columns: int | None = None) -> FloatArray:
     """Return the further columns (N, K) that robots see; zeros for robots that are not in the world.
 
     Args:
         function: The user's `extra_observation`.
         arena: The world.
-        n_columns: K; None = what the function returns.
+        n_columns: K; None = what the function returns, at least 1.
 
     Raises:
         ExtraFunctionError: the function failed, or returned another shape or numbers outside of [-1, 1].
     """
     present = arena.swarm.present
-    values = _numbers(function, arena, "extra_observation")
-    wanted = (len(present), n_columns or "K")
-    if values.ndim != 2 or len(values) != len(present) or (n_columns or values.shape[1]) != values.shape[1]:
-        raise _misshapen("extra_observation", function, wanted, values)
-    return _in_range("extra_observation", function, values, present[:, None])
+    return _called("extra_observation", function, arena, (len(present), n_columns), present[:, None])
 
 
 def extra_rewards(function: ExtraFunction, arena: Any) -> FloatArray:
@@ -75,39 +48,29 @@ def extra_rewards(function: ExtraFunction, arena: Any) -> FloatArray:
         ExtraFunctionError: as `extra_columns`.
     """
     active = arena.swarm.active
-    values = _numbers(function, arena, "extra_reward")
-    if values.shape != active.shape:
-        raise _misshapen("extra_reward", function, active.shape, values)
-    return _in_range("extra_reward", function, values, active)
+    return _called("extra_reward", function, arena, active.shape, active)
 
 
-def _numbers(function: ExtraFunction, arena: Any, role: str) -> np.ndarray:
+def _called(
+    role: str, function: ExtraFunction, arena: Any, shape: tuple[int | None, ...], counts: BoolArray
+) -> FloatArray:
+    """Return what the function says of the rows that count, and zeros in the others; None in `shape` = 1 or more."""
+    name = f"{role} {getattr(function, '__name__', repr(function))}"
     try:
         values = np.asarray(function(arena))
     except Exception as error:  # code of the user, which may raise anything
-        raise ExtraFunctionError(f"{role} failed with {in_words(error)}") from error
+        raise ExtraFunctionError(f"{name} failed with {in_words(error)}") from error
     if values.dtype.kind not in "biuf":
-        raise ExtraFunctionError(f"Expected {role} {_name(function)} to return real numbers, got {values.dtype}.")
-    return values
-
-
-def _misshapen(role: str, function: ExtraFunction, wanted: tuple[Any, ...], values: np.ndarray) -> ExtraFunctionError:
-    shape = ", ".join(map(str, wanted)) + "," * (len(wanted) == 1)
-    return ExtraFunctionError(
-        f"Expected {role} {_name(function)} to return shape ({shape}), one row per robot, got {values.shape}."
-    )
-
-
-def _in_range(role: str, function: ExtraFunction, values: np.ndarray, counts: BoolArray) -> FloatArray:
+        raise ExtraFunctionError(f"Expected {name} to return real numbers, got {values.dtype}.")
+    pairs = zip(values.shape, shape, strict=False)
+    if values.ndim != len(shape) or not all(n == wanted or (n and wanted is None) for n, wanted in pairs):
+        told = str(shape).replace("None", "K")
+        raise ExtraFunctionError(f"Expected {name} to return shape {told}, one row per robot, got {values.shape}.")
     values = np.where(counts, values, 0.0)
     fits = np.abs(values) <= 1.0
     if not fits.all():
         raise ExtraFunctionError(
-            f"Expected {role} {_name(function)} to return numbers in [-1, 1], got {values[~fits][0]}; divide by the "
-            "largest value that can occur, or clip."
+            f"Expected {name} to return numbers in [-1, 1], got {values[~fits][0]}; divide by the largest value that "
+            "can occur, or clip."
         )
     return values
-
-
-def _name(function: ExtraFunction) -> str:
-    return getattr(function, "__name__", repr(function))

@@ -117,8 +117,8 @@ class InterfaceConfig:
         whole("interface.extra_columns", self.extra_columns, at_least=0, at_most=MOST_EXTRA_COLUMNS)
         if self.extra_columns and self.frame_decisions:
             raise ConfigError(
-                f"Expected frame_decisions=0 beside extra_observation, of which only its author knows what a turn does "
-                f"to it, got {self.frame_decisions}."
+                f"Expected interface.frame_decisions of 0 beside extra_observation, because only its author knows what "
+                f"a turn does to it, got {self.frame_decisions}; give interface={{'frame_decisions': 0}}."
             )
 
     def decisions_in(self, ticks: int) -> int:
@@ -279,10 +279,11 @@ class LearnerInterface:
         _check_rows("observations", obs, (len(obs), self._n_columns))
         if out is not None:
             _check_rows("out", out, (len(obs), self.layout.size))
-        if self.config.extra_columns and (extra is None or extra.shape[1] != self.config.extra_columns):
+        n_extra = 0 if extra is None else extra.shape[1]
+        if n_extra != self.config.extra_columns:
             raise ValueError(
                 f"Expected {self.config.extra_columns} columns of extra_observation, which the learner sees, got "
-                f"{'none' if extra is None else extra.shape[1]}."
+                f"{n_extra}."
             )
         if self.translation.has_memory or self.config.frame_decisions:
             n_robots = len(self._commands)

@@ -144,7 +144,7 @@ def check_extra(interface: InterfaceConfig, extra: ExtraFunction | None) -> None
     if interface.extra_columns and extra is None:
         raise ExtraFunctionError(
             f"Expected the extra_observation of {interface.extra_columns} columns that the policy was trained with, "
-            "got none; make it LearnedPolicy(network.about.interface, network.choose, extra_observation=...)."
+            "got none; in Python, run LearnedPolicy(network.about.interface, network.choose, extra_observation=...)."
         )
 
 

@@ -184,7 +184,7 @@ class LearnerArena:
 
     def _add_extra(self, rewards: np.ndarray) -> None:
         """Add the user's `extra_reward` of a decision to the rewards of the robots (N,)."""
-        function, env = self._plan.extras.reward, self.forage_env
+        function, env = self._plan.extra_reward, self.forage_env
         if function is not None:
             values = extra_rewards(function, env.arena)
             if env.scenario.reward.team:
@@ -267,7 +267,7 @@ class LearnerArena:
         return out
 
     def _extra_columns(self) -> FloatArray | None:
-        function = self._plan.extras.observation
+        function = self._plan.extra_observation
         if function is None:
             return None
         try:

@@ -8,7 +8,7 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from swarm_forage_env._internal.fields import ConfigError, instance
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policies.extras import ExtraFunction, Extras, extra_columns
+from swarm_forage_env.policies.extras import ExtraFunction, extra_columns
 from swarm_forage_env.policies.interface import GivenInterface, InterfaceConfig, chosen_interface
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import scenario_of_same_size
@@ -35,8 +35,9 @@ class ArenaPlan:
     max_cycles: int | None = None
     """Ticks until truncation; default the scenario's horizon."""
     render_mode: str | None = None
-    extras: Extras = field(default_factory=Extras)
-    """What the user adds to rewards and observations."""
+    extra_reward: ExtraFunction | None = None
+    extra_observation: ExtraFunction | None = None
+    """What the user adds, see `policies.extras`; `interface` says how many columns."""
 
     def build(self, overrides: Mapping[str, Any], world: World | None = None) -> ForageEnv | SwarmWrapper:
         """Build the environment with its wrappers.
@@ -132,32 +133,39 @@ def plan_arena(
                 "into the sampler, where all worlds can share it. By id, make swarm_forage/sampled-v0."
             )
         config = sampler.largest
-    plan = ArenaPlan(
+    for name, function in (("extra_reward", extra_reward), ("extra_observation", extra_observation)):
+        if function is not None and not callable(function):
+            raise ConfigError(f"Expected {name} to be a function of the world, got {function!r}.")
+    chosen = chosen_interface(interface).for_scenario(config)
+    return ArenaPlan(
         world=World(config, disturbing),
         sampler=sampler,
-        interface=chosen_interface(interface).for_scenario(config),
+        interface=_with_extra_columns(chosen, config, extra_observation),
         max_cycles=max_cycles,
         render_mode=render_mode,
-        extras=Extras(reward=extra_reward, observation=extra_observation),
+        extra_reward=extra_reward,
+        extra_observation=extra_observation,
     )
-    if plan.extras.observation is not None:
-        return _with_extra_columns(plan, plan.extras.observation)
-    if plan.interface.extra_columns:
-        raise ConfigError(
-            f"Expected the extra_observation of the {plan.interface.extra_columns} columns of the interface, got none."
-        )
-    return plan
 
 
-def _with_extra_columns(plan: ArenaPlan, function: ExtraFunction) -> ArenaPlan:
-    """Return the plan with an interface that has the columns which the function returns."""
-    env = ForageEnv(plan.world.scenario)
+def _with_extra_columns(
+    interface: InterfaceConfig, scenario: ScenarioConfig, function: ExtraFunction | None
+) -> InterfaceConfig:
+    """Return the interface with as many extra columns as the function returns in a first run."""
+    told = interface.extra_columns
+    if function is None:
+        if told:
+            raise ConfigError(
+                f"Expected the extra_observation of the {told} columns of the interface, got none; give the function "
+                "again, in Python as extra_observation=..."
+            )
+        return interface
+    env = ForageEnv(scenario)
     env.reset_batch(seed=0)
     n_columns = extra_columns(function, env.arena).shape[1]
-    told = plan.interface.extra_columns
     if told not in (0, n_columns):
         raise ConfigError(f"Expected extra_observation with {told} columns, as the interface says, got {n_columns}.")
-    return replace(plan, interface=replace(plan.interface, extra_columns=n_columns))
+    return replace(interface, extra_columns=n_columns)
 
 
 def takes(make: Callable[Options, Any]) -> Callable[[Callable[..., Result]], Callable[Options, Result]]:

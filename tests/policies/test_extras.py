@@ -1,6 +1,5 @@
 """Rewards and observations of users: where they arrive, and what is refused."""
 
-from dataclasses import replace
 from typing import Any
 
 import gymnasium
@@ -68,9 +67,14 @@ def test_a_team_shares_extra_rewards_and_robots_that_are_away_see_nothing():
     ("role", "function", "message"),
     [
         ("extra_observation", lambda arena: np.zeros(N), r"shape \(6, K\), one row per robot, got \(6,\)"),
+        ("extra_observation", lambda arena: np.zeros((N, 0)), r"shape \(6, K\), one row per robot, got \(6, 0\)"),
         ("extra_observation", lambda arena: np.full((N, 1), np.nan), r"numbers in \[-1, 1\], got nan; divide"),
         ("extra_observation", lambda arena: np.full((N, 1), "a"), "real numbers, got <U1"),
-        ("extra_observation", lambda arena: arena.nothing, "extra_observation failed with AttributeError: .*line"),
+        (
+            "extra_observation",
+            lambda arena: arena.nothing,
+            "extra_observation <lambda> failed with AttributeError: .*line",
+        ),
         ("extra_reward", lambda arena: np.zeros((N, 1)), r"shape \(6,\), one row per robot, got \(6, 1\)"),
         ("extra_reward", lambda arena: np.full(N, 1.5), r"numbers in \[-1, 1\], got 1\.5"),
     ],
@@ -89,13 +93,10 @@ def test_after_a_failure_nothing_is_stepped_before_a_reset():
     def late(arena: Any) -> np.ndarray:
         return np.full((N, 1), 2.0 * (arena.tick == 2))
 
-    for env, actions in (
-        (SwarmVectorEnv("warehouse_small", **FIELDS, extra_observation=late), np.zeros((N, 3), np.float32)),
-        (
-            parallel_env("warehouse_small", **FIELDS, extra_observation=late),
-            {f"robot_{number}": np.zeros(3, np.float32) for number in range(N)},
-        ),
-    ):
+    rows = np.zeros((N, 3), np.float32)
+    dicts = {f"robot_{number}": wheels for number, wheels in enumerate(rows)}
+    for make, actions in ((SwarmVectorEnv, rows), (parallel_env, dicts)):
+        env: Any = make("warehouse_small", **FIELDS, extra_observation=late)
         env.reset(seed=1)
         env.step(actions)
         with pytest.raises(ExtraFunctionError):
@@ -113,11 +114,13 @@ def test_other_columns_than_the_interface_says_are_refused():
         parallel_env("warehouse_small", **FIELDS, interface={"extra_columns": 3})
     with pytest.raises(ConfigError, match="extra_reward to be a function"):
         parallel_env("warehouse_small", **FIELDS, extra_reward="mine")
-    with pytest.raises(ConfigError, match="frame_decisions=0 beside extra_observation"):
+    with pytest.raises(ConfigError, match=r"frame_decisions of 0 beside extra_observation, .* got 10; give interface"):
         InterfaceConfig(extra_columns=1, frame_decisions=10)
     bound = LearnerInterface(InterfaceConfig(extra_columns=1), SwarmSpec.of(scenario("warehouse_small", **FIELDS)))
-    with pytest.raises(ValueError, match=r"1 columns of extra_observation, .* got none"):
-        bound.observe(np.zeros((N, bound.layout.size - 1), np.float32))
+    rows = np.zeros((N, bound.layout.size - 1), np.float32)
+    for extra, n_columns in ((None, 0), (np.zeros((N, 2)), 2)):
+        with pytest.raises(ValueError, match=rf"1 columns of extra_observation, .* got {n_columns}"):
+            bound.observe(rows, extra=extra)
 
 
 def test_a_policy_that_was_trained_with_them_needs_the_function_again():
@@ -139,16 +142,9 @@ def test_a_policy_that_was_trained_with_them_needs_the_function_again():
 
     policy = LearnedPolicy(interface, choose, extra_observation=heading_and_cargo)
     run_policy(policy, plan_run(world, "crw", seed=1))
+    without = LearnedPolicy(InterfaceConfig(actions="discrete"), choose, extra_observation=heading_and_cargo)
+    with pytest.raises(ExtraFunctionError, match=r"shape \(6, 0\), one row per robot, got \(6, 2\)"):
+        run_policy(without, plan_run(world, "crw", seed=1))
     looks_north = seen[0][:, -2] > 0.0
     assert 0 < looks_north.sum() < N
     np.testing.assert_array_equal(network.choose(seen[0], np.random.default_rng()), looks_north.astype(int))
-
-
-def test_a_network_that_samples_draws_by_its_probabilities():
-    about = NetworkAbout(interface=InterfaceConfig(actions="discrete"), samples=True)
-    biases = np.log(np.array([0.7, 0.2, 0.1], np.float32))
-    network = Network((np.zeros((1, 3), np.float32),), (biases,), about)
-    drawn = network.choose(np.zeros((20_000, 1), np.float32), np.random.default_rng(1))
-    np.testing.assert_allclose(np.bincount(drawn) / 20_000, [0.7, 0.2, 0.1], atol=0.01)
-    mean = Network((np.ones((1, 3), np.float32),), (biases * 0,), replace(about, interface=InterfaceConfig()))
-    np.testing.assert_array_equal(mean.choose(np.array([[2.0]], np.float32), np.random.default_rng()), [[1.0] * 3])

@@ -8,7 +8,7 @@ can hold.
 import importlib.util
 import inspect
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
@@ -27,7 +27,7 @@ from swarm_forage_env._internal.files import alone_in, check_folder, replacing
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies import trust
-from swarm_forage_env.policies.extras import ExtraFunction, Extras
+from swarm_forage_env.policies.extras import ExtraFunction
 from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.policies.model_files import MODEL_FAULTS, deterministic_choice
 from swarm_forage_env.policies.network import Network, NetworkPolicy
@@ -135,9 +135,9 @@ def train(
             files; another call that trains in the folder; a stage whose scenario cannot be built; or a training that
             diverged.
     """
-    extras = Extras(reward=extra_reward, observation=extra_observation)
+    extras = {"extra_reward": extra_reward, "extra_observation": extra_observation}
     if extra_observation is not None:
-        arena = plan_arena(plan.scenario, interface=plan.interface, **extras.as_arguments())
+        arena = plan_arena(plan.scenario, interface=plan.interface, extra_observation=extra_observation)
         plan = replace(plan, interface=arena.interface)
     check_plan(plan)
     check_folder(folder)
@@ -152,11 +152,11 @@ def _train(
     resume: bool,
     report: Report,
     callbacks: Sequence[BaseCallback],
-    extras: Extras,
+    extras: Mapping[str, Any],
 ) -> TrainingResult:
     """Train in a folder that is checked, and that nobody else writes to."""
     torch.set_num_threads(1)  # networks this small gain nothing from more, and arenas want the cores
-    watch = _Watch(plan, folder, report, extras)
+    watch = _Watch(plan, folder, report, extras["extra_observation"])
     together = _Together(watch, callbacks)
     env = _arenas(plan, plan.stages[0], extras)
     sampler = plan.stages[0].sampler
@@ -190,8 +190,8 @@ def _train(
     )
 
 
-def _arenas(plan: TrainingPlan, stage: Stage, extras: Extras) -> SwarmVecEnv:
-    return SwarmVecEnv(**plan.arenas_of(stage), **extras.as_arguments())
+def _arenas(plan: TrainingPlan, stage: Stage, extras: Mapping[str, Any]) -> SwarmVecEnv:
+    return SwarmVecEnv(**plan.arenas_of(stage), **extras)
 
 
 def check_plan(plan: TrainingPlan) -> None:
@@ -333,9 +333,11 @@ def _has_diverged(model: BaseAlgorithm) -> bool:
 class _Watch(BaseCallback):
     """Checkpoints, evaluates and reports, over all stages of a training."""
 
-    def __init__(self, plan: TrainingPlan, folder: Path, report: Report, extras: Extras) -> None:
+    def __init__(
+        self, plan: TrainingPlan, folder: Path, report: Report, extra_observation: ExtraFunction | None
+    ) -> None:
         super().__init__()
-        self._extra_observation = extras.observation
+        self._extra_observation = extra_observation
         self.plan = plan
         self._folder = folder
         self._report = report
