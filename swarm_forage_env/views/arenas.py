@@ -12,7 +12,7 @@ rows (`LearnerArena`) are absent from the first step of the run to the last. The
   `ArenaStep.is_episode` is false for them.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, cast
 
@@ -23,13 +23,9 @@ from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.contract.types import BoolArray, IntArray, ObsArray
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policies.extras import ExtraFunction
-from swarm_forage_env.policies.interface import GivenInterface
-from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.views.learner_arena import LearnerArena
-from swarm_forage_env.views.plans import ArenaPlan, plan_arena
-from swarm_forage_env.views.sampler import ScenarioSampler
-from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
+from swarm_forage_env.views.plans import ArenaPlan, plan_arena, takes
+from swarm_forage_env.wrappers.base import SwarmWrapper
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -291,74 +287,26 @@ class ArenaBatch:
             arena.env.close()
 
 
-def open_arenas(
-    scenario: str | ScenarioConfig | None = None,
-    *,
-    num_envs: int = 1,
-    n_arenas: int | None = None,
-    sampler: ScenarioSampler | None = None,
-    interface: GivenInterface = None,
-    wrappers: Iterable[WrapperConfig | str] = (),
-    max_cycles: int | None = None,
-    render_mode: str | None = None,
-    extra_reward: ExtraFunction | None = None,
-    extra_observation: ExtraFunction | None = None,
-    **overrides: Any,
-) -> ArenaBatch:
+@takes(plan_arena)
+def open_arenas(*args: Any, num_envs: int = 1, n_arenas: int | None = None, **options: Any) -> ArenaBatch:
     """Build arenas.
 
-    Args:
-        scenario: Name of a preset, or a complete configuration; default warehouse_small.
-        num_envs: Robots in all arenas together, a multiple of the scenario's number. 1, the default of
-            `gymnasium.make_vec`, leaves the choice to `n_arenas`.
-        n_arenas: Arenas that run side by side; default as many as `num_envs` needs, at least one.
-        sampler: Draws the world of each run, instead of `scenario`, `wrappers` and `overrides`.
-        interface: What a learner sees and does, an `InterfaceConfig` or its fields by name; default full observations
-            and continuous actions.
-        wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
-            ("population:death_per_tick=0.01").
-        max_cycles: Ticks until truncation; default the scenario's horizon.
-        render_mode: None or "rgb_array".
-        extra_reward: See `plan_arena`.
-        extra_observation: See `plan_arena`.
-        overrides: Scenario fields by name (`n_robots=20`, `nest_progress=0.1`).
-
-    Raises:
-        ConfigError: as `plan_arena`, or n_arenas below 1.
-        ValueError: num_envs and n_arenas that do not fit together, or a window.
+    `num_envs` are the robots in all arenas together, a multiple of the scenario's number; 1, the default of
+    `gymnasium.make_vec`, leaves the choice to `n_arenas`, the arenas that run side by side, default one. A ValueError
+    tells where they do not fit together, or of a window.
     """
-    plan = plan_arena(
-        scenario,
-        sampler=sampler,
-        interface=interface,
-        wrappers=wrappers,
-        max_cycles=max_cycles,
-        render_mode=render_mode,
-        extra_reward=extra_reward,
-        extra_observation=extra_observation,
-        **overrides,
-    )
-    if render_mode == "human":
+    plan = plan_arena(*args, **options)
+    if plan.render_mode == "human":
         raise ValueError(
             "Expected render_mode None or 'rgb_array' for a vector environment, got 'human'; a window shows one arena, "
             "of parallel_env or JointForageEnv."
         )
-    return ArenaBatch(plan, _number_of_arenas(num_envs, n_arenas, plan.world.n_robots))
-
-
-def _number_of_arenas(num_envs: int, n_arenas: int | None, n_robots: int) -> int:
-    if n_arenas is not None and num_envs not in (1, n_arenas * n_robots):
-        raise ValueError(
-            f"Expected num_envs = {n_arenas * n_robots} for n_arenas = {n_arenas} of n_robots = {n_robots} (one "
-            f"sub-environment per robot), got {num_envs}; leave num_envs or n_arenas away."
-        )
-    if n_arenas is not None:
-        return n_arenas
+    n_robots = plan.world.n_robots
     if num_envs == 1:
-        return 1
-    if num_envs < 1 or num_envs % n_robots:
+        return ArenaBatch(plan, 1 if n_arenas is None else n_arenas)
+    if num_envs < 1 or num_envs % n_robots or n_arenas not in (None, num_envs // n_robots):
         raise ValueError(
-            f"Expected num_envs to be a multiple of n_robots = {n_robots} (one sub-environment per robot), got "
-            f"{num_envs}; choose another n_robots, or give n_arenas instead."
+            f"Expected num_envs to be n_arenas times n_robots = {n_robots} (one sub-environment per robot), got "
+            f"num_envs = {num_envs} and n_arenas = {n_arenas}; give one of both."
         )
-    return num_envs // n_robots
+    return ArenaBatch(plan, num_envs // n_robots)

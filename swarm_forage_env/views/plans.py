@@ -190,7 +190,9 @@ def constructor_takes(
 def _told_as(make: Callable[..., Any], function: Any) -> Any:
     own, made = inspect.signature(function), inspect.signature(make)
     first = [parameter for parameter in own.parameters.values() if parameter.name == "self"]
-    function.__signature__ = own.replace(parameters=[*first, *made.parameters.values()])
+    further = [parameter for parameter in own.parameters.values() if parameter.kind is parameter.KEYWORD_ONLY]
+    *shared, overrides = made.parameters.values()
+    function.__signature__ = own.replace(parameters=[*first, *shared, *further, overrides])
     if function.__doc__ and make.__doc__:  # python -OO leaves them out
         _, _, meaning = inspect.cleandoc(make.__doc__).partition("\n\n")
         function.__doc__ = f"{inspect.cleandoc(function.__doc__)}\n\n{meaning}"

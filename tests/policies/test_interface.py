@@ -260,3 +260,17 @@ def test_an_interface_is_given_as_it_is_by_fields_or_not_at_all():
     assert chosen_interface(numbered, driven) is numbered
     with pytest.raises(ConfigError, match=r"InterfaceConfig or its fields by name, .* got 'discrete'\."):
         chosen_interface("discrete")
+
+
+@pytest.mark.parametrize("name", ["observations", "out"])
+@pytest.mark.parametrize(("rows", "columns", "kind"), [(3, 0, np.float32), (4, -1, np.float32), (4, 0, np.float64)])
+def test_arrays_that_compiled_code_would_read_or_write_beyond_are_refused(name, rows, columns, kind):
+    env = ForageEnv(scenario("warehouse_small", n_robots=4))
+    interface = LearnerInterface(InterfaceConfig(observation="compact"), env.swarm_spec)
+    given = {"observations": np.zeros((4, env.layout.size), np.float32)}
+    given["out"] = np.zeros((4, interface.layout.size), np.float32)
+    wrong = np.zeros((rows, given[name].shape[1] + columns), kind)
+    if name == "observations" and rows == 3:
+        wrong = wrong[:, :, None]
+    with pytest.raises(ValueError, match=f"Expected {name} as float32 of shape"):
+        interface.observe(*(given | {name: wrong}).values())
