@@ -31,9 +31,9 @@ from metrics.benchmark import load_protocol
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.rendering.figures import COLOURS, check_picture, saved_figure
-from swarm_forage_env.runs.answer import Sheet
 from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.policy_spec import PolicySpec, policy_spec
+from swarm_forage_env.sheet import Sheet
 from swarm_forage_env.training.evaluations import finished_runs
 from swarm_forage_env.wrappers.world import World
 
@@ -199,10 +199,10 @@ def front_sheet(policy: str, search: Search, words: argparse.Namespace) -> Sheet
         told = [f"{one.mean:.2f} ± {one.upper - one.mean:.2f}" for one in both]
         told.append("yes" if search.stays[k] else "no")
         rows.append((f"{k or 'before'}", *told, *(f"{x:g}" for x in numbers.values())))
-    return Sheet(
+    return Sheet.of(
+        ("set", "performance", "interference", "on the front", *search.sets[0]),
+        rows,
         title=f"Performance and interference of {policy} in {words.horizon:,.0f} s, as shares of {YARDSTICK}'s",
-        header=("set", "performance", "interference", "on the front", *search.sets[0]),
-        rows=rows,
         notes=[f"± 95 % interval of the mean over {words.judging} seeds that the search did not have"],
     )
 
@@ -240,13 +240,13 @@ def comparison(
         policy_spec(policy, parameters=found, label="evolved"),
     ]
     means = [[aggregate(one) for one in each] for each in measured(policies, worlds, seeds, words.jobs)[0]]
-    return Sheet(
-        title=f"Performance of {policy} in {words.horizon:,.0f} s",
-        header=("numbers", *(world.scenario.name for world in worlds)),
-        rows=[
+    return Sheet.of(
+        ("numbers", *(world.scenario.name for world in worlds)),
+        [
             (spec.label, *(f"{one.mean:.1f} ± {one.upper - one.mean:.1f}" for one in each))
             for spec, each in zip(policies, means, strict=True)
         ],
+        title=f"Performance of {policy} in {words.horizon:,.0f} s",
         notes=[f"± 95 % interval of the mean of {words.judging} runs"],
     )
 

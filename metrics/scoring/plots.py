@@ -98,7 +98,7 @@ def _draw_panel(panel: Panel, rows: pl.DataFrame, of_look: Sequence[tuple[str, L
     distance = dict(rows.select("x", "distance").drop_nulls().iter_rows())
     texts = [f"{distance[place]:.3g} ({place:.3g})" if place in distance else f"{place:.3g}" for place in places]
     panel.set_xticks(range(len(places)), texts)
-    panel.margins(x=0.15)
+    panel.set_xlim(-0.5, len(places) - 0.5)
 
 
 def _draw_policy(panel: Panel, rows: pl.DataFrame, look: Look) -> None:

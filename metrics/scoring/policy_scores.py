@@ -21,13 +21,13 @@ import polars as pl
 
 from swarm_forage_env._internal.wording import counted, limits, number, percent, plain, suggestion
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
-from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.policy_spec import PolicyLike, PolicySpec, policy_specs
 from swarm_forage_env.runs.runner import run_plan
 from swarm_forage_env.runs.store import RunStore
 from swarm_forage_env.runs.table import Table
 from swarm_forage_env.scenarios.performance import Performance, performance_of
+from swarm_forage_env.sheet import Answer, Sheet
 from swarm_forage_env.studies import ladders
 from swarm_forage_env.studies.ladders import Budget
 from swarm_forage_env.wrappers.world import SIZE, World, WorldLike, world_of
@@ -163,7 +163,7 @@ class Scores(Answer):
             rows.append([words_of(first["measure"]), first["at"], arrow, *cells])
         marks = [f"{mark} = {words}" for mark, words in MARKS.items() if any(mark in "".join(row) for row in rows)]
         notes = [VALUES, *(["; ".join(marks)] if marks else [])] if rows else []
-        return Sheet(header=["measure", "at", "better", *self.policies], rows=rows, notes=notes)
+        return Sheet.of(["measure", "at", "better", *self.policies], rows, notes=notes)
 
     def _long(self) -> Iterator[Sheet]:
         """All levels, a row per policy."""
@@ -197,7 +197,7 @@ class Scores(Answer):
                         row["unit"],
                     )
                 )
-        yield Sheet(header=header, rows=rows)
+        yield Sheet.of(header, rows)
 
     def _pairs(self) -> Iterator[Sheet]:
         """All differences, pairs side by side."""
@@ -215,7 +215,7 @@ class Scores(Answer):
                 rows.append([name, at, *(_gap(of[pair]) if pair in of else "-" for pair in shown)])
             is_last = start + _PAIRS_PER_TABLE >= len(pairs)
             header = ["measure", "at", *(f"{first} - {second}" for first, second in shown)]
-            yield Sheet(header=header, rows=rows, notes=(TEST,) if is_last else ())
+            yield Sheet.of(header, rows, notes=(TEST,) if is_last else ())
 
     def _notes(self) -> list[str]:
         remarks: dict[str, list[str]] = {}
@@ -225,13 +225,17 @@ class Scores(Answer):
             place = f"{words_of(label_of(row['measure'], row['variant'], row['form']))}, {row['at']}"
             if place not in where:
                 where.append(place)
-        absent: dict[tuple[str, str], list[str]] = {}
+        without: dict[tuple[str, str], list[str]] = {}  # label and reason -> policies
         for (policy, label), reason in self.missing.items():
-            absent.setdefault((label, reason), []).append(policy)
+            without.setdefault((label, reason), []).append(policy)
+        absent: dict[tuple[str, str], list[str]] = {}  # policies and reason -> labels
+        for (label, reason), policies in without.items():
+            of = "" if len(policies) == len(self.policies) else f" of {', '.join(policies)}"
+            absent.setdefault((of, reason), []).append(label)
         return [
             *self.notes,
             *(f"{'; '.join(where)}: {remark}" for remark, where in remarks.items()),
-            *(f"{label} is not computed: {reason}" for label, reason in absent),
+            *(f"not computed{of}: {', '.join(labels)}: {reason}" for (of, reason), labels in absent.items()),
             *(f"failed: {line}" for lines in self.failures.values() for line in lines),
         ]
 

@@ -141,7 +141,7 @@ def test_curves_from_elsewhere_are_scored(command):
     code, out, _ = command("score", "--curves", "curves.csv")
     assert code == 0
     assert "task emergence" in out
-    assert "reactivity is not computed: there are no runs with criterion throttle" in out
+    assert "not computed: reactivity, adaptability: there are no runs with criterion throttle" in out
     assert not Path("results").exists()
     code, out, _ = command("score", "--curves", "curves.csv", "--variant", "paper", "--all")
     assert "scalability, paper" in out
