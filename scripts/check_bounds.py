@@ -23,15 +23,16 @@ TESTS = (
     "tests/policies/test_network_twin.py",
     "tests/promises/test_conservation.py",
     "tests/rendering/test_paint.py",
+    "tests/views/test_arenas.py",
     "tests/world/test_neighbourhood.py",
     "tests/wrappers/test_noise.py",
 )
 CHOICE = (
-    "(test_objects_are_conserved and warehouse_small and busy) or test_paint or together or gains_from_outside "
+    "(test_objects_are_conserved and warehouse_small and busy) or test_paint or ticks_one_by_one or gains_from_outside "
     "or they_are_those_of_the_twins or as_by_the_twin or test_interface_twins or test_network_twin"
 )
-"""Every kind of caches with Chipmunk; shapes beyond the edge; arenas together, wrapped and not, with the compiled
-engine; noise on wheels; neighbours and messages."""
+"""Every kind of caches with Chipmunk; shapes beyond the edge; decisions of learners, wrapped and not, with the
+compiled engine; noise on wheels; neighbours and messages."""
 ELSEWHERE = {
     "tick.run": "whole runs by one kernel need a compiled policy, which would be compiled, too",
     "counting.add_task_shares": "a part of tick.run",
@@ -48,15 +49,12 @@ def kernels() -> set[str]:
         for file in (ROOT / "swarm_forage_env").glob(place)
         for node in ast.parse(file.read_text(encoding="utf-8")).body
         if isinstance(node, ast.FunctionDef)
-        and any(isinstance(decorator, ast.Name) and decorator.id == "kernel" for decorator in node.decorator_list)
+        and {ast.unparse(decorator) for decorator in node.decorator_list} & {"kernel", "part"}
     }
 
 
 def compiled(cache: Path) -> set[str]:
-    """Return the names of the kernels that a cache holds.
-
-    Its files are named file.function-line.python.nbi, or file.function-line.python-called.nbi where only kernels call.
-    """
+    """Return the names of the kernels that a cache holds, whose files are named file.function-line.python.nbi."""
     return {file.name.partition("-")[0] for file in cache.rglob("*.nbi")}
 
 
