@@ -1,4 +1,4 @@
-"""What `scripts/bench` measures of this package: public names only, so that it fits older versions for long.
+"""What `scripts/bench` measures of this package: public names only, so that it fits several commits.
 
 Run as a program it reads lines `CASE ENGINE EFFORT` from standard input and answers each with a number in the unit of
 the case, or with "failed" and the reason. Effort 1 is a whole measurement, less is a shorter one. Times are processor
