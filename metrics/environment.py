@@ -80,9 +80,7 @@ def _period(frequency: float) -> float:
     return float(round(period)) if math.isclose(period, round(period), rel_tol=1e-12) else period
 
 
-def environment_scaling(
-    v: ArrayLike, i_ec: ArrayLike, *, model: ScalingModel = "linear", clip: bool = False
-) -> FloatArray:
+def environment_scaling(v: ArrayLike, i_ec: ArrayLike, *, model: ScalingModel = "linear") -> FloatArray:
     """Factor c_t by which the performance of a perfectly reactive swarm changes, Eqs. (5) and (6).
 
         linear        c_t = 1 - (V - I_ec)        throttles: fractions of speed lost
@@ -97,8 +95,7 @@ def environment_scaling(
     Args:
         v: Applied conditions V(t), shape (..., T) or one number.
         i_ec: Ideal conditions I_ec(t), broadcasting with v.
-        model: Which of the three.
-        clip: Set negative factors to 0, which `linear` gives for V - I_ec > 1. The authors' program keeps them.
+        model: Which of the three. `linear` gives negative factors for V - I_ec > 1.
 
     Returns:
         c_t, shape of the broadcast inputs.
@@ -124,8 +121,6 @@ def environment_scaling(
         if (i_ec == 0.0).any():
             raise CurveError("Expected i_ec != 0 for model='paper', which divides by it, got 0; use model='linear'.")
         scaling = v / i_ec
-    if clip:
-        scaling = np.maximum(scaling, 0.0)
     return scaling[0] if scalars else scaling
 
 

@@ -12,7 +12,7 @@ from scipy.special import stdtrit  # pyright: ignore[reportMissingTypeStubs]  (s
 from .checks import CurveError, check_level, check_option, check_resamples
 from .curves import FloatArray, as_curve
 
-AggregateMethod: TypeAlias = Literal["t", "two_sd", "bootstrap"]
+AggregateMethod: TypeAlias = Literal["t", "two_sd"]
 Order: TypeAlias = Literal["per_run", "mean_curve"]
 Experiment: TypeAlias = ArrayLike | tuple[ArrayLike, ...]
 """Curves of the runs of one experiment, shape (R, T); a tuple of them if a measure needs several of the same runs."""
@@ -79,18 +79,15 @@ def normalize(theta: ArrayLike, *, distance: bool = False) -> FloatArray:
     return -squashed if distance else squashed
 
 
-def aggregate(
-    values: ArrayLike, *, method: AggregateMethod = "t", level: float = 0.95, seed: int | None = None
-) -> Summary:
+def aggregate(values: ArrayLike, *, method: AggregateMethod = "t", level: float = 0.95) -> Summary:
     """Mean of one value per run, with an interval.
 
     Args:
         values: One value per run, shape (R,). NaN values are left out and counted.
         method: `t`: Student's interval for the mean. `two_sd`: mean +- 2 standard deviations, which the paper shades
             and calls a 95 % confidence interval. This interval shows where single runs lie; the interval for the mean
-            of 192 runs is about 14 times narrower. `bootstrap`: percentile interval of the mean over resampled runs.
-        level: Confidence level of `t` and `bootstrap`.
-        seed: Seed of the bootstrap; None draws a fresh one.
+            of 192 runs is about 14 times narrower.
+        level: Confidence level of `t`.
 
     Returns:
         Summary; its bounds are NaN for fewer than two runs.
@@ -108,16 +105,10 @@ def aggregate(
     mean, std = _mean_and_std(used)
     lower = upper = math.nan
     if used.size > 1:
-        if method == "bootstrap":
-            picks = np.random.default_rng(seed).integers(used.size, size=(_N_RESAMPLES, used.size))
-            with np.errstate(invalid="ignore"):  # infinities of both signs
-                means = used[picks].mean(axis=1)
-            lower, upper = percentile_bounds(means, level)
-        else:
-            spread = 2.0 * std
-            if method == "t":
-                spread = float(stdtrit(used.size - 1, 0.5 + 0.5 * level)) * std / math.sqrt(used.size)
-            lower, upper = mean - spread, mean + spread
+        spread = 2.0 * std
+        if method == "t":
+            spread = float(stdtrit(used.size - 1, 0.5 + 0.5 * level)) * std / math.sqrt(used.size)
+        lower, upper = mean - spread, mean + spread
     return Summary(mean=mean, std=std, lower=lower, upper=upper, n_used=used.size, n_nan=runs.size - used.size)
 
 

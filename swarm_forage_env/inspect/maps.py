@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -154,32 +153,29 @@ class ComparedMaps:
 def maps_of_runs(
     specs: Sequence[RunSpec],
     *,
-    side_m: float = 2 * CELL_M,
-    jobs: int | None = 1,
-    advance: Callable[[float], None] | None = None,
+    jobs: int | None,
+    advance: Callable[[float], None],
 ) -> ComparedMaps:
     """Make runs and return the mean of the maps of each policy.
 
     Args:
         specs: The runs; those of a policy differ in their seeds, and all arenas are of one size.
-        side_m: As in `floor_maps`.
         jobs: As in `runs.workers.map_runs`, and so is `advance`.
         advance: Called with the robot-ticks that are done.
 
     Raises:
-        ConfigError: see `floor_maps`.
         ValueError: a policy that is not installed, or refuses its file.
     """
     made: dict[str, list[FloorMaps]] = {}
-    found = map_runs(partial(_map_run, side_m), specs, jobs=jobs, advance=advance)
+    found = map_runs(_map_run, specs, jobs=jobs, advance=advance)
     for spec, maps in zip(specs, found, strict=True):
         made.setdefault(policy_label(spec.policy), []).append(maps)
     return ComparedMaps(maps=tuple(_mean_maps(maps, label) for label, maps in made.items()))
 
 
-def _map_run(side_m: float, spec: RunSpec, tell: Tell | None) -> FloorMaps:
+def _map_run(spec: RunSpec, tell: Tell | None) -> FloorMaps:
     """Make a run, for `runs.workers.map_runs`, and return its maps; `tell` is called after every frame."""
-    return floor_maps(record_replay(spec, progress=tell)[0], side_m=side_m)
+    return floor_maps(record_replay(spec, progress=tell)[0])
 
 
 def _sides(side_m: float, n: int, extent_m: float) -> FloatArray:

@@ -38,6 +38,8 @@ NOISE_GROUPS = ("proximity", "light", "ground", "wheel_speed", "position", "head
 """Groups of sensors that can be noisy, in the order of their columns."""
 POSE_GROUPS = NOISE_GROUPS[4:]
 """Groups that the authors' program leaves exact (quirk `pose_sensors_exact`); the paper speaks of all sensors."""
+N_LEVELS = 8
+"""Levels of noise in equal steps from 0, which is the ideal (study configuration)."""
 
 _READINGS = ("proximity", "light", "ground")
 """Groups with values in [0, 1]; those of the others lie in [-1, 1]."""
@@ -320,18 +322,14 @@ class ActuatorNoiseConfig(WrapperConfig):
         return f"wheel noise: sigma {sigma_in_words(self.sigma)}"
 
 
-def noise_levels(
-    sigma_max: float = 0.03, *, n_levels: int = 8, groups: tuple[str, ...] = NOISE_GROUPS
-) -> tuple[tuple[SensorNoiseConfig, ActuatorNoiseConfig], ...]:
+def noise_levels(sigma_max: float = 0.03) -> tuple[tuple[SensorNoiseConfig, ActuatorNoiseConfig], ...]:
     """Return the noise of the paper's robustness studies: Gaussian, one sigma for all sensors and the wheels.
 
     Args:
         sigma_max: Highest sigma: 0.03 in the warehouses and 0.10 in search and rescue (paper; the study configuration
             of search and rescue has 0.05).
-        n_levels: Levels in equal steps from 0, which is the ideal (study configuration: 8).
-        groups: Noisy sensors.
     """
     return tuple(
-        (SensorNoiseConfig(sigma=sigma, groups=groups), ActuatorNoiseConfig(sigma=sigma))
-        for sigma in np.linspace(0.0, sigma_max, n_levels).tolist()
+        (SensorNoiseConfig(sigma=sigma), ActuatorNoiseConfig(sigma=sigma))
+        for sigma in np.linspace(0.0, sigma_max, N_LEVELS).tolist()
     )

@@ -67,9 +67,8 @@ def test_the_print_lets_the_best_swarm_gain_from_adversity(model, expected):
     assert np.shape(value) == ()
 
 
-def test_linear_scaling_may_be_clipped():
+def test_linear_scaling_may_be_negative():
     assert environment_scaling([1.5, 0.2], 0.1) == pytest.approx([-0.4, 0.9], abs=1e-12)
-    assert environment_scaling([1.5, 0.2], 0.1, clip=True) == pytest.approx([0.0, 0.9], abs=1e-12)
 
 
 def test_scalings_that_divide_by_zero_are_refused_with_advice():

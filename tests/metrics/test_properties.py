@@ -271,10 +271,10 @@ def test_normalize_is_odd_bounded_and_keeps_order(theta):
 
 @law
 @given(values=arrays(np.float64, 7, elements=st.floats(-100, 100)), shift=st.floats(-100, 100))
-@pytest.mark.parametrize("method", ["t", "two_sd", "bootstrap"])
+@pytest.mark.parametrize("method", ["t", "two_sd"])
 def test_intervals_move_with_the_values_and_hold_the_mean(method, values, shift):
-    summary = metrics.aggregate(values, method=method, seed=1)
-    moved = metrics.aggregate(values + shift, method=method, seed=1)
+    summary = metrics.aggregate(values, method=method)
+    moved = metrics.aggregate(values + shift, method=method)
     for name in ("mean", "lower", "upper"):
         assert getattr(moved, name) == pytest.approx(getattr(summary, name) + shift, abs=1e-9)
     assert moved.std == pytest.approx(summary.std, abs=1e-9)
