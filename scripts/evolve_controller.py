@@ -97,8 +97,8 @@ def measured(policies: Sequence[PolicySpec], worlds: Sequence[World], seeds: Seq
     """Return performance (objects of a run) and interference (share of robot time), (2, policies, worlds, seeds)."""
     table = finished_runs(Plan.product(policies, worlds, seeds), jobs=jobs)
     runs = [[table.of(one) for one in table.plan.of_policy(policy.label)] for policy in policies]
-    performance = [[[run.performance.sum() for run in each] for each in rows] for rows in runs]
-    interference = [[[run.interference_fraction.mean() for run in each] for each in rows] for rows in runs]
+    performance = [[[run["performance"].sum() for run in each] for each in rows] for rows in runs]
+    interference = [[[run["interference_fraction"].mean() for run in each] for each in rows] for rows in runs]
     return np.array([performance, interference])
 
 

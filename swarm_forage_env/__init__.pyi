@@ -25,18 +25,17 @@ from .runs.policy_spec import policy_spec as policy_spec
 from .runs.policy_spec import policy_specs as policy_specs
 
 # runs
-from .runs.runner import run_plan as run_plan
-from .runs.plan_summary import summarize_plan as summarize_plan
+from .runs.plan import run_plan as run_plan
 from .runs.runner import rerun as rerun
 from .runs.plan import Plan as Plan
 from .runs.plan import Condition as Condition
-from .runs.table import Table as Table
-from .runs.runner import run_specs as run_specs
+from .runs.plan import Table as Table
+from .runs.runner import run_all as run_all
 from .runs.run import run_one as run_one
 from .runs.run import run_policy as run_policy
 from .runs.spec import plan_run as plan_run
 from .runs.spec import RunSpec as RunSpec
-from .runs.record import RunRecord as RunRecord
+from .runs.record import Record as Record
 from .runs.run import build_stack as build_stack
 from .wrappers.recorder import RunRecorder as RunRecorder
 

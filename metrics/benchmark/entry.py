@@ -26,11 +26,10 @@ from swarm_forage_env._internal.files import read_json, replacing
 from swarm_forage_env._internal.typed import Amount, Count, Name, Within, typed
 from swarm_forage_env.contract.policy import sees_world
 from swarm_forage_env.policies.registry import file_of, is_policy_file, policy_class, policy_label
-from swarm_forage_env.runs.plan import Plan
+from swarm_forage_env.runs.plan import Plan, Table
 from swarm_forage_env.runs.policy_spec import policy_specs
-from swarm_forage_env.runs.record import RunRecord
+from swarm_forage_env.runs.record import Record
 from swarm_forage_env.runs.spec import identity_of
-from swarm_forage_env.runs.table import Table
 from swarm_forage_env.runs.versions import software_versions
 
 from ..controllers import PAPER_POLICIES
@@ -326,7 +325,7 @@ def run_benchmark(
         BenchmarkError: runs failed, the name is that of a scripted controller, or the training does not fit its track.
         ConfigError: a name without characters, or with some that no terminal shows.
         ValueError: an unknown policy, or a file that cannot be opened.
-        swarm_forage_env.runs.runner.RunsInterrupted: Ctrl-C; finished runs are in `out`.
+        KeyboardInterrupt: Ctrl-C; finished runs are in `out`.
     """
     question = benchmark_question(policies, name=name, protocol=protocol, training=training)
     return ask(question, out=out, jobs=jobs, executor=executor, progress=progress)
@@ -367,7 +366,7 @@ def policy_origin(policy: str) -> tuple[str, int | None]:
     return file_digest(file), seed if isinstance(seed, int) else None
 
 
-def _core_hours(records: Iterable[RunRecord]) -> float | None:
+def _core_hours(records: Iterable[Record]) -> float | None:
     """What runs took, of those whose records tell it; three digits, as time is never the same twice."""
     known = [record.cpu_time_s for record in records if math.isfinite(record.cpu_time_s)]
     return float(f"{sum(known) / 3600.0:.3g}") if known else None
@@ -376,14 +375,14 @@ def _core_hours(records: Iterable[RunRecord]) -> float | None:
 def _runs(protocol: Protocol, table: Table) -> dict[str, WorldRuns]:
     """World -> performance and interference of all policies and seeds."""
 
-    def of_all(world: str, value: Callable[[RunRecord], float]) -> tuple[tuple[float, ...], ...]:
+    def of_all(world: str, value: Callable[[Record], float]) -> tuple[tuple[float, ...], ...]:
         conditions = [condition for condition in table.plan.conditions if condition.world.name == world]
         return tuple(tuple(six_digits(value(record)) for record in table.of(one)) for one in conditions)
 
     return {
         world.name: WorldRuns(
-            performance=of_all(world.name, lambda record: record.rate_per_1000_s("performance")),
-            interference=of_all(world.name, lambda record: float(record.interference_fraction.mean())),
+            performance=of_all(world.name, lambda record: record.per_1000_s("performance")),
+            interference=of_all(world.name, lambda record: float(record["interference_fraction"].mean())),
         )
         for world in protocol.worlds
     }

@@ -7,9 +7,8 @@ import numpy as np
 
 from swarm_forage_env.policies.registry import POLICIES
 from swarm_forage_env.runs.answer import Sheet
-from swarm_forage_env.runs.plan import Condition, Plan
+from swarm_forage_env.runs.plan import Condition, Plan, run_plan
 from swarm_forage_env.runs.policy_spec import policy_specs
-from swarm_forage_env.runs.runner import run_plan
 
 from .entry import check_finished, policy_origin, read_entry, six_digits
 from .protocol import BenchmarkError, load_protocol
@@ -33,7 +32,7 @@ def verify_entry(
         policies: Names or files of its policies, in their order; default: the installed policies with these names.
         n_worlds: How many worlds are drawn at most, counted for each policy.
         seed: Of this draw.
-        jobs: As in `swarm_forage_env.runs.runner.run_plan`.
+        jobs: As in `swarm_forage_env.runs.plan.run_plan`.
         progress: The same.
 
     Raises:
@@ -56,7 +55,7 @@ def verify_entry(
     for k, condition in chosen:
         name = condition.world.name
         stored = entry.performance(name)[k].tolist()
-        again = [six_digits(record.rate_per_1000_s("performance")) for record in table.of(condition)]
+        again = [six_digits(record.per_1000_s("performance")) for record in table.of(condition)]
         numbers = (", ".join(f"{value:g}" for value in values) for values in (stored, again))
         rows.append((condition.policy.label, name, *numbers, SAME if stored == again else "differs"))
     return Sheet(header=("policy", "world", "stored per 1,000 s", "again", "answer"), rows=rows)

@@ -21,11 +21,8 @@ import polars as pl
 
 from swarm_forage_env._internal.wording import counted, limits, number, percent, plain, suggestion
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
-from swarm_forage_env.runs.plan import Plan
+from swarm_forage_env.runs.plan import Plan, Table, run_plan
 from swarm_forage_env.runs.policy_spec import PolicyLike, PolicySpec, policy_specs
-from swarm_forage_env.runs.runner import run_plan
-from swarm_forage_env.runs.store import RunStore
-from swarm_forage_env.runs.table import Table
 from swarm_forage_env.scenarios.performance import Performance, performance_of
 from swarm_forage_env.sheet import Answer, Sheet
 from swarm_forage_env.studies import ladders
@@ -424,7 +421,7 @@ def score(
         CurveError: unknown measures, or a performance that is negative or not a number.
         ValueError: an unknown policy, performance, scenario, budget, or values that describe no run.
         ImportError: the policy is a model, and stable-baselines3 is not installed.
-        swarm_forage_env.runs.runner.RunsInterrupted: Ctrl-C; finished runs are in `out`.
+        KeyboardInterrupt: Ctrl-C; finished runs are in `out`.
     """
     question = score_question(
         policies,
@@ -547,8 +544,7 @@ def score_curves(
     failures: dict[str, Sequence[str]] = {}
     if policies:
         plan = _plan_beside(given, policy_specs(policies), chosen)
-        store = None if out is None else RunStore(out)
-        table = run_plan(plan, store=store, jobs=jobs, executor=executor, progress=progress)
+        table = run_plan(plan, out=out, jobs=jobs, executor=executor, progress=progress)
         simulated = [policy_curves(table, each.label) for each in plan.policies]
         failures = {each.label: lines for each in plan.policies if (lines := table.failure_lines(each.label))}
     studies = [*simulated, *given]

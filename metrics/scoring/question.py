@@ -14,10 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Generic, TypeVar
 
-from swarm_forage_env.runs.plan import Plan
-from swarm_forage_env.runs.runner import run_plan
-from swarm_forage_env.runs.store import RunStore
-from swarm_forage_env.runs.table import Table
+from swarm_forage_env.runs.plan import Plan, Table, run_plan
 
 Found = TypeVar("Found")
 
@@ -31,13 +28,13 @@ class Question(ABC, Generic[Found]):
     def make_runs(
         self,
         *,
-        store: RunStore | None = None,
+        out: str | Path | None = None,
         executor: Executor | None = None,
         jobs: int | None = None,
         progress: bool = False,
     ) -> Table:
-        """Make the runs that the answer needs; arguments and errors as in `swarm_forage_env.runs.runner.run_plan`."""
-        return run_plan(self.plan, store=store, executor=executor, jobs=jobs, progress=progress)
+        """Make the runs that the answer needs; arguments and errors as in `swarm_forage_env.runs.plan.run_plan`."""
+        return run_plan(self.plan, out=out, executor=executor, jobs=jobs, progress=progress)
 
     @abstractmethod
     def answer(self, table: Table) -> Found:
@@ -62,7 +59,6 @@ def ask(
         progress: Show progress and an estimate on stderr.
 
     Raises:
-        swarm_forage_env.runs.runner.RunsInterrupted: Ctrl-C; finished runs are in `out`.
+        KeyboardInterrupt: Ctrl-C; finished runs are in `out`.
     """
-    store = None if out is None else RunStore(out)
-    return question.answer(question.make_runs(store=store, jobs=jobs, executor=executor, progress=progress))
+    return question.answer(question.make_runs(out=out, jobs=jobs, executor=executor, progress=progress))

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swarm_forage_env.runs.plan import Condition
-from swarm_forage_env.runs.table import Curves, Table
+from swarm_forage_env.runs.plan import Condition, Curves, Table
 from swarm_forage_env.scenarios.columns import ALL_COLUMNS, Column
 from swarm_forage_env.scenarios.performance import (
     PERFORMANCE_COLUMNS,
@@ -316,9 +315,9 @@ def _curves(table: Table, condition: Condition, performance: Performance | None)
         where = f"run {record.run_id}"
         if performance is None:
             name = performance_of(condition.world.scenario.performance).name
-            checked.append(checked_performance(record.performance, name, record.n_intervals, where))
+            checked.append(checked_performance(record["performance"], name, len(record["interval"]), where))
         else:
-            checked.append(own_curve(performance, record.to_frame(), where))
+            checked.append(own_curve(performance, record.frame, where))
     if checked:
         columns["performance"] = np.stack(checked)
     return seeds, columns

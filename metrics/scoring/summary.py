@@ -16,11 +16,10 @@ from swarm_forage_env._internal.wording import counted, percent, plain
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 from swarm_forage_env.rendering.plots import Curve, draw_curves
 from swarm_forage_env.runs.answer import Answer, Sheet
-from swarm_forage_env.runs.plan import Condition, Plan
+from swarm_forage_env.runs.plan import Condition, Plan, Table
 from swarm_forage_env.runs.policy_spec import PolicyLike, policy_specs
-from swarm_forage_env.runs.record import RunRecord
-from swarm_forage_env.runs.store import RunStore, failure_lines
-from swarm_forage_env.runs.table import Table
+from swarm_forage_env.runs.record import Record
+from swarm_forage_env.runs.store import failure_file, failure_lines, record_file
 from swarm_forage_env.scenarios.performance import Performance, performance_of
 from swarm_forage_env.wrappers.world import World, WorldLike, world_of
 
@@ -117,7 +116,6 @@ class RunSummary(Answer):
     def to_mapping(self) -> dict[str, Any]:
         """Return policies, runs and failures as plain values."""
         folder = self.table.folder
-        store = None if folder is None else RunStore(folder)
         return {
             "scenario": self.world.scenario.name,
             "performance": {
@@ -131,11 +129,11 @@ class RunSummary(Answer):
                 {
                     **record.keys(),
                     "performance": performance_number(record, self.read_as),
-                    "deliveries_per_1000_s": record.rate_per_1000_s("collected"),
-                    "first_pickups_per_1000_s": record.rate_per_1000_s("first_picked"),
-                    "interference_fraction": float(record.interference_fraction.mean()),
+                    "deliveries_per_1000_s": record.per_1000_s("collected"),
+                    "first_pickups_per_1000_s": record.per_1000_s("first_picked"),
+                    "interference_fraction": float(record["interference_fraction"].mean()),
                     "wall_time_s": plain(record.wall_time_s),
-                    "file": None if store is None else str(store.path(record.run_id)),
+                    "file": None if folder is None else str(record_file(folder, record.run_id)),
                 }
                 for row in self.rows
                 for record in self.table.of(row.condition)
@@ -144,7 +142,7 @@ class RunSummary(Answer):
                 {
                     "run_id": failure.run_id,
                     "error": failure.error,
-                    "file": None if store is None else str(store.failure_path(failure.run_id)),
+                    "file": None if folder is None else str(failure_file(folder, failure.run_id)),
                 }
                 for failure in self.table.failures.values()
             ],
@@ -164,7 +162,7 @@ class RunSummary(Answer):
         n_worlds = len({row.condition.world for row in self.rows})
         curves: list[Curve] = []
         for row in self.rows:
-            runs = np.array([record.performance for record in self.table.of(row.condition)])
+            runs = np.array([record["performance"] for record in self.table.of(row.condition)])
             per_interval = [aggregate(column, level=LEVEL) for column in runs.T]
             mean, low, high = np.array([(point.mean, point.lower, point.upper) for point in per_interval]).T
             if len(runs) < FEWEST_RUNS:
@@ -173,7 +171,7 @@ class RunSummary(Answer):
             curves.append(Curve(label, mean, low, high))
         draw_curves(
             path,
-            self.table.of(self.rows[0].condition)[0].t_end_s,
+            self.table.of(self.rows[0].condition)[0]["t_end_s"],
             curves,
             title=self._title(n_worlds),
             ylabel=f"{read_as.title} per {scenario.interval_s:g} s" if read_as.is_total else read_as.title,
@@ -219,9 +217,9 @@ def summarize_runs(table: Table) -> RunSummary:
     return RunSummary(table=table, rows=tuple(_condition_summaries(table)))
 
 
-def performance_number(record: RunRecord, read_as: Performance) -> float:
+def performance_number(record: Record, read_as: Performance) -> float:
     """Return the performance of a run as one number: per 1,000 s for totals, else the mean over intervals."""
-    return record.rate_per_1000_s("performance") if read_as.is_total else float(record.performance.mean())
+    return record.per_1000_s("performance") if read_as.is_total else float(record["performance"].mean())
 
 
 def span(read_as: Performance) -> str:
@@ -248,23 +246,23 @@ def _condition_summaries(table: Table) -> Iterator[ConditionSummary]:
             caches=planned.scenario.caches,
             n_runs=len(records),
             performance=_mean(records, lambda record, read_as=read_as: performance_number(record, read_as)),
-            deliveries_per_1000_s=_mean(records, lambda record: record.rate_per_1000_s("collected")),
+            deliveries_per_1000_s=_mean(records, lambda record: record.per_1000_s("collected")),
             deliveries_per_robot_per_1000_s=_mean(records, _deliveries_per_robot),
-            first_pickups_per_1000_s=_mean(records, lambda record: record.rate_per_1000_s("first_picked")),
-            share_of_limit=share_of_limit(planned, float(np.mean([record.performance.sum() for record in records]))),
-            interference_fraction=float(np.mean([record.interference_fraction.mean() for record in records])),
+            first_pickups_per_1000_s=_mean(records, lambda record: record.per_1000_s("first_picked")),
+            share_of_limit=share_of_limit(planned, float(np.mean([record["performance"].sum() for record in records]))),
+            interference_fraction=float(np.mean([record["interference_fraction"].mean() for record in records])),
             simulated_s_per_wall_s=sum(record.horizon_s for record in records) / wall_s if wall_s else math.nan,
         )
 
 
-def _mean(records: Sequence[RunRecord], number: Callable[[RunRecord], float]) -> Summary:
+def _mean(records: Sequence[Record], number: Callable[[Record], float]) -> Summary:
     return aggregate([number(record) for record in records], level=LEVEL)
 
 
-def _deliveries_per_robot(record: RunRecord) -> float:
+def _deliveries_per_robot(record: Record) -> float:
     """Per 1,000 s and robot that is present."""
-    none = np.zeros(record.n_intervals)
-    share = np.divide(record.collected, record.n_present, out=none, where=record.n_present > 0.0)
+    delivered, present = record["collected"], record["n_present"]
+    share = np.divide(delivered, present, out=np.zeros(len(present)), where=present > 0.0)
     return float(share.sum()) * 1000.0 / record.horizon_s
 
 

@@ -10,7 +10,7 @@ from cyclopts.types import NonNegativeInt, PositiveInt
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli import EXIT_FAILURE
 from swarm_forage_env.cli.options import AsJson, Jobs, Names, Picture, Policies
-from swarm_forage_env.cli.printer import note, resumable, say
+from swarm_forage_env.cli.printer import note, say
 
 if TYPE_CHECKING:
     from metrics.benchmark import Board
@@ -70,8 +70,7 @@ def run(
         check_file(entry_file)
     if called not in PAPER_POLICIES:
         scripted_entries(load_protocol())  # what it will be shown beside
-    with resumable(out):
-        entry = ask(question, out=out, jobs=jobs)
+    entry = ask(question, out=out, jobs=jobs)
     if entry_file is not None:
         entry.write(entry_file)
         note(f"entry {entry_file}")

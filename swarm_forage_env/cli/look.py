@@ -139,14 +139,13 @@ def replay(
     from swarm_forage_env.cli.worlds import RESULTS, default_file, plan_runs
     from swarm_forage_env.inspect.replay.capture import record_replay
     from swarm_forage_env.inspect.replay.files import write_replays
-    from swarm_forage_env.runs.record import RunRecord
-    from swarm_forage_env.runs.spec import RunSpec
+    from swarm_forage_env.runs.record import Record
 
     is_stored = [Path(word).suffix == ".parquet" for word in policies]
     if any(is_stored) and (not all(is_stored) or world != WorldOptions() or seed):
         raise ConfigError("Expected stored runs alone, which have a world and a seed, got policies or options beside.")
     if all(is_stored):
-        specs = tuple(RunSpec.from_json(RunRecord.read(file).spec) for file in policies)
+        specs = tuple(Record.read(file).spec for file in policies)
     else:
         specs = plan_runs(world, policies, [seed])
     path = file or default_file(RESULTS, specs[0].world, [spec.policy for spec in specs], ".html")

@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from metrics.scoring.question import Question
     from swarm_forage_env.cli.options import RunOptions
     from swarm_forage_env.runs.answer import Answer as FoundAnswer
-    from swarm_forage_env.runs.store import RunStore
-    from swarm_forage_env.runs.table import Table
+    from swarm_forage_env.runs.plan import Table
     from swarm_forage_env.sheet import Answer as PrintedAnswer
 
     Answer = FoundAnswer | PrintedAnswer
@@ -68,34 +67,20 @@ def ask_and_show(question: "Question[Any]", folder: Path, options: "RunOptions",
     """
     from metrics.checks import CurveError
     from swarm_forage_env.rendering.figures import picture_ending
-    from swarm_forage_env.runs.plan_summary import summarize_plan
-    from swarm_forage_env.runs.store import RunStore
+    from swarm_forage_env.runs.plan import planned_line
 
     picture_ending(picture)  # before the work; a place that cannot be written to is told of beside the answer
     if options.dry_run:
-        show(summarize_plan(question.plan, out=folder), as_json=options.as_json)
+        say(planned_line(question.plan.specs, folder))
         return 0
-    store = RunStore(folder)
-    with resumable(folder):
-        table = question.make_runs(store=store, jobs=options.jobs, progress=True)
+    table = question.make_runs(out=folder, jobs=options.jobs, progress=True)
     try:
         answer: Answer = question.answer(table)
     except CurveError as error:  # what is left is too little
         raise CommandError(str(error)) from None
     show(answer, picture, as_json=options.as_json)
-    _tell_of_records(table, store)
+    _tell_of_records(table, folder)
     return int(bool(table.failures))
-
-
-@contextmanager
-def resumable(folder: Path) -> Iterator[None]:
-    """Let an interrupt of runs say where the finished ones are."""
-    from swarm_forage_env.runs.runner import RunsInterrupted
-
-    try:
-        yield
-    except RunsInterrupted as interrupt:
-        raise KeyboardInterrupt(f"{interrupt} They are in {folder}; the same command does the rest.") from None
 
 
 def show(answer: "Answer", picture: Path | None = None, *, as_json: bool = False) -> None:
@@ -134,14 +119,14 @@ def drawn_or_told(answer: "Answer", picture: Path) -> Path | None:
     return None
 
 
-def _tell_of_records(table: "Table", store: "RunStore") -> None:
+def _tell_of_records(table: "Table", folder: Path) -> None:
     """Say on stderr where the records are, and how a failed run is made again, one for each policy and reason."""
-    from swarm_forage_env.runs.store import failed_alike
+    from swarm_forage_env.runs.store import failed_alike, failure_file
 
     if table.records:
-        note(f"{counted(len(table.records), 'record')} in {store.folder}")
+        note(f"{counted(len(table.records), 'record')} in {folder}")
     reasons = failed_alike(table.failures.values())
     for first, *_ in reasons[:FAILURES_SHOWN]:
-        note(f"again, alone: swarm-forage rerun {store.failure_path(first.run_id)}")
+        note(f"again, alone: swarm-forage rerun {failure_file(folder, first.run_id)}")
     if len(reasons) > FAILURES_SHOWN:
         note(f"and {len(reasons) - FAILURES_SHOWN} more reasons")

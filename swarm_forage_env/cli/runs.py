@@ -70,7 +70,7 @@ def plot(
     from metrics.scoring.summary import summarize_runs
     from swarm_forage_env.cli.worlds import default_file
     from swarm_forage_env.rendering.figures import check_picture
-    from swarm_forage_env.runs.table import read_table
+    from swarm_forage_env.runs.plan import read_table
     from swarm_forage_env.studies.study_folder import StudyFolder
 
     if folder.suffix == ".parquet" or StudyFolder(folder).study_file.exists():
@@ -213,22 +213,22 @@ def rerun(file: Path, /, *, as_json: AsJson = False) -> int:
     Args:
         file: A record (.parquet) or a failure (.json).
     """
+    import json
     import traceback
 
-    from swarm_forage_env.policies.trust import UntrustedModelError
     from swarm_forage_env.runs import runner as again
     from swarm_forage_env.runs.record import RecordError
 
     try:
         answer = again.rerun(file)
-    except (UntrustedModelError, RecordError):
+    except RecordError:
         raise
     except Exception as error:  # of a failure it is the run's own, whatever it is, and what its user wants to see
         if file.suffix != ".json":
             raise
         note(traceback.format_exc().rstrip())
         raise CommandError("the run failed again") from error
-    say(answer.json() if as_json else answer.record.describe())
+    say(json.dumps(answer.to_mapping(), indent=1) if as_json else answer.record.describe())
     if answer.is_same is False:
         raise CommandError(f"the results differ from those in {file}")
     if answer.is_same and not as_json:

@@ -11,14 +11,13 @@ from cyclopts.types import PositiveInt
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli import EXIT_FAILURE
 from swarm_forage_env.cli.options import AsJson, DryRun, Jobs, Names, Style
-from swarm_forage_env.cli.printer import note, resumable, say, show
+from swarm_forage_env.cli.printer import note, say, show
 from swarm_forage_env.rendering.figures import SCREEN
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from metrics.curves import Variant
-    from swarm_forage_env.runs.plan_summary import PlanSummary
     from swarm_forage_env.studies.study import StudySpec
     from swarm_forage_env.studies.study_folder import StudyFolder
     from swarm_forage_env.studies.study_table import StudyTable
@@ -69,7 +68,6 @@ def run(
     """
     from swarm_forage_env._internal.fields import known_name
     from swarm_forage_env.runs.cluster import cluster_executor
-    from swarm_forage_env.runs.store import FAILED
     from swarm_forage_env.studies.description import StudyOutcome
     from swarm_forage_env.studies.study import RULES_NAMES
     from swarm_forage_env.studies.study_file import load_study
@@ -84,23 +82,22 @@ def run(
     if dry_run:
         say(_summary(study, folder, part))
         return 0
-    with resumable(folder.folder), nullcontext() if cluster is None else cluster_executor(cluster, jobs) as executor:
+    with nullcontext() if cluster is None else cluster_executor(cluster, jobs) as executor:
         state = run_study(study, folder, part=part, jobs=jobs, executor=executor, progress=True)
     if part == (1, 1):
         note(f"packed into {pack_study(folder, tell=note)}")
     say(StudyOutcome(outcomes=state, folder=folder))
-    return EXIT_FAILURE if state.count(FAILED) else 0
+    return EXIT_FAILURE if state.failures else 0
 
 
-def _summary(spec: "StudySpec", folder: "StudyFolder", part: tuple[int, int]) -> "PlanSummary":
+def _summary(spec: "StudySpec", folder: "StudyFolder", part: tuple[int, int]) -> str:
     """Say what is left to run."""
-    from swarm_forage_env.runs.plan_summary import summarize_plan
+    from swarm_forage_env.runs.plan import planned_line
     from swarm_forage_env.studies.study_folder import shard
 
     index, count = part
     name = f"{spec.name}, budget {spec.budget}" + (f", shard {index} of {count}" if count > 1 else "")
-    only, out = shard(spec.plan.specs, index, count), folder.store.folder
-    return summarize_plan(spec.plan, name=name, only=only, out=out)
+    return f"{name}: {planned_line(shard(spec.plan.specs, index, count), folder.runs)}"
 
 
 @app.command

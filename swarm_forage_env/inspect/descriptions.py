@@ -18,9 +18,9 @@ from swarm_forage_env.policies.pretrained import network_file
 from swarm_forage_env.policies.python_files import classes_of
 from swarm_forage_env.policies.registry import POLICIES, file_of, is_policy_file, policy_class
 from swarm_forage_env.runs.answer import Answer, Sheet
-from swarm_forage_env.runs.record import record_columns
 from swarm_forage_env.runs.spec import stated_caches
 from swarm_forage_env.scenarios import presets
+from swarm_forage_env.scenarios.columns import ALL_COLUMNS, CONTRIBUTED_COLUMNS
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.wrappers.registry import WRAPPERS, wrapper_config_class
 from swarm_forage_env.wrappers.world import FILE, read_world
@@ -97,11 +97,19 @@ def _wrappers() -> Sheet:
     return Sheet(title="wrappers", header=("wrapper", "example", "fields"), rows=rows)
 
 
+def _columns() -> Sheet:
+    rows = [
+        (name, column.unit or "-", column.meaning + (" (optional)" if name in CONTRIBUTED_COLUMNS else ""))
+        for name, column in ALL_COLUMNS.items()
+    ]
+    return Sheet(title="columns", header=("column", "unit", "meaning"), rows=rows)
+
+
 LISTS: dict[str, Callable[[], Sheet]] = {
     "scenarios": _scenarios,
     "policies": _policies,
     "wrappers": _wrappers,
-    "columns": record_columns,
+    "columns": _columns,
 }
 """What can be listed -> its table."""
 

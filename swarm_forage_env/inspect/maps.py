@@ -14,7 +14,7 @@ from swarm_forage_env.inspect.replay.capture import record_replay
 from swarm_forage_env.inspect.replay.frames import Replay, Status
 from swarm_forage_env.policies.registry import policy_label
 from swarm_forage_env.runs.spec import RunSpec
-from swarm_forage_env.runs.workers import Tell, map_runs
+from swarm_forage_env.runs.workers import each_run
 from swarm_forage_env.scenarios.floor import CELL_M
 from swarm_forage_env.scenarios.obstacles import Rectangle
 
@@ -160,22 +160,26 @@ def maps_of_runs(
 
     Args:
         specs: The runs; those of a policy differ in their seeds, and all arenas are of one size.
-        jobs: As in `runs.workers.map_runs`, and so is `advance`.
-        advance: Called with the robot-ticks that are done.
+        jobs: As in `runs.workers.each_run`.
+        advance: Called with the robot-ticks that are done when a run ends.
 
     Raises:
         ValueError: a policy that is not installed, or refuses its file.
     """
+    found: dict[str, FloorMaps] = {}
+    for spec, maps in each_run(_map_run, specs, jobs=jobs):
+        found[spec.run_id] = maps
+        if advance is not None:
+            advance(sum(spec.robot_ticks for spec in specs if spec.run_id in found))
     made: dict[str, list[FloorMaps]] = {}
-    found = map_runs(_map_run, specs, jobs=jobs, advance=advance)
-    for spec, maps in zip(specs, found, strict=True):
-        made.setdefault(policy_label(spec.policy), []).append(maps)
+    for spec in specs:
+        made.setdefault(policy_label(spec.policy), []).append(found[spec.run_id])
     return ComparedMaps(maps=tuple(_mean_maps(maps, label) for label, maps in made.items()))
 
 
-def _map_run(spec: RunSpec, tell: Tell | None) -> FloorMaps:
-    """Make a run, for `runs.workers.map_runs`, and return its maps; `tell` is called after every frame."""
-    return floor_maps(record_replay(spec, progress=tell)[0])
+def _map_run(spec: RunSpec) -> FloorMaps:
+    """Make a run and return its maps."""
+    return floor_maps(record_replay(spec)[0])
 
 
 def _sides(side_m: float, n: int, extent_m: float) -> FloatArray:

@@ -20,7 +20,6 @@ from swarm_forage_env.runs.workers import WorkerError, available_cores
 LOCAL = "local"
 CONNECT_WITHIN_S = 30.0
 """How long a scheduler may take to answer, at first and when the connection was lost."""
-TLS_NEEDS = ". An address with tls:// needs certificates: distributed.comm.tls in ~/.config/dask/distributed.yaml."
 
 
 @contextmanager
@@ -45,10 +44,9 @@ def cluster_executor(where: str, workers: int | None = None) -> Iterator[Executo
     if where != LOCAL and workers is not None:
         raise ConfigError(f"Expected no number of workers for a running scheduler, got {workers} for {where}.")
     with ExitStack() as stack:
-        loggers = {name: logging.getLogger(f"distributed.{name}") for name in ("client", "nanny")}
-        for logger in loggers.values():
+        for logger in map(logging.getLogger, ("distributed.client", "distributed.nanny")):
             stack.callback(logger.setLevel, logger.level)
-        loggers["client"].setLevel(logging.CRITICAL)  # the errors below say what it would
+            logger.setLevel(logging.CRITICAL)  # the errors below say what they would
         target: Any = where
         if where == LOCAL:
             with _interrupts_later():
@@ -63,19 +61,17 @@ def cluster_executor(where: str, workers: int | None = None) -> Iterator[Executo
         try:
             client = stack.enter_context(distributed.Client(target, timeout=CONNECT_WITHIN_S))
         except (OSError, RuntimeError, TypeError, ValueError) as error:  # Dask raises all of them of addresses
-            hint = TLS_NEEDS if where.startswith("tls:") else ""
-            raise ConfigError(
-                f"Expected local or the address of a Dask scheduler, got {where!r}: {error}{hint}"
-            ) from error
+            raise ConfigError(f"Expected local or the address of a Dask scheduler, got {where!r}: {error}") from error
         try:
             yield client.get_executor(pure=False)
+        except distributed.KilledWorker as error:
+            raise WorkerError(f"A run killed its workers, most likely because memory ran out: {error}") from error
         except (ClosedClientError, WorkerError) as error:
             if client.status == "running":
                 raise
             raise WorkerError(
                 f"The scheduler of Dask ({where}) does not answer any more: it ended, or its machine cannot be reached."
             ) from error
-        loggers["nanny"].setLevel(logging.ERROR)  # it warns of workers that are slow to leave
 
 
 @contextmanager

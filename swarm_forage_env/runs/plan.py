@@ -1,22 +1,39 @@
-"""Plan: which runs there are. A list of conditions, each a policy in a world, once per seed.
+"""Plan and table: which runs there are, and what they were. Every question is a function of a table.
 
     plan = Plan.product(policy_specs(["crw", "dpo"]), [World(scenario("warehouse_small"))], seeds=(0, 1, 2))
-    table = run_plan(plan)                                   # `runs.runner`
-    seeds, curves = table.curves(plan.conditions[0])
+    table = run_plan(plan)
+    seeds, curves = table.curves(plan.conditions[0], "performance")     # (R,), name -> (R, T)
 
-It is a list and not only a product: policies may have worlds of their own. Studies, scores, predictions, choices, the
-benchmark and the evaluations of a training each write a plan; `runs.runner` makes its runs, and nobody else does.
+A plan is a list of conditions and not only a product: policies may have worlds of their own. Studies, scores, the
+benchmark and the evaluations of a training each write a plan.
 """
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, several, whole
+from swarm_forage_env._internal.wording import counted
+from swarm_forage_env.contract.types import FloatArray
+from swarm_forage_env.policies.registry import policy_label
 from swarm_forage_env.runs.policy_spec import PolicySpec
+from swarm_forage_env.runs.record import Record
+from swarm_forage_env.runs.runner import run_all
 from swarm_forage_env.runs.spec import RunSpec
-from swarm_forage_env.wrappers.world import World
+from swarm_forage_env.runs.store import DONE, RunFailure, failure_lines, load, state_of
+from swarm_forage_env.scenarios.differences import preset_of
+from swarm_forage_env.wrappers.world import UNDISTURBED, World
+
+if TYPE_CHECKING:
+    import polars as pl
+
+Curves = tuple[tuple[int, ...], dict[str, FloatArray]]
+"""Seeds of the R finished runs, and for each column its values in T intervals, (R, T)."""
 
 
 class Condition(NamedTuple):
@@ -49,11 +66,7 @@ class Plan:
             whole("a seed", seed, at_least=0)
         if len(set(self.seeds)) < len(self.seeds):
             raise ConfigError(f"Expected different seeds, got {', '.join(map(str, self.seeds))}.")
-        _ = self._firsts  # refuses what runs refuse
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return what copies and pickles have; the runs by `id` are no others' than this plan's."""
-        return {"conditions": self.conditions, "seeds": self.seeds}
+        _ = self.robot_ticks  # refuses what runs refuse
 
     @classmethod
     def product(cls, policies: Iterable[PolicySpec], worlds: Sequence[World], seeds: Sequence[int]) -> "Plan":
@@ -73,12 +86,11 @@ class Plan:
 
     def specs_of(self, condition: Condition) -> tuple[RunSpec, ...]:
         """Return the runs of a condition, one per seed."""
-        first = self._firsts.get(id(condition)) or self._first_of(condition, condition.world)
+        first = self._first_of(condition)
         return tuple(replace(first, seed=seed) for seed in self.seeds)
 
-    def _first_of(self, condition: Condition, world: World) -> RunSpec:
-        """The run of a condition with the first seed, in its world with the caches of its policy."""
-        policy = condition.policy
+    def _first_of(self, condition: Condition) -> RunSpec:
+        policy, world = condition
         return RunSpec(
             world=world.with_caches(policy.caches),
             policy=policy.policy,
@@ -86,25 +98,154 @@ class Plan:
             seed=self.seeds[0],
         )
 
-    @cached_property
-    def _firsts(self) -> dict[int, RunSpec]:
-        """The run of each condition with the first seed, by `id`: configurations of users may have no hash."""
-        worlds: dict[tuple[int, str | None], World] = {}  # policies share them, and each costs many checks
-        found: dict[int, RunSpec] = {}
-        for condition in self.conditions:
-            policy, world = condition
-            asked = (id(world), policy.caches)
-            if asked not in worlds:
-                worlds[asked] = world.with_caches(policy.caches)
-            found[id(condition)] = self._first_of(condition, worlds[asked])
-        return found
-
     @property
     def specs(self) -> tuple[RunSpec, ...]:
         """All runs, condition by condition and seed by seed."""
         return tuple(spec for condition in self.conditions for spec in self.specs_of(condition))
 
-    @property
+    @cached_property
     def robot_ticks(self) -> int:
         """Robots times ticks of all runs."""
-        return sum(self._firsts[id(condition)].robot_ticks for condition in self.conditions) * len(self.seeds)
+        return sum(self._first_of(condition).robot_ticks for condition in self.conditions) * len(self.seeds)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Table:
+    """The runs of a plan."""
+
+    plan: Plan
+    records: Mapping[str, Record]
+    """run_id -> record, of the runs that finished."""
+    failures: Mapping[str, RunFailure] = field(default_factory=dict[str, RunFailure])
+    """run_id -> why a run failed."""
+    n_stored: int = 0
+    """How many of the records had been stored before and were not run again."""
+    folder: Path | None = None
+    """Where the records are, None where they are not stored."""
+
+    def of(self, condition: Condition) -> tuple[Record, ...]:
+        """Return the records of a condition, in the order of the seeds; runs that failed are left out.
+
+        They are read with the performance of its world: worlds that differ in that alone share their runs.
+        """
+        ids = (spec.run_id for spec in self.plan.specs_of(condition))
+        performance = condition.world.scenario.performance
+        return tuple(self.records[run_id].read_as(performance) for run_id in ids if run_id in self.records)
+
+    def failure_lines(self, policy: str) -> tuple[str, ...]:
+        """Return why runs of a policy failed, see `store.failure_lines`."""
+        ids = (spec.run_id for condition in self.plan.of_policy(policy) for spec in self.plan.specs_of(condition))
+        return failure_lines(self.failures[run_id] for run_id in ids if run_id in self.failures)
+
+    def curves(self, condition: Condition, *columns: str) -> Curves:
+        """Return the finished runs of a condition as arrays.
+
+        Args:
+            condition: One of the plan.
+            columns: Columns of records; those that its runs do not have are left out. Default all.
+        """
+        records = self.of(condition)
+        if not records:
+            return (), {}
+        names = [name for name in columns or records[0].columns if all(name in record.columns for record in records)]
+        return (
+            tuple(record.seed for record in records),
+            {name: np.stack([record[name] for record in records]).astype(np.float64) for name in names},
+        )
+
+    @cached_property
+    def frame(self) -> "pl.DataFrame":
+        """All records below each other, one row per interval, with the name of the world and the policy."""
+        import polars as pl
+
+        frames = [
+            record.frame.select(pl.lit(policy.label).alias("policy"), pl.lit(world.name).alias("world"), pl.all())
+            for policy, world in self.plan.conditions
+            for record in self.of(Condition(policy, world))
+        ]
+        return pl.concat(frames, how="diagonal") if frames else pl.DataFrame()
+
+
+def run_plan(
+    plan: Plan,
+    *,
+    out: str | Path | None = None,
+    executor: Executor | None = None,
+    jobs: int | None = None,
+    progress: bool = False,
+) -> Table:
+    """Make the runs of a plan and return them as a table.
+
+    Args:
+        plan: What to run. Policies that only this process can build run here, after all others.
+        out: As in `runs.runner.run_all`, and so are all further arguments.
+        executor: Makes the runs.
+        jobs: Processes.
+        progress: Show progress and an estimate on stderr.
+
+    Raises:
+        ValueError: a folder, and a policy without a name by which its runs are found again.
+        Exception: see `run_all`.
+    """
+    unnamed = [policy.label for policy in plan.policies if not policy.is_named]
+    if out is not None and unnamed:
+        raise ValueError(f"Expected name= for the policy {unnamed[0]}, by which its runs in {out} are found again.")
+    made_here = {policy.policy: policy.factory for policy in plan.policies if policy.factory is not None}
+    found = run_all(plan.specs, out=out, executor=executor, jobs=jobs, progress=progress, made_here=made_here)
+    return Table(
+        plan=plan,
+        records=found.records,
+        failures=found.failures,
+        n_stored=found.n_stored,
+        folder=None if out is None else Path(out),
+    )
+
+
+def planned_line(specs: Iterable[RunSpec], out: str | Path) -> str:
+    """Say in one line which runs there would be."""
+    planned = {spec.run_id: spec for spec in specs}
+    todo = [spec for spec in planned.values() if state_of(Path(out), spec) != DONE]
+    robot_ticks = sum(spec.robot_ticks for spec in todo)
+    return (
+        f"{counted(len(planned), 'run')}, {len(planned) - len(todo):,} stored, {len(todo):,} to do with "
+        f"{robot_ticks:.3g} robot-ticks; records go to {out}"
+    )
+
+
+def read_table(folder: str | Path, *, performance: str | None = None) -> Table:
+    """Return the runs that a folder holds as the table that made them; of scores and studies those of the plain world.
+
+    Caches that are not those of the scenario count as the policy's, as in runs of several policies in one world.
+
+    Args:
+        folder: Where records are.
+        performance: What of them is performance; default what each was made for.
+
+    Raises:
+        RecordError: the folder holds no records, or a damaged one.
+        ConfigError: it holds runs of several lengths, or of disturbed worlds only.
+    """
+    plain = [record for record in load(folder) if record.spec.world.criterion == UNDISTURBED]
+    if performance is not None:
+        plain = [record.read_as(performance) for record in plain]
+    if not plain:
+        raise ConfigError(f"Expected runs of a world in which nothing is varied in {folder}, got none.")
+    lengths = sorted({(record.spec.scenario.horizon_s, record.spec.scenario.interval_s) for record in plain})
+    if len(lengths) > 1:
+        told = ", ".join(f"{horizon_s:g} s in intervals of {interval_s:g} s" for horizon_s, interval_s in lengths)
+        raise ConfigError(f"Expected runs of one length in {folder}, got {told}; make folders of their own by --out.")
+    conditions: list[Condition] = []
+    for condition in (_condition_of(record.spec) for record in plain):
+        if condition not in conditions:  # wrappers of users may have no hash
+            conditions.append(condition)
+    plan = Plan(conditions=tuple(conditions), seeds=tuple(sorted({record.seed for record in plain})))
+    records = {record.run_id: record for record in plain}
+    return Table(plan=plan, records=records, n_stored=len(records), folder=Path(folder))
+
+
+def _condition_of(spec: RunSpec) -> Condition:
+    """Return the condition that a run is of."""
+    preset = preset_of(spec.scenario)
+    own, caches = spec.scenario.caches, "none" if preset is None else preset.caches
+    policy = PolicySpec(label=policy_label(spec.policy), policy=spec.policy, parameters=spec.parameters, caches=own)
+    return Condition(policy, spec.world.with_caches(caches))

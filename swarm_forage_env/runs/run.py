@@ -6,7 +6,7 @@
 import time
 from collections.abc import Iterable
 from datetime import UTC, datetime
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from swarm_forage_env.contract.kernel_policy import CompiledPolicy
 from swarm_forage_env.contract.policy import Policy, sees_world
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
-from swarm_forage_env.runs.record import RunRecord
+from swarm_forage_env.runs.record import Record
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.versions import software_versions
 from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -120,7 +120,7 @@ def build_stack(
     return RunRecorder(build_env(scenario, wrappers, reads=reads))
 
 
-def run_policy(policy: Policy, spec: RunSpec) -> RunRecord:
+def run_policy(policy: Policy, spec: RunSpec) -> Record:
     """Drive a policy object through the run that `spec` describes.
 
     This is for policies without a registered name, such as a closure over a trained model. `spec.policy` is then only
@@ -134,7 +134,7 @@ def run_policy(policy: Policy, spec: RunSpec) -> RunRecord:
     recorder = build_stack(spec.scenario, spec.wrappers, reads=getattr(policy, "reads", None))
     LiveRun(recorder, policy, spec.seed).advance()
     recorder.close()
-    return finished_record(recorder, spec, started)
+    return record_of_run(recorder, spec, started)
 
 
 class Started(NamedTuple):
@@ -154,7 +154,7 @@ class Started(NamedTuple):
         return time.perf_counter() - self.wall_s, time.process_time() - self.cpu_s
 
 
-def finished_record(recorder: RunRecorder, spec: RunSpec, started: Started) -> RunRecord:
+def record_of_run(recorder: RunRecorder, spec: RunSpec, started: Started) -> Record:
     """Return the record of a run that has ended.
 
     Args:
@@ -162,29 +162,17 @@ def finished_record(recorder: RunRecorder, spec: RunSpec, started: Started) -> R
         spec: The run.
         started: When it began.
     """
-    columns: dict[str, Any] = recorder.columns()
     wall_time_s, cpu_time_s = started.spent_s()
     origin = {
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "wall_time_s": f"{wall_time_s:.3f}",
         "cpu_time_s": f"{cpu_time_s:.3f}",
     }
-    return RunRecord(
-        run_id=spec.run_id,
-        scenario=spec.scenario.name,
-        controller=spec.policy,
-        n_robots=spec.scenario.robots.n_robots,
-        criterion=spec.world.criterion,
-        criterion_value=spec.world.value,
-        seed=spec.seed,
-        **columns,
-        contributed=recorder.contributed(),
-        spec=spec.to_json(),
-        provenance=software_versions() | origin,
-    )
+    columns = {**recorder.contributed(), **recorder.columns()}
+    return Record(spec=spec, columns=columns, made_with=software_versions() | origin)
 
 
-def run_one(spec: RunSpec) -> RunRecord:
+def run_one(spec: RunSpec) -> Record:
     """Run a specification. The result depends only on `spec`, the machine and the installed versions.
 
     Raises:

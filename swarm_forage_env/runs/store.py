@@ -1,34 +1,27 @@
-"""RunStore: a folder with one file per finished run, and one per failed run.
+"""A folder of runs: one file per finished run, and one per failed run.
 
-    <folder>/<run_id>.parquet         a RunRecord
+    <folder>/<run_id>.parquet         a Record
     <folder>/failures/<run_id>.json   a RunFailure; gone once the run succeeds
 
 Every file appears whole or not at all, so a folder can be read at any time. Several commands may write to one folder:
 runs of one specification have equal results, so it does not matter whose file stays.
 """
 
-import errno
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import suppress
-from dataclasses import dataclass, field
+import traceback
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import parse_json, replacing
-from swarm_forage_env.runs.record import RecordError, RunRecord
+from swarm_forage_env.runs.record import Record, RecordError
 from swarm_forage_env.runs.spec import RunSpec
-from swarm_forage_env.runs.versions import software_versions
 
 DONE, FAILED, MISSING = "done", "failed", "missing"
 STATES = (DONE, FAILED, MISSING)
 """What a planned run is: recorded; tried in vain; not there, or its file is damaged."""
-FAILURES = "failures"
-"""Name of the sub-folder for failed runs."""
-DAMAGED = ".damaged"
-"""What is added to the name of a file that cannot be used when its run is made again."""
-_WAY_OUT = "Move the file away, and its run will be made again."
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -45,152 +38,71 @@ class RunFailure:
         """Identity of the run that failed."""
         return self.spec.run_id
 
-
-def failed_alike(failures: Iterable[RunFailure]) -> tuple[tuple[RunFailure, ...], ...]:
-    """Return runs that failed, those together that a policy failed in for one reason."""
-    found: dict[tuple[str, ...], list[RunFailure]] = {}
-    for failure in failures:
-        policy, given = failure.spec.policy, json.dumps(failure.spec.parameters, sort_keys=True)
-        found.setdefault((policy, given, failure.error), []).append(failure)
-    return tuple(map(tuple, found.values()))
-
-
-def failure_lines(failures: Iterable[RunFailure]) -> tuple[str, ...]:
-    """Return why runs failed, a line per policy and reason: one that cannot run at all fails in all runs alike."""
-    return tuple(_failure_line(*alike) for alike in failed_alike(failures))
+    @classmethod
+    def of(cls, spec: RunSpec, error: BaseException) -> "RunFailure":
+        """Return the failure of a run that raised an error."""
+        reason = str(error).splitlines()
+        kind = MemoryError if isinstance(error, MemoryError) else type(error)  # numpy has a kind of its own
+        return cls(
+            spec=spec,
+            error=f"{kind.__name__}: {reason[0] if reason else 'no message'}",
+            traceback="".join(traceback.format_exception(error)).rstrip(),
+        )
 
 
-def _failure_line(first: RunFailure, *others: RunFailure) -> str:
-    more = f", and {len(others):,} more of its runs" if others else ""
-    return f"{first.spec.describe()}{more}: {first.error}"
+def record_file(folder: Path, run_id: str) -> Path:
+    """Return where the record of a run is."""
+    return folder / f"{run_id}.parquet"
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class StoredRuns:
-    """What a store holds of planned runs."""
-
-    states: Mapping[str, str] = field(default_factory=dict[str, str])
-    """run_id -> one of `STATES`, of every planned run."""
-    records: Mapping[str, RunRecord] = field(default_factory=dict[str, RunRecord])
-    """run_id -> record, read with the performance that its specification asks for."""
-    damaged: Mapping[str, str] = field(default_factory=dict[str, str])
-    """run_id of a run whose file cannot be used -> why; it counts as missing."""
-    n_foreign: int = 0
-    """Runs that other code or other versions of the packages made."""
+def failure_file(folder: Path, run_id: str) -> Path:
+    """Return where the failure of a run is, if it failed."""
+    return folder / "failures" / f"{run_id}.json"
 
 
-class RunStore:
-    """Records and failures in a folder; the folder is created by the first write."""
+def store(folder: Path, result: Record | RunFailure) -> None:
+    """Write what became of a run. A record ends the failure of an earlier try."""
+    run_id = result.spec.run_id
+    failure = failure_file(folder, run_id)
+    if isinstance(result, Record):
+        folder.mkdir(parents=True, exist_ok=True)
+        result.write(record_file(folder, run_id))
+        failure.unlink(missing_ok=True)
+        return
+    content = {
+        "run": result.spec.describe(),
+        "error": result.error,
+        "rerun": f"swarm-forage rerun {failure}",
+        "traceback": result.traceback.splitlines(),
+        "spec": result.spec.to_mapping(),
+    }
+    with replacing(failure) as draft:
+        draft.write_text(json.dumps(content, indent=1), encoding="utf-8")
 
-    def __init__(self, folder: str | os.PathLike[str]) -> None:
-        """Use `folder`.
 
-        Raises:
-            NotADirectoryError: there is a file of that name.
-        """
-        self.folder = Path(folder)
-        if self.folder.exists() and not self.folder.is_dir():
-            raise NotADirectoryError(errno.ENOTDIR, "Expected a folder for run records, got a file", str(self.folder))
+def stored_record(folder: Path, spec: RunSpec) -> Record | None:
+    """Return the record of a run with the performance that its specification asks for; None if there is none.
 
-    def path(self, run_id: str) -> Path:
-        """Return where the record of a run is, or would be."""
-        return self.folder / f"{run_id}.parquet"
+    Raises:
+        RecordError: the file is damaged, or holds another run than its name says.
+    """
+    file = record_file(folder, spec.run_id)
+    if not file.exists():
+        return None
+    record = Record.read(file)
+    if record.run_id != spec.run_id:
+        raise RecordError(f"Expected {file} to hold run {spec.run_id}, got run {record.run_id}; was it renamed?")
+    return record.read_as(spec.scenario.performance)
 
-    def failure_path(self, run_id: str) -> Path:
-        """Return where the failure of a run is, or would be."""
-        return self.folder / FAILURES / f"{run_id}.json"
 
-    def __contains__(self, run_id: str) -> bool:
-        return self.path(run_id).is_file()
-
-    def run_ids(self) -> tuple[str, ...]:
-        """Return the ids of all finished runs, sorted."""
-        return tuple(sorted(file.stem for file in self.folder.glob("*.parquet") if not file.name.startswith(".")))
-
-    def read(self, run_id: str) -> RunRecord:
-        """Return a stored record.
-
-        Raises:
-            RecordError: the file is missing, damaged, no record, or holds another run than its name says.
-        """
-        path = self.path(run_id)
-        try:
-            record = RunRecord.read(path)
-        except RecordError as error:
-            raise RecordError(f"{error} {_WAY_OUT}" if path.exists() else str(error)) from error
-        if record.run_id != run_id:
-            raise RecordError(
-                f"Expected {path} to hold run {run_id}, got run {record.run_id}; was the file renamed? {_WAY_OUT}"
-            )
-        return record
-
-    def look_up(self, planned: Iterable[RunSpec], *, keep: bool = True) -> StoredRuns:
-        """Read the files of planned runs and say what is there.
-
-        Args:
-            planned: The runs.
-            keep: Return the records, too.
-        """
-        states: dict[str, str] = {}
-        records: dict[str, RunRecord] = {}
-        damaged: dict[str, str] = {}
-        n_foreign = 0
-        versions = software_versions()
-        for spec in planned:
-            run_id = spec.run_id
-            states[run_id] = MISSING
-            if run_id in self:
-                try:
-                    record = self.read(run_id)
-                except RecordError as error:
-                    damaged[run_id] = str(error).removesuffix(f" {_WAY_OUT}")  # whoever asks does
-                    continue
-                states[run_id] = DONE
-                n_foreign += not record.made_by(versions)
-                if keep:
-                    records[run_id] = record.read_as(spec.scenario.performance)
-            elif self.failure_path(run_id).exists():
-                states[run_id] = FAILED
-        return StoredRuns(states=states, records=records, damaged=damaged, n_foreign=n_foreign)
-
-    def write(self, record: RunRecord) -> None:
-        """Store a record; an earlier failure of the same run is removed."""
-        self.folder.mkdir(parents=True, exist_ok=True)
-        record.write(self.path(record.run_id))
-        self.failure_path(record.run_id).unlink(missing_ok=True)
-
-    def put_aside(self, run_id: str) -> None:
-        """Rename a damaged file, so that nothing is lost by making its run again."""
-        path = self.path(run_id)
-        with suppress(FileNotFoundError):  # another command has done it
-            path.replace(path.with_suffix(f"{path.suffix}{DAMAGED}"))
-
-    def write_failure(self, failure: RunFailure) -> None:
-        """Store why a run failed, with the command that runs it again."""
-        path = self.failure_path(failure.run_id)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        content = {
-            "run": failure.spec.describe(),
-            "error": failure.error,
-            "rerun": f"swarm-forage rerun {path}",
-            "traceback": failure.traceback.splitlines(),
-            "spec": failure.spec.to_mapping(),
-        }
-        with replacing(path) as draft:
-            draft.write_text(json.dumps(content, indent=1), encoding="utf-8")
-
-    def records(self) -> Iterator[RunRecord]:
-        """Read all records, in the order of their ids; raises as `read`."""
-        return (self.read(run_id) for run_id in self.run_ids())
-
-    def failures(self) -> tuple[RunFailure, ...]:
-        """Return the runs that failed and have not succeeded since.
-
-        Raises:
-            RecordError: a file in the failures folder is no failure.
-        """
-        files = sorted((self.folder / FAILURES).glob("*.json"))
-        return tuple(read_failure(file) for file in files if not file.name.startswith("."))
+def state_of(folder: Path, spec: RunSpec) -> str:
+    """Return the state of a run, one of `STATES`."""
+    try:
+        if stored_record(folder, spec) is not None:
+            return DONE
+    except RecordError:
+        return MISSING
+    return FAILED if failure_file(folder, spec.run_id).exists() else MISSING
 
 
 def read_failure(path: str | os.PathLike[str]) -> RunFailure:
@@ -209,14 +121,29 @@ def read_failure(path: str | os.PathLike[str]) -> RunFailure:
         raise RecordError(f"Cannot read {path}: it is no failure of a run ({error}).") from error
 
 
-def load(folder: str | os.PathLike[str]) -> tuple[RunRecord, ...]:
+def load(folder: str | os.PathLike[str]) -> tuple[Record, ...]:
     """Return all records in a folder, in the order of their ids.
 
     Raises:
         RecordError: the folder holds no records, or a Parquet file in it is damaged or no record; the message names it.
     """
-    store = RunStore(folder)
-    records = tuple(store.records())
-    if not records:
-        raise RecordError(f"Expected run records (*.parquet) in {store.folder}, found none.")
-    return records
+    files = sorted(file for file in Path(folder).glob("*.parquet") if not file.name.startswith("."))
+    if not files:
+        raise RecordError(f"Expected run records (*.parquet) in {folder}, found none.")
+    return tuple(map(Record.read, files))
+
+
+def failed_alike(failures: Iterable[RunFailure]) -> tuple[tuple[RunFailure, ...], ...]:
+    """Return runs that failed, those together that a policy failed in for one reason."""
+    found: dict[tuple[str, ...], list[RunFailure]] = {}
+    for failure in failures:
+        policy, given = failure.spec.policy, json.dumps(failure.spec.parameters, sort_keys=True)
+        found.setdefault((policy, given, failure.error), []).append(failure)
+    return tuple(map(tuple, found.values()))
+
+
+def failure_lines(failures: Iterable[RunFailure]) -> tuple[str, ...]:
+    """Return why runs failed, a line per policy and reason: one that cannot run at all fails in all runs alike."""
+    alike = failed_alike(failures)
+    others = [f", and {len(runs) - 1:,} more of its runs" if len(runs) > 1 else "" for runs in alike]
+    return tuple(f"{runs[0].spec.describe()}{more}: {runs[0].error}" for runs, more in zip(alike, others, strict=True))

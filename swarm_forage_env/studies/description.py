@@ -7,7 +7,7 @@ from typing import Any
 from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.runner import Outcomes
-from swarm_forage_env.runs.store import DONE, FAILED, MISSING, STATES
+from swarm_forage_env.runs.store import DONE, FAILED, MISSING, STATES, failure_file
 from swarm_forage_env.studies.study import StudySpec
 from swarm_forage_env.studies.study_file import PAPER, left_out, left_out_words, load_study, set_names
 from swarm_forage_env.studies.study_folder import StudyFolder
@@ -149,7 +149,7 @@ class StudyOutcome(Answer):
         """Return how many runs are done, and how to make each failed run again."""
         files = [str(file) for file in self._failed()]
         lines = [f"  again, alone: swarm-forage rerun {file}" for file in files[:FAILURES_SHOWN]]
-        numbers = [self.outcomes.count(name) for name in STATES]
+        numbers = self._numbers()
         whole = self.folder.study().n_runs
         lines += _more(len(files))
         lines += [f"The study in this folder has {whole:,} runs in all."] if whole > sum(numbers) else []
@@ -157,12 +157,15 @@ class StudyOutcome(Answer):
 
     def to_mapping(self) -> dict[str, Any]:
         """Return how many runs are in which state, and the files of the failed ones."""
-        counts = {name: self.outcomes.count(name) for name in STATES}
+        counts = dict(zip(STATES, self._numbers(), strict=True))
         return {"folder": str(self.folder.folder), "n_runs": counts, "failed": [str(file) for file in self._failed()]}
 
     def _failed(self) -> list[Any]:
-        failed = [run_id for run_id, state in self.outcomes.states.items() if state == FAILED]
-        return [self.folder.store.failure_path(run_id) for run_id in failed]
+        return [failure_file(self.folder.runs, run_id) for run_id in self.outcomes.failures]
+
+    def _numbers(self) -> tuple[int, int, int]:
+        """How many runs are in each of `STATES`: a call that ends leaves none out."""
+        return self.outcomes.n_done, len(self.outcomes.failures), 0
 
 
 def _more(n_failed: int) -> list[str]:

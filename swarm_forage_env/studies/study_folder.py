@@ -18,9 +18,9 @@ from pathlib import Path
 from swarm_forage_env._internal.fields import ConfigError, whole
 from swarm_forage_env._internal.files import alone_in, parse_json, replacing
 from swarm_forage_env.runs.record import RecordError
-from swarm_forage_env.runs.runner import Outcomes, longest_first, run_specs
+from swarm_forage_env.runs.runner import Outcomes, longest_first, run_all
 from swarm_forage_env.runs.spec import RunSpec
-from swarm_forage_env.runs.store import FAILED, MISSING, STATES, RunStore
+from swarm_forage_env.runs.store import FAILED, MISSING, STATES, state_of
 from swarm_forage_env.studies.study import RULES_NAMES, Place, StudySpec
 
 
@@ -50,7 +50,7 @@ class StudyFolder:
         self.folder = Path(folder)
         if self.folder.exists() and not self.folder.is_dir():
             raise NotADirectoryError(errno.ENOTDIR, "Expected a folder for a study, got a file", str(self.folder))
-        self.store = RunStore(self.folder / "runs")
+        self.runs = self.folder / "runs"
         self.study_file = self.folder / "study.json"
 
     def study(self) -> StudySpec:
@@ -109,9 +109,9 @@ class StudyFolder:
     def place_states(self) -> tuple[PlaceState, ...]:
         """Return how many runs of each condition are in which state."""
         spec = self.study()
-        runs = {place: spec.specs_of(place) for place in spec.places}
-        states = self.store.look_up((run for of in runs.values() for run in of), keep=False).states
-        return tuple(place_state(place, (states[run.run_id] for run in of)) for place, of in runs.items())
+        return tuple(
+            place_state(place, (state_of(self.runs, run) for run in spec.specs_of(place))) for place in spec.places
+        )
 
 
 def place_state(place: Place, states: Iterable[str]) -> PlaceState:
@@ -154,7 +154,7 @@ def run_study(
         spec: The study.
         folder: Folder of the study.
         part: Index from 1 and number of shards; the call makes the runs of this shard only.
-        jobs: As in `runs.runner.run_specs`, like all further arguments.
+        jobs: As in `runs.runner.run_all`, like all further arguments.
         executor: Runs the work instead; the call does not shut it down.
         progress: Show progress, an estimate and damaged files on stderr.
 
@@ -164,12 +164,12 @@ def run_study(
     Raises:
         ConfigError: there is no such shard.
         RecordError: the folder holds another study.
-        RunsInterrupted: Ctrl-C.
+        KeyboardInterrupt: Ctrl-C.
         WorkerError: no worker process could be started.
     """
     planned = shard(spec.plan.specs, *part)
     folder.take(spec)
-    return run_specs(planned, store=folder.store, jobs=jobs, executor=executor, progress=progress, keep=False)
+    return run_all(planned, out=folder.runs, jobs=jobs, executor=executor, progress=progress, keep=False)
 
 
 def parse_shard(word: str) -> tuple[int, int]:

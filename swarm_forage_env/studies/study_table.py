@@ -22,12 +22,21 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import alone_in, parse_json, replacing
 from swarm_forage_env._internal.typed import typed
 from swarm_forage_env.runs.parquet import ParquetError, read_parquet, write_parquet
-from swarm_forage_env.runs.plan import Condition, Plan
-from swarm_forage_env.runs.record import COLUMN_DTYPES, RecordError, RunRecord, record_of
+from swarm_forage_env.runs.plan import Condition, Curves, Plan, Table
+from swarm_forage_env.runs.record import Record, RecordError
 from swarm_forage_env.runs.spec import RunSpec
-from swarm_forage_env.runs.store import DONE, FAILED, FAILURES, MISSING, RunFailure, RunStore, read_failure
-from swarm_forage_env.runs.table import Curves, Table
+from swarm_forage_env.runs.store import (
+    DONE,
+    FAILED,
+    MISSING,
+    RunFailure,
+    failure_file,
+    read_failure,
+    record_file,
+    stored_record,
+)
 from swarm_forage_env.runs.versions import VERSION_NAMES
+from swarm_forage_env.scenarios.columns import INTERVAL_COLUMNS, KEY_COLUMNS
 from swarm_forage_env.studies.study import Place, StudySpec
 from swarm_forage_env.studies.study_folder import PlaceState, StudyFolder, place_state
 
@@ -59,7 +68,7 @@ class StudyTable(Table):
     spec: StudySpec
     frame: "pl.DataFrame" = field()  # pyright: ignore[reportIncompatibleVariableOverride] - here it is given
     """Columns: `study`, `condition` (index in `spec.places`), `rules`, `policy`, one `AXIS` column per axis;
-    the columns of `RunRecord`, null for runs without such a column; `LOSS_COLUMNS`."""
+    the columns of `Record`, null for runs without such a column; `LOSS_COLUMNS`."""
     versions: Versions
     wall_time_s: float | None = None
     """Sum of the times that the finished runs took, by the clock. None if unknown: files leave it out, so that the same
@@ -67,7 +76,7 @@ class StudyTable(Table):
     damaged: tuple[str, ...] = ()
     """Why the table cannot use some files of a folder; their runs count as missing."""
     plan: Plan = field(init=False)
-    records: Mapping[str, RunRecord] = field(init=False)
+    records: Mapping[str, Record] = field(init=False)
     failures: Mapping[str, RunFailure] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -114,7 +123,7 @@ class StudyTable(Table):
         rows = self.rows(condition)
         rows = rows.filter(rows["state"] == DONE)
         seeds = tuple(int(seed) for seed in rows["seed"].unique(maintain_order=True))
-        names = columns or COLUMN_DTYPES
+        names = columns or INTERVAL_COLUMNS
         present = [name for name in names if name in rows.columns and rows[name].null_count() == 0]
         curves = {name: rows[name].to_numpy().astype(np.float64).reshape(len(seeds), -1) for name in present if seeds}
         return seeds, curves
@@ -192,17 +201,14 @@ class StudyTable(Table):
     def _rows_of(self, run_id: str) -> "pl.DataFrame":
         return self.frame.slice(*self._of_run[run_id])
 
-    def _record(self, run_id: str) -> RunRecord:
+    def _record(self, run_id: str) -> Record:
         """The record of a finished run, with the versions of all runs: a table does not say which run has which."""
-        import polars as pl
-
         rows, spec = self._rows_of(run_id), self.spec_of(run_id)
-        here = {"study", "condition", "rules", "policy", *LOSS_COLUMNS, *(AXIS + axis.name for axis in self.spec.axes)}
+        here = {*LOSS_COLUMNS, *KEY_COLUMNS, *_columns(self.spec)}
         kept = [name for name in rows.columns if name not in here and not rows[name].null_count()]
         names = dict.fromkeys(name for made in self.versions for name in made)
         made = {name: " or ".join(dict.fromkeys(made.get(name, "") for made in self.versions)) for name in names}
-        keys = zip(_NOT_KEPT, (run_id, spec.policy), strict=True)
-        return record_of(rows.select(*(pl.lit(value).alias(name) for name, value in keys), *kept), spec.to_json(), made)
+        return Record(spec=spec, columns={name: rows[name].to_numpy() for name in kept}, made_with=made)
 
     def _failure(self, run_id: str) -> RunFailure:
         row = self._rows_of(run_id).row(0, named=True)
@@ -267,16 +273,16 @@ def gather_study(
     for number, place in enumerate(spec.places):
         if places is not None and place not in places:
             continue
-        records: list[RunRecord] = []
+        records: list[Record] = []
         lost: list[dict[str, Any]] = []
         for run in spec.specs_of(place):
-            record = _record(folder.store, run, damaged)
+            record = _record(folder.runs, run, damaged)
             if record is None:
-                lost.append(_loss(folder.store, run))
+                lost.append(_loss(folder.runs, run))
             else:
                 records.append(record)
                 wall_time_s += record.wall_time_s
-                versions.add(tuple((name, record.provenance.get(name, "")) for name in VERSION_NAMES))
+                versions.add(tuple((name, record.made_with.get(name, "")) for name in VERSION_NAMES))
         first = {"study": spec.name, "condition": number, **place_columns(spec, place)}
         rows = pl.concat([_frame(records), _losses(lost)], how="diagonal").sort("seed", "interval")
         frames.append(rows.select(*(pl.lit(value).alias(name) for name, value in first.items()), pl.all()))
@@ -306,7 +312,7 @@ def pack_study(folder: StudyFolder, chosen: Path | None = None, *, tell: Callabl
         OSError: the file cannot be written.
     """
     folder.study()  # a folder without one is refused before anything is made in it
-    with alone_in(folder.store.folder):  # not the folder itself, which shards need in order to begin
+    with alone_in(folder.runs):  # not the folder itself, which shards need in order to begin
         table = gather_study(folder)
         if tell is not None:
             for line in table.damaged_lines:
@@ -358,18 +364,16 @@ def _parsed(told: str) -> Any:
         raise ParquetError(f"its metadata are damaged: {error}") from error
 
 
-def _record(store: RunStore, run: RunSpec, damaged: list[str]) -> RunRecord | None:
+def _record(folder: Path, run: RunSpec, damaged: list[str]) -> Record | None:
     """The record of a run, with the performance that the study asks for; None if it is missing or damaged."""
-    if run.run_id not in store:
-        return None
     try:
-        return store.read(run.run_id).read_as(run.scenario.performance)
+        return stored_record(folder, run)
     except RecordError as error:
         damaged.append(str(error))
         return None
 
 
-def _loss(store: RunStore, run: RunSpec) -> dict[str, Any]:
+def _loss(folder: Path, run: RunSpec) -> dict[str, Any]:
     """The row of a run without a usable record."""
     row: dict[str, Any] = {
         "scenario": run.scenario.name,
@@ -379,11 +383,11 @@ def _loss(store: RunStore, run: RunSpec) -> dict[str, Any]:
         "seed": run.seed,
         "state": MISSING,
     }
-    path = store.failure_path(run.run_id)
-    if run.run_id in store or not path.exists():
+    path = failure_file(folder, run.run_id)
+    if record_file(folder, run.run_id).exists() or not path.exists():
         return row
     failure = read_failure(path)
-    rerun = f"swarm-forage rerun {store.folder.name}/{FAILURES}/{path.name}"
+    rerun = f"swarm-forage rerun {path.relative_to(folder.parent)}"
     return {**row, "state": FAILED, "error": failure.error, "traceback": failure.traceback, "rerun": rerun}
 
 
@@ -396,13 +400,13 @@ def _losses(rows: Sequence[Mapping[str, Any]]) -> "pl.DataFrame":
     return pl.DataFrame(rows, schema=schema)
 
 
-def _frame(records: Sequence[RunRecord]) -> "pl.DataFrame":
+def _frame(records: Sequence[Record]) -> "pl.DataFrame":
     """The rows of one condition's records, which all have the same columns."""
     import polars as pl
 
     if not records:
         return pl.DataFrame()
-    frame = pl.concat([record.to_frame() for record in records]).drop(_NOT_KEPT)
+    frame = pl.concat([record.frame for record in records]).drop(_NOT_KEPT)
     return frame.with_columns(pl.lit(DONE).alias("state"))
 
 
@@ -414,6 +418,6 @@ def _columns(spec: StudySpec) -> list[str]:
 def _in_order(columns: Sequence[str], spec: StudySpec) -> list[str]:
     """Columns in order: address, columns of every record, contributed columns by name, and losses."""
     first = _columns(spec)
-    of_records = [name for name in RunRecord.column_names() if name in columns]
+    of_records = [name for name in (*KEY_COLUMNS, *INTERVAL_COLUMNS) if name in columns]
     contributed = sorted({*columns} - {*first, *of_records, *LOSS_COLUMNS})
     return [*first, *of_records, *contributed, *LOSS_COLUMNS]

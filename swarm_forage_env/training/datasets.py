@@ -34,7 +34,7 @@ from swarm_forage_env.policies.learned import InterfacePolicy
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import build_env
 from swarm_forage_env.runs.spec import RunSpec
-from swarm_forage_env.runs.workers import Tell, map_runs
+from swarm_forage_env.runs.workers import each_run
 
 CARD_FILE = "dataset.json"
 ARRAYS = ("observations", "actions", "rewards", "terminated", "truncated", "active")
@@ -165,8 +165,8 @@ def record_dataset(
         observation: "full" or "compact": what is recorded instead of what a learned policy sees, or of "full".
         site_memory: Whether the columns of `InterfaceConfig.site_memory` are recorded; None = those that a learned
             policy sees, none for others.
-        jobs: As in `runs.workers.map_runs`, and so is `advance`.
-        advance: Called with the robot-ticks that are done.
+        jobs: As in `runs.workers.each_run`.
+        advance: Called with the robot-ticks that are done when a run ends.
 
     Raises:
         ConfigError: seeds that are no different whole numbers, or an unknown kind of observation.
@@ -196,8 +196,10 @@ def record_dataset(
         with replacing(folder / CARD_FILE) as draft:
             draft.write_text(json.dumps(card, indent=1), encoding="utf-8")
         todo = [replace(spec, seed=seed) for seed in seeds if not _file(folder, seed).exists()]
-        for _ in map_runs(partial(_keep, config, folder), todo, jobs=jobs, advance=advance):
-            pass
+        made = each_run(partial(_keep, config, folder), todo, jobs=jobs)
+        for n_made, _ in enumerate(made, 1):
+            if advance is not None:
+                advance(n_made * spec.robot_ticks)
     return len(todo)
 
 
@@ -217,15 +219,15 @@ def _interface_of(
     return replace(config, **{name: value for name, value in chosen.items() if value is not None})
 
 
-def _keep(config: InterfaceConfig, folder: Path, spec: RunSpec, tell: Tell | None) -> None:
-    steps = record_steps(spec, config, tell)
+def _keep(config: InterfaceConfig, folder: Path, spec: RunSpec) -> None:
+    steps = record_steps(spec, config)
     arrays: dict[str, Any] = {name: getattr(steps, name) for name in ARRAYS}
     with replacing(_file(folder, spec.seed), ending=".tmp") as draft, draft.open("wb") as file:
         np.savez_compressed(file, **arrays)
 
 
-def record_steps(spec: RunSpec, config: InterfaceConfig, tell: Tell | None = None) -> Steps:
-    """Make a run and return what its robots saw and did; `tell` hears of ticks that are done and of all."""
+def record_steps(spec: RunSpec, config: InterfaceConfig) -> Steps:
+    """Make a run and return what its robots saw and did."""
     policy = load_policy(spec.policy, spec.parameters)
     env = build_env(spec.scenario, spec.wrappers, reads=None)
     world = env.unwrapped
@@ -258,8 +260,6 @@ def record_steps(spec: RunSpec, config: InterfaceConfig, tell: Tell | None = Non
         found["truncated"].append(~dead & truncated)
         gone = dead.copy()
         see(config.decisions_in(world.tick))
-        if tell is not None:
-            tell(world.tick, world.max_cycles)
     env.close()
     arrays: dict[str, Any] = {name: np.array(rows) for name, rows in found.items()}
     return Steps(seed=spec.seed, **arrays)

@@ -15,10 +15,8 @@ import numpy as np
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env.policies.network import Network
-from swarm_forage_env.runs.plan import Condition, Plan
+from swarm_forage_env.runs.plan import Condition, Plan, Table, run_plan
 from swarm_forage_env.runs.policy_spec import PolicySpec, policy_spec
-from swarm_forage_env.runs.runner import run_plan
-from swarm_forage_env.runs.table import Table
 from swarm_forage_env.training.evaluation_plan import ALL_WORLDS, BEST, CHOSEN_BY, EvaluationPlan, EvaluationWorld
 from swarm_forage_env.training.plan import TrainingPlan, read_plan
 from swarm_forage_env.wrappers.world import World
@@ -89,7 +87,7 @@ Baselines: TypeAlias = Mapping[str, tuple[str, float]]
 
 
 def finished_runs(plan: Plan, *, jobs: int | None = 1, progress: bool = False) -> Table:
-    """Make the runs of a plan, all of them; arguments as in `runs.runner.run_plan`.
+    """Make the runs of a plan, all of them; arguments as in `runs.plan.run_plan`.
 
     Raises:
         ConfigError: a run failed.
@@ -158,8 +156,8 @@ def known_baselines(plan: TrainingPlan, evaluation: Evaluation) -> dict[str, tup
 def means(table: Table, condition: Condition) -> tuple[float, float]:
     """Return performance per 1,000 s and interference of a policy in a world, means over its runs."""
     records = table.of(condition)
-    performance = np.mean([record.rate_per_1000_s("performance") for record in records])
-    return float(performance), float(np.mean([record.interference_fraction.mean() for record in records]))
+    performance = np.mean([record.per_1000_s("performance") for record in records])
+    return float(performance), float(np.mean([record["interference_fraction"].mean() for record in records]))
 
 
 def judged(table: Table, policy: str, baselines: Baselines) -> tuple[WorldEvaluation, ...]:

@@ -134,7 +134,7 @@ def test_objects_come_home_round_a_wide_wall(policy, caches):
     """Without detours hardly an object does: light and avoidance cancel before the wall."""
     walled = scenario("warehouse_small", n_robots=20, horizon_s=3000.0, obstacles=((7.0, 3.0, 7.4, 13.0),))
     delivered = [
-        run_one(plan_run(walled, policy, seed=1, caches=caches, parameters=parameters)).performance.sum()
+        run_one(plan_run(walled, policy, seed=1, caches=caches, parameters=parameters))["performance"].sum()
         for parameters in ({}, {"detour_after_s": 10_000.0})
     ]
     assert delivered[0] >= 2 > delivered[1]

@@ -68,7 +68,7 @@ def test_memory_pays():
 def test_cpfa_forages_in_either_engine_while_robots_die(physics):
     world = scenario("warehouse_medium", n_robots=50, horizon_s=400.0, physics=physics)
     spec = plan_run(world, "cpfa", wrappers=[parse_wrapper("population:death_per_tick=0.0005")], seed=1)
-    one, again = run_one(spec).columns(), run_one(spec).columns()
+    one, again = run_one(spec).columns, run_one(spec).columns
     assert one["n_active"][-1] < 50
     assert one["collected"].sum() > 20
     for name, values in one.items():

@@ -14,8 +14,7 @@ import pytest
 
 from swarm_forage_env.policies import pretrained
 from swarm_forage_env.policies.registry import POLICIES, RandomPolicy
-from swarm_forage_env.runs.record import RunRecord
-from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.runs.record import Record
 from swarm_forage_env.runs.store import load
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES
 
@@ -65,8 +64,8 @@ def test_json_is_the_only_thing_on_stdout(command):
     assert [run["seed"] for run in answer["runs"]] == [0, 1]
     (summary,) = answer["controllers"]
     assert (summary["controller"], summary["caches"], summary["n_runs"]) == ("random", "none", 2)
-    record = RunRecord.read(answer["runs"][0]["file"])
-    assert answer["runs"][0]["first_pickups_per_1000_s"] == record.rate_per_1000_s("first_picked")
+    record = Record.read(answer["runs"][0]["file"])
+    assert answer["runs"][0]["first_pickups_per_1000_s"] == record.per_1000_s("first_picked")
 
 
 def test_a_dry_run_plans_and_touches_nothing(command):
@@ -92,7 +91,7 @@ def test_a_density_chooses_the_arena(command):
     words = ("run", "random", "--robots", "20", "--set", "density=0.05", "--horizon", "4", "--jobs", "1")
     assert command(*words, "--set", "interval_s=2")[0] == 0
     (record,) = load(Path("results/warehouse_small_20_robots_4_s_c12cf6"))
-    arena = RunSpec.from_json(record.spec).scenario.arena
+    arena = record.spec.scenario.arena
     assert (arena.width_m, arena.height_m) == (28.4, 14.2)  # 400 m^2 = 2 a^2 with a = 14.14 m
 
 
@@ -100,7 +99,7 @@ def test_wrappers_disturb_the_run_and_are_part_of_its_record(command):
     words = ("--wrapper", "actuator_noise:sigma=0.1", "--wrapper", "throttle:waveform=constant,amplitude=0.2")
     code, out, _ = command(*RUN, *words, "--json")
     assert code == 0
-    record = RunRecord.read(json.loads(out)["runs"][0]["file"])
+    record = Record.read(json.loads(out)["runs"][0]["file"])
     assert record.adversity.tolist() == pytest.approx([0.2, 0.2])
     assert "4 s, with throttle: robots lose 20 % of their speed, wheel noise: sigma 0.1" in command(*RUN, *words)[1]
     assert [wrapper["wrapper"] for wrapper in json.loads(record.spec)["wrappers"]] == ["throttle", "actuator_noise"]
@@ -137,7 +136,7 @@ def test_rerun_compares_with_the_record(command):
 def test_rerun_notices_a_difference(command, monkeypatch):
     command(*RUN)
     (file,) = Path("results/warehouse_small_3_robots_4_s_33b9a3").glob("*.parquet")
-    monkeypatch.setattr(RunRecord, "same_results", lambda *_: False)
+    monkeypatch.setattr(Record, "equals", lambda *_: False)
     code, _, err = command("rerun", str(file))
     assert code == 1
     assert "the results differ" in err

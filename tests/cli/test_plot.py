@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from metrics.scoring.summary import summarize_runs
-from swarm_forage_env.runs.table import read_table
+from swarm_forage_env.runs.plan import read_table
 
 RUNS = ("--robots", "3", "--set", "n_objects=20", "--set", "interval_s=2", "--horizon", "4", "--jobs", "1")
 

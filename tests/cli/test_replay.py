@@ -5,7 +5,7 @@ from pathlib import Path
 
 from swarm_forage_env.inspect.replay.files import read_replays
 from swarm_forage_env.policies import pretrained
-from swarm_forage_env.runs.record import RunRecord
+from swarm_forage_env.runs.record import Record
 
 SHORT = ("--robots", "3", "--seconds", "4")
 
@@ -36,7 +36,7 @@ def test_replay_shows_runs_of_one_world_and_seed_side_by_side(command):
 def test_replay_makes_a_stored_run_again(command):
     assert command("run", "dpo", "--robots", "3", "--horizon", "200", "--jobs", "1")[0] == 0
     (file,) = Path("results/warehouse_small_3_robots_200_s").glob("*.parquet")
-    stored = RunRecord.read(file)
+    stored = Record.read(file)
     code, out, err = command("replay", str(file))
     assert (code, err) == (0, "")
     (replay,) = read_replays(out.split()[1])

@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 
 from swarm_forage_env.policies.registry import RandomPolicy
-from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import load
 from swarm_forage_env.studies.ladders import BUDGETS, Budget
 
@@ -53,7 +52,7 @@ def test_sizes_keep_a_density_if_asked(command):
     code, _, _ = command("score", "random", "--jobs", "1", "--budget", "tiny", *words)
     assert code == 0
     arenas = {
-        (record.n_robots, RunSpec.from_json(record.spec).scenario.arena.width_m)
+        (record.spec.world.n_robots, record.spec.scenario.arena.width_m)
         for record in load(Path("results/warehouse_small_20_robots_9db01d"))
     }
     assert arenas == {(1, 28.4), (20, 28.4)}

@@ -99,7 +99,7 @@ def test_an_interrupt_keeps_what_is_done(written, monkeypatch):
     def interrupted(*args, **options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(runner, "run_each", interrupted)
+    monkeypatch.setattr(runner, "run_one", interrupted)
     code, _, err = written(*RUN)
     assert code == 130
     assert f"in {FOLDER}; the same command does the rest" in err

@@ -10,7 +10,7 @@ import pytest
 from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.spec import RunSpec
-from swarm_forage_env.runs.store import RunFailure, RunStore
+from swarm_forage_env.runs.store import RunFailure, failure_file, store
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.world import World
 
@@ -49,9 +49,8 @@ def test_a_typed_model_is_opened(command, model):
 
 def test_a_failure_that_names_a_model_is_refused(command, model, tmp_path):
     spec = RunSpec(world=World(scenario("warehouse_small", n_robots=2, n_objects=10)), policy=str(model))
-    store = RunStore(tmp_path / "store")
-    store.write_failure(RunFailure(spec=spec, error="e", traceback="t"))
-    code, _, err = command("rerun", str(store.failure_path(spec.run_id)))
+    store(tmp_path / "store", RunFailure(spec=spec, error="e", traceback="t"))
+    code, _, err = command("rerun", str(failure_file(tmp_path / "store", spec.run_id)))
     assert code == 2
     assert "which you did not name yourself" in err
     assert "swarm-forage --trust-models and the same words again" in err
@@ -81,9 +80,8 @@ def test_a_study_that_names_a_model_is_refused(command, model, tmp_path):
 def test_the_option_opens_what_a_file_names(command, model, tmp_path):
     pytest.importorskip("stable_baselines3")
     spec = RunSpec(world=World(scenario("warehouse_small", n_robots=2, n_objects=10)), policy=str(model))
-    store = RunStore(tmp_path / "store")
-    store.write_failure(RunFailure(spec=spec, error="e", traceback="t"))
-    code, _, _ = command("--trust-models", "rerun", str(store.failure_path(spec.run_id)))
+    store(tmp_path / "store", RunFailure(spec=spec, error="e", traceback="t"))
+    code, _, _ = command("--trust-models", "rerun", str(failure_file(tmp_path / "store", spec.run_id)))
     assert (code, Path("owned").exists()) == (1, True)  # it holds no model, so the run fails again
 
 

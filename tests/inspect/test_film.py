@@ -202,7 +202,7 @@ def test_a_film_shows_the_run_that_its_name_promises(filmed, tmp_path, monkeypat
     counters = filmed[-1][3] - filmed[0][3]  # a static cache is counted when the world is made
     assert counters[Counter.FREE_PICKUPS] > 0
     for name, counter in TOTALS.items():
-        assert counters[counter] == record.columns()[name].sum(), name
+        assert counters[counter] == record[name].sum(), name
 
 
 def test_a_run_that_is_over_stays_as_it_ended(filmed, tmp_path):

@@ -69,7 +69,7 @@ def test_a_run_that_nobody_touches_is_that_of_run_one(policy, wrappers):
     frame = look_after(session, clock, 4.1)
     assert (frame["time_s"], frame["over"]) == (400.0, True)
     record = run_one(plan_run(World(SMALL, wrappers), policy, seed=3))
-    assert counted(frame) == int(record.collected.sum()) > 0
+    assert counted(frame) == int(record["collected"].sum()) > 0
     assert frame["changes"] == []
 
 

@@ -79,10 +79,10 @@ def test_a_replay_does_not_change_the_record(policy, wrappers, physics):
     spec = spec_of(policy, wrappers, physics=physics)
     kept, record = record_replay(spec, frame_s=0.6)
     assert record is not None
-    assert record.same_results(run_one(spec))
+    assert record.equals(run_one(spec))
     assert kept.ticks.tolist() == [*range(0, 400, 3), 400]
     for name, counter in TOTALS.items():
-        assert kept.counters[-1, counter] == record.columns()[name].sum(), name
+        assert kept.counters[-1, counter] == record[name].sum(), name
 
 
 def test_frames_show_the_run_within_half_a_step(tmp_path, monkeypatch):

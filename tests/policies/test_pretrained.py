@@ -37,7 +37,7 @@ def test_shipped_policies_run_by_name_without_torch():
         "from swarm_forage_env.runs.run import run_one\n"
         "from swarm_forage_env.runs.spec import plan_run\n"
         "world = warehouse_small(n_robots=5, horizon_s=20.0, interval_s=20.0)\n"
-        f"print(*(run_one(plan_run(world, name, seed=1)).controller for name in {(*SHIPPED,)}))"
+        f"print(*(run_one(plan_run(world, name, seed=1)).spec.policy for name in {(*SHIPPED,)}))"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert result.stdout.split() == [*SHIPPED], result.stderr
@@ -46,7 +46,7 @@ def test_shipped_policies_run_by_name_without_torch():
 def test_ppo_warehouse_small_forages_better_than_the_random_walk():
     world = warehouse_small(horizon_s=1000.0)
     delivered = {
-        name: run_one(plan_run(world, name, seed=5)).collected.sum() for name in ("crw", "ppo_warehouse_small")
+        name: run_one(plan_run(world, name, seed=5))["collected"].sum() for name in ("crw", "ppo_warehouse_small")
     }
     assert delivered["ppo_warehouse_small"] > 2 * delivered["crw"] > 0
 
@@ -54,7 +54,7 @@ def test_ppo_warehouse_small_forages_better_than_the_random_walk():
 def test_a_run_with_it_is_reproducible():
     world = warehouse_small(n_robots=10, horizon_s=60.0, interval_s=20.0)
     first, second = (run_one(plan_run(world, "ppo_warehouse_small", seed=3)) for _ in range(2))
-    assert first.same_results(second)
+    assert first.equals(second)
 
 
 def test_it_is_made_for_a_world_without_caches():

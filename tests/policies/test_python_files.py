@@ -11,7 +11,7 @@ import pytest
 from swarm_forage_env.policies.model_files import ModelError
 from swarm_forage_env.policies.python_files import PythonFileError, classes_of
 from swarm_forage_env.policies.registry import file_of, is_policy_file, load_policy, policy_label, split_class
-from swarm_forage_env.runs.runner import run_specs
+from swarm_forage_env.runs.runner import run_all
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import scenario
 
@@ -96,9 +96,9 @@ def test_another_process_finds_it(file):
     world = scenario("warehouse_small", n_robots=2, n_objects=10, horizon_s=2.0, interval_s=1.0)
     specs = [plan_run(world, "mine.py:Ahead", seed=seed) for seed in (1, 2)]
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as executor:
-        result = run_specs(specs, executor=executor)
+        result = run_all(specs, executor=executor)
     assert [failure.error for failure in result.failures.values()] == []
-    assert [record.controller for record in result.records.values()] == [f"{file}:Ahead"] * 2
+    assert [record.spec.policy for record in result.records.values()] == [f"{file}:Ahead"] * 2
 
 
 @pytest.mark.parametrize(

@@ -35,7 +35,7 @@ def run_all(blocks, page):
 def test_python_examples_run(page, tmp_path, monkeypatch):
     """The examples of a page run one after the other, as a user would type them, without any extra."""
     # Processes take longer to start than these runs.
-    monkeypatch.setattr(workers, "_run_in_pool", lambda todo, _: workers._run_here(todo))
+    monkeypatch.setattr(workers, "processes_of", lambda *_: 1)
     monkeypatch.chdir(tmp_path)
     run_all([block for needs, block in examples(page) if not needs], page)
 

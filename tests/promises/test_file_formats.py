@@ -4,7 +4,6 @@ import json
 import shutil
 
 import numpy as np
-import polars as pl
 import pytest
 
 from metrics.benchmark import BenchmarkError, load_protocol, read_entry
@@ -12,23 +11,13 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.inspect.replay.files import FORMAT_VERSION, read_replays
 from swarm_forage_env.inspect.replay.frames import ReplayError
 from swarm_forage_env.policies.network import Network, NetworkError
-from swarm_forage_env.runs.record import SCHEMA_VERSION, RecordError, RunRecord
+from swarm_forage_env.runs.record import RecordError
 from swarm_forage_env.runs.store import read_failure
 from swarm_forage_env.training.datasets import Dataset, DatasetError
 from swarm_forage_env.training.evaluations import read_evaluations
 from swarm_forage_env.training.plan import read_plan
 from tests.support.entries import TINY
 from tests.support.small_files import small_file
-
-
-@pytest.mark.parametrize("version", [SCHEMA_VERSION - 1, SCHEMA_VERSION + 1])
-def test_a_record_of_another_version_is_refused(tmp_path, version):
-    kept = small_file("record.parquet")
-    stamp = {name: text for name, text in pl.read_parquet_metadata(kept).items() if name.startswith("swarm_forage")}
-    stamp["swarm_forage_env.schema_version"] = str(version)
-    pl.read_parquet(kept).write_parquet(tmp_path / "a.parquet", metadata=stamp)
-    with pytest.raises(RecordError, match=f"it has schema version {version}, .* reads {SCHEMA_VERSION}; read it with"):
-        RunRecord.read(tmp_path / "a.parquet")
 
 
 def test_a_replay_of_another_version_is_refused(tmp_path):

@@ -6,7 +6,7 @@ import pytest
 from metrics import MEASURES, waveform
 from metrics.scoring.curves_file import study_curves
 from metrics.scoring.run_curves import CRITERIA, CURVE_COLUMNS
-from swarm_forage_env.runs.record import RunRecord
+from swarm_forage_env.runs.record import Record
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.presets import scenario
@@ -44,7 +44,7 @@ def test_criteria_have_the_same_names():
 
 
 @pytest.fixture(scope="module")
-def record() -> RunRecord:
+def record() -> Record:
     """A run in which every column that measures read has something in it."""
     wave = Waveform(kind="square", amplitude=0.2, offset=0.2, period_s=4.0)
     population = PopulationConfig(death_per_tick=0.02, malfunction_per_tick=0.3, repair_per_tick=0.3)
@@ -54,12 +54,12 @@ def record() -> RunRecord:
 
 
 def test_arrays_hold_what_the_record_holds(record):
-    (study,) = study_curves(record.to_frame())
+    (study,) = study_curves(record.frame)
     (runs,) = study.experiments
     assert (study.controller, runs.criterion, runs.value, runs.n_robots) == ("random", "throttle", 0.2, 4)
     assert runs.seeds == (3,)
     np.testing.assert_array_equal(study.t_end_s, [3.0, 6.0, 9.0, 12.0])
-    columns = record.columns()
+    columns = record.columns
     assert runs.curves.keys() == {
         name
         for name, column in CURVE_COLUMNS.items()
@@ -70,6 +70,6 @@ def test_arrays_hold_what_the_record_holds(record):
 
 
 def test_conditions_are_the_mean_of_the_waveform_over_each_interval(record):
-    (study,) = study_curves(record.to_frame())
+    (study,) = study_curves(record.frame)
     wave = waveform("square", np.arange(1, 61), frequency=DT_S / 4.0, amplitude=0.2, offset=0.2)
     np.testing.assert_allclose(study.experiments[0].curves["adversity"][0], wave.reshape(4, 15).mean(axis=1))

@@ -13,7 +13,7 @@ import pytest
 from swarm_forage_env._internal.files import alone_in
 from swarm_forage_env.inspect.maps import floor_maps
 from swarm_forage_env.inspect.replay.files import read_replays
-from swarm_forage_env.runs.runner import run_specs
+from swarm_forage_env.runs.runner import run_all
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.runs.store import load
 from swarm_forage_env.scenarios.presets import scenario
@@ -48,9 +48,9 @@ def test_two_runs_into_one_folder_leave_what_one_leaves(tmp_path):
     ]
     assert [process.wait(timeout=300) for process in both] == [0, 0]
     found = load(tmp_path / "both")
-    made = run_specs([replace(SPEC, seed=seed) for seed in range(3)], jobs=1).records
+    made = run_all([replace(SPEC, seed=seed) for seed in range(3)], jobs=1).records
     assert {record.run_id for record in found} == set(made)
-    assert all(record.same_results(made[record.run_id]) for record in found)
+    assert all(record.equals(made[record.run_id]) for record in found)
     assert not list((tmp_path / "both").glob(".*"))
 
 

@@ -13,10 +13,10 @@ from pettingzoo.utils.conversions import parallel_to_aec
 
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.runs.record import RunRecord
+from swarm_forage_env.runs.record import Record
 from swarm_forage_env.runs.run import build_stack, run_one
 from swarm_forage_env.runs.spec import RunSpec, plan_run
-from swarm_forage_env.scenarios.columns import CONTRIBUTED_COLUMNS
+from swarm_forage_env.scenarios.columns import ALL_COLUMNS
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.gymnasium import JointForageEnv
 from swarm_forage_env.wrappers.base import STACK_ORDER, WrapperConfig
@@ -231,12 +231,12 @@ def test_runs_survive_json_and_parquet(wrappers, tmp_path):
     assert RunSpec.from_json(spec.to_json()) == spec
     record = run_one(spec)
     record.write(tmp_path / "run.parquet")
-    again = RunRecord.read(tmp_path / "run.parquet")
-    stored = RunSpec.from_json(again.spec)
+    again = Record.read(tmp_path / "run.parquet")
+    stored = again.spec
     assert stored.wrappers == spec.wrappers
     assert stored.run_id == spec.run_id
-    assert run_one(stored).same_results(record)
-    assert set(record.contributed) <= set(CONTRIBUTED_COLUMNS)
+    assert run_one(stored).equals(record)
+    assert set(record.columns) <= set(ALL_COLUMNS)
 
 
 def test_every_difference_between_wrappers_is_another_run():

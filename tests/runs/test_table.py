@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarm_forage_env.runs.plan import Condition, Plan
+from swarm_forage_env.runs.plan import Condition, Plan, Table, run_plan
 from swarm_forage_env.runs.policy_spec import PolicySpec, policy_spec
 from swarm_forage_env.runs.run import run_one
-from swarm_forage_env.runs.runner import run_plan
-from swarm_forage_env.runs.table import Table
+from swarm_forage_env.scenarios.columns import INTERVAL_COLUMNS
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.noise import SensorNoiseConfig
 from swarm_forage_env.wrappers.world import World
@@ -30,14 +29,14 @@ def table():
 def test_each_condition_has_its_records_in_the_order_of_the_seeds(table):
     for condition in (FIRST, SECOND):
         for record, spec in zip(table.of(condition), PLAN.specs_of(condition), strict=True):
-            assert record.same_results(run_one(spec))
+            assert record.equals(run_one(spec))
     assert (table.n_stored, table.folder) == (0, None)
 
 
 def test_runs_that_failed_are_told_by_condition(table):
-    assert table.failures_of(FIRST) == ()
+    assert table.failure_lines("random") == ()
+    assert len(table.failure_lines("nobody")) == 1
     lost = PLAN.of_policy("nobody")[1]
-    assert [failure.spec for failure in table.failures_of(lost)] == list(PLAN.specs_of(lost))
     assert len(table.failures) == 4
     assert table.of(lost) == ()
     assert table.curves(lost) == ((), {})
@@ -49,7 +48,7 @@ def test_curves_are_the_columns_of_its_runs(table):
     assert list(curves) == ["collected", "interference_fraction"]
     for name, values in curves.items():
         assert (values.shape, values.dtype) == ((2, 2), np.float64)
-        np.testing.assert_array_equal(values, [record.columns()[name] for record in table.of(SECOND)])
+        np.testing.assert_array_equal(values, [record[name] for record in table.of(SECOND)])
     everything = table.curves(SECOND)[1]
     assert {"performance", "n_active", "believed_interference_fraction"} <= everything.keys()
     assert "believed_interference_fraction" not in table.curves(FIRST)[1], "only noisy runs have that column"
@@ -58,7 +57,7 @@ def test_curves_are_the_columns_of_its_runs(table):
 def test_a_column_that_only_some_runs_have_is_left_out(table):
     """Records of different versions may differ in what wrappers told them."""
     one, other = table.of(SECOND)
-    bare = replace(other, contributed={})
+    bare = replace(other, columns={name: other[name] for name in INTERVAL_COLUMNS})
     mixed = Table(plan=PLAN, records={one.run_id: one, other.run_id: bare})
     seeds, curves = mixed.curves(SECOND, "believed_interference_fraction", "n_active")
     assert (seeds, list(curves)) == ((1, 0), ["n_active"])

@@ -6,11 +6,13 @@ import numpy as np
 import polars as pl
 import pytest
 
-from swarm_forage_env.runs.record import RecordError, RunRecord
+from swarm_forage_env.runs.plan import run_plan
+from swarm_forage_env.runs.record import RecordError
 from swarm_forage_env.runs.run import run_one
-from swarm_forage_env.runs.runner import longest_first, run_plan, run_specs
-from swarm_forage_env.runs.store import FAILURES, MISSING
+from swarm_forage_env.runs.runner import longest_first, run_all
+from swarm_forage_env.runs.store import MISSING, record_file
 from swarm_forage_env.runs.versions import software_versions
+from swarm_forage_env.scenarios.columns import INTERVAL_COLUMNS, KEY_COLUMNS
 from swarm_forage_env.studies.study import Axis, Place
 from swarm_forage_env.studies.study_folder import StudyFolder, run_study
 from swarm_forage_env.studies.study_table import gather_study, read_study
@@ -47,8 +49,8 @@ def test_records_of_runs_by_several_versions_say_so(file):
     (made,) = table.versions
     mixed = replace(table, versions=(made, {**made, "commit": "0123456789abcdef"}))
     record = next(iter(mixed.records.values()))
-    assert record.provenance["commit"] == f"{made['commit']} or 0123456789abcdef"
-    assert record.provenance["numpy"].startswith(made["numpy"])
+    assert record.made_with["commit"] == f"{made['commit']} or 0123456789abcdef"
+    assert record.made_with["numpy"].startswith(made["numpy"])
 
 
 def test_every_interval_is_a_row_with_its_place(file):
@@ -56,7 +58,7 @@ def test_every_interval_is_a_row_with_its_place(file):
     assert frame.columns[:6] == ["study", "condition", "rules", "policy", "axis_population_size", "axis_noise"]
     assert frame.columns[-4:] == ["state", "error", "traceback", "rerun"]
     assert len(frame) == 16 * 2
-    assert set(RunRecord.column_names()) - set(frame.columns) == {"run_id", "controller"}
+    assert {*KEY_COLUMNS, *INTERVAL_COLUMNS} - set(frame.columns) == {"run_id", "controller"}
     last = frame.row(-1, named=True)
     place = ("tiny", 7, "described", "twin", 3.0, 0.02, 3, 1, 1, "done")
     columns = ("study", "condition", "rules", "policy", "axis_population_size", "axis_noise", "n_robots", "seed",
@@ -70,9 +72,9 @@ def test_a_place_gives_the_curves_of_its_runs_and_of_its_reference(file):
     for one in (place, table.spec.reference_of(place)):
         seeds, curves = table.curves(one, "collected", "interference_fraction", "believed_interference_fraction")
         assert seeds == (0, 1)
-        records = run_specs(STUDY.specs_of(one), jobs=1).records.values()
+        records = run_all(STUDY.specs_of(one), jobs=1, progress=False).records.values()
         for name, values in curves.items():
-            np.testing.assert_array_equal(values, [record.columns()[name] for record in records])
+            np.testing.assert_array_equal(values, [record[name] for record in records])
         assert ("believed_interference_fraction" in curves) == (one == place), "only noisy runs have that column"
     with pytest.raises(KeyError):
         table.curves(Place("described", "nobody", (3, 0.02)), "collected")
@@ -85,7 +87,7 @@ def test_it_is_the_table_of_a_plan(file):
     assert len(table.records) == len(fresh.records) == 16
     for condition, place in zip(table.plan.conditions, STUDY.places, strict=True):
         for mine, other in zip(table.of(condition), fresh.of(condition), strict=True):
-            assert mine.same_results(other)
+            assert mine.equals(other)
             assert mine.spec == other.spec
             assert mine.made_by(software_versions())
         seeds, curves = table.curves(condition, "collected")
@@ -93,7 +95,7 @@ def test_it_is_the_table_of_a_plan(file):
             table.curves(place)[0],
             table.curves(place)[1]["collected"].tolist(),
         )
-        assert table.failures_of(condition) == ()
+        assert table.failure_lines(condition.policy.label) == ()
     with pytest.raises(KeyError):
         table.records["beef"]
 
@@ -110,7 +112,7 @@ def test_a_run_can_be_made_again_from_the_file(file):
     table, place = read_study(file), Place("described", "twin", (2, 0.02))
     rows = table.rows(place).filter(pl.col("seed") == 1)
     again = run_one(table.spec_of(STUDY.specs_of(place)[1].run_id))
-    assert again.interference_ticks.tolist() == rows["interference_ticks"].to_list()
+    assert again["interference_ticks"].tolist() == rows["interference_ticks"].to_list()
     with pytest.raises(KeyError, match="no run 'beef'"):
         table.spec_of("beef")
 
@@ -120,7 +122,7 @@ def test_failed_and_missing_runs_are_rows(tmp_path):
     folder = StudyFolder(tmp_path / "mine")
     run_study(study, folder, jobs=1)
     gone = study.specs_of(study.places[0])[1]
-    folder.store.path(gone.run_id).unlink()
+    record_file(folder.runs, gone.run_id).unlink()
     gather_study(folder).write(tmp_path / "mine.parquet")
     table = read_study(tmp_path / "mine.parquet")
     assert [state.n_runs for state in table.place_states()] == [
@@ -133,7 +135,7 @@ def test_failed_and_missing_runs_are_rows(tmp_path):
     failed = table.rows(study.places[-1]).row(0, named=True)
     assert "nobody" in failed["error"]
     assert "Traceback" in failed["traceback"]
-    assert failed["rerun"] == f"swarm-forage rerun runs/{FAILURES}/{study.specs_of(study.places[-1])[0].run_id}.json"
+    assert failed["rerun"] == f"swarm-forage rerun runs/failures/{study.specs_of(study.places[-1])[0].run_id}.json"
     assert (folder.folder / failed["rerun"].split()[-1]).is_file()
     assert table.curves(study.places[-1], "collected") == ((), {})
     assert table.curves(study.places[0], "collected")[0] == (0,)
@@ -151,7 +153,7 @@ def test_a_study_without_any_run_has_a_table_too(tmp_path):
 def test_the_order_of_the_runs_does_not_change_a_byte(folder, file, tmp_path):
     other = StudyFolder(tmp_path / "other")
     other.take(STUDY)
-    run_specs(reversed(longest_first(STUDY.plan.specs)), store=other.store, jobs=1)
+    run_all(reversed(longest_first(STUDY.plan.specs)), out=other.runs, jobs=1, progress=False)
     gather_study(other).write(tmp_path / "other.parquet")
     assert (tmp_path / "other.parquet").read_bytes() == file.read_bytes()
 
@@ -162,7 +164,7 @@ def test_what_performance_is_may_be_an_axis(tmp_path):
                        settings={"n_robots": 3, "n_objects": 20}, reference=None)  # fmt: skip
     folder = StudyFolder(tmp_path)
     run_study(study, folder, jobs=1)
-    assert len(folder.store.run_ids()) == 2
+    assert len([*folder.runs.glob("*.parquet")]) == 2
     table = gather_study(folder)
     assert [table.curves(place, "performance")[1]["performance"].mean() for place in study.places] == [0.0, 3.0]
     assert table.spec.reference_of(study.places[0]) is None
@@ -179,7 +181,7 @@ def test_files_that_are_no_study_are_refused(file, tmp_path, folder):
         with pytest.raises(RecordError, match=message):
             read_study(path)
     with pytest.raises(RecordError, match="but no study"):
-        read_study(folder.store.path(folder.store.run_ids()[0]))
+        read_study(next(folder.runs.glob("*.parquet")))
     with pytest.raises(RecordError, match="No such file"):
         read_study(tmp_path / "nothing.parquet")
 

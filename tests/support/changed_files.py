@@ -15,7 +15,7 @@ from swarm_forage_env.inspect.replay.files import read_replays
 from swarm_forage_env.inspect.replay.frames import ReplayError
 from swarm_forage_env.policies.model_files import ModelError, open_network
 from swarm_forage_env.policies.network import NetworkError
-from swarm_forage_env.runs.record import RecordError, RunRecord
+from swarm_forage_env.runs.record import Record, RecordError
 from swarm_forage_env.runs.store import read_failure
 from swarm_forage_env.studies.study_table import read_study
 from swarm_forage_env.training.datasets import Dataset, DatasetError
@@ -26,7 +26,7 @@ from tests.support.entries import TINY
 from tests.support.small_files import small_file
 
 READERS: dict[str, tuple[Callable[[Path], Any], type[Exception]]] = {
-    "record.parquet": (RunRecord.read, RecordError),
+    "record.parquet": (Record.read, RecordError),
     "packed.parquet": (read_study, RecordError),
     "failure.json": (read_failure, RecordError),
     "replay.html": (read_replays, ReplayError),

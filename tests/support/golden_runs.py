@@ -96,7 +96,7 @@ def _others() -> dict[str, RunSpec]:
 def run_fingerprint(spec: RunSpec) -> str:
     """Fingerprint of every column of a run's record."""
     seen = hashlib.sha256()
-    for name, values in run_one(spec).columns().items():
+    for name, values in run_one(spec).columns.items():
         seen.update(name.encode() + values.tobytes())
     return seen.hexdigest()[:16]
 

@@ -17,7 +17,7 @@ from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.policies.pretrained import plan_file
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import plan_run
-from swarm_forage_env.runs.store import RunFailure, RunStore
+from swarm_forage_env.runs.store import RunFailure, failure_file, store
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.studies.study_folder import StudyFolder, run_study
 from swarm_forage_env.studies.study_table import pack_study
@@ -35,9 +35,9 @@ def _record(file: Path) -> None:
 
 
 def _failure(file: Path) -> None:
-    store = RunStore(file.parent / "of_failures")
-    store.write_failure(RunFailure(spec=SPEC, error="ValueError: too warm", traceback="ValueError: too warm"))
-    shutil.move(store.failure_path(SPEC.run_id), file)
+    folder = file.parent / "of_failures"
+    store(folder, RunFailure(spec=SPEC, error="ValueError: too warm", traceback="ValueError: too warm"))
+    shutil.move(failure_file(folder, SPEC.run_id), file)
 
 
 def _packed(file: Path) -> None:

@@ -91,7 +91,7 @@ def test_an_evaluation_is_the_runs_of_the_plan_beside_its_baseline(tmp_path):
     found = evaluator.evaluate(network(stands=False), 60)
     file = str(tmp_path / "policy.npz")
     runs = [run_one(spec) for spec in PLAN.judging(policy_spec(file, label=LEARNING.label)).specs]
-    assert found.worlds[0].performance == np.mean([record.rate_per_1000_s("performance") for record in runs])
+    assert found.worlds[0].performance == np.mean([record.per_1000_s("performance") for record in runs])
     assert found.worlds[0].baseline_policy in ("crw", "dpo", "stochm", "stochx")
     assert found.performance == pytest.approx(found.worlds[0].ratio)
 

@@ -46,4 +46,4 @@ def test_an_example_trains_a_policy_that_runs(name, tmp_path):
     policy = next(tmp_path.rglob("policy.*"))
     small = scenario("warehouse_small", n_robots=8, horizon_s=200.0)
     record = run_one(RunSpec(world=World(small), policy=str(policy), seed=1))
-    assert np.isfinite(record.performance).all()
+    assert np.isfinite(record["performance"]).all()

@@ -14,7 +14,7 @@ from stable_baselines3 import DQN, PPO
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.network import Network
-from swarm_forage_env.runs.table import Table
+from swarm_forage_env.runs.plan import Table
 from swarm_forage_env.scenarios.presets import warehouse_small
 from swarm_forage_env.training import evaluations
 from swarm_forage_env.training.evaluation_plan import EvaluationPlan, EvaluationWorld

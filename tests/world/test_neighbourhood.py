@@ -116,7 +116,7 @@ def test_a_message_that_is_not_finite_is_refused():
 def test_runs_of_scripted_policies_stay_what_they_are(physics):
     small = scenario("warehouse_small", **SMALL | {"physics": physics}, horizon_s=40.0, interval_s=20.0)
     rich = scenario("warehouse_small", **SMALL | {"physics": physics} | BOTH, horizon_s=40.0, interval_s=20.0)
-    plain, spoken = (run_one(plan_run(world, "crw", seed=1)).columns() for world in (small, rich))
+    plain, spoken = (run_one(plan_run(world, "crw", seed=1)).columns for world in (small, rich))
     for name, column in plain.items():
         np.testing.assert_array_equal(column, spoken[name])
 

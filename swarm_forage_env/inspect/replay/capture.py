@@ -20,8 +20,8 @@ from swarm_forage_env.inspect.replay.frames import (
 )
 from swarm_forage_env.policies.registry import load_policy, policy_label
 from swarm_forage_env.rendering.view import refusing
-from swarm_forage_env.runs.record import RunRecord
-from swarm_forage_env.runs.run import LiveRun, Started, build_stack, finished_record
+from swarm_forage_env.runs.record import Record
+from swarm_forage_env.runs.run import LiveRun, Started, build_stack, record_of_run
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.versions import software_versions
 from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -46,7 +46,7 @@ def record_replay(
     seconds: float | None = None,
     frame_s: float | None = None,
     progress: Progress | None = None,
-) -> tuple[Replay, RunRecord | None]:
+) -> tuple[Replay, Record | None]:
     """Run a specification and keep what happened.
 
     Args:
@@ -79,7 +79,7 @@ def record_replay(
             progress(capture.tick, end)
     recorder.close()
     replay = capture.replay(spec, signals=_signals(spec, capture.ticks))
-    return replay, finished_record(recorder, spec, started) if recorder.complete else None
+    return replay, record_of_run(recorder, spec, started) if recorder.complete else None
 
 
 def _last_tick(scenario: ScenarioConfig, seconds: float | None) -> int:

@@ -206,7 +206,7 @@ def _started(job: _Job) -> tuple[Any, BaseProcess]:
 def _train_here(job: _Job, driver: Connection) -> None:
     """Train in a process of its own. SIGTERM interrupts the training, which keeps a checkpoint."""
     signal.signal(signal.SIGTERM, _interrupt)
-    live_with_driver(driver)
+    live_with_driver()
     try:
         _train(job, driver.send)
         driver.send(None)

@@ -11,7 +11,7 @@ from metrics.benchmark.entry import entry_command
 from metrics.scoring import ask
 from swarm_forage_env import run_one
 from swarm_forage_env.policies.registry import RandomPolicy
-from swarm_forage_env.runs import workers
+from swarm_forage_env.runs import runner
 from tests.support.entries import TINY, made_up_entry
 
 
@@ -39,8 +39,8 @@ def test_an_entry_has_the_runs_of_all_policies(entry, protocol):
     spec = next(spec for spec in planned if spec.seed == 2 and spec.world.n_robots == 2)
     record = run_one(spec)
     row = entry.performance("room, 2 robots")[0]
-    assert row[1] == pytest.approx(record.performance.sum() / 0.2)  # per 1,000 s, of 200 s
-    assert entry.interference("room, 2 robots")[0, 1] == pytest.approx(record.interference_fraction.mean(), rel=1e-5)
+    assert row[1] == pytest.approx(record["performance"].sum() / 0.2)  # per 1,000 s, of 200 s
+    assert entry.interference("room, 2 robots")[0, 1] == pytest.approx(record["interference_fraction"].mean(), rel=1e-5)
     assert entry.performance("room, noisy wheels").shape == (2, 2)
 
 
@@ -84,7 +84,7 @@ def test_a_question_has_every_policy_in_every_world(protocol):
 
 
 def test_asked_again_the_stored_runs_answer(entry, protocol, folder, monkeypatch):
-    monkeypatch.setattr(workers, "run_one", lambda spec: pytest.fail("a stored run was repeated"))
+    monkeypatch.setattr(runner, "run_one", lambda spec: pytest.fail("a stored run was repeated"))
     question = benchmark_question(["crw", "ppo_warehouse_small"], name="both", protocol=protocol)
     assert ask(question, out=folder, jobs=1, progress=False).runs == entry.runs
 

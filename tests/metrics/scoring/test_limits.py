@@ -52,13 +52,13 @@ def test_places_in_a_nest_are_none_and_the_nearest_nest_counts():
 def test_no_run_exceeds_the_limit(name, policy):
     world = scenario(name, n_robots=8, n_objects=120, horizon_s=600.0, interval_s=200.0)
     spec = plan_run(world, policy, seed=5)
-    assert 0.0 <= share_of_limit(spec.world, float(run_one(spec).collected.sum())) <= 1.0
+    assert 0.0 <= share_of_limit(spec.world, float(run_one(spec)["collected"].sum())) <= 1.0
 
 
 def test_where_objects_fill_the_source_no_run_exceeds_the_limit_either():
     world = scenario("warehouse_small", n_robots=8, n_objects=800, horizon_s=2000.0)
     spec = plan_run(world, "oracle", seed=5)
-    assert 0.6 < share_of_limit(spec.world, float(run_one(spec).collected.sum())) <= 1.0
+    assert 0.6 < share_of_limit(spec.world, float(run_one(spec)["collected"].sum())) <= 1.0
 
 
 def test_first_pickups_are_held_against_all_objects_that_appear():

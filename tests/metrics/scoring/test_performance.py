@@ -9,9 +9,9 @@ import metrics
 from metrics import CurveError, Performance, score, score_curves
 from metrics.scoring.run_curves import checked_performance
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.runs import workers
-from swarm_forage_env.runs.record import record_columns
+from swarm_forage_env.runs import runner
 from swarm_forage_env.runs.store import load
+from swarm_forage_env.scenarios.columns import ALL_COLUMNS, KEY_COLUMNS
 from swarm_forage_env.scenarios.performance import DERIVED_PERFORMANCES, PERFORMANCE_COLUMNS
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.studies.ladders import Budget
@@ -43,15 +43,12 @@ def values(found) -> dict[tuple[int, int], float]:
 
 @pytest.fixture
 def no_runs(monkeypatch):
-    monkeypatch.setattr(workers, "run_one", lambda spec: pytest.fail("a stored run was repeated"))
+    monkeypatch.setattr(runner, "run_one", lambda spec: pytest.fail("a stored run was repeated"))
 
 
 def recorded() -> set[str]:
     """Columns of every record that hold a number per interval, but for the clock and performance itself."""
-    lines = [line.split() for line in record_columns().text().splitlines()[2:]]
-    keys = {"run_id", "scenario", "controller", "n_robots", "criterion", "criterion_value", "seed"}
-    names = {name for name, *_ in lines}
-    return names - keys - {"interval", "t_end_s", "performance"}
+    return set(ALL_COLUMNS) - set(KEY_COLUMNS) - {"interval", "t_end_s", "performance"}
 
 
 def test_every_recorded_column_is_a_performance():
@@ -66,8 +63,8 @@ def test_every_column_of_stored_runs_can_be_scored(name, folder, no_runs):
     assert found.settings["performance"] == name
     if name in PERFORMANCE_COLUMNS:
         for record in load(folder):
-            expected = record.columns().get(name, np.full(2, float(name == "task_share_none"))).sum()
-            assert values(found)[record.n_robots, record.seed] == pytest.approx(expected)
+            expected = record.columns.get(name, np.full(2, float(name == "task_share_none"))).sum()
+            assert values(found)[record.spec.world.n_robots, record.seed] == pytest.approx(expected)
 
 
 def test_scenario_and_argument_mean_the_same(folder, no_runs):

@@ -15,10 +15,9 @@ from metrics.scoring.frame import SCHEMA
 from metrics.scoring.policy_scores import Scores, spread
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import registry as policy_module
-from swarm_forage_env.runs import workers
+from swarm_forage_env.runs import runner
 from swarm_forage_env.runs.run import run_one
-from swarm_forage_env.runs.runner import RunsInterrupted
-from swarm_forage_env.runs.store import RunStore, load
+from swarm_forage_env.runs.store import load
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.studies.ladders import Budget
 from swarm_forage_env.wrappers.registry import parse_wrapper
@@ -78,7 +77,7 @@ def test_every_measure_has_rows_with_all_that_is_needed_to_read_them(found):
 
 def test_values_are_those_of_the_stored_runs(tmp_path):
     frame = scored(measures=["adaptability"], out=tmp_path).frame
-    runs = {(record.criterion_value, record.seed): record.performance for record in load(tmp_path)}
+    runs = {(record.spec.world.value, record.seed): record["performance"] for record in load(tmp_path)}
     assert runs.keys() == {(0.0, 0), (0.0, 1), (0.4, 0), (0.4, 1)}
     for seed, value in frame.select("seed", "value").iter_rows():
         assert value == metrics.adaptability(runs[0.0, seed], runs[0.4, seed])
@@ -95,14 +94,14 @@ def test_an_interrupted_call_goes_on_where_it_stopped(tmp_path, monkeypatch):
         return run_one(spec)
 
     with monkeypatch.context() as patch:
-        patch.setattr(workers, "run_one", interrupted)
-        with pytest.raises(RunsInterrupted, match="2 of 4 runs are finished"):
+        patch.setattr(runner, "run_one", interrupted)
+        with pytest.raises(KeyboardInterrupt, match="2 of 4 runs are finished"):
             scored(out=tmp_path, measures=SIZES)
-    before = set(RunStore(tmp_path).run_ids())
+    before = set(tmp_path.glob("*.parquet"))
     assert len(before) == 2
     first = scored(out=tmp_path, measures=SIZES)
-    assert before < set(RunStore(tmp_path).run_ids())
-    monkeypatch.setattr(workers, "run_one", lambda spec: pytest.fail("a stored run was repeated"))
+    assert before < set(tmp_path.glob("*.parquet"))
+    monkeypatch.setattr(runner, "run_one", lambda spec: pytest.fail("a stored run was repeated"))
     assert str(scored(out=tmp_path, measures=SIZES)) == str(first)
 
 
@@ -112,7 +111,7 @@ def test_failed_runs_are_those_of_their_policy(tmp_path, monkeypatch):
             raise RuntimeError("out of luck")
         return run_one(spec)
 
-    monkeypatch.setattr(workers, "run_one", failing)
+    monkeypatch.setattr(runner, "run_one", failing)
     found = scored(["random", "crw"], measures=SIZES, out=tmp_path)
     lost = found.summary.group_by("policy", maintain_order=True).agg(pl.col("lost").unique())
     assert lost.rows() == [("random", [0]), ("crw", [1])]
@@ -123,7 +122,7 @@ def test_failed_runs_are_those_of_their_policy(tmp_path, monkeypatch):
     assert " !" in str(found)
     assert "! = runs are missing" in str(found)
     fresh = []
-    monkeypatch.setattr(workers, "run_one", lambda spec: fresh.append(spec) or run_one(spec))
+    monkeypatch.setattr(runner, "run_one", lambda spec: fresh.append(spec) or run_one(spec))
     assert scored(["random", "crw"], measures=SIZES, out=tmp_path).failures == {}
     assert {(spec.policy, spec.seed) for spec in fresh} == {("crw", 1)}
 
@@ -151,7 +150,7 @@ def test_the_world_of_a_policy_is_kept(tmp_path):
     assert {spec.scenario.caches for spec in planned([Circling]).specs} == {"static"}
     assert {spec.scenario.caches for spec in planned([still]).specs} == {"none"}
     assert {spec.scenario.caches for spec in planned([Circling], caches="dynamic").specs} == {"dynamic"}
-    assert {record.controller for record in load(tmp_path)} == {"mine"}
+    assert {record.spec.policy for record in load(tmp_path)} == {"mine"}
 
 
 def test_parameters_reach_names_and_classes():
@@ -188,7 +187,7 @@ def test_stored_runs_of_functions_need_a_name(tmp_path):
     ],
 )
 def test_what_cannot_be_scored_is_refused_before_anything_runs(options, error, message, monkeypatch):
-    monkeypatch.setattr(workers, "run_one", lambda spec: pytest.fail("something was run"))
+    monkeypatch.setattr(runner, "run_one", lambda spec: pytest.fail("something was run"))
     with pytest.raises(error, match=message):
         scored(**options)
 
@@ -224,11 +223,11 @@ def test_wrappers_of_the_world_are_in_all_runs(slow, tmp_path):
     found = scored("random", slow, measures=[*SIZES, "population_robustness"], out=tmp_path)
     assert (found.world, found.failures, found.missing) == (slow.title(), {}, {})
     runs = load(tmp_path)
-    assert {run.criterion for run in runs} == {"population_size", "none", "population_dynamics"}
+    assert {run.spec.world.criterion for run in runs} == {"population_size", "none", "population_dynamics"}
     for run in runs:
-        wrappers = {config["wrapper"]: config for config in json.loads(run.spec)["wrappers"]}
+        wrappers = {config["wrapper"]: config for config in run.spec.to_mapping()["wrappers"]}
         assert wrappers["throttle"]["waveform"]["amplitude"] == 0.3
-        assert ("population" in wrappers) == (run.criterion == "population_dynamics")
+        assert ("population" in wrappers) == (run.spec.world.criterion == "population_dynamics")
 
 
 @pytest.mark.parametrize(
