@@ -71,7 +71,9 @@ def ask_and_show(question: "Question[Any]", folder: Path, options: "RunOptions",
 
     picture_ending(picture)  # before the work; a place that cannot be written to is told of beside the answer
     if options.dry_run:
-        say(planned_line(question.plan.specs, folder))
+        specs = question.plan.specs
+        planned = json.dumps([spec.to_mapping() for spec in specs], indent=1)
+        say(planned if options.as_json else planned_line(specs, folder))
         return 0
     table = question.make_runs(out=folder, jobs=options.jobs, progress=True)
     try:

@@ -79,7 +79,7 @@ def test_set_changes_any_field_with_its_type(command):
     settings = "team=true nest_size_m=2,4 walk_probability=0.5 static_size=3 physics_substeps=0.2,0.2,0.2,0.2,0.2"
     each = (word for setting in settings.split() for word in ("--set", setting))
     _, out, _ = command(*RUN, *each, "--dry-run", "--json")
-    world = json.loads(out)["runs"][0]["spec"]["scenario"]
+    world = json.loads(out)[0]["scenario"]
     assert world["reward"]["team"] is True
     assert world["arena"]["nest_size_m"] == [2.0, 4.0]
     assert world["objects"]["walk_probability"] == 0.5
@@ -100,9 +100,9 @@ def test_wrappers_disturb_the_run_and_are_part_of_its_record(command):
     code, out, _ = command(*RUN, *words, "--json")
     assert code == 0
     record = Record.read(json.loads(out)["runs"][0]["file"])
-    assert record.adversity.tolist() == pytest.approx([0.2, 0.2])
+    assert record["adversity"].tolist() == pytest.approx([0.2, 0.2])
     assert "4 s, with throttle: robots lose 20 % of their speed, wheel noise: sigma 0.1" in command(*RUN, *words)[1]
-    assert [wrapper["wrapper"] for wrapper in json.loads(record.spec)["wrappers"]] == ["throttle", "actuator_noise"]
+    assert [wrapper["wrapper"] for wrapper in record.spec.to_mapping()["wrappers"]] == ["throttle", "actuator_noise"]
 
 
 def test_a_failed_run_is_reported_with_the_way_to_run_it_again(command, monkeypatch):
@@ -151,8 +151,7 @@ def test_ctrl_c_in_this_process(command, monkeypatch):
     code, _, err = command(*RUN, "--seeds", "3")
     assert code == 130
     expected = (
-        "swarm-forage: Interrupted: 1 of 3 runs are finished and kept. They are in "
-        "results/warehouse_small_3_robots_4_s_33b9a3; "
+        "swarm-forage: Interrupted: 1 of 3 runs are finished. They are in results/warehouse_small_3_robots_4_s_33b9a3; "
     )
     assert err.splitlines()[-1] == expected + "the same command does the rest."
 

@@ -41,7 +41,7 @@ def test_replay_makes_a_stored_run_again(command):
     assert (code, err) == (0, "")
     (replay,) = read_replays(out.split()[1])
     assert replay.spec.run_id == stored.run_id
-    assert replay.counters[-1, 0] == stored.collected.sum()
+    assert replay.counters[-1, 0] == stored["collected"].sum()
     for beside in (("crw",), ("--seed", "3"), ("--robots", "2")):
         code, _, err = command("replay", str(file), *beside)
         assert (code, err.count("\n")) == (2, 1)

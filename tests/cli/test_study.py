@@ -102,7 +102,7 @@ def test_an_interrupt_keeps_what_is_done(written, monkeypatch):
     monkeypatch.setattr(runner, "run_one", interrupted)
     code, _, err = written(*RUN)
     assert code == 130
-    assert f"in {FOLDER}; the same command does the rest" in err
+    assert f"in {FOLDER}/runs; the same command does the rest" in err
 
 
 @pytest.mark.parametrize(
