@@ -27,7 +27,6 @@ from metrics.claims import CLAIMS, INTUITIONS, Claim
 from metrics.scoring import StudyFigure, StudyVerdict, draw_figure, study_figures
 from metrics.scoring.study_verdict import ANSWERS, BANDS, OURS, RELATIVELY, VARIANTS, claims_about
 from swarm_forage_env import read_study
-from swarm_forage_env.runs.store import DONE
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 DATA, PICTURES, PAGE = "results", Path("images/results"), "results.md"
@@ -47,7 +46,7 @@ answers, `scripts/write_results` this page."""
 def runs(results: StudyVerdict, hours: Mapping[str, float]) -> Iterator[dict[str, Any]]:
     """Yield one row per set: how many runs it has, in all and per condition, and what made them."""
     for table in results.tables:
-        done = [state.n_runs[DONE] for state in table.place_states()]
+        done = table.places()["done"].to_list()
         made = sorted({dict(versions).get("swarm-forage-env", "") for versions in table.versions})
         counts = {"runs": sum(done), "fewest": min(n for n in done if n), "most": max(done)}
         about = {"set": table.spec.name, "title": table.spec.title, "rules": " ".join(table.spec.rules)}

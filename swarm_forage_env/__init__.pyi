@@ -52,12 +52,11 @@ from .training.export.exporting import export_policy as export_policy
 from .policies.extras import ExtraFunctionError as ExtraFunctionError
 
 # studies
-from .studies.study_file import load_study as load_study
-from .studies.study_folder import run_study as run_study
-from .studies.study_table import read_study as read_study
+from .studies.study import load_study as load_study
+from .studies.results import run_study as run_study
+from .studies.results import read_study as read_study
 from .studies.study import StudySpec as StudySpec
-from .studies.study_folder import StudyFolder as StudyFolder
-from .studies.study_table import StudyTable as StudyTable
+from .studies.results import StudyTable as StudyTable
 
 # checks
 from .checks import check_env as check_env

@@ -144,13 +144,13 @@ def _protocol(content: Mapping[str, Any], *, quick: bool) -> Protocol:
 
 
 def _scenario(entry: Mapping[str, Any], of_all: Mapping[str, Any]) -> "ScenarioConfig":
+    from swarm_forage_env._internal.fields import as_tuples
     from swarm_forage_env.scenarios.presets import scenario
-    from swarm_forage_env.studies.study import plain_settings
 
     settings = {**of_all, **entry.get("set", {})}
     if "sources" in settings:
         settings |= {"placement": POSITIONS, "object_positions_m": _cell_middles(settings.pop("sources"))}
-    return scenario(entry["scenario"], **plain_settings(settings))
+    return scenario(entry["scenario"], **{name: as_tuples(value) for name, value in settings.items()})
 
 
 def _cell_middles(boxes: Sequence[Sequence[float]]) -> list[tuple[float, float]]:

@@ -19,7 +19,7 @@ from swarm_forage_env.scenarios.performance import (
     performance_curve,
     performance_of,
 )
-from swarm_forage_env.studies.study import value_words
+from swarm_forage_env.studies.study_file import value_words
 from swarm_forage_env.wrappers.world import SIZE, UNDISTURBED, World
 
 from ..checks import CurveError
@@ -29,8 +29,9 @@ from ..queues import PopulationRates
 if TYPE_CHECKING:
     import polars as pl
 
-    from swarm_forage_env.studies.study import Place, StudySpec, Value
-    from swarm_forage_env.studies.study_table import StudyTable
+    from swarm_forage_env.studies.results import StudyTable
+    from swarm_forage_env.studies.study import Place, StudySpec
+    from swarm_forage_env.studies.study_file import Value
 
 DELIVERIES = performance_of("collected")
 """What performance is unless something else is told."""

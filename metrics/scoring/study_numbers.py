@@ -20,8 +20,8 @@ from .measures import DISTURBANCES, MEASURES
 from .run_curves import THROTTLE, StudyCurves, StudyLine, study_lines
 
 if TYPE_CHECKING:
-    from swarm_forage_env.studies.study import Value
-    from swarm_forage_env.studies.study_table import StudyTable
+    from swarm_forage_env.studies.results import StudyTable
+    from swarm_forage_env.studies.study_file import Value
 
 FIGURE_MEASURES = (
     "raw_performance",

@@ -35,7 +35,7 @@ from .study_numbers import StudyPanel, StudyPanels, study_panels
 if TYPE_CHECKING:
     import polars as pl
 
-    from swarm_forage_env.studies.study_table import StudyTable
+    from swarm_forage_env.studies.results import StudyTable
 
 Band: TypeAlias = Literal["ci", "sd"]
 """What bars are: the 95 % confidence interval of the mean, or the mean plus and minus two standard deviations."""

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from swarm_forage_env._internal.wording import number, percent, plain
 from swarm_forage_env.runs.answer import Answer, Sheet
-from swarm_forage_env.studies.study_file import PAPER, is_set_of_paper, load_study
+from swarm_forage_env.studies.study import is_set_of_paper, load_study
+from swarm_forage_env.studies.study_file import PAPER
 
 from ..checks import CurveError
 from ..claims import CLAIMS, INTUITIONS, Claim, PanelName, Verdict, check_claim
@@ -21,8 +22,8 @@ from .measures import MEASURES
 from .study_numbers import StudyPanel, StudyPanels, study_panels
 
 if TYPE_CHECKING:
+    from swarm_forage_env.studies.results import StudyTable
     from swarm_forage_env.studies.study import StudySpec
-    from swarm_forage_env.studies.study_table import StudyTable
 
 VARIANTS: tuple[Variant, ...] = ("corrected", "paper")
 ANSWERS: tuple[ClaimAnswer, ...] = get_args(ClaimAnswer)
@@ -308,7 +309,6 @@ class StudyVerdict(Answer):
             "studies": [
                 {
                     "name": table.spec.name,
-                    "study_id": table.spec.study_id,
                     "budget": table.spec.budget,
                     "n_seeds": len(table.spec.seeds),
                     "versions": [dict(versions) for versions in table.versions],

@@ -71,9 +71,9 @@ def plot(
     from swarm_forage_env.cli.worlds import default_file
     from swarm_forage_env.rendering.figures import check_picture
     from swarm_forage_env.runs.plan import read_table
-    from swarm_forage_env.studies.study_folder import StudyFolder
+    from swarm_forage_env.studies.results import study_file
 
-    if folder.suffix == ".parquet" or StudyFolder(folder).study_file.exists():
+    if folder.suffix == ".parquet" or study_file(folder).exists():
         raise ConfigError(f"Expected a folder of runs, got a study; it is 'swarm-forage study plot {folder}'.")
     table = read_table(folder, performance=performance)
     found = summarize_runs(table)

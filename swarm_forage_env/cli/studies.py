@@ -18,9 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from metrics.curves import Variant
-    from swarm_forage_env.studies.study import StudySpec
-    from swarm_forage_env.studies.study_folder import StudyFolder
-    from swarm_forage_env.studies.study_table import StudyTable
+    from swarm_forage_env.studies.results import StudyTable
 
 app = App(name="study", help="Run the paper's experiments, or your own.")
 
@@ -68,36 +66,33 @@ def run(
     """
     from swarm_forage_env._internal.fields import known_name
     from swarm_forage_env.runs.cluster import cluster_executor
-    from swarm_forage_env.studies.description import StudyOutcome
-    from swarm_forage_env.studies.study import RULES_NAMES
-    from swarm_forage_env.studies.study_file import load_study
-    from swarm_forage_env.studies.study_folder import StudyFolder, parse_shard, run_study
-    from swarm_forage_env.studies.study_table import pack_study
+    from swarm_forage_env.runs.plan import planned_line
+    from swarm_forage_env.runs.store import failure_file
+    from swarm_forage_env.studies import results
+    from swarm_forage_env.studies.description import FAILURES_SHOWN
+    from swarm_forage_env.studies.description import status as status_of
+    from swarm_forage_env.studies.study import load_study
+    from swarm_forage_env.studies.study_file import RULES_NAMES
 
     known_name("rules", rules, (*RULES_NAMES, "both", "file"))
     chosen = {"both": tuple(RULES_NAMES), "file": None}.get(rules, (rules,))
     study = load_study(name, budget, seeds=seeds, rules=chosen)
-    part = parse_shard(shard)
-    folder = StudyFolder(out or Path("results", "studies", f"{study.name}_{study.budget}"))
+    folder = out or Path("results", "studies", f"{study.name}_{study.budget}")
     if dry_run:
-        say(_summary(study, folder, part))
+        planned = results.shard(study.plan.specs, shard)
+        say(f"{study.name}, budget {study.budget}, shard {shard}: {planned_line(planned, folder / 'runs')}")
         return 0
     with nullcontext() if cluster is None else cluster_executor(cluster, jobs) as executor:
-        state = run_study(study, folder, part=part, jobs=jobs, executor=executor, progress=True)
-    if part == (1, 1):
-        note(f"packed into {pack_study(folder, tell=note)}")
-    say(StudyOutcome(outcomes=state, folder=folder))
-    return EXIT_FAILURE if state.failures else 0
-
-
-def _summary(spec: "StudySpec", folder: "StudyFolder", part: tuple[int, int]) -> str:
-    """Say what is left to run."""
-    from swarm_forage_env.runs.plan import planned_line
-    from swarm_forage_env.studies.study_folder import shard
-
-    index, count = part
-    name = f"{spec.name}, budget {spec.budget}" + (f", shard {index} of {count}" if count > 1 else "")
-    return f"{name}: {planned_line(shard(spec.plan.specs, index, count), folder.runs)}"
+        found = results.run_study(study, folder, part=shard, jobs=jobs, executor=executor, progress=True)
+    if shard == "1/1":
+        file, table = results.pack_study(folder)
+        note(f"packed into {file}")
+        show(status_of(table))
+    else:
+        say(f"shard {shard}: {found.n_done:,} runs done, {len(found.failures):,} failed, in {folder}")
+    for run_id in list(found.failures)[:FAILURES_SHOWN]:
+        say(f"  again, alone: swarm-forage rerun {failure_file(folder / 'runs', run_id)}")
+    return EXIT_FAILURE if found.failures else 0
 
 
 @app.command
@@ -112,7 +107,7 @@ def status(place: Place, /, *, as_json: AsJson = False) -> int:
 
 def _read(place: Path) -> "StudyTable":
     """Read a study, and tell of damaged files in its folder."""
-    from swarm_forage_env.studies.study_table import read_study
+    from swarm_forage_env.studies.results import read_study
 
     table = read_study(place)
     for line in table.damaged_lines:

@@ -15,7 +15,7 @@
     [[axis]]                               # any number; the last one is plotted along x
     criterion = "noise"                    # or "quirk", or field = "n_objects" or "sensor_noise.sigma"
     values = [0.01, 0.02, 0.03]            # default for a criterion: the paper's values; for "quirk": none, and each
-    reference = 0.0                        # only on the last axis; default see `load_study`
+    reference = 0.0                        # only on the last axis; default see `StudySpec.reference`
 
     [budget.smoke]                         # all keys are optional; default: as in the paper
     seeds = 2
@@ -23,284 +23,294 @@
     interval_s = 100.0
     values = { noise = 2 }                 # number of values besides the reference, evenly spread, or a list of values
 
-The files of the paper's sets are in the folder `sets`.
+The folder of a study keeps the file with a table `[run]` at its end: the budget, seeds and rules that were chosen. The
+files of the paper's sets are in the folder `sets`.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias, get_origin
 
-from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, known_keys, known_name, several, table, whole
+import msgspec
+
+from swarm_forage_env._internal.fields import (
+    MOST_SEEDS,
+    ConfigError,
+    as_tuples,
+    known_keys,
+    known_name,
+    several,
+    whole,
+)
 from swarm_forage_env._internal.files import parse_toml
-from swarm_forage_env._internal.wording import suggestion
-from swarm_forage_env.policies.registry import is_policy_file
-from swarm_forage_env.runs.policy_spec import PolicySpec, policy_spec
+from swarm_forage_env.scenarios.overrides import field_sections, field_types, parse_tuple
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import QUIRK_NAMES
 from swarm_forage_env.studies.ladders import BUDGETS, CRITERIA, spread, study_values
-from swarm_forage_env.studies.study import (
-    NOTHING,
-    POLICY_KEYS,
-    QUIRK,
-    Axis,
-    StudySpec,
-    Value,
-    list_word,
-    plain_settings,
-    value_words,
-)
-from swarm_forage_env.wrappers.registry import wrappers_from_mapping
+from swarm_forage_env.wrappers.registry import wrapper_config_class
 from swarm_forage_env.wrappers.world import SIZE
+
+Value: TypeAlias = float | str | bool
+"""Value on an axis."""
 
 SETS = Path(__file__).parent / "sets"
 """Folder of the paper's sets."""
 PAPER = "paper"
 """Name of the budget that every study has: runs as long, and as many, as in the paper."""
-FILE_KEYS = ("name", "title", "scenario", "policies", "rules", "set", "wrappers", "axis", "budget")
-AXIS_KEYS = ("criterion", "field", "values", "reference")
-BUDGET_KEYS = ("seeds", "horizon_s", "interval_s", "values")
+RULES_NAMES = {"described": "DESCRIBED", "program": "AUTHORS_PROGRAM"}
+"""Word of studies -> name of the rules in `scenarios.quirks.RULES`."""
+SCENARIO_FIELDS = (*field_sections(), "density", "side_m")
+"""Scenario fields that a study may set and vary: all arguments that `scenarios.presets.scenario` takes by name."""
+OF_THE_STUDY = {
+    "horizon_s": "the budget of a study sets it",
+    "interval_s": "the budget of a study sets it",
+    "quirks": "the rules of a study set them",
+}
+"""Scenario field that a study must not set -> what decides it instead."""
+NOTHING = "none"
+"""Name of the empty list on an axis of lists, and of no switched quirk."""
+QUIRK = "quirk"
+"""Axis whose values are `NOTHING` and names of quirks, each of which is switched alone: on under the described rules,
+off under the program's."""
+RUN = "\n[run]  # what was chosen; written by 'swarm-forage study run'\n"
 
 
-def set_names() -> tuple[str, ...]:
-    """Return the names of the paper's sets."""
-    return tuple(sorted(file.stem for file in SETS.glob("*.toml")))
+class _Strict(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A table of the file that refuses other keys."""
 
 
-def find_study(name: str | Path) -> Path:
-    """Return the file of a study.
+class PolicyTable(_Strict, frozen=True):
+    """A policy with options; a text alone is its name or file."""
 
-    Args:
-        name: Name of one of the paper's sets, or path of a file.
+    policy: str
+    label: str = ""
+    parameters: dict[str, Any] = {}  # msgspec copies the default
+    caches: str | None = None
+
+
+class AxisTable(_Strict, frozen=True):
+    """What the study varies."""
+
+    criterion: str | None = None
+    field: str | None = None
+    values: tuple[int | float | str | bool | list[Any], ...] | None = None
+    reference: int | float | str | bool | list[Any] | None = None
+
+
+class BudgetTable(_Strict, frozen=True):
+    """How much to run."""
+
+    seeds: int | tuple[int, ...] = BUDGETS[PAPER].n_seeds
+    """Their number, or a list."""
+    horizon_s: float = BUDGETS[PAPER].horizon_s
+    interval_s: float = BUDGETS[PAPER].interval_s
+    values: dict[str, int | tuple[int | float | str | bool | list[Any], ...]] = {}
+
+
+class RunTable(_Strict, frozen=True):
+    """What was chosen of a study."""
+
+    budget: str
+    seeds: tuple[int, ...]
+    rules: tuple[str, ...]
+    looks: tuple[int, ...] = ()
+    """Numbers of runs of a condition after which claims were judged, and conditions left as they were where all was
+    decided; empty: once, at the end. Judgements correct for several looks."""
+    folder: str = ""
+    """Where the study file was, and the paths of its policies begin."""
+
+
+class StudyFile(_Strict, frozen=True):
+    """The content of a study file."""
+
+    name: str
+    scenario: str
+    policies: tuple[str | PolicyTable, ...]
+    title: str = ""
+    rules: tuple[str, ...] = tuple(RULES_NAMES)
+    set: dict[str, Any] = {}
+    wrappers: dict[str, dict[str, Any]] = {}
+    axis: tuple[AxisTable, ...] = ()
+    budget: dict[str, BudgetTable] = {}
+    run: RunTable | None = None
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Scenario fields as scenarios take them: lists are tuples."""
+        return {name: as_tuples(value) for name, value in self.set.items()}
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Axis:
+    """What a study varies, and its values.
 
     Raises:
-        ConfigError: there is neither.
+        ConfigError: an unknown name, no values, equal values, or values of several kinds.
     """
-    if str(name) in set_names():
-        return SETS / f"{name}.toml"
-    if not Path(name).is_file():
-        raise ConfigError(
-            f"Expected a study file that exists, or one of {', '.join(set_names())}, got {str(name)!r}."
-            f"{suggestion(str(name), set_names())}"
-        )
-    return Path(name)
+
+    name: str
+    """A criterion (`ladders.CRITERIA`), a scenario field, a field of a wrapper ("sensor_noise.sigma",
+    "throttle.waveform.amplitude"), or `QUIRK`."""
+    values: tuple[Value, ...]
+    """Numbers, texts or truth values. For a field that holds a list, texts with its entries between commas
+    (`list_word`)."""
+
+    def __post_init__(self) -> None:
+        wrapper, dot, _ = self.name.partition(".")
+        if dot:
+            wrapper_config_class(wrapper)  # refuses unknown names; the field is checked with its values
+        else:
+            allowed = (*CRITERIA, QUIRK, *(name for name in SCENARIO_FIELDS if name not in OF_THE_STUDY))
+            others = ", ".join((*CRITERIA, QUIRK))
+            shown_by = f"{others}, and the fields that swarm-forage info warehouse_small lists"
+            known_name("axis", self.name, allowed, all_by=shown_by)
+        several(f"the values of axis {self.name}", self.values, "values")
+        for value in self.values if self.name == QUIRK else ():
+            known_name("quirk", value, (NOTHING, *QUIRK_NAMES))
+        kinds = {"text" if isinstance(v, str) else "truth" if isinstance(v, bool) else "number" for v in self.values}
+        if len(kinds) > 1 or len(set(self.values)) < len(self.values):
+            raise ConfigError(
+                f"Expected different numbers, texts or truth values on axis {self.name}, got {list(self.values)!r}."
+            )
+        if self.name in _list_fields() and kinds != {"text"}:
+            raise ConfigError(
+                f"Expected lists on axis {self.name}, such as values = [[], [...]], got {list(self.values)!r}."
+            )
+
+    @property
+    def is_criterion(self) -> bool:
+        """Whether it varies a criterion, not a single field."""
+        return self.name in CRITERIA
 
 
-def load_study(
-    name: str | Path,
-    budget: str | None = None,
-    *,
-    seeds: int | None = None,
-    rules: Sequence[str] | None = None,
-) -> StudySpec:
-    """Read a study file and return the study with one of its budgets.
-
-    The reference is on the last axis. Default: for swarm sizes, one robot if it is among the sizes, else the smallest
-    size; for quirks "none", the rules as they are; for other criteria 0, the ideal conditions; for a field, none. Every
-    budget runs the reference.
-
-    Args:
-        name: Name of one of the paper's sets, or path of a file.
-        budget: Name of a budget; default the first of the file.
-        seeds: Number of seeds, 0, 1, 2, ..., in place of the seeds of the budget.
-        rules: Rules in place of those in the file.
-
-    Raises:
-        ConfigError: the file is missing, is not TOML, or does not describe a study; the message names the file.
-    """
-    file = find_study(name)
+def content_of(text: str) -> StudyFile:
+    """Return what a study file says; ConfigError says where it says something else."""
     try:
-        spec = _study(_read(file), file.parent, budget, seeds, rules)
-    except ConfigError as error:
-        raise error if str(file) in str(error) else ConfigError(f"Cannot use {file}: {error}") from error
-    return spec if file.parent == SETS else replace(spec, file=str(file))
+        return msgspec.convert(parse_toml(text), StudyFile)
+    except msgspec.ValidationError as error:
+        told, _, where = str(error).partition(" - at ")
+        raise ConfigError(f"{told}{' in ' + where.strip('`').removeprefix('$.') if where else ''}.") from error
 
 
-def is_set_of_paper(spec: StudySpec) -> bool:
-    """Return whether a study is a set of the paper at one of its budgets, with any seeds, not only by its name."""
-    if spec.name not in set_names():  # else a file of that name would be opened
-        return False
-    try:
-        same = load_study(spec.name, spec.budget, rules=spec.rules)
-    except ConfigError:  # no such budget of it
-        return False
-    return replace(same, seeds=spec.seeds).study_id == spec.study_id
-
-
-def left_out(spec: StudySpec) -> dict[str, tuple[str, ...]]:
-    """Return which of the paper's values a set leaves out: axis -> values as they are shown.
-
-        left_out(load_study("S2a", "reduced"))["walk_probability"]  # ("0.026",)
-
-    The mapping is empty for a set with all values, and for any other study.
-    """
-    if not is_set_of_paper(spec):
-        return {}
-    lacking: dict[str, tuple[str, ...]] = {}
-    for axis, planned in zip(spec.axes, load_study(spec.name, PAPER).axes, strict=True):
-        words = value_words(planned.values)
-        absent = tuple(words[value] for value in planned.values if value not in axis.values)
-        if absent:
-            lacking[axis.name] = absent
-    return lacking
-
-
-def left_out_words(spec: StudySpec) -> str:
-    """Return `left_out` as one text, "walk_probability 0.026; population_size 460, 627, 819"; "" for nothing."""
-    return "; ".join(f"{axis} {', '.join(values)}" for axis, values in left_out(spec).items())
-
-
-def _read(file: Path) -> dict[str, Any]:
-    try:
-        return parse_toml(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(f"Cannot use {file}: {error.strerror or error}.") from error
-    except ValueError as error:
-        raise ConfigError(f"Cannot use {file}: {error}") from error
-
-
-def _study(
-    content: Mapping[str, Any], folder: Path, budget: str | None, n_seeds: int | None, rules: Sequence[str] | None
-) -> StudySpec:
-    known_keys(content, FILE_KEYS, "key of a study file")
-    for key in ("name", "scenario", "policies"):
-        if key not in content:
-            raise ConfigError(f"Missing key {key!r} of a study file.")
-    budgets = _budgets(content)
-    chosen = next(iter(budgets)) if budget is None else budget
-    known_name("budget", chosen, budgets)
-    allowed, of_paper = budgets[chosen], BUDGETS[PAPER]
-    horizon_s = allowed.get("horizon_s", of_paper.horizon_s)
-    interval_s = allowed.get("interval_s", of_paper.interval_s)
-    settings = plain_settings(table("set", content.get("set", {})))
-    axes, reference = _axes(content, settings, allowed)
-    told: dict[str, Any] = {}
-    if rules is not None or "rules" in content:
-        told["rules"] = tuple(_listed("rules", rules or content["rules"]))
-    return StudySpec(
-        name=content["name"],
-        title=content.get("title", ""),
-        scenario=content["scenario"],
-        settings=settings,
-        wrappers=wrappers_from_mapping(table("wrappers", content.get("wrappers", {}))),
-        policies=tuple(_policy(entry, folder) for entry in _listed("policies", content["policies"])),
-        axes=axes,
-        reference=reference,
-        budget=chosen,
-        seeds=_seeds(allowed.get("seeds", of_paper.n_seeds) if n_seeds is None else n_seeds),
-        horizon_s=horizon_s,
-        interval_s=interval_s,
-        **told,
-    )
-
-
-def _budgets(content: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
-    """Name -> keys of each budget; `PAPER` is always there."""
-    given = {name: table(f"budget.{name}", keys) for name, keys in table("budget", content.get("budget", {})).items()}
-    for name, keys in given.items():
-        known_keys(keys, BUDGET_KEYS, "key of a budget", prefix=f"budget.{name}.")
-    return {**given, PAPER: given.get(PAPER, {})}
-
-
-def _listed(where: str, value: Any) -> list[Any]:
-    if not isinstance(value, list | tuple):
-        raise ConfigError(f"Expected {where} to be a list, got {value!r}.")
-    return list(value)
-
-
-def _seeds(given: Any) -> tuple[int, ...]:
-    """The seeds of a budget, which gives their number or a list."""
-    if isinstance(given, list):
-        return tuple(given)
+def seeds_of(given: int | tuple[int, ...]) -> tuple[int, ...]:
+    """Return the seeds of a budget, which gives their number or a list."""
+    if isinstance(given, tuple):
+        return given
     whole("seeds", given, at_least=1, at_most=MOST_SEEDS)
     return tuple(range(given))
 
 
-def _policy(entry: Any, folder: Path) -> PolicySpec:
-    """A policy from its name or its table; the path of a policy file starts at the study file."""
-    keys: dict[str, Any] = {"policy": entry} if isinstance(entry, str) else dict(table("a policy", entry))
-    known_keys(keys, POLICY_KEYS, "key of a policy")
-    word = keys.pop("policy", None)
-    if not isinstance(word, str):
-        raise ConfigError(f"Missing key 'policy', a name or a file, in {entry!r}.")
-    table(f"parameters of {word!r}", keys.get("parameters", {}))
-    return policy_spec(_beside(word, folder), **keys)
+def axes_of(file: StudyFile, asked: Mapping[str, Any]) -> tuple[tuple[Axis, ...], Value | None]:
+    """Return the axes of a study, and its reference on the last one.
 
+    Args:
+        file: The study.
+        asked: Name of an axis -> values of a budget, or their number.
 
-def _beside(word: str, folder: Path) -> str:
-    """Return a policy with the path of its file relative to a folder."""
-    return str(folder / word) if is_policy_file(word) else word
-
-
-def _axes(
-    content: Mapping[str, Any], settings: Mapping[str, Any], allowed: Mapping[str, Any]
-) -> tuple[tuple[Axis, ...], Value | None]:
-    """The axes with the values of a budget, and the reference on the last one."""
-    entries = [table("an axis", entry) for entry in _listed("axis", content.get("axis", []))]
-    chosen = table("values of a budget", allowed.get("values", {}))
+    Raises:
+        ConfigError: an axis without a name or without values, or values that are not on their axis.
+    """
     axes: list[Axis] = []
     reference: Value | None = None
-    for number, entry in enumerate(entries, 1):
-        known_keys(entry, AXIS_KEYS, "key of an axis")
-        name = _axis_name(entry)
-        given = _listed(
-            f"values of axis {name}", entry["values"] if "values" in entry else _of_paper(content, settings, name)
-        )
-        several(f"the values of axis {name}", tuple(given), "values")
-        values = [_place(value) for value in given]
-        is_last = number == len(entries)
-        if "reference" in entry and not is_last:
+    for number, one in enumerate(file.axis, 1):
+        name, is_last = _name_of(one), number == len(file.axis)
+        values = _words(name, _usual_values(file, name) if one.values is None else one.values)
+        if one.reference is not None and not is_last:
             raise ConfigError(f"Expected a reference on the last axis only, got one on {name}.")
         if is_last:
-            reference = _place(entry.get("reference", _usual_reference(name, values)))
+            (reference,) = (_usual_reference(name, values),) if one.reference is None else _words(name, [one.reference])
             if reference is not None and reference not in values:
                 values = [reference, *values]
-        axes.append(Axis(name=name, values=_chosen(name, values, reference if is_last else None, chosen.get(name))))
-    known_keys(chosen, [axis.name for axis in axes], "axis", prefix="values.")
+        axes.append(Axis(name=name, values=_chosen(name, values, reference, asked.get(name))))
+    known_keys(asked, [axis.name for axis in axes], "axis", prefix="values.")
     return tuple(axes), reference
 
 
-def _place(value: Any) -> Any:
-    """A value of the file as a place on an axis: lists are texts there."""
-    return list_word(value) if isinstance(value, list) else value
+def _words(name: str, given: Sequence[Any]) -> list[Value]:
+    """Values of an axis; lists become texts."""
+    several(f"the values of axis {name}", tuple(given), "values")
+    return [list_word(value) if isinstance(value, list) else value for value in given]
 
 
-def _axis_name(entry: Mapping[str, Any]) -> str:
-    names = [entry[key] for key in ("criterion", "field") if key in entry]
-    if len(names) != 1 or not isinstance(names[0], str):
-        raise ConfigError(f"Expected either criterion or field of an axis, as a text, got {dict(entry)!r}.")
-    if "criterion" in entry:
-        known_name("criterion", names[0], (*CRITERIA, QUIRK))
-    return names[0]
-
-
-def _of_paper(content: Mapping[str, Any], settings: Mapping[str, Any], name: str) -> list[Value]:
+def _usual_values(file: StudyFile, name: str) -> Sequence[Value]:
     if name == QUIRK:
         return [NOTHING, *QUIRK_NAMES]
     if name not in CRITERIA:
         raise ConfigError(f"Missing key 'values' of axis {name}; only criteria have values of their own.")
-    return list(study_values(scenario(content["scenario"], **settings), name))
+    return study_values(scenario(file.scenario, **file.settings), name)
 
 
-def _usual_reference(name: str, values: Sequence[Value]) -> Value | None:
+def _name_of(one: AxisTable) -> str:
+    """Name of an axis, a criterion or a field."""
+    names = [name for name in (one.criterion, one.field) if name is not None]
+    if len(names) != 1:
+        raise ConfigError(f"Expected either criterion or field of an axis, got {len(names)} of them.")
+    if one.criterion is not None:
+        known_name("criterion", one.criterion, (*CRITERIA, QUIRK))
+    return names[0]
+
+
+def _usual_reference(name: str, values: Sequence[Any]) -> Value | None:
     if name == SIZE:
         return min(values)
-    if name == QUIRK:
-        return NOTHING
-    return 0.0 if name in CRITERIA else None
+    return NOTHING if name == QUIRK else 0.0 if name in CRITERIA else None
 
 
 def _chosen(name: str, values: list[Value], reference: Value | None, asked: Any) -> tuple[Value, ...]:
     """The values that a budget runs: all, a list, or a number of values besides the reference."""
     if asked is None:
         return tuple(values)
-    if isinstance(asked, list):
-        asked = [_place(value) for value in asked]
-        several(f"values.{name}", tuple(asked), "values")
-        unknown = [value for value in asked if value not in values]
+    if isinstance(asked, tuple):
+        wanted = _words(name, asked)
+        unknown = [value for value in wanted if value not in values]
         if unknown:
             raise ConfigError(f"Expected values.{name} to be some of {values!r}, got {unknown[0]!r}.")
-        return tuple(value for value in values if value in asked or value == reference)
-    whole(f"values.{name}", asked, at_least=1)
-    others = spread([value for value in values if value != reference], asked)
-    return tuple(value for value in values if value in others or value == reference)
+    else:
+        whole(f"values.{name}", asked, at_least=1)
+        wanted = list(spread([value for value in values if value != reference], asked))
+    return tuple(value for value in values if value in wanted or value == reference)
+
+
+def list_word(entries: Sequence[Any]) -> str:
+    """Return a list as a value on an axis: ["nest_distance", "x"] is "nest_distance,x", [] is "none".
+
+    Plus signs join lists within it: [[1, 2], [3, 4]] is "1,2+3,4".
+    """
+    if any(isinstance(entry, list | tuple) for entry in entries):
+        return "+".join(map(list_word, entries))
+    return ",".join(map(str, entries)) or NOTHING
+
+
+@cache
+def _list_fields() -> dict[str, Any]:
+    """Scenario fields that hold a list -> their type."""
+    return {name: kind for name, kind in field_types().items() if get_origin(kind) is tuple}
+
+
+def field_value(name: str, value: Value) -> Any:
+    """Return the value that a scenario takes for a value on the axis of a field."""
+    kind = _list_fields().get(name)
+    if kind is None:
+        return value
+    try:
+        return parse_tuple("" if value == NOTHING else str(value), kind)
+    except ConfigError:
+        raise
+    except ValueError as error:
+        raise ConfigError(f"Expected lists of numbers on axis {name}, got {value!r}.") from error
+
+
+def value_words(values: Iterable[Value]) -> dict[Value, str]:
+    """Return the values of an axis in words: 2/7 as 0.285714, but with all digits if two values would look alike."""
+    short = {value: _short(value) for value in values}
+    shown = Counter(short.values())
+    return {value: word if shown[word] == 1 else str(value) for value, word in short.items()}
+
+
+def _short(value: Value) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -17,14 +17,15 @@ from swarm_forage_env.runs.runner import run_all
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.runs.store import load
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.studies.study_folder import StudyFolder
+from swarm_forage_env.studies import results
+from swarm_forage_env.studies.study_file import Axis
 from tests.support.console import answer
 from tests.support.small_files import small_file
 from tests.support.tiny_study import RANDOM, tiny_study
 
 SMALL = ("--robots", "2", "--set", "n_objects=10", "--horizon", "4", "--set", "interval_s=2")
 SPEC = plan_run(scenario("warehouse_small", n_robots=2, n_objects=10, horizon_s=4.0, interval_s=2.0), "random")
-STUDY = tiny_study(policies=(RANDOM,), axes=(), reference=None)
+STUDY = tiny_study(Axis(name="n_robots", values=(2,)), policies=(RANDOM,))
 
 
 @pytest.mark.parametrize("command", ["train --steps 128 --set n_arenas=1", "dataset random"])
@@ -56,18 +57,18 @@ def test_two_runs_into_one_folder_leave_what_one_leaves(tmp_path):
 
 def test_two_shards_that_add_seeds_at_once_both_keep_theirs(tmp_path, monkeypatch):
     pytest.importorskip("fcntl")
-    folder = StudyFolder(tmp_path / "study")
-    folder.take(STUDY)
-    both, read = Barrier(2), StudyFolder.study
+    folder = tmp_path / "study"
+    results.take(STUDY, folder)
+    both, read = Barrier(2), results.study_in
 
-    def study(self):
-        found = read(self)
+    def study_in(where):
+        found = read(where)
         with suppress(BrokenBarrierError):
             both.wait(0.3)  # both have read, and neither has written
         return found
 
-    monkeypatch.setattr(StudyFolder, "study", study)
-    shards = [Thread(target=folder.take, args=(replace(STUDY, seeds=(0, seed)),)) for seed in (5, 6)]
+    monkeypatch.setattr(results, "study_in", study_in)
+    shards = [Thread(target=results.take, args=(STUDY.with_run(seeds=(0, seed)), folder)) for seed in (5, 6)]
     for shard in shards:
         shard.start()
     for shard in shards:

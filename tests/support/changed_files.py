@@ -17,7 +17,7 @@ from swarm_forage_env.policies.model_files import ModelError, open_network
 from swarm_forage_env.policies.network import NetworkError
 from swarm_forage_env.runs.record import Record, RecordError
 from swarm_forage_env.runs.store import read_failure
-from swarm_forage_env.studies.study_table import read_study
+from swarm_forage_env.studies.results import read_study
 from swarm_forage_env.training.datasets import Dataset, DatasetError
 from swarm_forage_env.training.evaluations import read_evaluations
 from swarm_forage_env.training.plan import read_plan

@@ -18,10 +18,8 @@ import polars as pl
 from metrics import score, verdict
 from swarm_forage_env import scenario
 from swarm_forage_env.studies.ladders import Budget
-from swarm_forage_env.studies.study import Axis
-from swarm_forage_env.studies.study_file import load_study
-from swarm_forage_env.studies.study_folder import StudyFolder, run_study
-from swarm_forage_env.studies.study_table import gather_study
+from swarm_forage_env.studies.results import read_study, run_study
+from swarm_forage_env.studies.study import load_study, study_of
 from swarm_forage_env.views.gymnasium import SwarmVectorEnv
 from swarm_forage_env.wrappers.registry import parse_wrapper
 
@@ -58,17 +56,11 @@ def score_values() -> dict[str, dict[str, list[float]]]:
 
 def verdict_answers() -> dict[str, str]:
     """Return claim, rules and variant -> answers by intervals and by bands, of tiny runs over swarm sizes."""
-    small = replace(
-        load_study("S1a", "smoke", rules=("described", "program")),
-        axes=(Axis(name="population_size", values=(1, 2, 4, 8, 16, 32)),),
-        seeds=(0, 1, 2),
-        horizon_s=400.0,
-        interval_s=40.0,
-    )
+    small = "seeds = 3\nhorizon_s = 400.0\ninterval_s = 40.0\nvalues = { population_size = [1, 2, 4, 8, 16, 32] }\n"
+    study = study_of(f"{load_study('S1a').text}\n[budget.small]\n{small}", "small")
     with tempfile.TemporaryDirectory() as folder:
-        made = StudyFolder(Path(folder))
-        run_study(small, made, jobs=1)
-        found = verdict(gather_study(made))
+        run_study(study, folder, jobs=1)
+        found = verdict(read_study(folder))
     return {
         f"{one.claim.name} {one.rules} {one.variant}": f"{one.verdict.answer}, by bands {one.verdict.by_bands}"
         for one in found.judged

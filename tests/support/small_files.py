@@ -19,8 +19,8 @@ from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.runs.store import RunFailure, failure_file, store
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.studies.study_folder import StudyFolder, run_study
-from swarm_forage_env.studies.study_table import pack_study
+from swarm_forage_env.studies.results import pack_study, run_study
+from swarm_forage_env.studies.study_file import Axis
 from swarm_forage_env.training.datasets import record_dataset
 from swarm_forage_env.training.evaluations import Evaluation, write_evaluations
 from swarm_forage_env.training.plan import read_plan
@@ -41,8 +41,8 @@ def _failure(file: Path) -> None:
 
 
 def _packed(file: Path) -> None:
-    folder = StudyFolder(file.parent / "of_study")
-    run_study(tiny_study(axes=(), reference=None), folder, jobs=1)
+    folder = file.parent / "of_study"
+    run_study(tiny_study(Axis(name="n_robots", values=(2,))), folder, jobs=1)
     pack_study(folder, file)
 
 

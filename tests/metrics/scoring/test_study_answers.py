@@ -8,7 +8,7 @@ from metrics import CLAIMS, CurveError, verdict
 from metrics.claims import INTUITIONS
 from metrics.claims.claim import READINGS
 from swarm_forage_env.studies.description import paper_sets, status
-from swarm_forage_env.studies.study import Axis
+from swarm_forage_env.studies.study_file import Axis
 from tests.support.made_tables import made_study, made_table
 
 
@@ -84,11 +84,11 @@ def test_a_status_tells_what_is_missing():
     spec = made_study()
     found = status(table_of(lost={(spec.places[0], spec.seeds[0])}))
     assert not found.is_complete
-    assert found.headline.endswith(", 1 missing")
+    assert found.sheets()[0].title.endswith(", 1 missing")
     assert found.sheets()[1].header[:2] == ("rules", "policy")
     assert found.sheets()[1].rows[0][:2] == ("described", "crw")
 
 
 def test_sets_and_studies_are_described():
-    sets = paper_sets("reduced").to_mapping()["sets"]
-    assert sets["S2a"]["left_out"]["walk_probability"] == ["0.026"]
+    sets = {row["set"]: row for row in paper_sets("reduced").to_mapping()["sets"]}
+    assert sets["S2a"]["left out"] == "walk_probability 0.026; population_size 460, 627, 819"

@@ -5,8 +5,9 @@ import pytest
 
 from metrics.scoring.frame import scores
 from metrics.scoring.run_curves import study_lines
-from swarm_forage_env import StudyFolder, read_study, run_study
-from swarm_forage_env.studies.study import Axis
+from swarm_forage_env import read_study, run_study
+from swarm_forage_env.runs.store import record_file
+from swarm_forage_env.studies.study_file import Axis
 from tests.support.tiny_study import RANDOM, tiny_study
 
 
@@ -15,8 +16,7 @@ def made(tmp_path):
     """Run a study in this process and return its table."""
 
     def make(*axes, **changes):
-        folder = StudyFolder(tmp_path)
-        run_study(tiny_study(axes=axes, policies=(RANDOM,), **changes), folder, jobs=1)
+        run_study(tiny_study(*axes, policies=(RANDOM,), **changes), tmp_path, jobs=1)
         return read_study(tmp_path)
 
     return make
@@ -49,7 +49,7 @@ def test_sizes_are_scored_from_the_smallest(made):
 def test_the_lowest_rates_may_be_the_reference(made):
     """The authors compare with their lowest level; both forms of the measure then use the same runs."""
     (line,) = study_lines(made(Axis(name="population_dynamics", values=(1.0, 2.0, 4.0)), reference=1.0,
-                               settings={"n_robots": 4, "n_objects": 20}))  # fmt: skip
+                               set={"n_robots": 4, "n_objects": 20}))  # fmt: skip
     pairs = line.curves.levels("population_dynamics")
     assert [(reference.value, level.value) for reference, level in pairs] == [(1.0, 2.0), (1.0, 4.0)]
     assert all(reference.rates.lambda_bd == pytest.approx(0.005) for reference, _ in pairs), "0.001 per tick of 0.2 s"
@@ -60,7 +60,7 @@ def test_the_lowest_rates_may_be_the_reference(made):
 def test_lost_runs_are_counted_and_another_performance_is_read(made, tmp_path):
     table = made(Axis(name="noise", values=(0.0, 0.02)))
     noisy = table.spec.places[-1]
-    StudyFolder(tmp_path).store.path(table.spec.specs_of(noisy)[1].run_id).unlink()
+    record_file(tmp_path / "runs", table.spec.specs_of(noisy)[1].run_id).unlink()
     (line,) = study_lines(read_study(tmp_path), "n_active")
     reference, level = line.curves.experiments
     assert (reference.n_lost, level.n_lost, level.seeds) == (0, 1, (0,))

@@ -3,7 +3,6 @@
 from types import SimpleNamespace
 
 import numpy as np
-import polars as pl
 import pytest
 
 from metrics import CurveError
@@ -11,10 +10,9 @@ from metrics.claims import EXPERIMENTS, INTUITIONS, PanelName
 from metrics.scoring import judge_claims, study_panels
 from metrics.scoring.study_numbers import experiment_of
 from metrics.scoring.study_verdict import VARIANTS, StudyVerdict
-from swarm_forage_env.runs.policy_spec import PolicySpec
-from swarm_forage_env.studies.study import Axis
-from swarm_forage_env.studies.study_file import load_study, set_names
-from swarm_forage_env.studies.study_table import StudyTable
+from swarm_forage_env.studies.results import StudyTable
+from swarm_forage_env.studies.study import load_study, set_names
+from swarm_forage_env.studies.study_file import Axis
 from tests.support.made_tables import FOUR, made_study, made_table
 
 SIMPLE_FIRST = {"crw": 10.0, "dpo": 11.0, "stochm": 5.0, "stochx": 4.0}
@@ -112,7 +110,7 @@ def test_spatial_emergence_has_a_panel_beside_robots_alone_and_one_beside_the_ne
 
 def test_throttles_are_placed_by_the_distance_of_conditions():
     axis = Axis(name="throttle", values=(0.0, 0.2, 0.4))
-    spec = made_study("S1c", axis, reference=0.0, settings={"n_objects": 20, "n_robots": 4})
+    spec = made_study("S1c", axis, reference=0.0, set={"n_objects": 20, "n_robots": 4})
     table = made_table(spec, lambda place: 5.0 - place.values[-1], adversity=lambda place: 0.1 + place.values[-1])
     panel = only(study_panels(table).panels, "reactivity")
     assert panel.x.tolist() == [0.2, 0.4]
@@ -189,7 +187,7 @@ def test_the_claim_on_spatial_emergence_of_search_and_rescue_needs_no_lone_robot
     [
         ([made_study(), made_study()], r"Expected each study once under the same rules, got S1a \(described\), S1a"),
         ([made_study("mine")], "Expected studies of the paper's sets, S1a, .*; got study 'mine'"),
-        ([made_study(policies=(PolicySpec(label="crw", policy="random"),))], "it has no dpo, stochm, stochx"),
+        ([made_study(policies=({"policy": "random", "label": "crw"},))], "it has no dpo, stochm, stochx"),
     ],
 )
 def test_what_no_claim_is_about_is_refused(specs, message):
@@ -201,6 +199,6 @@ def test_what_no_claim_is_about_is_refused(specs, message):
 def test_a_study_without_a_finished_run_decides_nothing():
     spec = made_study()
     table = made_table(spec, by_policy)
-    nothing = StudyTable(spec=spec, frame=table.frame.with_columns(state=pl.lit("missing")), versions=())
+    nothing = StudyTable(spec=spec, frame=table.frame.clear(), versions=())
     judged, _ = judge_claims([nothing], [study_panels(nothing)], ("corrected",))
     assert {one.claim.name: one.verdict.answer for one in judged}["P2"] == "no scores"

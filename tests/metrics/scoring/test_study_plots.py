@@ -9,7 +9,7 @@ import pytest
 from metrics.scoring import study_panels
 from metrics.scoring.study_plots import caption, draw_figure, study_figures
 from metrics.statistics import aggregate
-from swarm_forage_env.studies.study import Axis
+from swarm_forage_env.studies.study_file import Axis
 from tests.support.made_tables import FOUR, made_study, made_table
 from tests.support.pictures import PNG, words_in
 
@@ -171,7 +171,7 @@ def test_two_axes_give_a_panel_per_value(tmp_path):
 
 
 def test_a_study_over_a_field_shows_performance():
-    (figure,) = figures(SIZES, Axis(name="n_objects", values=(30, 10)), settings={}, name="mine")
+    (figure,) = figures(SIZES, Axis(name="n_objects", values=(30, 10)), set={}, name="mine")
     assert [panel.criterion for panel in figure.panels] == ["n_objects"] * 3
     frame = figure.to_frame()
     assert frame["n_objects"].to_list()[:2] == [10.0, 30.0]
@@ -179,7 +179,7 @@ def test_a_study_over_a_field_shows_performance():
 
 
 def test_words_on_the_last_axis_and_studies_without_runs_have_no_figure():
-    words = made_study("mine", Axis(name="caches", values=("none", "static")), settings={"n_objects": 60})
+    words = made_study("mine", Axis(name="caches", values=("none", "static")), set={"n_objects": 60})
     assert study_figures(study_panels(made_table(words, lambda place: 1.0))) == ()
     spec = made_study()
     assert figures(lost={(place, seed) for place in spec.places for seed in spec.seeds}) == ()
