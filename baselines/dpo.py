@@ -31,7 +31,6 @@ from .memory import (
     new_memory,
     object_memories,
     object_row_of,
-    remembered_objects,
 )
 from .object_choice import MemoryParameters, object_is_known, object_is_reached, select_object
 from .parameters import chosen_parameters, kernel_constants
@@ -142,7 +141,3 @@ class DPOPolicy(ScriptedPolicy):
     def describe_memories(self) -> Memories:
         """Return where all robots remember objects."""
         return object_memories(self._memory, self._robots)
-
-    def remembered(self, robot_index: int) -> dict[int, tuple[int, int, float]]:
-        """Return what one robot remembers: object row -> (cell x, cell y, pheromone density)."""
-        return remembered_objects(self._memory, self._robots, robot_index, self._constants[0].log_keep)

@@ -212,12 +212,3 @@ def object_memories(memory: ObjectMemory, robots: np.ndarray) -> Memories:
     robot, entry = np.nonzero(np.arange(memory.row.shape[1]) < robots["n_known"][:, None])
     cells = np.column_stack((memory.cell_x[robot, entry], memory.cell_y[robot, entry]))
     return Memories.of_cells(robot.astype(np.int32), cells)
-
-
-def remembered_objects(
-    memory: ObjectMemory, robots: np.ndarray, robot_index: int, log_keep: float
-) -> dict[int, tuple[int, int, float]]:
-    """Return what one robot remembers, for inspection: object row -> (cell x, cell y, pheromone density)."""
-    robot = robots[robot_index]
-    lists = (part[robot_index, : robot["n_known"]].tolist() for part in memory[:4])
-    return {row: (x, y, density(int(robot["clock"]) - seen, log_keep)) for row, x, y, seen in zip(*lists, strict=True)}

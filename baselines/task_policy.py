@@ -10,7 +10,7 @@ from swarm_forage_env.contract.policy import Memories, SwarmSpec
 from swarm_forage_env.contract.types import CodeArray, FloatArray, IntArray
 
 from .cache_memory import new_task_memory
-from .memory import density, object_memories, remembered_objects
+from .memory import object_memories
 from .parameters import chosen_parameters, kernel_constants
 from .robots import describe_robot
 from .scripted import ScriptedPolicy
@@ -112,11 +112,6 @@ class TaskPolicy(ScriptedPolicy):
         """(8,) share of robots in each task, by `Task` code; robots that have not acted yet have none."""
         return np.bincount(self._allocation.task, minlength=N_TASKS) / len(self._allocation.task)
 
-    @property
-    def task_estimates(self) -> FloatArray:
-        """(N, 8) expected execution times in ticks, by `Task` code, a copy; for inspection."""
-        return self._allocation.estimate.copy()
-
     def describe_robot(self, row: int) -> str:
         """Return what one robot is up to, in one line for people."""
         robot = self._robots[row]
@@ -146,20 +141,3 @@ class TaskPolicy(ScriptedPolicy):
         cells = np.column_stack((known["cell_x"], known["cell_y"]))
         objects = object_memories(self._memory.objects, self._robots)
         return Memories.together((objects, Memories.of_cells(robot.astype(np.int32), cells, is_cache=True)))
-
-    def remembered(self, robot_index: int) -> dict[int, tuple[int, int, float]]:
-        """Return the objects that one robot remembers: object row -> (cell x, cell y, pheromone density)."""
-        return remembered_objects(self._memory.objects, self._robots, robot_index, self._constants[0].log_keep)
-
-    def remembered_caches(self, robot_index: int) -> dict[int, tuple[int, int, int, float]]:
-        """Return the caches that one robot remembers: serial -> (centre cell x, y, objects, pheromone density).
-
-        For inspection; nothing in a run needs it.
-        """
-        robot = self._robots[robot_index]
-        caches = self._memory.caches[robot_index, : robot["n_caches"]]
-        log_keep = self._constants[0].log_keep
-        return {
-            serial: (x, y, count, density(int(robot["clock"]) - seen, log_keep))
-            for x, y, serial, count, seen, *_ in caches.tolist()
-        }

@@ -3,6 +3,7 @@
 import pytest
 
 from swarm_forage_env.scenarios.quirks import Quirks
+from tests.support.memories import caches_of
 from tests.support.task_robot import TaskRobot
 
 CENTRE = (72, 40)
@@ -19,12 +20,12 @@ def stand(robot: TaskRobot, cell: tuple[int, int], *caches) -> None:
 def test_a_cache_is_remembered_with_place_count_and_decaying_density():
     robot = TaskRobot()
     stand(robot, (56, 40), CACHE_SEEN)
-    assert robot.policy.remembered_caches(0) == {7: (72, 40, 12, pytest.approx(1 - 1e-5))}
+    assert caches_of(robot.policy, 0) == {7: (72, 40, 12, pytest.approx(1 - 1e-5))}
     stand(robot, (40, 40))
     stand(robot, (40, 40))
-    assert robot.policy.remembered_caches(0) == {7: (72, 40, 12, pytest.approx((1 - 1e-5) ** 3, abs=1e-12))}
+    assert caches_of(robot.policy, 0) == {7: (72, 40, 12, pytest.approx((1 - 1e-5) ** 3, abs=1e-12))}
     stand(robot, (56, 40), (7, CENTRE, 11))
-    assert robot.policy.remembered_caches(0) == {7: (72, 40, 11, pytest.approx(1 - 1e-5))}
+    assert caches_of(robot.policy, 0) == {7: (72, 40, 11, pytest.approx(1 - 1e-5))}
     assert robot.policy.n_caches.tolist() == [1]
 
 
@@ -46,7 +47,7 @@ def test_a_cache_whose_square_should_be_in_the_window_but_is_not_seen_is_forgott
     robot = TaskRobot()
     stand(robot, (56, 40), CACHE_SEEN)
     stand(robot, cell)
-    assert (robot.policy.remembered_caches(0) == {}) == forgets
+    assert (caches_of(robot.policy, 0) == {}) == forgets
 
 
 @pytest.mark.parametrize(
@@ -67,7 +68,7 @@ def test_quirk_cache_forget_unit_mismatch_compares_metres_with_cells_in_either_a
     robot = TaskRobot(quirks=Quirks(cache_forget_unit_mismatch=True))
     stand(robot, (56, 40), CACHE_SEEN)
     stand(robot, cell)
-    assert (robot.policy.remembered_caches(0) == {}) == forgets
+    assert (caches_of(robot.policy, 0) == {}) == forgets
 
 
 @pytest.mark.parametrize("at_every_sight", [False, True])

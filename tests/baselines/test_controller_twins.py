@@ -15,6 +15,7 @@ from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
 from tests.reference.controllers import ObjectDictionary, ReferenceRobot
+from tests.support.memories import objects_of
 from tests.support.observations import GREYS, Observations, make_spec
 
 N_ROBOTS = 6
@@ -82,7 +83,7 @@ def test_compiled_controller_acts_like_the_slow_one(policy_class, quirks):
     if isinstance(policy, DPOPolicy):
         assert stages == set(VectorState)
         for i, twin in enumerate(twins):
-            assert set(policy.remembered(i)) == set(twin.memory.known)
+            assert set(objects_of(policy, i)) == set(twin.memory.known)
 
 
 def test_long_turns_are_as_in_the_slow_one():

@@ -11,6 +11,7 @@ from baselines.parameters import kernel_constants
 from baselines.robots import Activity, VectorState
 from swarm_forage_env.contract.codes import Event, Grip
 from swarm_forage_env.scenarios.quirks import Quirks
+from tests.support.memories import objects_of
 from tests.support.observations import Observations, make_spec
 
 GOAL = (10.5, 10.1)
@@ -138,7 +139,7 @@ def test_memory_is_kept_up_to_date_while_homing(robot):
     robot.seen.window({(1, 1): 9})
     robot.act()
     assert robot.activity is Activity.HOMING
-    assert set(robot.policy.remembered(0)) == {9}
+    assert set(objects_of(robot.policy, 0)) == {9}
 
 
 def test_starting_within_tolerance_is_an_arrival_unless_the_quirk_is_on():

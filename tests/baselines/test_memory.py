@@ -6,6 +6,7 @@ import pytest
 from baselines.dpo import DPOPolicy
 from baselines.memory import density
 from tests.reference.controllers import ObjectDictionary, visible_objects
+from tests.support.memories import objects_of
 from tests.support.observations import Observations, make_spec
 
 ACTIVE = np.ones(1, bool)
@@ -21,7 +22,7 @@ def look(policy: DPOPolicy, observations: Observations, x: float, y: float, obje
     observations.pose(x, y)
     observations.window(objects)
     policy.act(observations.array, ACTIVE)
-    return policy.remembered(0)
+    return objects_of(policy, 0)
 
 
 def test_density_of_an_object_seen_now_and_long_ago():
@@ -53,7 +54,7 @@ def test_positions_come_from_the_exact_cell_not_from_the_noisy_position():
     observations.believed_position(10.9, 7.3)
     observations.window({(0, 0): 7})
     policy.act(observations.array, ACTIVE)
-    assert policy.remembered(0)[7][:2] == (50, 40)
+    assert objects_of(policy, 0)[7][:2] == (50, 40)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -89,7 +90,7 @@ def test_memory_equals_the_naive_rule(seed):
             senses = {name: observations.get(name, i).astype(float) for name in ("los_cell", "los_object")}
             twins[i].update(*visible_objects(task, senses))
         for i, twin in enumerate(twins):
-            known = policy.remembered(i)
+            known = objects_of(policy, i)
             assert {row: entry[:2] for row, entry in known.items()} == {
                 row: cell for row, (cell, _) in twin.known.items()
             }

@@ -8,6 +8,7 @@ from swarm_forage_env.contract.codes import Counter, ObjectStatus
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.presets import scenario
+from tests.support.memories import caches_of
 
 SCENARIOS = ["warehouse_small", "warehouse_medium", "search_and_rescue"]
 CACHES = {"stochm": "static", "stochx": "dynamic"}
@@ -62,7 +63,7 @@ def test_swarms_deliver_and_use_caches(policy_name):
 def test_what_robots_remember_of_caches_was_true_and_is_while_they_see_them():
     run = Run("warehouse_small", "stochm", ticks=3000, seed=6)
     run.policy.act(run.obs, run.env.active)  # takes note of what is seen now
-    remembered = [run.policy.remembered_caches(robot) for robot in range(50)]
+    remembered = [caches_of(run.policy, robot) for robot in range(50)]
     assert sum(len(known) for known in remembered) == run.policy.n_caches.sum() > 0
     for known in remembered:
         for serial, (x, y, count, density) in known.items():

@@ -8,6 +8,7 @@ import pytest
 from baselines.robots import Activity, VectorState
 from swarm_forage_env.contract.codes import Event, Grip, Task
 from swarm_forage_env.scenarios.quirks import Quirks
+from tests.support.memories import caches_of, estimates_of
 from tests.support.task_robot import TaskRobot
 from tests.support.task_work import (
     CACHE,
@@ -98,7 +99,7 @@ def test_quirk_refusals_not_remembered(task):
     cache = (11, (int((x + 7.1) / 0.2), int(y / 0.2)), 4)  # the world wants 12.8 m, the robot 6.4 m
     robot.seen.event(Event.CACHE_TOO_NEAR, cache=cache)
     robot.act()
-    assert list(robot.policy.remembered_caches(0)) == [11]
+    assert list(caches_of(robot.policy, 0)) == [11]
     assert not robot.memory.caches[0].has_refused
     assert math.dist(robot.goal, (x, y)) < 0.6, "where it will be refused again"
     assert robot.activity is (Activity.TRANSPORT if task is Task.STARTER else Activity.WAIT_DROP)
@@ -169,9 +170,9 @@ def test_starting_within_tolerance_is_arrival():
 def test_a_drop_ends_the_task_and_the_next_one_starts_in_the_same_tick(robot, task):
     wait_for_drop(robot, task)
     lasted = robot.policy._allocation.exec_time[0, task]
-    estimate = robot.policy.task_estimates[0, task]
+    estimate = estimates_of(robot.policy, 0)[task]
     drop(robot)
-    assert robot.policy.task_estimates[0, task] == pytest.approx((estimate + lasted) / 2)
+    assert estimates_of(robot.policy, 0)[task] == pytest.approx((estimate + lasted) / 2)
     assert robot.activity is Activity.ACQUIRE
     has_begun = robot.record.explore_ticks == 1 or robot.stage is VectorState.VECTOR
     assert has_begun
@@ -224,9 +225,9 @@ def test_dropped_objects_add_up_over_successive_tasks_that_drop(robot):
 
 def test_a_robot_whose_drop_was_completed_in_repair_has_finished(robot):
     wait_for_drop(robot, Task.STARTER)
-    estimate = robot.policy.task_estimates[0, Task.STARTER]
+    estimate = estimates_of(robot.policy, 0)[Task.STARTER]
     robot.seen.carry(None)
     robot.act(3, active=False)
     robot.act()
-    assert robot.policy.task_estimates[0, Task.STARTER] != estimate
+    assert estimates_of(robot.policy, 0)[Task.STARTER] != estimate
     assert robot.activity is Activity.ACQUIRE

@@ -14,6 +14,7 @@ from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
 from tests.reference import task_chain
 from tests.reference.controllers import ObjectDictionary
 from tests.reference.task_controllers import TASKS, ReferenceTaskRobot
+from tests.support.memories import caches_of, estimates_of, objects_of
 from tests.support.observations import GREYS, Observations, make_spec
 
 N_ROBOTS = 6
@@ -162,11 +163,11 @@ def test_compiled_controller_acts_like_the_slow_one(policy_class, quirks):
             searching += policy._robots[i].is_searching
     for i, twin in enumerate(twins):
         known = {cache.serial: (*cell, cache.count) for cell, cache in twin.caches.items()}
-        assert {serial: value[:3] for serial, value in policy.remembered_caches(i).items()} == known
-        assert {row: cell for row, (*cell, _) in policy.remembered(i).items()} == {
+        assert {serial: value[:3] for serial, value in caches_of(policy, i).items()} == known
+        assert {row: cell for row, (*cell, _) in objects_of(policy, i).items()} == {
             row: list(cell) for row, (cell, _) in twin.memory.known.items()
         }
-        estimates = policy.task_estimates[i]
+        estimates = estimates_of(policy, i)
         assert {name: estimates[code] for code, name in enumerate(TASKS) if name} == pytest.approx(twin.estimates)
     tasks = list(Task)[1:] if policy_class is STOCHXPolicy else list(Task)[1:4]
     assert {task for task, _ in visited} == set(tasks)
