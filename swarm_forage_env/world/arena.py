@@ -342,7 +342,7 @@ class ForagingArena:
 
     @property
     def needs_python(self) -> bool:
-        """Whether Python is needed in every tick: for neighbours, messages or sensors of the user."""
+        """Whether Python is needed in every tick: for neighbours or messages."""
         return self._needs_python
 
     @property
