@@ -102,8 +102,9 @@ def each_run(
         except BrokenExecutor as error:
             raise _killed() from error
         finally:
-            for future in running:
-                future.cancel()
+            if executor is not None:  # a pool of ours ends whole, and complains of tasks that others have cancelled
+                for future in running:
+                    future.cancel()
 
 
 def _is_lost(future: Future[Any]) -> bool:

@@ -162,7 +162,7 @@ def test_real_robots_stand_beside_policies_in_one_table_and_picture(command, pai
     assert header == ["measure", "at", "better", "random", "real"]
     assert first[-3:] == ["2", "±", "0"]
     assert "real.csv: deliveries are counted in 2 intervals of 2 s" in out
-    assert {(record.n_robots, record.seed, record.horizon_s) for record in load(Path("here"))} == {
+    assert {(record.spec.world.n_robots, record.seed, record.horizon_s) for record in load(Path("here"))} == {
         (n, run, 4.0) for n in (1, 3) for run in (0, 1)
     }
     assert "picture real_scores.png" in err
