@@ -113,14 +113,13 @@ def probability_of_improvement(
     return Estimate(value=float(np.mean(shares)), lower=lower, upper=upper, n_runs=n_runs)
 
 
-def optimality_gap(values: ArrayLike, *, target: float = 1.0) -> float:
-    """Mean amount by which runs fall short of a target; 0 if every run reaches it.
+def optimality_gap(values: ArrayLike) -> float:
+    """Mean amount by which runs fall short of 1; 0 if every run reaches it.
 
-        optimality_gap([0.5, 1.5]) # 0.25: a run above the target does not make up for one below
+        optimality_gap([0.5, 1.5]) # 0.25: a run above 1 does not make up for one below
 
     Args:
         values: One value per run, any shape. NaN values are left out.
-        target: What a run should reach, in the unit of the values.
 
     Raises:
         CurveError: No values.
@@ -129,7 +128,7 @@ def optimality_gap(values: ArrayLike, *, target: float = 1.0) -> float:
     known = runs[~np.isnan(runs)]
     if known.size == 0:
         raise CurveError(f"Expected at least one run, got values of shape {runs.shape} without a number.")
-    return float(np.maximum(target - known, 0.0).mean())
+    return float(np.maximum(1.0 - known, 0.0).mean())
 
 
 def performance_profile(values: ArrayLike, thresholds: ArrayLike) -> FloatArray:

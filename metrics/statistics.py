@@ -39,9 +39,9 @@ class Summary:
     """Runs left out because their value is NaN."""
 
     @classmethod
-    def without_interval(cls, mean: float = math.nan, n_used: int = 0) -> "Summary":
-        """Return a number that runs give no interval to; NaN: there is none."""
-        return cls(mean=mean, std=math.nan, lower=math.nan, upper=math.nan, n_used=n_used, n_nan=0)
+    def without_interval(cls, n_used: int = 0) -> "Summary":
+        """Return what there is where runs give no number."""
+        return cls(mean=math.nan, std=math.nan, lower=math.nan, upper=math.nan, n_used=n_used, n_nan=0)
 
 
 @dataclass(frozen=True, kw_only=True)

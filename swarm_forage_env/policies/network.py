@@ -194,24 +194,19 @@ class Network:
         return max(size for weight in self.weights for size in weight.shape)
 
     @classmethod
-    def from_state_dict(
-        cls, state: Mapping[str, Any], about: NetworkAbout, *, n_outputs: int | None = None
-    ) -> "Network":
+    def from_state_dict(cls, state: Mapping[str, Any], about: NetworkAbout) -> "Network":
         """Take the layers of a perceptron from the state dict of a torch module.
 
         Args:
             state: Tensors by name, in the order of the layers: (out, in) under names that end in "weight", (out,) under
                 names that end in "bias". Others are left out.
             about: What is needed besides the weights.
-            n_outputs: How many outputs are actions; default all. Some libraries add deviations after the means.
 
         Raises:
             NetworkError: the layers do not follow on each other.
         """
         parts = {end: [_array(tensor) for name, tensor in state.items() if name.endswith(end)] for end in _LAYER_PARTS}
         weights, biases = ([array.T for array in parts["weight"]], parts["bias"])
-        if n_outputs is not None and weights and biases:
-            weights[-1], biases[-1] = weights[-1][:, :n_outputs], biases[-1][:n_outputs]
         return cls(tuple(map(np.ascontiguousarray, weights)), tuple(biases), about)
 
     def save(self, path: str | Path) -> None:
