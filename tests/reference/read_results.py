@@ -6,9 +6,9 @@ Nothing of this project is imported: the formulas are written out from docs/equa
 computes the rows of measures.csv anew from <set>.parquet and names those that differ; exit code 1 if there are any.
 """
 
-import json
 import math
 import sys
+import tomllib
 from collections.abc import Iterator
 from functools import cache
 from itertools import pairwise, takewhile
@@ -31,12 +31,12 @@ Measured = Iterator[tuple[str, str, float, np.ndarray]]
 
 def looked_at(line: Line, study: dict) -> Line:
     """Of a study that is looked at several times, the first runs of each condition, as many as the last look has."""
-    if not study.get("looks"):
+    if not study["run"].get("looks"):
         return line
     everywhere = set.intersection(*(set(rows["seed"]) for rows in line.values()))
-    leading = list(takewhile(everywhere.__contains__, sorted(study["seeds"])))
-    is_whole = len(line) == len(study["axes"][-1]["values"])
-    n_runs = max((look for look in study["looks"] if is_whole and look <= len(leading)), default=0)
+    leading = list(takewhile(everywhere.__contains__, sorted(study["run"]["seeds"])))
+    is_whole = len(line) == study["n_values"]
+    n_runs = max((look for look in study["run"]["looks"] if is_whole and look <= len(leading)), default=0)
     return {value: rows.filter(pl.col("seed").is_in(leading[:n_runs])) for value, rows in line.items() if n_runs}
 
 
@@ -105,7 +105,7 @@ def mean_at_work(level: float, n: int, ticks: float) -> float:
 
 def over_levels(line: Line, study: dict) -> Measured:
     """Measures of a policy over the levels of an adversity, each beside the study's reference."""
-    reference, criterion = study["reference"], study["axes"][-1]["name"]
+    reference, criterion = study["axis"][-1].get("reference", min(line)), study["axis"][-1]["criterion"]
     for level in line.keys() - {reference}:
         ideal, disturbed = paired(line[reference], line[level])
         x, y = curves(ideal, "performance"), curves(disturbed, "performance")
@@ -113,7 +113,7 @@ def over_levels(line: Line, study: dict) -> Measured:
             follows = 1.0 - (curves(disturbed, "adversity") - curves(ideal, "adversity"))
             yield "reactivity", "marginal", level, warped(follows * x, y)
         if criterion == "population_dynamics":  # Eq. (12): beyond what robots at work explain, expected and counted
-            n, ticks = line[level]["n_robots"][0], study["horizon_s"] / TICK_S
+            n, ticks = line[level]["n_robots"][0], line[level]["t_end_s"].max() / TICK_S
             share = mean_at_work(level, n, ticks) / mean_at_work(reference, n, ticks)
             counted = curves(disturbed, "n_active") / curves(ideal, "n_active")
             yield "population_robustness", "marginal", level, (y - share * x).sum(axis=1)
@@ -124,10 +124,10 @@ def over_levels(line: Line, study: dict) -> Measured:
 
 def measured(file: Path) -> Iterator[tuple[tuple, np.ndarray]]:
     """What names a row of measures.csv, and the values of its runs that are numbers, of a packed study."""
-    stamp = {key.rpartition(".")[2]: text for key, text in pl.read_parquet_metadata(file).items()}
-    study = json.loads(stamp["study"])
-    *others, last = (axis["name"] for axis in study["axes"])
-    rows = pl.read_parquet(file).filter(pl.col("state") == "done").sort(f"axis_{last}", "seed", "interval")
+    study = tomllib.loads(pl.read_parquet_metadata(file)["swarm_forage_env.study"])
+    *others, last = (axis.get("criterion") or axis["field"] for axis in study["axis"])
+    rows = pl.read_parquet(file).filter(pl.col("error").is_null()).sort(f"axis_{last}", "seed", "interval")
+    study["n_values"] = rows[f"axis_{last}"].n_unique()
     lines: dict[tuple, Line] = {}
     axes = [f"axis_{name}" for name in (*others, last)]
     for place, condition in rows.group_by("rules", "policy", *axes, maintain_order=True):
