@@ -12,7 +12,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_dpo_delivers_as_much_in_the_second_half_of_a_run(seed):
-    collected = run_one(plan_run(warehouse_medium(), "dpo", seed=seed)).collected
+    collected = run_one(plan_run(warehouse_medium(), "dpo", seed=seed))["collected"]
     half = len(collected) // 2
     first, second = np.mean(collected[1:half]), np.mean(collected[half:])  # nobody delivers in the first minutes
     print(f"\nseed {seed}: deliveries per interval {first:.1f}, then {second:.1f}")  # noqa: T201 - the finding

@@ -96,8 +96,8 @@ def test_policies_wait_and_deliver_less(policy):
         run_one(plan_run(world, policy, caches="none", wrappers=wrappers, seed=3))
         for wrappers in ((), (parse_wrapper(word),))
     )
-    assert hard.free_pickups.sum() > 0
-    assert 0 < hard.collected.sum() < easy.collected.sum()
+    assert hard["free_pickups"].sum() > 0
+    assert 0 < hard["collected"].sum() < easy["collected"].sum()
 
 
 def test_a_world_with_slow_handling_equals_the_wrapper_that_makes_it_slow():
@@ -105,6 +105,6 @@ def test_a_world_with_slow_handling_equals_the_wrapper_that_makes_it_slow():
     slow = with_overrides(world, pickup_ticks=7, drop_ticks=7)
     fields = run_one(plan_run(slow, "crw", seed=2))
     wrapped = run_one(plan_run(world, "crw", wrappers=(constant(7.4),), seed=2))
-    assert fields.free_pickups.sum() > 0
+    assert fields["free_pickups"].sum() > 0
     for name in ("collected", "free_pickups", "interference_ticks"):
-        assert getattr(fields, name).tolist() == getattr(wrapped, name).tolist()
+        assert fields[name].tolist() == wrapped[name].tolist()
