@@ -168,7 +168,8 @@ def record_of_run(recorder: RunRecorder, spec: RunSpec, started: Started) -> Rec
         "wall_time_s": f"{wall_time_s:.3f}",
         "cpu_time_s": f"{cpu_time_s:.3f}",
     }
-    columns = {**recorder.contributed(), **recorder.columns()}
+    contributed = {name: values.astype(np.float64) for name, values in recorder.contributed().items()}
+    columns = {**contributed, **recorder.columns()}
     return Record(spec=spec, columns=columns, made_with=software_versions() | origin)
 
 
