@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from swarm_forage_env.policies.registry import POLICIES
-from swarm_forage_env.runs.answer import Sheet
 from swarm_forage_env.runs.plan import Condition, Plan, run_plan
 from swarm_forage_env.runs.policy_spec import policy_specs
+from swarm_forage_env.sheet import Sheet
 
 from .entry import check_finished, policy_origin, read_entry, six_digits
 from .protocol import BenchmarkError, load_protocol
@@ -58,4 +58,4 @@ def verify_entry(
         again = [six_digits(record.per_1000_s("performance")) for record in table.of(condition)]
         numbers = (", ".join(f"{value:g}" for value in values) for values in (stored, again))
         rows.append((condition.policy.label, name, *numbers, SAME if stored == again else "differs"))
-    return Sheet(header=("policy", "world", "stored per 1,000 s", "again", "answer"), rows=rows)
+    return Sheet.of(header=("policy", "world", "stored per 1,000 s", "again", "answer"), rows=rows)

@@ -5,7 +5,7 @@
     print(found)
 
 A new question is a dataclass with `plan` and `answer`, and a function that writes the plan. Its answer is best an
-`swarm_forage_env.runs.answer.Answer`, which has all forms.
+`swarm_forage_env.sheet.Answer`, which has all forms.
 """
 
 from abc import ABC, abstractmethod

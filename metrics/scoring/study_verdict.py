@@ -7,7 +7,7 @@ from itertools import product
 from typing import TYPE_CHECKING, Any, get_args
 
 from swarm_forage_env._internal.wording import number, percent, plain
-from swarm_forage_env.runs.answer import Answer, Sheet
+from swarm_forage_env.sheet import Answer, Sheet
 from swarm_forage_env.studies.study import is_set_of_paper, load_study
 from swarm_forage_env.studies.study_file import PAPER
 
@@ -261,7 +261,7 @@ class StudyVerdict(Answer):
 
     def _counted(self) -> Sheet:
         rows = [(rules, *map(str, self.counts(rules, "corrected").values())) for rules in self.rules]
-        return Sheet(title="how many claims, measures corrected", header=("rules", *ANSWERS, WAITS), rows=rows)
+        return Sheet.of(title="how many claims, measures corrected", header=("rules", *ANSWERS, WAITS), rows=rows)
 
     def _at_a_glance(self) -> Iterator[Sheet]:
         """Each claim with its answers under all rules, measures corrected; the same of the intuitions."""
@@ -274,7 +274,7 @@ class StudyVerdict(Answer):
             folded = [row[0] for row in rows if self.is_folded and not {*row[2:]} - {WAITS, ""}]
             shown = [row for row in rows if row[0] not in folded]
             notes = [self._folded_words(folded, len(rows))] if folded else []
-            yield Sheet(title=title, header=("claim", "the paper", *columns), rows=shown, notes=notes)
+            yield Sheet.of(title=title, header=("claim", "the paper", *columns), rows=shown, notes=notes)
 
     def _folded_words(self, names: Sequence[str], n_all: int) -> str:
         lacks = {
@@ -299,7 +299,7 @@ class StudyVerdict(Answer):
         sheets: list[Sheet] = []
         for (what, rules, variant), some in groups.items():
             title = f"rules {rules}, measures {variant}" if rules else "without any run"
-            sheets.append(Sheet(title=f"{what}{title}", header=HEADER, rows=[_row(one) for one in some]))
+            sheets.append(Sheet.of(title=f"{what}{title}", header=HEADER, rows=[_row(one) for one in some]))
         first, *others = waiting_lines((*self.waiting, *self.expected_later))
         return [*sheets, Sheet(title=first, notes=others)]
 

@@ -15,12 +15,12 @@ import numpy as np
 from swarm_forage_env._internal.wording import counted, percent, plain
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 from swarm_forage_env.rendering.plots import Curve, draw_curves
-from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.plan import Condition, Plan, Table
 from swarm_forage_env.runs.policy_spec import PolicyLike, policy_specs
 from swarm_forage_env.runs.record import Record
 from swarm_forage_env.runs.store import failure_file, failure_lines, record_file
 from swarm_forage_env.scenarios.performance import Performance, performance_of
+from swarm_forage_env.sheet import Answer, Sheet
 from swarm_forage_env.wrappers.world import World, WorldLike, world_of
 
 from ..checks import chosen_seeds
@@ -93,7 +93,7 @@ class RunSummary(Answer):
             lines.append([*about, row.caches, str(row.n_runs), *numbers, *tail])
         notes = [f"{self._about_interval}; interference: share of active robot time"]
         notes += [ABOUT_LIMIT] if has_limit else []
-        return Sheet(title=self._title(n_worlds), header=header, rows=lines, notes=notes), failures
+        return Sheet.of(title=self._title(n_worlds), header=header, rows=lines, notes=notes), failures
 
     @property
     def _about_interval(self) -> str:

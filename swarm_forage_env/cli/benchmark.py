@@ -109,7 +109,7 @@ def verify(entry: Path, /, *, policy: Names = (), worlds: PositiveInt = 8, jobs:
 
     again = verify_entry(entry, policy, n_worlds=worlds, jobs=jobs)
     say(again.text())
-    return EXIT_FAILURE if any(row[-1] != SAME for row in again.rows) else 0
+    return EXIT_FAILURE if (again.frame["answer"] != SAME).any() else 0
 
 
 def _show(board: "Board", *, as_json: bool) -> None:

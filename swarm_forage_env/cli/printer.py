@@ -19,11 +19,8 @@ if TYPE_CHECKING:
 
     from metrics.scoring.question import Question
     from swarm_forage_env.cli.options import RunOptions
-    from swarm_forage_env.runs.answer import Answer as FoundAnswer
     from swarm_forage_env.runs.plan import Table
-    from swarm_forage_env.sheet import Answer as PrintedAnswer
-
-    Answer = FoundAnswer | PrintedAnswer
+    from swarm_forage_env.sheet import Answer
 
 FAILURES_SHOWN = 10
 """Reasons of failures for which the command that makes the first run again is told; the folder has those of all."""

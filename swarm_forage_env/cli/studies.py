@@ -128,7 +128,7 @@ def verdict(places: Places, /, *, table: bool = False, file: Path | None = None,
     """
     from metrics import verdict as verdict_of
     from swarm_forage_env._internal.files import check_file
-    from swarm_forage_env.runs.answer import FORMS
+    from swarm_forage_env.sheet import FORMS
 
     if file is not None and file.suffix not in FORMS:
         raise ConfigError(f"Expected --file as a file ending in {', '.join(FORMS)}, got {str(file)!r}.")

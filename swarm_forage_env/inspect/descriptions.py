@@ -5,7 +5,6 @@ import inspect
 import re
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +16,11 @@ from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.pretrained import network_file
 from swarm_forage_env.policies.python_files import classes_of
 from swarm_forage_env.policies.registry import POLICIES, file_of, is_policy_file, policy_class
-from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.spec import stated_caches
 from swarm_forage_env.scenarios import presets
 from swarm_forage_env.scenarios.columns import ALL_COLUMNS, CONTRIBUTED_COLUMNS
 from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.sheet import Sheet
 from swarm_forage_env.wrappers.registry import WRAPPERS, wrapper_config_class
 from swarm_forage_env.wrappers.world import FILE, read_world
 
@@ -29,51 +28,21 @@ _MOST_LETTERS = 160
 """Of an entry of a network's card."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Overview(Answer):
-    """What there is to choose from."""
-
-    tables: tuple[Sheet, ...]
-
-    def sheets(self) -> tuple[Sheet, ...]:
-        """Return one table per kind of thing."""
-        return self.tables
-
-    def to_mapping(self) -> dict[str, Any]:
-        """Return the rows by their columns."""
-        return {table.title: [dict(zip(table.header, row, strict=True)) for row in table.rows] for table in self.tables}
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Description(Answer):
-    """Everything about a scenario or a policy."""
-
-    name: str
-    lines: tuple[str, ...]
-
-    def sheets(self) -> tuple[Sheet, ...]:
-        """Return the text."""
-        return (Sheet(notes=self.lines),)
-
-    def to_mapping(self) -> dict[str, Any]:
-        """Return name and text."""
-        return {"name": self.name, "text": self.text()}
-
-
-def overview(what: str | None = None) -> Overview:
+def overview(what: str | None = None) -> Sheet:
     """Return which scenarios and policies there are, or what else `LISTS` has.
 
     Raises:
         ConfigError: there is no such list.
     """
-    if what is not None:
-        known_name("list", what, LISTS)
-    return Overview(tables=tuple(LISTS[name]() for name in ((what,) if what else ("scenarios", "policies"))))
+    if what is None:
+        return dataclasses.replace(_scenarios(), below=[_policies()])
+    known_name("list", what, LISTS)
+    return LISTS[what]()
 
 
 def _scenarios() -> Sheet:
     rows = [(name, *_scenario_cells(name)) for name in presets.SCENARIO_NAMES]
-    return Sheet(title="scenarios", header=("scenario", "robots", "objects", "arena", "what it is"), rows=rows)
+    return Sheet.of(title="scenarios", header=("scenario", "robots", "objects", "arena", "what it is"), rows=rows)
 
 
 def _scenario_cells(name: str) -> tuple[str, ...]:
@@ -85,7 +54,7 @@ def _scenario_cells(name: str) -> tuple[str, ...]:
 def _policies() -> Sheet:
     policies = {name: policy_class(name) for name in POLICIES}
     rows = [(name, _caches(policy), _first_line(policy)) for name, policy in policies.items()]
-    return Sheet(title="policies", header=("policy", "caches", "what it is"), rows=rows)
+    return Sheet.of(title="policies", header=("policy", "caches", "what it is"), rows=rows)
 
 
 def _wrappers() -> Sheet:
@@ -94,7 +63,7 @@ def _wrappers() -> Sheet:
         (name, f"{name}:{config.example}", ", ".join(field.name for field in dataclasses.fields(config)))
         for name, config in classes.items()
     ]
-    return Sheet(title="wrappers", header=("wrapper", "example", "fields"), rows=rows)
+    return Sheet.of(title="wrappers", header=("wrapper", "example", "fields"), rows=rows)
 
 
 def _columns() -> Sheet:
@@ -102,7 +71,7 @@ def _columns() -> Sheet:
         (name, column.unit or "-", column.meaning + (" (optional)" if name in CONTRIBUTED_COLUMNS else ""))
         for name, column in ALL_COLUMNS.items()
     ]
-    return Sheet(title="columns", header=("column", "unit", "meaning"), rows=rows)
+    return Sheet.of(title="columns", header=("column", "unit", "meaning"), rows=rows)
 
 
 LISTS: dict[str, Callable[[], Sheet]] = {
@@ -114,13 +83,13 @@ LISTS: dict[str, Callable[[], Sheet]] = {
 """What can be listed -> its table."""
 
 
-def describe(name: str) -> Description:
+def describe(name: str) -> Sheet:
     """Return everything about a scenario (by name, environment id or file) or a policy (by name or file).
 
     Raises:
         ConfigError: nothing has that name, or the file holds none.
     """
-    return Description(name=name, lines=tuple(_lines(name)))
+    return Sheet(notes=tuple(_lines(name)))
 
 
 def _lines(name: str) -> Iterable[str]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from swarm_forage_env._internal.wording import counted
-from swarm_forage_env.runs.answer import Answer, Sheet
+from swarm_forage_env.sheet import Answer, Sheet
 from swarm_forage_env.studies.results import StudyTable
 from swarm_forage_env.studies.study import StudySpec, left_out, load_study, set_names
 from swarm_forage_env.studies.study_file import PAPER
@@ -51,7 +51,7 @@ class PaperSets(Answer):
         ]  # fmt: skip
         title = f"experiment sets of the paper, budget {self.budget}"
         notes = ("of four controllers, under each of the two rules",)
-        return (Sheet(title=title, header=header, rows=shown, notes=notes),)
+        return (Sheet.of(title=title, header=header, rows=shown, notes=notes),)
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the sets."""
@@ -92,7 +92,7 @@ class StudyStatus(Answer):
         if len(left):
             words = list(spec.place_words().values())
             rows = [(*words[row["condition"]], *(str(row[name]) for name in STATES)) for row in left.to_dicts()]
-            sheets.append(Sheet(header=("rules", "policy", *(axis.name for axis in spec.axes), *STATES), rows=rows))
+            sheets.append(Sheet.of(header=("rules", "policy", *(axis.name for axis in spec.axes), *STATES), rows=rows))
         if failed := self._failed():
             notes = [f"  {row['policy']}, seed {row['seed']}: {row['error']}" for row in failed[:FAILURES_SHOWN]]
             more = len(failed) - FAILURES_SHOWN

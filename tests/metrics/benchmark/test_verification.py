@@ -21,7 +21,7 @@ def entry():
 
 
 def verified(file, **options):
-    return verify_entry(file, jobs=1, progress=False, **options).rows
+    return verify_entry(file, jobs=1, progress=False, **options).frame.rows()
 
 
 def test_an_entry_comes_again(entry, tmp_path):

@@ -32,7 +32,7 @@ def test_claims_are_counted_and_at_a_glance_under_both_rules_of_two_studies():
     program = made_table(made_study(rules=("program",)), lambda place: 10.0 * place.values[-1])
     found = replace(verdict(table_of(), program), is_short=True)
     counts, claims, intuitions = found.sheets()
-    assert counts.header == (
+    assert tuple(counts.frame.columns) == (
         "rules",
         "supported",
         "contradicted",
@@ -42,21 +42,21 @@ def test_claims_are_counted_and_at_a_glance_under_both_rules_of_two_studies():
         "no scores",
         "waits",
     )
-    assert [row[0] for row in counts.rows] == ["described", "program"]
-    assert {sum(map(int, row[1:])) for row in counts.rows} == {len(CLAIMS)}
-    assert claims.header[2:] == tuple(
+    assert [row[0] for row in counts.frame.rows()] == ["described", "program"]
+    assert {sum(map(int, row[1:])) for row in counts.frame.rows()} == {len(CLAIMS)}
+    assert tuple(claims.frame.columns[2:]) == tuple(
         f"{rules}: {word}"
         for rules in ("described", "program")
         for word in ("the paper's bands", "ours", "ours, relative")
     )
     told = found.to_mapping()["counts"]["program"]
-    assert [str(n) for n in told.values()] == list(counts.rows[1][1:])
-    answers = {row[0]: row[2:] for row in claims.rows}
+    assert [str(n) for n in told.values()] == list(counts.frame.rows()[1][1:])
+    answers = {row[0]: row[2:] for row in claims.frame.rows()}
     assert answers["P2"] == ("tie", "tie", "") * 2, "all four achieve the same"
     assert answers["V1"] == ("supported", "supported", "") * 2
     assert answers["D5"] == ("too vague", "too vague", "") * 2
     assert answers["R1"] == ("waits", "waits", "") * 2
-    assert len(intuitions.rows) == len(INTUITIONS)
+    assert len(intuitions.frame.rows()) == len(INTUITIONS)
 
 
 def test_claims_about_distances_are_read_relative_and_of_mean_curves():
@@ -65,7 +65,7 @@ def test_claims_about_distances_are_read_relative_and_of_mean_curves():
     (tie,) = [one for one in found.judged if one.claim.name == "N1" and one.variant == "corrected"]
     assert list(tie.verdict.otherwise) == list(READINGS)[:3]
     assert {other.answer for other in tie.verdict.otherwise.values()} == {"supported"}
-    (row,) = [row for sheet in found.sheets()[4:] for row in sheet.rows if row[0] == "N1"][:1]
+    (row,) = [row for sheet in found.sheets()[4:] for row in sheet.frame.rows() if row[0] == "N1"][:1]
     assert row[-1] == "of mean curves: supported\nof mean curves, relative to performance: supported"
 
 
@@ -85,8 +85,8 @@ def test_a_status_tells_what_is_missing():
     found = status(table_of(lost={(spec.places[0], spec.seeds[0])}))
     assert not found.is_complete
     assert found.sheets()[0].title.endswith(", 1 missing")
-    assert found.sheets()[1].header[:2] == ("rules", "policy")
-    assert found.sheets()[1].rows[0][:2] == ("described", "crw")
+    assert found.sheets()[1].frame.columns[:2] == ["rules", "policy"]
+    assert found.sheets()[1].frame.rows()[0][:2] == ("described", "crw")
 
 
 def test_sets_and_studies_are_described():
