@@ -180,6 +180,13 @@ def _type_of(argument: Any) -> Any:
     return argument.type if isinstance(argument, Callback) else typeof(argument)
 
 
+@functools.cache
+def _callable_by_address(function: Any, signature: Any) -> Any:
+    """Return the version of a kernel that compiled code calls by its address; every run asks."""
+    with _collector_off():
+        return _kept(function.py_func, functools.partial(cfunc, signature, **_OPTIONS))
+
+
 class Callback:
     """A kernel that another one takes as an argument: which one it is may change without compiling anything anew."""
 
@@ -203,9 +210,7 @@ class Callback:
 
     @functools.cached_property
     def _address(self) -> int:
-        with _collector_off():
-            options = functools.partial(cfunc, self.signature(), **_OPTIONS)
-            return cast(Any, _kept(cast(Any, self.function).py_func, options)).address
+        return _callable_by_address(self.function, self.signature()).address
 
     def signature(self) -> Any:
         """Return numba's signature."""
