@@ -42,7 +42,7 @@ def test_a_file_gives_scenario_fields_and_wrappers_and_options_go_before_it(comm
     assert command(CONFIG, "--scenario", "world.toml", *words)[0] == 0
     (folder,) = Path("results").glob("world_*")
     (record,) = load(folder)
-    spec = json.loads(record.spec)
+    spec = json.loads(record.spec.to_json())
     world, wrappers = spec["scenario"], spec["wrappers"]
     assert (world["robots"]["n_robots"], world["objects"]["n_objects"], world["horizon_s"]) == (3, 9, 4.0)
     assert world["physics_substeps"] == [0.2] * 5

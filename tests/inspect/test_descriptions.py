@@ -18,7 +18,7 @@ def told(tmp_path):
         layers = (np.zeros((23, 4), np.float32), np.zeros((4, 6), np.float32))
         biases = (np.zeros(4, np.float32), np.zeros(6, np.float32))
         Network(layers, biases, NetworkAbout(interface=FRAMED, **about)).save(tmp_path / "mine.npz")
-        return list(describe(str(tmp_path / "mine.npz")).lines)
+        return list(describe(str(tmp_path / "mine.npz")).notes)
 
     return tell
 

@@ -154,7 +154,7 @@ def test_a_planned_run_carries_the_interface_as_plain_values(tmp_path):
     policy = load_policy(spec.policy, spec.parameters)
     policy.reset(ENV.swarm_spec, np.random.default_rng(0))
     assert policy.interface.config == interface
-    assert run_one(spec).scenario == "warehouse_small"
+    assert run_one(spec).spec.scenario.name == "warehouse_small"
 
 
 def test_an_interface_that_is_guessed_is_said_once_and_on_one_line(tmp_path):

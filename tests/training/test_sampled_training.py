@@ -190,12 +190,10 @@ def test_worlds_to_be_judged_in_fit_the_policy(fields):
         )
 
 
-def test_a_plan_may_have_other_frames(tmp_path):
+def test_runs_may_have_other_frames_than_a_training(tmp_path):
     plan = tmp_path / "plan.toml"
     text = (Path(__file__).parents[1] / "support/tiny_plan.toml").read_text()
-    plan.write_text(text)
-    assert named_plan(str(plan), frame_decisions=9).interface.frame_decisions == 9
     both = "in_runs = { decision_ticks = 2, frame_decisions = 500 }\n"
     plan.write_text(both + text.replace("[interface]", "[interface]\nframe_decisions = 200"))
+    assert named_plan(str(plan)).interface.frame_decisions == 200
     assert named_plan(str(plan)).run_interface.frame_decisions == 500
-    assert named_plan(str(plan), frame_decisions=9).run_interface.frame_decisions == 9

@@ -121,20 +121,6 @@ def test_runs_of_scripted_policies_stay_what_they_are(physics):
         np.testing.assert_array_equal(column, spoken[name])
 
 
-def test_identities_are_those_of_before_where_they_are_off():
-    ids = [
-        plan_run(scenario("warehouse_small", **fields), "crw", seed=1).run_id
-        for fields in (
-            {},
-            {"neighbour_range_m": 3.0, "message_range_m": 3.0},
-            {"neighbours_seen": 1},
-            {"message_size": 1},
-        )
-    ]
-    assert ids[0] == ids[1]
-    assert len(set(ids)) == 3
-
-
 def test_snapshots_and_copies_go_on_alike():
     env, actions = made(**BOTH), drawn(12)
     env.reset_batch(seed=1)
