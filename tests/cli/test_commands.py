@@ -186,7 +186,7 @@ def test_ctrl_c_with_worker_processes(tmp_path):
                 os.killpg(process.pid, signal.SIGKILL)
     assert process.returncode == 130
     assert out == ""
-    assert "runs are finished and kept" in err
+    assert re.search(r"\d of \d runs are finished\. They are in ", err)
     assert "Traceback" not in err
     assert 1 <= len(load(tmp_path)) < 6
 
