@@ -14,6 +14,7 @@ rows (`LearnerArena`) are absent from the first step of the run to the last. The
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol, cast
 
 import numpy as np
@@ -207,8 +208,9 @@ class ArenaBatch:
         self._returns += rewards
         over = [number for number, arena in enumerate(self.arenas) if arena.is_over]
         terminated, truncated = self._dead & ~self._absent, np.zeros(self._shape, np.bool_)
-        terminated[over] |= self._absent[over]
-        truncated[over] = ~terminated[over]
+        if over:  # to index by an empty list takes longer than a small swarm's tick
+            terminated[over] |= self._absent[over]
+            truncated[over] = ~terminated[over]
         obs = obs.reshape(self.n_rows, -1)
         ended = np.flatnonzero(terminated | truncated).astype(np.int32)
         step = ArenaStep(
@@ -217,11 +219,7 @@ class ArenaBatch:
             terminated=terminated.ravel(),
             truncated=truncated.ravel(),
             active=self._active.flatten(),
-            ended=ended,
-            final_obs=obs[ended],
-            is_episode=~self._absent.ravel()[ended],
-            returns=self._returns.ravel()[ended],
-            lengths=self._lengths.ravel()[ended],
+            **(self._endings(ended, obs) if len(ended) else self._no_endings),
             outcomes=tuple(map(self._outcome, over)),
         )
         self._absent |= self._dead
@@ -229,6 +227,20 @@ class ArenaBatch:
             self._start(number, obs.reshape(*self._shape, -1)[number])
             step.active.reshape(self._shape)[number] = self._active[number]
         return step
+
+    def _endings(self, ended: IntArray, obs: ObsArray) -> dict[str, Any]:
+        """Return what an `ArenaStep` says of the rows that are done."""
+        return {
+            "ended": ended,
+            "final_obs": obs[ended],
+            "is_episode": ~self._absent.ravel()[ended],
+            "returns": self._returns.ravel()[ended],
+            "lengths": self._lengths.ravel()[ended],
+        }
+
+    @cached_property
+    def _no_endings(self) -> dict[str, Any]:
+        return self._endings(np.zeros(0, np.int32), np.zeros((self.n_rows, self.interface.layout.size), np.float32))
 
     def _outcome(self, number: int) -> RunOutcome:
         env = self.arenas[number].forage_env
