@@ -48,7 +48,7 @@ TEST = (
 )
 """How differences are tested, as a text for readers."""
 VALUES = "± half of Student's 95 % interval over seeds; %: share of the performance compared with"
-MARKS = {"!": "runs are missing or have no value", "?": "misleads, see below"}
+MARKS = {"!": "runs are missing, or have no value or no share", "?": "misleads, see below"}
 _PAIRS_PER_TABLE = 6
 _NO_AMOUNT = 1e-12
 """Smaller amounts are rounding errors and are shown as zero."""
@@ -108,8 +108,8 @@ class Scores(Answer):
     def _sentence(self, rows: pl.DataFrame) -> tuple[str, bool]:
         """Return what is told of the best policy and the next, and whether it is certain; nothing of fewer than two."""
         first = rows.row(0, named=True)
-        column = "mean" if rows["relative"].is_nan().all() else "relative"
         measure = MEASURES[first["measure"]]
+        column = "relative" if measure.is_amount else "mean"
         ranked = rows.filter(pl.col(column).is_finite()).sort(column, descending=measure.higher_is_better)["policy"]
         if len(ranked) < 2:
             return "", False
@@ -132,7 +132,7 @@ class Scores(Answer):
         if not of["better"]:
             return words_of(first["measure"]), False
         side = "ahead of" if measure.higher_is_better else "below"
-        return f"{words_of(first['measure'])} at {first['at']}: {best} is best, {gap} {side} {other}.", True
+        return f"{words_of(first['measure'])} at {first['at']}: {best} is best, {gap} {side} {other} (certain).", True
 
     def sheets(self) -> tuple[Sheet, ...]:
         """Return sentences, a table and notes; with `is_full`, all levels and differences."""
@@ -290,7 +290,7 @@ def _marks(row: Mapping[str, Any]) -> str:
 
 def _cell(row: Mapping[str, Any]) -> str:
     """Return a value with half of its interval, as a share where there are shares."""
-    if math.isnan(row["relative"]):
+    if not MEASURES[row["measure"]].is_amount:
         return spread(row["mean"], row["upper"] - row["mean"]) + _marks(row)
     return spread(row["relative"], row["relative_upper"] - row["relative"], is_share=True) + _marks(row)
 

@@ -273,14 +273,14 @@ def test_sentences_say_who_is_best_by_how_much_and_whether_that_is_certain():
         }
     )
     assert found.sentences() == [
-        "raw performance at N = 4: a is best, 9.38 ± 0.61 objects in 400 s ahead of b.",
+        "raw performance at N = 4: a is best, 9.38 ± 0.61 objects in 400 s ahead of b (certain).",
         "No certain difference: adaptability.",
     ]
     against = made(
         {(name, "raw_performance"): values for name, values in (("a", HIGH), ("b", LOW), ("c", HIGH))}, against="b"
     )
     (sentence,) = against.sentences()
-    assert "ahead of b." in sentence
+    assert "ahead of b (certain)." in sentence
     assert against.differences.select("first", "second").rows() == [("a", "b"), ("c", "b")]
     assert made({("a", "raw_performance"): HIGH}).sentences() == []
 
