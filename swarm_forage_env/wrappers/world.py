@@ -192,10 +192,10 @@ def _check_places(tables: Mapping[str, Any]) -> None:
 
 
 def describe_file(file: str | Path) -> WorldDescription:
-    """Read a file of a world, and look at no names and values of scenario fields.
+    """Read a file of a world, and look at no values of scenario fields.
 
     Raises:
-        ConfigError: not readable, no TOML, or tables that no wrapper has or refuses; names the file.
+        ConfigError: not readable, no TOML, an unknown field, or tables that no wrapper has or refuses; names the file.
     """
     path = Path(file)
     try:
@@ -206,6 +206,7 @@ def describe_file(file: str | Path) -> WorldDescription:
         text("scenario", preset)
         wrappers = wrappers_from_mapping(table("wrappers", tables.get("wrappers", {})))
         given = {name: as_tuples(value) for name, value in table("set", tables.get("set", {})).items()}
+        known_keys(given, (*field_sections(), "quirks", "density", "side_m"), "scenario field")
     except OSError as error:
         raise ConfigError(f"Cannot use {path}: {error.strerror or error}.") from error
     except ValueError as error:
