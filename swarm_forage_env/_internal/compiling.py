@@ -33,6 +33,7 @@ _CONFIG: Any = numba_config  # its settings are made at run time
 _PACKAGE = Path(__file__).parents[1]
 _COMPILED_IN_EVERYWHERE = (
     "_internal/compiling.py",
+    "_internal/held.py",
     "_internal/prefetching.py",
     "contract/*.py",
     "scenarios/floor.py",
@@ -135,10 +136,10 @@ def direct(function: F, *example: Any) -> F:
     """
     if not is_compiled(function):
         return function
-    key = function, tuple(map(_kind_of, example))
+    key = function, tuple(map(kind_of, example))
     if key not in _entry_points:
         with _collector_off():
-            _entry_points[key] = cast(Any, function).compile(tuple(map(_type_of, example)))
+            _entry_points[key] = cast(Any, function).compile(tuple(map(typeof, example)))
     return cast(F, _entry_points[key])
 
 
@@ -165,19 +166,14 @@ class Calls:
         return Calls, ()
 
 
-def _kind_of(argument: Any) -> Any:
+def kind_of(argument: Any) -> Any:
     """Return something that is equal for arguments of the same type."""
     if isinstance(argument, np.ndarray):
         flags = argument.flags
         return argument.dtype, argument.ndim, flags.c_contiguous, flags.f_contiguous, flags.aligned, flags.writeable
     if isinstance(argument, tuple):
-        return type(argument), *map(_kind_of, argument)
-    return type(argument) if type(argument) in (bool, int, float) else _type_of(argument)
-
-
-def _type_of(argument: Any) -> Any:
-    """Return numba's type of an argument."""
-    return argument.type if isinstance(argument, Callback) else typeof(argument)
+        return type(argument), *map(kind_of, argument)
+    return type(argument) if type(argument) in (bool, int, float) else typeof(argument)
 
 
 @functools.cache
@@ -194,7 +190,7 @@ class Callback:
         """Take `function`, which returns nothing, for arguments of the types of `example`; it is compiled when used."""
         self.function = function
         if is_compiled(function):
-            self.type = types.FunctionType(types.none(*map(typeof, example)))
+            self._numba_type_ = types.FunctionType(types.none(*map(typeof, example)))  # where numba looks
 
     def __call__(self, *arguments: Any) -> None:
         """Call the function itself, for kernels that are not compiled."""
@@ -214,7 +210,7 @@ class Callback:
 
     def signature(self) -> Any:
         """Return numba's signature."""
-        return self.type.signature
+        return self._numba_type_.signature
 
 
 @contextmanager

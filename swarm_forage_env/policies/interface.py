@@ -15,8 +15,9 @@ from typing import Any, TypeAlias
 import numpy as np
 from gymnasium import spaces
 
-from swarm_forage_env._internal.compiling import Callback
+from swarm_forage_env._internal.compiling import Callback, Calls
 from swarm_forage_env._internal.fields import ConfigError, known_keys, number, one_of, switch, whole
+from swarm_forage_env._internal.held import hold
 from swarm_forage_env.contract.kernel_policy import example_of
 from swarm_forage_env.contract.layout import (
     BUILT_IN_SLICES,
@@ -28,10 +29,10 @@ from swarm_forage_env.contract.layout import (
     neighbours_row,
 )
 from swarm_forage_env.contract.policy import COMMANDS, ActionError, SwarmSpec
-from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, ObsArray
+from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.policies.compact_layout import COMPACT_READS, SITE_ROWS, compact_layout
 from swarm_forage_env.policies.frames import frames_of
-from swarm_forage_env.policies.kernels.frames import frame_of, leave_frames, take_frames
+from swarm_forage_env.policies.kernels.frames import frame_of
 from swarm_forage_env.policies.kernels.learner import (
     GRIP_COMMANDS,
     MOTION_WHEELS,
@@ -41,15 +42,10 @@ from swarm_forage_env.policies.kernels.learner import (
     SITE_COLUMNS,
     SiteMemory,
     Translation,
-    automatic_grip,
-    compact_view,
     mask_actions,
     new_site_memory,
-    numbered_actions,
-    remember_sites,
-    show_sites,
 )
-from swarm_forage_env.policies.kernels.network import keep_on
+from swarm_forage_env.policies.kernels.network import carry_out, keep_on, see
 from swarm_forage_env.scenarios.config import ScenarioConfig
 
 OBSERVATIONS = ("full", "compact")
@@ -218,6 +214,9 @@ class LearnerInterface:
         self.observation_space = self.new_observation_space()
         self.action_space = self.new_action_space()
         self._actions_shape = (spec.n_robots, *(self.action_space.shape or ()))
+        n_values = 0 if self.translation.is_discrete else self._actions_shape[1]
+        self._chosen = np.zeros(spec.n_robots, np.int32), np.zeros((spec.n_robots, n_values), np.float32)
+        self._call = Calls()
 
     def new_observation_space(self) -> spaces.Box:
         """Return a new space, with its own random state, for one robot's row."""
@@ -279,6 +278,8 @@ class LearnerInterface:
         _check_rows("observations", obs, (len(obs), self._n_columns))
         if out is not None:
             _check_rows("out", out, (len(obs), self.layout.size))
+            if not (out.flags.c_contiguous and out.flags.writeable):
+                raise ValueError("Expected out as an array in one piece that can be written to; give a copy.")
         n_extra = 0 if extra is None else extra.shape[1]
         if n_extra != self.config.extra_columns:
             raise ValueError(
@@ -296,21 +297,9 @@ class LearnerInterface:
             )
         if out is None:
             out = np.empty((len(obs), self.layout.size), np.float32)
-        t = self.translation
-        if t.is_compact:
-            compact_view(obs, t.view_starts, *t.half, t.behind_counts, out)
-        else:
-            np.copyto(out[:, : t.n_shown], obs[:, : t.n_shown])
-        at = t.n_shown
-        if t.has_memory:
-            remember_sites(obs, t.pose_starts, t.cargo_starts, t.half, t.sites)
-            show_sites(obs, t.pose_starts, t.half, t.sites, out[:, at:])
-            at += N_SITES * SITE_COLUMNS
-        if len(t.own_columns):
-            out[:, at : at + len(t.own_columns)] = obs[:, t.own_columns]
         if extra is not None:
-            out[:, -extra.shape[1] :] = extra
-        take_frames(out, decision or 0, t.frames)
+            out[:, -n_extra:] = extra
+        self._call(see, np.ascontiguousarray(obs), decision or 0, self._held, out)
         return out
 
     def command(self, actions: np.ndarray, obs: ObsArray) -> ActionArray:
@@ -344,42 +333,38 @@ class LearnerInterface:
             actions: What `checked` returned.
             obs: As in `command`.
         """
-        commands, t = self._commands, self.translation
-        if t.is_discrete:
-            numbered_actions(actions, t.wheels, t.grips, obs, t.cargo_starts[0], commands)
-        else:
-            driven = t.n_driven
-            np.copyto(commands[:, :driven], actions[:, :driven], casting="same_kind")
-            if self.config.message_size:
-                np.copyto(commands[:, COMMANDS:], actions[:, driven:], casting="same_kind")
-        if t.grips_itself:
-            automatic_grip(obs, t.grip_starts, commands)
-        leave_frames(commands, t.frames)
-        return commands
+        self._call(carry_out, np.ascontiguousarray(obs), self._held, *self._kept(actions), self._commands)
+        return self._commands
 
-    def keeping_on(self, actions: np.ndarray) -> tuple[Callback, tuple[Any, ...]]:
-        """Return a kernel and its state that do what `carry_out` does, without Python; see `ForagingArena.decide`.
+    def driver(self, actions: np.ndarray) -> tuple[tuple[tuple[Any, ...], Callback], ActionArray]:
+        """Return a kernel and its state, held, that do what `carry_out` does, and the actions that they write.
+
+        `ForagingArena.decide` takes both.
 
         Args:
             actions: As in `carry_out`.
         """
-        _, number, values, _ = self._kept
+        self._kept(actions)
+        return self._driver, self._commands
+
+    def _kept(self, actions: np.ndarray) -> tuple[IntArray, ObsArray]:
+        """Keep actions in the buffers that kernels read, and return both; only one of them is in use."""
+        number, values = self._chosen
         np.copyto(number if self.translation.is_discrete else values, actions, casting="same_kind")
-        return self._keep_on, self._kept
+        return number, values
+
+    @cached_property
+    def _held(self) -> Translation:
+        return hold(self.translation)
+
+    @cached_property
+    def _driver(self) -> tuple[tuple[Any, ...], Callback]:
+        state = (self.translation, *self._chosen, self._commands)
+        return hold((state, Callback(keep_on, *example_of(state))))
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what copies and pickles have; addresses of compiled code are no others' than this one's."""
-        return {name: value for name, value in vars(self).items() if name not in ("_kept", "_keep_on")}
-
-    @cached_property
-    def _kept(self) -> tuple[Any, ...]:
-        n_robots = len(self._commands)
-        number, values = np.zeros(n_robots, np.int32), np.zeros((n_robots, *self._actions_shape[1:]), np.float32)
-        return self.translation, number, values.reshape(n_robots, -1), self._commands
-
-    @cached_property
-    def _keep_on(self) -> Callback:
-        return Callback(keep_on, *example_of(self._kept))
+        return {name: value for name, value in vars(self).items() if name not in ("_held", "_driver")}
 
     def _check_numbers(self, actions: np.ndarray) -> None:
         most = self._n_choices - 1

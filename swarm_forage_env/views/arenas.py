@@ -139,6 +139,8 @@ class ArenaBatch:
         shape = self._shape = n_arenas, self.n_robots
         self._absent, self._present, self._dead, self._active = np.zeros((4, *shape), np.bool_)
         self._returns, self._lengths = np.zeros(shape), np.zeros(shape, np.int32)
+        self._told: list[tuple[BoolArray, ...]] = [()] * n_arenas
+        """Of each arena, those rows of present, active and dead that are its robots."""
 
     def reset(
         self, seeds: Sequence[int | None], options: Sequence[Mapping[str, Any] | None]
@@ -170,13 +172,16 @@ class ArenaBatch:
         for rows in (self._present, self._active, self._returns, self._lengths):
             rows[number] = 0
         self._absent[number] = np.arange(self.n_robots) >= arena.n_robots
+        told = self._present, self._active, self._dead
+        self._told[number] = tuple(rows[number, : arena.n_robots] for rows in told)
         self._look(number, out)
 
     def _look(self, number: int, out: ObsArray) -> None:
         """Note which robots of an arena are there, at work and dead, and write what they see to `out`."""
-        env = self.arenas[number].forage_env
-        for rows, now in ((self._present, env.swarm.present), (self._active, env.active), (self._dead, env.terminated)):
-            rows[number, : len(now)] = now
+        env, (present, active, dead) = self.arenas[number].forage_env, self._told[number]
+        np.copyto(present, env.swarm.present)
+        np.copyto(active, env.swarm.active)
+        np.copyto(dead, env.terminated)
         self.arenas[number].observe(out)
 
     def step(self, actions: np.ndarray) -> ArenaStep:
@@ -194,10 +199,11 @@ class ArenaBatch:
         obs = np.empty((*self._shape, self.interface.layout.size), np.float32)
         rewards = np.zeros(self._shape, np.float32)
         present = self._present.copy()
-        for number, chosen in enumerate(actions.reshape(*self._shape, *actions.shape[1:])):
-            arena = self.arenas[number]
+        by_arena = actions.reshape(*self._shape, *actions.shape[1:])
+        for number, arena in enumerate(self.arenas):
             try:
-                arena.step(chosen[: arena.n_robots], rewards[number, : arena.n_robots])
+                n_robots = len(self._told[number][0])
+                arena.step(by_arena[number, :n_robots], rewards[number, :n_robots])
                 self._look(number, obs[number])
             except BaseException as error:
                 # Where the first arena refuses its actions, nothing has happened.
@@ -206,8 +212,8 @@ class ArenaBatch:
                 raise
         self._lengths += present
         self._returns += rewards
-        over = [number for number, arena in enumerate(self.arenas) if arena.is_over]
         terminated, truncated = self._dead & ~self._absent, np.zeros(self._shape, np.bool_)
+        over = [number for number, arena in enumerate(self.arenas) if arena.is_over]
         if over:  # to index by an empty list takes longer than a small swarm's tick
             terminated[over] |= self._absent[over]
             truncated[over] = ~terminated[over]

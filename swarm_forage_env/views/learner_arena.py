@@ -117,8 +117,15 @@ class LearnerArena:
         self._change(overrides, None if sampler is None else sampler.world_of(seed, self._share))
         self._seeds = seeds  # not before the world is known to be possible
         self.env.reset_batch(seed)
+        self._begin()
         self.interface.forget()
         self.interface.enter(0)
+
+    def _begin(self) -> None:
+        """Find out, once per run, whether several ticks can be one compiled call."""
+        env, layers = self.forage_env, self.env.stack if isinstance(self.env, SwarmWrapper) else ()
+        is_paid = env.reward_model.payment is not None
+        self._tells_ahead = is_compiled(keep_on) and is_paid and needs_no_python(env, layers)
 
     def _change(self, overrides: dict[str, Any], world: World | None) -> None:
         """Build another environment, if the one that there is has another world."""
@@ -145,34 +152,33 @@ class LearnerArena:
         """
         env, interface = self.forage_env, self.interface
         env.require_whole()
-        chosen, start = interface.checked(actions), env.tick
+        arena, chosen = env.arena, interface.checked(actions)
+        start = before = arena.tick
         if isinstance(self.env, SwarmWrapper):  # wrappers may draw numbers before the world looks at actions
             env.refuse_bad_step(env.checked_actions(interface.carry_out(chosen, self.env.last_obs)), None)
+        driver, commands = interface.driver(chosen)
         end = min(start + self._plan.interface.decision_ticks, env.max_cycles)
         try:
             while True:
-                before = env.tick
                 n_ahead, disturbances = self._told_ahead(end - before)
                 if n_ahead == 0:
                     rewards += self.env.step_batch(interface.carry_out(chosen, self.env.last_obs))[1]
                 else:
-                    act = interface.keeping_on(chosen)
-                    n_observed = env.arena.decide(*act, n_ahead, env.reward_model, rewards, disturbances)
+                    n_observed = arena.decide(driver, commands, n_ahead, env.reward_model, rewards, disturbances)
                     if isinstance(self.env, SwarmWrapper):
-                        self.env.pass_ticks(env.tick - before, n_observed)
-                if self.is_over or env.tick >= end:
+                        self.env.pass_ticks(arena.tick - before, n_observed)
+                before = arena.tick
+                if before >= end or self.is_over:
                     break
             self._add_extra(rewards)
         except BaseException as error:
-            if not isinstance(error, ActionError) or env.tick > start:
+            if not isinstance(error, ActionError) or arena.tick > start:
                 env.break_off()
             raise
 
     def _told_ahead(self, n_ticks: int) -> tuple[int, Disturbances]:
         """Return how many ticks can be one compiled call, and what wrappers do in them; 0 = Python steps one."""
-        env = self.forage_env
-        layers = self.env.stack if isinstance(self.env, SwarmWrapper) else ()
-        if not is_compiled(keep_on) or env.reward_model.payment is None or not needs_no_python(env, layers):
+        if not self._tells_ahead:
             return 0, UNDISTURBED
         return self.env.told_ahead(n_ticks) if isinstance(self.env, SwarmWrapper) else (n_ticks, UNDISTURBED)
 
@@ -180,7 +186,7 @@ class LearnerArena:
     def is_over(self) -> bool:
         """Whether the horizon is reached or all robots are dead."""
         env = self.forage_env
-        return env.tick >= env.max_cycles or bool(env.terminated.all())
+        return env.arena.tick >= env.max_cycles or np.count_nonzero(env.terminated) == len(env.terminated)
 
     def _add_extra(self, rewards: np.ndarray) -> None:
         """Add the user's `extra_reward` of a decision to the rewards of the robots (N,)."""
@@ -239,6 +245,7 @@ class LearnerArena:
             self._adopt(env, interface)
             self._overrides, self._world = dict(snapshot.overrides), snapshot.world
             before.close()
+        self._begin()
         self._seeds.bit_generator.state = snapshot.seeds
         self.interface.recall(snapshot.memory)
         self.interface.enter(self._decision)
@@ -260,10 +267,10 @@ class LearnerArena:
         """
         if out is None:
             out = np.empty((self.n_rows, self.interface.layout.size), np.float32)
-        self.interface.observe(
-            self.env.last_obs, out[: self.n_robots], decision=self._decision, extra=self._extra_columns()
-        )
-        out[self.n_robots :] = 0.0
+        n_robots = self.n_robots
+        if n_robots < self.n_rows:
+            out[n_robots:] = 0.0
+        self.interface.observe(self.env.last_obs, out[:n_robots], decision=self._decision, extra=self._extra_columns())
         return out
 
     def _extra_columns(self) -> FloatArray | None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from swarm_forage_env._internal.compiling import Callback, Calls
 from swarm_forage_env._internal.fields import whole
+from swarm_forage_env._internal.held import hold
 from swarm_forage_env._internal.rng import Stream, TickDraws, stream_rng
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.kernel_policy import CompiledPolicy
@@ -104,6 +105,7 @@ class ForagingArena:
         self.obs = sensors.obs
         twist = self._physics.twist
         self._arrays = new_arrays(config, state, sensors, twist, source, placement_draws, self._static_caches)
+        self._held = hold(self._arrays)
         self._call = Calls()
         self._neighbourhood = Neighbourhood(config.robots, self.layout, self.reads)
         self.has_changed = False
@@ -111,7 +113,7 @@ class ForagingArena:
 
     def observe(self) -> ObsArray:
         """Return the observation (N, D) of the world as it is now; only needed after a change between two steps."""
-        self._call(kernels.observe, self._arrays)
+        self._call(kernels.observe, self._held)
         self._sense_further()
         return self.obs
 
@@ -156,11 +158,11 @@ class ForagingArena:
         """
         tick = self.tick + 1
         gain = self._unit_gain if wheel_gain is None else np.ascontiguousarray(wheel_gain, np.float64)
-        call, arrays, physics = self._call, self._arrays, self._physics
+        call, arrays, physics = self._call, self._held, self._physics
         picks, walks = self.draws(tick)
         draws = picks[0], walks[0]
         if isinstance(physics, Bodies):
-            outcome = call(kernels.whole, arrays, physics.state, actions, gain, tick, self.has_changed, *draws)
+            outcome = call(kernels.whole, arrays, physics.held, actions, gain, tick, self.has_changed, *draws)
         else:
             outcome = call(kernels.set_out, arrays, actions, gain, tick, self.has_changed)
             if outcome == DONE:
@@ -207,13 +209,13 @@ class ForagingArena:
         picks, walks = self.draws(self.tick)
         if outcome == NO_ROOM:
             self._physics.advance(self.swarm)
-            outcome = self._call(kernels.meet_and_close, self._arrays, actions, self.tick, picks[0], walks[0])
+            outcome = self._call(kernels.meet_and_close, self._held, actions, self.tick, picks[0], walks[0])
         if outcome == TO_PLACE:
             self._create_dynamic_caches()
             self._replace_displaced()
             self._restore_caches(tasks)
             self._arrays.sensors.kept[0] = False  # nobody has listed which squares of the floor have changed
-            self._call(kernels.close, self._arrays, walks[0])
+            self._call(kernels.close, self._held, walks[0])
 
     def run(
         self,
@@ -257,8 +259,8 @@ class ForagingArena:
         with self._observation_kept(kept):
             n_begun, outcome, tasks_counted = policy.call(
                 kernels.run,
-                self._arrays,
-                self._bodies.state,
+                self._held,
+                self._bodies.held,
                 disturbances,
                 gain,
                 first,
@@ -288,8 +290,8 @@ class ForagingArena:
 
     def decide(
         self,
-        act: Callback,
-        state: tuple[Any, ...],
+        driver: tuple[tuple[Any, ...], Callback],
+        actions: ActionArray,
         n_ticks: int,
         rewards: RewardModel,
         paid: ObsArray,
@@ -298,8 +300,8 @@ class ForagingArena:
         """Carry out a decision of a learner; what is not said here is as in `run`. `needs_python` must be false.
 
         Args:
-            act: A kernel that writes actions, called as that of a `CompiledPolicy`; it draws nothing.
-            state: What it reads and edits; the last are the actions, (N, A) float32.
+            driver: State and kernel as a `CompiledPolicy` has them, held; the kernel draws nothing.
+            actions: (N, A) float32, the same actions.
             n_ticks: At most so many ticks, and at least one; it ends earlier where Python has to act.
             rewards: What makes the rewards; it must have a `payment`.
             paid: (N,) float32, the rewards are added.
@@ -310,22 +312,21 @@ class ForagingArena:
         n_drawn = min((len(rows) for rows in (picks, walks) if rows is not self._nothing), default=n_ticks)
         n_begun, outcome = self._call(
             kernels.decide,
-            self._arrays,
-            self._bodies.state,
+            self._held,
+            self._bodies.held,
             disturbances,
             rewards.payment,
             self._unit_gain,
             first,
             min(n_ticks, n_drawn),
             self.has_changed,
-            act,
-            state,
+            driver,
             picks,
             walks,
             paid,
         )
         self.tick, self.has_changed = first + n_begun - 2, self.has_changed and n_begun == 1
-        self.conclude(outcome, state[-1], disturbances.gain if len(disturbances.gain) else self._unit_gain)
+        self.conclude(outcome, actions, disturbances.gain if len(disturbances.gain) else self._unit_gain)
         if outcome != DONE:  # Python has ended the tick
             paid += rewards.reward()
         return n_begun - (outcome != DONE)

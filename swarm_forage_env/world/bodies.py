@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from swarm_forage_env._internal.compiling import Calls
+from swarm_forage_env._internal.held import hold
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.world.kernels.bodies import WALLS, BodyState, move_bodies, tell_poses
@@ -29,6 +30,7 @@ class Bodies:
         twist: (N + 1, 3) float64 to be filled before `advance`: velocity x, y in m/s and turn rate in rad/s.
             The last row belongs to nobody; it is that of Chipmunk's static body.
         state: Everything that the compiled functions need.
+        held: The same, as they take it.
     """
 
     def __init__(
@@ -65,6 +67,7 @@ class Bodies:
             n_substeps=len(config.physics_substeps),
             **_room_for(n_robots, PAIRS_PER_ROBOT * n_robots, WALLS + len(obstacles)),
         )
+        self.held = hold(self.state)
 
     @property
     def n_pairs(self) -> int:
@@ -79,6 +82,7 @@ class Bodies:
         n_contacts[:] = before[0]
         contacts[: len(before[1])] = before[1]
         self.state = self.state._replace(**more)
+        self.held = hold(self.state)
 
     def advance(self, swarm: SwarmState) -> None:
         """Move all bodies by one tick along `twist` and write position, heading and facing of present robots."""

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from swarm_forage_env._internal.compiling import Calls
+from swarm_forage_env._internal.held import hold
 from swarm_forage_env.scenarios.config import RewardConfig
 from swarm_forage_env.world.kernels.reward import Payment, Weights, rewards
 from swarm_forage_env.world.state import StepEvents, SwarmState
@@ -41,11 +42,12 @@ class RewardModel:
             weights=Weights(*(float(getattr(config, name)) for name in Weights._fields)),
             is_dense=bool(config.nest_progress or config.interference or config.tick),
         )
+        self._held = hold(self._payment)
 
     @property
     def payment(self) -> Payment | None:
         """What `kernels.reward.pay` does the work of `reward` with; None where it cannot: `team`."""
-        return None if self._is_team else self._payment
+        return None if self._is_team else self._held
 
     def remember(self) -> None:
         """Keep the positions before a step, if a term needs them."""
@@ -61,7 +63,7 @@ class RewardModel:
         if not (p.events.happened[0] or p.is_dense):
             p.reward[:] = 0.0
             return p.reward
-        self._call(rewards, p)
+        self._call(rewards, self._held)
         if self._is_team:
             active = p.swarm.active
             p.reward[:] = p.total.sum() / max(1, np.count_nonzero(active)) * active

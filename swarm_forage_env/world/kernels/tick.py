@@ -19,6 +19,7 @@ from collections.abc import Callable
 from typing import Any
 
 from swarm_forage_env._internal.compiling import kernel, part
+from swarm_forage_env._internal.held import opened
 from swarm_forage_env._internal.prefetching import LARGE
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.types import ActionArray, CodeArray, FloatArray, ObsArray
@@ -125,6 +126,7 @@ def sense(a: ArenaArrays) -> None:
 @kernel
 def observe(a: ArenaArrays) -> None:
     """Write the observation of the world as it is now."""
+    a = opened(a)
     look(a)
     sense(a)
 
@@ -136,6 +138,7 @@ def set_out(a: ArenaArrays, actions: ActionArray, wheel_gain: FloatArray, tick: 
     `look_first`: robots came or went since the last `look`. Returns `DONE`, or the first active row whose action or
     gain is not finite; then nothing has happened.
     """
+    a = opened(a)
     swarm, m, s = a.state.swarm, a.motion, a.sensors
     bad = drive(
         actions,
@@ -188,6 +191,7 @@ def close(a: ArenaArrays, walk_chance: FloatArray) -> None:
 
     `walk_chance` (M,) uniform in [0, 1); not read where objects lie still.
     """
+    a = opened(a)
     objects, caches, counters, w = a.state.objects, a.state.caches, a.state.events.counters, a.wandering
     if w.probability > 0.0:
         counters[_OBJECTS_MOVED] += walk(
@@ -204,6 +208,7 @@ def close(a: ArenaArrays, walk_chance: FloatArray) -> None:
 @kernel
 def meet_and_close(a: ArenaArrays, actions: ActionArray, tick: int, chance: FloatArray, walk_chance: FloatArray) -> int:
     """`meet`, then `close` unless anything is to be placed; returns `DONE` or `TO_PLACE`."""
+    a = opened(a)
     if meet(a, actions, tick, chance):
         return TO_PLACE
     close(a, walk_chance)
@@ -222,6 +227,7 @@ def whole(
     walk_chance: FloatArray,
 ) -> int:
     """The whole tick, with compiled bodies; returns `DONE`, `TO_PLACE`, `NO_ROOM` or the row of a refused action."""
+    a, b = opened(a), opened(b)
     swarm = a.state.swarm
     refused = set_out(a, actions, wheel_gain, tick, look_first)
     if refused != DONE:
@@ -300,6 +306,7 @@ def run(
         How many ticks have begun, the outcome of the last of them, and whether its tasks were codes of `Task`, one per
         robot. Tasks of a tick with a refused action are not looked at.
     """
+    a, b = opened(a), opened(b)
     obs, swarm, s, actions = a.sensors.obs, a.state.swarm, a.sensors, policy_state[-1]
     light_is_due = s.light_is_due
     gain = d.gain if d.gain.shape[0] > 0 else wheel_gain
@@ -334,8 +341,7 @@ def decide(
     first: int,
     n_ticks: int,
     look_first: bool,
-    act: Callable[..., None],
-    state: tuple[Any, ...],
+    driver: tuple[tuple[Any, ...], Callable[..., None]],
     chances: FloatArray,
     walk_chances: FloatArray,
     paid: ObsArray,
@@ -351,8 +357,7 @@ def decide(
         first: Number of the first tick.
         n_ticks: How many, at most as many as there are draws. Light is left out but in the last one.
         look_first: See `set_out`.
-        act: As the policy of `run`, but it does not look at its draws.
-        state: Its state.
+        driver: State and function as the policy of `run` has them; the function does not look at its draws.
         chances: See `run`.
         walk_chances: See `run`.
         paid: (N,) float32, the rewards of ticks that are `DONE` are added.
@@ -360,6 +365,8 @@ def decide(
     Returns:
         How many ticks have begun, and the outcome of the last of them.
     """
+    a, b, payment, driver = opened(a), opened(b), opened(payment), opened(driver)
+    state, act = driver
     sensors, swarm = a.sensors, a.state.swarm
     gain = d.gain if d.gain.shape[0] > 0 else wheel_gain
     for k in range(n_ticks):
