@@ -155,7 +155,9 @@ class Training:
     def _evaluate(self) -> None:
         """Run the network in the middle of the generation."""
         layers = layers_of(np.array([self.strategy.result.xfavorite], np.float32), self.sizes)
-        about = NetworkAbout(interface=self.plan.interface, samples=True, caches=self.plan.scenario.caches)
+        about = NetworkAbout(
+            interface=self.plan.interface, activation="tanh", samples=True, caches=self.plan.scenario.caches
+        )
         network = Network(tuple(weight[0] for weight, _ in layers), tuple(bias[0] for _, bias in layers), about)
         evaluation = self.evaluator.evaluate(network, self.done)
         reached = f"{evaluation.performance:.2f} of the baselines, interference {evaluation.interference_fraction:.3f}"

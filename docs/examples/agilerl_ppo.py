@@ -59,6 +59,6 @@ while decisions < N_DECISIONS:
     agent.learn(rollout[torch.from_numpy(np.concatenate(at_work))])  # not at work: nothing to learn from
     decisions += len(rollout)
     if evaluator.is_due(decisions):
-        about = NetworkAbout(interface=plan.interface, samples=plan.samples)
+        about = NetworkAbout(interface=plan.interface, activation="tanh", samples=plan.samples)
         network = Network.from_state_dict(agent.actor.state_dict(), about)
         print(decisions, evaluator.evaluate(network, decisions).performance)

@@ -70,5 +70,5 @@ experiment = Experiment(
     config=settings,
 )
 experiment.run()
-about = NetworkAbout(interface=INTERFACE, samples=True)
+about = NetworkAbout(interface=INTERFACE, activation="tanh", samples=True)
 Network.from_state_dict(experiment.policy.state_dict(), about).save("policy.npz")

@@ -70,4 +70,5 @@ for _ in range(0, N_DECISIONS, N_STEPS * n_rows):
             nn.utils.clip_grad_norm_(weights, 0.5)
             optimizer.step()
     print(f"reward per decision: {rewards.mean():.4f}")
-Network.from_state_dict(actor.state_dict(), NetworkAbout(interface=INTERFACE, samples=True)).save("policy.npz")
+about = NetworkAbout(interface=INTERFACE, activation="tanh", samples=True)
+Network.from_state_dict(actor.state_dict(), about).save("policy.npz")

@@ -53,6 +53,8 @@ while decisions < N_DECISIONS:
     decisions = int(result["env_runners"]["num_module_steps_sampled_lifetime"]["robot"])
     if evaluator.is_due(decisions):
         state = algorithm.get_module("robot").state_dict()
-        network = Network.from_state_dict(state, NetworkAbout(interface=plan.interface, samples=plan.samples))
+        network = Network.from_state_dict(
+            state, NetworkAbout(interface=plan.interface, activation="tanh", samples=plan.samples)
+        )
         print(decisions, evaluator.evaluate(network, decisions).performance)
 algorithm.stop()

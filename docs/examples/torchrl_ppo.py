@@ -75,4 +75,5 @@ for rollout in Collector(env, actor, frames_per_batch=200, total_frames=N_DECISI
     optimizer.zero_grad()
     loss.backward()
     optimizer.step()
-Network.from_state_dict(actor.state_dict(), NetworkAbout(interface=interface, samples=True)).save("policy.npz")
+about = NetworkAbout(interface=interface, activation="tanh", samples=True)
+Network.from_state_dict(actor.state_dict(), about).save("policy.npz")

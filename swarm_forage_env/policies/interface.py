@@ -47,6 +47,7 @@ from swarm_forage_env.policies.kernels.learner import (
 )
 from swarm_forage_env.policies.kernels.network import carry_out, keep_on, see
 from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.presets import scenario
 
 OBSERVATIONS = ("full", "compact")
 ACTIONS = ("continuous", "discrete")
@@ -151,9 +152,13 @@ class InterfaceConfig:
 
 
 def _check_rows(name: str, rows: np.ndarray, shape: tuple[int, int]) -> None:
-    """Refuse an array of another shape or type than compiled code takes."""
-    if rows.shape != shape or rows.dtype != np.float32:
-        raise ValueError(f"Expected {name} as float32 of shape {shape}, got {rows.dtype} of shape {rows.shape}.")
+    """Refuse an array of another shape, type or order in memory than compiled code takes."""
+    if rows.shape != shape or rows.dtype != np.float32 or not rows.flags.c_contiguous:
+        order = "" if rows.flags.c_contiguous else ", not contiguous"
+        raise ValueError(
+            f"Expected {name} as contiguous float32 of shape {shape}, got {rows.dtype} of shape {rows.shape}{order}; "
+            "np.ascontiguousarray(rows, np.float32) makes such an array."
+        )
 
 
 class LearnerInterface:
@@ -227,6 +232,12 @@ class LearnerInterface:
         if self.translation.is_discrete:
             return spaces.Discrete(self._n_choices)
         return spaces.Box(-1.0, 1.0, (self.translation.n_driven + (self.config.message_size or 0),), np.float32)
+
+    @property
+    def widths(self) -> tuple[int, int]:
+        """Columns that a robot sees, and numbers that a network gives for its action."""
+        space = self.action_space
+        return self.layout.size, int(space.n) if isinstance(space, spaces.Discrete) else space.shape[0]
 
     @property
     def active_column(self) -> int:
@@ -311,7 +322,9 @@ class LearnerInterface:
 
         Raises:
             ActionError: another shape, or a number outside of `action_space`.
+            ValueError: observations of another shape or type.
         """
+        _check_rows("observations", obs, (len(self._commands), self._n_columns))
         return self.carry_out(self.checked(actions), obs)
 
     def checked(self, actions: np.ndarray) -> np.ndarray:
@@ -384,13 +397,21 @@ class LearnerInterface:
             obs: (N, D) observations of the environment.
 
         Raises:
-            ValueError: the actions are continuous.
+            ValueError: the actions are continuous, or observations of another shape or type.
         """
+        _check_rows("observations", obs, (len(obs), self._n_columns))
         if not self.translation.is_discrete:
             raise ValueError("Expected discrete actions: continuous ones have no mask. Set actions='discrete'.")
         mask = np.empty((len(obs), self._n_choices), np.bool_)
         mask_actions(obs, self._mask_starts, self._dynamic_caches, mask)
         return mask
+
+
+def any_swarm(config: InterfaceConfig) -> LearnerInterface:
+    """Return the choices bound to some swarm that shows what they see: columns and actions are the same in all."""
+    company = {name: getattr(config, name) for name in ("neighbours_seen", "neighbour_range_m", "message_size")}
+    shown = {name: value for name, value in company.items() if value is not None}
+    return LearnerInterface(config, SwarmSpec.of(scenario("warehouse_small", **shown)))
 
 
 @lru_cache(maxsize=64)  # a curriculum may ask for a new size in every run

@@ -5,9 +5,9 @@ wherever the name of a policy may.
 """
 
 import hashlib
-import pickle
+import itertools
 import warnings
-from collections.abc import Mapping
+from dataclasses import asdict
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
@@ -15,13 +15,16 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import ConfigError, one_of, switch, table
 from swarm_forage_env._internal.wording import install_command
-from swarm_forage_env.contract.policy import COMMANDS, SwarmSpec
+from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ObsArray
 from swarm_forage_env.policies.interface import (
+    ACTIONS,
+    OBSERVATIONS,
     GivenInterface,
     InterfaceConfig,
+    any_swarm,
     chosen_interface,
     interface_from_mapping,
 )
@@ -30,24 +33,12 @@ from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.scenarios.config import CACHE_KINDS
 
 MODEL_NOTE = "swarm_forage_note"
-"""Attribute of a model, saved with it: {"interface": fields, "caches": kind}, which its spaces do not show."""
+"""Attribute of a model, saved with it: {"interface": fields, "caches": kind, "samples": whether it draws}."""
 _DIGEST_DIGITS = 16
-MODEL_FAULTS = (
-    ValueError,
-    LookupError,
-    TypeError,
-    AttributeError,
-    AssertionError,
-    RuntimeError,
-    OSError,
-    EOFError,
-    pickle.UnpicklingError,
-)
-"""Errors that stable-baselines3 and torch raise for a damaged file or one without a model."""
 
 
 class InterfaceGuessWarning(UserWarning):
-    """A model that does not tell its interface runs by the default one, which may not be what it was trained with."""
+    """A model without a note: what its spaces show is taken, and one tick per decision, which they do not show."""
 
 
 class ModelError(ValueError):
@@ -55,18 +46,19 @@ class ModelError(ValueError):
 
 
 class ModelPolicy(LearnedPolicy):
-    """A model saved by stable-baselines3 (PPO, A2C, DQN, SAC, TD3, DDPG) or sb3-contrib, acting without exploration.
+    """A model saved by stable-baselines3 (PPO, A2C, DQN, SAC, TD3, DDPG) or sb3-contrib.
 
     A model of one robot is applied to every robot, whatever the swarm size; a recurrent one remembers for each of them.
-    Its interface is given by
+    A model of a whole swarm, (N, d) to (N, k), works for its own N only. Discrete actions are drawn by their
+    probabilities where the model has some (PPO, A2C), as in its training; all others are its best ones. What it sees
+    and does is told by
 
     * the note that our training leaves in the file (`training.sb3.export.note_interface`),
     * the parameter `interface`, whose fields override those of the note,
-    * its spaces, where both are missing and the spaces are those of the environment itself, (D,) to (3,). They do not
-      show how many ticks a decision lasts; 1 is taken, and an `InterfaceGuessWarning` says so unless `digest` is given.
+    * its spaces. They do not show how many ticks a decision lasts; 1 is taken, and an `InterfaceGuessWarning` says so
+      unless `digest` is given.
 
-    A model of the whole swarm, (N, D) to (N, 3), needs no note either, and works for its own N only. Nothing is
-    normalised: a model trained behind `VecNormalize` gets other numbers than in training.
+    Nothing is normalised: a model trained behind `VecNormalize` gets other numbers than in training.
 
     Opening a model runs code that the file contains. Open only what you trust.
 
@@ -81,92 +73,110 @@ class ModelPolicy(LearnedPolicy):
             path: The saved file.
             digest: Result of `file_digest` when the run was planned; a file that has changed since then is refused.
             interface: What the model sees and does: an `InterfaceConfig` or its fields by name, which are plain values
-                for `RunSpec.parameters`. Other fields are those of the note in the file, else the default.
+                for `RunSpec.parameters`. Other fields are those of the note in the file, or follow from its spaces.
 
         Raises:
             ImportError: stable-baselines3 is not installed.
-            ModelError: the file is missing, has changed, or does not hold such a model.
+            ModelError: the file is missing, has changed, or does not hold such a model; or its spaces are not those of
+                its interface.
             ConfigError: an unknown field or value in `interface`.
         """
-        self._path = Path(path)
-        self._network, note = _open_model(str(path), checked_digest(path, digest))
-        noted, caches = (None, None) if note is None else _read_note(note, self._path)
-        self._is_told = noted is not None or interface is not None
-        self._source = f"the note in {self._path.name}" if interface is None else "the parameter interface"
-        super().__init__(
-            chosen_interface(interface, noted), remember=deterministic_choice(self._network), caches=caches
-        )
-        if digest is None and not self._is_told:
-            warnings.warn(
-                f"{self._path.name} does not tell its interface: it runs with full observations, continuous actions "
-                f"and one decision per tick. If it was trained otherwise, say so: {self._path.name}:decision_ticks=5",
-                InterfaceGuessWarning,
-                stacklevel=2,
+        name = Path(path).name
+        network, note = _open_model(str(path), checked_digest(path, digest))
+        found, self._n_robots = describe_spaces(network), _n_rows(network.observation_space)
+        config, caches, draws = None, None, has_probabilities(network)
+        if note is not None:
+            config, caches, draws = _read_note(note, name)
+        if note is None and not isinstance(interface, InterfaceConfig):
+            said = dict(interface or {})
+            interface_from_mapping(said)  # refuses unknown fields and values
+            config = _deduced(found, tuple(said.items()))
+            if config is None:
+                raise ModelError(
+                    f"Expected {name} to see and do what an interface says, but it has no note, and goes from "
+                    f"{' to '.join(found)}. Say what it was trained with, such as {name}:neighbours_seen=3, or call "
+                    "training.sb3.export.note_interface(model, interface) before it is saved."
+                )
+            if digest is None and "decision_ticks" not in said:
+                warnings.warn(_told(name, config, draws), InterfaceGuessWarning, stacklevel=2)
+        config = chosen_interface(interface, config)
+        fitting = describe_spaces(any_swarm(config))
+        if found != fitting:
+            source = f"the note in {name}" if interface is None else "the parameter interface"
+            raise ModelError(
+                f"Expected a model from {' to '.join(fitting)}, as {source} says; {name} goes from "
+                f"{' to '.join(found)}."
             )
+        super().__init__(config, remember=model_choice(network, draws=draws), caches=caches)
+        self._name = name
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
-        """Start a run.
-
-        Raises:
-            ModelError: the spaces of the model are not those of its interface, or its interface is not known.
-        """
+        """Start a run; raises ModelError where the model is one of another number of robots together."""
+        if self._n_robots not in (None, spec.n_robots):
+            raise ModelError(f"Expected the {self._n_robots} robots that {self._name} steers, got {spec.n_robots}.")
         super().reset(spec, rng)
-        found, fitting = describe_spaces(self._network), describe_spaces(self.interface)
-        columns, n_robots = spec.layout.size, spec.n_robots
-        acts = COMMANDS + (self.interface.config.message_size or 0)
-        whole_swarm = (f"Box({n_robots}, {columns})", f"Box({n_robots}, {acts})")
-        sees_what_the_environment_shows = fitting == (f"Box({columns})", f"Box({acts})")
-        if found == fitting or (found == whole_swarm and sees_what_the_environment_shows):
-            return
-        name, goes = self._path.name, " to ".join(found)
-        if self._is_told:
-            raise ModelError(
-                f"Expected a model from {' to '.join(fitting)}, as {self._source} says; {name} goes from {goes}."
-            )
-        raise ModelError(
-            f"Expected {name} to tell what it sees and does, but it has no note, and its spaces, {goes}, are neither "
-            f"those of the environment, {' to '.join(fitting)}, nor those of these {n_robots} robots together, "
-            f"{' to '.join(whole_swarm)}. Give the interface that it was trained with: "
-            f"{name}:observation=compact,decision_ticks=5 as the policy, or "
-            'load_policy(path, {"interface": {"observation": "compact"}}); or call '
-            "training.sb3.export.note_interface(model, interface) before the model is saved."
-        )
 
 
-def deterministic_choice(model: Any) -> Remember:
-    """Return how a model of stable-baselines3, or its policy network, chooses without exploration.
+@lru_cache(maxsize=64)  # every run opens its model anew
+def _deduced(found: tuple[str, str], said: tuple[tuple[str, Any], ...]) -> InterfaceConfig | None:
+    """Return the interface with such spaces and with what is said of it; None where there is none."""
+    for seen, done, grips, remembers in itertools.product(OBSERVATIONS, ACTIONS, (False, True), (False, True)):
+        fields = {"observation": seen, "actions": done, "automatic_gripper": grips, "site_memory": remembers}
+        try:
+            config = interface_from_mapping({**fields, **dict(said)})
+        except ConfigError:  # no messages beside discrete actions
+            continue
+        if describe_spaces(any_swarm(config)) == found:
+            return config
+    return None
+
+
+def _told(name: str, config: InterfaceConfig, draws: bool) -> str:
+    """Say how a model without a note runs, and what to add."""
+    default = asdict(InterfaceConfig())
+    shown = ",".join(f"{key}={value}".lower() for key, value in asdict(config).items() if value != default[key])
+    return (
+        f"{name} has no note of its training. By its spaces it runs with {shown or 'full observations and commands'}, "
+        f"{'draws its actions' if draws else 'takes its best actions'}, and decides in every tick; if it decided less "
+        f"often, say so: {name}:decision_ticks=5"
+    )
+
+
+def model_choice(model: Any, *, draws: bool) -> Remember:
+    """Return how a model of stable-baselines3, or its policy network, chooses; the chance is that of the run.
 
     The memory is the state of a recurrent model, a row per robot; other models have none.
     """
-    return partial(_predicted, model)
+    return partial(_predicted, model, draws)
 
 
 def _predicted(
-    model: Any,
-    rows: ObsArray,
-    memory: Any,
-    rng: np.random.Generator,  # noqa: ARG001 - nothing is drawn
+    model: Any, draws: bool, rows: ObsArray, memory: Any, rng: np.random.Generator
 ) -> tuple[np.ndarray, Any]:
-    return model.predict(rows, state=memory, deterministic=True)
+    if not draws:
+        return model.predict(rows, state=memory, deterministic=True)
+    import torch  # pyright: ignore[reportMissingImports] - an extra
+
+    with torch.random.fork_rng(devices=()):
+        torch.manual_seed(int(rng.integers(2**31)))
+        return model.predict(rows, state=memory, deterministic=False)
 
 
-def _read_note(note: Any, path: Path) -> tuple[InterfaceConfig, str]:
-    """Return the interface and the caches of a note.
+def has_probabilities(network: Any) -> bool:
+    """Whether a policy network has probabilities of discrete actions: of PPO and A2C, not of DQN."""
+    return isinstance(network.action_space, spaces.Discrete) and hasattr(network, "get_distribution")
 
-    Raises:
-        ModelError: the note holds something else.
-    """
-    if not isinstance(note, Mapping) or not isinstance(note.get("interface"), Mapping):
-        raise ModelError(f"Expected the note in {path} to be a table with interface and caches, got {note!r}.")
+
+def _read_note(note: Any, name: str) -> tuple[InterfaceConfig, str, bool]:
+    """Return interface, caches and whether actions are drawn, as a note says; raises ModelError for something else."""
     try:
-        interface = interface_from_mapping(dict(note["interface"]))
+        values = table("it", note)
+        interface = interface_from_mapping(table("interface", values.get("interface")))
+        one_of("caches", values.get("caches"), CACHE_KINDS)
+        switch("samples", values.get("samples"))
     except ConfigError as error:
-        raise ModelError(f"Cannot use the note in {path}: {error}") from error
-    if note.get("caches") not in CACHE_KINDS:
-        raise ModelError(
-            f"Expected caches in the note in {path} to be one of {', '.join(CACHE_KINDS)}, got {note.get('caches')!r}."
-        )
-    return interface, note["caches"]
+        raise ModelError(f"Cannot use the note in {name}: {error}") from error
+    return interface, values["caches"], values["samples"]
 
 
 def open_network(path: str | Path, *, digest: str | None = None, interface: GivenInterface = None) -> NetworkPolicy:
@@ -216,13 +226,21 @@ def checked_digest(path: str | Path, planned: str | None) -> str:
 
 
 def describe_spaces(owner: Any) -> tuple[str, str]:
-    """Return kind and size of the spaces of a model or an interface; a model and its interface must agree in them."""
+    """Return kind and size of the spaces of a model or an interface, of one robot; the two must agree in them."""
     return _kind_and_size(owner.observation_space), _kind_and_size(owner.action_space)
 
 
 def _kind_and_size(space: spaces.Space[Any]) -> str:
-    size = space.n if isinstance(space, spaces.Discrete) else ", ".join(map(str, space.shape or ()))
-    return f"{type(space).__name__}({size})"
+    if isinstance(space, spaces.Discrete):
+        return f"Discrete({space.n})"
+    shape = space.shape or ()
+    own = shape if _n_rows(space) is None else shape[1:]
+    return f"{type(space).__name__}({', '.join(map(str, own))})"
+
+
+def _n_rows(space: spaces.Space[Any]) -> int | None:
+    """Return how many robots a space is of together, None where it is of one."""
+    return space.shape[0] if space.shape is not None and len(space.shape) == 2 else None
 
 
 @lru_cache(maxsize=2)
@@ -248,7 +266,7 @@ def _open_model(path: str, digest: str) -> tuple[Any, Any]:  # noqa: ARG001 - wi
         network = data["policy_class"](data["observation_space"], data["action_space"], lambda _: 0.0, **settings)
         weights: Any = parameters["policy"]
         network.load_state_dict(weights)
-    except MODEL_FAULTS as error:
+    except Exception as error:  # torch and the library raise many kinds
         reason = " ".join(str(error).split())
         raise ModelError(
             f"Expected {path} to be a model saved by stable-baselines3, but it cannot be opened: {reason}."

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gymnasium import spaces
 
 from swarm_forage_env._internal.archives import ArchiveError, read_arrays
 from swarm_forage_env._internal.fields import ConfigError, known_keys, number, one_of, switch, table
@@ -21,7 +20,7 @@ from swarm_forage_env._internal.files import parse_json, replacing
 from swarm_forage_env.contract.kernel_policy import KernelPolicy
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ObsArray
-from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping
+from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, any_swarm, interface_from_mapping
 from swarm_forage_env.policies.kernels.network import Choice, Layers, forward, step_network
 from swarm_forage_env.policies.kernels.products import LANES, ROWS
 from swarm_forage_env.policies.learned import InterfacePolicy, check_extra
@@ -36,33 +35,33 @@ _MOST_NUMBERS = 2**26
 _LAYER_PARTS = ("weight", "bias")
 
 
-class NetworkError(ValueError):
+class NetworkError(ConfigError):
     """A file that does not hold a network, or a network that does not fit its interface."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class NetworkAbout:
-    """What is needed besides the weights, as plain values."""
+    """What is needed besides the weights, as plain values.
+
+    Raises:
+        ConfigError: an unknown word, or a choice that is neither True nor False.
+    """
 
     interface: InterfaceConfig
-    activation: str = "tanh"
-    """Activation after every layer except the last."""
-    samples: bool = False
-    """Whether discrete actions are drawn by the softmax of the outputs; if not, the one with the largest output is
-    taken. Continuous actions are always the mean."""
+    activation: str
+    """What follows on every layer except the last, "tanh" or "relu". The weights do not tell it."""
+    samples: bool
+    """Whether discrete actions are drawn by the softmax of the outputs, as the logits of PPO and A2C want it; if not,
+    the one with the largest output is taken. Continuous actions are always the mean."""
     caches: str = "none"
     """Kind of caches that the policy was trained with; the default for its runs."""
     card: dict[str, Any] = field(default_factory=dict)
     """How the network was made, as a text for readers."""
 
     def __post_init__(self) -> None:
-        try:
-            one_of("activation", self.activation, ACTIVATIONS)
-            one_of("caches", self.caches, CACHE_KINDS)
-            switch("samples", self.samples)
-            table("card", self.card)
-        except ConfigError as error:
-            raise NetworkError(str(error)) from error
+        one_of("activation", self.activation, ACTIVATIONS)
+        one_of("caches", self.caches, CACHE_KINDS)
+        switch("samples", self.samples)
 
     def to_json(self) -> str:
         """Return the text that files hold."""
@@ -70,22 +69,14 @@ class NetworkAbout:
 
     @classmethod
     def from_json(cls, text: str) -> "NetworkAbout":
-        """Read the text back.
-
-        Raises:
-            NetworkError: not a JSON object, unknown or missing keys, or values that make no sense.
-        """
+        """Read the text back; raises NetworkError where it says something else."""
         try:
-            mapping = parse_json(text)
-        except ValueError as error:
-            raise NetworkError(f"Expected a description of a network as JSON, got {text[:80]!r}: {error}") from error
-        if not isinstance(mapping, dict) or not isinstance(mapping.get("interface"), dict):
-            raise NetworkError(f"Expected a description of a network with its interface, got {text[:80]!r}.")
-        try:
+            mapping = table("it", parse_json(text))
             known_keys(mapping, cls.__dataclass_fields__, "key about a network")
-            return cls(**{**mapping, "interface": interface_from_mapping(mapping["interface"])})
-        except ConfigError as error:
-            raise NetworkError(f"Expected a description of a network that can be used: {error}") from error
+            interface = interface_from_mapping(table("interface", mapping.get("interface")))
+            return cls(**{**mapping, "interface": interface})
+        except (TypeError, ValueError) as error:
+            raise NetworkError(f"Expected a description of a network, got {text[:80]!r}: {error}") from error
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,8 +100,15 @@ class Network:
         if not all(array.dtype.kind == "f" and _is_finite(array) for array in (*self.weights, *self.biases)):
             raise NetworkError("Expected weights and biases that are finite numbers; did the training diverge?")
         if self._width() * sum(len(weight) + 1 for weight in self.weights) > _MOST_NUMBERS:
+            raise NetworkError(f"Expected layers of at most {_MOST_NUMBERS:,} numbers side by side, got {sizes}.")
+
+    def check_fits(self, interface: LearnerInterface) -> None:
+        """Refuse an interface with other columns or actions than the network takes and gives; raises NetworkError."""
+        wanted, found = interface.widths, (self.n_columns, len(self.biases[-1]))
+        if wanted != found:
             raise NetworkError(
-                f"Expected layers that take at most {_MOST_NUMBERS:,} numbers side by side, got {sizes}."
+                f"Expected a network from {wanted[0]} columns to {wanted[1]} actions, as its interface says, got one "
+                f"from {found[0]} to {found[1]}; give the interface that it was trained with."
             )
 
     @property
@@ -149,14 +147,11 @@ class Network:
         stays the likeliest.
 
         Raises:
-            NetworkError: a temperature out of `TEMPERATURES`, or a network that does not draw discrete actions.
+            ConfigError: a temperature out of `TEMPERATURES`, or a network that does not draw discrete actions.
         """
         if temperature == 1.0:
             return self
-        try:
-            number("temperature", temperature, at_least=TEMPERATURES[0], at_most=TEMPERATURES[1])
-        except ConfigError as error:
-            raise NetworkError(str(error)) from error
+        number("temperature", temperature, at_least=TEMPERATURES[0], at_most=TEMPERATURES[1])
         if self.about.interface.actions != "discrete" or not self.about.samples:
             raise NetworkError(
                 "Expected a network that draws discrete actions, got one that takes the likeliest or the mean."
@@ -203,14 +198,22 @@ class Network:
             about: What is needed besides the weights.
 
         Raises:
-            NetworkError: the layers do not follow on each other.
+            NetworkError: the layers do not follow on each other, or do not fit the interface.
         """
-        parts = {end: [_array(tensor) for name, tensor in state.items() if name.endswith(end)] for end in _LAYER_PARTS}
-        weights, biases = ([array.T for array in parts["weight"]], parts["bias"])
-        return cls(tuple(map(np.ascontiguousarray, weights)), tuple(biases), about)
+        weights, biases = (
+            tuple(_array(tensor) for name, tensor in state.items() if name.endswith(end)) for end in _LAYER_PARTS
+        )
+        network = cls(tuple(np.ascontiguousarray(array.T) for array in weights), biases, about)
+        network.check_fits(any_swarm(about.interface))
+        return network
 
     def save(self, path: str | Path) -> None:
-        """Write the file; an existing one is replaced."""
+        """Write the file; an existing one is replaced.
+
+        Raises:
+            NetworkError: the layers do not fit the interface.
+        """
+        self.check_fits(any_swarm(self.about.interface))
         layers = {f"weight_{k}": weight for k, weight in enumerate(self.weights)}
         layers |= {f"bias_{k}": bias for k, bias in enumerate(self.biases)}
         with replacing(Path(path)) as draft, draft.open("wb") as file:
@@ -270,17 +273,11 @@ class NetworkPolicy(KernelPolicy, InterfacePolicy):
         """
         check_extra(self._config, None)
         self._bind(spec)
-        space, network, layers = self.interface.action_space, self._network, self._network.layers()
-        n_actions = int(space.n) if isinstance(space, spaces.Discrete) else space.shape[0]
-        wanted, found = (self.interface.layout.size, n_actions), (network.n_columns, len(network.biases[-1]))
-        if wanted != found:
-            raise NetworkError(
-                f"Expected a network from {wanted[0]} columns to {wanted[1]} actions, as its interface says, got one "
-                f"from {found[0]} to {found[1]}."
-            )
-        n_robots = spec.n_robots
+        self._network.check_fits(self.interface)
+        layers, n_robots = self._network.layers(), spec.n_robots
+        n_columns, n_actions = self.interface.widths
         self._choice = Choice(
-            seen=np.zeros((n_robots, wanted[0]), np.float32),
+            seen=np.zeros((n_robots, n_columns), np.float32),
             outputs=np.zeros((n_robots, n_actions), np.float32),
             number=np.zeros(n_robots, np.int32),
             is_made=np.zeros(n_robots, np.bool_),

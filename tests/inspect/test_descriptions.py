@@ -7,7 +7,9 @@ from swarm_forage_env.inspect.descriptions import describe
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.network import Network, NetworkAbout
 
-FRAMED = InterfaceConfig(observation="compact", actions="discrete", decision_ticks=5, frame_decisions=200)
+FRAMED = InterfaceConfig(
+    observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5, frame_decisions=200
+)
 
 
 @pytest.fixture
@@ -17,7 +19,9 @@ def told(tmp_path):
     def tell(**about) -> list[str]:
         layers = (np.zeros((23, 4), np.float32), np.zeros((4, 6), np.float32))
         biases = (np.zeros(4, np.float32), np.zeros(6, np.float32))
-        Network(layers, biases, NetworkAbout(interface=FRAMED, **about)).save(tmp_path / "mine.npz")
+        Network(layers, biases, NetworkAbout(interface=FRAMED, samples=False, **{"activation": "tanh"} | about)).save(
+            tmp_path / "mine.npz"
+        )
         return list(describe(str(tmp_path / "mine.npz")).notes)
 
     return tell

@@ -130,7 +130,11 @@ def test_a_policy_that_was_trained_with_them_needs_the_function_again():
     layout, choices = LearnerInterface(interface, spec).layout, LearnerInterface(interface, spec).action_space
     weights = np.zeros((layout.size, choices.n), np.float32)  # type: ignore[union-attr] - discrete
     weights[layout["extra"].start, 1] = 1.0  # who looks north drives; all others stand
-    network = Network((weights,), (np.zeros(choices.n, np.float32),), NetworkAbout(interface=interface))  # type: ignore[union-attr]
+    network = Network(
+        (weights,),
+        (np.zeros(choices.n, np.float32),),
+        NetworkAbout(interface=interface, activation="tanh", samples=False),
+    )  # type: ignore[union-attr]
     with pytest.raises(ExtraFunctionError, match=r"extra_observation of 2 columns that the policy was trained with"):
         NetworkPolicy(network).reset(spec, np.random.default_rng())
 

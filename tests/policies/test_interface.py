@@ -262,15 +262,32 @@ def test_an_interface_is_given_as_it_is_by_fields_or_not_at_all():
         chosen_interface("discrete")
 
 
-@pytest.mark.parametrize("name", ["observations", "out"])
-@pytest.mark.parametrize(("rows", "columns", "kind"), [(3, 0, np.float32), (4, -1, np.float32), (4, 0, np.float64)])
-def test_arrays_that_compiled_code_would_read_or_write_beyond_are_refused(name, rows, columns, kind):
+@pytest.mark.parametrize(
+    ("name", "spoilt"),
+    [
+        (name, spoilt)
+        for name in ("observations", "out", "mask", "command")
+        for spoilt in (
+            lambda rows: rows[:, :-1].copy(),
+            lambda rows: rows[:, :, None],
+            lambda rows: rows.astype(np.float64),
+            lambda rows: np.asfortranarray(rows),
+        )
+    ],
+)
+def test_arrays_that_compiled_code_would_read_or_write_beyond_are_refused(name, spoilt):
     env = ForageEnv(scenario("warehouse_small", n_robots=4))
-    interface = LearnerInterface(InterfaceConfig(observation="compact"), env.swarm_spec)
-    given = {"observations": np.zeros((4, env.layout.size), np.float32)}
-    given["out"] = np.zeros((4, interface.layout.size), np.float32)
-    wrong = np.zeros((rows, given[name].shape[1] + columns), kind)
-    if name == "observations" and rows == 3:
-        wrong = wrong[:, :, None]
-    with pytest.raises(ValueError, match=f"Expected {name} as float32 of shape"):
-        interface.observe(*(given | {name: wrong}).values())
+    interface = bound(env, observation="compact", actions="discrete")
+    obs, out = np.zeros((4, env.layout.size), np.float32), np.zeros((4, interface.layout.size), np.float32)
+    calls = {
+        "observations": lambda: interface.observe(spoilt(obs)),
+        "out": lambda: interface.observe(obs, spoilt(out)),
+        "mask": lambda: interface.mask(spoilt(obs)),
+        "command": lambda: interface.command(np.zeros(4, np.int64), spoilt(obs)),
+    }
+    with pytest.raises(ValueError, match=r"Expected (observations|out) as contiguous float32 of shape"):
+        calls[name]()
+    with pytest.raises(ValueError, match="contiguous float32"):
+        interface.command(np.zeros(4, np.int64), obs[:3])
+    with pytest.raises(ValueError, match="contiguous float32"):
+        interface.observe(obs, out[:3])

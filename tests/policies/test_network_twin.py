@@ -26,7 +26,9 @@ def random_network(interface: InterfaceConfig, env: ForageEnv, **about) -> Netwo
     sizes = [shape.layout.size, 5, 13, int(space.n) if hasattr(space, "n") else space.shape[0]]
     weights = tuple(rng.normal(size=size).astype(np.float32) for size in itertools.pairwise(sizes))
     biases = tuple(rng.normal(size=size).astype(np.float32) for size in sizes[1:])
-    return Network(weights, biases, NetworkAbout(interface=interface, **about))
+    return Network(
+        weights, biases, NetworkAbout(interface=interface, **{"activation": "tanh", "samples": False} | about)
+    )
 
 
 @pytest.mark.parametrize(

@@ -32,7 +32,7 @@ def network_in(tmp_path):
         path.parent.mkdir(parents=True)
         weights = np.random.default_rng(seed).normal(size=(23, 6)).astype(np.float32)
         interface = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True)
-        about = NetworkAbout(interface=interface, caches="static")
+        about = NetworkAbout(interface=interface, activation="tanh", samples=False, caches="static")
         Network((weights,), (np.zeros(6, np.float32),), about).save(path)
         return path
 

@@ -224,7 +224,11 @@ def network_file(path, *, caches="none", seed=0):
     """A network from compact observations to motions, with random weights."""
     weights = np.random.default_rng(seed).normal(size=(23, 6)).astype(np.float32)
     interface = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True)
-    network = Network((weights,), (np.zeros(6, np.float32),), NetworkAbout(interface=interface, caches=caches))
+    network = Network(
+        (weights,),
+        (np.zeros(6, np.float32),),
+        NetworkAbout(interface=interface, activation="tanh", samples=False, caches=caches),
+    )
     network.save(path)
     return path
 

@@ -37,7 +37,7 @@ def network(*, stands: bool) -> Network:
     """A network that takes all actions alike, or always stands."""
     bias = np.zeros(N_ACTIONS, np.float32)
     bias[0] = 50.0 if stands else 0.0
-    about = NetworkAbout(interface=NUMBERED, samples=True)
+    about = NetworkAbout(interface=NUMBERED, activation="tanh", samples=True)
     return Network((np.zeros((N_INPUTS, N_ACTIONS), np.float32),), (bias,), about)
 
 

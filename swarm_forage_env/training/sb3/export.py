@@ -10,11 +10,9 @@ from stable_baselines3.common.torch_layers import FlattenExtractor
 from stable_baselines3.dqn.policies import DQNPolicy
 from torch import nn
 
-from swarm_forage_env.contract.policy import SwarmSpec
-from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
-from swarm_forage_env.policies.model_files import MODEL_NOTE, describe_spaces
+from swarm_forage_env.policies.interface import InterfaceConfig, any_swarm, interface_from_mapping
+from swarm_forage_env.policies.model_files import MODEL_NOTE, describe_spaces, has_probabilities
 from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkError
-from swarm_forage_env.scenarios.presets import scenario
 
 ACTIVATION_CLASSES: dict[str, type[nn.Module]] = {"tanh": nn.Tanh, "relu": nn.ReLU}
 """Layers of torch, by the names that plans and network files have for them."""
@@ -25,7 +23,7 @@ def export_network(
     model: BaseAlgorithm,
     interface: InterfaceConfig,
     *,
-    samples: bool = False,
+    samples: bool | None = None,
     caches: str = "none",
     card: dict[str, Any] | None = None,
 ) -> Network:
@@ -34,8 +32,8 @@ def export_network(
     Args:
         model: The trained model.
         interface: What it saw and did in training, `SwarmVecEnv.interface.config`.
-        samples: Draw discrete actions by their probabilities (PPO, A2C) instead of taking the likeliest. Those of a DQN
-            need a temperature, see `Network.at_temperature`.
+        samples: Whether discrete actions are drawn by their probabilities; default where the model has some (PPO, A2C),
+            as in its training. Those of a DQN need a temperature, see `Network.at_temperature`.
         caches: Kind of caches that it was trained with.
         card: How it came about, plain values.
 
@@ -58,26 +56,30 @@ def export_network(
     about = NetworkAbout(
         interface=interface,
         activation=_NAMES[between.pop()] if between else "tanh",
-        samples=samples,
+        samples=has_probabilities(model.policy) if samples is None else samples,
         caches=caches,
         card=card or {},
     )
     return Network(weights, biases, about)
 
 
-def note_interface(model: BaseAlgorithm, interface: InterfaceConfig, *, caches: str = "none") -> None:
+def note_interface(
+    model: BaseAlgorithm, interface: InterfaceConfig, *, caches: str = "none", samples: bool | None = None
+) -> None:
     """Note on a model what its spaces do not tell; saved with it, so that its zip file runs as it was trained.
 
     Args:
         model: Any model of one robot, before it is saved.
         interface: What it sees and does in training, `SwarmVecEnv.interface.config`.
         caches: Kind of caches that it is trained with.
+        samples: As in `export_network`.
 
     Raises:
         NetworkError: an interface that is not the model's.
     """
     _check_spaces(model, interface)
-    setattr(model, MODEL_NOTE, {"interface": asdict(interface), "caches": caches})
+    draws = has_probabilities(model.policy) if samples is None else samples
+    setattr(model, MODEL_NOTE, {"interface": asdict(interface), "caches": caches, "samples": draws})
 
 
 def _check_interface(model: BaseAlgorithm, interface: InterfaceConfig) -> None:
@@ -91,14 +93,7 @@ def _check_interface(model: BaseAlgorithm, interface: InterfaceConfig) -> None:
 
 def _check_spaces(model: BaseAlgorithm, interface: InterfaceConfig) -> None:
     """Refuse an interface with other observations or actions than the model has."""
-    # Any scenario with these sensors will do: all have the same columns and actions.
-    shown: dict[str, Any] = {}
-    for name in ("neighbours_seen", "neighbour_range_m", "message_size"):
-        if getattr(interface, name) is not None:
-            shown[name] = getattr(interface, name)
-    spec = SwarmSpec.of(scenario("warehouse_small", **shown))
-    bound = LearnerInterface(interface, spec)
-    wanted, found = describe_spaces(bound), describe_spaces(model)
+    wanted, found = describe_spaces(any_swarm(interface)), describe_spaces(model)
     if wanted != found:
         raise NetworkError(
             f"Expected a model from {' to '.join(wanted)} for this interface, got one from {' to '.join(found)}; give "
