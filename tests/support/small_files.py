@@ -60,7 +60,7 @@ def _entry(file: Path) -> None:
 
 def _network(file: Path) -> None:
     interface = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True)
-    weights = np.linspace(-1.0, 1.0, 12, dtype=np.float32).reshape(4, 3)
+    weights = np.linspace(-1.0, 1.0, 138, dtype=np.float32).reshape(23, 6)
     Network((weights,), (weights[0],), NetworkAbout(interface=interface, activation="tanh", samples=False)).save(file)
 
 

@@ -29,7 +29,7 @@ from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.extras import ExtraFunction
 from swarm_forage_env.policies.learned import LearnedPolicy
-from swarm_forage_env.policies.model_files import MODEL_FAULTS, deterministic_choice
+from swarm_forage_env.policies.model_files import model_choice
 from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import Started
@@ -271,7 +271,7 @@ def _checkpoint(plan: TrainingPlan, folder: Path, env: SwarmVecEnv) -> BaseAlgor
     trust.check(path)
     try:
         return ALGORITHM_CLASSES[plan.algorithm].load(path, env=env, device="cpu")
-    except MODEL_FAULTS as error:
+    except Exception as error:  # torch and the library raise many kinds
         reason = " ".join(str(error).split())
         raise ConfigError(f"Cannot open the checkpoint {path}: {reason}; train anew in another folder.") from error
 
@@ -290,7 +290,7 @@ def _prepared(plan: TrainingPlan, stage: Stage, folder: Path, env: SwarmVecEnv, 
             model = algorithm(env=env, device="cpu", **arguments_of(plan, env), **options)
     except (AssertionError, TypeError, ValueError) as error:  # how the library refuses values
         raise ConfigError(f"Cannot prepare {plan.algorithm} with its options: {error}") from error
-    note_interface(model, plan.interface, caches=plan.scenario.caches)
+    note_interface(model, plan.interface, caches=plan.scenario.caches, samples=plan.samples)
     return model
 
 
@@ -476,7 +476,7 @@ class _Watch(BaseCallback):
         """
         interface, extra = self.plan.run_interface, self._extra_observation
         if not self.plan.samples:
-            return LearnedPolicy(interface, remember=deterministic_choice(self.model), extra_observation=extra)
+            return LearnedPolicy(interface, remember=model_choice(self.model, draws=False), extra_observation=extra)
         network = self._network()
         if extra is None:
             return NetworkPolicy(network)
