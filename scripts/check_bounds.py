@@ -16,7 +16,7 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-PLACES = ("policies/kernels/*.py", "rendering/kernels.py", "world/kernels/*.py")
+PLACES = ("policies/kernels/*.py", "world/kernels/*.py")
 """Where they are, in `swarm_forage_env`."""
 TESTS = (
     "tests/policies/test_interface_twins.py",

@@ -215,7 +215,7 @@ def draw(exhibit: Exhibit) -> None:
 
 def show(exhibit: Exhibit) -> None:
     """Make the replay and the picture of an exhibit."""
-    replays = [record_replay(spec, frame_s=exhibit.frame_s)[0] for spec in exhibit.specs()]
+    replays = [record_replay(spec, frame_s=exhibit.frame_s) for spec in exhibit.specs()]
     path = write_replays(FOLDER / f"{exhibit.name}.html", replays)
     draw(exhibit)
     print(f"{path.name}: {path.stat().st_size / 1e3:.0f} kB")

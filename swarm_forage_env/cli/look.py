@@ -155,7 +155,7 @@ def replay(
     replays: list[Replay] = []
     for spec in specs:
         with progress_bar(f"{spec.policy}, seed {spec.seed}") as progress:
-            replays.append(record_replay(spec, seconds=seconds, progress=progress)[0])
+            replays.append(record_replay(spec, seconds=seconds, progress=progress))
     written = write_replays(path, replays)
     say(f"wrote {written} ({written.stat().st_size / 1e6:.1f} MB)")
 
@@ -175,7 +175,7 @@ def maps(
     files beside the picture.
     """
     from swarm_forage_env.cli.worlds import RESULTS, default_file, plan_runs
-    from swarm_forage_env.inspect.maps import maps_of_runs
+    from swarm_forage_env.inspect.maps import maps_of_runs, write_maps
     from swarm_forage_env.rendering.figures import check_picture
 
     specs = plan_runs(world, policies, range(seeds))
@@ -184,7 +184,7 @@ def maps(
     with progress_bar("runs", sum(spec.robot_ticks for spec in specs)) as advance:
         found = maps_of_runs(specs, jobs=jobs, advance=advance)
     try:
-        found.write(file)
+        write_maps(file, found)
     except ImportError as error:
         note(error)
     say(f"wrote maps to {file} and .npz files beside it")

@@ -1,4 +1,4 @@
-"""Filming a run: `record_run` drives a policy and writes a GIF or an MP4.
+"""Filming a run: `record_run` drives a policy and writes a GIF or an MP4, or one PNG.
 
 A film is planned and driven like any run, by `runs.spec` and `runs.run`. Drawing reads the state and never writes it,
 so filming does not change a run.
@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from swarm_forage_env._internal.fields import ConfigError, number
-from swarm_forage_env._internal.files import check_file
+from swarm_forage_env._internal.files import check_file, replacing
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.registry import load_policy, policy_label
 from swarm_forage_env.rendering.frame import Trails, render_frame
-from swarm_forage_env.rendering.video import Frame, check_film, check_picture, write_film, write_picture
-from swarm_forage_env.rendering.view import RenderError, arena_view, refusing
+from swarm_forage_env.rendering.video import Frame, check_film, write_film
+from swarm_forage_env.rendering.view import arena_view
 from swarm_forage_env.runs.run import LiveRun, build_env
 from swarm_forage_env.runs.spec import chosen_caches, pin_policy
 from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -63,28 +63,31 @@ def record_run(
         The path written.
 
     Raises:
-        RenderError: a value out of range; then nothing has been run or written.
-        ConfigError: `parameters` with a policy object.
+        ConfigError: a value out of range, or `parameters` with a policy object; then nothing has been run or written.
         OSError: the file cannot be written; then nothing has been run.
         ImportError: Pillow, or for .mp4 imageio with ffmpeg, is not installed.
         ValueError: unknown policy name, or a policy file that cannot be opened or does not fit the scenario.
     """
-    given = world_of(world)
+    given, path = world_of(world), Path(path)
     scenario = given.scenario
-    with refusing():
-        number("trail_s", trail_s, at_least=0.0)
+    number("trail_s", trail_s, at_least=0.0)
     if at_s is None:
-        ticks = _picture_ticks(scenario, seconds, speedup, fps)
-        path, n_samples = check_film(path, fps, len(ticks)), round(trail_s * fps / speedup) + 1
+        ticks = _film_ticks(scenario, seconds, speedup, fps)
+        check_film(path, fps, len(ticks))
+        n_samples = round(trail_s * fps / speedup) + 1
     else:
-        path, ticks = check_picture(path), _trail_ticks(scenario, at_s, trail_s)
+        if path.suffix.lower() != ".png":
+            raise ConfigError(
+                f"Expected a picture's path to end in .png, got {str(path)!r}; for a film, leave --at out."
+            )
+        ticks = _trail_ticks(scenario, at_s, trail_s)
         n_samples = len(ticks)
+    check_file(path)
     arena_view(scenario, size_px, theme)  # refuses a bad size or theme before the run starts
     policy, name, scenario = cast_policy(policy, scenario, caches, parameters)
     arena_words = f"{scenario.arena.width_m:g} x {scenario.arena.height_m:g} m"
     title = World(scenario, given.wrappers).title(name, arena_words, digests=False)
     stack = build_env(scenario, given.wrappers, reads=getattr(policy, "reads", None))
-    check_file(path)
     trails = Trails(scenario.robots.n_robots, n_samples) if n_samples > 1 else None
 
     def frames() -> Iterator[Frame]:
@@ -103,9 +106,19 @@ def record_run(
             if progress is not None:
                 progress(done, len(ticks))
 
-    if at_s is not None:
-        return write_picture(next(frames()), path)
-    return write_film(frames(), path, fps=fps, n_frames=len(ticks), theme=theme)
+    if at_s is None:
+        write_film(frames(), path, fps=fps, theme=theme)
+    else:
+        write_picture(next(frames()), path)
+    return path
+
+
+def write_picture(frame: Frame, path: Path) -> None:
+    """Write one picture, (H, W, 3) uint8, as PNG, whole or not at all."""
+    from PIL import Image
+
+    with replacing(path, ending=".png") as draft:
+        Image.fromarray(frame).save(draft, optimize=True)
 
 
 def cast_policy(
@@ -129,30 +142,17 @@ def cast_policy(
 
 def _trail_ticks(scenario: ScenarioConfig, at_s: float, trail_s: float) -> list[int]:
     """Return the ticks of the trail of one picture, one per second, the last that of the picture."""
-    with refusing():
-        number("at_s", at_s, at_least=0.0, at_most=scenario.horizon_s)
+    number("at_s", at_s, at_least=0.0, at_most=scenario.horizon_s)
     end = round(at_s / scenario.dt_s)
     back = range(end, -1, -round(1.0 / scenario.dt_s))
     return [tick for tick in back if (end - tick) * scenario.dt_s <= trail_s][::-1]
 
 
-def _picture_ticks(scenario: ScenarioConfig, seconds: float, speedup: float, fps: float) -> list[int]:
+def _film_ticks(scenario: ScenarioConfig, seconds: float, speedup: float, fps: float) -> list[int]:
     """Return the ticks to draw, 0 first, evenly spaced up to rounding."""
-    with refusing():
-        for label, value in (("seconds", seconds), ("speedup", speedup), ("fps", fps)):
-            number(label, value, above=0.0)
-    if seconds > scenario.horizon_s:
-        raise RenderError(
-            f"Expected seconds <= {scenario.horizon_s:g}, the scenario's horizon_s, got {seconds:g}; "
-            "film less or give the scenario a longer horizon."
-        )
-    step_s = speedup / fps
-    if step_s < scenario.dt_s:
-        raise RenderError(
-            f"Expected at least one tick of {scenario.dt_s} s per picture, got speedup / fps = {step_s:g} s; "
-            f"use fps <= {speedup / scenario.dt_s:g} or raise speedup."
-        )
-    n_steps = math.floor(seconds / step_s + 1e-9)
-    if n_steps < 1:
-        raise RenderError(f"Expected seconds >= {step_s:g}, the time between two pictures, got {seconds:g}.")
-    return [round(picture * step_s / scenario.dt_s) for picture in range(n_steps + 1)]
+    number("seconds (of a run of horizon_s)", seconds, above=0.0, at_most=scenario.horizon_s)
+    number("fps", fps, above=0.0)
+    number(f"speedup (a tick of {scenario.dt_s} s or more per picture)", speedup, at_least=scenario.dt_s * fps)
+    number("seconds (of two pictures or more)", seconds, at_least=speedup / fps)
+    n_steps = math.floor(seconds * fps / speedup + 1e-9)
+    return [round(picture * speedup / fps / scenario.dt_s) for picture in range(n_steps + 1)]

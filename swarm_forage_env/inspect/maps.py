@@ -13,6 +13,7 @@ from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.inspect.replay.capture import record_replay
 from swarm_forage_env.inspect.replay.frames import Replay, Status
 from swarm_forage_env.policies.registry import policy_label
+from swarm_forage_env.rendering.figures import Panel, policy_words, saved_figure
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.workers import each_run
 from swarm_forage_env.scenarios.floor import CELL_M
@@ -25,6 +26,12 @@ MEANINGS: Mapping[str, tuple[str, str]] = {
     "drops": ("objects dropped", "per m² and 1,000 s"),
 }
 """Map -> what is counted, and in which unit."""
+_OBSTACLE = {"facecolor": "white", "edgecolor": "black", "hatch": "////", "linewidth": 0.5}
+"""Hatched: neither a map nor a difference has that."""
+_MAP_IN = 3.6
+"""Width of a map with its scale, inches."""
+_MOST_OF_FLOOR = 0.5
+"""What happens in a smaller part of the floor is shown without the rest (our choice)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -67,14 +74,9 @@ class FloorMaps:
 
     def write(self, path: str | Path) -> None:
         """Write the arrays to an .npz file, whole or not at all."""
-        content: dict[str, Any] = {
-            **self.arrays,
-            "side_m": self.side_m,
-            "size_m": self.size_m,
-            "n_robots": self.n_robots,
-        }
+        sizes: dict[str, Any] = {"side_m": self.side_m, "size_m": self.size_m, "n_robots": self.n_robots}
         with replacing(Path(path)) as draft, draft.open("wb") as file:
-            np.savez_compressed(file, **content)
+            np.savez_compressed(file, **self.arrays, **sizes)
 
 
 def floor_maps(replay: Replay, *, side_m: float = 2 * CELL_M) -> FloorMaps:
@@ -92,7 +94,8 @@ def floor_maps(replay: Replay, *, side_m: float = 2 * CELL_M) -> FloorMaps:
     number("side_m", side_m, at_least=CELL_M, at_most=max(arena.width_m, arena.height_m))
     extents = arena.height_m, arena.width_m
     edges = [np.arange(0.0, extent + side_m - 1e-9, side_m) for extent in extents]
-    area_m2 = np.outer(*(_sides(side_m, len(marks) - 1, extent) for marks, extent in zip(edges, extents, strict=True)))
+    sides_m = [np.diff(np.minimum(marks, extent)) for marks, extent in zip(edges, extents, strict=True)]
+    area_m2 = np.outer(*sides_m)
 
     def count(places_m: FloatArray) -> FloatArray:
         inside = np.clip(places_m, 0.0, [arena.width_m, arena.height_m])
@@ -119,44 +122,10 @@ def floor_maps(replay: Replay, *, side_m: float = 2 * CELL_M) -> FloorMaps:
     )
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ComparedMaps:
-    """Maps of several swarms, and what is more in each after the first than in the first."""
-
-    maps: tuple[FloorMaps, ...]
-
-    @property
-    def rows(self) -> tuple[FloorMaps, ...]:
-        """Maps and differences."""
-        return (*self.maps, *(one.minus(self.maps[0]) for one in self.maps[1:]))
-
-    def write(self, picture: str | Path) -> None:
-        """Write arrays to .npz files beside a picture, and then draw it.
-
-        Args:
-            picture: File to write.
-
-        Raises:
-            ImportError: matplotlib is not installed; the arrays are written.
-        """
-        from swarm_forage_env.rendering.plots import MapRow, draw_maps
-
-        rows = self.rows
-        for one in rows:
-            one.write(Path(picture).with_suffix(f".{as_file_name(one.label)}.npz"))
-        shown = [
-            MapRow(one.label, one.arrays, one.is_difference, one.size_m, one.obstacles_m, one.nests_m) for one in rows
-        ]
-        draw_maps(picture, shown, MEANINGS)
-
-
 def maps_of_runs(
-    specs: Sequence[RunSpec],
-    *,
-    jobs: int | None,
-    advance: Callable[[float], None],
-) -> ComparedMaps:
-    """Make runs and return the mean of the maps of each policy.
+    specs: Sequence[RunSpec], *, jobs: int | None, advance: Callable[[float], None] | None = None
+) -> list[FloorMaps]:
+    """Make runs and return the mean of the maps of each policy, and what is more in each than in the first.
 
     Args:
         specs: The runs; those of a policy differ in their seeds, and all arenas are of one size.
@@ -174,17 +143,101 @@ def maps_of_runs(
     made: dict[str, list[FloorMaps]] = {}
     for spec in specs:
         made.setdefault(policy_label(spec.policy), []).append(found[spec.run_id])
-    return ComparedMaps(maps=tuple(_mean_maps(maps, label) for label, maps in made.items()))
+    means = [_mean_maps(maps, label) for label, maps in made.items()]
+    return [*means, *(one.minus(means[0]) for one in means[1:])]
+
+
+def write_maps(picture: str | Path, maps: Sequence[FloorMaps]) -> None:
+    """Write arrays to .npz files beside a picture, and then draw it.
+
+    Raises:
+        ConfigError: an ending that no picture has.
+        ImportError: matplotlib is not installed; the arrays are written.
+    """
+    for one in maps:
+        one.write(Path(picture).with_suffix(f".{as_file_name(one.label)}.npz"))
+    draw_maps(picture, maps)
+
+
+def draw_maps(path: str | Path, maps: Sequence[FloorMaps]) -> None:
+    """Draw maps of floors of the same proportions: a row of panels per map or difference, a column per quantity.
+
+    All maps in a column share one scale, and so do all differences, where white is 0. What happened in a small part of
+    the floor only is shown there.
+
+    Args:
+        path: File to write; as in `saved_figure`, whose errors this has.
+        maps: One per row.
+    """
+    width_m, height_m = maps[0].size_m
+    names = [name for name in MEANINGS if name in maps[0].arrays]
+    size_in = _MAP_IN * len(names), (0.75 * height_m / width_m * _MAP_IN + 0.25) * len(maps) + 0.6
+    with saved_figure(path, size_in) as figure:
+        panels = figure.subplots(len(maps), len(names), squeeze=False)
+        for column, name in enumerate(names):
+            what, unit = MEANINGS[name]
+            panels[0, column].set_title(what)
+            x_low, y_low, x_high, y_high = _busy_part([one.arrays[name] for one in maps])
+            for is_difference in (False, True):
+                rows = [row for row, one in enumerate(maps) if one.is_difference == is_difference]
+                if not rows:
+                    continue
+                top = _map_top([maps[row].arrays[name] for row in rows])
+                image: Any = None
+                for row in rows:
+                    image = _draw_map(panels[row, column], maps[row], name, top)
+                    panels[row, column].set(
+                        xlim=(x_low * width_m, x_high * width_m), ylim=(y_low * height_m, y_high * height_m)
+                    )
+                ends = "both" if is_difference else "max"
+                scale = figure.colorbar(image, ax=[panels[row, column] for row in rows], extend=ends)
+                scale.set_label(f"more {unit}" if is_difference else unit)
+        for one, line in zip(maps, panels[:, 0], strict=True):
+            line.set_ylabel(f"{policy_words(one.label)}\ny (m)")
+        for panel in panels[-1]:
+            panel.set_xlabel("x (m)")
+
+
+def _draw_map(panel: Panel, maps: FloorMaps, name: str, top: float) -> Any:
+    """Draw the squares of one map, and what stands on its floor; returns the image."""
+    low, colours, nest = (-top, "RdBu_r", "black") if maps.is_difference else (0.0, "cividis", "white")
+    extent = (0, maps.size_m[0], 0, maps.size_m[1])
+    image = panel.imshow(maps.arrays[name], origin="lower", extent=extent, vmin=low, vmax=top, cmap=colours)
+    outline = {"facecolor": "none", "edgecolor": nest, "linestyle": "--", "linewidth": 0.8}
+    for boxes, look in ((maps.obstacles_m, _OBSTACLE), (maps.nests_m, outline)):
+        for x_low, y_low, x_high, y_high in boxes:
+            panel.fill([x_low, x_high, x_high, x_low], [y_low, y_low, y_high, y_high], **look)
+    panel.grid(visible=False)
+    return image
+
+
+def _busy_part(arrays: Sequence[FloatArray]) -> Rectangle:
+    """Return the part of the floor to show, in shares of it: all, or where something is if that is less than half.
+
+    It has the proportions of the floor, and one square around whatever is there.
+    """
+    ny, nx = arrays[0].shape
+    y, x = np.nonzero(np.any([array != 0.0 for array in arrays], axis=0))
+    if not len(x):
+        return 0.0, 0.0, 1.0, 1.0
+    lows = np.maximum([(x.min() - 1) / nx, (y.min() - 1) / ny], 0.0)
+    highs = np.minimum([(x.max() + 2) / nx, (y.max() + 2) / ny], 1.0)
+    side = float((highs - lows).max())
+    if side**2 >= _MOST_OF_FLOOR:
+        return 0.0, 0.0, 1.0, 1.0
+    x_low, y_low = np.clip(0.5 * (lows + highs - side), 0.0, 1.0 - side).tolist()
+    return x_low, y_low, x_low + side, y_low + side
+
+
+def _map_top(arrays: Sequence[FloatArray]) -> float:
+    """Return the end of the scale of maps: few squares hold most; the last percent would hide all others."""
+    values = np.abs(np.concatenate([array.ravel() for array in arrays]))
+    return float(np.quantile(values[values > 0], 0.99)) if values.any() else 1.0
 
 
 def _map_run(spec: RunSpec) -> FloorMaps:
     """Make a run and return its maps."""
-    return floor_maps(record_replay(spec)[0])
-
-
-def _sides(side_m: float, n: int, extent_m: float) -> FloatArray:
-    """Return the sides of squares along one axis, (n,) m: the last is what is left of the arena."""
-    return np.append(np.full(n - 1, side_m), min(side_m, extent_m - (n - 1) * side_m))
+    return floor_maps(record_replay(spec))
 
 
 def _mean_maps(maps: Sequence[FloorMaps], label: str) -> FloorMaps:

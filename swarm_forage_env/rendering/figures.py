@@ -50,6 +50,8 @@ _FEW_DECADES = 100.0
 """Over less than two decades, powers of ten alone are too few numbers along an axis."""
 _FLATTEST = 0.8
 """Height of a figure that is made narrower, as a share of its width: words need as much height as before."""
+_LETTER = 0.55
+"""Width of a letter as a share of the height of the font, roughly."""
 _NARROWEST_FIGURE_IN = 5.2
 """Unless a style says otherwise: room for a headline."""
 
@@ -141,7 +143,8 @@ def saved_figure(
     with styles.context(["default", str(file_of_style), {"font.size": style.font_size}]):
         figure = Drawing(figsize=(width, height))
         if title and style.title:
-            figure.suptitle(title, wrap=True)
+            most = int(width * 72.0 / (_LETTER * style.font_size))
+            figure.suptitle(textwrap.fill(title, max(20, most), break_long_words=False))
         yield figure
         _fit_words(figure, style)
         _spread_numbers(figure)
@@ -236,11 +239,16 @@ def saved_panels(
 
 
 def legend_below(figure: Figure) -> None:
-    """Explain everything with a label once, below all panels, in as few rows as the width has room for."""
+    """Explain everything with a label once, below all panels, in as few rows as the width has room for.
+
+    The paper's policies stand first, in its order.
+    """
     shown: dict[str, Any] = {}
     for panel in figure.axes:
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
             shown.setdefault(label, handle)
+    order = [*POLICY_NAMES.values()]
+    shown = dict(sorted(shown.items(), key=lambda item: order.index(item[0]) if item[0] in order else len(order)))
     for n_columns in range(len(shown), 0, -1):
         legend = figure.legend([*shown.values()], [*shown], loc="outside lower center", ncols=n_columns)
         if n_columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
@@ -315,11 +323,20 @@ def policy_words(text: str) -> str:
     return _POLICY_WORD.sub(lambda found: POLICY_NAMES[found[0]], text)
 
 
-def looks(policies: Iterable[str]) -> list[Look]:
-    """Return the looks of policies, in their order: the paper's always have their own, others what is free."""
+def places_of(policies: Iterable[str]) -> list[int]:
+    """Return the places of policies in `COLOURS`: the paper's always have their own, others what is free."""
     called = [*policies]
     own = {policy: place for place, policy in enumerate(POLICY_NAMES)}
     free = [place for place in _PLACES_OF_OTHERS if place not in {own.get(policy) for policy in called}]
     others = [policy for policy in dict.fromkeys(called) if policy not in own]
     places = own | dict(zip(others, free * len(others), strict=False))
-    return [Look(policy_words(policy), COLOURS[places[policy]], MARKERS[places[policy]]) for policy in called]
+    return [places[policy] for policy in called]
+
+
+def looks(policies: Iterable[str]) -> list[Look]:
+    """Return the looks of policies, in their order, each with the colour and marker of its place."""
+    called = [*policies]
+    return [
+        Look(policy_words(policy), COLOURS[place], MARKERS[place])
+        for policy, place in zip(called, places_of(called), strict=True)
+    ]

@@ -1,82 +1,64 @@
 """One picture of the world. Drawing reads the state arrays and never changes them."""
 
+import math
+import textwrap
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from swarm_forage_env._internal.fields import ConfigError, whole
 from swarm_forage_env.contract.codes import Counter, ObjectStatus
-from swarm_forage_env.contract.types import BoolArray, FloatArray
-from swarm_forage_env.rendering.paint import (
-    Canvas,
-    Canvases,
-    Colour,
-    paint_box,
-    paint_crosses,
-    paint_discs,
-    paint_frame,
-    paint_glows,
-    paint_needles,
-    paint_rings,
-    paint_squares,
-    plain,
-)
+from swarm_forage_env.contract.types import BoolArray
 from swarm_forage_env.rendering.view import (
     CACHE_OPACITY,
+    DETAIL,
     NEST_OPACITY,
     SOURCE_OPACITY,
+    Box,
+    Colour,
     Palette,
-    RenderError,
     View,
     arena_view,
     legend_rows,
     scale_bar_m,
     text_font,
-    text_height,
+    text_width,
 )
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M, WALL_M
 from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
 
 if TYPE_CHECKING:
-    from PIL import ImageDraw
+    from PIL import Image
 
 _SMALLEST_TEXT_PX = 6.0
 _SMALLEST_DETAILED_PX = 2.0
 """Robots below this radius are plain discs."""
+_TRAIL_OPACITY = 0.55
+"""Of the newest part of a trail."""
 
 
 class Trails:
     """Recent positions of all robots, for `render_frame` to draw as fading lines.
 
-    Args:
-        n_robots: Number of robots N.
-        n_samples: Positions remembered per robot; one is added per call of `add`.
+    Attributes:
+        position: (n_samples, N, 2) m, oldest first; NaN where there is no position.
+        carrying: (n_samples, N) whether the robot carried an object then.
     """
 
     def __init__(self, n_robots: int, n_samples: int) -> None:
-        if n_samples < 2:
-            raise RenderError(f"Expected n_samples >= 2 positions to join by a line, got {n_samples}.")
-        self._position = np.full((n_samples, n_robots, 2), np.nan)
-        self._carrying = np.zeros((n_samples, n_robots), np.bool_)
+        """Remember `n_samples` positions, at least 2, of each robot; one is added per call of `add`."""
+        whole("n_samples", n_samples, at_least=2)
+        self.position = np.full((n_samples, n_robots, 2), np.nan)
+        self.carrying: BoolArray = np.zeros((n_samples, n_robots), np.bool_)
 
     def add(self, swarm: SwarmState) -> None:
         """Remember where the robots are now; robots without a body leave a gap."""
-        self._position[:-1] = self._position[1:]
-        self._carrying[:-1] = self._carrying[1:]
-        self._position[-1] = np.where(swarm.present[:, None], swarm.position, np.nan)
-        self._carrying[-1] = swarm.carried_object >= 0
-
-    @property
-    def position(self) -> FloatArray:
-        """(n_samples, N, 2) m, oldest first; NaN where there is no position."""
-        return self._position
-
-    @property
-    def carrying(self) -> BoolArray:
-        """(n_samples, N) whether the robot carried an object then."""
-        return self._carrying
+        now = np.where(swarm.present[:, None], swarm.position, np.nan)
+        self.position = np.concatenate((self.position[1:], now[None]))
+        self.carrying = np.concatenate((self.carrying[1:], swarm.carried_object[None] >= 0))
 
 
 def render_frame(
@@ -116,174 +98,196 @@ def render_frame(
         (H, W, 3) uint8 picture, first row at the top.
 
     Raises:
-        RenderError: `size_px` out of range, no such theme, or trails of another number of robots.
+        ConfigError: `size_px` out of range, no such theme, or trails of another number of robots.
         ImportError: Pillow is not installed.
     """
     view = arena_view(scenario, size_px, theme)
-    canvases = _canvases(scenario, size_px, theme)
-    canvas = canvases.borrow()
+    image = _ground(scenario, size_px, theme).copy()
     if trails is not None:
-        _draw_trails(canvas, view, trails, len(swarm.heading))
-    _draw_caches(canvas, view, scenario, caches)
-    lying = objects.cell[objects.status == ObjectStatus.FREE]
-    paint_squares(canvas, view.pixels((lying + 0.5) * CELL_M), view.object_px, view.palette.object)
-    _draw_robots(canvas, view, swarm, events)
-    picture = canvas.take_picture()
-    canvases.give_back(canvas)
-    _write_header(picture, view, scenario, swarm, events, tick, title)
-    _write_counts(picture, view, caches)
-    return picture
+        _draw_trails(image, view, trails, len(swarm.heading))
+    pen = _Pen(image, view.palette)
+    there = caches.alive
+    places = [*zip(view.pixels((caches.cell[there] + 0.5) * CELL_M).tolist(), caches.count[there], strict=True)]
+    for (x, y), _ in places:
+        pen.sign("cache", x, y, scenario.cache_side_cells * CELL_M * view.scale / 2, line=max(1.0, 1.5 * view.unit))
+    for x, y in view.pixels((objects.cell[objects.status == ObjectStatus.FREE] + 0.5) * CELL_M).tolist():
+        pen.square(x, y, view.object_px, view.palette.object)
+    _draw_robots(pen, view, swarm, events)
+    for (x, y), n_objects in places:
+        pen.text(x, y, str(n_objects), view.palette.text, 1.5 * view.text_px, "mm", rim=view.palette.floor)
+    _write_header(pen, view, scenario, swarm, events, tick, title)
+    return np.asarray(image.reduce(DETAIL))
+
+
+class _Pen:
+    """Draws on an image of `DETAIL` times the size; places and lengths are pixels of the finished picture."""
+
+    def __init__(self, image: "Image.Image", palette: Palette) -> None:
+        from PIL import ImageDraw
+
+        self._draw = ImageDraw.Draw(image, "RGBA")
+        self._colours = palette
+
+    def box(self, box: Box, colour: Colour, opacity: float = 1.0) -> None:
+        left, top, right, bottom = (round(DETAIL * edge) for edge in box)
+        if right > left and bottom > top:
+            self._draw.rectangle((left, top, right - 1, bottom - 1), fill=(*colour, round(255 * opacity)))
+
+    def frame(self, box: Box, line: float, colour: Colour) -> None:
+        left, top, right, bottom = (round(DETAIL * edge) for edge in box)
+        self._draw.rectangle((left, top, right - 1, bottom - 1), outline=colour, width=max(1, round(DETAIL * line)))
+
+    def square(self, x: float, y: float, side: float, colour: Colour) -> None:
+        self.box((x - side / 2, y - side / 2, x + side / 2, y + side / 2), colour)
+
+    def disc(self, x: float, y: float, radius: float, colour: Colour, opacity: float = 1.0) -> None:
+        edges = [DETAIL * edge for edge in (x - radius, y - radius, x + radius, y + radius)]
+        self._draw.ellipse(edges, fill=(*colour, round(255 * opacity)))
+
+    def ring(self, x: float, y: float, radius: float, line: float, colour: Colour) -> None:
+        reach = radius + line / 2
+        edges = [DETAIL * edge for edge in (x - reach, y - reach, x + reach, y + reach)]
+        self._draw.ellipse(edges, outline=colour, width=max(1, round(DETAIL * line)))
+
+    def line(self, ends: Box, width: float, colour: Colour) -> None:
+        self._draw.line([DETAIL * end for end in ends], fill=colour, width=max(1, round(DETAIL * width)))
+
+    def text(
+        self, x: float, y: float, words: str, colour: Colour, text_px: float, anchor: str, rim: Colour | None = None
+    ) -> None:
+        self._draw.text(
+            (DETAIL * x, DETAIL * y),
+            words,
+            fill=colour,
+            font=text_font(text_px),
+            anchor=anchor,
+            stroke_width=0 if rim is None else 2 * DETAIL,
+            stroke_fill=rim,
+        )
+
+    def sign(self, name: str, x: float, y: float, radius: float, *, heading: float = 0.0, line: float = 1.0) -> None:
+        """Draw a thing by its name in the legend."""
+        colours = self._colours
+        box = (x - radius, y - radius, x + radius, y + radius)
+        if name in ("empty", "carrying"):
+            colour = colours.empty if name == "empty" else colours.carrying
+            if radius >= _SMALLEST_DETAILED_PX:  # a rim separates robots that touch
+                self.disc(x, y, radius + max(0.5, 0.22 * radius), colours.floor)
+                ahead, aside = 2.1 * radius * math.cos(heading), -2.1 * radius * math.sin(heading)
+                self.line((x, y, x + ahead, y + aside), 0.5 * radius, colour)
+            self.disc(x, y, radius, colour)
+            if name == "carrying":
+                self.square(x, y, 0.85 * radius, colours.object)
+        elif name == "in interference":
+            self.ring(x, y, 1.55 * radius + 0.5, max(1.5, 0.4 * radius), colours.interference)
+        elif name == "in repair":
+            self.ring(x, y, 0.8 * radius, 0.4 * radius, colours.repair)
+        elif name == "dead":
+            half = 0.75 * radius
+            self.line((x - half, y - half, x + half, y + half), 0.4 * radius, colours.repair)
+            self.line((x - half, y + half, x + half, y - half), 0.4 * radius, colours.repair)
+        elif name == "object":
+            self.square(x, y, 1.2 * radius, colours.object)
+        elif name == "obstacle":
+            self.box(box, colours.wall)
+        elif name == "source":
+            self.box(box, colours.source, 4 * SOURCE_OPACITY)
+        else:
+            colour, opacity = (colours.nest, NEST_OPACITY) if name == "nest" else (colours.cache, CACHE_OPACITY)
+            self.box(box, colour, opacity)
+            self.frame(box, line, colour)
 
 
 @lru_cache(maxsize=4)
-def _canvases(scenario: ScenarioConfig, size_px: int, theme: str) -> Canvases:
-    """Canvases that show all parts that never change during a run; these are painted once."""
-    view = arena_view(scenario, size_px, theme)
-    arena = scenario.arena
-    canvas = Canvas(plain(view.height, view.width, view.palette.page))
-    left, top, right, bottom = view.box((-WALL_M, -WALL_M, arena.width_m + WALL_M, arena.height_m + WALL_M))
-    paint_box(canvas, (left, top, right, bottom), view.palette.wall)
-    inner = view.box(arena.interior_m)
-    line = 2.0 * view.unit  # walls of huge arenas would vanish
-    paint_box(
-        canvas,
-        (
-            max(inner[0], left + line),
-            max(inner[1], top + line),
-            min(inner[2], right - line),
-            min(inner[3], bottom - line),
-        ),
-        view.palette.floor,
-    )
+def _ground(scenario: ScenarioConfig, size_px: int, theme: str) -> "Image.Image":
+    """Return what never changes during a run, at `DETAIL` times the size."""
+    from PIL import Image
+
+    view, arena = arena_view(scenario, size_px, theme), scenario.arena
+    colours = view.palette
+    image = Image.new("RGB", (DETAIL * view.width, DETAIL * view.height), colours.page)
+    pen = _Pen(image, colours)
+    outer = view.box((-WALL_M, -WALL_M, arena.width_m + WALL_M, arena.height_m + WALL_M))
+    inner, line = view.box(arena.interior_m), 2.0 * view.unit  # walls of huge arenas would vanish
+    pen.box(outer, colours.wall)
+    lows = max(inner[0], outer[0] + line), max(inner[1], outer[1] + line)
+    pen.box((*lows, min(inner[2], outer[2] - line), min(inner[3], outer[3] - line)), colours.floor)
     if scenario.objects.placement != "power_law":  # its clusters are drawn anew in each run
-        for cells in scenario.source_cells:
-            x_low, y_low, x_high, y_high = (CELL_M * cell for cell in cells)
-            paint_box(canvas, view.box((x_low, y_low, x_high, y_high)), view.palette.source, SOURCE_OPACITY)
+        for left, low, right, high in scenario.source_cells:
+            box = view.box((CELL_M * left, CELL_M * low, CELL_M * right, CELL_M * high))
+            pen.box(box, colours.source, SOURCE_OPACITY)
     for nest in map(view.box, arena.nest_boxes_m):
-        paint_box(canvas, nest, view.palette.floor)  # a source may reach under a nest
-        paint_box(canvas, nest, view.palette.nest, NEST_OPACITY)
-        paint_frame(canvas, nest, max(1.0, 1.5 * view.unit), view.palette.nest)
+        pen.box(nest, colours.floor)  # a source may reach under a nest
+        pen.box(nest, colours.nest, NEST_OPACITY)
+        pen.frame(nest, max(1.0, 1.5 * view.unit), colours.nest)
     for box in arena.obstacles:
-        paint_box(canvas, view.box(box), view.palette.wall)
-    lights = view.pixels(np.asarray(arena.lights_m)[:, :2])
-    paint_glows(canvas, lights, 26.0 * view.unit, view.palette.light, 0.5)
-    paint_discs(canvas, lights, max(1.5, 3.0 * view.unit), view.palette.light)
-    return Canvases(_draw_legend(canvas, view, scenario))
+        pen.box(view.box(box), colours.wall)
+    for x, y in view.pixels(np.asarray(arena.lights_m)[:, :2]).tolist():
+        for ring in range(12):
+            pen.disc(x, y, 22.0 * view.unit * (12 - ring) / 12, colours.light, 0.03)
+        pen.disc(x, y, max(1.5, 3.0 * view.unit), colours.light)
+    _draw_legend(pen, view, scenario)
+    return image
 
 
-def _draw_trails(canvas: Canvas, view: View, trails: Trails, n_robots: int) -> None:
-    position, carrying = trails.position, trails.carrying
-    n_samples = len(position)
-    if position.shape[1] != n_robots:
-        raise RenderError(f"Expected trails of {n_robots} robots, got {position.shape[1]}; make new ones per world.")
-    start, step = position[:-1], np.diff(position, axis=0)
-    known = np.isfinite(step).all(axis=2)
-    if not known.any():
-        return
-    longest_px = view.scale * float(np.abs(step[known]).max())
-    n_dots = int(np.clip(np.ceil(longest_px / 1.5), 1, 16))
-    age = (np.arange(1, n_samples) / n_samples)[:, None]
-    fade = np.broadcast_to(0.55 * age**1.5, known.shape)
-    for loaded, colour in ((False, view.palette.empty), (True, view.palette.carrying)):
-        rows = known & (carrying[:-1] == loaded)
-        dots = [start[rows] + (k / n_dots) * step[rows] for k in range(n_dots)]
-        radius = max(0.4, 0.2 * view.robot_px)
-        paint_discs(canvas, view.pixels(np.concatenate(dots)), radius, colour, np.tile(fade[rows], n_dots))
-
-
-def _draw_caches(canvas: Canvas, view: View, scenario: ScenarioConfig, caches: CacheState) -> None:
-    for x, y in (caches.cell[caches.alive] + 0.5) * CELL_M:
-        half = scenario.cache_side_cells * CELL_M / 2
-        box = view.box((x - half, y - half, x + half, y + half))
-        paint_box(canvas, box, view.palette.cache, CACHE_OPACITY)
-        paint_frame(canvas, box, max(1.0, 1.5 * view.unit), view.palette.cache, 0.8)
-
-
-def _draw_robots(canvas: Canvas, view: View, swarm: SwarmState, events: StepEvents) -> None:
-    radius = view.robot_px
-    centre = view.pixels(swarm.position)
-    direction = np.stack((np.cos(swarm.heading), -np.sin(swarm.heading)), axis=1)
-    working = swarm.present & swarm.active
-    carrying = swarm.carried_object >= 0
-    interfering = working & events.interfering
-    paint_crosses(canvas, centre[swarm.dead], radius, 0.4 * radius, view.palette.repair)
-    paint_rings(canvas, centre[swarm.present & ~swarm.active], 0.8 * radius, 0.4 * radius, view.palette.repair)
-    for rows, colour in ((working & ~carrying, view.palette.empty), (working & carrying, view.palette.carrying)):
-        _draw_bodies(canvas, centre[rows], direction[rows], radius, colour, view.palette)
-    paint_squares(canvas, centre[swarm.present & carrying], 0.85 * radius, view.palette.object)
-    paint_rings(canvas, centre[interfering], 1.55 * radius + 0.5, max(1.0, 0.36 * radius), view.palette.interference)
-
-
-def _draw_bodies(
-    canvas: Canvas, centre: FloatArray, direction: FloatArray, radius: float, colour: Colour, palette: Palette
-) -> None:
-    """Discs of one colour; unless they are tiny, they get needles and rims that separate robots that touch."""
-    detailed = radius >= _SMALLEST_DETAILED_PX
-    if detailed:
-        paint_discs(canvas, centre, radius + max(0.5, 0.22 * radius), palette.floor)
-    paint_discs(canvas, centre, radius, colour)
-    if detailed:
-        paint_rings(canvas, centre, radius + 0.2, max(0.5, 0.14 * radius), palette.page)
-        paint_needles(canvas, centre, direction, 2.1 * radius, 0.4 * radius, colour)
-
-
-def _draw_legend(canvas: Canvas, view: View, scenario: ScenarioConfig) -> NDArray[np.uint8]:
-    """Paint the legend's symbols and write its text; returns the finished picture."""
-    from PIL import Image, ImageDraw
-
-    text_px = text_height(view.unit)
-    top = round(view.bottom + WALL_M * view.scale)
+def _draw_legend(pen: _Pen, view: View, scenario: ScenarioConfig) -> None:
+    text_px, colour = view.text_px, view.palette.faint_text
+    top = view.bottom + WALL_M * view.scale
     rows = legend_rows(scenario, view.width, view.scale)
-    for row in rows:
-        for name, x, y in row:
-            _draw_symbol(canvas, view.palette, name, x + 0.5 * text_px, top + y, 0.42 * text_px)
+    for name, x, y in (entry for row in rows for entry in row):
+        room = 0.42 * text_px
+        small = {"empty": 0.75, "carrying": 0.75, "in interference": 0.6}
+        pen.sign(name, x + 0.5 * text_px, top + y, small.get(name, 1.0) * room)
+        pen.text(x + 1.45 * text_px, top + y, name, colour, text_px, "lm")
     bar_m = scale_bar_m(scenario.arena.width_m)
     right, middle = view.width - text_px, top + rows[0][0][2]
     start = right - bar_m * view.scale
-    paint_box(canvas, (start, middle - 1, right, middle + 1), view.palette.faint_text)
+    pen.box((start, middle - 1, right, middle + 1), colour)
     for x in (start, right - 1.5):
-        paint_box(canvas, (x, middle - 4, x + 1.5, middle + 4), view.palette.faint_text)
-    picture = Image.fromarray(canvas.take_picture())
-    pen = ImageDraw.Draw(picture)
-    font = text_font(text_px)
-    for row in rows:
-        for name, x, y in row:
-            pen.text((x + 1.45 * text_px, top + y), name, fill=view.palette.faint_text, font=font, anchor="lm")
-    pen.text((start - 0.5 * text_px, middle), f"{bar_m} m", fill=view.palette.faint_text, font=font, anchor="rm")
-    return np.array(picture)
+        pen.box((x, middle - 4, x + 1.5, middle + 4), colour)
+    pen.text(start - 0.5 * text_px, middle, f"{bar_m} m", colour, text_px, "rm")
 
 
-def _draw_symbol(canvas: Canvas, palette: Palette, name: str, x: float, y: float, radius: float) -> None:
-    """Paint the legend's symbol for `name` in a box of half side `radius` around (x, y)."""
-    centre, ahead = np.array([[x, y]]), np.array([[1.0, 0.0]])
-    box = (x - radius, y - radius, x + radius, y + radius)
-    body = 0.75 * radius
-    if name in ("empty", "carrying"):
-        _draw_bodies(canvas, centre, ahead, body, palette.empty if name == "empty" else palette.carrying, palette)
-        if name == "carrying":
-            paint_squares(canvas, centre, 0.85 * body, palette.object)
-    elif name == "in interference":
-        paint_rings(canvas, centre, radius, max(1.0, 0.3 * radius), palette.interference)
-    elif name == "in repair":
-        paint_rings(canvas, centre, 0.8 * radius, 0.4 * radius, palette.repair)
-    elif name == "dead":
-        paint_crosses(canvas, centre, 0.8 * radius, 0.4 * radius, palette.repair)
-    elif name == "object":
-        paint_squares(canvas, centre, 1.2 * radius, palette.object)
-    elif name == "source":
-        paint_box(canvas, box, palette.source, 4 * SOURCE_OPACITY)
-    elif name == "nest":
-        paint_box(canvas, box, palette.nest, NEST_OPACITY)
-        paint_frame(canvas, box, 1.0, palette.nest)
-    elif name == "obstacle":
-        paint_box(canvas, box, palette.wall)
-    else:
-        paint_box(canvas, box, palette.cache, CACHE_OPACITY)
-        paint_frame(canvas, box, 1.0, palette.cache)
+def _draw_trails(image: "Image.Image", view: View, trails: Trails, n_robots: int) -> None:
+    from PIL import Image, ImageDraw
+
+    n_samples, n_known = trails.carrying.shape
+    if n_known != n_robots:
+        raise ConfigError(f"Expected trails of {n_robots} robots, got {n_known}; make new ones per world.")
+    ends = DETAIL * view.pixels(np.concatenate((trails.position[:-1], trails.position[1:]), axis=2).reshape(-1, 2))
+    ends = ends.reshape(n_samples - 1, n_robots, 4)
+    width = max(1, round(DETAIL * max(0.8, 0.4 * view.robot_px)))
+    for loaded, colour in ((False, view.palette.empty), (True, view.palette.carrying)):
+        share = Image.new("L", image.size)
+        pen = ImageDraw.Draw(share)
+        for sample in range(n_samples - 1):
+            strength = round(255 * _TRAIL_OPACITY * ((sample + 1) / n_samples) ** 1.5)
+            rows = np.isfinite(ends[sample]).all(axis=1) & (trails.carrying[sample] == loaded)
+            for piece in ends[sample, rows].tolist():
+                pen.line(piece, fill=strength, width=width)
+        image.paste(colour, mask=share)
+
+
+def _draw_robots(pen: _Pen, view: View, swarm: SwarmState, events: StepEvents) -> None:
+    working, carrying = swarm.present & swarm.active, swarm.carried_object >= 0
+    shown = {
+        "dead": swarm.dead,
+        "in repair": swarm.present & ~swarm.active,
+        "empty": working & ~carrying,
+        "carrying": working & carrying,
+        "in interference": working & events.interfering,
+    }
+    places: list[tuple[float, float]] = [*map(tuple, view.pixels(swarm.position).tolist())]
+    heading: list[float] = swarm.heading.tolist()
+    for name, rows in shown.items():
+        for robot in np.flatnonzero(rows).tolist():
+            pen.sign(name, *places[robot], view.robot_px, heading=heading[robot])
+    for robot in np.flatnonzero(shown["in repair"] & carrying).tolist():
+        pen.square(*places[robot], 0.85 * view.robot_px, view.palette.object)
 
 
 def _write_header(
-    picture: NDArray[np.uint8],
+    pen: _Pen,
     view: View,
     scenario: ScenarioConfig,
     swarm: SwarmState,
@@ -292,65 +296,33 @@ def _write_header(
     title: str | None,
 ) -> None:
     """Write headline, clock and figures above the arena."""
-    from PIL import Image, ImageDraw
-
-    top = view.bottom - (scenario.arena.height_m + WALL_M) * view.scale
-    header = picture[: int(top)]
-    written = Image.fromarray(header)  # a copy, so it is of no more than the rows that have text in them
-    pen = ImageDraw.Draw(written)
-    margin = text_height(view.unit)
-    arena, count = scenario.arena, events.counters
+    arena, count, margin = scenario.arena, events.counters, view.text_px
     headline = title or f"{scenario.name.replace('_', ' ')}, {arena.width_m:g} x {arena.height_m:g} m"
-    seconds = tick * scenario.dt_s
-    n_active = int(np.count_nonzero(swarm.active & swarm.present))
-    n_carrying = int(np.count_nonzero(swarm.present & (swarm.carried_object >= 0)))
-    n_interfering = int(np.count_nonzero(events.interfering & swarm.active))
+    clock = f"{tick * scenario.dt_s:,.0f} s"
+    carrying = swarm.present & (swarm.carried_object >= 0)
     done = f"{count[Counter.COLLECTED]:,} delivered    {count[Counter.FIRST_PICKED]:,} first pick-ups"
-    now = f"{n_active:,} robots    {n_carrying:,} carrying    {n_interfering:,} in interference"
+    now = (
+        f"{np.count_nonzero(swarm.active & swarm.present):,} robots    {np.count_nonzero(carrying):,} carrying    "
+        f"{np.count_nonzero(events.interfering & swarm.active):,} in interference"
+    )
     room = view.width - 2 * margin
-    _write_line(pen, 0.33 * top, headline, f"{seconds:,.0f} s", 1.35 * margin, margin, room, view.palette.text)
-    _write_line(pen, 0.72 * top, done, now, margin, margin, room, view.palette.faint_text)
-    header[:] = np.asarray(written)
+    lines, size = [headline], 1.35 * margin
+    beside = room - text_width(clock, size) - size
+    if text_width(headline, size) > beside:
+        size = 1.1 * margin
+        lines = textwrap.wrap(headline, max(1, int(len(headline) * beside / text_width(headline, size))))
+        size = min(_fitting(max(lines, key=len), size, beside), 0.5 * view.header / len(lines))
+    for k, line in enumerate(lines):
+        y = 0.33 * view.header + (k - (len(lines) - 1) / 2) * 1.2 * size
+        pen.text(margin, y, line, view.palette.text, size, "lm")
+    pen.text(margin + room, 0.33 * view.header, clock, view.palette.text, size, "rm")
+    size = _fitting(f"{done}    {now}", margin, room)
+    pen.text(margin, 0.75 * view.header, done, view.palette.faint_text, size, "lm")
+    pen.text(margin + room, 0.75 * view.header, now, view.palette.faint_text, size, "rm")
 
 
-def _write_counts(picture: NDArray[np.uint8], view: View, caches: CacheState) -> None:
-    """Write into each cache how many objects it has."""
-    from PIL import Image, ImageDraw
-
-    font, line_px = text_font(1.5 * text_height(view.unit)), 2
-    for (x, y), n_objects in zip(caches.cell[caches.alive], caches.count[caches.alive], strict=True):
-        column, row = view.pixels(((x + 0.5) * CELL_M, (y + 0.5) * CELL_M)).tolist()
-        text = str(n_objects)
-        wide, high = int(font.getlength(text) / 2) + 2 * line_px, int(font.size) + 2 * line_px
-        left, top = max(0, int(column) - wide), max(0, int(row) - high)
-        place = picture[top : int(row) + high, left : int(column) + wide]
-        written = Image.fromarray(place)
-        ImageDraw.Draw(written).text(
-            (column - left, row - top),
-            text,
-            fill=view.palette.text,
-            font=font,
-            anchor="mm",
-            stroke_width=line_px,
-            stroke_fill=view.palette.floor,
-        )
-        place[:] = np.asarray(written)
-
-
-def _write_line(
-    pen: "ImageDraw.ImageDraw",
-    y: float,
-    left: str,
-    right: str,
-    text_px: float,
-    margin: float,
-    room: float,
-    colour: Colour,
-) -> None:
-    """Write one line with a left and a right part, smaller if the two would not fit into `room` pixels."""
-    font = text_font(text_px)
-    while font.getlength(left) + font.getlength(right) + 1.5 * text_px > room and text_px > _SMALLEST_TEXT_PX:
+def _fitting(words: str, text_px: float, room: float) -> float:
+    """Return a height, at most `text_px`, in which a line fits into `room` pixels."""
+    while text_width(words, text_px) > room and text_px > _SMALLEST_TEXT_PX:
         text_px -= 1.0
-        font = text_font(text_px)
-    pen.text((margin, y), left, fill=colour, font=font, anchor="lm")
-    pen.text((margin + room, y), right, fill=colour, font=font, anchor="rm")
+    return text_px

@@ -14,36 +14,25 @@ from importlib import resources
 from string import Template
 from typing import Any
 
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import parse_json
 
-SCRIPTS = (
+SHARED_SCRIPTS = (
     "theme.js",
-    "fflate.js",
-    "decode.js",
     "events.js",
     "run.js",
-    "player.js",
     "view.js",
     "draw.js",
     "panels.js",
     "curves.js",
     "inspect.js",
     "legend.js",
-    "controls.js",
-    "main.js",
 )
-"""Parts of the script in the order in which they are put together; later ones use earlier ones."""
-_OF_REPLAYS = ("fflate.js", "decode.js", "player.js", "controls.js", "main.js")
-SHARED_SCRIPTS = tuple(script for script in SCRIPTS if script not in _OF_REPLAYS)
-"""Those that the page to play with has, too."""
+"""Parts of both scripts in the order in which they are put together; later ones use earlier ones."""
+REPLAY_SCRIPTS = ("decode.js", "player.js", "controls.js", "main.js")
 PLAY_SCRIPTS = ("link.js", "swarm.js", "walls.js", "cards.js", "buttons.js", "play.js")
-"""Its own, which come after them."""
 _HEADER = re.compile(r'<script type="application/json" id="header">(.*?)</script>', re.DOTALL)
 _DATA = re.compile(r'<script type="text/plain" class="run">(.*?)</script>', re.DOTALL)
-
-
-class PageError(ValueError):
-    """A text that is no replay page, or a damaged one."""
 
 
 def build_replay_page(title: str, header: dict[str, Any], blocks: list[bytes]) -> str:
@@ -59,43 +48,37 @@ def build_replay_page(title: str, header: dict[str, Any], blocks: list[bytes]) -
     )
     # "<" within JSON would end the script element early if "/script>" followed.
     written = json.dumps(header, allow_nan=False).replace("<", "\\u003c")
-    return Template(_part("replay_page", "index.html")).substitute(
-        title=html.escape(title),
-        style=_part("replay_page", "replay.css"),
-        script="\n".join(_part("replay_page", name) for name in SCRIPTS),
-        header=written,
-        data=data,
-    )
+    return _page("replay_page", ("replay.css",), REPLAY_SCRIPTS, title=html.escape(title), header=written, data=data)
 
 
 def take_replay_page_apart(text: str) -> tuple[dict[str, Any], list[bytes]]:
     """Return header and blocks of a page, as they were given to `build_replay_page`.
 
     Raises:
-        PageError: there is no header, or header or blocks cannot be read.
+        ConfigError: there is no header.
+        ValueError: the header or a block is damaged.
     """
     found = _HEADER.search(text)
     if found is None or not text.rstrip().endswith("</html>"):
-        raise PageError("it is no replay page or cut short")
-    try:
-        header = parse_json(found[1])
-        blocks = [base64.b64decode(block, validate=True) for block in _DATA.findall(text)]
-    except ValueError as error:
-        raise PageError(f"its content is damaged ({error})") from error
-    if not isinstance(header, dict):
-        raise PageError("its header is no JSON object")
-    return header, blocks
+        raise ConfigError("it is no replay page or cut short")
+    return parse_json(found[1]), [base64.b64decode(block, validate=True) for block in _DATA.findall(text)]
 
 
 def build_play_page() -> str:
     """Return the page to play with as text; it gets all else from the server that sends it."""
-    shared = [_part("replay_page", name) for name in SHARED_SCRIPTS]
-    own = [_part("play_page", name) for name in PLAY_SCRIPTS]
-    return Template(_part("play_page", "index.html")).substitute(
-        style=_part("replay_page", "replay.css") + _part("play_page", "play.css"), script="\n".join([*shared, *own])
+    return _page("play_page", ("replay.css", "play.css"), PLAY_SCRIPTS)
+
+
+def _page(folder: str, styles: tuple[str, ...], scripts: tuple[str, ...], **parts: str) -> str:
+    return Template(_part(f"{folder}/index.html")).substitute(
+        style="".join(_part(f"{name.removesuffix('.css')}_page/{name}") for name in styles),
+        script="\n".join(
+            [_part(f"replay_page/{name}") for name in SHARED_SCRIPTS] + [_part(f"{folder}/{name}") for name in scripts]
+        ),
+        **parts,
     )
 
 
 @cache
-def _part(folder: str, name: str) -> str:
-    return resources.files("swarm_forage_env.rendering").joinpath(folder, name).read_text(encoding="utf-8")
+def _part(file: str) -> str:
+    return resources.files("swarm_forage_env.rendering").joinpath(file).read_text(encoding="utf-8")

@@ -1,10 +1,10 @@
-"""Pictures of runs, trainings, maps and networks. They need matplotlib (the optional extra "plots")."""
+"""Pictures of runs and trainings. They need matplotlib (the optional extra "plots")."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import cycle, repeat
 from pathlib import Path
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,25 +13,16 @@ from swarm_forage_env.rendering.figures import (
     MARKERS,
     SCREEN,
     FigureStyle,
-    Panel,
     legend_below,
     looks,
-    policy_words,
     saved_figure,
     shade,
 )
 
-_OBSTACLE = {"facecolor": "white", "edgecolor": "black", "hatch": "////", "linewidth": 0.5}
-"""Hatched: neither a map nor a difference has that."""
-_NEST = {"facecolor": "none", "edgecolor": "black", "linestyle": "--", "linewidth": 0.8}
-_MAP_IN = 3.6
-"""Width of a map with its scale, inches."""
 _SMOOTHED = 5
 """Intervals of a running mean: deliveries come in bursts, which hide who delivers more (our choice)."""
 _MANY_INTERVALS = 20
 """With fewer, single ones are drawn alone."""
-_MOST_OF_FLOOR = 0.5
-"""What happens in a smaller part of the floor is shown without the rest (our choice)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,94 +149,3 @@ def draw_trainings(
         # Beside the axes: levels of others may lie anywhere in them. Not at the top, where headlines may be wide.
         shown_once = {label: handle for handle, label in zip(*upper.get_legend_handles_labels(), strict=True)}
         figure.legend([*shown_once.values()], [*shown_once], loc="outside right center")
-
-
-Box: TypeAlias = tuple[float, float, float, float]
-"""x low, y low, x high, y high, m."""
-
-
-class MapRow(NamedTuple):
-    """A map of a floor, or a difference of two, to draw."""
-
-    label: str
-    arrays: Mapping[str, FloatArray]
-    """Name of a quantity -> (ny, nx), row = y from below."""
-    is_difference: bool
-    size_m: tuple[float, float]
-    """Extent of the floor along x and y."""
-    obstacles_m: Sequence[Box] = ()
-    """They are hatched."""
-    nests_m: Sequence[Box] = ()
-    """They are outlined."""
-
-
-def draw_maps(
-    path: str | Path,
-    rows: Sequence[MapRow],
-    columns: Mapping[str, tuple[str, str]],
-) -> None:
-    """Draw maps of floors of the same proportions: a row of panels per map or difference, a column per quantity.
-
-    Colours of a quantity mean the same in all maps, and the same in all differences, where white is 0. Squares in which
-    nothing happened are white, and what happened in a small part of the floor only is shown there.
-
-    Args:
-        path: File to write; as in `saved_figure`, whose errors this has.
-        rows: One per map or difference.
-        columns: What is counted, and its unit, by name of the array; their order is that of the columns.
-    """
-    shape = rows[0].size_m[1] / rows[0].size_m[0]
-    size_in = _MAP_IN * len(columns), (0.75 * shape * _MAP_IN + 0.9) * len(rows)
-    with saved_figure(path, size_in) as figure:
-        panels = figure.subplots(len(rows), len(columns), squeeze=False)
-        for row, line in zip(rows, panels, strict=True):
-            alike = [one for one in rows if one.is_difference == row.is_difference]
-            for name, axes in zip(columns, line, strict=True):
-                top = _map_top([one.arrays[name] for one in alike])
-                image = _draw_map(axes, row, name, top)
-                x_low, y_low, x_high, y_high = _busy_part([one.arrays[name] for one in rows])
-                axes.set_xlim(x_low * row.size_m[0], x_high * row.size_m[0])
-                axes.set_ylim(y_low * row.size_m[1], y_high * row.size_m[1])
-                what, unit = columns[name]
-                axes.set_title(f"{policy_words(row.label)}\n{what}")
-                ends = "both" if row.is_difference else "max"
-                scale = figure.colorbar(image, ax=axes, extend=ends, shrink=min(1.0, 1.2 * shape))
-                scale.set_label(f"more {unit}" if row.is_difference else unit)
-
-
-def _draw_map(axes: Panel, row: MapRow, name: str, top: float) -> Any:
-    """Draw the squares of one map, and what stands on its floor; returns the image."""
-    low, colours = (-top, "RdBu_r") if row.is_difference else (0.0, "cividis_r")
-    squares = np.ma.masked_equal(row.arrays[name], 0.0)
-    extent = (0, row.size_m[0], 0, row.size_m[1])
-    image = axes.imshow(squares, origin="lower", extent=extent, vmin=low, vmax=top, cmap=colours)
-    for boxes, look in ((row.obstacles_m, _OBSTACLE), (row.nests_m, _NEST)):
-        for x_low, y_low, x_high, y_high in boxes:
-            axes.fill([x_low, x_high, x_high, x_low], [y_low, y_low, y_high, y_high], **look)
-    axes.set(xlabel="x [m]", ylabel="y [m]")
-    axes.grid(visible=False)
-    return image
-
-
-def _busy_part(arrays: Sequence[FloatArray]) -> Box:
-    """Return the part of the floor to show, in shares of it: all, or where something is if that is less than half.
-
-    It has the proportions of the floor, and one square around whatever is there.
-    """
-    ny, nx = arrays[0].shape
-    y, x = np.nonzero(np.any([array != 0.0 for array in arrays], axis=0))
-    if not len(x):
-        return 0.0, 0.0, 1.0, 1.0
-    lows = np.maximum([(x.min() - 1) / nx, (y.min() - 1) / ny], 0.0)
-    highs = np.minimum([(x.max() + 2) / nx, (y.max() + 2) / ny], 1.0)
-    side = float((highs - lows).max())
-    if side**2 >= _MOST_OF_FLOOR:
-        return 0.0, 0.0, 1.0, 1.0
-    x_low, y_low = np.clip(0.5 * (lows + highs - side), 0.0, 1.0 - side).tolist()
-    return x_low, y_low, x_low + side, y_low + side
-
-
-def _map_top(arrays: Sequence[FloatArray]) -> float:
-    """Return the end of the scale of maps: few squares hold most; the last percent would hide all others."""
-    values = np.abs(np.concatenate([array.ravel() for array in arrays]))
-    return float(np.quantile(values[values > 0], 0.99)) if values.any() else 1.0

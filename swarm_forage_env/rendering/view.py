@@ -1,51 +1,40 @@
 """How a picture is laid out: colours, fonts, and where the arena and the legend go.
 
-Design (our choice): robots, objects and caches are bright on a dark floor, or dark on a light one. The colours differ
-for readers with the common forms of colour blindness, too, and shape is a second sign (interference is a ring, repair a
-hollow disc).
+Robots, objects and caches are bright on a dark floor, or dark on a light one (our choice). The colours differ for
+readers with the common forms of colour blindness, and shape is a second sign: interference is a ring, repair a hollow
+disc.
 """
 
-from collections.abc import Generator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swarm_forage_env._internal.fields import ConfigError, as_whole, one_of
+from swarm_forage_env._internal.fields import whole, one_of
 from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.contract.types import FloatArray
-from swarm_forage_env.rendering.paint import Colour
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M, WALL_M
 
 if TYPE_CHECKING:
     from PIL import ImageFont
 
+Colour: TypeAlias = tuple[int, int, int]
+"""Red, green, blue in 0..255."""
+Box: TypeAlias = tuple[float, float, float, float]
+DETAIL = 2
+"""Pictures are drawn at so many times their size, and made smaller at the end: that smooths all edges."""
 MIN_SIZE_PX = 240
 MAX_SIZE_PX = 4000
 _REFERENCE_PX = 900.0
 """Picture width for which text and symbol sizes are given; other widths scale them."""
 
 
-class RenderError(ValueError):
-    """A picture or film that cannot be made as asked; the message says what was expected and what came."""
-
-
-@contextmanager
-def refusing() -> Generator[None]:
-    """Let the checks of `_internal.fields` raise RenderError."""
-    try:
-        yield
-    except ConfigError as error:
-        raise RenderError(str(error)) from error
-
-
 @dataclass(frozen=True, slots=True)
 class Palette:
-    """Colours of everything that is drawn."""
+    """Colours of everything that is drawn; the defaults are for a dark floor."""
 
     page: Colour = (13, 17, 23)
     floor: Colour = (24, 31, 42)
@@ -63,10 +52,8 @@ class Palette:
     faint_text: Colour = (150, 160, 176)
 
 
-PALETTE = Palette()
-"""Dark."""
 THEMES = {
-    "dark": PALETTE,
+    "dark": Palette(),
     "light": Palette(
         page=(238, 241, 245),
         floor=(251, 252, 253),
@@ -95,36 +82,40 @@ class View:
     """Where the arena lies in the picture: metres to pixels, y up to rows down."""
 
     width: int
+    """Of the whole picture, pixels."""
     height: int
-    """Size of the whole picture, pixels."""
     scale: float
     """Pixels per metre."""
     left: float
+    """Pixel column of the arena's origin."""
     bottom: float
-    """Pixel coordinates of the arena origin."""
+    """Pixel row of the arena's origin."""
+    header: int
+    """Height of the header, pixels."""
     robot_px: float
     """Radius that robots are drawn with."""
     object_px: float
     """Side that objects are drawn with."""
-    palette: Palette = PALETTE
-    """Colours of everything."""
+    palette: Palette
 
     @property
     def unit(self) -> float:
         """Size of text and symbols relative to a picture 900 pixels wide."""
         return self.width / _REFERENCE_PX
 
+    @property
+    def text_px(self) -> float:
+        """Height of ordinary text."""
+        return text_height(self.unit)
+
     def pixels(self, position_m: ArrayLike) -> FloatArray:
         """Return pixel coordinates (column, row), shape (..., 2), of arena positions (..., 2) in metres."""
-        position = np.asarray(position_m, np.float64)
-        return np.stack(
-            (self.left + self.scale * position[..., 0], self.bottom - self.scale * position[..., 1]), axis=-1
-        )
+        return np.asarray(position_m, np.float64) * (self.scale, -self.scale) + (self.left, self.bottom)
 
-    def box(self, box_m: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+    def box(self, box_m: Box) -> Box:
         """Return (left, top, right, bottom) in pixels of a rectangle (x low, y low, x high, y high) in metres."""
-        (left, bottom), (right, top) = self.pixels(((box_m[0], box_m[1]), (box_m[2], box_m[3])))
-        return (float(left), float(top), float(right), float(bottom))
+        (left, bottom), (right, top) = self.pixels(((box_m[0], box_m[1]), (box_m[2], box_m[3]))).tolist()
+        return left, top, right, bottom
 
 
 @lru_cache(maxsize=8)
@@ -132,21 +123,18 @@ def arena_view(scenario: ScenarioConfig, size_px: int = 900, theme: str = "dark"
     """Return where `render_frame` puts the arena in its picture.
 
     Raises:
-        RenderError: `size_px` is not a whole number in [240, 4000], or there is no such theme.
+        ConfigError: `size_px` is not a whole number in [240, 4000], or there is no such theme.
         ImportError: Pillow is not installed (the legend's height depends on its text).
     """
-    with refusing():
-        as_whole("size_px", size_px, at_least=MIN_SIZE_PX, at_most=MAX_SIZE_PX)
-        one_of("theme", theme, THEMES)
+    whole("size_px", size_px, at_least=MIN_SIZE_PX, at_most=MAX_SIZE_PX)
+    one_of("theme", theme, THEMES)
     arena = scenario.arena
     width_m, height_m = arena.width_m + 2 * WALL_M, arena.height_m + 2 * WALL_M
     scale = size_px / max(width_m, height_m)
     width = max(MIN_SIZE_PX, round(width_m * scale))
     unit = width / _REFERENCE_PX
-    header = round(max(40.0, 66.0 * unit))
-    floor_px = round(height_m * scale)
-    legend = legend_rows(scenario, width, scale)
-    footer = round(legend[-1][-1][2] + text_height(unit) * 1.2)
+    header, floor_px = round(max(40.0, 66.0 * unit)), round(height_m * scale)
+    footer = round(legend_rows(scenario, width, scale)[-1][-1][2] + text_height(unit) * 1.2)
     area_px = arena.width_m * arena.height_m * scale * scale
     robot_gap = (area_px / scenario.robots.n_robots) ** 0.5
     object_gap = (area_px / scenario.objects.n_objects) ** 0.5
@@ -158,6 +146,7 @@ def arena_view(scenario: ScenarioConfig, size_px: int = 900, theme: str = "dark"
         scale=scale,
         left=(width - width_m * scale) / 2 + WALL_M * scale,
         bottom=header + floor_px - WALL_M * scale,
+        header=header,
         robot_px=max(scenario.robots.radius_m * scale, min(4.6 * grow, max(least_px, 0.065 * robot_gap))),
         object_px=max(0.9 * CELL_M * scale, min(2.6 * grow, max(0.8, 0.35 * object_gap))),
         palette=THEMES[theme],
@@ -166,21 +155,31 @@ def arena_view(scenario: ScenarioConfig, size_px: int = 900, theme: str = "dark"
 
 def legend_rows(scenario: ScenarioConfig, width: int, scale: float) -> list[list[tuple[str, float, float]]]:
     """Flow the legend into rows of (name, x, y of the middle below the arena) that fit `width` pixels."""
-    names = ["empty", "carrying", "in interference", "in repair", "dead", "object"]
-    if scenario.objects.placement != "power_law":
-        names.append("source")
-    names.append("nest")
-    if scenario.arena.obstacles:
-        names.append("obstacle")
-    if scenario.caches != "none":
-        names.append("cache")
+    there = {
+        "source": scenario.objects.placement != "power_law",
+        "obstacle": bool(scenario.arena.obstacles),
+        "cache": scenario.caches != "none",
+    }
+    names = (
+        "empty",
+        "carrying",
+        "in interference",
+        "in repair",
+        "dead",
+        "object",
+        "source",
+        "nest",
+        "obstacle",
+        "cache",
+    )
     text_px = text_height(width / _REFERENCE_PX)
-    font = text_font(text_px)
     bar = scale_bar_m(scenario.arena.width_m) * scale + 3.5 * text_px
     rows: list[list[tuple[str, float, float]]] = [[]]
     x, y = text_px, 1.3 * text_px
     for name in names:
-        length = 1.45 * text_px + font.getlength(name)
+        if not there.get(name, True):
+            continue
+        length = 1.45 * text_px + text_width(name, text_px)
         if rows[-1] and x + length > width - text_px - (bar if len(rows) == 1 else 0.0):
             rows.append([])
             x, y = text_px, y + 1.6 * text_px
@@ -199,13 +198,18 @@ def text_height(unit: float) -> float:
     return max(9.0, 14.0 * unit)
 
 
+def text_width(words: str, text_px: float) -> float:
+    """Width of a text in pixels of the finished picture."""
+    return text_font(text_px).getlength(words) / DETAIL
+
+
 @lru_cache(maxsize=32)
 def text_font(text_px: float) -> "ImageFont.FreeTypeFont":
-    """The font that ships with Pillow: the same letters on every machine."""
+    """The font that ships with Pillow, the same letters on every machine, as large as it is drawn."""
     try:
         from PIL import ImageFont
     except ImportError as error:
         raise ImportError(
             f"Rendering needs Pillow, which is not installed; run {install_command('render')}."
         ) from error
-    return ImageFont.load_default(round(text_px))  # type: ignore[return-value] - no bitmap font with a size
+    return ImageFont.load_default(round(DETAIL * text_px))  # type: ignore[return-value] - no bitmap font with a size

@@ -7,11 +7,12 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import ObjectStatus
-from swarm_forage_env.inspect.maps import MEANINGS, floor_maps
+from swarm_forage_env.inspect.maps import MEANINGS, FloorMaps, draw_maps, floor_maps
 from swarm_forage_env.inspect.replay.frames import Replay, Status
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.world import World
+from tests.support.pictures import keep_figures
 
 WORLD = scenario("warehouse_small", n_robots=2, n_objects=1, horizon_s=200.0)
 
@@ -65,7 +66,7 @@ def test_objects_count_where_they_lay_and_where_they_were_dropped(replay):
     per_event = 1000.0 / 150.0 / 0.16
     assert arrays["pickups"][13, 25] == pytest.approx(per_event), "the middle of cell (51, 26)"
     assert arrays["drops"][12, 25] == pytest.approx(per_event), "where the robot was"
-    assert arrays["pickups"].sum() == arrays["drops"].sum() == pytest.approx(per_event)
+    assert [arrays[name].sum() for name in ("pickups", "drops")] == pytest.approx([per_event] * 2)
     assert arrays.keys() == MEANINGS.keys()
 
 
@@ -91,3 +92,37 @@ def test_arrays_go_to_a_file(replay, tmp_path):
     with np.load(tmp_path / "maps.npz") as stored:
         assert {*stored} == {*MEANINGS, "side_m", "size_m", "n_robots"}
         assert np.array_equal(stored["density"], maps.arrays["density"])
+
+
+def images_of(monkeypatch, *maps: FloorMaps):
+    """Draw maps, and return the panels that show them."""
+    pytest.importorskip("matplotlib")
+    drawn = keep_figures(monkeypatch)
+    draw_maps("unused.png", maps)
+    return [axes for axes in drawn[-1].axes if axes.get_images()]
+
+
+def test_maps_of_one_quantity_have_one_scale_and_differences_a_symmetric_one(monkeypatch):
+    few, many = (
+        FloorMaps(label=name, side_m=1.0, size_m=(2.0, 1.0), n_robots=1, arrays={"density": np.array([[0.0, value]])})
+        for name, value in (("few", 1.0), ("many", 10.0))
+    )
+    panels = images_of(monkeypatch, few, many, many.minus(few), few.minus(many))
+    scales = [axes.get_images()[0].get_clim() for axes in panels]
+    assert scales[0] == scales[1] == pytest.approx((0.0, 10.0), rel=0.02)
+    assert scales[2] == scales[3] == pytest.approx((-9.0, 9.0), rel=0.02)
+
+
+def test_maps_show_where_something_is_and_outline_nests(monkeypatch):
+    crowd = np.zeros((10, 20))
+    crowd[2, 5] = 1.0
+    arrays = {"density": crowd, "drops": np.ones((10, 20))}
+    nests = ((2.0, 4.0, 6.0, 16.0),)
+    one = FloorMaps(label="few", side_m=2.0, size_m=(40.0, 20.0), n_robots=1, arrays=arrays, nests_m=nests)
+    part, whole = images_of(monkeypatch, one)
+    assert (whole.get_xlim(), whole.get_ylim()) == ((0.0, 40.0), (0.0, 20.0))
+    (x_low, x_high), (y_low, y_high) = part.get_xlim(), part.get_ylim()
+    assert x_low < 10.0 < 12.0 < x_high < 20.0
+    assert y_low < 4.0 < 6.0 < y_high < 10.0
+    assert (x_high - x_low) / (y_high - y_low) == pytest.approx(2.0)
+    assert [patch.get_linestyle() for patch in whole.patches] == ["--"]

@@ -9,54 +9,35 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.inspect.replay.coding import pack, unpack
-from swarm_forage_env.inspect.replay.frames import ReplayError
 
 
 @given(
-    st.sampled_from(["u1", "u2", "i4"]).flatmap(
+    st.sampled_from(["u1", "u2", "i4", "f4"]).flatmap(
         lambda dtype: arrays.arrays(dtype, arrays.array_shapes(min_dims=1, max_dims=3, min_side=0, max_side=5))
     )
 )
-def test_whole_numbers_come_back(array):
-    kind = f"{array.dtype.kind}{array.dtype.itemsize}"
-    again = unpack(pack(array), kind, array.shape)
+def test_arrays_come_back(array):
+    again = unpack(pack(array), f"{array.dtype.kind}{array.dtype.itemsize}", array.shape)
     assert again.dtype == array.dtype
-    assert np.array_equal(again, array)
+    assert np.array_equal(again, array, equal_nan=array.dtype.kind == "f")
 
 
-def test_floats_come_back():
-    array = np.array([0.1, -2.5, 3e8], np.float32)
-    assert np.array_equal(unpack(pack(array), "f4", (3,)), array)
-
-
-@pytest.mark.parametrize(
-    ("dtype", "shape", "expected"),
-    [
-        ("f8", (3,), "types u1, u2, i4, f4"),
-        ("u1", (4,), "Expected 4 bytes"),
-        ("u2", (3,), "Expected 6 bytes"),
-        ("u1", (2,), "Expected 2 bytes .* got more"),
-    ],
-)
-def test_arrays_of_another_kind_are_refused(dtype, shape, expected):
-    with pytest.raises(ReplayError, match=expected):
+@pytest.mark.parametrize(("dtype", "shape"), [("u1", (4,)), ("u2", (3,)), ("u1", (2,))])
+def test_arrays_of_another_size_are_refused(dtype, shape):
+    with pytest.raises(ConfigError, match=r"Expected \d bytes for an array of shape"):
         unpack(pack(np.zeros(3, np.uint8)), dtype, shape)
 
 
-def test_no_more_is_unpacked_than_the_shape_says():
-    bomb = zlib.compress(bytes(10_000_000), 9)
-    assert len(bomb) < 10_000
-    tracemalloc.start()
-    with pytest.raises(ReplayError, match=r"Expected 3 bytes .* got more"):
-        unpack(bomb, "u1", (3,))
-    _, most = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert most < 1_000_000
-
-
-def test_bytes_that_are_cut_short_are_refused():
+def test_damaged_bytes_are_refused_and_no_more_is_unpacked_than_the_shape_says():
     packed = pack(np.arange(50, dtype=np.uint8))
-    for end in (-1, 8):
-        with pytest.raises(ReplayError, match="cut short"):
-            unpack(packed[:end], "u1", (50,))
+    for bad in (packed[:-1], packed[:8], packed[:-4] + b"xxxx"):
+        with pytest.raises(ConfigError, match="Expected"):
+            unpack(bad, "u1", (50,))
+    bomb = zlib.compress(bytes(10_000_000), 9)
+    tracemalloc.start()
+    with pytest.raises(ConfigError, match="Expected 3 bytes"):
+        unpack(bomb, "u1", (3,))
+    assert tracemalloc.get_traced_memory()[1] < 1_000_000
+    tracemalloc.stop()

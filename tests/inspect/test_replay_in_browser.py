@@ -42,7 +42,7 @@ PHONE = {"width": 390, "height": 844, "touch": True}
 def replays(tmp_path_factory):
     chromium()  # skips before anything is run
     specs = [plan_run(WORLD, name, wrappers=DISTURBED, seed=0) for name in ("stochm", "crw")]
-    return [record_replay(spec)[0] for spec in specs]
+    return [record_replay(spec) for spec in specs]
 
 
 @pytest.fixture(scope="module")

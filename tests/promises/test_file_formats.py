@@ -9,7 +9,6 @@ import pytest
 from metrics.benchmark import BenchmarkError, load_protocol, read_entry
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.inspect.replay.files import FORMAT_VERSION, read_replays
-from swarm_forage_env.inspect.replay.frames import ReplayError
 from swarm_forage_env.policies.network import Network, NetworkError
 from swarm_forage_env.runs.record import RecordError
 from swarm_forage_env.runs.store import read_failure
@@ -25,7 +24,7 @@ def test_a_replay_of_another_version_is_refused(tmp_path):
     told = f'"version": {FORMAT_VERSION},'
     assert page.count(told) == 1
     (tmp_path / "a.html").write_text(page.replace(told, '"version": 99,'), encoding="utf-8")
-    with pytest.raises(ReplayError, match=f"version 99 of the format, this version .* reads {FORMAT_VERSION}; "):
+    with pytest.raises(ConfigError, match=f"version 99 of the format, this version .* reads {FORMAT_VERSION}; "):
         read_replays(tmp_path / "a.html")
 
 

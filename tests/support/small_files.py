@@ -47,7 +47,7 @@ def _packed(file: Path) -> None:
 
 
 def _replay(file: Path) -> None:
-    write_replays(file, record_replay(SPEC, frame_s=1.0)[0])
+    write_replays(file, record_replay(SPEC, frame_s=1.0))
 
 
 def _dataset(folder: Path) -> None:

@@ -5,9 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from swarm_forage_env._internal.fields import ConfigError, number
-from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
-from swarm_forage_env.wrappers.handling import IDEAL_COST, HandlingCostConfig
 from swarm_forage_env.wrappers.noise import ActuatorNoise, ActuatorNoiseConfig, SensorNoise, SensorNoiseConfig
 from swarm_forage_env.wrappers.population import PopulationConfig, PopulationDynamics
 from swarm_forage_env.wrappers.throttle import Throttle, ThrottleConfig
@@ -20,8 +18,6 @@ _IDLE: tuple[WrapperConfig, ...] = (
     ActuatorNoiseConfig(sigma=0.0),
 )
 """One of each kind, which changes nothing until somebody raises its level."""
-STILL = {ThrottleConfig.name: 0.0, HandlingCostConfig.name: IDEAL_COST}
-"""Wrapper with a waveform -> what this is while it changes nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +25,7 @@ class LevelKind:
     """A level that can be changed, from 0 on; the page has a slider for it."""
 
     title: str
-    """For people."""
+    """For people, with its unit."""
     wrapper: type[SwarmWrapper]
     field: str
     """Of the wrapper's configuration: a number or a `Waveform`, whose amplitude is the level."""
@@ -41,16 +37,22 @@ class LevelKind:
 
 
 LEVELS = {
-    "sensor_noise": LevelKind("sensor noise", SensorNoise, "sigma", 0.1, 0.005),
-    "wheel_noise": LevelKind("wheel noise", ActuatorNoise, "sigma", 0.5, 0.01),
-    "throttle": LevelKind("throttle", Throttle, "waveform", 0.9, 0.05),
+    "sensor_noise": LevelKind("sensor noise (sigma, of a range of 1)", SensorNoise, "sigma", 0.1, 0.005),
+    "wheel_noise": LevelKind("wheel noise (sigma, of full speed)", ActuatorNoise, "sigma", 0.5, 0.01),
+    "throttle": LevelKind("throttle (share of speed that is lost)", Throttle, "waveform", 0.9, 0.05),
     "failures": LevelKind("failures per 1,000 s", PopulationDynamics, "malfunction_per_tick", 20.0, 0.5, True),
     "repairs": LevelKind("repairs per 1,000 s", PopulationDynamics, "repair_per_tick", 20.0, 0.5, True),
     "deaths": LevelKind("deaths per 1,000 s", PopulationDynamics, "death_per_tick", 20.0, 0.5, True),
 }
 """Name in commands -> level. Where sliders end is our choice: by then, every policy of ours has lost most of its
 deliveries."""
-MOST_CHANGES = 20
+_DEEDS = {
+    "kill": (PopulationDynamics.kill, "is not alive", "was killed", "killed"),
+    "break": (PopulationDynamics.break_down, "is not at work", "broke down and waits for repair", "broken"),
+    "repair": (PopulationDynamics.repair, "is not in repair", "is at work again", "repaired"),
+}
+"""What can be done to a robot -> how, what is told where it cannot be and where it was, and the change."""
+_MOST_CHANGES = 20
 """Changes that are told in one line; our choice: more than anybody reads."""
 
 
@@ -67,31 +69,27 @@ class Levels:
         changes: What was changed by hand, in words, the latest last; empty for a run as planned.
     """
 
-    def __init__(self, stack: ForageEnv | SwarmWrapper) -> None:
+    def __init__(self, stack: Any) -> None:
         """Find the wrappers of a stack."""
-        self._wrappers: dict[type, Any] = {}
-        while isinstance(stack, SwarmWrapper):
-            self._wrappers[type(stack)] = stack
-            stack = stack.env  # type: ignore[assignment] - PettingZoo types it as any parallel environment
+        self._wrappers: dict[type, Any] = {type(one): one for one in stack.stack}
         self.changes: list[str] = []
-        self._dt_s = stack.unwrapped.scenario.dt_s
-        self._per_1000_s = 1000.0 / self._dt_s
-
-    @property
-    def latest_changes(self) -> list[str]:
-        """The last changes, as many as are told."""
-        return self.changes[-MOST_CHANGES:]
+        self._per_1000_s = 1000.0 / stack.unwrapped.scenario.dt_s
 
     @property
     def changes_in_words(self) -> str:
         """The last changes, and how many there were before them; empty where nothing was changed."""
-        n_before = len(self.changes) - len(self.latest_changes)
-        return ", ".join([*([f"{n_before} more before"] if n_before else []), *self.latest_changes])
+        n_before = max(0, len(self.changes) - _MOST_CHANGES)
+        return ", ".join([*([f"{n_before} more before"] if n_before else []), *self.changes[n_before:]])
+
+    @property
+    def all_configs(self) -> tuple[WrapperConfig, ...]:
+        """The wrappers as they are now."""
+        return tuple(one.made_from for one in self._wrappers.values())
 
     @property
     def configs(self) -> tuple[WrapperConfig, ...]:
         """What disturbs the swarm now, as a run could have it from its start; without what changes nothing."""
-        return tuple(one.made_from for one in self._wrappers.values() if one.made_from not in _IDLE)
+        return tuple(config for config in self.all_configs if config not in _IDLE)
 
     def level(self, name: str) -> float | None:
         """Return the level now; None for a table of values, which has no amplitude."""
@@ -108,46 +106,24 @@ class Levels:
             ConfigError: the level cannot be that, or it follows a table; it stays what it was.
         """
         kind, wrapper = LEVELS[name], self._wrappers[LEVELS[name].wrapper]
-        number(kind.title, wanted, at_least=0.0)
+        title = kind.title.partition(" (")[0]
+        number(title, wanted, at_least=0.0)
         if self.level(name) is None:
-            raise ConfigError(f"Expected {kind.title} with an amplitude, got a table of values; it stays as it is.")
-        if wanted == self.level(name):
-            return f"{kind.title} is {wanted:g}"
-        value = getattr(wrapper.made_from, kind.field)
-        changed = wanted / self._per_1000_s if kind.per_1000_s else wanted
-        if isinstance(value, Waveform):
-            changed = replace(value, amplitude=wanted)
-        wrapper.reconfigure(replace(wrapper.made_from, **{kind.field: changed}))
-        self._note(kind.title, f"{kind.title} {wanted:g}")
-        return f"{kind.title} is {wanted:g}"
+            raise ConfigError(f"Expected {title} with an amplitude, got a table of values; it stays as it is.")
+        if wanted != self.level(name):
+            value = getattr(wrapper.made_from, kind.field)
+            changed = wanted / self._per_1000_s if kind.per_1000_s else wanted
+            if isinstance(value, Waveform):
+                changed = replace(value, amplitude=wanted)
+            wrapper.reconfigure(replace(wrapper.made_from, **{kind.field: changed}))
+            self.changes = [old for old in self.changes if not old.startswith(f"{title} ")]
+            self.changes.append(f"{title} {wanted:g}")
+        return f"{title} is {wanted:g}"
 
-    def kill(self, robot: int) -> str:
-        """Let a robot die; returns one line about it."""
-        if not self._wrappers[PopulationDynamics].kill(robot):
-            return f"robot {robot} is not alive"
-        self._note("", f"robot {robot} killed")
-        return f"robot {robot} was killed"
-
-    def break_down(self, robot: int) -> str:
-        """Send a robot to repair; returns one line about it."""
-        if not self._wrappers[PopulationDynamics].break_down(robot):
-            return f"robot {robot} is not at work"
-        self._note("", f"robot {robot} broken")
-        return f"robot {robot} broke down and waits for repair"
-
-    def repair(self, robot: int) -> str:
-        """Let a robot come back from repair; returns one line about it."""
-        if not self._wrappers[PopulationDynamics].repair(robot):
-            return f"robot {robot} is not in repair"
-        self._note("", f"robot {robot} repaired")
-        return f"robot {robot} is at work again"
-
-    def signals(self, tick: int) -> dict[str, float]:
-        """Return what the waveforms of time are at a tick, by name of the wrapper; see `Replay.signals`."""
-        waves = [one.made_from for one in self._wrappers.values() if one.made_from.name in STILL]
-        return {one.name: one.waveform.signal(self._dt_s)(tick) for one in waves}
-
-    def _note(self, same: str, change: str) -> None:
-        """Keep a change; a later one of the same level replaces the earlier."""
-        self.changes = [old for old in self.changes if not (same and old.startswith(f"{same} "))]
-        self.changes.append(change)
+    def treat(self, deed: str, robot: int) -> str:
+        """Kill, break or repair a robot; returns one line about it."""
+        act, refusal, done, change = _DEEDS[deed]
+        if not act(self._wrappers[PopulationDynamics], robot):
+            return f"robot {robot} {refusal}"
+        self.changes.append(f"robot {robot} {change}")
+        return f"robot {robot} {done}"

@@ -14,6 +14,7 @@ What is refused is answered with a table of "error", one line for people.
 
 import json
 import secrets
+import sys
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
@@ -24,7 +25,6 @@ from swarm_forage_env.rendering.pages import build_play_page
 HOST = "127.0.0.1"
 MOST_BYTES = 10_000
 """Longest body of a request; our choice: a hundred times the longest command."""
-HTTP_PORT = 80
 SILENCE_S = 60.0
 """A connection on which nothing comes for so long is closed."""
 _HEADERS = {
@@ -34,7 +34,6 @@ _HEADERS = {
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
 }
-_HTML, _JSON = "text/html; charset=utf-8", "application/json"
 
 
 class PlayServer(ThreadingHTTPServer):
@@ -43,6 +42,7 @@ class PlayServer(ThreadingHTTPServer):
     Attributes:
         session: What is looked at and steered.
         token: What every address begins with.
+        hosts: What a browser names as the host of the page.
         address: Where the page is.
     """
 
@@ -61,15 +61,14 @@ class PlayServer(ThreadingHTTPServer):
         super().__init__((HOST, port), _Handler)
         self.session = session
         self.token = secrets.token_urlsafe(16)
-        self.hosts = hosts_of(self.server_port)
+        suffix = "" if self.server_port == 80 else f":{self.server_port}"  # browsers leave that of HTTP out
+        self.hosts = (f"{HOST}{suffix}", f"localhost{suffix}")
         self.address = f"http://{self.hosts[0]}/{self.token}/"
 
-
-def hosts_of(port: int) -> tuple[str, ...]:
-    """Return what a browser names as the host of the page; it leaves the port out where it is that of HTTP."""
-    names = (HOST, "localhost")
-    with_port = tuple(f"{name}:{port}" for name in names)
-    return (*with_port, *names) if port == HTTP_PORT else with_port
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Keep quiet about a reader who has left; whatever else went wrong is told."""
+        if not isinstance(sys.exception(), ConnectionError | TimeoutError):
+            super().handle_error(request, client_address)
 
 
 class _Refused(Exception):  # noqa: N818 - it is an answer, no error of ours
@@ -91,31 +90,33 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """Send the page."""
-        if self.headers.get("Content-Length", "0") != "0" or "Transfer-Encoding" in self.headers:
-            self.close_connection = True  # nobody reads the body, which would be taken for the next request
-        self._answer(self._page)
+        self._answer()
 
     def do_POST(self) -> None:
         """Send a frame or a replay, or carry out a command."""
-        self._answer(self._post)
+        self._answer()
 
-    def _answer(self, make: Any) -> None:
+    def _answer(self) -> None:
         try:
-            self._send(*self._outcome(make))
+            self._send(*self._outcome())
         except (ConnectionError, TimeoutError):  # the reader has gone, maybe in the middle of the answer
             self.close_connection = True
 
-    def _outcome(self, make: Any) -> tuple[int, str, bytes]:
+    def _outcome(self) -> tuple[int, Any]:
+        """Return the status, and the page as text or the answer as a table."""
         try:
             self._check_sender()
-            return (200, *make())
+            place = self.path.removeprefix(f"/{self.server.token}/")
+            return 200, self._page(place) if self.command == "GET" else self._made(place, self._body())
         except _Refused as refused:
             self.close_connection = True  # its body may be still to come
-            return (refused.status, *_as_json({"error": str(refused)}))
+            return refused.status, {"error": str(refused)}
         except ValueError as error:  # what was asked for cannot be
-            return (400, *_as_json({"error": str(error)}))
+            return 400, {"error": str(error)}
+        except (ConnectionError, TimeoutError):
+            raise
         except Exception as error:  # noqa: BLE001 - a user's policy may raise anything, and the page tells of it
-            return (500, *_as_json({"error": f"{type(error).__name__}: {error}"}))
+            return 500, {"error": f"{type(error).__name__}: {error}"}
 
     def _check_sender(self) -> None:
         """Refuse whoever is not our page."""
@@ -128,24 +129,21 @@ class _Handler(BaseHTTPRequestHandler):
         if not secrets.compare_digest(token.encode(), self.server.token.encode()):
             raise _Refused(403, "Expected the address with its token, as the command shows it.")
 
-    @property
-    def _place(self) -> str:
-        return self.path.removeprefix(f"/{self.server.token}/")
-
-    def _page(self) -> tuple[str, bytes]:
-        if self._place != "":
+    def _page(self, place: str) -> str:
+        if self.headers.get("Content-Length", "0") != "0" or "Transfer-Encoding" in self.headers:
+            self.close_connection = True  # nobody reads the body, which would be taken for the next request
+        if place:
             raise _Refused(404, "There is no such page.")
-        return _HTML, build_play_page().encode()
+        return build_play_page()
 
-    def _post(self) -> tuple[str, bytes]:
-        body, session = self._body(), self.server.session
-        if self._place == "frame":
-            return _as_json(session.frame(parse_json(body)))
-        if self._place == "command":
-            return _as_json({"done": session.carry_out(parse_json(body))})
-        if self._place == "replay":
-            name, page = session.replay_page()
-            return _as_json({"name": name, "page": page})
+    def _made(self, place: str, body: str) -> dict[str, Any]:
+        session = self.server.session
+        if place == "frame":
+            return session.frame(parse_json(body))
+        if place == "command":
+            return {"done": session.carry_out(parse_json(body))}
+        if place == "replay":
+            return dict(zip(("name", "page"), session.replay_page(), strict=True))
         raise _Refused(404, "There is no such place.")
 
     def _body(self) -> str:
@@ -154,12 +152,11 @@ class _Handler(BaseHTTPRequestHandler):
             raise _Refused(411, "Expected the length of the body as a whole number.")
         if len(length) > len(str(MOST_BYTES)) or int(length) > MOST_BYTES:
             raise _Refused(413, f"Expected a body of at most {MOST_BYTES:,} bytes, got {length[:20]}.")
-        try:
-            return self.rfile.read(int(length)).decode("utf-8")
-        except TimeoutError as error:
-            raise _Refused(408, "Expected the whole body, got a part of it.") from error
+        return self.rfile.read(int(length)).decode("utf-8")
 
-    def _send(self, status: int, kind: str, body: bytes) -> None:
+    def _send(self, status: int, answer: Any) -> None:
+        kind = "text/html; charset=utf-8" if isinstance(answer, str) else "application/json"
+        body = (answer if isinstance(answer, str) else json.dumps(answer, allow_nan=False)).encode()
         self.send_response(status)
         for name, value in {**_HEADERS, "Content-Type": kind, "Content-Length": str(len(body))}.items():
             self.send_header(name, value)
@@ -170,7 +167,3 @@ class _Handler(BaseHTTPRequestHandler):
 
     def log_message(self, format: str, *args: Any) -> None:  # noqa: A002 - the name that http.server has
         """Keep quiet: what is asked for is nobody else's business."""
-
-
-def _as_json(values: Any) -> tuple[str, bytes]:
-    return _JSON, json.dumps(values, allow_nan=False).encode()

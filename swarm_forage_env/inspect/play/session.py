@@ -7,21 +7,21 @@ its first tick. So a run that nobody has touched since its start is the one that
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from threading import Lock
 from typing import Any
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError, known_name, number, table, whole
+from swarm_forage_env._internal.fields import ConfigError, known_keys, known_name, number, table, whole
 from swarm_forage_env._internal.files import as_file_name
-from swarm_forage_env._internal.typed import Count, typed
+from swarm_forage_env._internal.wording import shown
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.inspect.play.levels import LEVELS
 from swarm_forage_env.inspect.play.run import SPEEDS, RunByHand
 from swarm_forage_env.inspect.replay.capture import caches_now, objects_now, status_now
-from swarm_forage_env.inspect.replay.files import counted_performance, geometry, page_of, task_names
+from swarm_forage_env.inspect.replay.files import for_page, page_of
 from swarm_forage_env.policies.registry import POLICIES, policy_label
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -62,7 +62,6 @@ class PlaySession:
     Attributes:
         setting: What the run is made of.
         run: The run.
-        note: What the last command has done, for people.
     """
 
     def __init__(self, setting: Setting, *, clock: Callable[[], float] = time.monotonic) -> None:
@@ -78,20 +77,107 @@ class PlaySession:
         self._lock, self._clock = Lock(), clock
         self._policies = tuple(dict.fromkeys((*POLICIES, setting.policy)))
         self._serial = 0
-        self.note = ""
         self._begin(setting)
 
     def _begin(self, setting: Setting) -> None:
         """Start a run; if it cannot be, all stays as it is."""
-        spec = plan_run(setting.world, setting.policy, caches=setting.caches, seed=setting.seed)
-        run = RunByHand(spec)
+        run = RunByHand(plan_run(setting.world, setting.policy, caches=setting.caches, seed=setting.seed))
         if self._serial:
             run.speed, run.paused = self.run.speed, self.run.paused
         self.setting, self.run = setting, run
         self._serial += 1
         self._seen_s = self._clock()
 
-    # Frames
+    def carry_out(self, command: Any) -> str:
+        """Do what a command asks for; returns one line about it. A command that is refused changes nothing.
+
+        Args:
+            command: A table; "do" names the command, the rest are its arguments.
+
+        Raises:
+            ConfigError: no such table, command or arguments.
+            ValueError: a run that cannot be.
+        """
+        with self._lock:
+            run, arena = self.run, self.setting.world.scenario.arena
+            walls = arena.obstacles
+            match command:
+                case {"do": "play"}:
+                    run.paused, self._seen_s = False, self._clock()
+                case {"do": "pause"}:
+                    run.paused = True
+                case {"do": "step"}:
+                    run.paused = True
+                    run.step()
+                    return "one tick"
+                case {"do": "speed", "value": value}:
+                    number("speed", value, above=0.0, at_most=SPEEDS[-1])
+                    run.speed = float(value)
+                case {"do": "level", "name": name, "value": value}:
+                    known_name("level", name, LEVELS)
+                    return run.levels.set(name, value)
+                case {"do": "kill" | "break" | "repair" as deed, "robot": robot}:
+                    self._check_robot(robot)
+                    return run.levels.treat(deed, robot)
+                case {"do": "start", **changes}:
+                    return self._start_again(changes)
+                case {"do": "wall", "box": [float() | int(), float() | int(), float() | int(), float() | int()] as box}:
+                    return self._with_walls((*walls, wall_of(box, arena.width_m, arena.height_m)))
+                case {"do": "remove_wall", "index": index}:
+                    whole("the number of a wall", index, at_least=0, at_most=len(walls) - 1)
+                    return self._with_walls((*walls[:index], *walls[index + 1 :]))
+                case {"do": "remove_walls"}:
+                    return self._with_walls(())
+                case _:
+                    raise ConfigError(f"Expected a command of the page with its arguments, got {shown(command)}.")
+            return ""
+
+    def _start_again(self, changes: dict[str, Any]) -> str:
+        """Start a run, the same or another one, with the levels of now; a chosen scenario begins as its preset."""
+        known_keys(changes, ("scenario", "policy", "robots", "seed"))
+        now = self.setting
+        world = replace(now.world, wrappers=self.run.levels.configs)
+        policy, seed = changes.get("policy", now.policy), changes.get("seed", now.seed)
+        known_name("policy", policy, self._policies)
+        if "scenario" in changes:
+            known_name("scenario", changes["scenario"], PRESETS)
+            world = replace(world, scenario=scenario(changes["scenario"]), name="")
+        if "robots" in changes:
+            whole("robots", changes["robots"], at_least=1, at_most=most_robots(world.scenario))
+            world = replace(world, scenario=with_overrides(world.scenario, n_robots=changes["robots"]))
+        self._begin(replace(now, world=world, policy=policy, seed=seed))
+        return f"started again with seed {seed}"
+
+    def _with_walls(self, walls: tuple[Rectangle, ...]) -> str:
+        """Start the run again with other walls."""
+        world = self.setting.world
+        try:
+            here = with_overrides(world.scenario, obstacles=walls)
+        except ConfigError as error:
+            raise ConfigError(f"A wall cannot stand there. {error}") from error
+        self._begin(replace(self.setting, world=replace(world, scenario=here, wrappers=self.run.levels.configs)))
+        return f"started again with {len(walls)} wall{'' if len(walls) == 1 else 's'}"
+
+    def replay_page(self) -> tuple[str, str]:
+        """Return the name of a file and the replay page of the run so far.
+
+        Raises:
+            ConfigError: the run has not gone on for one frame.
+        """
+        with self._lock:
+            replay = self.run.replay()
+        name = f"{replay.spec.world.file_name}_{as_file_name(policy_label(self.setting.policy))}.html"
+        return name, page_of([replay])
+
+    def summary(self) -> str:
+        """Return one line about the run so far; it waits for `LONGEST_SUMMARY_S` at most."""
+        # Who compiles a new run keeps the lock for long; to read the old one without it breaks nothing.
+        is_ours = self._lock.acquire(timeout=LONGEST_SUMMARY_S)
+        try:
+            return self.run.summary()
+        finally:
+            if is_ours:
+                self._lock.release()
 
     def frame(self, asked: Any = None) -> dict[str, Any]:
         """Let the run go on for what is due, and return what is to be seen.
@@ -103,25 +189,28 @@ class PlaySession:
         Raises:
             ConfigError: no such table, or no such robot.
         """
-        words: _Asked = typed(_Asked, {} if asked is None else asked, "frame")
+        words = table("a frame", {} if asked is None else asked)
         with self._lock:
             now = self._clock()
             passed, self._seen_s = now - self._seen_s, now
             self.run.advance(min(max(passed, 0.0), LONGEST_WAIT_S))
             frame = self._swarm() | self._floor() | self._numbers()
-            if words.robot is not None and words.run == self._serial:
-                frame["robot"] = self._robot(words.robot)
-            if words.run != self._serial:
+            if words.get("run") != self._serial:
                 frame["about"] = self._about()
+            elif "robot" in words:
+                frame["robot"] = self._robot(words["robot"])
             return frame
+
+    def _check_robot(self, robot: Any) -> None:
+        whole("robot", robot, at_least=0, at_most=self.run.scenario.robots.n_robots - 1)
 
     def _swarm(self) -> dict[str, Any]:
         world, policy = self.run.world, self.run.policy
         swarm = world.swarm
         told: dict[str, Any] = {}
         if hasattr(policy, "describe_robots"):
-            states = policy.describe_robots()  # type: ignore[attr-defined] - optional, see Policy
-            told["activity"], told["words"] = states.activity.tolist(), list(states.words)
+            states = policy.describe_robots()
+            told = {"activity": states.activity.tolist(), "words": list(states.words)}
             if states.n_remembered is not None:
                 told["remembered"] = states.n_remembered.tolist()
         return told | {
@@ -146,7 +235,6 @@ class PlaySession:
         run, counters = self.run, self.run.world.events.counters
         time_s = run.world.tick * run.scenario.dt_s
         active = int(counters[Counter.ACTIVE])
-        levels = {name: run.levels.level(name) for name in LEVELS}
         return {
             "run": self._serial,
             "time_s": round(time_s, 3),
@@ -157,10 +245,8 @@ class PlaySession:
             "per_1000_s": 1000.0 * int(counters[Counter.COLLECTED]) / time_s if time_s else 0.0,
             "interference": int(counters[Counter.INTERFERING]) / active if active else 0.0,
             "curve": self._curve(),
-            "levels": levels,
-            "changes": run.levels.latest_changes,
-            "n_changes": len(run.levels.changes),
-            "note": self.note,
+            "levels": {name: run.levels.level(name) for name in LEVELS},
+            "changes": run.levels.changes_in_words,
         }
 
     def _curve(self) -> dict[str, list[float]]:
@@ -168,28 +254,25 @@ class PlaySession:
         capture, dt_s = self.run.capture, self.run.scenario.dt_s
         last = len(capture.ticks) - 1
         wanted = min(MOST_BINS, max(FEWEST_BINS, round(capture.ticks[-1] * dt_s / SHORTEST_BIN_S)))
-        edges = np.round(np.linspace(0, last, min(wanted, last) + 1)).astype(int)
-        seconds = np.array(capture.ticks)[edges] * dt_s
-        delivered, interfering, active = (
-            np.diff(capture.counted(counter)[edges])
-            for counter in (Counter.COLLECTED, Counter.INTERFERING, Counter.ACTIVE)
-        )
+        edges = np.round(np.linspace(0, last, min(wanted, last) + 1)).astype(int).tolist()
+        seconds = np.array([capture.ticks[edge] for edge in edges]) * dt_s
+        counted = np.diff([capture.counters[edge] for edge in edges], axis=0).reshape(-1, len(Counter))
         return {
             "time_s": ((seconds[1:] + seconds[:-1]) / 2).tolist(),
-            "per_1000_s": (1000.0 * delivered / np.diff(seconds)).tolist(),
-            "interference": (interfering / np.maximum(active, 1)).tolist(),
+            "per_1000_s": (1000.0 * counted[:, Counter.COLLECTED] / np.diff(seconds)).tolist(),
+            "interference": (counted[:, Counter.INTERFERING] / np.maximum(counted[:, Counter.ACTIVE], 1)).tolist(),
         }
 
     def _robot(self, robot: int) -> dict[str, Any]:
         self._check_robot(robot)
         run = self.run
         left, right = (100.0 * run.world.swarm.wheel_speed[robot]).tolist()
-        places = run.remembered_places(robot)
-        remembered = () if places is None else ((1, places.objects_m), (2, places.caches_m))
+        remembered = run.remembered_places(robot)
+        places = [] if remembered is None else [*enumerate(remembered, start=1)]
         return {
             "row": robot,
             "told": [*run.told_of(robot), ("wheels", f"{left:.1f}, {right:.1f} cm/s")],
-            "places": [[kind, *place] for kind, places_m in remembered for place in places_m.tolist()],
+            "places": [[kind, *place] for kind, places_m in places for place in places_m.tolist()],
         }
 
     def _about(self) -> dict[str, Any]:
@@ -208,143 +291,19 @@ class PlaySession:
             ],
             "header": {
                 "label": policy_label(self.setting.policy),
+                "look": 0,
                 "scenario": here.name,
                 "seed": self.setting.seed,
                 "n_robots": here.robots.n_robots,
                 "n_objects": here.objects.n_objects,
                 "n_cache_slots": len(run.world.caches.alive),
                 "dt_s": here.dt_s,
-                "position_step_m": run.step_m,
+                "position_step_m": run.capture.step_m,
                 "has_tasks": hasattr(run.policy, "task"),
-                "tasks": task_names(),
-                "counters": [counter.name.lower() for counter in Counter],
-                "performance": counted_performance(here),
                 "signals": [],
-                "world": geometry(here),
+                **for_page(here),
             },
         }
-
-    # Commands
-
-    def carry_out(self, command: Any) -> str:
-        """Do what a command asks for; returns one line about it. A command that is refused changes nothing.
-
-        Args:
-            command: A table; "do" names it, the rest are its arguments.
-
-        Raises:
-            ConfigError: no such table, command or arguments.
-            ValueError: a run that cannot be.
-        """
-        words = dict(table("a command", command))
-        name = words.pop("do", None)
-        known_name("command", name, _COMMANDS)
-        kind, act = _COMMANDS[name]
-        arguments = typed(kind, words, name)
-        with self._lock:
-            self.note = act(self, arguments)
-            return self.note
-
-    def replay_page(self) -> tuple[str, str]:
-        """Return the name of a file and the replay page of the run so far.
-
-        Raises:
-            ReplayError: the run has not gone on for one frame.
-        """
-        with self._lock:
-            replay = self.run.replay()
-        return f"{replay.spec.world.file_name}_{as_file_name(policy_label(self.setting.policy))}.html", page_of(
-            [replay]
-        )
-
-    def summary(self) -> str:
-        """Return one line about the run so far; it waits for `LONGEST_SUMMARY_S` at most."""
-        # Who compiles a new run keeps the lock for long; to read the old one without it breaks nothing.
-        is_ours = self._lock.acquire(timeout=LONGEST_SUMMARY_S)
-        try:
-            return f"{self.run.name}: {self.run.summary()}"
-        finally:
-            if is_ours:
-                self._lock.release()
-
-    def _check_robot(self, robot: int) -> None:
-        n_robots = self.run.scenario.robots.n_robots
-        if robot >= n_robots:
-            raise ConfigError(f"Expected a robot from 0 to {n_robots - 1}, got {robot}.")
-
-    def _play(self, _: "_Nothing") -> str:
-        self.run.paused = False
-        self._seen_s = self._clock()
-        return ""
-
-    def _pause(self, _: "_Nothing") -> str:
-        self.run.paused = True
-        return ""
-
-    def _step(self, _: "_Nothing") -> str:
-        self.run.paused = True
-        self.run.step()
-        return "one tick"
-
-    def _set_speed(self, asked: "_Value") -> str:
-        number("speed", asked.value, above=0.0, at_most=SPEEDS[-1])
-        self.run.speed = float(asked.value)
-        return ""
-
-    def _set_level(self, asked: "_Level") -> str:
-        known_name("level", asked.name, LEVELS)
-        return self.run.levels.set(asked.name, asked.value)
-
-    def _kill(self, asked: "_Robot") -> str:
-        self._check_robot(asked.robot)
-        return self.run.levels.kill(asked.robot)
-
-    def _break_down(self, asked: "_Robot") -> str:
-        self._check_robot(asked.robot)
-        return self.run.levels.break_down(asked.robot)
-
-    def _repair(self, asked: "_Robot") -> str:
-        self._check_robot(asked.robot)
-        return self.run.levels.repair(asked.robot)
-
-    def _start_again(self, asked: "_Run") -> str:
-        """Start a run, the same or another one, with the levels of now; a chosen scenario begins as its preset."""
-        if asked.policy is not None:
-            known_name("policy", asked.policy, self._policies)
-        world = replace(self.setting.world, wrappers=self.run.levels.configs)
-        if asked.scenario is not None:
-            world = replace(world, scenario=scenario(asked.scenario), name="")
-        if asked.robots is not None:
-            whole("robots", asked.robots, at_least=1, at_most=most_robots(world.scenario))
-            world = replace(world, scenario=with_overrides(world.scenario, n_robots=asked.robots))
-        self._begin(
-            replace(
-                self.setting,
-                world=world,
-                policy=self.setting.policy if asked.policy is None else asked.policy,
-                seed=self.setting.seed if asked.seed is None else asked.seed,
-            )
-        )
-        return f"started again with seed {self.setting.seed}"
-
-    def _with_walls(self, walls: tuple[Rectangle, ...]) -> str:
-        here = with_overrides(self.setting.world.scenario, obstacles=walls)
-        world = replace(self.setting.world, scenario=here, wrappers=self.run.levels.configs)
-        self._begin(replace(self.setting, world=world))
-        return f"started again with {len(walls)} wall{'' if len(walls) == 1 else 's'}"
-
-    def _add_wall(self, asked: "_Wall") -> str:
-        arena = self.setting.world.scenario.arena
-        return self._with_walls((*arena.obstacles, wall_of(asked.box, arena.width_m, arena.height_m)))
-
-    def _remove_wall(self, asked: "_Index") -> str:
-        walls = self.setting.world.scenario.arena.obstacles
-        if asked.index >= len(walls):
-            raise ConfigError(f"Expected one of {len(walls)} walls, from 0 on, got {asked.index}.")
-        return self._with_walls((*walls[: asked.index], *walls[asked.index + 1 :]))
-
-    def _remove_walls(self, _: "_Nothing") -> str:
-        return self._with_walls(())
 
 
 def most_robots(here: ScenarioConfig) -> int:
@@ -353,7 +312,7 @@ def most_robots(here: ScenarioConfig) -> int:
     return max(here.robots.n_robots, MOST_ROBOTS * preset)
 
 
-def wall_of(box: tuple[float, float, float, float], width_m: float, height_m: float) -> Rectangle:
+def wall_of(box: Sequence[float], width_m: float, height_m: float) -> Rectangle:
     """Return the wall that somebody drew from one corner to the other: inside the arena, and thick enough.
 
     Args:
@@ -361,9 +320,9 @@ def wall_of(box: tuple[float, float, float, float], width_m: float, height_m: fl
         width_m: Extent of the arena along x, m.
         height_m: Along y, m.
     """
-    x = _side(box[0], box[2], width_m)
-    y = _side(box[1], box[3], height_m)
-    return x[0], y[0], x[1], y[1]
+    x_low, x_high = _side(box[0], box[2], width_m)
+    y_low, y_high = _side(box[1], box[3], height_m)
+    return x_low, y_low, x_high, y_high
 
 
 def _side(one: float, other: float, extent_m: float) -> tuple[float, float]:
@@ -373,65 +332,3 @@ def _side(one: float, other: float, extent_m: float) -> tuple[float, float]:
         return low, high
     start = round(min(max((low + high - WALL_M) / 2, 0.0), extent_m - WALL_M), 2)
     return start, round(start + WALL_M, 2)
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Asked:
-    robot: Count | None = None
-    run: Count = 0
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Nothing:
-    pass
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Value:
-    value: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Level:
-    name: str
-    value: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Robot:
-    robot: Count
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Index:
-    index: Count
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Wall:
-    box: tuple[float, float, float, float]
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Run:
-    scenario: str | None = None
-    policy: str | None = None
-    robots: int | None = None
-    seed: int | None = None
-
-
-_COMMANDS: Mapping[str, tuple[type, Callable[[PlaySession, Any], str]]] = {
-    "play": (_Nothing, PlaySession._play),
-    "pause": (_Nothing, PlaySession._pause),
-    "step": (_Nothing, PlaySession._step),
-    "speed": (_Value, PlaySession._set_speed),
-    "level": (_Level, PlaySession._set_level),
-    "kill": (_Robot, PlaySession._kill),
-    "break": (_Robot, PlaySession._break_down),
-    "repair": (_Robot, PlaySession._repair),
-    "start": (_Run, PlaySession._start_again),
-    "wall": (_Wall, PlaySession._add_wall),
-    "remove_wall": (_Index, PlaySession._remove_wall),
-    "remove_walls": (_Nothing, PlaySession._remove_walls),
-}
-"""Name -> arguments, and what is done."""

@@ -12,6 +12,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -27,10 +28,6 @@ TASK_SHIFT = 4
 Small: TypeAlias = NDArray[np.uint8]
 Middle: TypeAlias = NDArray[np.uint16]
 Whole: TypeAlias = NDArray[np.int32]
-
-
-class ReplayError(ValueError):
-    """A replay that cannot be made as asked, or a file that holds none; the message names the file."""
 
 
 class Status(IntFlag):
@@ -84,7 +81,7 @@ class Replay:
     memory_events: Whole | None = None
     """(E, 5) frame, robot row, what is new, and where, x, y in steps of `position_step_m`: 1 = an object is remembered
     there, 2 = a cache, -1 and -2 = no more. In order of robots, then of frames; frame 0 has what all remember then.
-    None where the policy does not tell, and in pages of version 2."""
+    None where the policy does not tell."""
     signals: Mapping[str, NDArray[np.float32]]
     """(F,) each: throttle or handling cost at the frames, by name of the wrapper."""
     versions: Mapping[str, str]
@@ -144,31 +141,23 @@ class Replay:
             The frames in which they had done so, (E,); +1 for a pick-up and -1 for a drop, (E,); and where, (E, 2) m:
             the cell in which a free object lay, else where the robot was.
         """
-        return _handovers(self)
+        events = self.object_events
+        events = events[np.lexsort((events[:, 0], events[:, 1]))]  # every object's story, one after the other
+        after, before = events[1:], events[:-1]
+        same = after[:, 1] == before[:, 1]
+        taken, left = (same & (part[:, 2] == ObjectStatus.CARRIED) for part in (after, before))
+        position_m = self.position_m
+        lay_m = (before[taken, 3:] + 0.5) * CELL_M
+        at_robot_m = position_m[after[taken, 0], after[taken, 3]]
+        taken_m = np.where(before[taken, 2, None] == ObjectStatus.FREE, lay_m, at_robot_m)
+        left_m = position_m[after[left, 0], before[left, 3]]
+        frames = np.concatenate((after[taken, 0], after[left, 0]))
+        signs = np.repeat(np.array([1, -1], np.int32), (taken.sum(), left.sum()))
+        in_time = np.argsort(frames, kind="stable")
+        return frames[in_time], signs[in_time], np.concatenate((taken_m, left_m))[in_time]
 
 
 def position_step_m(scenario: ScenarioConfig) -> float:
     """Return the step in which positions of a scenario are stored: they must fit into 16 bits."""
     longer_m = max(scenario.arena.width_m, scenario.arena.height_m)
     return max(POSITION_STEP_M, longer_m / np.iinfo(np.uint16).max)
-
-
-def _handovers(replay: Replay) -> tuple[Whole, Whole, FloatArray]:
-    from swarm_forage_env.contract.codes import ObjectStatus
-
-    events = replay.object_events
-    order = np.lexsort((events[:, 0], events[:, 1]))  # every object's story, one after the other
-    after, before = events[order][1:], events[order][:-1]
-    same = after[:, 1] == before[:, 1]
-    now_carried, was_carried = (part[:, 2] == ObjectStatus.CARRIED for part in (after, before))
-    position_m = replay.position_m
-    taken, left = same & now_carried, same & was_carried
-    from_floor = before[taken, 2] == ObjectStatus.FREE
-    at_robot = position_m[after[taken, 0], after[taken, 3]]
-    taken_m = np.where(from_floor[:, None], (before[taken, 3:] + 0.5) * CELL_M, at_robot)
-    left_m = position_m[after[left, 0], before[left, 3]]
-    frames = np.concatenate((after[taken, 0], after[left, 0]))
-    signs = np.concatenate((np.ones(taken.sum(), np.int32), -np.ones(left.sum(), np.int32)))
-    places = np.concatenate((taken_m, left_m))
-    in_time = np.argsort(frames, kind="stable")
-    return frames[in_time], signs[in_time], places[in_time]

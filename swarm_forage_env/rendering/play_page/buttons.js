@@ -5,10 +5,15 @@ function connectButtons(page) {
   byId("play").onclick = () => page.tell({ do: page.swarm.now.paused ? "play" : "pause" });
   byId("step").onclick = () => page.tell({ do: "step" });
   byId("speed").onchange = () => page.tell({ do: "speed", value: Number(byId("speed").value) });
-  byId("restart").onclick = () => page.tell({ do: "start", seed: Number(byId("seed").value) });
+  byId("restart").onclick = () => {
+    if (byId("seed").checkValidity()) page.tell({ do: "start", seed: Number(byId("seed").value) });
+    else showNote("A seed is a whole number from 0 on.", true);
+  };
+  byId("seed").onkeydown = (event) => event.key === "Enter" && byId("restart").click();
   byId("save").onclick = () => page.save();
   byId("whole").onclick = () => page.showWhole();
   byId("theme").onclick = () => theme.toggle();
+  byId("help").onclick = () => byId("keys").showModal();
   byId("scenario").onchange = () => page.tell({ do: "start", scenario: byId("scenario").value });
   byId("policy").onchange = () => page.tell({ do: "start", policy: byId("policy").value });
   byId("robots").oninput = () => {
@@ -26,14 +31,13 @@ const PLAY_KEYS = {
   w: (page) => page.drawWalls(!page.drawsWalls),
   0: (page) => page.showWhole(),
   t: () => theme.toggle(),
+  "?": () => document.getElementById("keys").showModal(),
   Escape: (page) => page.choose(-1, null),
 };
 
 function pressPlayKey(event, page) {
   const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
-  if (event.ctrlKey || event.metaKey || event.altKey || !Object.hasOwn(PLAY_KEYS, key)) return;
-  if (["SELECT", "INPUT"].includes(event.target.tagName)) return;
-  if (key === " " && event.target.tagName === "BUTTON") return; // space presses the button in focus
+  if (isTyping(event) || !Object.hasOwn(PLAY_KEYS, key)) return;
   event.preventDefault();
   PLAY_KEYS[key](page);
 }
@@ -46,7 +50,7 @@ function showSetting(page, about) {
     `seed ${header.seed}`];
   if (obstacles_m.length > 0) facts.push(obstacles_m.length === 1 ? "1 wall" : `${obstacles_m.length} walls`);
   document.getElementById("title").textContent = `${header.label} in ${about.place.replaceAll("_", " ")}`;
-  document.getElementById("subtitle").textContent = [...facts, ...about.disturbances].join("  ·  ");
+  showFacts([...facts, ...about.disturbances]);
   document.getElementById("seed").value = String(header.seed);
   fill("scenario", about.scenarios.map((name) => [name, name.replaceAll("_", " ")]), header.scenario);
   fill("policy", about.policies.map((name) => [name, name.split("/").at(-1)]), about.policy);

@@ -9,7 +9,6 @@ class PlayPage {
     this.camera = new Camera();
     this.serial = 0; // the number of no run
     this.drawsWalls = false;
-    this.tip = document.getElementById("tip");
     this.robotCard = new RobotCard(this);
     this.waiting = new Map(); // levels that are to be sent
     connectButtons(this);
@@ -62,14 +61,19 @@ class PlayPage {
     this.serial = serial;
     this.about = about;
     this.swarm = new LiveSwarm(about.header);
-    document.getElementById("arenas").replaceChildren();
-    document.getElementById("curves").replaceChildren();
+    const ghosts = [this.rate?.lines, this.interference?.lines];
+    for (const id of ["arenas", "curves"]) {
+      const place = document.getElementById(id);
+      place.style.minHeight = `${place.offsetHeight}px`; // else what is below jumps
+      place.replaceChildren();
+    }
     this.panel = new PlayPanel(document.getElementById("arenas"), this.swarm, this.camera, this);
     this.clock = { endS: 1, seek() {} };
     const chart = (title, unit) =>
       new LineChart(document.getElementById("curves"), title, this.clock, [this.swarm], () => [], unit);
     this.rate = chart("deliveries per 1,000 s", "");
     this.interference = chart("share of time in interference", " %");
+    [this.rate.ghosts, this.interference.ghosts] = ghosts; // the run before, to compare with
     const legend = document.getElementById("legend");
     legend.replaceChildren();
     this.legend = new Legend([this.swarm], this);
@@ -88,9 +92,7 @@ class PlayPage {
     showControls(now);
     document.getElementById("score").replaceChildren(heading("now"), tableOf([this.swarm], numbersOf(this.swarm)));
     for (const { name } of this.about.sliders) this.sliders[name].show(now.levels[name]);
-    const before = now.n_changes - now.changes.length;
-    const changes = [...(before > 0 ? [`${before} more before`] : []), ...now.changes];
-    document.getElementById("changes").textContent = changes.length ? `changed by hand: ${changes.join(", ")}` : "";
+    document.getElementById("changes").textContent = now.changes && `changed by hand: ${now.changes}`;
     this.robotCard.show(this.swarm, focus.chosen);
     this.showCurves(now);
   }
@@ -124,10 +126,12 @@ class PlayPage {
     const arenas = document.getElementById("arenas");
     const { width_m, height_m } = this.swarm.header.world;
     const height = innerWidth <= 860 ? innerHeight * 0.5 : Math.max(300, innerHeight * 0.62);
+    arenas.style.gridTemplateColumns = "100%"; // names that wrap in a narrow panel would make the arena smaller
     const caption = this.panel.box.querySelector("figcaption").offsetHeight + 2;
     const grid = bestGrid(1, width_m / height_m, arenas.clientWidth, height, 12, caption);
     arenas.style.gridTemplateColumns = `${grid.width + 2}px`;
     this.panel.resize(grid.width, grid.height);
+    for (const id of ["arenas", "curves"]) document.getElementById(id).style.minHeight = "";
     for (const chart of [this.rate, this.interference]) {
       chart.told = null;
       chart.resize();
@@ -151,12 +155,12 @@ class PlayPage {
   }
 
   showTip(panel, event) {
-    Inspector.prototype.showTip.call(this, panel, event);
+    if (!this.drawsWalls) showTip(panel, event);
     this.repaint();
   }
 
   hideTip() {
-    this.tip.hidden = true;
+    document.getElementById("tip").hidden = true;
     this.repaint();
   }
 

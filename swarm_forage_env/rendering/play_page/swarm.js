@@ -7,7 +7,7 @@ class LiveSwarm extends Run {
   constructor(header) {
     const none = new Int32Array(0);
     super({ ...header, n_frames: 0, frame_ticks: 1, end_tick: 0 },
-      { object_events: none, cache_events: none, deliveries: none, status: new Uint8Array(0) }, 0);
+      { object_events: none, cache_events: none, deliveries: none, status: new Uint8Array(0) });
     this.nFrames = KEPT_S;
     this.frameS = 1;
     this.frame = KEPT_S - 1;

@@ -49,9 +49,7 @@ const KEYS = {
 
 function pressKey(event, player, page) {
   const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
-  if (event.ctrlKey || event.metaKey || event.altKey || !Object.hasOwn(KEYS, key)) return;
-  if (document.getElementById("keys").open || event.target.tagName === "SELECT") return;
-  if (key === " " && event.target.tagName === "BUTTON") return; // space presses the button in focus
+  if (isTyping(event) || !Object.hasOwn(KEYS, key)) return;
   event.preventDefault();
   KEYS[key]({ player, page, shift: event.shiftKey });
 }

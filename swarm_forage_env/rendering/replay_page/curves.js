@@ -175,17 +175,25 @@ class LineChart extends Chart {
 
   use(series) {
     this.lines = this.runs.map(series);
-    this.top = roundUp(Math.max(0, ...this.lines.flat().map((point) => point.value)));
+    const all = [...this.lines, ...(this.ghosts ?? [])].flat();
+    this.top = roundUp(Math.max(0, ...all.map((point) => point.value)));
   }
 
   paintStill(pen) {
     this.valueAxis(pen, this.unit);
     this.timeAxis(pen);
+    for (const points of this.ghosts ?? []) {
+      pen.strokeStyle = theme.colours.faint;
+      pen.lineWidth = 1;
+      pen.beginPath();
+      for (const { time, value } of points) if (time <= this.player.endS) pen.lineTo(this.x(time), this.y(value));
+      pen.stroke();
+    }
     this.lines.forEach((points, index) => {
-      pen.strokeStyle = theme.ofRun(this.runs[index].index);
+      pen.strokeStyle = theme.ofRun(this.runs[index]);
       pen.lineWidth = 1.8;
       pen.lineJoin = "round";
-      pen.setLineDash(DASHES[this.runs[index].index % DASHES.length]);
+      if (this.runs.length > 1) pen.setLineDash(DASHES[this.runs[index].look % DASHES.length]);
       pen.beginPath();
       for (const { time, value } of points) pen.lineTo(this.x(time), this.y(value));
       pen.stroke();
@@ -196,7 +204,7 @@ class LineChart extends Chart {
   tell(time) {
     this.tellValues(
       this.lines.map((points, index) => [
-        theme.ofRun(this.runs[index].index),
+        theme.ofRun(this.runs[index]),
         `${this.runs.length > 1 ? `${this.runs[index].header.label} ` : ""}${plainNumber(valueAt(points, time))}${this.unit}`,
       ]),
     );
@@ -272,7 +280,7 @@ class LifeChart extends Chart {
     this.runs.forEach((run, row) => {
       const top = 2 + 16 * row;
       if (this.runs.length > 1) {
-        pen.fillStyle = theme.ofRun(run.index);
+        pen.fillStyle = theme.ofRun(run);
         pen.fillRect(LEFT_PX - 12, top + 3, 6, 6);
       }
       for (let x = LEFT_PX; x < this.width - RIGHT_PX; x++) {

@@ -22,6 +22,7 @@ class Painter {
 
   paint(pen, { chosen, hovered, speed }) {
     const { view, run } = this;
+    view.settle();
     pen.clearRect(0, 0, view.width, view.height);
     this.radius = view.robotPx(run.nRobots);
     this.floor(pen);
@@ -32,7 +33,6 @@ class Painter {
     this.robots(pen);
     this.counts(pen);
     for (const robot of new Set([hovered, chosen])) if (robot >= 0) this.halo(pen, robot, robot === chosen);
-    this.scaleBar(pen);
   }
 
   box(pen, [left, bottom, right, top]) {
@@ -325,29 +325,5 @@ class Painter {
       const side = sides[kind] + 4;
       pen.strokeRect(view.px(x) - side / 2, view.py(y) - side / 2, side, side);
     }
-  }
-
-  scaleBar(pen) {
-    const { view } = this;
-    const fitting = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100].filter((m) => m * view.scale <= view.width / 5);
-    const metres = fitting.at(-1) ?? 0.1;
-    const [, bottom, east] = this.run.header.world.interior_m;
-    const right = Math.min(view.width - 14, view.px(east) - 10);
-    const y = Math.min(view.height - 13, view.py(bottom) - 10);
-    const left = right - metres * view.scale;
-    pen.font = "11px system-ui, sans-serif";
-    pen.textAlign = "right";
-    pen.textBaseline = "bottom";
-    for (const [colour, width] of [[theme.colours.floor, 4], [theme.colours.text, 1.5]]) {
-      pen.strokeStyle = colour;
-      pen.lineWidth = width;
-      pen.beginPath();
-      pen.moveTo(left, y);
-      pen.lineTo(right, y);
-      pen.stroke();
-      if (width > 2) pen.strokeText(`${metres} m`, right, y - 3);
-    }
-    pen.fillStyle = theme.colours.text;
-    pen.fillText(`${metres} m`, right, y - 3);
   }
 }

@@ -35,7 +35,7 @@ function tableOf(runs, rows) {
     names.append(document.createElement("th"));
     for (const run of runs) {
       const name = document.createElement("span");
-      name.style.color = theme.ofRun(run.index);
+      name.style.color = theme.ofRun(run);
       name.append(...breakable(run.header.label));
       const head = document.createElement("th");
       head.append(name);
@@ -60,7 +60,6 @@ class Inspector {
     this.page = page;
     this.score = document.getElementById("score");
     this.robot = document.getElementById("robot");
-    this.tip = document.getElementById("tip");
     this.told = "";
   }
 
@@ -129,27 +128,25 @@ class Inspector {
       const words = robotFacts(run, focus.chosen).map(([key, text]) =>
         ["task", "state", "activity"].includes(key) ? text : `${key} ${text}`,
       );
-      told.append(swatch(theme.ofRun(run.index)), name, words.join(" · "));
+      told.append(swatch(theme.ofRun(run)), name, words.join(" · "));
       return told;
     });
   }
+}
 
-  showTip(panel, event) {
-    this.tip.hidden = focus.hovered < 0;
-    if (focus.hovered < 0) return;
-    const name = document.createElement("b");
-    name.textContent = `robot ${focus.hovered}`;
-    const lines = robotFacts(panel.run, focus.hovered).map(([key, text]) => {
-      const line = document.createElement("span");
-      line.textContent = `${key}: ${text}`;
-      return line;
-    });
-    this.tip.replaceChildren(name, ...lines);
-    const { offsetWidth, offsetHeight } = this.tip;
-    const left = event.clientX + 16 + offsetWidth > innerWidth ? event.clientX - offsetWidth - 12 : event.clientX + 16;
-    this.tip.style.left = `${Math.max(4, left)}px`;
-    this.tip.style.top = `${Math.max(4, Math.min(event.clientY + 14, innerHeight - offsetHeight - 6))}px`;
-  }
+/** Tell of the robot under the pointer, beside it. */
+function showTip(panel, event) {
+  const tip = document.getElementById("tip");
+  tip.hidden = focus.hovered < 0;
+  if (tip.hidden) return;
+  const lines = [`robot ${focus.hovered}`, ...robotFacts(panel.run, focus.hovered).map((fact) => fact.join(": "))];
+  tip.replaceChildren(
+    ...lines.map((text, k) => Object.assign(document.createElement(k ? "span" : "b"), { textContent: text })),
+  );
+  const { offsetWidth, offsetHeight } = tip;
+  const left = event.clientX + 16 + offsetWidth > innerWidth ? event.clientX - offsetWidth - 12 : event.clientX + 16;
+  tip.style.left = `${Math.max(4, left)}px`;
+  tip.style.top = `${Math.max(4, Math.min(event.clientY + 14, innerHeight - offsetHeight - 6))}px`;
 }
 
 function countCaches(run) {

@@ -28,7 +28,7 @@ class Page {
     const { world } = header;
     const facts = [header.scenario.replaceAll("_", " "), `${header.n_robots} robots`, `${header.n_objects} objects`,
       `${world.width_m} × ${world.height_m} m`, `seed ${header.seed}`];
-    document.getElementById("subtitle").textContent = [...facts, ...this.disturbances()].join("  ·  ");
+    showFacts([...facts, ...this.disturbances()]);
   }
 
   /** What disturbs the runs, in words; those of one run alone begin with its name. */
@@ -77,17 +77,14 @@ class Page {
   paint() {
     const { time, speed } = this.player;
     for (const run of this.runs) run.seek(time);
-    if (focus.follows && focus.chosen >= 0) this.keepInSight();
+    for (const { view, run } of this.panels) {
+      view.followed = focus.follows ? { x: run.x[focus.chosen], y: run.y[focus.chosen] } : null;
+    }
     for (const panel of this.panels) panel.paint(speed);
     for (const chart of [this.life, ...this.charts]) if (!chart.card.hidden) chart.paint(time);
     showTime(this.player);
     this.inspector.update();
     this.keepAddress();
-  }
-
-  keepInSight() {
-    const { run, view } = focus.panel ?? this.panels[0];
-    view.lookAt(run.x[focus.chosen], run.y[focus.chosen]);
   }
 
   /** Look at a robot, or at none (-1). */
@@ -97,6 +94,15 @@ class Page {
     if (robot < 0) focus.follows = false;
     this.life.choose(robot);
     this.repaint();
+  }
+
+  /** Leave the camera where the panel is that a hand moves. */
+  stopFollowing(view) {
+    if (!focus.follows) return;
+    focus.follows = false;
+    const { x, y } = view.middle;
+    Object.assign(this.camera, { x: x / view.world.width_m, y: y / view.world.height_m });
+    for (const panel of this.panels) panel.view.followed = null;
   }
 
   follow(wanted) {
@@ -143,17 +149,17 @@ class Page {
   }
 
   showTip(panel, event) {
-    this.inspector.showTip(panel, event);
+    showTip(panel, event);
     this.repaint();
   }
 
   hideTip() {
-    this.inspector.tip.hidden = true;
+    document.getElementById("tip").hidden = true;
     this.repaint();
   }
 }
 
-function start() {
+async function start() {
   const loading = document.getElementById("loading");
   try {
     theme.start();
@@ -161,7 +167,7 @@ function start() {
     const texts = [...document.querySelectorAll("script.run")];
     const runs = [];
     for (const [index, about] of header.runs.entries()) {
-      runs.push(new Run(about, unpackRun(about, texts[index].textContent), index));
+      runs.push(new Run(about, await unpackRun(about, texts[index].textContent)));
       texts[index].remove(); // the text is not needed any more, and it is large
     }
     new Page(runs);

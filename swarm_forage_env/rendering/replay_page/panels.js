@@ -1,6 +1,7 @@
 // The arenas: one canvas per run, side by side, and what pointers do there.
 
 const TAP_PX = 6; // a pointer that moved less was a click
+const LENGTHS_M = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100]; // of the scale beside the name
 const REACH_PX = 16; // how near a click must come to a robot
 
 /** What is looked at: the same robot in all runs. */
@@ -21,10 +22,11 @@ class Panel {
     this.box.className = "arena";
     this.box.style.margin = "0";
     this.box.innerHTML = `<figcaption class="caption"><i class="swatch"></i><span class="name"></span>
-      <span class="amount"></span><span class="unit"></span></figcaption><canvas></canvas>`;
+      <span class="scale"></span><span class="amount"></span><span class="unit"></span></figcaption><canvas></canvas>`;
     this.box.querySelector(".name").append(...breakable(run.header.label));
     this.box.querySelector(".unit").textContent = run.header.performance.words;
     this.amount = this.box.querySelector(".amount");
+    this.scale = this.box.querySelector(".scale");
     this.canvas = this.box.querySelector("canvas");
     this.canvas.setAttribute("aria-label", `arena of ${run.header.label}`);
     parent.append(this.box);
@@ -41,11 +43,15 @@ class Panel {
     const { run } = this;
     this.canvas.classList.toggle("zoomed", this.view.camera.zoom > 1);
     this.painter.paint(this.pen, { ...focus, speed });
+    this.canvas.classList.toggle("over", focus.hovered >= 0);
+    const metres = LENGTHS_M.findLast((length) => length * this.view.scale <= this.view.width / 6) ?? 0.1;
+    this.scale.textContent = `${metres} m`;
+    this.scale.style.width = `${metres * this.view.scale}px`;
     this.amount.textContent = run.counted(run.header.performance.counter).toLocaleString("en");
   }
 
   theme() {
-    this.box.querySelector(".swatch").style.background = theme.ofRun(this.run.index);
+    this.box.querySelector(".swatch").style.background = theme.ofRun(this.run);
   }
 
   place(event) {
@@ -102,7 +108,7 @@ class Panel {
     const others = [...this.pointers].filter(([other]) => other !== id).map(([, place]) => place);
     const scale = this.view.scale;
     if (others.length === 0) {
-      focus.follows = false;
+      this.page.stopFollowing?.(this.view);
       this.view.moveBy((before[0] - here[0]) / scale, (here[1] - before[1]) / scale);
     } else {
       const fixed = others[0];

@@ -27,9 +27,9 @@ function between(y0, y1, y2, y3, share) {
 }
 
 class Run {
-  constructor(header, arrays, index) {
+  constructor(header, arrays) {
     this.header = header;
-    this.index = index;
+    this.look = header.look;
     this.arrays = arrays;
     this.nRobots = header.n_robots;
     this.nFrames = header.n_frames;

@@ -19,7 +19,7 @@ const theme = {
     const names = ["page", "panel", "line", "text", "faint", "accent", "wall", "floor", "nest", "light", "source",
       "cache", "object", "empty", "carrying", "interference", "repair", "grid"];
     for (let k = 0; k < 8; k++) names.push(`task-${k}`);
-    for (let k = 0; k < 6; k++) names.push(`run-${k}`);
+    for (let k = 0; k < 8; k++) names.push(`run-${k}`);
     this.colours = Object.fromEntries(names.map((key) => [key, style.getPropertyValue(`--${key}`).trim()]));
     document.dispatchEvent(new Event("themed"));
   },
@@ -29,10 +29,25 @@ const theme = {
     this.set(document.documentElement.dataset.theme === "dark" ? "light" : "dark");
   },
 
-  ofRun(index) {
-    return this.colours[`run-${index % 6}`];
+  /** The colour that a run's policy has in figures. */
+  ofRun(run) {
+    return this.colours[`run-${run.look}`];
   },
 };
+
+/** Write facts below the headline; where there are many, a click unfolds them. */
+function showFacts(facts) {
+  const line = document.getElementById("subtitle");
+  line.textContent = line.title = facts.join("  ·  ");
+  line.onclick = () => line.classList.toggle("whole");
+}
+
+/** Whether a key is for the element that has it, and not for the page. */
+function isTyping(event) {
+  if (event.ctrlKey || event.metaKey || event.altKey || document.getElementById("keys").open) return true;
+  if (event.key === " " && event.target.matches("button:focus-visible")) return true; // chosen by keys, not clicked
+  return event.target.matches("select, input[type=number]");
+}
 
 /** A canvas of this many CSS pixels, sharp on dense screens; returns its context. */
 function sizeCanvas(canvas, width, height) {

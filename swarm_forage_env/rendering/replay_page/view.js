@@ -26,6 +26,7 @@ class View {
   constructor(world, camera) {
     this.world = world;
     this.camera = camera;
+    this.followed = null; // a place in m that stays in the middle, in place of the camera's
     this.resize(100, 100);
   }
 
@@ -40,19 +41,32 @@ class View {
     return this.fit * this.camera.zoom;
   }
 
+  /** What is in the middle, m. */
+  get middle() {
+    const { x, y, zoom } = this.camera;
+    const { width_m, height_m } = this.world;
+    if (!this.followed) return { x: x * width_m, y: y * height_m };
+    const within = (place, extent) => Math.min(extent - (0.5 * extent) / zoom, Math.max((0.5 * extent) / zoom, place));
+    return { x: within(this.followed.x, width_m), y: within(this.followed.y, height_m) };
+  }
+
+  /** Work out, once per picture, where the arena's corner lies. */
+  settle() {
+    const { x, y } = this.middle;
+    this.left = this.width / 2 - x * this.scale;
+    this.bottom = this.height / 2 + y * this.scale;
+  }
+
   px(x) {
-    return this.width / 2 + (x - this.camera.x * this.world.width_m) * this.scale;
+    return this.left + x * this.scale;
   }
 
   py(y) {
-    return this.height / 2 - (y - this.camera.y * this.world.height_m) * this.scale;
+    return this.bottom - y * this.scale;
   }
 
   metres(px, py) {
-    return [
-      this.camera.x * this.world.width_m + (px - this.width / 2) / this.scale,
-      this.camera.y * this.world.height_m - (py - this.height / 2) / this.scale,
-    ];
+    return [this.middle.x + (px - this.width / 2) / this.scale, this.middle.y - (py - this.height / 2) / this.scale];
   }
 
   /** Zoom by a factor; what lies under the pixel stays there. */
@@ -67,13 +81,6 @@ class View {
   moveBy(x, y) {
     this.camera.x += x / this.world.width_m;
     this.camera.y += y / this.world.height_m;
-    this.camera.clamp();
-  }
-
-  /** Move the camera to a place. */
-  lookAt(x, y) {
-    this.camera.x = x / this.world.width_m;
-    this.camera.y = y / this.world.height_m;
     this.camera.clamp();
   }
 
