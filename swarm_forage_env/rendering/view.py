@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swarm_forage_env._internal.fields import whole, one_of
+from swarm_forage_env._internal.fields import one_of, whole
 from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.scenarios.config import ScenarioConfig

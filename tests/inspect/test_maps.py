@@ -94,32 +94,32 @@ def test_arrays_go_to_a_file(replay, tmp_path):
         assert np.array_equal(stored["density"], maps.arrays["density"])
 
 
-def images_of(monkeypatch, *maps: FloorMaps):
+def images_of(monkeypatch, tmp_path, *maps: FloorMaps):
     """Draw maps, and return the panels that show them."""
     pytest.importorskip("matplotlib")
     drawn = keep_figures(monkeypatch)
-    draw_maps("unused.png", maps)
+    draw_maps(tmp_path / "unused.png", maps)
     return [axes for axes in drawn[-1].axes if axes.get_images()]
 
 
-def test_maps_of_one_quantity_have_one_scale_and_differences_a_symmetric_one(monkeypatch):
+def test_maps_of_one_quantity_have_one_scale_and_differences_a_symmetric_one(monkeypatch, tmp_path):
     few, many = (
         FloorMaps(label=name, side_m=1.0, size_m=(2.0, 1.0), n_robots=1, arrays={"density": np.array([[0.0, value]])})
         for name, value in (("few", 1.0), ("many", 10.0))
     )
-    panels = images_of(monkeypatch, few, many, many.minus(few), few.minus(many))
+    panels = images_of(monkeypatch, tmp_path, few, many, many.minus(few), few.minus(many))
     scales = [axes.get_images()[0].get_clim() for axes in panels]
     assert scales[0] == scales[1] == pytest.approx((0.0, 10.0), rel=0.02)
     assert scales[2] == scales[3] == pytest.approx((-9.0, 9.0), rel=0.02)
 
 
-def test_maps_show_where_something_is_and_outline_nests(monkeypatch):
+def test_maps_show_where_something_is_and_outline_nests(monkeypatch, tmp_path):
     crowd = np.zeros((10, 20))
     crowd[2, 5] = 1.0
     arrays = {"density": crowd, "drops": np.ones((10, 20))}
     nests = ((2.0, 4.0, 6.0, 16.0),)
     one = FloorMaps(label="few", side_m=2.0, size_m=(40.0, 20.0), n_robots=1, arrays=arrays, nests_m=nests)
-    part, whole = images_of(monkeypatch, one)
+    part, whole = images_of(monkeypatch, tmp_path, one)
     assert (whole.get_xlim(), whole.get_ylim()) == ((0.0, 40.0), (0.0, 20.0))
     (x_low, x_high), (y_low, y_high) = part.get_xlim(), part.get_ylim()
     assert x_low < 10.0 < 12.0 < x_high < 20.0
