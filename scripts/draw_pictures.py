@@ -9,12 +9,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from PIL import Image
-
-from swarm_forage_env import load_policy, plan_run, scenario
+from swarm_forage_env import scenario
 from swarm_forage_env.inspect.film import record_run
-from swarm_forage_env.rendering.frame import Trails, render_frame
-from swarm_forage_env.runs.run import LiveRun, build_env
 
 IMAGES = Path(__file__).resolve().parent.parent / "docs" / "images"
 PICTURES = {
@@ -32,35 +28,12 @@ FIELDS: dict[str, dict[str, Any]] = {
 FILM = "small.gif"
 """The trained policy in the small warehouse: a hundred pictures of 300 s, half a megabyte."""
 TRAIL_S = 40.0
-SAMPLE_S = 1.0
 
 
 def draw(file: Path, scenario_name: str, policy_name: str, time_s: float, size_px: int, theme: str) -> None:
     """Run a policy with seed 0 and draw the arena as it is at `time_s`."""
     world = scenario(scenario_name, **FIELDS.get(file.name, {}))
-    world = plan_run(world, policy_name).scenario  # with the caches that the policy is made for
-    policy = load_policy(policy_name)
-    run = LiveRun(build_env(world), policy, 0)
-    env = run.forage_env
-    trails = Trails(world.robots.n_robots, round(TRAIL_S / SAMPLE_S) + 1)
-    for sample in range(round(TRAIL_S / SAMPLE_S) + 1):
-        run.advance(to_tick=round((time_s - TRAIL_S + sample * SAMPLE_S) / world.dt_s))
-        trails.add(env.swarm)
-    title = f"{scenario_name.replace('_', ' ')}, {policy_name}, {world.arena.width_m:g} x {world.arena.height_m:g} m"
-    picture = render_frame(
-        world,
-        env.swarm,
-        env.objects,
-        env.caches,
-        env.events,
-        tick=env.tick,
-        size_px=size_px,
-        trails=trails,
-        title=title,
-        theme=theme,
-    )
-    Image.fromarray(picture).save(file, optimize=True)
-    print(file)
+    print(record_run(world, policy_name, file, at_s=time_s, size_px=size_px, trail_s=TRAIL_S, theme=theme))
 
 
 def film(file: Path) -> None:

@@ -11,21 +11,17 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from PIL import Image
-
-from swarm_forage_env import RunSpec, load_policy, parse_wrapper, plan_run, scenario
+from swarm_forage_env import RunSpec, parse_wrapper, plan_run, scenario
 from swarm_forage_env.inspect.film import record_run
 from swarm_forage_env.inspect.replay.capture import record_replay
 from swarm_forage_env.inspect.replay.files import read_replays, write_replays
-from swarm_forage_env.rendering.frame import Trails, render_frame
-from swarm_forage_env.runs.run import LiveRun, build_env
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 FOLDER = DOCS / "gallery"
 HORIZON_S = 1000.0
 FRAME_S = 1.0
 SEED = 1
-TRAIL_S = 40
+TRAIL_S = 40.0
 PICTURE_PX = 560
 
 
@@ -201,16 +197,10 @@ MOST_FILM_BYTES = 400_000
 def draw(exhibit: Exhibit) -> None:
     """Draw the last run of an exhibit at its end, with trails."""
     spec = exhibit.specs()[-1]
-    policy = load_policy(spec.policy)
-    run = LiveRun(build_env(spec.scenario, spec.wrappers), policy, spec.seed)
-    env, trails = run.forage_env, Trails(spec.scenario.robots.n_robots, TRAIL_S + 1)
-    for second in range(TRAIL_S + 1):
-        run.advance(to_tick=round((exhibit.horizon_s - TRAIL_S + second) / spec.scenario.dt_s))
-        trails.add(env.swarm)
-    state = (env.swarm, env.objects, env.caches, env.events)
-    title = f"{spec.scenario.name}, {spec.policy}".replace("_", " ")
-    picture = render_frame(spec.scenario, *state, tick=env.tick, size_px=PICTURE_PX, trails=trails, title=title)
-    Image.fromarray(picture).save(FOLDER / f"{exhibit.name}.png", optimize=True)
+    file = FOLDER / f"{exhibit.name}.png"
+    record_run(
+        spec.world, spec.policy, file, at_s=exhibit.horizon_s, seed=spec.seed, size_px=PICTURE_PX, trail_s=TRAIL_S
+    )
 
 
 def show(exhibit: Exhibit) -> None:

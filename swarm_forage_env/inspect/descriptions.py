@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from swarm_forage_env._internal.fields import ConfigError, known_name
-from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.policies.network import Network
@@ -35,52 +34,44 @@ def overview(what: str | None = None) -> Sheet:
         ConfigError: there is no such list.
     """
     if what is None:
-        return dataclasses.replace(_scenarios(), below=[_policies()])
+        return dataclasses.replace(overview("scenarios"), below=[overview("policies")])
     known_name("list", what, LISTS)
-    return LISTS[what]()
+    header, rows = LISTS[what]
+    return Sheet.of(title=what, header=header, rows=[*rows()])
 
 
-def _scenarios() -> Sheet:
-    rows = [(name, *_scenario_cells(name)) for name in presets.SCENARIO_NAMES]
-    return Sheet.of(title="scenarios", header=("scenario", "robots", "objects", "arena", "what it is"), rows=rows)
+def _scenarios() -> Iterator[tuple[Any, ...]]:
+    for name in presets.SCENARIO_NAMES:
+        config = presets.scenario(name)
+        arena = f"{config.arena.width_m:g} x {config.arena.height_m:g} m"
+        counts = str(config.robots.n_robots), str(config.objects.n_objects)
+        yield name, *counts, arena, _first_line(presets.PRESETS[name])
 
 
-def _scenario_cells(name: str) -> tuple[str, ...]:
-    config = presets.scenario(name)
-    arena = f"{config.arena.width_m:g} x {config.arena.height_m:g} m"
-    return str(config.robots.n_robots), str(config.objects.n_objects), arena, _first_line(presets.PRESETS[name])
+def _policies() -> Iterator[tuple[Any, ...]]:
+    for name in POLICIES:
+        policy = policy_class(name)
+        yield name, stated_caches(policy) or "the scenario's", _first_line(policy)
 
 
-def _policies() -> Sheet:
-    policies = {name: policy_class(name) for name in POLICIES}
-    rows = [(name, _caches(policy), _first_line(policy)) for name, policy in policies.items()]
-    return Sheet.of(title="policies", header=("policy", "caches", "what it is"), rows=rows)
+def _wrappers() -> Iterator[tuple[Any, ...]]:
+    for name in WRAPPERS:
+        config = wrapper_config_class(name)
+        yield name, f"{name}:{config.example}", ", ".join(field.name for field in dataclasses.fields(config))
 
 
-def _wrappers() -> Sheet:
-    classes = {name: wrapper_config_class(name) for name in WRAPPERS}
-    rows = [
-        (name, f"{name}:{config.example}", ", ".join(field.name for field in dataclasses.fields(config)))
-        for name, config in classes.items()
-    ]
-    return Sheet.of(title="wrappers", header=("wrapper", "example", "fields"), rows=rows)
+def _columns() -> Iterator[tuple[Any, ...]]:
+    for name, column in ALL_COLUMNS.items():
+        yield name, column.unit or "-", column.meaning + (" (optional)" if name in CONTRIBUTED_COLUMNS else "")
 
 
-def _columns() -> Sheet:
-    rows = [
-        (name, column.unit or "-", column.meaning + (" (optional)" if name in CONTRIBUTED_COLUMNS else ""))
-        for name, column in ALL_COLUMNS.items()
-    ]
-    return Sheet.of(title="columns", header=("column", "unit", "meaning"), rows=rows)
-
-
-LISTS: dict[str, Callable[[], Sheet]] = {
-    "scenarios": _scenarios,
-    "policies": _policies,
-    "wrappers": _wrappers,
-    "columns": _columns,
+LISTS: dict[str, tuple[tuple[str, ...], Callable[[], Iterable[tuple[Any, ...]]]]] = {
+    "scenarios": (("scenario", "robots", "objects", "arena", "what it is"), _scenarios),
+    "policies": (("policy", "caches", "what it is"), _policies),
+    "wrappers": (("wrapper", "example", "fields"), _wrappers),
+    "columns": (("column", "unit", "meaning"), _columns),
 }
-"""What can be listed -> its table."""
+"""What can be listed -> header and rows of its table."""
 
 
 def describe(name: str) -> Sheet:
@@ -92,28 +83,26 @@ def describe(name: str) -> Sheet:
     return Sheet(notes=tuple(_lines(name)))
 
 
-def _lines(name: str) -> Iterable[str]:
+def _lines(name: str) -> Iterator[str]:
     name = re.sub(r"^swarm_forage/(\w+)-v\d+$", r"\1", name)
-    if name in presets.PRESETS:
-        return _scenario_lines(presets.scenario(name), _first_line(presets.PRESETS[name]))
-    if Path(name).suffix == FILE:
-        world = read_world(name)
-        return _scenario_lines(world.scenario, world.title(digests=False))
-    if name in POLICIES:
-        network = network_file(name)
-        return [*_policy_lines(name), *([] if network is None else ["", *_file_lines(network)])]
     if is_policy_file(name):
-        return _file_lines(Path(file_of(name)))
-    known = (*presets.SCENARIO_NAMES, *POLICIES)
-    raise ConfigError(f"Unknown scenario or policy {name!r}.{suggestion(name, known)} Known: {', '.join(known)}.")
+        yield from _file_lines(Path(file_of(name)))
+    elif Path(name).suffix == FILE:
+        world = read_world(name)
+        yield from _scenario_lines(world.scenario, world.title(digests=False))
+    else:
+        known_name("scenario or policy", name, (*presets.SCENARIO_NAMES, *POLICIES))
+        if name in presets.PRESETS:
+            yield from _scenario_lines(presets.scenario(name), _first_line(presets.PRESETS[name]))
+        else:
+            yield from _policy_lines(name)
 
 
 def _scenario_lines(config: ScenarioConfig, headline: str) -> Iterator[str]:
     spec = SwarmSpec.of(config)
     interface = LearnerInterface(InterfaceConfig(), spec)
     yield f"{config.name}: {headline}"
-    yield ""
-    yield "Fields (change them with --set name=value):"
+    yield "\nFields (change them with --set name=value):"
     for item in dataclasses.fields(config):
         value = getattr(config, item.name)
         if dataclasses.is_dataclass(value):
@@ -122,32 +111,32 @@ def _scenario_lines(config: ScenarioConfig, headline: str) -> Iterator[str]:
                 yield f"    {inner.name:<34}{in_words(getattr(value, inner.name))}"
         else:
             yield f"  {item.name:<36}{in_words(value)}"
-    yield ""
-    yield "Spaces, per robot:"
+    yield "\nSpaces, per robot:"
     yield f"  action       {interface.action_space}: left wheel, right wheel, gripper"
     yield f"  observation  {interface.observation_space}"
     yield f"  state()      Box(-1.0, 1.0, ({spec.state_size},), float32)"
-    yield ""
-    yield "Observation:"
+    yield "\nObservation:"
     yield spec.layout.describe()
 
 
 def _policy_lines(name: str) -> Iterator[str]:
-    policy = policy_class(name)
-    network = network_file(name)
-    reads = getattr(policy, "reads", None) if network is None else Network.load(network).about.interface.reads
+    policy, file = policy_class(name), network_file(name)
+    caches = stated_caches(policy)
+    reads = getattr(policy, "reads", None) if file is None else Network.load(file).about.interface.reads
     yield f"{name}: {_first_paragraph(policy)}"
-    yield ""
-    yield f"  defined in  {policy.__module__}"
-    yield f"  caches      {_caches(policy, ' (the caches it is made for)')}"
+    yield f"\n  defined in  {policy.__module__}"
+    made_for = "the scenario's" if caches is None else f"{caches} (the caches it is made for)"
+    yield f"  caches      {made_for}"
     yield f"  reads       {'all slices' if reads is None else ', '.join(reads) or 'nothing'}"
-    settings = tuple(_settings(policy))
-    if not settings:
-        yield "  parameters  none"
-    else:
-        yield ""
-        yield "Parameters (change them in a study file, or in Python with plan_run(..., parameters={name: value})):"
+    settings = [*_settings(policy)]
+    if settings:
+        yield "\nParameters (change them in a study file, or in Python with plan_run(..., parameters={name: value})):"
         yield from (f"  {field:<34}{in_words(value)}" for field, value in settings)
+    else:
+        yield "  parameters  none"
+    if file is not None:
+        yield ""
+        yield from _file_lines(file)
 
 
 def _settings(policy: Callable[..., Any]) -> Iterator[tuple[str, Any]]:
@@ -159,11 +148,6 @@ def _settings(policy: Callable[..., Any]) -> Iterator[tuple[str, Any]]:
     for name, argument in arguments.items():
         if argument.kind not in (argument.VAR_KEYWORD, argument.VAR_POSITIONAL):
             yield name, "to be given" if argument.default is argument.empty else argument.default
-
-
-def _caches(policy: object, if_stated: str = "") -> str:
-    stated = stated_caches(policy)
-    return "the scenario's" if stated is None else f"{stated}{if_stated}"
 
 
 def _file_lines(file: Path) -> Iterator[str]:

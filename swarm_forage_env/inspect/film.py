@@ -6,7 +6,6 @@ so filming does not change a run.
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +17,9 @@ from swarm_forage_env.rendering.frame import Trails, render_frame
 from swarm_forage_env.rendering.video import Frame, check_film, write_film
 from swarm_forage_env.rendering.view import arena_view
 from swarm_forage_env.runs.run import LiveRun, build_env
-from swarm_forage_env.runs.spec import chosen_caches, pin_policy
+from swarm_forage_env.runs.spec import chosen_caches, plan_run
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.wrappers.world import World, WorldLike, world_of
+from swarm_forage_env.wrappers.world import WorldLike, world_of
 
 
 def record_run(
@@ -43,7 +42,7 @@ def record_run(
     """Run a policy and film it, or draw it at one time.
 
     Args:
-        world: A `World`, a configuration or the name of a preset; its horizon need not be whole recording intervals.
+        world: A `World`, a configuration or the name of a preset.
         policy: Name of an installed policy, path of a policy file, or a fresh policy object.
         path: File to write, .gif or .mp4; with `at_s` .png.
         at_s: Simulated time of the only picture.
@@ -84,9 +83,16 @@ def record_run(
         n_samples = len(ticks)
     check_file(path)
     arena_view(scenario, size_px, theme)  # refuses a bad size or theme before the run starts
-    policy, name, scenario = cast_policy(policy, scenario, caches, parameters)
-    arena_words = f"{scenario.arena.width_m:g} x {scenario.arena.height_m:g} m"
-    title = World(scenario, given.wrappers).title(name, arena_words, digests=False)
+    if isinstance(policy, str):
+        spec = plan_run(given, policy, parameters=parameters, caches=caches)
+        given, name, policy = spec.world, policy_label(spec.policy), load_policy(spec.policy, spec.parameters)
+    elif parameters:
+        raise ConfigError(f"Expected parameters with a policy's name or file only, got them with {policy!r}.")
+    else:
+        name = getattr(policy, "name", type(policy).__name__)
+        given = given.with_caches(chosen_caches(caches, policy, scenario))
+    scenario = given.scenario
+    title = given.title(name, f"{scenario.arena.width_m:g} x {scenario.arena.height_m:g} m", digests=False)
     stack = build_env(scenario, given.wrappers, reads=getattr(policy, "reads", None))
     trails = Trails(scenario.robots.n_robots, n_samples) if n_samples > 1 else None
 
@@ -119,25 +125,6 @@ def write_picture(frame: Frame, path: Path) -> None:
 
     with replacing(path, ending=".png") as draft:
         Image.fromarray(frame).save(draft, optimize=True)
-
-
-def cast_policy(
-    policy: str | Policy, scenario: ScenarioConfig, caches: str | None, parameters: Mapping[str, Any] | None
-) -> tuple[Policy, str, ScenarioConfig]:
-    """Return the policy as an object, its name for people, and the scenario with the caches that the run has.
-
-    Arguments and errors are those of `record_run`.
-    """
-    stating: object = policy
-    if isinstance(policy, str):
-        name = policy_label(policy)
-        found, pinned, stating = pin_policy(policy, parameters or {})
-        policy = load_policy(found, pinned)
-    elif parameters:
-        raise ConfigError(f"Expected parameters with a policy's name or file only, got them with {policy!r}.")
-    else:
-        name = getattr(policy, "name", type(policy).__name__)
-    return policy, name, replace(scenario, caches=chosen_caches(caches, stating, scenario))
 
 
 def _trail_ticks(scenario: ScenarioConfig, at_s: float, trail_s: float) -> list[int]:

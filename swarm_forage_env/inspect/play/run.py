@@ -8,10 +8,10 @@ from typing import Any
 
 from swarm_forage_env.contract.codes import Counter, Task
 from swarm_forage_env.contract.policy import RememberedPlaces
-from swarm_forage_env.inspect.film import cast_policy
 from swarm_forage_env.inspect.play.levels import Levels, with_idle
 from swarm_forage_env.inspect.replay.capture import Capture, ticks_between_frames
 from swarm_forage_env.inspect.replay.frames import Replay
+from swarm_forage_env.policies.registry import load_policy, policy_label
 from swarm_forage_env.runs.run import LiveRun, build_env
 from swarm_forage_env.runs.spec import RunSpec
 
@@ -29,7 +29,7 @@ class RunByHand:
         spec: The run, as it was started.
         policy: The policy; only read it.
         name: Name of the policy, for people.
-        scenario: The scenario, with the caches that the policy asks for.
+        scenario: The scenario of the run.
         run: The run; it goes on by `advance` and `step` only.
         world: Its environment; only read it.
         levels: What can be changed by hand.
@@ -44,10 +44,11 @@ class RunByHand:
         Raises:
             ValueError: unknown policy name, or a policy file that cannot be opened or does not fit the scenario.
         """
-        self.spec, here = spec, spec.scenario
-        policy, self.name, self.scenario = cast_policy(spec.policy, here, here.caches, spec.parameters)
+        self.spec, self.name, self.scenario = spec, policy_label(spec.policy), spec.scenario
+        here = self.scenario
+        policy = load_policy(spec.policy, spec.parameters)
         self.policy: Any = policy
-        stack = build_env(self.scenario, with_idle(spec.wrappers), reads=getattr(policy, "reads", None))
+        stack = build_env(here, with_idle(spec.wrappers), reads=getattr(policy, "reads", None))
         self.levels = Levels(stack)
         self.run = LiveRun(stack, policy, spec.seed)
         self.world = self.run.forage_env
