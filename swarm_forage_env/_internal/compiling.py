@@ -109,8 +109,12 @@ def part(function: F) -> F:
 
 
 def inline_kernel(function: F) -> F:
-    """Compile a function into each of its callers; it may take other compiled functions as arguments."""
-    return cast(F, njit(inline="always", **_OPTIONS)(function))
+    """Compile a function into each of its callers, and on its own for calls from Python only.
+
+    It may take other compiled functions as arguments. For the phases of a tick: each level of functions that call each
+    other is optimized anew with all that is in it, and one level less is seconds less.
+    """
+    return _kept(function, functools.partial(njit, inline="always", no_cfunc_wrapper=True, **_OPTIONS))
 
 
 def is_compiled(function: Callable[..., Any]) -> bool:

@@ -18,7 +18,7 @@ sense           the rest of the observation
 from collections.abc import Callable
 from typing import Any
 
-from swarm_forage_env._internal.compiling import kernel, part
+from swarm_forage_env._internal.compiling import inline_kernel, kernel, part
 from swarm_forage_env._internal.held import opened
 from swarm_forage_env._internal.prefetching import LARGE
 from swarm_forage_env.contract.codes import Counter
@@ -69,7 +69,7 @@ def look(a: ArenaArrays) -> None:
     )
 
 
-@part
+@inline_kernel
 def sense(a: ArenaArrays) -> None:
     """Complete the observation after `look`; slices that are not read may stay zero."""
     swarm, objects, events, s = a.state.swarm, a.state.objects, a.state.events, a.sensors
@@ -131,7 +131,7 @@ def observe(a: ArenaArrays) -> None:
     sense(a)
 
 
-@kernel
+@inline_kernel
 def set_out(a: ArenaArrays, actions: ActionArray, wheel_gain: FloatArray, tick: int, look_first: bool) -> int:
     """From actions to velocities of the bodies, in tick number `tick`.
 
@@ -160,7 +160,7 @@ def set_out(a: ArenaArrays, actions: ActionArray, wheel_gain: FloatArray, tick: 
     return DONE
 
 
-@part
+@inline_kernel
 def meet(a: ArenaArrays, actions: ActionArray, tick: int, chance: FloatArray) -> bool:
     """After the bodies have moved: who is near, who is in interference, who picks up and drops.
 
@@ -185,7 +185,7 @@ def _alive(caches: CacheState) -> int:
     return n_alive
 
 
-@kernel
+@inline_kernel
 def close(a: ArenaArrays, walk_chance: FloatArray) -> None:
     """After everything is placed: objects walk, caches are counted, robots sense.
 
@@ -205,7 +205,7 @@ def close(a: ArenaArrays, walk_chance: FloatArray) -> None:
     sense(a)
 
 
-@kernel
+@inline_kernel
 def meet_and_close(a: ArenaArrays, actions: ActionArray, tick: int, chance: FloatArray, walk_chance: FloatArray) -> int:
     """`meet`, then `close` unless anything is to be placed; returns `DONE` or `TO_PLACE`."""
     a = opened(a)
@@ -215,7 +215,7 @@ def meet_and_close(a: ArenaArrays, actions: ActionArray, tick: int, chance: Floa
     return DONE
 
 
-@kernel
+@inline_kernel
 def whole(
     a: ArenaArrays,
     b: BodyState,
@@ -238,7 +238,7 @@ def whole(
     return meet_and_close(a, actions, tick, chance, walk_chance)
 
 
-@part
+@inline_kernel
 def disturb_senses(d: Disturbances, k: int, a: ArenaArrays) -> None:
     """Write noise into the observation after tick `k` of `d`, if there is any."""
     if d.lanes.shape[0] == 0:
