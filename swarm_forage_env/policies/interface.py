@@ -245,25 +245,16 @@ class LearnerInterface:
         return self.layout.part("active").start
 
     def forget(self) -> None:
-        """Forget what robots remember: a run begins."""
-        for part in (*self.translation.sites, self.translation.frames.taken):
+        """Forget what robots remember, and let them have the frames of the first decision: a run begins."""
+        for part in self.translation.sites:
             part[...] = 0
+        frames = self.translation.frames
+        if frames.length:
+            frames.taken[:] = [frame_of(robot, 0, frames.length) for robot in range(len(frames.taken))]
 
     def memory(self) -> SiteMemory | None:
         """Return a copy of what robots remember; None without memory."""
         return copy.deepcopy(self.translation.sites) if self.config.site_memory else None
-
-    def recall(self, memory: SiteMemory | None) -> None:
-        """Let robots remember what `memory()` of an interface of the same choices and swarm returned."""
-        if memory is not None:
-            for part, kept in zip(self.translation.sites, memory, strict=True):
-                np.copyto(part, kept)
-
-    def enter(self, decision: int) -> None:
-        """Let robots have the frames of a decision without looking, which `observe` does anyway; see there."""
-        frames = self.translation.frames
-        if frames.length:
-            frames.taken[:] = [frame_of(robot, decision, frames.length) for robot in range(len(frames.taken))]
 
     def observe(
         self,

@@ -14,7 +14,7 @@ from swarm_forage_env.contract.types import BoolArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import LearnerInterface
 from swarm_forage_env.views.arenas import ArenaStep, open_arenas
-from swarm_forage_env.views.learner_arena import LearnerArena, LearnerSnapshot
+from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.plans import constructor_takes, plan_arena
 from swarm_forage_env.wrappers.base import WrapperConfig
 
@@ -88,15 +88,6 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
         env = self.forage_env
         terminated, truncated = bool(env.terminated.all()), env.tick >= env.max_cycles
         return self._arena.observe(), float(rewards.sum()), terminated, truncated, self._info()
-
-    def snapshot(self) -> LearnerSnapshot:
-        """Return the state of the run as a value; see `ForageEnv.snapshot`."""
-        return self._arena.snapshot()
-
-    def restore(self, snapshot: LearnerSnapshot) -> tuple[ObsArray, dict[str, Any]]:
-        """Go back to a snapshot; returns observations (N, d) and info. See `ForageEnv.restore`."""
-        self._arena.restore(snapshot)
-        return self._arena.observe(), self._info()
 
     def render(self) -> np.ndarray | None:
         """Return a picture (height, width, 3) uint8 when created with render_mode="rgb_array", else None."""

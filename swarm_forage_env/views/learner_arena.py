@@ -1,8 +1,7 @@
 """One arena for learning: environment, wrappers, interface, seeds, and fields overridden for a curriculum."""
 
 import copy
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -14,37 +13,16 @@ from swarm_forage_env.contract.reset_and_step import OPTION_OF_TESTS
 from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.extras import ExtraFunctionError, extra_columns, extra_rewards
-from swarm_forage_env.policies.interface import MOTIONS, InterfaceConfig, LearnerInterface
-from swarm_forage_env.policies.kernels.learner import SiteMemory
+from swarm_forage_env.policies.interface import MOTIONS, LearnerInterface
 from swarm_forage_env.policies.kernels.network import keep_on
 from swarm_forage_env.views.plans import ArenaPlan
 from swarm_forage_env.world.arena import UNDISTURBED
 from swarm_forage_env.world.kernels.disturbances import Disturbances
-from swarm_forage_env.world.snapshots import Snapshot, SnapshotError
 from swarm_forage_env.wrappers.base import SwarmWrapper, needs_no_python
 from swarm_forage_env.wrappers.world import World
 
 SCENARIO_OPTION = "scenario"
 """The only reset option."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False, slots=True)
-class LearnerSnapshot:
-    """The state of a `LearnerArena` or of a view of it; as `world.snapshots.Snapshot`, it can be pickled."""
-
-    stack: Snapshot
-    """Of the environment and its wrappers."""
-    interface: InterfaceConfig
-    overrides: Mapping[str, Any]
-    """Scenario fields that a reset has overridden."""
-    world: World | None
-    """What the sampler drew for the run; None without a sampler."""
-    seeds: Mapping[str, Any]
-    """State of the generator of the next seeds."""
-    agents: tuple[str, ...] = ()
-    """Agents of a parallel environment that are left."""
-    memory: SiteMemory | None = None
-    """What robots remember, where the interface lets them."""
 
 
 class LearnerArena:
@@ -119,7 +97,6 @@ class LearnerArena:
         self.env.reset_batch(seed)
         self._begin()
         self.interface.forget()
-        self.interface.enter(0)
 
     def _begin(self) -> None:
         """Find out, once per run, whether several ticks can be one compiled call."""
@@ -196,59 +173,6 @@ class LearnerArena:
             if env.scenario.reward.team:
                 values = values.sum() / max(1, np.count_nonzero(env.active)) * env.active
             rewards += values
-
-    def snapshot(self, *, agents: Sequence[str] = ()) -> LearnerSnapshot:
-        """Return the state of the run and of the sequence of seeds; see `ForageEnv.snapshot`."""
-        return LearnerSnapshot(
-            stack=self.env.snapshot(),
-            interface=self._plan.interface,
-            overrides=dict(self._overrides),
-            world=self._world,
-            seeds=self._seeds.bit_generator.state,
-            agents=tuple(agents),
-            memory=self.interface.memory(),
-        )
-
-    def restore(self, snapshot: LearnerSnapshot) -> None:
-        """Go back to a snapshot of this arena or of one of the same plan; see `ForageEnv.restore`.
-
-        Raises:
-            SnapshotError: not such a snapshot, or one of another interface, scenario, sampler or stack; nothing
-                changes.
-        """
-        if not isinstance(snapshot, LearnerSnapshot):  # pyright: ignore[reportUnnecessaryIsInstance] - from users
-            raise SnapshotError(
-                f"Expected a LearnerSnapshot, as `snapshot()` of an environment with an interface returns it, got "
-                f"{type(snapshot).__name__}."
-            )
-        if snapshot.interface != self._plan.interface:
-            raise SnapshotError(
-                f"Expected a snapshot of an environment with {self._plan.interface}, got one with {snapshot.interface}."
-            )
-        if (snapshot.world is None) != (self._plan.sampler is None):
-            here, there = ("without", "with") if self._plan.sampler is None else ("with", "without")
-            raise SnapshotError(
-                f"Expected a snapshot of an environment {here} a sampler, got one {there}; restore it in one that is "
-                "made alike."
-            )
-        before, interface = self.env, self.interface
-        is_same = (snapshot.overrides, snapshot.world) == (self._overrides, self._world)
-        if is_same:
-            env = before
-        else:
-            try:
-                env, interface = self._built(snapshot.overrides, snapshot.world)
-            except ConfigError as error:
-                raise SnapshotError(f"Expected a snapshot of a world that can be here: {error}") from error
-        env.restore_batch(snapshot.stack)
-        if not is_same:
-            self._adopt(env, interface)
-            self._overrides, self._world = dict(snapshot.overrides), snapshot.world
-            before.close()
-        self._begin()
-        self._seeds.bit_generator.state = snapshot.seeds
-        self.interface.recall(snapshot.memory)
-        self.interface.enter(self._decision)
 
     @property
     def active(self) -> BoolArray:

@@ -11,7 +11,7 @@ from swarm_forage_env.contract.policy import state_size
 from swarm_forage_env.contract.reset_and_step import is_over
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import LearnerInterface
-from swarm_forage_env.views.learner_arena import LearnerArena, LearnerSnapshot
+from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.plans import constructor_takes, plan_arena, takes
 
 Infos = dict[str, dict[str, Any]]
@@ -126,16 +126,6 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
         )
         self.agents = [] if truncated else [agent for agent in self.agents if not dead[self._row_of[agent]]]
         return results
-
-    def snapshot(self) -> LearnerSnapshot:
-        """Return the state of the run as a value; see `ForageEnv.snapshot`."""
-        return self._arena.snapshot(agents=self.agents)
-
-    def restore(self, snapshot: LearnerSnapshot) -> dict[str, np.ndarray]:
-        """Go back to a snapshot; returns observations per agent. See `ForageEnv.restore`."""
-        self._arena.restore(snapshot)
-        self.agents = list(snapshot.agents)
-        return self._per_agent(self._arena.observe())
 
     def _chosen(self, actions: dict[str, Any]) -> np.ndarray:
         """Return one row per robot; zeros for robots that have left."""

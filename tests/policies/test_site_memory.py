@@ -1,5 +1,6 @@
 """Site memory of learners: against a slow twin along runs, and its rules by hand."""
 
+import copy
 import pickle
 
 import numpy as np
@@ -99,18 +100,17 @@ def test_a_robot_remembers_an_object_seen_on_its_way_home():
     assert seen(interface, env, "sighting_site")[2] == 0.0, "that was the object"
 
 
-def test_a_new_run_begins_without_memory_and_a_snapshot_brings_it_back():
+def test_a_new_run_begins_without_memory_and_a_copy_has_it():
     plan = plan_arena("warehouse_small", n_robots=2, physics="compiled", interface=INTERFACE)
     arena = LearnerArena(plan)
     sites = slice(arena.interface.layout["pickup_site"].start, arena.interface.layout["sighting_site"].stop)
     arena.reset(0)
-    arena.interface.recall(SiteMemory(np.full((2, 2, 2), 3.0), np.ones((2, 2), np.bool_), np.ones(2, np.bool_)))
-    shown = remembered(arena.interface)
-    snapshot = arena.snapshot()
+    for part, value in zip(arena.interface.translation.sites, (3.0, True, True), strict=True):
+        part[...] = value
+    other, shown = copy.deepcopy(arena), remembered(arena.interface)
     arena.reset()
     assert not arena.observe()[:, sites].any()
-    arena.restore(snapshot)
-    for part, kept in zip(remembered(arena.interface), shown, strict=True):
+    for part, kept in zip(remembered(other.interface), shown, strict=True):
         np.testing.assert_array_equal(part, kept)
 
 

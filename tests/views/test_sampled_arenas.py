@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from pettingzoo.test import parallel_api_test
 
-from swarm_forage_env import SnapshotError, parallel_env
+from swarm_forage_env import parallel_env
 from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.views.arenas import ArenaBatch
@@ -127,23 +127,6 @@ def test_the_global_state_has_robots_and_objects_in_their_places():
     np.testing.assert_array_equal(state[36 : 36 + 3 * n_objects], own[6 * n_robots :])
     assert not state[6 * n_robots : 36].any()
     assert not state[36 + 3 * n_objects :].any()
-
-
-def test_a_snapshot_of_one_world_is_restored_from_another():
-    env = ParallelLearnerEnv(sampler=WORLDS, interface=COMPACT)
-    first, _ = env.reset(seed=3)
-    kept = env.snapshot()
-    env.reset(seed=5)
-    restored = env.restore(kept)
-    assert restored.keys() == first.keys()
-    np.testing.assert_array_equal(np.stack(list(restored.values())), np.stack(list(first.values())))
-
-
-def test_a_snapshot_of_a_drawn_world_needs_a_sampler():
-    env, other = ParallelLearnerEnv("warehouse_small", n_robots=2), ParallelLearnerEnv(sampler=worlds_of())
-    other.reset(seed=3)
-    with pytest.raises(SnapshotError, match="without a sampler, got one with;"):
-        env.restore(other.snapshot())
 
 
 def test_the_central_view_is_padded():
