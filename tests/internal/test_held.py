@@ -1,13 +1,13 @@
 """Tuples that compiled code finds by one address."""
 
 import copy
-import pickle
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env._internal.held import hold, opened
+from tests.support.branches import pickled
 
 
 class Inner(NamedTuple):
@@ -46,7 +46,7 @@ def test_a_held_tuple_is_read_and_written_as_the_tuple_is():
 def test_copies_have_arrays_of_their_own():
     outer = new_outer()
     pair = outer, hold(outer)
-    for theirs, held in (copy.deepcopy(pair), pickle.loads(pickle.dumps(pair))):
+    for theirs, held in (copy.deepcopy(pair), pickled(pair)):
         add_up(held)
         assert theirs.values[0, 0] == 3.5
     assert outer.values[0, 0] == 0.0
