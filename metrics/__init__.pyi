@@ -72,11 +72,10 @@ from .scoring import ForagingLimit as ForagingLimit
 from .statistics import normalize as normalize
 from .statistics import Summary as Summary
 from .statistics import aggregate as aggregate
-from .statistics import bootstrap_measure as bootstrap_measure
 from .statistics import Estimate as Estimate
-from .distributions import interquartile_mean as interquartile_mean
-from .distributions import probability_of_improvement as probability_of_improvement
-from .significance import paired_tests as paired_tests
+from .statistics import interquartile_mean as interquartile_mean
+from .statistics import probability_of_improvement as probability_of_improvement
+from .statistics import paired_tests as paired_tests
 
 # claims of the paper
 from .controllers import PAPER_POLICIES as PAPER_POLICIES

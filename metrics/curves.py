@@ -6,7 +6,6 @@ scored: the result of that run is NaN, and the other runs are not affected. Infi
 per interval is finite and a distance between infinite curves has no meaning.
 """
 
-from collections.abc import Iterable
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -60,10 +59,10 @@ def as_curves(*, signed: bool = False, **curves: ArrayLike | None) -> tuple[Floa
         CurveError: One of them is no curve (see `as_curve`), or they differ in T or do not broadcast.
     """
     arrays = {name: as_curve(name, values, signed=signed) for name, values in curves.items()}
-    shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
     if len({array.shape[-1] for array in arrays.values()}) > 1:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
         raise CurveError(f"Expected curves with equally many intervals T on the last axis, got {shapes}.")
-    check_broadcast(arrays.values(), shapes)
+    check_broadcast(*arrays.values())
     return tuple(arrays.values())
 
 
@@ -83,12 +82,13 @@ def as_interference(**fractions: ArrayLike | None) -> tuple[FloatArray, ...]:
     return arrays
 
 
-def as_waveforms(n_intervals: int, **waveforms: ArrayLike | None) -> tuple[FloatArray, ...]:
-    """Return the named environment signals with n_intervals samples each; a number stands for a constant signal.
+def as_waveforms(*curves: FloatArray, **waveforms: ArrayLike | None) -> tuple[FloatArray, ...]:
+    """Return the named environment signals with as many samples as the curves; a number stands for a constant signal.
 
     Raises:
-        CurveError: A signal is missing, infinite or of another length.
+        CurveError: A signal is missing, infinite or of another length, or does not broadcast with the curves.
     """
+    n_intervals = curves[0].shape[-1]
     arrays: list[FloatArray] = []
     for name, values in waveforms.items():
         wave = as_curve(name, values, signed=True)
@@ -97,18 +97,16 @@ def as_waveforms(n_intervals: int, **waveforms: ArrayLike | None) -> tuple[Float
         if wave.shape[-1] != n_intervals:
             raise CurveError(f"Expected {name} with one sample per interval, T = {n_intervals}, got {wave.shape}.")
         arrays.append(wave)
+    check_broadcast(*curves, *arrays)
     return tuple(arrays)
 
 
-def check_broadcast(arrays: Iterable[FloatArray], shapes: str) -> None:
-    """Check that the axes before the last broadcast; `shapes` describes the arrays.
-
-    Raises:
-        CurveError: They do not.
-    """
+def check_broadcast(*arrays: FloatArray) -> None:
+    """Check that the axes before the last broadcast; CurveError if they do not."""
     try:
         np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
     except ValueError as error:
+        shapes = ", ".join(str(array.shape) for array in arrays)
         raise CurveError(f"Expected run axes that broadcast, got {shapes}; pair runs one to one or average.") from error
 
 
@@ -122,10 +120,8 @@ def reduce_intervals(theta: FloatArray, reduce: Reduction, *inputs: FloatArray) 
     check_option("reduce", reduce, Reduction)
     if reduce == "last":
         value = theta[..., -1]
-    elif reduce == "mean":
-        value = theta.mean(axis=-1)
     else:
-        value = theta.sum(axis=-1)
+        value = theta.mean(axis=-1) if reduce == "mean" else theta.sum(axis=-1)
     for curve in inputs:
         value = np.where(np.isnan(curve).any(axis=-1), np.nan, value)
     return value[()]

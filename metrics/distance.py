@@ -37,7 +37,7 @@ def dtw(x: ArrayLike, y: ArrayLike) -> FloatArray:
         CurveError: A curve is missing, empty or infinite, or leading axes do not broadcast.
     """
     x, y = as_curve("x", x, signed=True), as_curve("y", y, signed=True)
-    check_broadcast((x, y), f"x {x.shape}, y {y.shape}")
+    check_broadcast(x, y)
     n, m = int(x.shape[-1]), int(y.shape[-1])
     shape = np.broadcast_shapes(x.shape[:-1], y.shape[:-1])
     all_x = np.ascontiguousarray(np.broadcast_to(x, (*shape, n))).reshape(-1, n)

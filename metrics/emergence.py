@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .checks import check_option, check_size, check_size_order
+from .checks import check_option, check_sizes
 from .curves import (
     FloatArray,
     Reduction,
@@ -65,15 +65,14 @@ def spatial_emergence(
     E_S weights the time lost with performance. If performance falls from N1 to N2, the weight falls too, and E_S can be
     positive although robots lose more time. So look at `time_emergence`, too.
     """
-    n1, n2 = check_size("n1", n1), check_size("n2", n2)
+    n1, n2 = check_sizes(n1, n2)
     if perf_one is None and t_lost_one is None and n1 > 1:
         perf_one = t_lost_one = np.zeros(np.shape(perf1)[-1:])  # their terms cancel, whatever they are
-    perf1, t_lost1, perf2, t_lost2, perf_one, t_lost_one = as_curves(
+    inputs = as_curves(
         perf1=perf1, t_lost1=t_lost1, perf2=perf2, t_lost2=t_lost2, perf_one=perf_one, t_lost_one=t_lost_one
     )
-    inputs = (perf1, t_lost1, perf2, t_lost2, perf_one, t_lost_one)
+    perf1, t_lost1, perf2, t_lost2, perf_one, t_lost_one = inputs
     check_option("variant", variant, Variant)
-    check_size_order(n1, n2)
     lost1 = performance_lost(perf1, t_lost1, n1, perf_one, t_lost_one)
     lost2 = performance_lost(perf2, t_lost2, n2, perf_one, t_lost_one)
     if variant == "corrected" and n1 == 1:
@@ -111,8 +110,7 @@ def time_emergence(
         CurveError: Fractions are missing, outside [0, 1] or of different length, or n1 >= n2.
         ValueError: Unknown reduction.
     """
-    n1, n2 = check_size("n1", n1), check_size("n2", n2)
-    check_size_order(n1, n2)
+    n1, n2 = check_sizes(n1, n2)
     t_lost1, t_lost2 = as_interference(t_lost1=t_lost1, t_lost2=t_lost2)
     return reduce_intervals(n2 * (t_lost1 - t_lost2), reduce, t_lost1, t_lost2)
 
@@ -144,8 +142,7 @@ def task_emergence(
         CurveError: Curves are missing, negative, infinite or of different length, or n1 >= n2.
         ValueError: Unknown reduction.
     """
-    n1, n2 = check_size("n1", n1), check_size("n2", n2)
-    check_size_order(n1, n2)
+    n1, n2 = check_sizes(n1, n2)
     perf1, perf2 = as_curves(perf1=perf1, perf2=perf2)
     gain = reduce_intervals(perf2 - n2 / n1 * perf1, reduce, perf1, perf2)
     return per_performance(gain, perf2, reduce) if relative else gain
@@ -230,17 +227,13 @@ def _undisturbed(
     perf1: ArrayLike, t_lost1: ArrayLike, n1: int, perf2: ArrayLike, t_lost2: ArrayLike, n2: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return f1, u1, f2, u2, each (...,), and the summed performance of the larger swarm, (..., 1)."""
-    n1, n2 = check_size("n1", n1), check_size("n2", n2)
-    check_size_order(n1, n2)
+    n1, n2 = check_sizes(n1, n2)
     perf1, t_lost1, perf2, t_lost2 = as_curves(perf1=perf1, t_lost1=t_lost1, perf2=perf2, t_lost2=t_lost2)
     as_interference(t_lost1=t_lost1, t_lost2=t_lost2)
-    f1, u1 = _undisturbed_rate(perf1, t_lost1, n1)
-    f2, u2 = _undisturbed_rate(perf2, t_lost2, n2)
+    f1, f2 = t_lost1.mean(axis=-1), t_lost2.mean(axis=-1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        u1, u2 = (
+            np.where(f < 1.0, perf.sum(axis=-1) / (n * (1.0 - f)), np.nan)
+            for perf, n, f in ((perf1, n1, f1), (perf2, n2, f2))
+        )
     return f1, u1, f2, u2, perf2.sum(axis=-1, keepdims=True)
-
-
-def _undisturbed_rate(perf: FloatArray, t_lost: FloatArray, n: int) -> tuple[FloatArray, FloatArray]:
-    fraction, total = t_lost.mean(axis=-1), perf.sum(axis=-1)
-    undisturbed = 1.0 - fraction
-    never = undisturbed <= 0.0
-    return fraction, np.where(never, np.nan, total / (n * np.where(never, 1.0, undisturbed)))

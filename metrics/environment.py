@@ -113,14 +113,11 @@ def environment_scaling(v: ArrayLike, i_ec: ArrayLike, *, model: ScalingModel = 
         raise CurveError(f"Expected v and i_ec on the same intervals, got {v.shape} and {i_ec.shape}.") from error
     if model == "linear":
         scaling = 1.0 - (v - i_ec)
-    elif model == "reciprocal":
-        if (v == 0.0).any():
-            raise CurveError("Expected v != 0 for model='reciprocal', got 0; use model='linear' for throttles.")
-        scaling = i_ec / v
     else:
-        if (i_ec == 0.0).any():
-            raise CurveError("Expected i_ec != 0 for model='paper', which divides by it, got 0; use model='linear'.")
-        scaling = v / i_ec
+        name, above, below = ("v", i_ec, v) if model == "reciprocal" else ("i_ec", v, i_ec)
+        if (below == 0.0).any():
+            raise CurveError(f"Expected {name} != 0, by which model={model!r} divides; use model='linear'.")
+        scaling = above / below
     return scaling[0] if scalars else scaling
 
 
@@ -137,7 +134,7 @@ def environment_distance(v: ArrayLike, i_ec: ArrayLike) -> float:
     Raises:
         CurveError: The signals are missing, infinite, of different length, or not one signal each.
     """
-    v, i_ec = as_waveforms(as_curve("v", v, signed=True).shape[-1], v=v, i_ec=i_ec)
+    v, i_ec = as_waveforms(as_curve("v", v, signed=True), v=v, i_ec=i_ec)
     if v.ndim != 1 or i_ec.ndim != 1:
         raise CurveError(f"Expected one signal each, shape (T,), got v {v.shape} and i_ec {i_ec.shape}.")
     return float(dtw(i_ec, v))

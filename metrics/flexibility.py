@@ -5,7 +5,7 @@ Robustness to a changing population is in `population`.
 
 from numpy.typing import ArrayLike
 
-from .curves import FloatArray, as_curves, as_waveforms, check_broadcast, per_performance, reduce_intervals
+from .curves import FloatArray, as_curves, as_waveforms, per_performance, reduce_intervals
 from .distance import dtw
 from .environment import ScalingModel, environment_scaling
 
@@ -44,20 +44,12 @@ def reactivity(
         ValueError: Unknown option.
     """
     perf_ideal, perf = as_curves(perf_ideal=perf_ideal, perf=perf)
-    v, i_ec = as_waveforms(perf.shape[-1], v=v, i_ec=i_ec)
-    shapes = f"perf_ideal {perf_ideal.shape}, perf {perf.shape}, v {v.shape}, i_ec {i_ec.shape}"
-    check_broadcast((perf_ideal, perf, v, i_ec), shapes)
-    perfectly_reactive = environment_scaling(v, i_ec, model=model) * perf_ideal
-    distance = dtw(perfectly_reactive, perf)
+    v, i_ec = as_waveforms(perf_ideal, perf, v=v, i_ec=i_ec)
+    distance = dtw(environment_scaling(v, i_ec, model=model) * perf_ideal, perf)
     return per_performance(distance, perf_ideal) if relative else distance
 
 
-def adaptability(
-    perf_ideal: ArrayLike,
-    perf: ArrayLike,
-    *,
-    relative: bool = False,
-) -> FloatArray:
+def adaptability(perf_ideal: ArrayLike, perf: ArrayLike, *, relative: bool = False) -> FloatArray:
     """Adaptability A(N), Eq. (7): distance from a swarm whose performance does not change at all.
 
         P_A*(t) = P_ideal(t)        A = DTW( P_A*, P )
@@ -81,12 +73,7 @@ def adaptability(
     return per_performance(distance, perf_ideal) if relative else distance
 
 
-def noise_robustness(
-    perf_ideal: ArrayLike,
-    perf: ArrayLike,
-    *,
-    relative: bool = False,
-) -> FloatArray:
+def noise_robustness(perf_ideal: ArrayLike, perf: ArrayLike, *, relative: bool = False) -> FloatArray:
     """Sensor and actuator noise robustness B_sa = DTW( P_ideal, P ), Eq. (8). Lower is better.
 
     A distance has no sign: a swarm that delivers more under noise scores badly, too. Report `mean_signed_difference`
@@ -96,17 +83,15 @@ def noise_robustness(
     Args:
         perf_ideal: Performance without noise, shape (..., T), objects per interval.
         perf: Performance P(N, t) with noise, same intervals.
-        relative: Divide by the summed P_ideal, see `metrics.curves.per_performance`.
+        relative: As in `reactivity`.
 
     Returns:
         B_sa >= 0, shape (...,), in the unit of `perf`; a pure number if relative.
 
     Raises:
-        CurveError: Curves are missing, negative, infinite or of different length.
+        CurveError: As in `adaptability`.
     """
-    perf_ideal, perf = as_curves(perf_ideal=perf_ideal, perf=perf)
-    distance = dtw(perf_ideal, perf)
-    return per_performance(distance, perf_ideal) if relative else distance
+    return adaptability(perf_ideal, perf, relative=relative)
 
 
 def mean_signed_difference(perf_ideal: ArrayLike, perf: ArrayLike) -> FloatArray:

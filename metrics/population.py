@@ -6,23 +6,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .checks import (
-    CurveError,
-    PopulationError,
-    check_horizon,
-    check_option,
-    check_size,
-    check_whole,
-)
-from .curves import (
-    FloatArray,
-    Reduction,
-    as_curves,
-    as_waveforms,
-    check_broadcast,
-    per_performance,
-    reduce_intervals,
-)
+from .checks import CurveError, PopulationError, check_horizon, check_option, check_size
+from .curves import FloatArray, Reduction, as_curves, as_waveforms, per_performance, reduce_intervals
 from .queues import PopulationRates, mean_away, queue_statistics
 
 PopulationWeight: TypeAlias = Literal["paper", "transient"]
@@ -105,14 +90,12 @@ def recorded_population_robustness(
         ValueError: Unknown reduction.
     """
     perf, perf_ideal = as_curves(perf=perf, perf_ideal=perf_ideal)
-    active, ideal = as_waveforms(perf.shape[-1], n_active=n_active, n_active_ideal=n_active_ideal)
+    active, ideal = as_waveforms(perf, perf_ideal, n_active=n_active, n_active_ideal=n_active_ideal)
     if (active < 0.0).any() or (ideal <= 0.0).any():
         raise CurveError(
             "Expected n_active >= 0 and n_active_ideal > 0 robots in every interval, got "
             f"{np.nanmin(active)} and {np.nanmin(ideal)}; pass the ideal swarm's robots at work."
         )
-    shapes = f"perf {perf.shape}, perf_ideal {perf_ideal.shape}, n_active {active.shape}, n_active_ideal {ideal.shape}"
-    check_broadcast((perf, perf_ideal, active, ideal), shapes)
     gain = reduce_intervals(perf - active / ideal * perf_ideal, reduce, perf, active, perf_ideal, ideal)
     return per_performance(gain, perf_ideal, reduce) if relative else gain
 
@@ -176,21 +159,19 @@ def availability(n: int, n_min: int, ratio_out: float) -> float:
         CurveError: n < 1, or n_min is no whole number.
         PopulationError: A ratio that is negative or NaN.
     """
-    n, n_min = check_size("n", n), check_whole("n_min", n_min)
+    n, n_min = check_size("n", n), check_size("n_min", n_min, least=-math.inf)
     if not ratio_out >= 0.0:
         raise PopulationError(f"Expected ratio_out = lambda / mu >= 0, got {ratio_out}.")
-    if n_min <= 0:
-        return 1.0
-    if n_min > n:
-        return 0.0
+    if n_min <= 0 or n_min > n:
+        return float(n_min <= 0)
     if ratio_out == 0.0 or math.isinf(ratio_out):
-        return 1.0 if ratio_out == 0.0 else 0.0
+        return float(ratio_out == 0.0)
     if ratio_out == 1.0:
         return (n - n_min + 1) / (n + 1)
     # Powers of q <= 1 only, so that nothing overflows; exact near q = 1.
-    log_q = math.log(ratio_out)
-    p_v = math.expm1((n - n_min + 1) * -abs(log_q)) / math.expm1((n + 1) * -abs(log_q))
-    return p_v if log_q < 0.0 else p_v * math.exp(n_min * -abs(log_q))
+    log_q = -abs(math.log(ratio_out))
+    p_v = math.expm1((n - n_min + 1) * log_q) / math.expm1((n + 1) * log_q)
+    return p_v if ratio_out < 1.0 else p_v * math.exp(n_min * log_q)
 
 
 def ratio_for_team(team: float) -> float:

@@ -59,26 +59,18 @@ class QueueStats:
     the number away. Its time away counts the service twice, because 1 / (mu - lambda) already contains it.
     """
 
-    lam: float
-    """Rate of leaving, lambda."""
-    mu: float
-    """Rate of entering, mu."""
     rho: float
     """lambda / mu; 0 if no robot leaves, inf if no robot returns."""
     stable: bool
     """Whether rho < 1. A finite swarm is always stable."""
     length_printed: float
-    """Number away as printed in Eq. (10), rho^2 / (1 - rho), which is `waiting`."""
+    """Number away as printed in Eq. (10), rho^2 / (1 - rho): those that wait, without the one in service."""
     length: float
     """Number away in an unlimited M/M/1 queue, rho / (1 - rho)."""
-    waiting: float
-    """Number waiting, without the one in service, rho^2 / (1 - rho)."""
     time_printed: float
     """Time away per visit as printed in Eq. (11), 1 / (mu - lambda) + 1 / mu."""
     time: float
     """Time away per visit, W = 1 / (mu - lambda)."""
-    waiting_time: float
-    """Part of that time before the service begins, 1 / (mu - lambda) - 1 / mu."""
     truncated_length: float | None
     """Mean number away of a swarm of n robots, L_N; None if n was not given."""
     truncated_distribution: FloatArray | None
@@ -99,29 +91,30 @@ def queue_statistics(rates: PopulationRates, n: int | None = None) -> QueueStats
     Raises:
         CurveError: n < 1.
     """
-    distribution = None if n is None else stationary_distribution(rates, check_size("n", n))
     lam, mu = rates.lam, rates.mu
     rho = 0.0 if lam == 0.0 else math.inf if mu == 0.0 else lam / mu
-    stable = rho < 1.0
-    length = rho / (1.0 - rho) if stable else math.inf
-    waiting = rho * length
+    distribution = None if n is None else _stationary(rho, check_size("n", n))
+    length = rho / (1.0 - rho) if rho < 1.0 else math.inf
     time = 1.0 / (mu - lam) if mu > lam else math.inf
-    service = 1.0 / mu if mu > 0.0 else math.inf
-    waiting_time = time - service if mu > lam else math.inf
     return QueueStats(
-        lam=lam,
-        mu=mu,
         rho=rho,
-        stable=stable,
-        length_printed=waiting,
+        stable=rho < 1.0,
+        length_printed=rho * length,
         length=length,
-        waiting=waiting,
-        time_printed=time + service,
+        time_printed=time + (1.0 / mu if mu > 0.0 else math.inf),
         time=time,
-        waiting_time=waiting_time,
         truncated_length=None if distribution is None else float(distribution @ np.arange(distribution.size)),
         truncated_distribution=distribution,
     )
+
+
+def _stationary(rho: float, n: int) -> FloatArray:
+    """Probabilities that 0, 1, ..., n of n robots are away in equilibrium, in proportion to rho^k, shape (n + 1,)."""
+    if rho == 0.0 or math.isinf(rho):
+        return np.eye(n + 1)[0 if rho == 0.0 else n]
+    log_weight = np.arange(n + 1.0) * math.log(rho)
+    weight = np.exp(log_weight - log_weight.max())  # logarithms, because rho^n overflows for large swarms
+    return weight / weight.sum()
 
 
 def mean_away(rates: PopulationRates, n: int, horizon: float) -> float:
@@ -154,46 +147,20 @@ def mean_away(rates: PopulationRates, n: int, horizon: float) -> float:
     check_horizon(horizon)
     if rates.lam == 0.0:
         return 0.0
-    leave, back = _chain(rates, n)
-    jump_rate = leave[0] + rates.mu  # no state has a larger total rate
+    leave, back = np.full(n + 1, rates.lam), np.full(n + 1, rates.mu)  # from each state 0 ... n robots away
+    leave[n] = back[0] = 0.0
+    jump_rate = rates.lam + rates.mu  # no state has a larger total rate
     expected_jumps = jump_rate * horizon
     n_jumps = int(expected_jumps + 12.0 * math.sqrt(expected_jumps)) + 40  # the tail beyond is below 1e-16
-    more_jumps = pdtrc(np.arange(n_jumps), expected_jumps)
     up, down = leave / jump_rate, back / jump_rate
     stay = 1.0 - up - down
     n_away = np.arange(n + 1.0)
-    probability = np.zeros(n + 1)
-    probability[0] = 1.0
+    probability = (n_away == 0.0).astype(np.float64)
     total = 0.0
-    for more in more_jumps:
+    for more in pdtrc(np.arange(n_jumps), expected_jumps):
         total += more * (probability @ n_away)
         after = stay * probability
         after[1:] += up[:-1] * probability[:-1]
         after[:-1] += down[1:] * probability[1:]
         probability = after
     return float(total / expected_jumps)
-
-
-def _chain(rates: PopulationRates, n: int) -> tuple[FloatArray, FloatArray]:
-    """Rates of one robot more, and of one robot fewer, being away, from each state 0 ... n; shapes (n + 1,)."""
-    leave, back = np.full(n + 1, rates.lam), np.full(n + 1, rates.mu)
-    leave[n] = back[0] = 0.0
-    return leave, back
-
-
-def stationary_distribution(rates: PopulationRates, n: int) -> FloatArray:
-    """Probabilities that 0, 1, ..., n of n robots are away in equilibrium, shape (n + 1,).
-
-    Balance across every cut between k and k + 1 robots away: leave[k] pi[k] = back[k + 1] pi[k + 1].
-    """
-    distribution = np.zeros(n + 1)
-    if rates.lam == 0.0:
-        distribution[0] = 1.0
-        return distribution
-    if rates.mu == 0.0:
-        distribution[n] = 1.0
-        return distribution
-    leave, back = _chain(rates, n)
-    log_weight = np.concatenate([[0.0], np.cumsum(np.log(leave[:-1]) - np.log(back[1:]))])
-    weight = np.exp(log_weight - log_weight.max())  # logarithms, because rho^n overflows for large swarms
-    return weight / weight.sum()

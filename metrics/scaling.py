@@ -3,10 +3,8 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .checks import check_option, check_size, check_size_order
+from .checks import check_option, check_size, check_sizes
 from .curves import FloatArray, Reduction, Variant, as_curves, reduce_intervals
-
-_DEFAULT_REDUCTION: dict[Variant, Reduction] = {"paper": "sum", "corrected": "total"}
 
 
 def scalability(
@@ -51,32 +49,18 @@ def scalability(
         CurveError: Curves are missing, negative, infinite or of different length; n1 >= n2.
         ValueError: Unknown option.
     """
-    n1, n2 = check_size("n1", n1), check_size("n2", n2)
-    perf1, perf2 = as_curves(perf1=perf1, perf2=perf2)
+    n1, n2 = check_sizes(n1, n2)
     check_option("variant", variant, Variant)
-    check_size_order(n1, n2)
     if reduce is None:
-        reduce = _DEFAULT_REDUCTION[variant]
+        reduce = "sum" if variant == "paper" else "total"
     check_option("reduce", reduce, Reduction)
-    theta = _THETA[variant]
+    r, curves = n2 / n1, as_curves(perf1=perf1, perf2=perf2)
+    if reduce == "total":
+        curves = tuple(curve.sum(axis=-1, keepdims=True) for curve in curves)
     with np.errstate(divide="ignore", invalid="ignore"):
-        if reduce == "total":
-            total1, total2 = perf1.sum(axis=-1, keepdims=True), perf2.sum(axis=-1, keepdims=True)
-            return reduce_intervals(theta(total1, n1, total2, n2), "last", total1, total2)
-        return reduce_intervals(theta(perf1, n1, perf2, n2), reduce, perf1, perf2)
-
-
-def _karp_flatt(perf1: FloatArray, n1: int, perf2: FloatArray, n2: int) -> FloatArray:
-    speedup, r = perf2 / perf1, n2 / n1
-    return 1.0 - (1.0 / speedup - 1.0 / r) / (1.0 - 1.0 / r)
-
-
-def _as_printed(perf1: FloatArray, n1: int, perf2: FloatArray, n2: int) -> FloatArray:
-    speedup, r = perf2 / perf1, n2 / n1
-    return 1.0 - (speedup - 1.0 / r) / (1.0 - 1.0 / r)
-
-
-_THETA = {"corrected": _karp_flatt, "paper": _as_printed}
+        speedup = curves[1] / curves[0]
+        fraction = (speedup if variant == "paper" else 1.0 / speedup) - 1.0 / r
+        return reduce_intervals(1.0 - fraction / (1.0 - 1.0 / r), reduce, *curves)
 
 
 def efficiency(perf: ArrayLike, n: int, *, reduce: Reduction = "last") -> FloatArray:

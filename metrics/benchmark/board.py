@@ -28,7 +28,6 @@ from swarm_forage_env.rendering.figures import (
 from swarm_forage_env.sheet import Answer, Sheet
 
 from ..controllers import PAPER_POLICIES
-from ..distributions import performance_profile
 from ..statistics import Estimate
 from .entry import Entry
 from .protocol import BenchmarkError, Protocol, load_protocol
@@ -229,7 +228,7 @@ def _draw_profiles(panel: Panel, ranked: Sequence[Standing], reference: Referenc
     drawn: Counter[str] = Counter()  # there are more entries than colours
     for look, standing in zip(looks(standing.entry.name for standing in ranked), ranked, strict=True):
         shares = [shares_of(standing.entry, world, reference).ravel() for world in protocol.scored]
-        profile = performance_profile(np.concatenate(shares), thresholds)
+        profile = (np.concatenate(shares) > thresholds[:, None]).mean(axis=1)
         style = _LINES[drawn[look.colour] % len(_LINES)]
         drawn[look.colour] += 1
         panel.plot(thresholds, profile, style, color=look.colour, label=look.name)

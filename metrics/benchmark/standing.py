@@ -16,8 +16,7 @@ import numpy as np
 
 from ..controllers import PAPER_POLICIES
 from ..curves import FloatArray
-from ..distributions import N_RESAMPLES, interquartile_mean, optimality_gap, probability_of_improvement
-from ..statistics import Estimate, aggregate
+from ..statistics import N_RESAMPLES, Estimate, aggregate, interquartile_mean, probability_of_improvement
 from .entry import Entry, read_entry
 from .protocol import BenchmarkError, Protocol, ProtocolWorld, scripted_folder
 
@@ -137,7 +136,7 @@ def standing_of(entry: Entry, reference: Reference, protocol: Protocol) -> Stand
         entry=entry,
         score=over_trainings(scores(counts)) if entry.is_trained else scores(counts)[0],
         improvement=_within_0_and_1(over_trainings(chances)) if entry.is_trained else chances[0],
-        gap=optimality_gap(np.concatenate([shares[world.name].ravel() for world in counting])),
+        gap=float(np.maximum(0.0, 1.0 - np.concatenate([shares[world.name].ravel() for world in counting])).mean()),
         n_won=_n_won(performances, theirs),
         n_worlds=len(counting),
         calm=middle(lambda world: world.counts and not world.is_disturbed),

@@ -21,8 +21,7 @@ from swarm_forage_env.wrappers.world import SIZE
 
 from ..checks import CurveError
 from ..curves import FloatArray, Form, Variant
-from ..significance import SIGNIFICANT, holm, paired_p
-from ..statistics import Summary, aggregate
+from ..statistics import SIGNIFICANT, Summary, aggregate, holm, paired_p
 from .measures import MEASURES, Compared, Level, Measure, Uncomputable, check_measures, levels, remark_on, unit_of
 from .run_curves import RunCurves, StudyCurves
 
@@ -231,7 +230,7 @@ def summarized(frame: pl.DataFrame) -> pl.DataFrame:
 def _summary(values: pl.Series) -> Summary:
     """Return mean and interval of values, without nulls; NaN is a run in which there is none."""
     known = values.drop_nulls().to_numpy()
-    return aggregate(known) if known.size else Summary.without_interval()
+    return aggregate(known) if known.size else Summary()
 
 
 def differences(frame: pl.DataFrame, pairs: Sequence[tuple[str, str]] | None = None) -> pl.DataFrame:
@@ -276,7 +275,7 @@ def _difference(mine: FloatArray, theirs: FloatArray) -> dict[str, Any]:
         gaps = mine - theirs
     gaps = gaps[~(np.isnan(mine) | np.isnan(theirs))]
     is_known = gaps.size > 0 and bool(np.isfinite(gaps).all())
-    of = aggregate(gaps) if is_known else Summary.without_interval(n_used=gaps.size)
+    of = aggregate(gaps) if is_known else Summary(n_used=gaps.size)
     return {"difference": of.mean, "lower": of.lower, "upper": of.upper, "pairs": of.n_used, "p": paired_p(gaps)}
 
 

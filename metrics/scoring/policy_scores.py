@@ -31,7 +31,7 @@ from swarm_forage_env.wrappers.world import SIZE, World, WorldLike, world_of
 
 from ..checks import CurveError, chosen_seeds
 from ..curves import Form, Variant
-from ..significance import ROUNDING
+from ..statistics import ROUNDING
 from .curves_file import read_curves
 from .frame import ROW, check_words, differences, label_of, scores, summarized, words_of
 from .measures import MEASURES, PICTURED, check_measures, criteria_of

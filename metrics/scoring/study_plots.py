@@ -41,7 +41,7 @@ Band: TypeAlias = Literal["ci", "sd"]
 """What bars are: the 95 % confidence interval of the mean, or the mean plus and minus two standard deviations."""
 
 _BANDS: dict[Band, str] = {"ci": "95 % interval of the mean", "sd": "mean ± 2 standard deviations of runs"}
-_NOTHING = Summary.without_interval()
+_NOTHING = Summary()
 _APART, _OF_GAP = 0.022, 0.17
 """Distance between policies at one level: a share of the axis, at most this one of the least gap between levels."""
 _DOTS_ASIDE = 0.35

@@ -1,4 +1,4 @@
-"""Normalisation, intervals over runs, bootstrap, by hand and by counting how often an interval covers the truth."""
+"""Statistics over runs: by hand, beside what other programs give, and by how often an interval covers the truth."""
 
 import math
 
@@ -6,194 +6,138 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from metrics import CurveError, adaptability, aggregate, bootstrap_measure, normalize, scalability, spatial_emergence
+from metrics import CurveError, aggregate, interquartile_mean, normalize, paired_tests, probability_of_improvement
+from metrics.statistics import holm, paired_p
+
+NAN = math.nan
+FIRST = [[1.0, 5, 9, 2, 7, 11, 3, 30], [0, 2, 4, 6, 8, 10, 12, 1]]
+SECOND = [[2.0, 4, 6, 2, 1, 12, 0, 3], [3, 2, 5, 5, 9, 10, 15, 0]]
 
 
 def test_normalize_by_hand():
-    assert normalize(1.0) == pytest.approx(0.462117157, abs=1e-9)
-    assert normalize(1.0, distance=True) == pytest.approx(-0.462117157, abs=1e-9)
-    sigmoid = 1 / (1 + np.exp(-np.array([-2.0, 0.3])))
-    assert normalize([-2.0, 0.3]) == pytest.approx(2 * sigmoid - 1, abs=1e-12)
+    sigmoid = 1 / (1 + np.exp(-np.array([-2.0, 0.3, 1.0])))
+    assert normalize([-2.0, 0.3, 1.0]) == pytest.approx(2 * sigmoid - 1, abs=1e-12)
+    assert normalize([0.0, 1e6], distance=True).tolist() == [0.0, -1.0], "no overflow"
 
 
-def test_normalize_does_not_overflow():
-    assert normalize([-1e6, 1e6]).tolist() == [-1.0, 1.0]
-    assert normalize([0.0, 1e6], distance=True).tolist() == [0.0, -1.0]
+def test_students_interval_is_scipys_and_the_bands_are_two_deviations():
+    values = np.array([1.0, 2, 3, 4, 5])
+    found = aggregate([*values, NAN])
+    assert (found.mean, found.n_used, found.n_nan) == (3.0, 5, 1)
+    assert (found.std, found.lower, found.upper) == pytest.approx((1.58113883, 1.0367568, 4.9632432), abs=1e-7)
+    expected = stats.t.interval(0.9, 4, loc=3.0, scale=stats.sem(values))
+    found = aggregate(values, level=0.9)
+    assert (found.lower, found.upper) == pytest.approx(expected, abs=1e-12)
+    bands = aggregate([*values, NAN], method="two_sd")
+    assert (bands.lower, bands.upper) == pytest.approx((-0.16227766, 6.16227766), abs=1e-8)
 
 
-def test_student_interval_by_hand():
-    summary = aggregate([1, 2, 3, 4, 5])
-    assert (summary.mean, summary.n_used, summary.n_nan) == (3.0, 5, 0)
-    assert summary.std == pytest.approx(1.58113883, abs=1e-8)
-    assert (summary.lower, summary.upper) == pytest.approx((1.0367568, 4.9632432), abs=1e-7)
+@pytest.mark.parametrize(("runs", "mean"), [([1.0, NAN], 1.0), ([NAN, NAN], NAN), ([1.0, -math.inf], -math.inf)])
+def test_where_runs_have_no_scatter_only_the_mean_is_known(runs, mean):
+    found = aggregate(runs)
+    assert found.mean == pytest.approx(mean, nan_ok=True)
+    assert np.isnan([found.std, found.lower, found.upper]).all()
 
 
-def test_student_interval_is_scipys():
-    values = np.random.default_rng(1).normal(size=12)
-    expected = stats.t.interval(0.9, 11, loc=values.mean(), scale=stats.sem(values))
-    summary = aggregate(values, level=0.9)
-    assert (summary.lower, summary.upper) == pytest.approx(expected, abs=1e-12)
-
-
-def test_bands_of_the_paper_by_hand():
-    summary = aggregate([1, 2, 3, 4, 5], method="two_sd")
-    assert (summary.lower, summary.upper) == pytest.approx((-0.16227766, 6.16227766), abs=1e-8)
-
-
-def test_bands_of_the_paper_are_fourteen_times_wider():
-    values = np.random.default_rng(2).normal(size=192)
-    bands, interval = aggregate(values, method="two_sd"), aggregate(values)
-    assert (bands.upper - bands.lower) / (interval.upper - interval.lower) == pytest.approx(14, abs=0.1)
-
-
-def test_intervals_cover_the_true_mean_as_often_as_they_say():
+def test_intervals_hold_the_truth_as_often_as_they_say():
     rng = np.random.default_rng(3)
-    n_studies = 300
-    covered = 0
-    for _ in range(n_studies):
-        summary = aggregate(rng.normal(5.0, 2.0, size=40), level=0.9)
-        covered += summary.lower <= 5.0 <= summary.upper
-    assert covered / n_studies == pytest.approx(0.9, abs=0.055)  # three standard errors of a share of 0.9
+    means = [aggregate(rng.normal(5.0, 2.0, size=40), level=0.9) for _ in range(300)]
+    assert np.mean([one.lower <= 5.0 <= one.upper for one in means]) == pytest.approx(0.9, abs=0.055)
+    truth = stats.norm.cdf(1.0 / math.sqrt(2.0))  # of two normal variables, one of them shifted by 1
+    hits = [
+        probability_of_improvement(rng.normal(1, 1, 16), rng.normal(0, 1, 16), seed=k, n_resamples=400).holds(truth)
+        for k in range(200)
+    ]
+    assert 0.87 < np.mean(hits) < 0.99
 
 
-@pytest.mark.parametrize("method", ["t", "two_sd"])
-def test_runs_that_cannot_be_scored_are_left_out_and_counted(method):
-    summary = aggregate([1.0, math.nan, 3.0, math.nan], method=method)
-    assert (summary.mean, summary.n_used, summary.n_nan) == (2.0, 2, 2)
-    assert summary.lower < 2.0 < summary.upper
+def test_the_paired_test_is_that_of_scipy():
+    values = np.array([1.0, 2.5, -0.5, 3.0, 2.0])
+    assert paired_p(values) == pytest.approx(stats.ttest_1samp(values, 0.0).pvalue, rel=1e-12)
 
 
-@pytest.mark.parametrize("method", ["t", "two_sd"])
-def test_one_run_says_nothing_about_the_spread(method):
-    summary = aggregate([1.0, math.nan], method=method)
-    assert summary.mean == 1.0
-    assert np.isnan([summary.std, summary.lower, summary.upper]).all()
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [([0.0, 0.0, 0.0], 1.0), ([2.0, 2.0, 2.0], 0.25), ([1.0], NAN), ([], NAN), ([math.inf, 1.0], NAN)],
+)
+def test_where_students_t_does_not_exist(values, expected):
+    assert paired_p(np.array(values)) == pytest.approx(expected, nan_ok=True)
 
 
-def test_no_run_at_all():
-    summary = aggregate([math.nan, math.nan])
-    assert math.isnan(summary.mean)
-    assert (summary.n_used, summary.n_nan) == (0, 2)
+def test_holms_example_by_hand():
+    # Sorted 0.01, 0.03, 0.04 times 3, 2, 1: 0.03, 0.06, 0.04, never falling.
+    np.testing.assert_allclose(holm(np.array([0.04, 0.01, NAN, 0.03])), [0.06, 0.03, NAN, 0.06])
+    np.testing.assert_allclose(holm(np.array([0.9, 0.8])), [1.0, 1.0])
+    assert holm(np.empty(0)).size == 0
 
 
-def test_infinite_values_stay_visible():
-    summary = aggregate([1.0, -math.inf])
-    assert summary.mean == -math.inf
-    assert math.isnan(summary.std)
+def test_levels_are_tested_together_and_a_missing_run_takes_its_partner_along():
+    first = np.array([[4.0, 6.0, 8.0, NAN], [5.0, 5.0, 6.0, 7.0]])
+    second = np.array([[1.0, 2.0, 3.0, 9.0], [5.0, 6.0, 5.0, NAN]])
+    # Differences 3, 4, 5 and 0, -1, 1: p values of scipy, the smaller one times two.
+    p = [stats.ttest_rel(a[:3], b[:3]).pvalue for a, b in zip(first, second, strict=True)]
+    np.testing.assert_allclose(paired_tests(first, second), [2 * p[0], p[1]])
+    np.testing.assert_allclose(paired_tests(first[0], second[0]), p[0])
+    np.testing.assert_allclose(paired_tests([first[0], [1.0, NAN, NAN, NAN]], second), [p[0], NAN])
 
 
-@pytest.mark.parametrize("values", [[], [[1.0, 2.0]], 1.0])
-def test_aggregate_wants_one_value_per_run(values):
-    with pytest.raises(CurveError, match="one value per run"):
-        aggregate(values)
+def test_the_interquartile_mean_is_that_of_rliable_and_scipy():
+    # rliable 1.2.0: aggregate_iqm(scores.T) = 5.5, interval of 50,000 resamples [2.875, 8.625].
+    found = interquartile_mean(FIRST, seed=1)
+    assert (found.value, found.n_runs) == (5.5, 16)
+    assert (found.lower, found.upper) == pytest.approx((2.875, 8.625), abs=0.25)
+    assert found.holds(5.5)
+    assert not found.holds(9.0)
+    assert interquartile_mean(SECOND[0]).value == 2.75 == stats.trim_mean(SECOND[0], 0.25)
+    # 14 values: a quarter of them, 3.5, is rounded down. rliable: 4.5.
+    assert interquartile_mean([level[:7] for level in SECOND]).value == 4.5
 
 
-@pytest.mark.parametrize("level", [0.0, 1.0, 95.0, math.nan])
-def test_levels_are_probabilities(level):
-    with pytest.raises(ValueError, match="level"):
-        aggregate([1.0, 2.0], level=level)
+def test_runs_are_resampled_within_their_level():
+    # Both runs of each level are alike, so that no resample can differ; mixing the levels would give 0 to 10.
+    found = interquartile_mean([[0.0, 0.0], [10.0, 10.0]], seed=1)
+    assert (found.value, found.lower, found.upper) == (5.0, 5.0, 5.0)
 
 
-def noisy_runs(seed, n_runs=24, n_intervals=10, level=5.0):
-    return level + np.random.default_rng(seed).uniform(-1, 1, size=(n_runs, n_intervals))
+def test_missing_runs_are_left_out_and_levels_may_differ_in_runs():
+    found = interquartile_mean([[1.0, NAN, 3.0], [5.0, 7.0]], seed=1)
+    assert (found.value, found.n_runs) == (4.0, 4)
+    alone = interquartile_mean([3.0, NAN])
+    assert alone.value == 3.0
+    assert math.isnan(alone.lower)
 
 
-def test_bootstrap_per_run_is_the_mean_of_the_measure():
-    ideal, observed = noisy_runs(1), noisy_runs(2)
-    summary = bootstrap_measure(adaptability, ideal, observed, seed=1, n_resamples=200)
-    values = adaptability(ideal, observed)
-    assert summary.mean == pytest.approx(values.mean(), abs=1e-12)
-    assert summary.std == pytest.approx(values.std(ddof=1), abs=1e-12)
-    assert summary.lower < summary.mean < summary.upper
-    assert (summary.n_used, summary.n_nan) == (24, 0)
+def test_the_probability_of_improvement_is_that_of_rliable():
+    # rliable 1.2.0: probability_of_improvement(first.T, second.T) = 0.57421875, interval of 20,000 resamples
+    # [0.375, 0.76953125]; with five runs of the first 0.49375.
+    found = probability_of_improvement(FIRST, SECOND, seed=1)
+    assert found.value == 0.57421875
+    assert (found.lower, found.upper) == pytest.approx((0.375, 0.76953125), abs=0.02)
+    fewer = probability_of_improvement([level[:5] for level in FIRST], SECOND)
+    assert (fewer.value, fewer.n_runs) == (0.49375, 10)
 
 
-def test_bootstrap_of_mean_curves_lowers_the_noise_floor():
-    ideal, observed = noisy_runs(1), noisy_runs(2)
-    options = {"seed": 1, "n_resamples": 200}
-    mean_curve = bootstrap_measure(adaptability, ideal, observed, order="mean_curve", **options)
-    assert mean_curve.mean == pytest.approx(adaptability(ideal.mean(axis=0), observed.mean(axis=0)), abs=1e-12)
-    assert math.isnan(mean_curve.std)
-    assert mean_curve.upper < bootstrap_measure(adaptability, ideal, observed, **options).lower
+def test_improvement_by_hand_in_both_directions():
+    # 3 beats 1 and 2; 4 beats 1 and 2 and ties 4; 5 beats all: 2 + 2.5 + 3 of 9.
+    assert probability_of_improvement([3, 4, 5], [1, 2, 4]).value == pytest.approx(7.5 / 9)
+    assert probability_of_improvement([3, 4, 5], [1, 2, 4], higher_is_better=False).value == pytest.approx(1.5 / 9)
+    apart = probability_of_improvement([3, 4], [1, 2], seed=1)
+    assert (apart.value, apart.lower, apart.upper) == (1.0, 1.0, 1.0)
+    assert math.isnan(probability_of_improvement([3.0], [1.0, 2.0]).lower)
 
 
-@pytest.mark.parametrize("order", ["per_run", "mean_curve"])
-def test_bootstrap_covers_the_truth_as_often_as_it_says(order):
-    def gain(small, large):
-        return large[..., 0] - 2 * small[..., 0]
-
-    n_studies = 100
-    covered = 0
-    for seed in range(n_studies):
-        small, large = noisy_runs(2 * seed, level=5.0), noisy_runs(2 * seed + 1, level=11.0)
-        summary = bootstrap_measure(gain, small, large, order=order, level=0.9, seed=seed, n_resamples=200)
-        covered += summary.lower <= 1.0 <= summary.upper
-    assert covered / n_studies == pytest.approx(0.9, abs=0.09)  # three standard errors of a share of 0.9
-
-
-def test_bootstrap_keeps_curves_of_the_same_runs_together():
-    perf, lost = noisy_runs(1), np.random.default_rng(9).random((24, 10)) * 0.2
-    one = (np.full((24, 10), 1.0), np.full((24, 10), 0.1))
-
-    def spatial(small, large, alone):
-        return spatial_emergence(*small, 2, *large, 4, *alone)
-
-    small, large = (perf, lost), (2 * perf, lost)
-    summary = bootstrap_measure(spatial, small, large, one, seed=1, n_resamples=50)
-    expected = spatial_emergence(perf, lost, 2, 2 * perf, lost, 4, *one)
-    assert summary.mean == pytest.approx(expected.mean(), abs=1e-12)
-
-
-def test_bootstrap_of_unequal_experiments_needs_mean_curves():
-    def theta(small, large):
-        return scalability(small, 1, large, 2)
-
-    few, many = noisy_runs(1, n_runs=8), noisy_runs(2, n_runs=24)
-    with pytest.raises(CurveError, match="equally many runs"):
-        bootstrap_measure(theta, few, many)
-    summary = bootstrap_measure(theta, few, many, order="mean_curve", seed=1)
-    assert summary.n_used == 8
-    assert summary.lower < summary.mean < summary.upper
-
-
-def test_bootstrap_leaves_out_runs_that_cannot_be_scored():
-    ideal, observed = noisy_runs(1), noisy_runs(2)
-    observed[3, 4] = math.nan
-    summary = bootstrap_measure(adaptability, ideal, observed, seed=1, n_resamples=50)
-    assert (summary.n_used, summary.n_nan) == (23, 1)
-    assert math.isfinite(summary.lower)
-    assert math.isnan(bootstrap_measure(adaptability, ideal, observed, order="mean_curve", n_resamples=5).mean)
-
-
-def test_bootstrap_works_where_hardly_a_resample_is_without_such_runs():
-    ideal, observed = noisy_runs(1), noisy_runs(2)
-    observed[::2, 0] = math.nan
-    summary = bootstrap_measure(adaptability, ideal, observed, seed=1, n_resamples=50)
-    assert summary.n_nan == 12
-    assert summary.lower < summary.mean < summary.upper
-
-
-def test_bootstrap_resamples_experiments_on_their_own():
-    """Runs of equal number would cancel, which is chance where experiments have nothing to do with each other."""
-    runs = noisy_runs(1)
-    summary = bootstrap_measure(lambda few, many: many.mean(axis=-1) - few.mean(axis=-1), runs, runs, seed=1)
-    assert summary.mean == 0.0
-    assert summary.upper - summary.lower > 0.1
-
-
-@pytest.mark.parametrize("order", ["per_run", "mean_curve"])
-def test_bootstrap_of_one_run_has_no_bounds(order):
-    summary = bootstrap_measure(adaptability, noisy_runs(1, n_runs=1), noisy_runs(2, n_runs=1), order=order)
-    assert math.isfinite(summary.mean)
-    assert np.isnan([summary.lower, summary.upper]).all()
-
-
-def test_bootstrap_refuses_what_it_cannot_resample():
-    with pytest.raises(CurveError, match="same runs"):
-        bootstrap_measure(adaptability, [1.0, 2.0], [1.0, 2.0])
-    with pytest.raises(CurveError, match="same runs"):
-        bootstrap_measure(adaptability, (noisy_runs(1, n_runs=3), noisy_runs(1, n_runs=4)), noisy_runs(2, n_runs=3))
-    with pytest.raises(ValueError, match="n_resamples"):
-        bootstrap_measure(adaptability, noisy_runs(1), noisy_runs(2), n_resamples=0)
-    with pytest.raises(ValueError, match="experiment"):
-        bootstrap_measure(adaptability)
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        *((lambda v=values: aggregate(v), "one value per run") for values in ([], [[1.0, 2.0]], 1.0)),
+        *((lambda x=level: aggregate([1.0, 2.0], level=x), "level") for level in (0.0, 1.0, 95.0, NAN)),
+        *((lambda v=v: interquartile_mean(v), "at least one run") for v in ([], [NAN], [[1.0], [NAN]], [[[1.0]]])),
+        (lambda: probability_of_improvement(FIRST, FIRST[:1]), "2 and 1 levels"),
+        (lambda: paired_tests([1.0, 2.0], [1.0]), "same shape"),
+        (lambda: paired_tests(1.0, 1.0), "same shape"),
+    ],
+)
+def test_what_does_not_fit_is_refused(call, message):
+    with pytest.raises(ValueError, match=message) as raised:
+        call()
+    assert message == "level" or isinstance(raised.value, CurveError)

@@ -19,7 +19,7 @@ from metrics.benchmark import (
 )
 from metrics.benchmark.board import bounded
 from metrics.benchmark.standing import over_trainings, scripted_entries
-from metrics.distributions import interquartile_mean
+from metrics.statistics import interquartile_mean
 from swarm_forage_env._internal.wording import plain_markdown
 from tests.support.entries import TINY, made_up_entry
 from tests.support.pictures import words_in

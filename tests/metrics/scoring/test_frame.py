@@ -12,7 +12,7 @@ from metrics import CurveError
 from metrics.scoring.frame import SCHEMA, differences, pseudo_values, scores, summarized
 from metrics.scoring.measures import MEASURES, Compared
 from metrics.scoring.run_curves import RunCurves, StudyCurves
-from metrics.significance import holm, paired_p
+from metrics.statistics import holm, paired_p
 from tests.support.curve_tables import CLOCK, IDEAL, SLOWED, rows, scored, throttled
 
 NAN = math.nan

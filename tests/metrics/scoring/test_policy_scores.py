@@ -176,7 +176,7 @@ def test_stored_runs_of_functions_need_a_name(tmp_path):
         ({"policies": ["random", "random"]}, ConfigError, "different names, got random, random"),
         ({"measures": ["speed"]}, CurveError, "Unknown measure 'speed'"),
         ({"budget": "quik"}, ConfigError, "Unknown budget 'quik'. Did you mean 'quick'"),
-        ({"seeds": 0}, ValueError, "Expected one or more seeds, got 0"),
+        ({"seeds": 0}, ValueError, "Expected one or more seeds, at most 100,000, got 0"),
         ({"seeds": [1, 1]}, ValueError, r"Expected different seeds, at least one, got \[1, 1\]"),
         ({"horizon_s": 3.0}, ConfigError, "whole number of intervals"),
         (
