@@ -1,9 +1,8 @@
 """The claims of the paper and its intuitions, each with a verdict by its rule and by ours: arrays in, answers out."""
 
 from .claim import Claim, PanelName, Statement, Verdict, check_claim
-from .experiments import EXPERIMENTS
-from .intuitions import INTUITIONS
 from .panel import Panel
-from .paper import CLAIMS
+from .paper import CLAIMS, INTUITIONS
+from .words import EXPERIMENTS
 
 __all__ = ["CLAIMS", "EXPERIMENTS", "INTUITIONS", "Claim", "Panel", "PanelName", "Statement", "Verdict", "check_claim"]

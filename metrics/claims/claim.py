@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, NamedTuple, TypeAlias, cast
+from typing import Any, Literal, NamedTuple, cast
 
 from ..controllers import PAPER_POLICIES
 from ..curves import Form
@@ -32,21 +32,12 @@ class PanelName(NamedTuple):
         return " ".join(word for word in words if word).replace("_", " ")
 
 
-Place: TypeAlias = tuple[str, str] | tuple[str, str, Form] | PanelName
-"""A panel: experiment, measure, and the form if it is not the marginal one; or its whole name."""
 DISTANCES = ("reactivity", "adaptability", "noise_robustness")
 RELATIVE_TOO = (*DISTANCES, "population_robustness")
 """Measures in amounts of performance, which rank policies by how much they do. Claims about them are also judged
 relative to performance."""
 RELATIVE = "relative to performance"
 """Name of these verdicts among the others."""
-
-
-def named(place: Place) -> PanelName:
-    """Return the name of a panel."""
-    if isinstance(place, PanelName):
-        return place
-    return PanelName(place[0], place[1], place[2] if len(place) == 3 else "marginal")
 
 
 def _relative(name: PanelName) -> PanelName:
@@ -160,23 +151,15 @@ def _panels_of(statements: Iterable[Statement]) -> tuple[PanelName, ...]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Verdict:
-    """What scores say about a claim."""
+class Verdict(Outcome):
+    """What scores say about a claim: by intervals, our rule, if nothing else is said.
+
+    `why` has one line per statement.
+    """
 
     claim: str
-    answer: Answer
-    """Answer by intervals, our rule."""
     by_bands: Answer
     """Answer by bands of two standard deviations that overlap or not, the paper's rule."""
-    statistic: float
-    """Number that decides by our rule; `why` says what it is. For several statements, the share of them that holds."""
-    effect: float
-    """Size of the difference or change, as a share of the panel's scale. For several statements, the median of those
-    with this answer. NaN where there is none."""
-    n_runs: int
-    """Smallest number of runs behind any number that the rule used; 0 for formulas and missing scores."""
-    why: str
-    """What the rule found, and the limit that it compared this with; one line per statement."""
     otherwise: Mapping[str, "Verdict"] = field(default_factory=dict[str, "Verdict"])
     """Verdicts on other meanings of the claim and on its other readings (`READINGS`), where there are scores."""
 
@@ -192,10 +175,10 @@ def check_claim(claim: Claim, panels: Mapping[PanelName, Panel] | Mapping[tuple[
         CurveError: A panel lacks a policy that the claim names.
     """
     if claim.vague:
-        return _told(claim, Outcome("too vague", why=claim.vague))
-    by_name = {named(name): panel for name, panel in panels.items()}
-    others = {words: _verdict(claim, statements, by_name) for words, statements in claim.otherwise.items()}
-    others |= {words: _verdict(claim, read.statements, by_name) for words, read in read_otherwise(claim).items()}
+        return Verdict(claim=claim.name, answer="too vague", by_bands="too vague", why=claim.vague)
+    by_name = {PanelName(*cast("tuple[Any, ...]", name)): panel for name, panel in panels.items()}
+    meanings = {**claim.otherwise, **{words: read.statements for words, read in read_otherwise(claim).items()}}
+    others = {words: _verdict(claim, statements, by_name) for words, statements in meanings.items()}
     scored = {words: verdict for words, verdict in others.items() if verdict.answer != "no scores"}
     return replace(_verdict(claim, claim.statements, by_name), otherwise=scored)
 
@@ -204,15 +187,10 @@ def _verdict(claim: Claim, statements: tuple[Statement, ...], panels: Mapping[Pa
     rules: tuple[Rule, Rule] = ("intervals", "bands")
     joined = all_of if claim.needs == "all" else most_of
     ours, bands = (joined([statement.outcome(panels, rule) for statement in statements]) for rule in rules)
-    return _told(claim, ours, bands)
-
-
-def _told(claim: Claim, ours: Outcome, bands: Outcome | None = None) -> Verdict:
-    """Return the verdict from an outcome by each rule, or from one outcome that needs no rule."""
     return Verdict(
         claim=claim.name,
         answer=ours.answer,
-        by_bands=(bands or ours).answer,
+        by_bands=bands.answer,
         statistic=ours.statistic,
         effect=ours.effect,
         n_runs=ours.n_runs,

@@ -8,6 +8,7 @@ be `ORDERED` of the pairs, because policies that tie do not show whether two ord
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -21,7 +22,6 @@ from .panel import (
     Rule,
     bounds,
     mean_over_runs,
-    of_equal_runs,
     order,
     resampled_means,
     std_over_runs,
@@ -58,33 +58,18 @@ def same_order(
         first: One panel.
         second: The other; levels and runs may differ.
         policies: Policies to order, two or more.
-        better: 1 or -1 for each panel: whether higher or lower is better there.
+        better: 1 or -1 for each panel: whether higher or lower is better there; (1, -1) asks for the opposite order.
         least: `SAME`, or `LOOSE` for orders that only have to be similar. A single random order passes `LOOSE` in four
             of 24 cases, so a claim needs several such panels.
         rule: As everywhere.
     """
 
     def decide(tau: float, lower: float, upper: float) -> Answer:
-        return _is_above(least, tau, lower, upper)
+        if tau > least and lower > 0.0:
+            return "supported"
+        return "contradicted" if upper <= (LOOSE if least > LOOSE else 0.0) else "undecided"
 
     return _of_tau(first, second, policies, better, rule, decide, f"above {least:.2g} is the same order")
-
-
-def opposite_order(
-    first: Panel,
-    second: Panel,
-    *,
-    policies: Names,
-    better: tuple[int, int] = (1, 1),
-    least: float = SAME,
-    rule: Rule = "intervals",
-) -> Outcome:
-    """Whether policies have the opposite order in two panels: `same_order` with the opposite sign of tau."""
-
-    def decide(tau: float, lower: float, upper: float) -> Answer:
-        return _is_above(least, -tau, -upper, -lower)
-
-    return _of_tau(first, second, policies, better, rule, decide, f"below {-least:.2g} is the opposite order")
 
 
 def unrelated(first: Panel, second: Panel, *, policies: Names, rule: Rule = "intervals") -> Outcome:
@@ -103,12 +88,6 @@ def unrelated(first: Panel, second: Panel, *, policies: Names, rule: Rule = "int
     return _of_tau(first, second, policies, (1, 1), rule, decide, limit, needed=ORDERED)
 
 
-def _is_above(least: float, tau: float, lower: float, upper: float) -> Answer:
-    if tau > least and lower > 0.0:
-        return "supported"
-    return "contradicted" if upper <= (LOOSE if least > LOOSE else 0.0) else "undecided"
-
-
 def _of_tau(
     first: Panel,
     second: Panel,
@@ -124,12 +103,9 @@ def _of_tau(
 
     `needed`: share of the pairs that must have an order in both panels.
     """
-    parts: list[Panel] = []
-    for panel in (first, second):
-        part = at_scored_levels(panel, policies, rule)
-        if isinstance(part, Outcome):
-            return part
-        parts.append(part)
+    parts = _both_scored(first, second, policies, rule)
+    if isinstance(parts, Outcome):
+        return parts
     n_runs = min(part.n_runs(policies) for part in parts)
     ordered = [_ordered(part, policies, side, rule) for part, side in zip(parts, better, strict=True)]
     found, drawn = zip(*ordered, strict=True)
@@ -142,6 +118,11 @@ def _of_tau(
     interval = f"{lower:.2f} to {upper:.2f}, " if rule == "intervals" else ""
     why = f"Kendall's tau of the two orders is {tau:.2f} ({interval}of {n_ordered} of {n_pairs} pairs); {limit}"
     return Outcome(decide(tau, lower, upper), tau, n_runs=n_runs, why=why)
+
+
+def _both_scored(first: Panel, second: Panel, policies: Names, rule: Rule) -> tuple[Panel, Panel] | Outcome:
+    a, b = (at_scored_levels(panel, policies, rule) for panel in (first, second))
+    return a if isinstance(a, Outcome) else b if isinstance(b, Outcome) else (a, b)
 
 
 def _ordered(panel: Panel, policies: Names, better: int, rule: Rule) -> tuple[FloatArray, FloatArray]:
@@ -178,13 +159,16 @@ def differs_more(few: Panel, many: Panel, *, pairs: Pairs, rule: Rule = "interva
     comparisons that differ must rise, or fall, by `MORE`.
     """
     names = sorted({name for pair in pairs for name in pair})
-    parts: list[Panel] = []
-    for panel in (few, many):
-        part = at_scored_levels(panel, names, rule)
-        if isinstance(part, Outcome):
-            return part
-        parts.append(part)
-    equal = of_equal_runs(parts[0], parts[1], names)
+    parts = _both_scored(few, many, names, rule)
+    if isinstance(parts, Outcome):
+        return parts
+    # Intervals narrow with the number of runs, so more runs alone would make more differences.
+    complete = [np.flatnonzero(np.isfinite(part.of(names)).all(axis=(0, 1))) for part in parts]
+    n_equal = min(map(len, complete))
+    equal = [
+        replace(part, scores={name: part.scores[name][:, runs[:n_equal]] for name in names})
+        for part, runs in zip(parts, complete, strict=True)
+    ]
     n_runs = equal[0].n_runs(names)
     if n_runs < LEAST_RUNS[rule]:
         return Outcome("undecided", n_runs=n_runs, why=f"{n_runs} runs of each panel, {LEAST_RUNS[rule]} are needed")

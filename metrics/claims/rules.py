@@ -26,7 +26,7 @@ from .panel import (
     Panel,
     Rule,
     bounds,
-    interval_of,
+    intervals_of,
     mean_over_runs,
     order,
     resampled_deviations,
@@ -57,11 +57,12 @@ class Outcome:
 
     answer: Answer
     statistic: float = nan
-    """Number that decides; `why` says what it is."""
+    """Number that decides; `why` says what it is. For several statements, the share of them that holds."""
     effect: float = nan
-    """Size of the difference or change, as a share of the panel's scale; NaN where a statement has none."""
+    """Size of the difference or change, as a share of the panel's scale; NaN where a statement has none. For several
+    statements, the median of those with this answer."""
     n_runs: int = 0
-    """Smallest number of runs behind any number that the rule used."""
+    """Smallest number of runs behind any number that the rule used; 0 for formulas and missing scores."""
     why: str = ""
     """What the rule found, and what it compared this with."""
     parts: tuple["Outcome", ...] = field(default=(), repr=False)
@@ -98,7 +99,6 @@ def _of_most(n_for: int, n_against: int, n_tied: int, *, total: int) -> Answer |
 
 
 def _joined(outcomes: Sequence[Outcome], answer: Answer) -> Outcome:
-    """One outcome: its statistic is the share of supported parts, its effect the median of parts with this answer."""
     if len(outcomes) == 1:
         return outcomes[0]
     parts = tuple(leaf for outcome in outcomes for leaf in outcome.parts or (outcome,))
@@ -111,8 +111,18 @@ def _joined(outcomes: Sequence[Outcome], answer: Answer) -> Outcome:
 
 def contrary(outcome: Outcome, supported: Answer = "contradicted") -> Outcome:
     """Return the outcome of the contrary statement, `supported` where this one is; open answers stay."""
+    if outcome.parts:
+        return all_of([contrary(part, supported) for part in outcome.parts])
     turned: dict[Answer, Answer] = {"supported": supported, "contradicted": "supported"}
     return replace(outcome, answer=turned.get(outcome.answer, outcome.answer))
+
+
+def without(policies: Iterable[str]) -> Outcome:
+    """Return the outcome where policies have no scores."""
+    return Outcome("no scores", why=f"no scores of {' and '.join(policies)}")
+
+
+# -------------------------------------------------------------------------------------------------------- two engines
 
 
 def by_levels(
@@ -132,7 +142,7 @@ def by_levels(
     """
     n_runs = panel.n_runs(policies)
     if not n_runs:
-        return _without(policies)
+        return without(policies)
     total, n_for, n_against = holds.size, int(holds.sum()), int(fails.sum())
     n_tied = 0 if tied is None else int(tied.sum())
     answer = _of_most(n_for, n_against - n_tied, n_tied, total=total) or "undecided"
@@ -149,16 +159,12 @@ def within(interval: tuple[float, float], low: float, high: float) -> Answer:
     return "contradicted" if upper < low or lower > high else "undecided"
 
 
-def _without(policies: Iterable[str]) -> Outcome:
-    return Outcome("no scores", why=f"no scores of {' and '.join(policies)}")
-
-
 def at_scored_levels(panel: Panel, policies: Names, rule: Rule) -> Panel | Outcome:
     """The panel at the levels with enough runs of policies, or the outcome if these are half of the levels or fewer."""
     counts = panel.runs_at_levels(policies)
     enough = counts >= LEAST_RUNS[rule]
     if not counts.any():
-        return _without(policies)
+        return without(policies)
     if enough.mean() > MANY:
         return panel.at(enough)
     why = f"{(~enough).sum()} of {enough.size} levels have fewer than {LEAST_RUNS[rule]} runs with a score of "
@@ -177,16 +183,17 @@ def of_curves(
         part = at_scored_levels(panel, policies, rule)
         if isinstance(part, Outcome):
             return part
-        found = replace(judge(part, part.of(policies), policies), n_runs=part.n_runs(policies))
+        found = judge(part, part.of(policies), policies)
         n_out = panel.levels.size - part.levels.size
         left_out = f"; {n_out} of {panel.levels.size} levels left out: too few scores" if n_out else ""
-        return replace(found, why=found.why + left_out)
+        return replace(found, n_runs=part.n_runs(policies), why=found.why + left_out)
 
     return all_of([judged(policies) for policies in groups])
 
 
-def _ends(interval: tuple[float, float]) -> str:
-    return f"{interval[0]:.2f} to {interval[1]:.2f}"
+def alone(policies: Names) -> list[Names]:
+    """Return each policy as a group of its own."""
+    return [(policy,) for policy in policies]
 
 
 # ------------------------------------------------------------------------------------------------- heights at levels
@@ -194,7 +201,7 @@ def _ends(interval: tuple[float, float]) -> str:
 
 def ties(panel: Panel, *, pairs: Pairs, levels: Levels = "all", rule: Rule = "intervals") -> Outcome:
     """Whether pairs of policies mostly tie: at more than half of the levels, all pairs counted together."""
-    part, names = panel.part(levels), sorted({name for pair in pairs for name in pair})
+    part, names = panel.part(levels), _names_in(pairs)
     found = order(part, pairs, rule)
     what = f"comparisons of {' and '.join(names)} tie"
     return by_levels(part, names, found == 0.0, np.abs(found) == 1.0, what, effect=_gap(part, pairs))
@@ -211,14 +218,18 @@ def never_differ(panel: Panel, *, pairs: Pairs, n_panels: int = 1, rule: Rule = 
     Supported if all comparisons tie. Contradicted if one differs: by intervals after Bonferroni's correction for the
     comparisons of `n_panels` panels, about which a claim says this, so that one difference by chance does not count.
     """
-    names = sorted({name for pair in pairs for name in pair})
+    names = _names_in(pairs)
     if not panel.n_runs(names):
-        return _without(names)
+        return without(names)
     found = order(panel, pairs, rule, n_tests=len(pairs) * panel.levels.size * n_panels)
     n_tied, n_apart = int((found == 0.0).sum()), int((np.abs(found) == 1.0).sum())
     answer: Answer = "contradicted" if n_apart else "supported" if n_tied == found.size else "undecided"
     why = f"{n_apart} of {found.size} comparisons differ, {n_tied} tie, {found.size - n_apart - n_tied} open"
     return Outcome(answer, n_apart / found.size, _gap(panel, pairs), panel.n_runs(names), why)
+
+
+def _names_in(pairs: Pairs) -> list[str]:
+    return sorted({name for pair in pairs for name in pair})
 
 
 def _gap(panel: Panel, pairs: Pairs) -> float:
@@ -254,14 +265,11 @@ def is_higher(panel: Panel, *, upper: Names, lower: Names, levels: Levels = "all
     )
 
 
-def is_not_higher(
-    panel: Panel, *, first: str, second: str, levels: Levels = "all", rule: Rule = "intervals"
-) -> Outcome:
+def is_not_higher(panel: Panel, *, first: str, second: str, rule: Rule = "intervals") -> Outcome:
     """Whether a policy is no higher than another: lower or tied at more than half of the levels."""
-    part = panel.part(levels)
-    (found,) = order(part, ((first, second),), rule)
-    what, effect = f"levels have {first} no higher than {second}", _lead(part, (first,), (second,))
-    return by_levels(part, (first, second), found <= 0.0, found == 1.0, what, effect=effect)
+    (found,) = order(panel, ((first, second),), rule)
+    what, effect = f"levels have {first} no higher than {second}", _lead(panel, (first,), (second,))
+    return by_levels(panel, (first, second), found <= 0.0, found == 1.0, what, effect=effect)
 
 
 def _lead(panel: Panel, upper: Names, lower: Names) -> float:
@@ -281,29 +289,24 @@ def leads_by_little(
     that bands do not overlap, and the lead is the difference of the means.
     """
     part = panel.part(levels)
-    leads = np.array([_leads(part, leader, other, rule) for other in others])  # (others, L, 2)
-    lower, upper = leads[..., 0], leads[..., 1]
-    limit = FLAT * part.scale
+    pairs, limit = [(leader, other) for other in others], FLAT * part.scale
     means = mean_over_runs(part.of((leader, *others)))
+    gaps = means[0] - means[1:]
+    if rule == "intervals":
+        ends = np.array([intervals_of(part, pair, part.confidence) for pair in pairs])  # (others, L, 2)
+        lower, upper = ends[..., 0], ends[..., 1]
+    else:
+        apart = order(part, pairs, rule)
+        lower = np.where(apart > 0.0, gaps, -inf)
+        upper: FloatArray = np.where(apart < 0.0, gaps, np.maximum(gaps, 0.0))
     return by_levels(
         part,
         (leader, *others),
         np.all(lower > 0.0, axis=0) & (upper.min(axis=0) <= limit),
         np.any(upper < 0.0, axis=0) | np.all(lower > limit, axis=0),
         f"levels have {leader} above {' and '.join(others)} by at most {FLAT:g} of the scale",
-        effect=float(mean_over_runs((means[0] - means[1:]).min(axis=0))) / part.scale,
+        effect=float(mean_over_runs(gaps.min(axis=0))) / part.scale,
     )
-
-
-def _leads(panel: Panel, leader: str, other: str, rule: Rule) -> FloatArray:
-    """Bounds of the lead at each level, (L, 2): NaN where there are too few runs."""
-    a, b = panel.of((leader, other))
-    if rule == "intervals":
-        known = ((x[np.isfinite(x)], y[np.isfinite(y)]) for x, y in zip(a, b, strict=True))
-        return np.array([interval_of(x, y, panel.confidence) for x, y in known])
-    gap = mean_over_runs(a) - mean_over_runs(b)
-    (apart,) = order(panel, ((leader, other),), rule)
-    return np.stack([np.where(apart > 0.0, gap, -inf), np.where(apart < 0.0, gap, np.maximum(gap, 0.0))], axis=1)
 
 
 # ------------------------------------------------------------------------------------------------------ single curves
@@ -315,17 +318,9 @@ def is_constant(panel: Panel, *, policies: Names, rule: Rule = "intervals") -> O
     One wild level does not decide for all others, but a fall over several levels does. By intervals: the largest mean
     less the smallest is at most `FLAT` of the scale. By bands: one height lies within the bands of all these levels.
     """
-    return all_of([_constancy(panel, policy, rule) for policy in policies])
 
-
-def varies(panel: Panel, *, policies: Names, rule: Rule = "intervals") -> Outcome:
-    """Whether each policy varies with the level: the contrary of `is_constant` for each."""
-    return all_of([contrary(_constancy(panel, policy, rule)) for policy in policies])
-
-
-def _constancy(panel: Panel, policy: str, rule: Rule) -> Outcome:
-    def judge(part: Panel, scores: FloatArray, _: Names) -> Outcome:
-        (values,) = scores
+    def judge(part: Panel, scores: FloatArray, names: Names) -> Outcome:
+        (values,), (policy,) = scores, names
         means, drawn = resampled_means(values, part.confidence)
         every = np.ones((1, means.size), dtype=np.bool_)
         kept = list(every if means.size < MIN_CONSTANT else every ^ np.eye(means.size, dtype=np.bool_))
@@ -343,7 +338,12 @@ def _constancy(panel: Panel, policy: str, rule: Rule) -> Outcome:
         why = f"means of {policy} at {where} spread over {spread:.2f} of the scale ({_ends(interval)}); {FLAT:g} is "
         return Outcome(within(interval, -inf, FLAT), spread, spread, why=why + "still constant")
 
-    return of_curves(panel, [(policy,)], rule, judge)
+    return of_curves(panel, alone(policies), rule, judge)
+
+
+def varies(panel: Panel, *, policies: Names, rule: Rule = "intervals") -> Outcome:
+    """Whether each policy varies with the level: the contrary of `is_constant` for each."""
+    return contrary(is_constant(panel, policies=policies, rule=rule))
 
 
 def is_narrow(panel: Panel, *, policies: Names, rule: Rule = "intervals") -> Outcome:
@@ -351,17 +351,9 @@ def is_narrow(panel: Panel, *, policies: Names, rule: Rule = "intervals") -> Out
 
     By intervals, the rule looks at the median width over the levels, which one wild level does not change.
     """
-    return all_of([_narrowness(panel, policy, rule) for policy in policies])
 
-
-def is_wide(panel: Panel, *, policies: Names, rule: Rule = "intervals") -> Outcome:
-    """Whether the bands of policies are wider than this: the contrary of `is_narrow` for each."""
-    return all_of([contrary(_narrowness(panel, policy, rule)) for policy in policies])
-
-
-def _narrowness(panel: Panel, policy: str, rule: Rule) -> Outcome:
-    def judge(part: Panel, scores: FloatArray, _: Names) -> Outcome:
-        (values,) = scores
+    def judge(part: Panel, scores: FloatArray, names: Names) -> Outcome:
+        (values,), (policy,) = scores, names
         found, drawn = resampled_deviations(values, part.confidence)
         width = 4.0 * float(np.median(found)) / part.scale
         if rule == "bands":
@@ -372,7 +364,12 @@ def _narrowness(panel: Panel, policy: str, rule: Rule) -> Outcome:
         why = f"bands of {policy} are {width:.2f} of the scale wide ({_ends(interval)}); {FLAT:g} is still narrow"
         return Outcome(within(interval, -inf, FLAT), width, width, why=why)
 
-    return of_curves(panel, [(policy,)], rule, judge)
+    return of_curves(panel, alone(policies), rule, judge)
+
+
+def is_wide(panel: Panel, *, policies: Names, rule: Rule = "intervals") -> Outcome:
+    """Whether the bands of policies are wider than this: the contrary of `is_narrow` for each."""
+    return contrary(is_narrow(panel, policies=policies, rule=rule))
 
 
 def is_wider(panel: Panel, *, upper: Names, lower: Names, rule: Rule = "intervals") -> Outcome:
@@ -384,9 +381,11 @@ def is_wider(panel: Panel, *, upper: Names, lower: Names, rule: Rule = "interval
 
     def judge(part: Panel, values: FloatArray, names: Names) -> Outcome:
         found, drawn = resampled_deviations(values, part.confidence)
-        wider, narrower = found[0] >= WIDER * found[1], found[1] >= WIDER * found[0]
+        if rule == "intervals":
+            return _larger(part, names, found, drawn, "scatter")
         what = f"levels have the band of {names[0]} {WIDER:g} times as wide as that of {names[1]}"
-        return _larger(part, names, rule, found, drawn, (wider, narrower, what), "scatter")
+        (a, b), effect = found, float((found[0] - found[1]).mean()) / part.scale
+        return by_levels(part, names, a >= WIDER * b, b >= WIDER * a, what, effect=effect, against="the reverse")
 
     return of_curves(panel, tuple(product(upper, lower)), rule, judge)
 
@@ -399,36 +398,28 @@ def reaches_higher(panel: Panel, *, upper: Names, lower: Names, rule: Rule = "in
     """
 
     def judge(part: Panel, values: FloatArray, names: Names) -> Outcome:
-        (means, drawn), (widths, drawn_widths) = (
-            of(values, part.confidence) for of in (resampled_means, resampled_deviations)
-        )
-        edges, limit = means + 2.0 * widths, TIE * part.scale
-        gap = edges[0] - edges[1]
+        means, drawn = resampled_means(values, part.confidence)
+        widths, drawn_widths = resampled_deviations(values, part.confidence)
+        edges = means + 2.0 * widths
+        if rule == "intervals":
+            return _larger(part, names, edges, drawn + 2.0 * drawn_widths, "upper edge")
+        gap = (edges[0] - edges[1]) / part.scale
         what = f"levels have the upper edge of {names[0]} {TIE:g} of the scale above that of {names[1]}"
-        seen = (gap >= limit, gap <= -limit, what)
-        return _larger(part, names, rule, edges, drawn + 2.0 * drawn_widths, seen, "upper edge")
+        return by_levels(part, names, gap >= TIE, gap <= -TIE, what, effect=float(gap.mean()), against="the reverse")
 
     return of_curves(panel, tuple(product(upper, lower)), rule, judge)
 
 
-def _larger(
-    panel: Panel,
-    names: Names,
-    rule: Rule,
-    found: FloatArray,
-    drawn: FloatArray,
-    seen: tuple[BoolArray, BoolArray, str],
-    what: str,
-) -> Outcome:
-    """Whether a number at levels, (2, L), is larger for the first policy: at most levels, or in their median."""
-    if rule == "bands":
-        holds, fails, words = seen
-        effect = float((found[0] - found[1]).mean()) / panel.scale
-        return by_levels(panel, names, holds, fails, words, effect=effect, against="the reverse")
+def _larger(panel: Panel, names: Names, found: FloatArray, drawn: FloatArray, what: str) -> Outcome:
+    """Whether a number at levels, (2, L), is larger for the first policy, in their median."""
     gap = float(np.median(found[0] - found[1])) / panel.scale
     interval = bounds(np.median(drawn[:, 0] - drawn[:, 1], axis=-1) / panel.scale)
     why = f"{what} of {names[0]} less that of {names[1]} is {gap:.2f} of the scale ({_ends(interval)}); "
     return Outcome(within(interval, 0.0, inf), gap, gap, why=why + "above 0 it is larger")
+
+
+def _ends(interval: tuple[float, float]) -> str:
+    return f"{interval[0]:.2f} to {interval[1]:.2f}"
 
 
 # ----------------------------------------------------------------------------------------------------------- formulas
@@ -442,24 +433,17 @@ def availability_is(*, n: int, n_min: int, team: float, expected: float, within:
 
 
 def is_less_available(*, few: int, many: int, needed: Sequence[tuple[int, int]], team: float) -> Outcome:
-    """Whether a second swarm is less available than the first with the same mean team at work.
+    """Whether a second swarm is less available than the first with the same mean team at work, for all robots needed.
 
     It then needs a larger team for the same availability. Availability is 1 where no robot is needed, so the curve of
-    the second swarm has also dropped more steeply.
-
-    Args:
-        few: Size of the first swarm.
-        many: Size of the second.
-        needed: Pairs: robots needed of the first and of the second swarm. The statement must hold for all pairs.
-        team: Mean robots at work in both.
+    the second swarm has also dropped more steeply. `needed` has pairs: robots needed of the first and of the second.
     """
     ratio = ratio_for_team(team)
-    robots = dict(zip((few, many), zip(*needed, strict=True), strict=True))
-    found = {n: [availability(n, n_min, ratio) for n_min in robots[n]] for n in (many, few)}
-    share = float(np.mean(np.array(found[many]) < found[few]))
+    found = [(availability(few, a, ratio), availability(many, b, ratio)) for a, b in needed]
+    share = float(np.mean([of_many < of_few for of_few, of_many in found]))
     told = (
-        f"{', '.join(f'{p_v:.4f}' for p_v in of)} for {', '.join(map(str, robots[n]))} of {n}"
-        for n, of in found.items()
+        f"{p_many:.4f} of {b} of {many}, {p_few:.4f} of {a} of {few}"
+        for (a, b), (p_few, p_many) in zip(needed, found, strict=True)
     )
     why = f"{'; '.join(told)}; mean team {team:g}"
     return Outcome("supported" if share == 1.0 else "contradicted", share, why=why)

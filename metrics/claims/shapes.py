@@ -1,6 +1,6 @@
 """Rules about the shape of curves: where they begin to change, how steep and how straight they are; see `rules`."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from ..checks import CurveError
 from ..curves import FloatArray
 from .panel import CONFIDENCE, Panel, Rule, bounds, mean_over_runs, resampled_means, std_over_runs
-from .rules import Answer, Names, Outcome, of_curves
+from .rules import Answer, Names, Outcome, alone, of_curves
 
 LINEAR = 0.9
 """Share of the variance between levels that a line explains if growth is nearly linear (our choice)."""
@@ -97,13 +97,13 @@ def is_linear(panel: Panel, *, policies: Names, rule: Rule = "intervals") -> Out
             most = _ratio(rest**0.5 + rests**0.5, total**0.5 - totals**0.5)
             least = _ratio(rest**0.5 - rests**0.5, total**0.5 + totals**0.5)
             answer = "supported" if 1.0 - most >= LINEAR and lower > 0.0 else "undecided"
-            answer = "contradicted" if 1.0 - least < LINEAR or upper <= _tie(part) else answer
+            answer = "contradicted" if 1.0 - least < LINEAR or upper <= part.tie else answer
             words = f"{1.0 - most:.2f} to {1.0 - least:.2f} with its interval; "
         why = f"a line explains {explained:.2f} of the variance of {policy} ({words}{LINEAR:g} is nearly linear)"
         why = f"{why} and rises by {rise:.2f} of the scale" + ("" if rise > 0.0 else ": it does not grow")
         return Outcome(answer, explained, rise, why=why)
 
-    return of_curves(panel, [(policy,) for policy in policies], rule, judge)
+    return of_curves(panel, alone(policies), rule, judge)
 
 
 def _ratio(above: float, below: float) -> float:
@@ -117,11 +117,6 @@ def _line(levels: FloatArray, means: FloatArray) -> tuple[FloatArray, FloatArray
     slope = y @ x / (x @ x)
     total = (y**2).sum(axis=1)
     return np.maximum(0.0, total - slope**2 * (x @ x)), total, slope * (levels[-1] - levels[0])
-
-
-def _tie(panel: Panel) -> float:
-    """Margin of a tie, mean of levels, as a share of the scale."""
-    return float(panel.tie_margins.mean()) / panel.scale
 
 
 def changes_within(panel: Panel, *, policies: Names, between: tuple[float, float], rule: Rule = "intervals") -> Outcome:
@@ -144,23 +139,23 @@ def changes_within(panel: Panel, *, policies: Names, between: tuple[float, float
             onset = _onset(part, policy)
             if onset == inf:
                 return Outcome("contradicted", onset, why=f"band of {policy} never leaves that of the first level")
-            answer, reason = _located(low <= onset <= high, part.levels, part.levels[1:], (low, high))
+            answer, reason = _located(float(low <= onset <= high), part.levels, part.levels[1:], (low, high))
             return Outcome(answer, onset, why=f"band of {policy} leaves that of the first level at {onset:.3g}{reason}")
         if part.levels.size < MIN_LEVELS:
             return _too_few(part, names)
-        found = _bends(part, policy)
-        middle, inside = float(np.median(found.places)), float(((found.places >= low) & (found.places <= high)).mean())
-        why = f"slope of {policy} changes by {found.change:.2f} of the scale, by chance alone up to {found.chance:.2f}"
+        places, change, chance = _bends(part, policy)
+        middle, inside = float(np.median(places)), float(((places >= low) & (places <= high)).mean())
+        why = f"slope of {policy} changes by {change:.2f} of the scale, by chance alone up to {chance:.2f}"
         answer = "undecided"
-        if found.is_none:
-            answer, why = "contradicted", f"{why}: no change, {found.tie:.2g} would be one"
-        elif found.is_real:
-            answer, reason = _located(_mostly(inside), part.levels, part.levels[1:-1], (low, high))
+        if abs(change) + chance <= part.tie:
+            answer, why = "contradicted", f"{why}: no change, {part.tie:.2g} would be one"
+        elif abs(change) > chance:
+            answer, reason = _located(inside, part.levels, part.levels[1:-1], (low, high))
             where = f"in {inside:.0%} of the resamples between {between[0]:.3g} and {between[1]:.3g}"
             why = f"slope of {policy} changes at {middle:.3g}, {where}{reason}"
-        return Outcome(answer, middle, found.change, why=why)
+        return Outcome(answer, middle, change, why=why)
 
-    return of_curves(panel, [(policy,) for policy in policies], rule, judge)
+    return of_curves(panel, alone(policies), rule, judge)
 
 
 def changes_before(panel: Panel, *, first: str, others: Names, rule: Rule = "intervals") -> Outcome:
@@ -179,20 +174,21 @@ def changes_before(panel: Panel, *, first: str, others: Names, rule: Rule = "int
             return Outcome("supported" if mine < theirs else "contradicted", mine, why=why)
         if part.levels.size < MIN_LEVELS:
             return _too_few(part, names)
-        bends = [_bends(part, name) for name in names]
-        before = float((bends[0].places < bends[1].places).mean())
-        if unsure := [name for name, found in zip(names, bends, strict=True) if not found.is_real]:
+        bends = {name: _bends(part, name) for name in names}
+        mine, theirs = (bends[name][0] for name in names)
+        before = float((mine < theirs).mean())
+        if unsure := [name for name, (_, change, chance) in bends.items() if abs(change) <= chance]:
             return Outcome("undecided", before, why=f"no change of {' and '.join(unsure)} that chance could not make")
-        sure = _mostly(before)
-        answer: Answer = "undecided" if sure is None else "supported" if sure else "contradicted"
-        return Outcome(answer, before, why=f"{first} changes before {names[1]} in {before:.0%} of the resamples")
+        return Outcome(
+            _mostly(before), before, why=f"{first} changes before {names[1]} in {before:.0%} of the resamples"
+        )
 
     return of_curves(panel, [(first, other) for other in others], rule, judge)
 
 
-def _mostly(share: float) -> bool | None:
-    """Whether a share of resamples is surely most (True) or surely few (False) of them."""
-    return True if share >= CONFIDENCE else False if share <= 1.0 - CONFIDENCE else None
+def _mostly(share: float) -> Answer:
+    """Whether a share of resamples is surely most or surely few of them."""
+    return "supported" if share >= CONFIDENCE else "contradicted" if share <= 1.0 - CONFIDENCE else "undecided"
 
 
 def broken_line(levels: FloatArray, means: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -224,29 +220,13 @@ def _onset(panel: Panel, policy: str) -> float:
     return float(panel.levels[apart][0]) if apart.any() else inf
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Bends:
-    """Where the mean curve of a policy bends, with its resamples."""
+def _bends(panel: Panel, policy: str) -> tuple[FloatArray, float, float]:
+    """Return where the mean curve of a policy bends, and how much.
 
-    places: FloatArray
-    """Level of the bend in each resample, (B,)."""
-    change: float
-    """Change of the slope, times the span of levels, as a share of the scale."""
-    chance: float
-    """Part of it that chance may have added, at `CONFIDENCE`."""
-    tie: float
-    """Margin of a tie, as a share of the scale: a smaller change does not count."""
-
-    @property
-    def is_real(self) -> bool:
-        return abs(self.change) > self.chance
-
-    @property
-    def is_none(self) -> bool:
-        return abs(self.change) + self.chance <= self.tie
-
-
-def _bends(panel: Panel, policy: str) -> _Bends:
+    Returns:
+        Level of the bend in each resample, (B,); change of the slope, times the span of levels, as a share of the
+        scale; and the part of it that chance may have added, at `CONFIDENCE`.
+    """
     (values,) = panel.of((policy,))
     means, drawn = resampled_means(values, panel.confidence)
     unit = (panel.levels[-1] - panel.levels[0]) / panel.scale
@@ -254,8 +234,7 @@ def _bends(panel: Panel, policy: str) -> _Bends:
     places, _ = broken_line(panel.levels, drawn)
     # The bend is put where it fits best, so chance may add what it adds at its best place.
     _, by_chance = broken_line(panel.levels, drawn - means)
-    chance = float(np.quantile(np.abs(by_chance), CONFIDENCE)) * unit
-    return _Bends(places=places, change=float(change[0]) * unit, chance=chance, tie=_tie(panel))
+    return places, float(change[0]) * unit, float(np.quantile(np.abs(by_chance), CONFIDENCE)) * unit
 
 
 def _too_few(panel: Panel, policies: Names) -> Outcome:
@@ -264,22 +243,22 @@ def _too_few(panel: Panel, policies: Names) -> Outcome:
 
 
 def _located(
-    is_between: bool | None, levels: FloatArray, possible: FloatArray, between: tuple[float, float]
+    share: float, levels: FloatArray, possible: FloatArray, between: tuple[float, float]
 ) -> tuple[Answer, str]:
     """Return whether a change lies between two values, or undecided and why if the levels cannot show it.
 
     Args:
-        is_between: What the runs say; None if they leave it open.
+        share: Of the resamples that have it there.
         levels: Of the panel, (L,).
         possible: Those at which a change could be seen.
         between: The two values.
     """
     low, high = between
-    where = f"{low:.3g} to {high:.3g}"
-    if is_between is False and not ((possible >= low) & (possible <= high)).any():
+    answer, where = _mostly(share), f"{low:.3g} to {high:.3g}"
+    if answer == "contradicted" and not ((possible >= low) & (possible <= high)).any():
         return "undecided", f"; no level that was run could show a change at {where}"
     has_below, has_above = bool((possible < low).any()) or levels[0] == 0.0, bool((possible > high).any())
     lacking = [word for word, has in (("below", has_below), ("above", has_above)) if not has]
-    if is_between and lacking:
+    if answer == "supported" and lacking:
         return "undecided", f"; no level that was run could show a change {' or '.join(lacking)} {where}"
-    return "undecided" if is_between is None else "supported" if is_between else "contradicted", ""
+    return answer, ""

@@ -13,8 +13,9 @@ import polars as pl
 from ..checks import CurveError
 from ..claims import Panel, PanelName
 from ..claims.claim import DISTANCES
-from ..claims.panel import CONFIDENCE, TIE
+from ..claims.panel import TIE
 from ..curves import FloatArray, Form, Variant
+from ..statistics import CONFIDENCE
 from .frame import SCHEMA, check_words, label_of, scores
 from .measures import DISTURBANCES, MEASURES
 from .run_curves import THROTTLE, StudyCurves, StudyLine, study_lines

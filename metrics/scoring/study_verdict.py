@@ -14,8 +14,8 @@ from swarm_forage_env.studies.study_file import PAPER
 from ..checks import CurveError
 from ..claims import CLAIMS, INTUITIONS, Claim, PanelName, Verdict, check_claim
 from ..claims.claim import RELATIVE, read_otherwise
-from ..claims.experiments import POLICIES
 from ..claims.rules import Answer as ClaimAnswer
+from ..controllers import PAPER_POLICIES as POLICIES
 from ..curves import Variant
 from .frame import label_of
 from .measures import MEASURES

@@ -9,7 +9,7 @@ import pytest
 from metrics import CurveError, Panel
 from metrics.claims import orders, shapes
 from metrics.claims import rules as general
-from metrics.claims.experiments import ONSET, SIGMAS
+from metrics.claims.words import ONSET, SIGMAS
 from metrics.claims.panel import interval_of, order, resampled_means
 from metrics.claims.rules import Outcome, all_of, most_of
 from tests.support.panels import SIX, panel
@@ -115,7 +115,7 @@ def test_four_runs_seldom_give_a_wrong_answer(statement, curves, sd, parameters,
     assert found.count(wrong) <= 8
 
 
-@pytest.mark.parametrize("statement", [orders.same_order, orders.opposite_order, orders.unrelated])
+@pytest.mark.parametrize("statement", [orders.same_order, orders.unrelated])
 def test_noise_has_no_order(statement):
     names = {"policies": ("a", "b", "c", "d")}
     alike = dict.fromkeys(names["policies"], 1.0)
@@ -291,8 +291,8 @@ def test_orders_in_two_panels():
     assert answers(orders.same_order, rising, rising, **names) == BOTH
     assert answers(orders.same_order, rising, falling, **names) == NEITHER
     assert answers(orders.same_order, rising, falling, better=(1, -1), **names) == BOTH
-    assert answers(orders.opposite_order, rising, falling, **names) == BOTH
-    assert answers(orders.opposite_order, rising, rising, **names) == NEITHER
+    assert answers(orders.same_order, falling, rising, better=(-1, 1), **names) == BOTH
+    assert answers(orders.same_order, rising, rising, better=(1, -1), **names) == NEITHER
     assert answers(orders.unrelated, rising, mixed, **names) == BOTH
     assert answers(orders.unrelated, rising, rising, **names) == NEITHER
     assert answers(orders.unrelated, rising, falling, **names) == NEITHER, "the opposite order is a tie, too"
@@ -301,7 +301,7 @@ def test_orders_in_two_panels():
     apart = panel({"a": 2.0, "b": 1.0, "c": 1.0, "d": 1.0})
     assert answers(orders.unrelated, apart, rising, **names) == OPEN, "one policy alone stands at one end or the other"
     noise = panel(dict.fromkeys("abcd", 1.0), sd=1.0)
-    for statement in (orders.same_order, orders.opposite_order, orders.unrelated):
+    for statement in (orders.same_order, orders.unrelated):
         assert answers(statement, rising, noise, **names) == OPEN
     # a < b and c < a in one, c < b in both: one pair of three agrees with each order of the others.
     three = orders.same_order(rising, panel({"a": 2.0, "b": 3.0, "c": 1.0}), policies=("a", "b", "c"))
@@ -420,13 +420,9 @@ def test_panels_that_do_not_fit_are_refused(levels, scores, message):
         Panel(levels=levels, scores=scores)
 
 
-def test_an_absent_policy_and_unknown_options_are_refused():
+def test_an_absent_policy_and_too_few_levels_are_refused():
     found = panel({"a": 1.0, "b": 1.0})
     with pytest.raises(CurveError, match="scores of c"):
         general.is_constant(found, policies=("c",))
-    with pytest.raises(ValueError, match="rule"):
-        general.ties(found, **AB, rule="eye")
-    with pytest.raises(ValueError, match="levels"):
-        general.ties(found, **AB, levels="middle")
     with pytest.raises(CurveError, match="three or more levels"):
         shapes.bend_of(found.part("low").part("low"))

@@ -179,10 +179,6 @@ RULES: dict[str, Rule] = {
         predicate=orders.same_order, parameters={"policies": FOUR}, border=shuffled(LADDER), wrong=("supported",),
         holds=fixed(LADDER, LADDER), fails=fixed(LADDER, {"a": 1.0, "b": 2.0, "c": 3.0, "d": 4.0}),
     ),
-    "the opposite order, of random ones": Rule(
-        predicate=orders.opposite_order, parameters={"policies": FOUR}, border=shuffled(LADDER), wrong=("supported",),
-        holds=fixed(LADDER, {"a": 1.0, "b": 2.0, "c": 3.0, "d": 4.0}), fails=fixed(LADDER, LADDER),
-    ),
     "unrelated orders": Rule(
         predicate=orders.unrelated, parameters={"policies": FOUR},
         border=fixed(LADDER, {"a": 3.0, "b": 1.0, "c": 4.0, "d": 2.0}), wrong=("contradicted",),
