@@ -1,14 +1,13 @@
 """A benchmark that others can enter: a fixed protocol of worlds and seeds, entry files, and what they are worth."""
 
 from .board import Board, board_of, draw_benchmark
-from .entry import BenchmarkQuestion, Entry, Training, benchmark_question, read_entry, run_benchmark
+from .entry import Entry, Training, read_entry, run_benchmark
 from .protocol import BenchmarkError, Protocol, ProtocolWorld, load_protocol
 from .standing import Standing, reference_of, scripted_entries, standing_of
 from .verification import SAME, verify_entry
 
 __all__ = [
     "run_benchmark",
-    "benchmark_question",
     "verify_entry",
     "load_protocol",
     "read_entry",
@@ -17,7 +16,6 @@ __all__ = [
     "standing_of",
     "board_of",
     "draw_benchmark",
-    "BenchmarkQuestion",
     "Board",
     "Protocol",
     "ProtocolWorld",

@@ -26,7 +26,7 @@ from swarm_forage_env._internal.files import read_json, replacing
 from swarm_forage_env._internal.typed import Amount, Count, Name, Within, typed
 from swarm_forage_env.contract.policy import sees_world
 from swarm_forage_env.policies.registry import file_of, is_policy_file, policy_class, policy_label
-from swarm_forage_env.runs.plan import Plan, Table
+from swarm_forage_env.runs.plan import Plan, Table, run_plan
 from swarm_forage_env.runs.policy_spec import policy_specs
 from swarm_forage_env.runs.record import Record
 from swarm_forage_env.runs.spec import identity_of
@@ -34,7 +34,6 @@ from swarm_forage_env.runs.versions import software_versions
 
 from ..controllers import PAPER_POLICIES
 from ..curves import FloatArray
-from ..scoring.question import Question, ask
 from .protocol import OPEN, BenchmarkError, Protocol, load_protocol
 
 TRAINED_IN = ("given", "other", "nothing", "unknown")
@@ -227,39 +226,6 @@ def read_entry(path: str | Path, protocol: Protocol | None = None) -> Entry:
     return entry
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class BenchmarkQuestion(Question[Entry]):
-    """Runs of some policies in all worlds of a protocol; several are training seeds of one method, and one entry."""
-
-    name: str
-    """Name of the entry in tables."""
-    protocol: Protocol
-    training: Training = field(default_factory=Training)
-
-    def answer(self, table: Table) -> Entry:
-        """Return the entry.
-
-        Raises:
-            BenchmarkError: runs failed.
-        """
-        check_finished(table)
-        policies = [policy.policy for policy in self.plan.policies]
-        return Entry(
-            protocol=self.protocol.identity,
-            name=self.name,
-            command=entry_command(policies, self.name, training=self.training),
-            policies=tuple(
-                EntryPolicy(name=policy_label(policy), digest=digest, training_seed=seed)
-                for policy in policies
-                for digest, seed in [policy_origin(policy)]
-            ),
-            runs=_runs(self.protocol, table),
-            training=self.training,
-            core_hours=_core_hours(table.records.values()),
-            versions={package: version for package, version in software_versions().items() if version},
-        )
-
-
 def check_finished(table: Table) -> None:
     """Refuse a table in which runs are missing.
 
@@ -272,30 +238,6 @@ def check_finished(table: Table) -> None:
             f"Expected all {len(table.plan.specs)} runs to finish, {len(table.failures)} failed; the first, "
             f"{first.spec.describe()}: {first.error}"
         )
-
-
-def benchmark_question(
-    policies: Sequence[str], *, name: str, protocol: Protocol | None = None, training: Training | None = None
-) -> BenchmarkQuestion:
-    """Return what `run_benchmark` asks; arguments and errors as there."""
-    text("the name of an entry", name)
-    chosen, told = protocol or load_protocol(), training or Training()
-    if name in PAPER_POLICIES and (tuple(policies) != (name,) or chosen.is_quick):
-        raise BenchmarkError(
-            f"Expected another name than {name!r}, which is that of an entry that comes with the package; choose one "
-            "with --name."
-        )
-    if not chosen.is_quick:
-        told.check_track(chosen, len(policies))
-    specs = policy_specs(policies)
-    omniscient = [spec.label for spec in specs if sees_world(policy_class(spec.policy))]
-    if omniscient:
-        raise BenchmarkError(
-            f"Expected policies that decide by what robots observe, got {omniscient[0]}, which reads the world. It is "
-            "a yardstick and no contestant: swarm-forage run puts it beside others."
-        )
-    plan = Plan.product(specs, [each.world for each in chosen.worlds], chosen.seeds)
-    return BenchmarkQuestion(plan=plan, name=name, protocol=chosen, training=told)
 
 
 def run_benchmark(
@@ -327,8 +269,39 @@ def run_benchmark(
         ValueError: an unknown policy, or a file that cannot be opened.
         KeyboardInterrupt: Ctrl-C; finished runs are in `out`.
     """
-    question = benchmark_question(policies, name=name, protocol=protocol, training=training)
-    return ask(question, out=out, jobs=jobs, executor=executor, progress=progress)
+    text("the name of an entry", name)
+    chosen, told = protocol or load_protocol(), training or Training()
+    if name in PAPER_POLICIES and (tuple(policies) != (name,) or chosen.is_quick):
+        raise BenchmarkError(
+            f"Expected another name than {name!r}, which is that of an entry that comes with the package; choose one "
+            "with --name."
+        )
+    if not chosen.is_quick:
+        told.check_track(chosen, len(policies))
+    specs = policy_specs(policies)
+    omniscient = [spec.label for spec in specs if sees_world(policy_class(spec.policy))]
+    if omniscient:
+        raise BenchmarkError(
+            f"Expected policies that decide by what robots observe, got {omniscient[0]}, which reads the world. It is "
+            "a yardstick and no contestant: swarm-forage run puts it beside others."
+        )
+    plan = Plan.product(specs, [each.world for each in chosen.worlds], chosen.seeds)
+    table = run_plan(plan, out=out, jobs=jobs, executor=executor, progress=progress)
+    check_finished(table)
+    return Entry(
+        protocol=chosen.identity,
+        name=name,
+        command=entry_command([spec.policy for spec in specs], name, training=told),
+        policies=tuple(
+            EntryPolicy(name=policy_label(spec.policy), digest=digest, training_seed=seed)
+            for spec in specs
+            for digest, seed in [policy_origin(spec.policy)]
+        ),
+        runs=_runs(chosen, table),
+        training=told,
+        core_hours=_core_hours(table.records.values()),
+        versions={package: version for package, version in software_versions().items() if version},
+    )
 
 
 def entry_command(policies: Sequence[str], name: str, *, training: Training | None = None) -> str:

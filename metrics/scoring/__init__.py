@@ -6,13 +6,13 @@ from .frame import differences, scores, summarized
 from .limits import ForagingLimit, limit_of
 from .measures import MEASURES, Measure
 from .plots import draw_scores
-from .policy_scores import ScoreQuestion, Scores, score, score_curves, score_question
-from .question import Question, ask
+from .policy_scores import Scores, score, score_curves, score_question
+from .question import Question
 from .run_curves import StudyLine, study_lines
 from .study_numbers import StudyPanel, StudyPanels, study_panels
 from .study_plots import PlottedStudy, StudyFigure, draw_figure, plot, study_figures
 from .study_verdict import Judged, StudyVerdict, Waiting, judge_claims, verdict
-from .summary import RunQuestion, RunSummary, run_question, summarize_runs
+from .summary import RunSummary, summarize_runs
 
 __all__ = [
     "MEASURES",
@@ -24,8 +24,6 @@ __all__ = [
     "differences",
     "limit_of",
     "ForagingLimit",
-    "ask",
-    "run_question",
     "summarize_runs",
     "score_question",
     "study_lines",
@@ -38,8 +36,6 @@ __all__ = [
     "draw_scores",
     "Scores",
     "Question",
-    "ScoreQuestion",
-    "RunQuestion",
     "StudyLine",
     "StudyPanel",
     "StudyPanels",

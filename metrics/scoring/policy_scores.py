@@ -23,7 +23,7 @@ from swarm_forage_env._internal.wording import counted, limits, number, percent,
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 from swarm_forage_env.runs.plan import Plan, Table, run_plan
 from swarm_forage_env.runs.policy_spec import PolicyLike, PolicySpec, policy_specs
-from swarm_forage_env.scenarios.performance import Performance, performance_of
+from swarm_forage_env.scenarios.performance import performance_of
 from swarm_forage_env.sheet import Answer, Sheet
 from swarm_forage_env.studies import ladders
 from swarm_forage_env.studies.ladders import Budget
@@ -36,7 +36,7 @@ from .curves_file import read_curves
 from .frame import ROW, check_words, differences, label_of, scores, summarized, words_of
 from .measures import MEASURES, PICTURED, check_measures, criteria_of
 from .plots import draw_scores
-from .question import Question, ask
+from .question import Question
 from .run_curves import THROTTLE, PerformanceLike, StudyCurves, own_performance, policy_curves
 
 if TYPE_CHECKING:
@@ -313,58 +313,6 @@ def spread(mean: float, half: float, *, is_share: bool = False) -> str:
     return f"{mean:.{decimals}f} ± {half:.{decimals}f}{unit}"
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ScoreQuestion(Question[Scores]):
-    """The runs that score policies."""
-
-    world: World
-    """What the worlds of the plan are variants of."""
-    measures: tuple[str, ...]
-    budget: str
-    """Name of the budget, "custom" for one of the user's own."""
-    performance: Performance | None = None
-    """A function of records that is the performance; None = what the scenario names."""
-    variants: tuple[Variant, ...] = ("corrected",)
-    forms: tuple[Form, ...] = ("marginal",)
-    against: str | None = None
-    is_full: bool = False
-
-    def answer(self, table: Table) -> Scores:
-        """Return the scores of all policies."""
-        policies = tuple(policy.label for policy in self.plan.policies)
-        studies = [policy_curves(table, policy, self.performance) for policy in policies]
-        frame, missing = scores(studies, self.measures, variants=self.variants, forms=self.forms)
-        scenario = self.plan.conditions[0].world.scenario
-        read_as = self.performance or performance_of(self.world.scenario.performance)
-        return Scores(
-            frame=frame,
-            policies=policies,
-            world=self.world.title(),
-            missing=missing,
-            failures={policy: lines for policy in policies if (lines := table.failure_lines(policy))},
-            settings={
-                "budget": self.budget,
-                "horizon_s": scenario.horizon_s,
-                "interval_s": scenario.interval_s,
-                "seeds": list(self.plan.seeds),
-                "performance": read_as.name,
-                "n_robots": self.world.n_robots,
-                "out": None if table.folder is None else str(table.folder),
-            },
-            notes=tuple(self._other_objects()),
-            against=self.against,
-            is_full=self.is_full,
-        )
-
-    def _other_objects(self) -> Iterator[str]:
-        """Yield how worlds over swarm sizes differ from the world that was named, where they do."""
-        there = {c.world.scenario.objects.n_objects for c in self.plan.conditions if c.world.criterion == SIZE}
-        here = self.world.scenario.objects.n_objects
-        if there - {here}:
-            objects = " or ".join(f"{n:,}" for n in sorted(there))
-            yield f"rows over N have {objects} objects, enough for large swarms; 'run' has the {here:,} of the scenario"
-
-
 def score(
     policies: PolicyLike | Sequence[PolicyLike] | Mapping[str, PolicyLike],
     world: WorldLike = "warehouse_small",
@@ -439,7 +387,7 @@ def score(
         forms=forms,
         against=against,
     )
-    return ask(question, out=out, jobs=jobs, executor=executor, progress=progress)
+    return question.ask(out=out, jobs=jobs, executor=executor, progress=progress)
 
 
 def score_question(
@@ -459,7 +407,7 @@ def score_question(
     forms: Sequence[Form] = ("marginal",),
     against: str | None = None,
     is_full: bool = False,
-) -> ScoreQuestion:
+) -> Question[Scores]:
     """Return the question of `score`; arguments and errors as there."""
     wanted = check_measures(measures)
     check_words("variant", variants, get_args(Variant))
@@ -479,17 +427,44 @@ def score_question(
             f"Expected one of {', '.join(labels)} to compare against, got {against!r}.{suggestion(against, labels)}"
         )
     worlds = ladders.plan_worlds(chosen, criteria_of(wanted, disturbance), allowed, density=density)
-    return ScoreQuestion(
-        plan=Plan.product(specs, worlds, chosen_seeds(seeds, allowed.n_seeds)),
-        world=chosen,
-        measures=wanted,
-        budget=budget if isinstance(budget, str) else "custom",
-        performance=own_performance(performance),
-        variants=tuple(variants),
-        forms=tuple(forms),
-        against=against,
-        is_full=is_full,
-    )
+    plan = Plan.product(specs, worlds, chosen_seeds(seeds, allowed.n_seeds))
+    own = own_performance(performance)
+
+    def answer(table: Table) -> Scores:
+        frame, missing = scores(
+            [policy_curves(table, label, own) for label in labels], wanted, variants=variants, forms=forms
+        )
+        scenario = worlds[0].scenario
+        return Scores(
+            frame=frame,
+            policies=tuple(labels),
+            world=chosen.title(),
+            missing=missing,
+            failures={label: lines for label in labels if (lines := table.failure_lines(label))},
+            settings={
+                "budget": budget if isinstance(budget, str) else "custom",
+                "horizon_s": scenario.horizon_s,
+                "interval_s": scenario.interval_s,
+                "seeds": list(plan.seeds),
+                "performance": (own or performance_of(chosen.scenario.performance)).name,
+                "n_robots": chosen.n_robots,
+                "out": None if table.folder is None else str(table.folder),
+            },
+            notes=tuple(_other_objects(chosen, worlds)),
+            against=against,
+            is_full=is_full,
+        )
+
+    return Question(plan=plan, answer=answer)
+
+
+def _other_objects(world: World, worlds: Sequence[World]) -> Iterator[str]:
+    """Yield how worlds over swarm sizes differ from the world that was named, where they do."""
+    there = {each.scenario.objects.n_objects for each in worlds if each.criterion == SIZE}
+    here = world.scenario.objects.n_objects
+    if there - {here}:
+        objects = " or ".join(f"{n:,}" for n in sorted(there))
+        yield f"rows over N have {objects} objects, enough for large swarms; 'run' has the {here:,} of the scenario"
 
 
 def score_curves(

@@ -1,14 +1,11 @@
-"""A question: which runs it needs, and how their table answers it. Everything that is asked of policies is one.
+"""A question: which runs it needs, and how their table answers it.
 
-    question = score_question(["crw"], "warehouse_small", budget="quick")
-    found = ask(question, out="results")          # makes the runs, or reads those that are there
-    print(found)
-
-A new question is a dataclass with `plan` and `answer`, and a function that writes the plan. Its answer is best an
-`swarm_forage_env.sheet.Answer`, which has all forms.
+question = score_question(["crw"], "warehouse_small", budget="quick")
+question.plan.specs                    # the runs, before any is made
+print(question.ask(out="results"))     # makes the runs, or reads those that are there
 """
 
-from abc import ABC, abstractmethod
+from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,45 +17,20 @@ Found = TypeVar("Found")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Question(ABC, Generic[Found]):
+class Question(Generic[Found]):
     """Runs, and what they answer."""
 
     plan: Plan
+    answer: Callable[[Table], Found]
+    """From the table of the runs to the answer, which says which runs failed."""
 
-    def make_runs(
+    def ask(
         self,
         *,
         out: str | Path | None = None,
-        executor: Executor | None = None,
         jobs: int | None = None,
-        progress: bool = False,
-    ) -> Table:
-        """Make the runs that the answer needs; arguments and errors as in `swarm_forage_env.runs.plan.run_plan`."""
-        return run_plan(self.plan, out=out, executor=executor, jobs=jobs, progress=progress)
-
-    @abstractmethod
-    def answer(self, table: Table) -> Found:
-        """Return the answer that the runs give; it says which failed."""
-
-
-def ask(
-    question: Question[Found],
-    *,
-    out: str | Path | None = None,
-    jobs: int | None = None,
-    executor: Executor | None = None,
-    progress: bool = True,
-) -> Found:
-    """Make the runs of a question and return its answer.
-
-    Args:
-        question: What is asked.
-        out: Folder for run records. Runs that it already holds are not repeated, so you can repeat an interrupted call.
-        jobs: Processes; default one per core.
-        executor: Runs the work instead, for example Dask's `client.get_executor()`.
-        progress: Show progress and an estimate on stderr.
-
-    Raises:
-        KeyboardInterrupt: Ctrl-C; finished runs are in `out`.
-    """
-    return question.answer(question.make_runs(out=out, jobs=jobs, executor=executor, progress=progress))
+        executor: Executor | None = None,
+        progress: bool = True,
+    ) -> Found:
+        """Make the runs and return the answer; arguments and errors as in `swarm_forage_env.runs.plan.run_plan`."""
+        return self.answer(run_plan(self.plan, out=out, jobs=jobs, executor=executor, progress=progress))

@@ -5,7 +5,7 @@ print(summarize_runs(table))
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,23 +15,19 @@ import numpy as np
 from swarm_forage_env._internal.wording import counted, percent, plain
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 from swarm_forage_env.rendering.plots import Curve, draw_curves
-from swarm_forage_env.runs.plan import Condition, Plan, Table
-from swarm_forage_env.runs.policy_spec import PolicyLike, policy_specs
+from swarm_forage_env.runs.plan import Condition, Table
 from swarm_forage_env.runs.record import Record
 from swarm_forage_env.runs.store import failure_file, failure_lines, record_file
 from swarm_forage_env.scenarios.performance import Performance, performance_of
 from swarm_forage_env.sheet import Answer, Sheet
-from swarm_forage_env.wrappers.world import World, WorldLike, world_of
+from swarm_forage_env.wrappers.world import World
 
-from ..checks import chosen_seeds
 from ..statistics import Summary, aggregate
 from .limits import ABOUT_LIMIT, share_of_limit
 from .plots import FEWEST_RUNS
-from .question import Question
 
 LEVEL = 0.95
 """Confidence level of all intervals."""
-_ENDS = ("mean", "low", "high")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,15 +37,10 @@ class ConditionSummary:
     condition: Condition
     caches: str
     n_runs: int
-    performance: Summary
-    """Of what the scenario names, see `performance_number`."""
-    deliveries_per_1000_s: Summary
-    deliveries_per_robot_per_1000_s: Summary
-    """Per robot that is present."""
-    first_pickups_per_1000_s: Summary
+    of: Mapping[str, Summary]
+    """Quantity of `_quantities` -> mean and interval over runs."""
     share_of_limit: float | None
     """Mean performance over the estimated limit of the world; None where there is no estimate, see `limit_of`."""
-    interference_fraction: float
     simulated_s_per_wall_s: float
     """Simulated seconds per second and process, policy and recording included."""
 
@@ -86,10 +77,10 @@ class RunSummary(Answer):
         lines: list[list[str]] = []
         for row in self.rows:
             about = [row.condition.policy.label, *([row.condition.world.name] if n_worlds > 1 else [])]
-            numbers = [spread_text(row.performance)] if other else []
-            numbers += [spread_text(row.deliveries_per_1000_s)]
+            numbers = [spread_text(row.of["performance"])] if other else []
+            numbers += [spread_text(row.of["deliveries_per_1000_s"])]
             numbers += ["-" if row.share_of_limit is None else percent(row.share_of_limit)] if has_limit else []
-            tail = [f"{row.interference_fraction:.3f}", f"{row.simulated_s_per_wall_s:,.0f}"]
+            tail = [f"{row.of['interference_fraction'].mean:.3f}", f"{row.simulated_s_per_wall_s:,.0f}"]
             lines.append([*about, row.caches, str(row.n_runs), *numbers, *tail])
         notes = [f"{self._about_interval}; interference: share of active robot time"]
         notes += [ABOUT_LIMIT] if has_limit else []
@@ -128,10 +119,7 @@ class RunSummary(Answer):
             "runs": [
                 {
                     **record.keys(),
-                    "performance": performance_number(record, self.read_as),
-                    "deliveries_per_1000_s": record.per_1000_s("collected"),
-                    "first_pickups_per_1000_s": record.per_1000_s("first_picked"),
-                    "interference_fraction": float(record["interference_fraction"].mean()),
+                    **_quantities(record, self.read_as),
                     "wall_time_s": plain(record.wall_time_s),
                     "file": None if folder is None else str(record_file(folder, record.run_id)),
                 }
@@ -180,38 +168,6 @@ class RunSummary(Answer):
         )
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class RunQuestion(Question[RunSummary]):
-    """The question what policies achieve in worlds."""
-
-    def answer(self, table: Table) -> RunSummary:
-        """Return the summary of all runs."""
-        return summarize_runs(table)
-
-
-def run_question(
-    policies: Sequence[PolicyLike] | Mapping[str, PolicyLike],
-    *worlds: WorldLike,
-    seeds: int | Sequence[int] = 1,
-    parameters: Mapping[str, Any] | None = None,
-    caches: str | None = None,
-) -> RunQuestion:
-    """Return the question what policies achieve in worlds, which `summarize_runs` answers.
-
-    Args:
-        policies: As in `score`.
-        worlds: Each is a `World`, a configuration or the name of a preset.
-        seeds: Their number, or a list.
-        parameters: As in `score`.
-        caches: As in `score`.
-
-    Raises:
-        ValueError: an unknown policy or scenario, or values that describe no run.
-    """
-    chosen = policy_specs(policies, parameters=parameters, caches=caches)
-    return RunQuestion(plan=Plan.product(chosen, [world_of(world) for world in worlds], chosen_seeds(seeds, 1)))
-
-
 def summarize_runs(table: Table) -> RunSummary:
     """Return what the runs of a table achieved, one row per condition that has finished runs."""
     return RunSummary(table=table, rows=tuple(_condition_summaries(table)))
@@ -233,6 +189,19 @@ def spread_text(summary: Summary) -> str:
     return f"{summary.mean:.2f}" + ("" if math.isnan(half) else f" ± {half:.2f}")
 
 
+def _quantities(record: Record, read_as: Performance) -> dict[str, float]:
+    """Return what is told of a run, each as one number."""
+    delivered, present = record["collected"], record["n_present"]
+    per_robot = np.divide(delivered, present, out=np.zeros(len(present)), where=present > 0.0)
+    return {
+        "performance": performance_number(record, read_as),
+        "deliveries_per_1000_s": record.per_1000_s("collected"),
+        "deliveries_per_robot_per_1000_s": float(per_robot.sum()) * 1000.0 / record.horizon_s,  # that is present
+        "first_pickups_per_1000_s": record.per_1000_s("first_picked"),
+        "interference_fraction": float(record["interference_fraction"].mean()),
+    }
+
+
 def _condition_summaries(table: Table) -> Iterator[ConditionSummary]:
     for condition in table.plan.conditions:
         records = table.of(condition)
@@ -241,29 +210,15 @@ def _condition_summaries(table: Table) -> Iterator[ConditionSummary]:
         wall_s = sum(record.wall_time_s for record in records)
         read_as = performance_of(condition.world.scenario.performance)
         planned = table.plan.specs_of(condition)[0].world
+        runs = [_quantities(record, read_as) for record in records]
         yield ConditionSummary(
             condition=condition,
             caches=planned.scenario.caches,
             n_runs=len(records),
-            performance=_mean(records, lambda record, read_as=read_as: performance_number(record, read_as)),
-            deliveries_per_1000_s=_mean(records, lambda record: record.per_1000_s("collected")),
-            deliveries_per_robot_per_1000_s=_mean(records, _deliveries_per_robot),
-            first_pickups_per_1000_s=_mean(records, lambda record: record.per_1000_s("first_picked")),
+            of={name: aggregate([run[name] for run in runs], level=LEVEL) for name in runs[0]},
             share_of_limit=share_of_limit(planned, float(np.mean([record["performance"].sum() for record in records]))),
-            interference_fraction=float(np.mean([record["interference_fraction"].mean() for record in records])),
             simulated_s_per_wall_s=sum(record.horizon_s for record in records) / wall_s if wall_s else math.nan,
         )
-
-
-def _mean(records: Sequence[Record], number: Callable[[Record], float]) -> Summary:
-    return aggregate([number(record) for record in records], level=LEVEL)
-
-
-def _deliveries_per_robot(record: Record) -> float:
-    """Per 1,000 s and robot that is present."""
-    delivered, present = record["collected"], record["n_present"]
-    share = np.divide(delivered, present, out=np.zeros(len(present)), where=present > 0.0)
-    return float(share.sum()) * 1000.0 / record.horizon_s
 
 
 def _condition_mapping(row: ConditionSummary) -> dict[str, Any]:
@@ -271,18 +226,13 @@ def _condition_mapping(row: ConditionSummary) -> dict[str, Any]:
         "controller": row.condition.policy.label,
         "caches": row.caches,
         "n_runs": row.n_runs,
-        "performance": _ends(row.performance),
-        "deliveries_per_1000_s": _ends(row.deliveries_per_1000_s),
-        "deliveries_per_robot_per_1000_s": _ends(row.deliveries_per_robot_per_1000_s),
-        "first_pickups_per_1000_s": _ends(row.first_pickups_per_1000_s),
-        "interference_fraction": plain(row.interference_fraction),
+        **{
+            name: {"mean": plain(of.mean), "low": plain(of.lower), "high": plain(of.upper)}
+            for name, of in row.of.items()
+        },
         "share_of_limit": row.share_of_limit,
         "simulated_s_per_wall_s": plain(row.simulated_s_per_wall_s),
     }
-
-
-def _ends(summary: Summary) -> dict[str, float | None]:
-    return dict(zip(_ENDS, map(plain, (summary.mean, summary.lower, summary.upper)), strict=True))
 
 
 def _about_bands(curves: Sequence[Curve]) -> str:

@@ -55,22 +55,20 @@ def run(
         raise ConfigError("Expected --name for an entry of several policies.")
     if quick and file is not None:
         raise ConfigError("Expected --file without --quick: a quick look is no entry.")
-    from metrics.benchmark import Training, benchmark_question, board_of, load_protocol, scripted_entries
+    from metrics.benchmark import Training, board_of, load_protocol, run_benchmark, scripted_entries
     from metrics.controllers import PAPER_POLICIES
-    from metrics.scoring.question import ask
     from swarm_forage_env._internal.files import as_file_name, check_file
     from swarm_forage_env.policies.registry import policy_label
 
     protocol = load_protocol(quick=quick)
     called = name or f"{policy_label(first)}{', quick' if quick else ''}"
     training = Training(worlds=trained_in, command=training_command, track=track, decisions=decisions)
-    question = benchmark_question([*policies], name=called, protocol=protocol, training=training)
     entry_file = None if quick else file or FOLDER / f"{as_file_name(called)}.json"
     if entry_file is not None:
         check_file(entry_file)
     if called not in PAPER_POLICIES:
         scripted_entries(load_protocol())  # what it will be shown beside
-    entry = ask(question, out=out, jobs=jobs)
+    entry = run_benchmark([*policies], name=called, protocol=protocol, training=training, out=out, jobs=jobs)
     if entry_file is not None:
         entry.write(entry_file)
         note(f"entry {entry_file}")

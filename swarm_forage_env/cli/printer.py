@@ -64,7 +64,7 @@ def ask_and_show(question: "Question[Any]", folder: Path, options: "RunOptions",
     """
     from metrics.checks import CurveError
     from swarm_forage_env.rendering.figures import picture_ending
-    from swarm_forage_env.runs.plan import planned_line
+    from swarm_forage_env.runs.plan import planned_line, run_plan
 
     picture_ending(picture)  # before the work; a place that cannot be written to is told of beside the answer
     if options.dry_run:
@@ -72,7 +72,7 @@ def ask_and_show(question: "Question[Any]", folder: Path, options: "RunOptions",
         planned = json.dumps([spec.to_mapping() for spec in specs], indent=1)
         say(planned if options.as_json else planned_line(specs, folder))
         return 0
-    table = question.make_runs(out=folder, jobs=options.jobs, progress=True)
+    table = run_plan(question.plan, out=folder, jobs=options.jobs, progress=True)
     try:
         answer: Answer = question.answer(table)
     except CurveError as error:  # what is left is too little

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 from cyclopts.types import PositiveInt
@@ -25,9 +25,6 @@ from swarm_forage_env.cli.options import (
 from swarm_forage_env.cli.printer import ask_and_show, note, say, show
 from swarm_forage_env.rendering.figures import SCREEN
 
-if TYPE_CHECKING:
-    from metrics.scoring import ScoreQuestion
-
 
 def run(
     policies: Policies,
@@ -42,11 +39,14 @@ def run(
     Makes the runs in parallel, shows a table, stores one record per run and draws performance over time. The command
     does not repeat runs that the folder already holds, so after an interruption, just enter it again.
     """
-    from metrics.scoring.summary import run_question
+    from metrics.scoring import Question, summarize_runs
     from swarm_forage_env.cli.worlds import default_file, default_folder, described_world
+    from swarm_forage_env.runs.plan import Plan
+    from swarm_forage_env.runs.policy_spec import policy_specs
 
     chosen, caches = described_world(world)
-    question = run_question(policies, chosen, seeds=range(seeds), caches=caches)
+    plan = Plan.product(policy_specs(policies, caches=caches), [chosen], range(seeds))
+    question = Question(plan=plan, answer=summarize_runs)
     folder = options.out or default_folder(chosen)
     return ask_and_show(question, folder, options, options.picture or default_file(folder, chosen, policies, ".png"))
 
@@ -115,7 +115,8 @@ def score(
         budget: quick, standard or paper: sets the length and number of runs, and the levels.
         disturbance: Disturbance for reactivity and adaptability: throttle or handling_cost.
     """
-    from swarm_forage_env.cli.worlds import default_file, default_folder
+    from metrics.scoring import score_question
+    from swarm_forage_env.cli.worlds import default_file, default_folder, described_fields, described_world
 
     asked: dict[str, Any] = {
         "measures": measures or None,
@@ -134,9 +135,15 @@ def score(
         world = replace(world, settings=(*world.settings, f"performance={performance}"))
     if not policies:
         raise ConfigError("Expected policies to run, or a file with --curves; 'swarm-forage list' names policies.")
-    question = asked_scores(policies, world, budget=budget, seeds=seeds, disturbance=disturbance, **asked)
-    folder = options.out or default_folder(question.world)
-    file = options.picture or default_file(folder, question.world, policies, "_scores.png")
+    for word in world.settings:
+        if word.partition("=")[0] in ("horizon_s", "interval_s"):
+            raise ConfigError(f"Expected no --set {word}, which the budget sets; --horizon changes the length of runs.")
+    chosen, caches = described_world(replace(world, horizon=None))
+    asked |= {"budget": budget, "seeds": seeds, "disturbance": disturbance, "horizon_s": world.horizon}
+    density = described_fields(world).fields.get("density")
+    question = score_question(policies, chosen, caches=caches, density=density, **asked)
+    folder = options.out or default_folder(chosen)
+    file = options.picture or default_file(folder, chosen, policies, "_scores.png")
     return ask_and_show(question, folder, options, file)
 
 
@@ -168,27 +175,6 @@ def _score_curves(
     )
     show(found, options.picture or file.with_name(f"{file.stem}_scores.png"), as_json=options.as_json)
     return int(bool(found.failures))
-
-
-_OF_THE_BUDGET = ("horizon_s", "interval_s")
-
-
-def asked_scores(policies: Sequence[str], options: WorldOptions, **how: Any) -> "ScoreQuestion":
-    """Return the question that the words ask; `how` are further arguments of `score_question`.
-
-    Raises:
-        ConfigError: whatever is wrong with the words.
-        ImportError: the policy is a model, and stable-baselines3 is not installed.
-    """
-    from metrics.scoring import score_question
-    from swarm_forage_env.cli.worlds import described_fields, described_world
-
-    for word in options.settings:
-        if word.partition("=")[0] in _OF_THE_BUDGET:
-            raise ConfigError(f"Expected no --set {word}, which the budget sets; --horizon changes the length of runs.")
-    density = described_fields(options).fields.get("density")
-    world, caches = described_world(replace(options, horizon=None))
-    return score_question(policies, world, horizon_s=options.horizon, caches=caches, density=density, **how)
 
 
 def check(policies: Policies, /, *, world: WorldOptions = WorldOptions()) -> None:

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from metrics.benchmark import benchmark_question
+from metrics.benchmark import run_benchmark
 from metrics.benchmark.protocol import BenchmarkError
 from swarm_forage_env import CheckError, check_determinism, check_policy, scenario
 from swarm_forage_env._internal.fields import ConfigError
@@ -92,7 +92,7 @@ def test_it_is_no_contestant():
     with pytest.raises(CheckError, match="reads the world"):
         check_policy("oracle")
     with pytest.raises(BenchmarkError, match="oracle, which reads the world"):
-        benchmark_question(["oracle"], name="mine")
+        run_benchmark(["oracle"], name="mine")
 
 
 def test_its_runs_repeat():

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from metrics.benchmark import BenchmarkError, Training, benchmark_question, load_protocol, read_entry
+from metrics.benchmark import BenchmarkError, Training, load_protocol, read_entry, run_benchmark
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.runs.spec import identity_of
 from tests.support.entries import TINY, made_up_entry
@@ -112,4 +112,4 @@ def test_what_no_file_may_say_is_refused_before_any_run():
     with pytest.raises(BenchmarkError, match="got 'mars'"):
         Training(worlds="mars")
     with pytest.raises(ConfigError, match="Expected the name of an entry to be a non-empty text"):
-        benchmark_question(["crw"], name="\x1b[31m")
+        run_benchmark(["crw"], name="\x1b[31m")

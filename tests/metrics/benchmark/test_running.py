@@ -6,10 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from metrics.benchmark import BenchmarkError, Training, benchmark_question, load_protocol, read_entry, run_benchmark
+from metrics.benchmark import BenchmarkError, Training, load_protocol, read_entry, run_benchmark
 from metrics.benchmark.entry import entry_command
-from metrics.scoring import ask
-from swarm_forage_env import run_one
+from swarm_forage_env import plan_run, run_one
 from swarm_forage_env.policies.registry import RandomPolicy
 from swarm_forage_env.runs import runner
 from tests.support.entries import TINY, made_up_entry
@@ -35,9 +34,8 @@ def entry(protocol, folder):
 
 
 def test_an_entry_has_the_runs_of_all_policies(entry, protocol):
-    planned = benchmark_question(["crw"], name="one", protocol=protocol).plan.specs
-    spec = next(spec for spec in planned if spec.seed == 2 and spec.world.n_robots == 2)
-    record = run_one(spec)
+    world = next(each.world for each in protocol.worlds if each.name == "room, 2 robots")
+    record = run_one(plan_run(world, "crw", seed=2))
     row = entry.performance("room, 2 robots")[0]
     assert row[1] == pytest.approx(record["performance"].sum() / 0.2)  # per 1,000 s, of 200 s
     assert entry.interference("room, 2 robots")[0, 1] == pytest.approx(record["interference_fraction"].mean(), rel=1e-5)
@@ -71,22 +69,15 @@ def test_stored_runs_give_the_same_entry(entry, protocol, folder, tmp_path):
 
 def test_an_unknown_policy_is_refused(protocol):
     with pytest.raises(ValueError, match="Unknown policy 'cwr'"):
-        benchmark_question(["cwr"], name="one", protocol=protocol)
-
-
-def test_a_question_has_every_policy_in_every_world(protocol):
-    plan = benchmark_question(["crw", "dpo"], name="two", protocol=protocol).plan
-    assert plan.seeds == protocol.seeds
-    for policy in ("crw", "dpo"):
-        conditions = plan.of_policy(policy)
-        assert [condition.world.name for condition in conditions] == [world.name for world in protocol.worlds]
-        assert [condition.world.wrappers for condition in conditions] == [w.world.wrappers for w in protocol.worlds]
+        run_benchmark(["cwr"], name="one", protocol=protocol)
 
 
 def test_asked_again_the_stored_runs_answer(entry, protocol, folder, monkeypatch):
     monkeypatch.setattr(runner, "run_one", lambda spec: pytest.fail("a stored run was repeated"))
-    question = benchmark_question(["crw", "ppo_warehouse_small"], name="both", protocol=protocol)
-    assert ask(question, out=folder, jobs=1, progress=False).runs == entry.runs
+    again = run_benchmark(
+        ["crw", "ppo_warehouse_small"], name="both", protocol=protocol, out=folder, jobs=1, progress=False
+    )
+    assert again.runs == entry.runs
 
 
 def test_no_entry_is_made_of_failed_runs(tmp_path, monkeypatch):
@@ -104,12 +95,11 @@ def test_no_entry_is_made_of_failed_runs(tmp_path, monkeypatch):
     assert len(list(tmp_path.glob("*.parquet"))) == n_runs - 1
 
 
-def test_an_entry_names_its_track(protocol):
-    question = benchmark_question(["crw"], name="one", protocol=protocol)
-    assert question.training.track == "open"
+def test_an_entry_names_its_track(entry, protocol):
+    assert entry.training.track == "open"
     in_short = Training(worlds="given", track="short", decisions=100)
     with pytest.raises(BenchmarkError, match="Expected 2 trainings"):
-        benchmark_question(["crw"], name="one", protocol=protocol, training=in_short)
+        run_benchmark(["crw"], name="one", protocol=protocol, training=in_short)
     assert entry_command(["crw", "dpo"], "two", training=in_short) == (
         "swarm-forage benchmark crw dpo --name two --trained-in given --track short --decisions 100"
     )

@@ -321,7 +321,5 @@ def test_a_mean_has_as_many_digits_as_its_interval(mean, half, is_share, text):
 
 def test_other_objects_than_those_of_run_are_told():
     world = scenario("warehouse_small", n_robots=4, n_objects=200)
-    told = score_question(["random"], world, budget=TINY, measures=SIZES)
-    assert list(told._other_objects()) == [
-        "rows over N have 512 objects, enough for large swarms; 'run' has the 200 of the scenario"
-    ]
+    found = score(["random"], world, budget=TINY, measures=["raw_performance"], seeds=1, progress=False)
+    assert found.notes == ("rows over N have 512 objects, enough for large swarms; 'run' has the 200 of the scenario",)

@@ -5,7 +5,6 @@ import json
 import pytest
 
 from metrics import summarize_runs
-from metrics.scoring import ask, run_question
 from swarm_forage_env import Plan, World, parse_wrapper, policy_specs, run_plan, scenario
 from tests.support.pictures import keep_figures
 
@@ -33,7 +32,8 @@ def test_failed_runs_are_in_the_answer_and_leave_nothing_to_draw(tmp_path):
     def refuse(obs):
         raise RuntimeError("I would rather not")
 
-    summary = ask(run_question({"no": refuse}, WORLD), progress=False)
+    plan = Plan.product(policy_specs({"no": refuse}), [World(WORLD)], seeds=[0])
+    summary = summarize_runs(run_plan(plan))
     assert (summary.rows, summary.has_picture) == ((), False)
     assert str(summary).endswith("RuntimeError: I would rather not")
     with pytest.raises(ValueError, match="nothing to draw"):
