@@ -294,11 +294,12 @@ def leads_by_little(
     gaps = means[0] - means[1:]
     if rule == "intervals":
         ends = np.array([intervals_of(part, pair, part.confidence) for pair in pairs])  # (others, L, 2)
-        lower, upper = ends[..., 0], ends[..., 1]
     else:
         apart = order(part, pairs, rule)
-        lower = np.where(apart > 0.0, gaps, -inf)
-        upper: FloatArray = np.where(apart < 0.0, gaps, np.maximum(gaps, 0.0))
+        ends = np.stack(
+            [np.where(apart > 0.0, gaps, -inf), np.where(apart < 0.0, gaps, np.maximum(gaps, 0.0))], axis=-1
+        )
+    lower, upper = ends[..., 0], ends[..., 1]
     return by_levels(
         part,
         (leader, *others),
