@@ -18,6 +18,15 @@ from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.plans import constructor_takes, plan_arena
 from swarm_forage_env.wrappers.base import WrapperConfig
 
+_OF_RUN = {
+    "seed": np.int64,
+    "seconds": np.float64,
+    "collected": np.int64,
+    "first_picked": np.int64,
+    "n_robots": np.int64,
+}
+"""What infos of a vector environment tell of a run that ended, see `RunOutcome`."""
+
 
 class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
     """One agent that sees and steers every robot: the view of single-agent algorithms and of central control.
@@ -112,11 +121,12 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
     the last observations. A dead robot terminates once and is a row of zeros until its arena starts anew. With a
     sampler an arena has as many rows as the largest world has robots; those to spare in a run are absent all through.
 
-    Infos are arrays over rows, with masks under the name with an underscore in front, as Gymnasium does it:
-    `active` always; `final_obs` (objects, None elsewhere) and `final_info` ({}) of rows that are done; `episode`
-    (return "r", steps "l", seconds since creation "t") of rows whose episode ended. So Gymnasium's
-    `RecordEpisodeStatistics` is not needed. It refuses to overwrite this key, and under another key it would count
-    absent rows as episodes.
+    Infos are arrays over rows, with masks under the name with an underscore in front, as Gymnasium does it: `active`,
+    and with discrete actions `action_mask` (num_envs, number of actions) int8. Rows that are done have `final_obs`
+    (objects, None elsewhere) and `final_info` with, for rows whose episode ended, `episode`: its return "r", steps "l"
+    and seconds since creation "t"; and, for all rows of an arena whose run ended, `run`: seed, simulated seconds,
+    collected, first_picked and n_robots. Gymnasium's `RecordEpisodeStatistics` works, and counts absent rows as
+    episodes.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - declared like this by Gymnasium
@@ -139,6 +149,7 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
         self.single_action_space = self.interface.action_space
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self._is_discrete = self.interface.config.actions == "discrete"
         self._everybody: BoolArray = np.ones(self.num_envs, np.bool_)
         self._started = time.perf_counter()
 
@@ -165,7 +176,7 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
             raise ValueError(f"Expected one seed per arena ({self.n_arenas}), got {len(seeds)}.")
         super().reset(seed=seeds[0])
         obs, active = self._arenas.reset(seeds, [options] * self.n_arenas)
-        return obs, self._with_masks({"active": active})
+        return obs, self._now(active)
 
     def step(self, actions: np.ndarray) -> tuple[ObsArray, np.ndarray, BoolArray, BoolArray, dict[str, Any]]:
         """Step every arena by one decision.
@@ -180,7 +191,7 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
         return step.obs, step.rewards, step.terminated, step.truncated, self._infos(step)
 
     def _infos(self, step: ArenaStep) -> dict[str, Any]:
-        infos = self._with_masks({"active": step.active})
+        infos = self._now(step.active)
         if len(step.ended) == 0:
             return infos
         is_done = np.zeros(self.num_envs, np.bool_)
@@ -188,19 +199,39 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
         final_obs = np.full(self.num_envs, None, object)
         for row, obs in zip(step.ended.tolist(), step.final_obs, strict=True):
             final_obs[row] = obs
-        infos |= {"final_obs": final_obs, "_final_obs": is_done, "final_info": {}, "_final_info": is_done.copy()}
-        rows = step.ended[step.is_episode]
-        if len(rows):
-            is_episode = np.zeros(self.num_envs, np.bool_)
-            is_episode[rows] = True
-            returns, lengths = np.zeros(self.num_envs, np.float32), np.zeros(self.num_envs, np.int32)
-            returns[rows], lengths[rows] = step.returns[step.is_episode], step.lengths[step.is_episode]
-            seconds = np.where(is_episode, round(time.perf_counter() - self._started, 6), 0.0)
-            infos |= {"episode": {"r": returns, "l": lengths, "t": seconds}, "_episode": is_episode}
+        infos |= {"final_obs": final_obs, "_final_obs": is_done}
+        infos |= {"final_info": self._final_info(step), "_final_info": is_done.copy()}
         return infos
 
-    def _with_masks(self, columns: dict[str, np.ndarray]) -> dict[str, Any]:
-        return columns | {f"_{name}": self._everybody.copy() for name in columns}
+    def _final_info(self, step: ArenaStep) -> dict[str, Any]:
+        """Return what is told of episodes and runs that ended."""
+        is_episode = np.zeros(self.num_envs, np.bool_)
+        rows = step.ended[step.is_episode]
+        is_episode[rows] = True
+        returns, lengths = np.zeros(self.num_envs, np.float32), np.zeros(self.num_envs, np.int32)
+        returns[rows], lengths[rows] = step.returns[step.is_episode], step.lengths[step.is_episode]
+        seconds = np.where(is_episode, round(time.perf_counter() - self._started, 6), 0.0)
+        told: dict[str, Any] = {"episode": {"r": returns, "l": lengths, "t": seconds}, "_episode": is_episode}
+        if step.outcomes:
+            of_run = {name: np.zeros(self.num_envs, kind) for name, kind in _OF_RUN.items()}
+            has_ended = np.zeros(self.num_envs, np.bool_)
+            for outcome in step.outcomes:
+                rows = slice(outcome.arena * self.n_robots, (outcome.arena + 1) * self.n_robots)
+                has_ended[rows] = True
+                for name, values in of_run.items():
+                    values[rows] = getattr(outcome, name)
+            told |= {"run": of_run, "_run": has_ended}
+        return told
+
+    def _now(self, active: BoolArray) -> dict[str, Any]:
+        """Return what is told of all rows in every step."""
+        infos: dict[str, Any] = {"active": active, "_active": self._everybody.copy()}
+        if self._is_discrete:
+            infos |= {
+                "action_mask": self._arenas.action_masks().astype(np.int8),
+                "_action_mask": infos["_active"].copy(),
+            }
+        return infos
 
     def action_masks(self) -> BoolArray:
         """Return which discrete actions make sense now, (num_envs, number of actions)."""

@@ -9,9 +9,9 @@ import pytest
 from metrics import CurveError, Panel
 from metrics.claims import orders, shapes
 from metrics.claims import rules as general
-from metrics.claims.words import ONSET, SIGMAS
 from metrics.claims.panel import interval_of, order, resampled_means
 from metrics.claims.rules import Outcome, all_of, most_of
+from metrics.claims.words import ONSET, SIGMAS
 from tests.support.panels import SIX, panel
 
 

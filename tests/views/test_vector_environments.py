@@ -6,9 +6,11 @@ import pytest
 from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
+from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 import swarm_forage_env
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.views.gymnasium import JointForageEnv, SwarmVectorEnv
 from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv
@@ -128,9 +130,10 @@ def test_infos_by_hand():
             continue
         np.testing.assert_array_equal(infos["_final_obs"], done)
         assert [final is not None for final in infos["final_obs"]] == done.tolist()
+        told = infos["final_info"]
         episodes = {
-            (tick, robot): (infos["episode"]["r"][robot], infos["episode"]["l"][robot])
-            for robot in np.flatnonzero(infos["_episode"]).tolist()
+            (tick, robot): (told["episode"]["r"][robot], told["episode"]["l"][robot])
+            for robot in np.flatnonzero(told["_episode"]).tolist()
         }
         assert episodes == {key: value for key, value in lives.EPISODES.items() if key[0] == tick}
         for robot in np.flatnonzero(truncated).tolist():
@@ -164,7 +167,7 @@ def test_the_same_seed_gives_the_same_data_twice_and_nothing_is_reused():
         envs.reset(seed=2)
         data = [envs.step(envs.action_space.sample()) for _ in range(10)]
         for *_, infos in data:
-            infos.get("episode", {}).pop("t", None)  # the clock on the wall
+            infos.get("final_info", {}).pop("episode", None)  # the clock on the wall
         return data
 
     first, second = played(), played()
@@ -175,6 +178,26 @@ def test_the_same_seed_gives_the_same_data_twice_and_nothing_is_reused():
         for mine, theirs in zip(one[4].get("final_obs", ()), other[4].get("final_obs", ()), strict=True):
             np.testing.assert_array_equal(mine, theirs)
     assert not np.array_equal(first[0][0], first[1][0])
+
+
+def test_the_end_of_a_run_tells_what_it_brought():
+    worlds = {"n_robots": 3, "n_objects": 500, "max_cycles": 400, "interface": {"automatic_gripper": True}}
+    curve = np.array([0.6, 0.5], np.float32)
+    envs = RecordEpisodeStatistics(SwarmVectorEnv("warehouse_small", n_arenas=2, **worlds))
+    single = ParallelLearnerEnv("warehouse_small", **worlds)
+    envs.reset(seed=10)
+    single.reset(seed=11)
+    for _ in range(400):
+        *_, infos = envs.step(np.tile(curve, (6, 1)))
+        single.step(dict.fromkeys(single.agents, curve))
+    run = infos["final_info"]["run"]
+    assert infos["final_info"]["_run"].all()
+    assert run["seed"].tolist() == [10, 10, 10, 11, 11, 11]
+    counters = single.forage_env.events.counters
+    assert run["collected"][3:].tolist() == [counters[Counter.COLLECTED]] * 3
+    assert run["first_picked"][3] == counters[Counter.FIRST_PICKED] > 0
+    assert (run["seconds"][0], run["n_robots"][0]) == (80.0, 3)
+    assert infos["episode"]["l"].tolist() == infos["final_info"]["episode"]["l"].tolist() == [400] * 6
 
 
 def test_seeds_per_arena_and_their_number():
@@ -231,5 +254,7 @@ def test_masks_come_with_discrete_actions():
     envs = SwarmVectorEnv("warehouse_small", num_envs=6, n_robots=3, interface=INTERFACES[2])
     envs.reset(seed=0)
     masks = envs.action_masks()
+    *_, infos = envs.step(np.zeros(6, np.int64))
+    np.testing.assert_array_equal(infos["action_mask"], envs.action_masks())
     assert masks.shape == (6, envs.single_action_space.n)
     assert masks[:, :6].all()
