@@ -32,7 +32,7 @@ from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.rendering.figures import COLOURS, check_picture, saved_figure
 from swarm_forage_env.runs.plan import Plan
-from swarm_forage_env.runs.policy_spec import PolicySpec, policy_spec
+from swarm_forage_env.runs.spec import PolicySpec, policy_spec
 from swarm_forage_env.sheet import Sheet
 from swarm_forage_env.training.evaluations import finished_runs
 from swarm_forage_env.wrappers.world import World

@@ -20,9 +20,9 @@ from .contract.policy import Policy as Policy
 from .contract.robot_policy import RobotPolicy as RobotPolicy
 from .contract.robot_policy import StepError as StepError
 from .policies.registry import RandomPolicy as RandomPolicy
-from .runs.policy_spec import PolicySpec as PolicySpec
-from .runs.policy_spec import policy_spec as policy_spec
-from .runs.policy_spec import policy_specs as policy_specs
+from .runs.spec import PolicySpec as PolicySpec
+from .runs.spec import policy_spec as policy_spec
+from .runs.spec import policy_specs as policy_specs
 
 # runs
 from .runs.plan import run_plan as run_plan

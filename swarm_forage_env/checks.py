@@ -11,7 +11,7 @@ import contextlib
 import copy
 import io
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import PurePath
@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from pettingzoo import ParallelEnv
 
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env._internal.wording import install_command, suggestion
 from swarm_forage_env.contract.codes import Task
@@ -29,21 +30,20 @@ from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import LiveRun, build_stack
-from swarm_forage_env.runs.spec import chosen_caches
-from swarm_forage_env.scenarios.config import CACHE_KINDS, ScenarioConfig
+from swarm_forage_env.runs.spec import stated_caches
+from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import scenario as preset
 from swarm_forage_env.wrappers.base import SwarmWrapper
 
 _INTERVAL_TICKS = 10
 """Length of a recording interval in compared records. Our choice: short, so that small differences are seen."""
+_MOMENT = ("observation", "reward", "termination", "truncation")
+"""What an agent gets in a tick."""
 
 
 class CheckError(ValueError):
     """An environment or a policy that breaks a promise; the message says what was expected, what came, what to do."""
-
-
-# Environments
 
 
 def check_env(env: ParallelEnv[str, Any, Any], *, ticks: int = 60) -> None:
@@ -85,7 +85,7 @@ def _check_parallel_api(env: ParallelEnv[str, Any, Any], ticks: int) -> None:
         from pettingzoo.test import parallel_api_test
     except ImportError as error:
         raise ImportError(f"PettingZoo's tests need pytest: {install_command('test')}.") from error
-    has_horizon, horizon = "max_cycles" in vars(env), getattr(env, "max_cycles", None)
+    before = {name: value for name, value in vars(env).items() if name == "max_cycles"}
     try:
         with warnings.catch_warnings(), contextlib.redirect_stdout(io.StringIO()):
             warnings.simplefilter("error", UserWarning)  # some faults are only warnings in PettingZoo
@@ -96,47 +96,40 @@ def _check_parallel_api(env: ParallelEnv[str, Any, Any], ticks: int) -> None:
             f"Expected an environment that passes PettingZoo's parallel_api_test, got: {reason}"
         ) from error
     finally:  # the test sets a horizon of its own
-        if has_horizon:
-            env.max_cycles = horizon  # pyright: ignore[reportAttributeAccessIssue] - only some environments have one
-        else:
-            vars(env).pop("max_cycles", None)
+        vars(env).pop("max_cycles", None)
+        vars(env).update(before)
 
 
-class _Moment(NamedTuple):
-    """What an agent gets in a tick."""
-
-    observation: np.ndarray
-    reward: float = 0.0
-    termination: bool = False
-    truncation: bool = False
+_Run = list[dict[str, tuple[Any, ...]]]
+"""What each agent got, tick by tick, see `_MOMENT`."""
 
 
-def _dict_run(env: ParallelEnv[str, Any, Any], actions: Sequence[dict[str, Any]]) -> list[dict[str, _Moment]]:
+def _dict_run(env: ParallelEnv[str, Any, Any], actions: Sequence[dict[str, Any]]) -> _Run:
     obs, _ = env.reset(seed=1)
-    run = [{agent: _Moment(np.copy(row)) for agent, row in obs.items()}]
     _check_in_spaces(env, obs, 0)
+    run: _Run = [{agent: (np.copy(row), 0.0, False, False) for agent, row in obs.items()}]
     for tick, chosen in enumerate(actions, start=1):
         if not env.agents:
             break
         obs, rewards, ended, cut, _ = env.step({agent: chosen[agent] for agent in env.agents})
         _check_in_spaces(env, obs, tick)
-        run.append({name: _Moment(np.copy(row), rewards[name], ended[name], cut[name]) for name, row in obs.items()})
+        run.append({agent: (np.copy(row), rewards[agent], ended[agent], cut[agent]) for agent, row in obs.items()})
     return run
 
 
-def _batch_run(env: ForageEnv | SwarmWrapper, actions: Sequence[dict[str, Any]]) -> list[dict[str, _Moment]]:
+def _batch_run(env: ForageEnv | SwarmWrapper, actions: Sequence[dict[str, Any]]) -> _Run:
     """The same with arrays; agents that have left the environment are left out, as in dictionaries."""
     names = env.possible_agents
     obs = env.reset_batch(1)
-    run = [{name: _Moment(obs[row].copy()) for row, name in enumerate(names)}]
+    run: _Run = [{name: (obs[row].copy(), 0.0, False, False) for row, name in enumerate(names)}]
     for chosen in actions:
-        staying = {name for name, before in run[-1].items() if not (before.termination or before.truncation)}
+        staying = {name for name, (_, _, terminated, truncated) in run[-1].items() if not (terminated or truncated)}
         if not staying:
             break
         packed = np.array([chosen[name] if name in staying else np.zeros(3) for name in names], np.float32)
-        obs, rewards, terminated, truncated = env.step_batch(packed)
+        obs, rewards, ended, cut = env.step_batch(packed)
         rows = [(row, name) for row, name in enumerate(names) if name in staying]
-        run.append({name: _Moment(obs[row].copy(), rewards[row], terminated[row], truncated) for row, name in rows})
+        run.append({name: (obs[row].copy(), rewards[row], ended[row], cut) for row, name in rows})
     return run
 
 
@@ -153,9 +146,7 @@ def _check_in_spaces(env: ParallelEnv[str, Any, Any], obs: dict[str, Any], tick:
         raise CheckError(f"Expected state() in state_space {space}, got {_summary(state)} at tick {tick}.")
 
 
-def _compare_runs(
-    run: Sequence[dict[str, _Moment]], other: Sequence[dict[str, _Moment]], expected: str, advice: str
-) -> None:
+def _compare_runs(run: _Run, other: _Run, expected: str, advice: str) -> None:
     # Terminations and truncations are compared, too, so runs with equal ticks have equal lengths.
     for tick, (one, two) in enumerate(zip(run, other, strict=False)):
         if one.keys() != two.keys():
@@ -163,7 +154,7 @@ def _compare_runs(
                 f"{expected}, got other agents at tick {tick}: {sorted(one.keys() ^ two.keys())}; {advice}"
             )
         for agent, moment in one.items():
-            for what, mine, theirs in zip(_Moment._fields, moment, two[agent], strict=True):
+            for what, mine, theirs in zip(_MOMENT, moment, two[agent], strict=True):
                 if not np.array_equal(mine, theirs, equal_nan=True):
                     raise CheckError(f"{expected}, got another {what} of {agent} at tick {tick}; {advice}")
 
@@ -174,9 +165,6 @@ def _summary(values: Any) -> str:
         return type(values).__name__
     ends = f" from {values.min():g} to {values.max():g}" if values.size and values.dtype.kind in "fiub" else ""
     return f"{values.dtype} of shape {values.shape}{ends}"
-
-
-# Policies
 
 
 def check_policy(
@@ -192,7 +180,7 @@ def check_policy(
     Args:
         policy: A registered name, the path of a policy file, a class that needs no arguments, or an object (which is
             copied).
-        scenario: Where it acts; with the caches of `runs.spec.chosen_caches`. Choose one in which your policy meets
+        scenario: Where it acts, with the caches that the policy states. Choose one in which your policy meets
             everything that it reacts to.
         seed: Seed of the environment and of the policy.
         ticks: How long it acts.
@@ -211,24 +199,16 @@ def check_policy(
         )
     reads = _checked_reads(subject, world.layout)
     scenes = list(_act_in(subject, world, seed, ticks, away=True))
+    seen = [scene.obs for scene in scenes]
     act_again = partial(_check_same_actions, subject, world.swarm_spec, seed, scenes)
-    act_again(
-        [scene.obs.copy() for scene in scenes],
-        "Expected reset to begin a new run",
-        "make all memory in reset, and draw random numbers from the generator that reset is given only.",
-    )
-    act_again(
-        _in_one_buffer(scenes),
-        "Expected a policy that keeps no reference to the observation array",
-        "the next step overwrites the array: copy what must be kept.",
-    )
+    advice = "make all memory in reset, and draw random numbers from the generator that reset is given only."
+    act_again((obs.copy() for obs in seen), "Expected reset to begin a new run", advice)
+    expected = "Expected a policy that keeps no reference to the observation array"
+    act_again(_in_one_buffer(seen), expected, "the next step overwrites the array: copy what must be kept.")
     if reads is not None:
-        for filling, words in ((0.0, "zeros"), (None, "other numbers")):
-            act_again(
-                [_without_unread(world.layout, reads, filling, scene.obs) for scene in scenes],
-                f"Expected equal actions when the slices that are not in reads = {reads!r} hold {words}",
-                "name every slice that act looks at in reads; the others are not computed in runs.",
-            )
+        expected = f"Expected equal actions when the slices that are not in reads = {reads!r} hold other numbers"
+        advice = "name every slice that act looks at in reads; the others are not computed in runs."
+        act_again((_without_unread(world.layout, reads, obs) for obs in seen), expected, advice)
     n_robots = config.robots.n_robots
     other = ForageEnv(with_overrides(config, n_robots=n_robots // 2 if n_robots > 1 else 2))
     for _ in _act_in(subject, other, seed, min(ticks, _INTERVAL_TICKS), away=False):
@@ -236,7 +216,7 @@ def check_policy(
 
 
 class _Scene(NamedTuple):
-    """What a policy saw in a tick, and what it did."""
+    """What a policy saw in a tick, and what it did; inactive robots do nothing."""
 
     obs: ObsArray
     active: BoolArray
@@ -261,7 +241,7 @@ def _act_in(policy: Policy, world: ForageEnv, seed: int, ticks: int, *, away: bo
 
 
 def _asked(policy: Policy, obs: ObsArray, active: BoolArray, tick: int, spec: SwarmSpec) -> _Scene:
-    """Call `act` and check the actions; the scene holds copies, with zeros for inactive robots."""
+    """Call `act` and check the actions."""
     shown, at_work = obs.copy(), active.copy()
     try:
         actions: Any = policy.act(obs, active)
@@ -301,75 +281,68 @@ def _checked_tasks(policy: Policy, n_robots: int, tick: int) -> Any:
     tasks = getattr(policy, "task", None)
     if tasks is None:
         return None
-    expected = f"Expected task as int8 of shape (n_robots,) = ({n_robots},) with codes of Task (0 to {len(Task) - 1})"
     if not isinstance(tasks, np.ndarray) or tasks.dtype != np.int8 or tasks.shape != (n_robots,):
-        raise CheckError(f"{expected}, got {_summary(tasks)} at tick {tick}; make the array in reset.")
-    if tasks.min() < 0 or tasks.max() >= len(Task):
-        raise CheckError(f"{expected}, got codes {np.unique(tasks).tolist()} at tick {tick}; see contract.codes.Task.")
-    return tasks
+        got, advice = _summary(tasks), "make the array in reset"
+    elif tasks.min() < 0 or tasks.max() >= len(Task):
+        got, advice = f"codes {np.unique(tasks).tolist()}", "see contract.codes.Task"
+    else:
+        return tasks
+    raise CheckError(
+        f"Expected task as int8 of shape (n_robots,) = ({n_robots},) with codes of Task (0 to {len(Task) - 1}), got "
+        f"{got} at tick {tick}; {advice}."
+    )
 
 
 def _check_same_actions(
-    policy: Policy,
-    spec: SwarmSpec,
-    seed: int,
-    scenes: Sequence[_Scene],
-    shown: Sequence[ObsArray] | Iterator[ObsArray],
-    expected: str,
+    policy: Policy, spec: SwarmSpec, seed: int, scenes: list[_Scene], shown: Iterable[ObsArray], expected: str,
     advice: str,
-) -> None:
+) -> None:  # fmt: skip
     """Give a policy the observations of `scenes` again, as `shown` has them, and compare its actions."""
     _reset(policy, spec, seed)
     for tick, (scene, obs) in enumerate(zip(scenes, shown, strict=True)):
         again = _asked(policy, obs, scene.active.copy(), tick, spec).actions
-        different = np.flatnonzero((again != scene.actions).any(axis=1))
-        if len(different):
-            row = different[0]
+        for row in np.flatnonzero((again != scene.actions).any(axis=1)):
             raise CheckError(
                 f"{expected}, got other actions at tick {tick}: {again[row].tolist()} instead of "
                 f"{scene.actions[row].tolist()} for robot {row}; {advice}"
             )
 
 
-def _in_one_buffer(scenes: Sequence[_Scene]) -> Iterator[ObsArray]:
+def _in_one_buffer(seen: Sequence[ObsArray]) -> Iterator[ObsArray]:
     """One array for all ticks, overwritten in each, as the environment does."""
-    buffer = np.empty_like(scenes[0].obs)
-    for scene in scenes:
-        buffer[:] = scene.obs
+    buffer = np.empty_like(seen[0])
+    for obs in seen:
+        buffer[:] = obs
         yield buffer
 
 
-def _without_unread(
-    layout: ObservationLayout, reads: Sequence[str], filling: float | None, observed: ObsArray
-) -> ObsArray:
-    """Return observations in which the slices that are not read hold `filling`; None = random numbers."""
+def _without_unread(layout: ObservationLayout, reads: Sequence[str], observed: ObsArray) -> ObsArray:
+    """Return observations in which the slices that are not read hold random numbers."""
     obs, rng = observed.copy(), np.random.default_rng(0)
     for part in layout:
         if part.name not in reads:
             unread = obs[:, layout[part.name]]
-            values = rng.uniform(-1.0, 1.0, unread.shape) if filling is None else filling
             is_read = part.name == "light" and LIGHT_IF_CARRYING in reads
-            np.copyto(unread, values, where=obs[:, layout["carrying"]] < 0.5 if is_read else True)
+            np.copyto(
+                unread,
+                rng.uniform(-1.0, 1.0, unread.shape),
+                where=obs[:, layout["carrying"]] < 0.5 if is_read else True,
+            )
     return obs
 
 
 def _checked_reads(policy: Policy, layout: ObservationLayout) -> tuple[str, ...] | None:
     """Return `reads` of a policy, None = all; raises CheckError when it names no slice."""
     reads = getattr(policy, "reads", None)
-    if reads is None:
-        return None
     if isinstance(reads, str):
         raise CheckError(f"Expected reads as a tuple of names of slices, got {reads!r}; write ({reads!r},).")
-    for name in reads:
+    for name in reads or ():
         if name not in (*layout.names, LIGHT_IF_CARRYING):
             raise CheckError(
                 f"Expected reads to name slices of the observation, got {name!r}.{suggestion(str(name), layout.names)} "
                 f"Known: {', '.join(layout.names)}."
             )
-    return tuple(reads)
-
-
-# Whole runs
+    return None if reads is None else tuple(reads)
 
 
 def check_determinism(
@@ -383,7 +356,7 @@ def check_determinism(
 
     Args:
         policy: As in `check_policy`; each run gets a fresh one.
-        scenario: Where it runs; with the caches of `runs.spec.chosen_caches`.
+        scenario: Where it runs, with the caches that the policy states.
         seeds: Seeds of the runs.
         seconds: Simulated length of a run, rounded to recording intervals of ten ticks.
 
@@ -398,7 +371,7 @@ def check_determinism(
     interval_s = _INTERVAL_TICKS * config.dt_s
     config = replace(config, interval_s=interval_s, horizon_s=max(1, round(seconds / interval_s)) * interval_s)
     for seed in seeds:
-        run, again = (_results(config, policy, seed) for policy in (_built(build), _built(build)))
+        run, again = (_results(config, _built(build), seed) for _ in range(2))
         for name, values in run.items():
             if not np.array_equal(values, again.get(name, np.empty(0))):
                 raise CheckError(
@@ -408,17 +381,13 @@ def check_determinism(
 
 
 def _results(config: ScenarioConfig, policy: Policy, seed: int) -> dict[str, np.ndarray]:
-    """Make a run; return its columns, and the poses at its end, which show differences first."""
+    """Make a run; return the poses at its end, which show differences first, and its columns."""
     recorder = build_stack(config, reads=getattr(policy, "reads", None))
     run = LiveRun(recorder, policy, seed)
     run.advance()
     swarm = run.forage_env.swarm
-    return {
-        "position of the robots at the end": swarm.position.copy(),
-        "heading of the robots at the end": swarm.heading.copy(),
-        **recorder.columns(),
-        **recorder.contributed(),
-    }
+    poses = {f"{what} of the robots at the end": getattr(swarm, what).copy() for what in ("position", "heading")}
+    return {**poses, **recorder.columns(), **recorder.contributed()}
 
 
 def _factory_of(policy: Any) -> Callable[[], Any]:
@@ -441,12 +410,9 @@ def _built(build: Callable[[], Any]) -> Policy:
 
 
 def _config_for(policy: Policy, scenario: str | ScenarioConfig) -> ScenarioConfig:
-    """Return a scenario with the caches of `chosen_caches`; raises CheckError for caches that there are not."""
-    caches = getattr(policy, "caches", None)
-    if caches is not None and caches not in CACHE_KINDS:
-        raise CheckError(
-            f"Expected caches of the policy to be one of {', '.join(CACHE_KINDS)}, got {caches!r}; leave the attribute "
-            "out where it does not matter."
-        )
+    """Return a scenario with the caches that a policy states; raises CheckError for caches that there are not."""
     config = preset(scenario) if isinstance(scenario, str) else scenario
-    return replace(config, caches=chosen_caches(None, policy, config))
+    try:
+        return replace(config, caches=stated_caches(policy) or config.caches)
+    except ConfigError as error:
+        raise CheckError(f"{error} Leave the attribute out where it does not matter.") from error

@@ -332,7 +332,7 @@ class UnknownCaches(Sound):
         (WritesIntoActive, "leave obs and active as they are"),
         (UnknownSlice, "got 'proximty'. Did you mean 'proximity'"),
         (TextForReads, r"got 'proximity'; write \('proximity',\)"),
-        (ReadsMore, r"not in reads = \('proximity',\) hold zeros, got other actions at tick 0"),
+        (ReadsMore, r"not in reads = \('proximity',\) hold other numbers, got other actions at tick 0"),
         (ReadsMoreButZeros, "hold other numbers, got other actions"),
         (Remembers, "Expected reset to begin a new run, got other actions at tick 0"),
         (RandomNumbersOfItsOwn, "Expected reset to begin a new run"),

@@ -7,7 +7,7 @@ import numpy as np
 
 from swarm_forage_env.policies.registry import POLICIES
 from swarm_forage_env.runs.plan import Condition, Plan, run_plan
-from swarm_forage_env.runs.policy_spec import policy_specs
+from swarm_forage_env.runs.spec import policy_specs
 from swarm_forage_env.sheet import Sheet
 
 from .entry import check_finished, policy_origin, read_entry, six_digits

@@ -22,7 +22,7 @@ import polars as pl
 from swarm_forage_env._internal.wording import counted, limits, number, percent, plain, suggestion
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 from swarm_forage_env.runs.plan import Plan, Table, run_plan
-from swarm_forage_env.runs.policy_spec import PolicyLike, PolicySpec, policy_specs
+from swarm_forage_env.runs.spec import PolicyLike, PolicySpec, policy_specs
 from swarm_forage_env.scenarios.performance import performance_of
 from swarm_forage_env.sheet import Answer, Sheet
 from swarm_forage_env.studies import ladders
@@ -351,7 +351,7 @@ def score(
             Default: the performance of the scenario. It only changes how runs are read, so runs in `out` are not
             repeated.
         parameters: Keyword arguments of a registered policy or a class.
-        caches: "none", "static", "dynamic"; default see `swarm_forage_env.runs.spec.chosen_caches`.
+        caches: "none", "static", "dynamic"; default those that each policy states, else those of the world.
         density: Robots per m^2 at all swarm sizes: the arena grows with the swarm, and one robot is in the smallest
             arena. Default: all sizes are in the scenario's arena (in search and rescue: at its density).
         disturbance: Disturbance for reactivity and adaptability: "throttle" (robots lose speed) or "handling_cost"

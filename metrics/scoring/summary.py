@@ -118,7 +118,7 @@ class RunSummary(Answer):
             "controllers": [_condition_mapping(row) for row in self.rows],
             "runs": [
                 {
-                    **record.keys(),
+                    **record.keys,
                     **_quantities(record, self.read_as),
                     "wall_time_s": plain(record.wall_time_s),
                     "file": None if folder is None else str(record_file(folder, record.run_id)),
@@ -155,7 +155,8 @@ class RunSummary(Answer):
             mean, low, high = np.array([(point.mean, point.lower, point.upper) for point in per_interval]).T
             if len(runs) < FEWEST_RUNS:
                 low = high = np.full_like(mean, np.nan)
-            label = row.condition.policy.label if n_worlds == 1 else row.condition.describe()
+            policy, world = row.condition
+            label = policy.label if n_worlds == 1 else f"{policy.label} in {world.name}"
             curves.append(Curve(label, mean, low, high))
         draw_curves(
             path,

@@ -17,7 +17,7 @@ from swarm_forage_env.rendering.frame import Trails, render_frame
 from swarm_forage_env.rendering.video import Frame, check_film, write_film
 from swarm_forage_env.rendering.view import arena_view
 from swarm_forage_env.runs.run import LiveRun, build_env
-from swarm_forage_env.runs.spec import chosen_caches, plan_run
+from swarm_forage_env.runs.spec import plan_run, stated_caches
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.wrappers.world import WorldLike, world_of
 
@@ -54,7 +54,7 @@ def record_run(
         trail_s: Simulated time over which the robots' trails fade; 0 for none.
         theme: "dark" or "light".
         caches: "none", "static" or "dynamic"; default what the policy states in `caches`, or what the scenario has if
-            the policy states nothing (`runs.spec.chosen_caches`).
+            the policy states nothing.
         parameters: Keyword arguments of a policy that is given by name or path.
         progress: Called with (pictures done, pictures in all) after each picture of a film.
 
@@ -90,7 +90,7 @@ def record_run(
         raise ConfigError(f"Expected parameters with a policy's name or file only, got them with {policy!r}.")
     else:
         name = getattr(policy, "name", type(policy).__name__)
-        given = given.with_caches(chosen_caches(caches, policy, scenario))
+        given = given.with_caches(caches or stated_caches(policy))
     scenario = given.scenario
     title = given.title(name, f"{scenario.arena.width_m:g} x {scenario.arena.height_m:g} m", digests=False)
     stack = build_env(scenario, given.wrappers, reads=getattr(policy, "reads", None))

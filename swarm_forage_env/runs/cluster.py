@@ -1,4 +1,4 @@
-"""Executors on many machines, by Dask; `runner` uses them as it uses a pool of local processes.
+"""Executors on many machines, by Dask; `run_all` uses them as it uses a pool of local processes.
 
 Workers need the same versions of the packages, and no shared disk: tasks and records travel through the scheduler. A
 worker may join or be killed at any time; what it was running is run elsewhere.
@@ -15,7 +15,7 @@ from typing import Any
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.wording import install_command
-from swarm_forage_env.runs.workers import WorkerError, available_cores
+from swarm_forage_env.runs.workers import WorkerError, available_cores, deaf_children
 
 LOCAL = "local"
 CONNECT_WITHIN_S = 30.0
@@ -34,7 +34,7 @@ def cluster_executor(where: str, workers: int | None = None) -> Iterator[Executo
     Raises:
         ConfigError: no scheduler answers there, or it is given `workers`.
         ImportError: Dask is not installed.
-        WorkerError: the scheduler ended while the executor was in use.
+        WorkerError: the scheduler ended while the executor was in use, or a run killed its workers.
     """
     try:
         import distributed
@@ -49,15 +49,10 @@ def cluster_executor(where: str, workers: int | None = None) -> Iterator[Executo
             logger.setLevel(logging.CRITICAL)  # the errors below say what they would
         target: Any = where
         if where == LOCAL:
+            options: dict[str, Any] = {"threads_per_worker": 1, "host": "127.0.0.1", "dashboard_address": None}
             with _interrupts_later():
-                target = stack.enter_context(
-                    distributed.LocalCluster(
-                        n_workers=workers or available_cores(),
-                        threads_per_worker=1,
-                        host="127.0.0.1",
-                        dashboard_address=None,  # type: ignore[arg-type] - None is documented: no dashboard
-                    )
-                )
+                cluster = distributed.LocalCluster(n_workers=workers or available_cores(), **options)
+                target = stack.enter_context(cluster)
         try:
             client = stack.enter_context(distributed.Client(target, timeout=CONNECT_WITHIN_S))
         except (OSError, RuntimeError, TypeError, ValueError) as error:  # Dask raises all of them of addresses
@@ -76,22 +71,17 @@ def cluster_executor(where: str, workers: int | None = None) -> Iterator[Executo
 
 @contextmanager
 def _interrupts_later() -> Iterator[None]:
-    """Hold back Ctrl-C until the end of the block.
-
-    A terminal sends it to the workers, too. Dask prints tracebacks where it ends a worker, or this process, while they
-    start. So it is raised here when all have started, and workers, which inherit what is blocked, never see it.
-    """
-    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "pthread_sigmask"):
-        yield  # only the main thread has handlers; Windows cannot block
+    """Hold back Ctrl-C until the end of the block: Dask prints tracebacks where it ends workers that are starting."""
+    if threading.current_thread() is not threading.main_thread():  # only the main thread has handlers
+        yield
         return
     caught: list[int] = []
     usual = signal.signal(signal.SIGINT, lambda number, _: caught.append(number))
-    resource_tracker.ensure_running()  # multiprocessing's; started later it would unblock it again
-    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    resource_tracker.ensure_running()  # multiprocessing's; started later it would unblock the signal again
     try:
-        yield
+        with deaf_children():
+            yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
         signal.signal(signal.SIGINT, usual)
     if caught:
         raise KeyboardInterrupt

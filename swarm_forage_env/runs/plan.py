@@ -13,24 +13,20 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError, several, whole
+from swarm_forage_env._internal.fields import ConfigError, whole
 from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.policies.registry import policy_label
-from swarm_forage_env.runs.policy_spec import PolicySpec
 from swarm_forage_env.runs.record import Record
 from swarm_forage_env.runs.runner import run_all
-from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.runs.spec import PolicySpec, RunSpec
 from swarm_forage_env.runs.store import DONE, RunFailure, failure_lines, load, state_of
 from swarm_forage_env.scenarios.differences import preset_of
 from swarm_forage_env.wrappers.world import UNDISTURBED, World
-
-if TYPE_CHECKING:
-    import polars as pl
 
 Curves = tuple[tuple[int, ...], dict[str, FloatArray]]
 """Seeds of the R finished runs, and for each column its values in T intervals, (R, T)."""
@@ -41,10 +37,6 @@ class Condition(NamedTuple):
 
     policy: PolicySpec
     world: World
-
-    def describe(self) -> str:
-        """Return the condition in a few words."""
-        return f"{self.policy.label} in {self.world.name}"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -60,8 +52,8 @@ class Plan:
     """All conditions share them, so their runs are paired."""
 
     def __post_init__(self) -> None:
-        several("conditions of a plan", self.conditions, "conditions")
-        several("seeds", self.seeds, "seeds")
+        if not self.conditions or not self.seeds:
+            raise ConfigError("Expected a plan with one or more conditions and seeds, got none.")
         for seed in self.seeds:
             whole("a seed", seed, at_least=0)
         if len(set(self.seeds)) < len(self.seeds):
@@ -86,17 +78,9 @@ class Plan:
 
     def specs_of(self, condition: Condition) -> tuple[RunSpec, ...]:
         """Return the runs of a condition, one per seed."""
-        first = self._first_of(condition)
-        return tuple(replace(first, seed=seed) for seed in self.seeds)
-
-    def _first_of(self, condition: Condition) -> RunSpec:
         policy, world = condition
-        return RunSpec(
-            world=world.with_caches(policy.caches),
-            policy=policy.policy,
-            parameters=policy.parameters,
-            seed=self.seeds[0],
-        )
+        first = RunSpec(world=world.with_caches(policy.caches), policy=policy.policy, parameters=policy.parameters)
+        return tuple(replace(first, seed=seed) for seed in self.seeds)
 
     @property
     def specs(self) -> tuple[RunSpec, ...]:
@@ -106,7 +90,7 @@ class Plan:
     @cached_property
     def robot_ticks(self) -> int:
         """Robots times ticks of all runs."""
-        return sum(self._first_of(condition).robot_ticks for condition in self.conditions) * len(self.seeds)
+        return sum(spec.robot_ticks for spec in self.specs)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -118,8 +102,6 @@ class Table:
     """run_id -> record, of the runs that finished."""
     failures: Mapping[str, RunFailure] = field(default_factory=dict[str, RunFailure])
     """run_id -> why a run failed."""
-    n_stored: int = 0
-    """How many of the records had been stored before and were not run again."""
     folder: Path | None = None
     """Where the records are, None where they are not stored."""
 
@@ -153,18 +135,6 @@ class Table:
             {name: np.stack([record[name] for record in records]).astype(np.float64) for name in names},
         )
 
-    @cached_property
-    def frame(self) -> "pl.DataFrame":
-        """All records below each other, one row per interval, with the name of the world and the policy."""
-        import polars as pl
-
-        frames = [
-            record.frame.select(pl.lit(policy.label).alias("policy"), pl.lit(world.name).alias("world"), pl.all())
-            for policy, world in self.plan.conditions
-            for record in self.of(Condition(policy, world))
-        ]
-        return pl.concat(frames, how="diagonal") if frames else pl.DataFrame()
-
 
 def run_plan(
     plan: Plan,
@@ -174,31 +144,20 @@ def run_plan(
     jobs: int | None = None,
     progress: bool = False,
 ) -> Table:
-    """Make the runs of a plan and return them as a table.
+    """Make the runs of a plan and return them as a table; arguments and errors are those of `run_all`.
 
-    Args:
-        plan: What to run. Policies that only this process can build run here, after all others.
-        out: As in `runs.runner.run_all`, and so are all further arguments.
-        executor: Makes the runs.
-        jobs: Processes.
-        progress: Show progress and an estimate on stderr.
+    Policies that only this process can build run here, after all others.
 
     Raises:
         ValueError: a folder, and a policy without a name by which its runs are found again.
-        Exception: see `run_all`.
     """
     unnamed = [policy.label for policy in plan.policies if not policy.is_named]
     if out is not None and unnamed:
         raise ValueError(f"Expected name= for the policy {unnamed[0]}, by which its runs in {out} are found again.")
     made_here = {policy.policy: policy.factory for policy in plan.policies if policy.factory is not None}
     found = run_all(plan.specs, out=out, executor=executor, jobs=jobs, progress=progress, made_here=made_here)
-    return Table(
-        plan=plan,
-        records=found.records,
-        failures=found.failures,
-        n_stored=found.n_stored,
-        folder=None if out is None else Path(out),
-    )
+    folder = None if out is None else Path(out)
+    return Table(plan=plan, records=found.records, failures=found.failures, folder=folder)
 
 
 def planned_line(specs: Iterable[RunSpec], out: str | Path) -> str:
@@ -235,17 +194,11 @@ def read_table(folder: str | Path, *, performance: str | None = None) -> Table:
         told = ", ".join(f"{horizon_s:g} s in intervals of {interval_s:g} s" for horizon_s, interval_s in lengths)
         raise ConfigError(f"Expected runs of one length in {folder}, got {told}; make folders of their own by --out.")
     conditions: list[Condition] = []
-    for condition in (_condition_of(record.spec) for record in plain):
+    for spec in (record.spec for record in plain):
+        own, preset = spec.scenario.caches, preset_of(spec.scenario)
+        policy = PolicySpec(label=policy_label(spec.policy), policy=spec.policy, parameters=spec.parameters, caches=own)
+        condition = Condition(policy, spec.world.with_caches("none" if preset is None else preset.caches))
         if condition not in conditions:  # wrappers of users may have no hash
             conditions.append(condition)
     plan = Plan(conditions=tuple(conditions), seeds=tuple(sorted({record.seed for record in plain})))
-    records = {record.run_id: record for record in plain}
-    return Table(plan=plan, records=records, n_stored=len(records), folder=Path(folder))
-
-
-def _condition_of(spec: RunSpec) -> Condition:
-    """Return the condition that a run is of."""
-    preset = preset_of(spec.scenario)
-    own, caches = spec.scenario.caches, "none" if preset is None else preset.caches
-    policy = PolicySpec(label=policy_label(spec.policy), policy=spec.policy, parameters=spec.parameters, caches=own)
-    return Condition(policy, spec.world.with_caches(caches))
+    return Table(plan=plan, records={record.run_id: record for record in plain}, folder=Path(folder))

@@ -9,14 +9,13 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from swarm_forage_env._internal.files import parse_json, replacing
-from swarm_forage_env._internal.typed import typed
-from swarm_forage_env.runs.parquet import ParquetError, read_parquet, write_parquet
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.versions import VERSION_NAMES
 from swarm_forage_env.scenarios.columns import INTERVAL_COLUMNS, KEY_COLUMNS
@@ -25,7 +24,7 @@ from swarm_forage_env.scenarios.performance import performance_curve
 if TYPE_CHECKING:
     import polars as pl
 
-_FILE_KEYS = ("swarm_forage_env.spec", "swarm_forage_env.made_with")
+_SPEC, _MADE_WITH = "swarm_forage_env.spec", "swarm_forage_env.made_with"
 
 
 class RecordError(ValueError):
@@ -89,8 +88,9 @@ class Record:
         """Seconds of a core that the run took, other work of the machine left out; NaN where unknown."""
         return float(self.made_with.get("cpu_time_s", "nan"))
 
+    @property
     def keys(self) -> dict[str, str | int | float]:
-        """Return what tells runs apart by name, see `KEY_COLUMNS`."""
+        """What tells runs apart, by name, see `KEY_COLUMNS`."""
         world = self.spec.world
         names = self.run_id, world.scenario.name, self.spec.policy
         return dict(zip(KEY_COLUMNS, (*names, world.n_robots, world.criterion, world.value, self.seed), strict=True))
@@ -101,8 +101,7 @@ class Record:
         import polars as pl
 
         keys = [
-            pl.lit(key, dtype=pl.Int64 if isinstance(key, int) else None).alias(name)
-            for name, key in self.keys().items()
+            pl.lit(key, dtype=pl.Int64 if isinstance(key, int) else None).alias(name) for name, key in self.keys.items()
         ]
         return pl.DataFrame(dict(self.columns)).select(*keys, pl.all())
 
@@ -135,26 +134,15 @@ class Record:
         return mine.keys() == theirs.keys() and all(np.array_equal(mine[name], theirs[name]) for name in mine)
 
     def describe(self) -> str:
-        """Return a few lines about the run for people."""
-        world, seconds, n_intervals = self.spec.world, self.horizon_s, len(self["interval"])
-        lines = [
-            f"run {self.spec.describe()}",
-            f"  criterion      {world.criterion} = {world.value:g}",
-            f"  length         {seconds:g} s in {n_intervals} intervals of {seconds / n_intervals:g} s",
-            f"  delivered      {self['collected'].sum()} ({self.per_1000_s('collected'):.1f} per 1,000 s)",
-            f"  first pick-ups {self['first_picked'].sum()} ({self.per_1000_s('first_picked'):.1f} per 1,000 s)",
-            f"  interference   {self['interference_fraction'].mean():.3f} of active robot time",
-            f"  active robots  {self['n_active'].mean():.1f} on average",
-        ]
-        return "\n".join(
-            [*lines, "  made with      " + ", ".join(f"{n} {v}" for n, v in sorted(self.made_with.items()))]
-        )
+        """Return one line about the run for people."""
+        delivered = f"{self['collected'].sum()} ({self.per_1000_s('collected'):.1f} per 1,000 s)"
+        return f"{self.spec.describe()}: {self.horizon_s:g} s, delivered {delivered}"
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the record to a Parquet file, whole or not at all; raises OSError where that cannot be."""
-        values = self.spec.to_json(), json.dumps(dict(self.made_with), sort_keys=True)
-        with replacing(Path(path)) as draft:
-            write_parquet(draft, self.frame, dict(zip(_FILE_KEYS, values, strict=True)))
+        told = {_SPEC: self.spec.to_mapping(), _MADE_WITH: dict(self.made_with)}
+        texts = {key: json.dumps(content, sort_keys=True) for key, content in told.items()}
+        write_parquet(Path(path), self.frame, texts)
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> "Record":
@@ -163,17 +151,42 @@ class Record:
         Raises:
             RecordError: the file is missing, no record, or damaged; the message names it.
         """
+        texts, frame = read_parquet(path)
+        if _SPEC not in texts or _MADE_WITH not in texts:
+            raise RecordError(f"Cannot read {path}: it is a Parquet file, but no run record of swarm_forage_env.")
         try:
-            texts, frame = read_parquet(path)
-            if not set(_FILE_KEYS) <= texts.keys():
-                raise ParquetError("it is a Parquet file, but no run record of swarm_forage_env")
-            spec, made_with = (texts[key] for key in _FILE_KEYS)
+            made_with = parse_json(texts[_MADE_WITH])
             return cls(
-                spec=RunSpec.from_json(spec),
+                spec=RunSpec.from_mapping(parse_json(texts[_SPEC])),
                 columns={name: frame[name].to_numpy() for name in frame.columns if name not in KEY_COLUMNS},
-                made_with=typed(Mapping[str, str], parse_json(made_with), "made_with"),
+                made_with={str(name): str(value) for name, value in made_with.items()},
             )
-        except OSError as error:
-            raise RecordError(f"Cannot read {path}: {error.strerror or error}.") from error
-        except ValueError as error:
+        except (AttributeError, ValueError) as error:
             raise RecordError(f"Cannot read {path}: {str(error).removesuffix('.')}.") from error
+
+
+def read_parquet(path: str | os.PathLike[str]) -> "tuple[Mapping[str, str], pl.DataFrame]":
+    """Return the texts in the metadata of a Parquet file, by key, and its table.
+
+    Raises:
+        RecordError: the file cannot be read, or is no Parquet file or a damaged one.
+    """
+    import polars as pl
+
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise RecordError(f"Cannot read {path}: {error.strerror or error}.") from error
+    try:
+        return pl.read_parquet_metadata(BytesIO(content)), pl.read_parquet(BytesIO(content))
+    except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
+        reason = str(error).strip().partition("\n")[0]
+        raise RecordError(f"Cannot read {path}: it is no Parquet file or a damaged one ({reason}).") from error
+
+
+def write_parquet(path: Path, frame: "pl.DataFrame", texts: Mapping[str, str], compression_level: int = 3) -> None:
+    """Write a table, with texts by key in its metadata, whole or not at all; raises OSError where that cannot be."""
+    buffer = BytesIO()  # polars tells a full disk as an error of its own, among many others
+    frame.write_parquet(buffer, metadata=dict(texts), compression_level=compression_level)
+    with replacing(path) as draft:
+        draft.write_bytes(buffer.getvalue())

@@ -58,8 +58,16 @@ class LiveRun:
 
     @property
     def compiled_policy(self) -> CompiledPolicy | None:
-        """The policy for a run without Python between ticks, see `compiled_policy_of`."""
-        return None if self._by_ticks else compiled_policy_of(self._stack, self._policy)
+        """The policy for a run without Python between ticks; None where Python might have a say.
+
+        That is where `needs_no_python` says so, or a recorder that is a subclass or was changed.
+        """
+        stack = self._stack
+        if self._by_ticks or type(stack) is not RunRecorder or "after_step" in vars(stack) or not steps_as_made(stack):
+            return None
+        if not hasattr(type(self._policy), "compiled") or not needs_no_python(self.forage_env, stack.stack[1:]):
+            return None
+        return self._policy.compiled()  # type: ignore[attr-defined] - optional, see Policy
 
     def advance(self, *, to_tick: int | None = None) -> None:
         """Let policy and environment act in turn until `to_tick` ticks have passed since the start, or the run ends."""
@@ -79,19 +87,6 @@ class LiveRun:
             # Checking the first row alone is fast, and in almost every tick it is enough.
             over = truncated or bool(terminated[0] and terminated.all())
         self._obs, self.over = obs, over
-
-
-def compiled_policy_of(stack: ForageEnv | SwarmWrapper, policy: Policy) -> CompiledPolicy | None:
-    """Return a policy, which was reset, for a run without Python between ticks; None where Python might have a say.
-
-    That is where `needs_no_python` says so, or a recorder that is a subclass or was changed.
-    """
-    if type(stack) is not RunRecorder or "after_step" in vars(stack) or not steps_as_made(stack):
-        return None
-    env = stack.unwrapped
-    if not hasattr(type(policy), "compiled") or not needs_no_python(env, stack.stack[1:]):
-        return None
-    return policy.compiled()  # type: ignore[attr-defined] - optional, see Policy
 
 
 def build_env(

@@ -11,7 +11,7 @@ from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from rich.console import Console
 
@@ -72,16 +72,19 @@ def run_all(
     wanted = {spec.run_id: spec for spec in specs}
     folder, here = None if out is None else Path(out), made_here or {}
     records, failures, done = dict[str, Record](), dict[str, RunFailure](), set[str]()
+
+    def finished(record: Record) -> None:
+        done.add(record.run_id)
+        if keep:
+            records[record.run_id] = record
+
     try:
-        if folder is not None:
-            for record in _stored(wanted.values(), folder, tell=progress):
-                done.add(record.run_id)
-                if keep:
-                    records[record.run_id] = record
+        for record in _stored(wanted.values(), folder, tell=progress) if folder is not None else ():
+            finished(record)
+        n_stored = len(done)
         todo = longest_first(spec for run_id, spec in wanted.items() if run_id not in done)
         if folder is not None and todo:
             check_folder(folder)
-        n_stored = len(done)
         apart = [spec for spec in todo if spec.policy not in here]
         n_processes = processes_of(len(apart), jobs) if executor is None else None
         with (
@@ -96,12 +99,9 @@ def run_all(
                     store(folder, result)
                 if isinstance(result, RunFailure):
                     failures[spec.run_id] = result
-                    shown.advance(spec, math.nan)
-                    continue
-                done.add(spec.run_id)
-                if keep:
-                    records[spec.run_id] = result
-                shown.advance(spec, result.wall_time_s)
+                else:
+                    finished(result)
+                shown.advance(spec, math.nan if isinstance(result, RunFailure) else result.wall_time_s)
     except KeyboardInterrupt as interrupt:
         kept = "" if folder is None else f" They are in {folder}; the same command does the rest."
         told = f"Interrupted: {len(done)} of {counted(len(wanted), 'run')} are finished.{kept}"
@@ -141,30 +141,19 @@ def _stored(specs: Collection[RunSpec], folder: Path, *, tell: bool) -> Iterator
             yield record
     console = Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True, quiet=not tell)
     if n_found:
-        console.print(f"{n_found} of {counted(len(specs), 'run')} {'is' if n_found == 1 else 'are'} stored already.")
-    if n_foreign:
-        console.print(
-            f"{n_foreign} of them {'was' if n_foreign == 1 else 'were'} made by other code or other versions of the "
-            "packages; give another folder to run them afresh."
-        )
+        other = f", {n_foreign:,} by other code or versions (give another folder to run them afresh)" * bool(n_foreign)
+        console.print(f"{n_found:,} of {counted(len(specs), 'run')} stored already{other}.")
     if damaged:
         more = f" So are those of {len(damaged) - 1} more files." if len(damaged) > 1 else ""
         console.print(f"{damaged[0]} Its run is made again.{more}")
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Rerun:
+class Rerun(NamedTuple):
     """What came out when a stored run was made again."""
 
     record: Record
-    file: Path
-    """Of the record, or the failure."""
     is_same: bool | None
     """Whether the results are those in the file, bit for bit; None where the run had failed."""
-
-    def to_mapping(self) -> dict[str, Any]:
-        """Return what the run is, and whether it is the same."""
-        return {**self.record.keys(), "file": str(self.file), "is_same": self.is_same}
 
 
 def rerun(file: str | Path) -> Rerun:
@@ -184,4 +173,4 @@ def rerun(file: str | Path) -> Rerun:
     except ValueError as error:
         raise RecordError(f"Cannot run {path} again: {error}") from error
     again = run_policy(policy, stored.spec)
-    return Rerun(record=again, file=path, is_same=again.equals(stored) if isinstance(stored, Record) else None)
+    return Rerun(again, again.equals(stored) if isinstance(stored, Record) else None)

@@ -1,25 +1,27 @@
-"""RunSpec: everything that determines a run, as frozen data with an identity."""
+"""What is run: a policy as it is run, and RunSpec, everything that determines a run, with its identity."""
 
+import copy
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-from swarm_forage_env._internal.fields import ConfigError, instance, known_keys, table, text, whole
-from swarm_forage_env._internal.files import parse_json
+from swarm_forage_env._internal.fields import ConfigError, instance, known_keys, one_of, table, whole
 from swarm_forage_env.policies.registry import (
     file_of,
+    from_callable,
     is_policy_file,
     load_policy,
     named_interface,
     policy_class,
+    policy_label,
     whole_path,
 )
-from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping, to_mapping, whole_intervals
-from swarm_forage_env.wrappers.registry import wrapper_config_class
+from swarm_forage_env.scenarios.config import CACHE_KINDS, ScenarioConfig, from_mapping, to_mapping, whole_intervals
+from swarm_forage_env.wrappers.registry import wrapper_config_class, wrapper_configs
 from swarm_forage_env.wrappers.world import UNDISTURBED, World, WorldLike, world_of
 
 if TYPE_CHECKING:
@@ -29,6 +31,10 @@ RUN_ID_DIGITS = 16
 """Hexadecimal digits of a run_id: 64 bits, so that a million runs collide with probability 3e-8."""
 _MAX_SEED = 2**63 - 1
 _KEYS = ("scenario", "policy", "parameters", "wrappers", "criterion", "criterion_value", "seed")
+
+PolicyLike: TypeAlias = Any
+"""A registered name; the path of a trained policy (*.zip of stable-baselines3, *.npz); a policy object or class; a
+function of observations (N, D) that returns actions (N, 3)."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -52,7 +58,7 @@ class RunSpec:
     def __post_init__(self) -> None:
         whole("seed", self.seed, at_least=0, at_most=_MAX_SEED)
         instance("world", self.world, World)
-        text("policy", self.policy)
+        instance("policy", self.policy, str)
         table("parameters", self.parameters)
         whole_intervals(self.scenario)
         try:
@@ -101,7 +107,7 @@ class RunSpec:
         return {
             "policy": self.policy,
             "parameters": dict(self.parameters),
-            "wrappers": wrappers_to_list(self.wrappers),
+            "wrappers": [{"wrapper": config.name, **config.to_mapping()} for config in self.wrappers],
             "criterion": self.world.criterion,
             "criterion_value": self.world.value,
             "seed": self.seed,
@@ -127,24 +133,23 @@ class RunSpec:
         )
         return cls(world=world, **values)
 
-    def to_json(self) -> str:
-        """Return the specification as one line of JSON."""
-        return json.dumps(self.to_mapping(), sort_keys=True)
 
-    @classmethod
-    def from_json(cls, text: str) -> "RunSpec":
-        """Build a specification back from `to_json`.
+def wrappers_from_list(entries: Any) -> "tuple[WrapperConfig, ...]":
+    """Build wrapper configurations from a list of tables, each with its name as `wrapper`.
 
-        Raises:
-            ConfigError: no JSON object, or one that describes no run.
-        """
-        try:
-            mapping = parse_json(text)
-        except ValueError as error:
-            raise ConfigError(f"Expected a run specification as JSON: {error}.") from error
-        if not isinstance(mapping, dict):
-            raise ConfigError(f"Expected a run specification as a JSON object, got {type(mapping).__name__}.")
-        return cls.from_mapping(mapping)
+    Raises:
+        ConfigError: no list of tables, or a table that describes no wrapper.
+    """
+    if not isinstance(entries, (list, tuple)):
+        raise ConfigError(f"Expected wrappers as a list of tables, got {entries!r}.")
+    configs: list[WrapperConfig] = []
+    for entry in entries:
+        values = dict(table("a wrapper", entry))
+        name = values.pop("wrapper", None)
+        if not isinstance(name, str):
+            raise ConfigError(f"Missing key 'wrapper' (its name) in the wrapper {entry!r}.")
+        configs.append(wrapper_config_class(name).from_mapping(values))
+    return tuple(configs)
 
 
 @lru_cache(maxsize=64)
@@ -153,113 +158,6 @@ def _identifying_fields(scenario: ScenarioConfig) -> dict[str, Any]:
     mapping = to_mapping(scenario)
     del mapping["performance"]
     return mapping
-
-
-def chosen_caches(asked: str | None, policy: object, scenario: ScenarioConfig) -> str:
-    """Return which caches a run has: what was asked for, else what the policy states, else what the scenario has.
-
-    `plan_run`, and by it scores and the command line, and `record_run` ask here. `RunSpec` takes its scenario as it is.
-
-    Args:
-        asked: "none", "static" or "dynamic" if the user asked for it, else None.
-        policy: A policy, or its class. It may state the caches that it is made for in the attribute `caches`.
-        scenario: The scenario that the run was given.
-    """
-    if asked is not None:
-        return asked
-    return stated_caches(policy) or scenario.caches
-
-
-def stated_caches(policy: object) -> str | None:
-    """Return which caches a policy, or its class, states that it is made for; None where it states nothing."""
-    stated = getattr(policy, "caches", None)
-    # On a class, a property is not a value; it has one only on an object.
-    return stated if isinstance(stated, str) else None
-
-
-def plan_run(
-    world: WorldLike,
-    policy: str,
-    *,
-    wrappers: "Iterable[WrapperConfig]" = (),
-    parameters: Mapping[str, Any] | None = None,
-    caches: str | None = None,
-    seed: int = 0,
-) -> RunSpec:
-    """Plan a run of a policy.
-
-    Args:
-        world: The world, or a scenario; its caches are those of `chosen_caches`.
-        policy: Registered name, or path of a policy file.
-        wrappers: What disturbs the swarm besides the wrappers of the world.
-        parameters: Keyword arguments of the policy, plain values. A "digest" says that a file was checked before.
-        caches: Which caches there are; default see `chosen_caches`.
-        seed: Seed of the run.
-
-    Raises:
-        ConfigError: see `RunSpec` and `World`.
-        ValueError: no installed policy has that name, or a file that cannot be opened.
-    """
-    given = world_of(world)
-    chosen = dict(parameters or {})
-    stating: object = None
-    # A study plans thousands of runs of a policy that was looked up before, so it is not looked up again.
-    if caches is None or (is_policy_file(policy) and "digest" not in chosen):
-        policy, chosen, stating = pin_policy(policy, chosen)
-    more = tuple(wrappers)
-    disturbed = replace(given, wrappers=(*given.wrappers, *more), name="") if more else given
-    planned = disturbed.with_caches(chosen_caches(caches, stating, given.scenario))
-    return RunSpec(world=planned, policy=policy, parameters=chosen, seed=seed)
-
-
-def pin_policy(policy: str | Path, parameters: Mapping[str, Any]) -> tuple[str, dict[str, Any], object]:
-    """Return a policy as specifications name it; the content of a file becomes part of its runs' identity.
-
-    Args:
-        policy: Registered name, or path of a policy file, with or without its interface (`split_interface`). A file is
-            opened once, before anything is run.
-        parameters: Keyword arguments of the policy; a "digest" of a file is kept, and the file checked against it.
-
-    Returns:
-        The registered name, or the whole path of the file; the parameters, with the file's digest; and the class of the
-        name or the opened policy, which may state `caches`.
-
-    Raises:
-        ValueError: no installed policy has that name, the file cannot be opened, or an interface is given twice.
-    """
-    name, pinned = named_interface(str(policy), parameters)
-    if not is_policy_file(name):
-        return name, pinned, policy_class(name)
-    from swarm_forage_env.policies.model_files import file_digest  # late: most runs open no model
-
-    file = whole_path(name)
-    planned = pinned if "digest" in pinned else {"digest": file_digest(file_of(file)), **pinned}
-    # Without a digest it says what it guesses, which runs do not repeat.
-    return file, planned, load_policy(file, pinned)
-
-
-def wrappers_to_list(wrappers: "Iterable[WrapperConfig]") -> list[dict[str, Any]]:
-    """Return wrapper configurations as plain values; `wrappers_from_list` reads them back."""
-    return [{"wrapper": config.name, **config.to_mapping()} for config in wrappers]
-
-
-def wrappers_from_list(entries: Any) -> "tuple[WrapperConfig, ...]":
-    """Build wrapper configurations back from `wrappers_to_list`.
-
-    Raises:
-        ConfigError: no list of tables, or a table that describes no wrapper.
-    """
-    if not isinstance(entries, (list, tuple)):
-        raise ConfigError(f"Expected wrappers as a list of tables, got {entries!r}.")
-    return tuple(_wrapper_from_mapping(entry) for entry in entries)
-
-
-def _wrapper_from_mapping(entry: Mapping[str, Any]) -> "WrapperConfig":
-    values = dict(entry) if isinstance(entry, Mapping) else {}
-    name = values.pop("wrapper", None)
-    if not isinstance(name, str):
-        raise ConfigError(f"Missing key 'wrapper' (its name) in the wrapper {entry!r}.")
-    return wrapper_config_class(name).from_mapping(values)
 
 
 def identity_of(mapping: Mapping[str, Any]) -> str:
@@ -277,3 +175,158 @@ def _canonical(value: Any) -> Any:
     if isinstance(value, float) and value.is_integer():
         return int(value)
     return value
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class PolicySpec:
+    """A policy as it is run."""
+
+    label: str
+    """Name in tables."""
+    policy: str
+    """Registered name, path of a policy file, or the name under which runs of an object are stored."""
+    parameters: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    """Keyword arguments of the policy; of a file with its digest."""
+    caches: str | None = None
+    """Which caches its runs have; None = those of the world."""
+    factory: Callable[..., Any] | None = field(default=None, compare=False)
+    """Builds the policy in this process; None if worker processes can load it by its name."""
+    is_named: bool = field(default=True, compare=False)
+    """Whether its runs may be stored: a name tells which policy a stored run belongs to."""
+
+
+def stated_caches(policy: object) -> str | None:
+    """Return which caches a policy, or its class, states that it is made for (`caches`); None where it states nothing.
+
+    Raises:
+        ConfigError: it states caches that there are not.
+    """
+    stated = getattr(policy, "caches", None)
+    if not isinstance(stated, str):  # on a class a property is no value
+        return None
+    one_of("caches of the policy", stated, CACHE_KINDS)
+    return stated
+
+
+def policy_spec(
+    policy: PolicyLike, *, label: str = "", parameters: Mapping[str, Any] | None = None, caches: str | None = None
+) -> PolicySpec:
+    """Look a policy up and return it as it is run.
+
+    A file is opened once, before anything is run, and its content becomes part of its runs' identity (`digest`).
+
+    Args:
+        policy: See `PolicyLike`.
+        label: Name in tables; default the registered name, of a file its name without the ending.
+        parameters: Keyword arguments of a registered policy, a file or a class. A "digest" that is given says that a
+            file was checked before.
+        caches: Which caches its runs have; default those that it states, else those of the world.
+
+    Raises:
+        ConfigError: there is no such policy, its file cannot be opened, or there are no such caches.
+        TypeError: something that is no policy.
+        ValueError: parameters where none can be given.
+    """
+    if caches is not None:
+        one_of("caches", caches, CACHE_KINDS)
+    if not isinstance(policy, str | Path):
+        return _built_here(policy, label, parameters or {}, caches)
+    found, pinned = named_interface(str(policy), parameters or {})
+    if not is_policy_file(found):
+        stating: object = policy_class(found)
+    else:
+        from swarm_forage_env.policies.model_files import file_digest  # late: most runs open no model
+
+        found, chosen = whole_path(found), pinned
+        try:
+            if "digest" not in chosen:
+                pinned = {"digest": file_digest(file_of(found)), **chosen}
+            stating = load_policy(found, chosen)  # without a digest it says what it guesses, which runs do not repeat
+        except ConfigError:
+            raise
+        except ValueError as error:
+            raise ConfigError(str(error)) from error
+    return PolicySpec(
+        label=label or policy_label(found), policy=found, parameters=pinned, caches=caches or stated_caches(stating)
+    )
+
+
+def policy_specs(
+    policies: Sequence[PolicyLike] | Mapping[str, PolicyLike],
+    *,
+    parameters: Mapping[str, Any] | None = None,
+    caches: str | None = None,
+) -> tuple[PolicySpec, ...]:
+    """Return several policies as they are run, each with a name of its own; files of one name by their whole paths.
+
+    Args:
+        policies: Policies, or a mapping from names to policies.
+        parameters: As in `policy_spec`, the same for all.
+        caches: As in `policy_spec`.
+
+    Raises:
+        ConfigError: equal names; for the rest see `policy_spec`.
+    """
+    named = policies.items() if isinstance(policies, Mapping) else [("", policy) for policy in policies]
+    specs = [policy_spec(policy, label=name, parameters=parameters, caches=caches) for name, policy in named]
+    labels = [spec.label for spec in specs]
+    specs = [replace(spec, label=spec.policy) if labels.count(spec.label) > 1 else spec for spec in specs]
+    if len({spec.label for spec in specs}) < len(specs):
+        raise ConfigError(f"Expected policies of different names, got {', '.join(labels)}; give a mapping from names.")
+    return tuple(specs)
+
+
+def _built_here(given: Any, label: str, parameters: Mapping[str, Any], caches: str | None) -> PolicySpec:
+    """A policy object, a class or a function, which only this process can make."""
+    is_policy = all(callable(getattr(given, name, None)) for name in ("reset", "act"))
+    if not callable(given) and not is_policy:
+        raise TypeError(
+            "Expected a policy as a registered name, the path of a trained one, an object or class with reset and act, "
+            f"or a function of observations, got {given!r}."
+        )
+    name: str = label or getattr(given, "__name__", type(given).__name__)
+    if isinstance(given, type):
+        factory: Any = given
+    elif parameters:
+        raise ValueError(f"Expected parameters with a name, a file or a class only, got them with {given!r}.")
+    else:
+        factory = partial(copy.deepcopy, given) if is_policy else partial(from_callable, given, name=name)
+    return PolicySpec(
+        label=name,
+        policy=name,
+        parameters=parameters,
+        caches=caches or stated_caches(given),
+        factory=factory,
+        is_named=bool(label),
+    )
+
+
+def plan_run(
+    world: WorldLike,
+    policy: str | Path,
+    *,
+    wrappers: "Iterable[WrapperConfig | str]" = (),
+    parameters: Mapping[str, Any] | None = None,
+    caches: str | None = None,
+    seed: int = 0,
+) -> RunSpec:
+    """Plan a run of a policy.
+
+    Args:
+        world: The world, or a scenario.
+        policy: Registered name, or path of a policy file.
+        wrappers: What disturbs the swarm besides the wrappers of the world; words such as "sensor_noise:sigma=0.1" are
+            read by `parse_wrapper`.
+        parameters: Keyword arguments of the policy, plain values.
+        caches: Which caches there are; default those that the policy states, else those of the scenario.
+        seed: Seed of the run.
+
+    Raises:
+        ConfigError: no installed policy has that name, a file cannot be opened, or see `RunSpec` and `World`.
+    """
+    given, more = world_of(world), wrapper_configs(wrappers)
+    disturbed = replace(given, wrappers=(*given.wrappers, *more), name="") if more else given
+    found = policy_spec(policy, parameters=parameters, caches=caches)
+    return RunSpec(
+        world=disturbed.with_caches(found.caches), policy=found.policy, parameters=found.parameters, seed=seed
+    )

@@ -14,8 +14,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.files import parse_json, replacing
+from swarm_forage_env._internal.files import read_json, replacing
 from swarm_forage_env.runs.record import Record, RecordError
 from swarm_forage_env.runs.spec import RunSpec
 
@@ -62,11 +61,9 @@ def failure_file(folder: Path, run_id: str) -> Path:
 
 def store(folder: Path, result: Record | RunFailure) -> None:
     """Write what became of a run. A record ends the failure of an earlier try."""
-    run_id = result.spec.run_id
-    failure = failure_file(folder, run_id)
+    failure = failure_file(folder, result.run_id)
     if isinstance(result, Record):
-        folder.mkdir(parents=True, exist_ok=True)
-        result.write(record_file(folder, run_id))
+        result.write(record_file(folder, result.run_id))
         failure.unlink(missing_ok=True)
         return
     content = {
@@ -111,13 +108,11 @@ def read_failure(path: str | os.PathLike[str]) -> RunFailure:
     Raises:
         RecordError: the file is missing or no failure.
     """
+    content = read_json(Path(path), RecordError)
     try:
-        content = parse_json(Path(path).read_text(encoding="utf-8"))
         spec = RunSpec.from_mapping(content["spec"])
         return RunFailure(spec=spec, error=content["error"], traceback="\n".join(content["traceback"]))
-    except OSError as error:
-        raise RecordError(f"Cannot read {path}: {error.strerror or error}.") from error
-    except (ConfigError, KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError) as error:
         raise RecordError(f"Cannot read {path}: it is no failure of a run ({error}).") from error
 
 
@@ -133,17 +128,13 @@ def load(folder: str | os.PathLike[str]) -> tuple[Record, ...]:
     return tuple(map(Record.read, files))
 
 
-def failed_alike(failures: Iterable[RunFailure]) -> tuple[tuple[RunFailure, ...], ...]:
-    """Return runs that failed, those together that a policy failed in for one reason."""
-    found: dict[tuple[str, ...], list[RunFailure]] = {}
-    for failure in failures:
-        policy, given = failure.spec.policy, json.dumps(failure.spec.parameters, sort_keys=True)
-        found.setdefault((policy, given, failure.error), []).append(failure)
-    return tuple(map(tuple, found.values()))
-
-
 def failure_lines(failures: Iterable[RunFailure]) -> tuple[str, ...]:
     """Return why runs failed, a line per policy and reason: one that cannot run at all fails in all runs alike."""
-    alike = failed_alike(failures)
-    others = [f", and {len(runs) - 1:,} more of its runs" if len(runs) > 1 else "" for runs in alike]
-    return tuple(f"{runs[0].spec.describe()}{more}: {runs[0].error}" for runs, more in zip(alike, others, strict=True))
+    alike: dict[tuple[str, ...], list[RunFailure]] = {}
+    for failure in failures:
+        given = json.dumps(failure.spec.parameters, sort_keys=True)
+        alike.setdefault((failure.spec.policy, given, failure.error), []).append(failure)
+    return tuple(
+        f"{first.spec.describe()}{f', and {len(others):,} more of its runs' if others else ''}: {first.error}"
+        for first, *others in alike.values()
+    )

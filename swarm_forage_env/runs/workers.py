@@ -11,10 +11,10 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future
 from contextlib import contextmanager, nullcontext, suppress
 from itertools import islice
 from multiprocessing import get_context, parent_process
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from swarm_forage_env._internal.compiling import is_kept, tell_of_first_run
-from swarm_forage_env._internal.fields import as_whole
+from swarm_forage_env._internal.fields import whole
 from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.registry import file_of, is_policy_file
 from swarm_forage_env.runs.run import warm_up
@@ -38,7 +38,15 @@ WAKE_UP_EVERY_S = 0.5
 
 
 class WorkerError(RuntimeError):
-    """Worker processes could not be started, one was killed, or an executor ended before its work was done."""
+    """A worker process was killed or could not be started, or an executor ended before its work was done."""
+
+    def __init__(
+        self,
+        message: str = "A worker process was killed, most likely because memory ran out: the same call makes what is "
+        "missing, with fewer processes at a time (--jobs 1) or smaller runs. A script must start runs under "
+        "`if __name__ == '__main__':`.",
+    ) -> None:
+        super().__init__(message)
 
 
 def available_cores() -> int:
@@ -53,7 +61,7 @@ def processes_of(n_runs: int, jobs: int | None) -> int:
         ConfigError: `jobs` is no number of processes.
     """
     if jobs is not None:
-        jobs = as_whole("jobs", jobs, at_least=1, or_none=True)
+        whole("jobs", jobs, at_least=1)
     return min(jobs or available_cores(), max(1, n_runs))
 
 
@@ -85,55 +93,43 @@ def each_run(
         return
     for file in {file_of(spec.policy) for spec in specs if is_policy_file(spec.policy)}:
         trust.check(file)  # workers know nothing of what the user of a command allows
-    with _process_pool(n_workers, specs) if executor is None else nullcontext(executor) as workers:
-        waiting, running = iter(specs), dict[Future[Result], RunSpec]()
-        try:
-            while True:
-                with deaf_children():
-                    running |= {workers.submit(do, spec): spec for spec in islice(waiting, AT_A_TIME - len(running))}
-                if not running:
-                    return
-                finished, _ = wait(running, timeout=WAKE_UP_EVERY_S, return_when=FIRST_COMPLETED)
-                lost = [future for future in finished if _is_lost(future)]
-                for future in finished.difference(lost):
-                    yield running.pop(future), future.result()
-                if lost:
-                    raise _killed()
-        except BrokenExecutor as error:
-            raise _killed() from error
-        finally:
-            if executor is not None:  # a pool of ours ends whole, and complains of tasks that others have cancelled
-                for future in running:
-                    future.cancel()
+    with _process_pool(n_workers) if executor is None else nullcontext(executor) as workers:
+        if executor is None:
+            if not is_kept(observe):
+                tell_of_first_run()  # workers have nobody to tell
+            for _ in _done(workers, _warmed_up, list({_kernels_of(spec): spec for spec in specs}.values()), 1):
+                pass
+        yield from _done(workers, do, specs, AT_A_TIME)
 
 
-def _is_lost(future: Future[Any]) -> bool:
-    """Whether the worker of a finished task died, or its executor ended."""
-    return future.cancelled() or isinstance(future.exception(), BrokenExecutor)
+def _done(
+    workers: Executor, do: Callable[[RunSpec], Result], specs: Sequence[RunSpec], at_a_time: int
+) -> Generator[tuple[RunSpec, Result]]:
+    waiting, running = iter(specs), dict[Future[Result], RunSpec]()
+    try:
+        while True:
+            with deaf_children():
+                running |= {workers.submit(do, spec): spec for spec in islice(waiting, at_a_time - len(running))}
+            if not running:
+                return
+            finished, _ = wait(running, timeout=WAKE_UP_EVERY_S, return_when=FIRST_COMPLETED)
+            lost = [one for one in finished if one.cancelled() or isinstance(one.exception(), BrokenExecutor)]
+            for future in finished.difference(lost):
+                yield running.pop(future), future.result()
+            if lost:
+                raise WorkerError
+    except BrokenExecutor as error:
+        raise WorkerError from error
+    finally:
+        if not isinstance(workers, ProcessPoolExecutor):  # a pool ends whole, and complains of what others cancelled
+            for future in running:
+                future.cancel()
 
 
-def _killed() -> WorkerError:
-    """What is said then: the system gives no reason."""
-    return WorkerError(
-        "A worker process was killed, most likely because memory ran out. The same command makes what is missing; try "
-        "fewer processes at a time (--jobs 1), or smaller runs."
-    )
-
-
-def _asked(pool: Executor, task: Callable[..., Any], *args: Any) -> None:
-    """Have a task done.
-
-    Raises:
-        WorkerError: the worker that did it was killed.
-        Exception: whatever the task raises.
-    """
-    with deaf_children():
-        future = pool.submit(task, *args)
-    while not future.done():
-        wait((future,), timeout=WAKE_UP_EVERY_S)
-    if _is_lost(future):
-        raise _killed()
-    future.result()
+def _kernels_of(spec: RunSpec) -> tuple[str, ...]:
+    """Runs for which this is equal use the same kernels."""
+    world = spec.scenario
+    return (spec.policy, world.caches, world.physics, *(config.name for config in spec.wrappers))
 
 
 def _warmed_up(spec: RunSpec) -> None:
@@ -143,26 +139,11 @@ def _warmed_up(spec: RunSpec) -> None:
 
 
 @contextmanager
-def _process_pool(n_workers: int, specs: Sequence[RunSpec]) -> Iterator[Executor]:
-    """Local processes of one thread each, with compiled code to find; they end at once when the driver stops or dies.
-
-    Raises:
-        WorkerError: they cannot be started.
-    """
+def _process_pool(n_workers: int) -> Iterator[Executor]:
+    """Local processes of one thread each; they end at once when the driver stops or dies."""
     with single_threaded_children():
         pool = ProcessPoolExecutor(n_workers, mp_context=get_context("spawn"), initializer=live_with_driver)
         try:
-            try:
-                _asked(pool, os.getpid)
-            except WorkerError as error:
-                raise WorkerError(
-                    "Worker processes could not be started. A script that starts runs must do so under "
-                    "`if __name__ == '__main__':`; jobs=1 runs everything in this process."
-                ) from error
-            if not is_kept(observe):
-                tell_of_first_run()  # workers have nobody to tell
-            for spec in {_kernels_of(spec): spec for spec in specs}.values():
-                _asked(pool, _warmed_up, spec)
             yield pool
         except BaseException:
             processes = [*(pool._processes or {}).values()]
@@ -171,12 +152,6 @@ def _process_pool(n_workers: int, specs: Sequence[RunSpec]) -> Iterator[Executor
                 process.terminate()
             raise
         pool.shutdown()
-
-
-def _kernels_of(spec: RunSpec) -> tuple[str, ...]:
-    """Runs for which this is equal use the same kernels."""
-    world = spec.scenario
-    return (spec.policy, world.caches, world.physics, *(config.name for config in spec.wrappers))
 
 
 @contextmanager
@@ -195,14 +170,9 @@ def deaf_children() -> Iterator[None]:
 def live_with_driver() -> None:
     """Prepare a process that a driver has started: it ignores Ctrl-C, and exits when the driver is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_leave_after_driver, daemon=True).start()
-
-
-def _leave_after_driver() -> None:
     driver = parent_process()
     if driver is not None:
-        driver.join()
-        os._exit(1)
+        threading.Thread(target=lambda: (driver.join(), os._exit(1)), daemon=True).start()
 
 
 @contextmanager

@@ -20,9 +20,8 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, whole
 from swarm_forage_env._internal.files import alone_in, parse_json, replacing
-from swarm_forage_env.runs.parquet import ParquetError, read_parquet, write_parquet
 from swarm_forage_env.runs.plan import Curves
-from swarm_forage_env.runs.record import RecordError
+from swarm_forage_env.runs.record import RecordError, read_parquet, write_parquet
 from swarm_forage_env.runs.runner import Outcomes, longest_first, run_all
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import failure_file, read_failure, stored_record
@@ -235,8 +234,7 @@ class StudyTable:
     def write(self, path: str | Path) -> None:
         """Write the table to a Parquet file, whole or not at all; raises OSError where that cannot be."""
         texts = {_STUDY: self.spec.to_toml(), _VERSIONS: json.dumps(self.versions, sort_keys=True)}
-        with replacing(Path(path)) as draft:
-            write_parquet(draft, self.frame, texts, _COMPRESSION)
+        write_parquet(Path(path), self.frame, texts, _COMPRESSION)
 
 
 def _address(spec: StudySpec, place: Place) -> dict[str, Any]:
@@ -256,17 +254,14 @@ def read_study(path: str | Path) -> StudyTable:
     """
     if Path(path).is_dir():
         return _gathered(Path(path))
+    texts, frame = read_parquet(path)
+    if not {_STUDY, _VERSIONS} <= texts.keys():
+        raise RecordError(f"Cannot read {path}: it is a Parquet file, but no study of swarm_forage_env.")
+    lacking = {"condition", "seed", "interval", "error"} - {*frame.columns}
+    if lacking:
+        raise RecordError(f"Cannot read {path}: it has no column {min(lacking)}.")
     try:
-        texts, frame = read_parquet(path)
-        if not {_STUDY, _VERSIONS} <= texts.keys():
-            raise ParquetError("it is a Parquet file, but no study of swarm_forage_env")
-        spec = study_of(texts[_STUDY])
-        lacking = {"condition", "seed", "interval", "error"} - {*frame.columns}
-        if lacking:
-            raise ParquetError(f"it has no column {min(lacking)}")
-        return StudyTable(spec=spec, frame=frame, versions=tuple(parse_json(texts[_VERSIONS])))
-    except OSError as error:
-        raise RecordError(f"Cannot read {path}: {error.strerror or error}.") from error
+        return StudyTable(spec=study_of(texts[_STUDY]), frame=frame, versions=tuple(parse_json(texts[_VERSIONS])))
     except ValueError as error:
         raise RecordError(f"Cannot read {path}: {str(error).removesuffix('.')}.") from error
 

@@ -19,8 +19,7 @@ from swarm_forage_env._internal.fields import ConfigError, check_file_name, know
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.policies.registry import is_policy_file
 from swarm_forage_env.runs.plan import Condition, Plan
-from swarm_forage_env.runs.policy_spec import PolicySpec, policy_spec
-from swarm_forage_env.runs.spec import RunSpec, wrappers_from_list
+from swarm_forage_env.runs.spec import PolicySpec, RunSpec, policy_spec, wrappers_from_list
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.quirks import QUIRK_NAMES, RULES, Quirks
 from swarm_forage_env.studies.ladders import CRITERIA, swarms_of_sizes, wrappers_at

@@ -27,7 +27,7 @@ from swarm_forage_env._internal.fields import (
 )
 from swarm_forage_env.policies.registry import policy_class
 from swarm_forage_env.runs.plan import Plan
-from swarm_forage_env.runs.policy_spec import PolicySpec
+from swarm_forage_env.runs.spec import PolicySpec
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.config import from_mapping as config_from_mapping
 from swarm_forage_env.scenarios.overrides import with_overrides

@@ -16,7 +16,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.runs.plan import Condition, Plan, Table, run_plan
-from swarm_forage_env.runs.policy_spec import PolicySpec, policy_spec
+from swarm_forage_env.runs.spec import PolicySpec, policy_spec
 from swarm_forage_env.training.evaluation_plan import ALL_WORLDS, BEST, CHOSEN_BY, EvaluationPlan, EvaluationWorld
 from swarm_forage_env.training.plan import TrainingPlan, read_plan
 from swarm_forage_env.wrappers.world import World

@@ -19,8 +19,8 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import check_folder
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.policies.network import Network, NetworkPolicy
-from swarm_forage_env.runs.policy_spec import policy_spec
 from swarm_forage_env.runs.run import Started
+from swarm_forage_env.runs.spec import policy_spec
 from swarm_forage_env.runs.versions import software_versions
 from swarm_forage_env.training.evaluations import (
     EVALUATIONS_FILE,

@@ -23,7 +23,7 @@ from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_
 from swarm_forage_env.policies.network import ACTIVATIONS, TEMPERATURES
 from swarm_forage_env.policies.pretrained import plan_file, plan_names
 from swarm_forage_env.runs.plan import Plan
-from swarm_forage_env.runs.policy_spec import PolicySpec
+from swarm_forage_env.runs.spec import PolicySpec
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import scenario_of_same_size
 from swarm_forage_env.training.defaults import DEFAULT_ARENAS, DEFAULT_HIDDEN, DEFAULT_STEPS

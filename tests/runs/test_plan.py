@@ -6,7 +6,7 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.runs.plan import Condition, Plan
-from swarm_forage_env.runs.policy_spec import policy_spec
+from swarm_forage_env.runs.spec import policy_spec
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.world import SIZE, World

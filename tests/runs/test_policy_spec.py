@@ -8,7 +8,7 @@ from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.model_files import file_digest
 from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.policies.registry import RandomPolicy
-from swarm_forage_env.runs.policy_spec import PolicySpec, policy_spec, policy_specs
+from swarm_forage_env.runs.spec import PolicySpec, policy_spec, policy_specs
 
 
 class ForStatic(RandomPolicy):

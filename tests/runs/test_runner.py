@@ -18,7 +18,7 @@ from swarm_forage_env.policies.registry import RandomPolicy, from_callable
 from swarm_forage_env.policies.trust import UntrustedModelError, only_typed
 from swarm_forage_env.runs import runner
 from swarm_forage_env.runs.plan import Condition, Plan, planned_line, run_plan
-from swarm_forage_env.runs.policy_spec import policy_spec
+from swarm_forage_env.runs.spec import policy_spec
 from swarm_forage_env.runs.record import RecordError
 from swarm_forage_env.runs.run import WARM_UP_TICKS, build_stack, run_one, run_policy, warm_up
 from swarm_forage_env.runs.runner import longest_first, rerun, run_all

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarm_forage_env.runs.plan import Condition, Plan, Table, run_plan
-from swarm_forage_env.runs.policy_spec import PolicySpec, policy_spec
+from swarm_forage_env.runs.spec import PolicySpec, policy_spec
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.scenarios.columns import INTERVAL_COLUMNS
 from swarm_forage_env.scenarios.presets import scenario

@@ -6,7 +6,7 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.runs.plan import Plan
-from swarm_forage_env.runs.policy_spec import policy_spec
+from swarm_forage_env.runs.spec import policy_spec
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
 from swarm_forage_env.studies.ladders import BUDGETS, plan_worlds, study_values, wrappers_at

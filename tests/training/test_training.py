@@ -21,7 +21,7 @@ from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterfac
 from swarm_forage_env.policies.model_files import ModelError, ModelPolicy
 from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.policies.registry import load_policy
-from swarm_forage_env.runs.policy_spec import policy_spec
+from swarm_forage_env.runs.spec import policy_spec
 from swarm_forage_env.scenarios.presets import search_and_rescue, warehouse_small
 from swarm_forage_env.training.evaluation_plan import EvaluationPlan
 from swarm_forage_env.training.evaluations import finished_runs, means, read_evaluations, write_evaluations
