@@ -1,20 +1,22 @@
-"""Make docs/gallery.md: short replays of every scenario, controller and kind of adversity, a picture of each; films.
+"""Make docs/gallery.md, short replays of every scenario, controller and kind of adversity, films, and docs/images.
 
     python scripts/make_gallery.py [NAME ... | --pages]
 
-Without names, everything is made. A NAME is that of a replay or of a film. `--pages` makes no run: it puts the present
-style sheet and scripts around the runs of the stored replays, which is enough after a change of the page. Needs the
-render extra.
+Without names, everything is made. A NAME is that of a replay, of a film or of a picture in docs/images. `--pages` makes
+no run: it puts the present style sheet and scripts around the runs of the stored replays, which is enough after a
+change of the page. Needs the render extra.
 """
 
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from swarm_forage_env import RunSpec, parse_wrapper, plan_run, scenario
+from swarm_forage_env import RunSpec, plan_run, scenario
 from swarm_forage_env.inspect.film import record_run
 from swarm_forage_env.inspect.replay.capture import record_replay
 from swarm_forage_env.inspect.replay.files import read_replays, write_replays
+from swarm_forage_env.scenarios.config import ScenarioConfig
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 FOLDER = DOCS / "gallery"
@@ -44,12 +46,7 @@ class Exhibit:
         world = scenario(self.scenario, horizon_s=self.horizon_s, physics="compiled")
         last = len(self.policies) - 1
         return [
-            plan_run(
-                world,
-                name,
-                seed=SEED,
-                wrappers=(parse_wrapper(self.wrapper),) if self.wrapper and index == last else (),
-            )
+            plan_run(world, name, seed=SEED, wrappers=[self.wrapper] if self.wrapper and index == last else [])
             for index, name in enumerate(self.policies)
         ]
 
@@ -185,6 +182,16 @@ FILMS = (
     Film("film_search_and_rescue", "search and rescue", "search_and_rescue"),
     Film("film_dual", "two sources", "warehouse_dual", 1),
 )
+WALLS = ((14.0, 0.2, 14.4, 6.0), (14.0, 10.0, 14.4, 15.8), (20.0, 7.0, 21.0, 9.0))
+PICTURES: dict[str, tuple[ScenarioConfig, str, dict[str, Any]]] = {
+    "warehouse_small_dpo.png": (scenario("warehouse_small"), "dpo", {"at_s": 300.0}),
+    "warehouse_small_ppo.png": (scenario("warehouse_small"), "ppo_warehouse_small", {"at_s": 900.0}),
+    "warehouse_quad_dpo.png": (scenario("warehouse_quad"), "dpo", {"at_s": 300.0, "size_px": 700}),
+    "obstacles_crw.png": (scenario("warehouse_small", obstacles=WALLS), "crw", {"at_s": 300.0, "size_px": 700}),
+    "warehouse_small_light.png": (scenario("warehouse_small"), "stochm", {"at_s": 300.0, "theme": "light"}),
+    "small.gif": (scenario("warehouse_small"), "ppo_warehouse_small", {"speedup": 30.0, "fps": 10.0, "size_px": 560}),
+}
+"""File in docs/images -> the world, the policy and how it is drawn; the film is README's."""
 FILM_COLUMNS = 5
 FILM_SPEEDUP = 30.0
 FILM_FPS = 6.0
@@ -196,11 +203,15 @@ MOST_FILM_BYTES = 400_000
 
 def draw(exhibit: Exhibit) -> None:
     """Draw the last run of an exhibit at its end, with trails."""
-    spec = exhibit.specs()[-1]
-    file = FOLDER / f"{exhibit.name}.png"
-    record_run(
-        spec.world, spec.policy, file, at_s=exhibit.horizon_s, seed=spec.seed, size_px=PICTURE_PX, trail_s=TRAIL_S
-    )
+    spec, file = exhibit.specs()[-1], FOLDER / f"{exhibit.name}.png"
+    end = {"at_s": exhibit.horizon_s, "trail_s": TRAIL_S}
+    record_run(spec.world, spec.policy, file, seed=spec.seed, size_px=PICTURE_PX, **end)
+
+
+def picture(name: str) -> None:
+    """Draw robots at work, or film them, for the other pages."""
+    world, policy, options = PICTURES[name]
+    print(record_run(world, policy, DOCS / "images" / name, trail_s=TRAIL_S, **options))
 
 
 def show(exhibit: Exhibit) -> None:
@@ -270,10 +281,10 @@ def table_of_films() -> list[str]:
 
 def make(names: list[str]) -> None:
     """Make the exhibits and films of these names, all if there is none."""
-    unknown = {*names} - {one.name for one in (*EXHIBITS, *FILMS)}
+    known = [*(one.name for one in (*EXHIBITS, *FILMS)), *PICTURES]
+    unknown = {*names}.difference(known)
     if unknown:
-        known = ", ".join(one.name for one in (*EXHIBITS, *FILMS))
-        sys.exit(f"Expected names among {known}, or --pages, got {', '.join(sorted(unknown))}.")
+        sys.exit(f"Expected names among {', '.join(known)}, or --pages, got {', '.join(sorted(unknown))}.")
     FOLDER.mkdir(exist_ok=True)
     for exhibit in EXHIBITS:
         if not names or exhibit.name in names:
@@ -281,6 +292,9 @@ def make(names: list[str]) -> None:
     for film in FILMS:
         if not names or film.name in names:
             shoot(film)
+    for name in PICTURES:
+        if not names or name in names:
+            picture(name)
 
 
 def main(words: list[str]) -> None:

@@ -1,18 +1,16 @@
 """Numbers of runs in README.md, docs/ and the paper: made by commands, stored once, written between markers.
 
-    scripts/update_docs                  write the stored numbers into all pages
-    scripts/update_docs --check          say which pages differ from what is stored; exit 1 if any does
-    scripts/update_docs --remake         run all commands, store what they print, write the pages (half an hour)
-    scripts/update_docs --remake run     the same for one of them
-    scripts/update_docs --compare FILE   compare the deliveries that a run of README's command printed with the stored;
-                                         where other versions are installed, only say that they are not compared
+    python scripts/update_docs.py       write the stored numbers into all pages
+        --check                         say which pages differ from what is stored; exit 1 if any does
+        --remake [run]                  run all commands, or one, store what they print, write the pages (half an hour)
+        --compare FILE                  compare the deliveries that a run of README's command printed with the stored;
+                                        where other versions are installed, only say that they are not compared
 
 The commands are listed below; the store is docs/results.json. Answers to claims and means of measures come of the files
 of docs/results, see `results_numbers.py`. A block looks like
 `<!-- generated: run.crw by scripts/update_docs -->20.45 ± 0.91<!-- end -->`; `run.table` is all that a command printed.
 A number must not begin a line: Markdown takes a comment there for the start of an HTML block, which ends the paragraph.
 --remake needs an installation with everything: pip install -e ".[plots,train]" "torch==2.13.0"
-The interpreter is $PYTHON, else that of the active environment or of .venv, else python3.
 """
 
 import argparse
@@ -27,6 +25,8 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from metrics.benchmark import board_of, read_entry
 from scripts.results_numbers import results_fields

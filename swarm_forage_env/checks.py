@@ -41,6 +41,12 @@ _INTERVAL_TICKS = 10
 _MOMENT = ("observation", "reward", "termination", "truncation")
 """What an agent gets in a tick."""
 
+CHECKED = (
+    "Looked at: actions and tasks with robots away, resets, memory of observations, what reads names, and another "
+    "number of robots."
+)
+"""What `check_policy` looks at, in a sentence."""
+
 
 class CheckError(ValueError):
     """An environment or a policy that breaks a promise; the message says what was expected, what came, what to do."""

@@ -30,15 +30,17 @@ def replacing(path: Path, *, ending: str = ".tmp") -> Generator[Path]:
     """Give a draft beside `path` to write to; it takes the place of `path` when all went well, else it is removed.
 
     No two drafts have the same name, whichever threads, processes or machines write to the folder. It is made if it is
-    missing.
+    missing. A link stays one: the file that it leads to is replaced.
 
     Args:
         path: File to create or replace.
         ending: Of the draft's name, for libraries that choose a format by it.
 
     Raises:
-        OSError: it cannot be written; the error names `path`.
+        OSError: it cannot be written, or is a folder, a device or a pipe; the error names `path`.
     """
+    _check_regular(path)
+    path = path.resolve() if path.is_symlink() else path
     draft = path.with_name(f".{path.name[:50]}.{uuid4().hex}{ending}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -128,11 +130,16 @@ def check_file(path: Path) -> None:
     """Refuse a file that cannot be written, before the work whose result it takes; see `check_folder`.
 
     Raises:
-        OSError: there is a folder of that name, or its folder cannot be written to.
+        OSError: there is a folder, a device or a pipe of that name, or its folder cannot be written to.
     """
-    if path.is_dir():
-        raise IsADirectoryError(None, "Expected a file to write, got a folder", str(path))
-    check_folder(path.parent)
+    _check_regular(path)
+    check_folder((path.resolve() if path.is_symlink() else path).parent)
+
+
+def _check_regular(path: Path) -> None:
+    if path.exists() and not path.is_file():
+        kind = "a folder" if path.is_dir() else "a device or a pipe"
+        raise OSError(errno.EINVAL, f"Expected a file to write, got {kind}", str(path))
 
 
 def as_file_name(text: str) -> str:

@@ -1,11 +1,13 @@
 """The console command `swarm-forage`. It may import everything; nothing imports it."""
 
+import atexit
 import logging
 import os
 import signal
 import sys
 import warnings
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 EXIT_FAILURE = 1
@@ -26,11 +28,16 @@ class CommandError(Exception):
     """What was asked for failed, though the words of the command were right: one line and exit code 1."""
 
 
+class NothingAskedError(ValueError):
+    """A command without the words that it needs: it shows its help."""
+
+
 def main() -> None:
     """Run the command line and exit, in a process that does nothing else."""
     # Or processes that start would look for Python's own modules in the current folder first (SECURITY.md).
     os.environ["PYTHONSAFEPATH"] = "1"
     try:
+        atexit.register(_die_of_signal)  # registered first, so done last
         hear()
         _tell_news()
         code = answer(sys.argv[1:])
@@ -41,10 +48,21 @@ def main() -> None:
     sys.exit(code)
 
 
+def _die_of_signal() -> None:
+    """End by the signal that came, not by an exit code, so that a shell ends the loop around the command, too."""
+    if came:
+        signal.signal(came[0], signal.SIG_DFL)
+        os.kill(os.getpid(), came[0])
+
+
 def hear() -> None:
-    """Let Ctrl-C and SIGTERM raise KeyboardInterrupt, and raise it again where it is lost."""
+    """Let Ctrl-C and SIGTERM raise KeyboardInterrupt, and raise it again where it is lost.
+
+    Whoever started the command may have had it ignore one of them, as nohup and shells do for the background.
+    """
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, _interrupt)
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _interrupt)
     sys.unraisablehook = _unraisable
 
 
@@ -62,6 +80,8 @@ def answer(words: Sequence[str]) -> int:
     What a user can mend is told in one line; other errors are raised, once no interrupt is their reason.
     """
     try:
+        if sys.stdout is None:  # pyright: ignore[reportUnnecessaryComparison] - that is what Python makes of it
+            raise CommandError("Expected a standard output to write to, got a closed one; > /dev/null drops it.")
         from swarm_forage_env.cli.app import carry_out
 
         code = carry_out(words)
@@ -82,10 +102,11 @@ def answer(words: Sequence[str]) -> int:
 
 
 def complain(message: str) -> None:
-    """Print one line on stderr."""
+    """Print one line on stderr, if there is one."""
     from swarm_forage_env._internal.wording import printable
 
-    sys.stderr.write(f"swarm-forage: {printable(' '.join(message.split()))}\n")
+    if sys.stderr is not None:  # pyright: ignore[reportUnnecessaryComparison] - it is where it was closed
+        sys.stderr.write(f"swarm-forage: {printable(' '.join(message.split()))}\n")
 
 
 def _told(error: Exception) -> int | None:
@@ -93,13 +114,23 @@ def _told(error: Exception) -> int | None:
     if isinstance(error, BrokenPipeError):  # whoever read our output has enough, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the last flush fails again
         return EXIT_FAILURE
-    if isinstance(error, OSError) and error.strerror and error.filename:
+    if isinstance(error, FileNotFoundError) and not _has_working_folder():
+        complain("The working folder is gone; go to one that is there (cd).")
+    elif isinstance(error, OSError) and error.strerror and error.filename:
         complain(f"{error.strerror}: {error.filename}")
     elif isinstance(error, ImportError | OSError) or type(error).__module__.partition(".")[0] in PACKAGES:
         complain(str(error))
     else:
         return None
     return EXIT_USAGE if isinstance(error, ValueError) else EXIT_FAILURE
+
+
+def _has_working_folder() -> bool:
+    try:
+        Path.cwd()
+    except FileNotFoundError:
+        return False
+    return True
 
 
 def _interrupt(number: int, _: object = None) -> None:

@@ -10,7 +10,7 @@ from contextlib import nullcontext
 
 from cyclopts import App, CycloptsError, Group, MissingArgumentError, Parameter
 
-from swarm_forage_env.cli import EXIT_USAGE, complain
+from swarm_forage_env.cli import EXIT_USAGE, NothingAskedError, complain
 
 COMMANDS: dict[str, dict[str, tuple[str, str]]] = {
     "Run and look": {
@@ -90,8 +90,10 @@ def carry_out(words: Sequence[str]) -> int:
     try:
         with nullcontext() if trusts else only_typed(_files_typed(words)):
             return app(words) or 0
-    except CycloptsError as error:
-        if isinstance(error, MissingArgumentError) and not any(word.startswith("-") for word in words):
+    except (CycloptsError, NothingAskedError) as error:
+        if isinstance(error, MissingArgumentError | NothingAskedError) and not any(
+            word.startswith("-") for word in words
+        ):
             app.help_print(words)
         complain(str(error))
         return EXIT_USAGE

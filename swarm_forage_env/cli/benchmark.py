@@ -1,19 +1,15 @@
 """The commands `benchmark`, `benchmark show` and `benchmark verify`."""
 
-import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import App, Parameter
 from cyclopts.types import NonNegativeInt, PositiveInt
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli import EXIT_FAILURE
-from swarm_forage_env.cli.options import AsJson, Jobs, Names, Picture, Policies
+from swarm_forage_env.cli.options import Jobs, Names, Picture, Policies
 from swarm_forage_env.cli.printer import note, say
-
-if TYPE_CHECKING:
-    from metrics.benchmark import Board
 
 app = App(name="benchmark")
 FOLDER = Path("results", "benchmark")
@@ -33,7 +29,6 @@ def run(
     track: str = "open",
     decisions: NonNegativeInt | None = None,
     jobs: Jobs = None,
-    as_json: AsJson = False,
 ) -> None:
     """Run policies in all worlds of the benchmark, write one entry file, and show its score.
 
@@ -72,13 +67,13 @@ def run(
     if entry_file is not None:
         entry.write(entry_file)
         note(f"entry {entry_file}")
-    _show(board_of([entry], protocol), as_json=as_json)
+    say(board_of([entry], protocol).text())
     if quick:
         note("A quick look, no entry: shorter runs than those of the scripted controllers.")
 
 
 @app.command(name="show")
-def show_entries(entries: tuple[Path, ...] = (), /, *, picture: Picture = None, as_json: AsJson = False) -> None:
+def show_entries(entries: tuple[Path, ...] = (), /, *, picture: Picture = None) -> None:
     """Show the scores of entries, beside the scripted controllers.
 
     Args:
@@ -91,11 +86,11 @@ def show_entries(entries: tuple[Path, ...] = (), /, *, picture: Picture = None, 
     if picture is not None:
         check_picture(picture)
         board.draw(picture)
-    _show(board, as_json=as_json)
+    say(board.text())
 
 
 @app.command
-def verify(entry: Path, /, *, policy: Names = (), worlds: PositiveInt = 8, jobs: Jobs = None) -> int:
+def verify(entry: Path, /, *, policy: Names = (), worlds: PositiveInt = 8) -> int:
     """Make runs of an entry again and say whether its numbers come out; exit code 1 if not.
 
     Args:
@@ -105,10 +100,6 @@ def verify(entry: Path, /, *, policy: Names = (), worlds: PositiveInt = 8, jobs:
     """
     from metrics.benchmark import SAME, verify_entry
 
-    again = verify_entry(entry, policy, n_worlds=worlds, jobs=jobs)
+    again = verify_entry(entry, policy, n_worlds=worlds)
     say(again.text())
     return EXIT_FAILURE if (again.frame["answer"] != SAME).any() else 0
-
-
-def _show(board: "Board", *, as_json: bool) -> None:
-    say(json.dumps(board.to_mapping()["entries"], indent=1) if as_json else board.text())

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from swarm_forage_env.cli.options import AsJson, Jobs, Picture, Policies, Policy, Seed, Seeds, WorldOptions
+from swarm_forage_env.cli.options import AsJson, Picture, Policies, Policy, Seed, Seeds, WorldOptions
 from swarm_forage_env.cli.printer import note, progress_bar, say, show
 
 if TYPE_CHECKING:
@@ -88,7 +88,6 @@ def record(
         float | None, Parameter(help="Draw one picture at this simulated second, in place of a film.")
     ] = None,
     seconds: float = 300.0,
-    speedup: float = 20.0,
     size: int = 900,
 ) -> None:
     """Film a run, or draw it at one time.
@@ -99,20 +98,20 @@ def record(
         file: File to write: .gif or .mp4, or .png with --at; default results/SCENARIO_POLICY.gif.
         at: Draw one picture at this simulated second, in place of a film.
         seconds: Simulated seconds to film.
-        speedup: Simulated seconds per second of film.
         size: Longer side of the arena in pixels.
     """
     from swarm_forage_env.cli.worlds import RESULTS, default_file, described_world
     from swarm_forage_env.inspect.film import record_run
 
     chosen, caches = described_world(world)
-    path = file or default_file(RESULTS, chosen, [policy], ".gif" if at is None else ".png")
+    ending = ".gif" if at is None else f"_{at:g}_s.png"
+    path = file or default_file(RESULTS, chosen, [policy], ending, seed=seed)
     look: dict[str, Any] = {"seed": seed, "size_px": size, "caches": caches}
     if at is not None:
         record_run(chosen, policy, path, at_s=at, **look)
     else:
         with progress_bar("pictures") as progress:
-            record_run(chosen, policy, path, seconds=seconds, speedup=speedup, progress=progress, **look)
+            record_run(chosen, policy, path, seconds=seconds, progress=progress, **look)
     say(f"wrote {path}")
 
 
@@ -148,7 +147,8 @@ def replay(
         specs = tuple(Record.read(file).spec for file in policies)
     else:
         specs = plan_runs(world, policies, [seed])
-    path = file or default_file(RESULTS, specs[0].world, [spec.policy for spec in specs], ".html")
+    names, seed = [spec.policy for spec in specs], specs[0].seed
+    path = file or default_file(RESULTS, specs[0].world, names, ".html", seed=seed)
     if path.suffix.lower() not in PAGES:
         raise ConfigError(f"Expected a page that ends in {' or '.join(PAGES)}, got {path}; 'record' makes films.")
     check_file(path)
@@ -166,7 +166,7 @@ def maps(
     *,
     world: WorldOptions = WorldOptions(),
     seeds: Seeds = 1,
-    jobs: Jobs = None,
+    seed: Seed = 0,
     picture: Picture = None,
 ) -> None:
     """Draw where robots were, where they took and left objects, and where they got in each other's way.
@@ -178,11 +178,11 @@ def maps(
     from swarm_forage_env.inspect.maps import maps_of_runs, write_maps
     from swarm_forage_env.rendering.figures import check_picture
 
-    specs = plan_runs(world, policies, range(seeds))
-    file = picture or default_file(RESULTS, specs[0].world, policies, "_maps.png")
+    specs = plan_runs(world, policies, range(seed, seed + seeds))
+    file = picture or default_file(RESULTS, specs[0].world, policies, "_maps.png", seed=seed)
     check_picture(file)
     with progress_bar("runs", sum(spec.robot_ticks for spec in specs)) as advance:
-        found = maps_of_runs(specs, jobs=jobs, advance=advance)
+        found = maps_of_runs(specs, advance=advance)
     try:
         write_maps(file, found)
     except ImportError as error:

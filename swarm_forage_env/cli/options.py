@@ -5,7 +5,7 @@ A parameter of a command is an option, or a class of options that describe one t
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,7 +14,7 @@ from cyclopts.types import NonNegativeInt, PositiveInt
 from cyclopts.validators import Number
 
 from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError
-from swarm_forage_env.rendering.figures import FigureStyle
+from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 
 
 def _names(_: Any, tokens: Sequence[Token]) -> tuple[str, ...]:
@@ -39,9 +39,9 @@ Scenario = Annotated[
     str, Parameter(help="A preset (see 'swarm-forage list'), or a .toml file with fields and wrappers.")
 ]
 Seeds = Annotated[
-    int, Parameter(help="Runs of each policy, with seeds from 0.", validator=Number(gte=1, lte=MOST_SEEDS))
+    int, Parameter(help="Runs of each policy, with seeds one after the other.", validator=Number(gte=1, lte=MOST_SEEDS))
 ]
-Seed = Annotated[NonNegativeInt, Parameter(help="Seed of the run.")]
+Seed = Annotated[NonNegativeInt, Parameter(help="Seed of the run; of several runs the first one.")]
 Jobs = Annotated[
     PositiveInt | None, Parameter(help="Number of processes; default one per usable core; 1 = only this process.")
 ]
@@ -55,8 +55,6 @@ Performance = Annotated[
 Picture = Annotated[Path | None, Parameter(help="Picture to draw: .png, .svg or .pdf; default beside the results.")]
 AsJson = Annotated[bool, Parameter(name="--json", help="Print the results as JSON.")]
 DryRun = Annotated[bool, Parameter(help="Say how many runs there are, how many are stored, and how large the rest is.")]
-Style = Annotated[FigureStyle, Parameter(name="*", negative_bool="no-")]
-"""How figures look."""
 
 
 @Parameter(name="*")
@@ -83,6 +81,19 @@ class WorldOptions:
             "population:death_per_tick=0.0001; may be repeated.",
         ),
     ] = ()
+
+
+@Parameter(name="*", negative_bool="no-")
+@dataclass(frozen=True, kw_only=True, slots=True)
+class StyleOptions:
+    """How figures look."""
+
+    width_in: Annotated[float | None, Parameter(help="Width in inches; default what the panels want.")] = None
+    title: Annotated[bool, Parameter(help="Whether there is a headline; in a paper, the caption says it.")] = True
+
+    def style(self) -> FigureStyle:
+        """Return the style; raises ConfigError for a width that no page has."""
+        return replace(SCREEN, width_in=self.width_in, title=self.title)
 
 
 @Parameter(name="*")

@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     from swarm_forage_env.runs.plan import Table
     from swarm_forage_env.sheet import Answer
 
-FAILURES_SHOWN = 10
-"""Reasons of failures for which the command that makes the first run again is told; the folder has those of all."""
-
 
 def say(text: object) -> None:
     """Print a result on stdout."""
@@ -119,13 +116,10 @@ def drawn_or_told(answer: "Answer", picture: Path) -> Path | None:
 
 
 def _tell_of_records(table: "Table", folder: Path) -> None:
-    """Say on stderr where the records are, and how a failed run is made again, one for each policy and reason."""
-    from swarm_forage_env.runs.store import failed_alike, failure_file
+    """Say on stderr where the records are, and how a failed run is made again."""
+    from swarm_forage_env.runs.store import failure_file
 
     if table.records:
         note(f"{counted(len(table.records), 'record')} in {folder}")
-    reasons = failed_alike(table.failures.values())
-    for first, *_ in reasons[:FAILURES_SHOWN]:
-        note(f"again, alone: swarm-forage rerun {failure_file(folder, first.run_id)}")
-    if len(reasons) > FAILURES_SHOWN:
-        note(f"and {len(reasons) - FAILURES_SHOWN} more reasons")
+    for run_id in list(table.failures)[:1]:
+        note(f"again, alone: swarm-forage rerun {failure_file(folder, run_id)}")

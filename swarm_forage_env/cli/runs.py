@@ -9,7 +9,7 @@ from cyclopts import Parameter
 from cyclopts.types import PositiveInt
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.cli import CommandError
+from swarm_forage_env.cli import CommandError, NothingAskedError
 from swarm_forage_env.cli.options import (
     AsJson,
     CurveOptions,
@@ -18,12 +18,12 @@ from swarm_forage_env.cli.options import (
     Picture,
     Policies,
     RunOptions,
+    Seed,
     Seeds,
-    Style,
+    StyleOptions,
     WorldOptions,
 )
 from swarm_forage_env.cli.printer import ask_and_show, note, say, show
-from swarm_forage_env.rendering.figures import SCREEN
 
 
 def run(
@@ -32,6 +32,7 @@ def run(
     *,
     world: WorldOptions = WorldOptions(),
     seeds: Seeds = 1,
+    seed: Seed = 0,
     options: RunOptions = RunOptions(),
 ) -> int:
     """Run policies in a scenario and compare how they perform.
@@ -42,13 +43,14 @@ def run(
     from metrics.scoring import Question, summarize_runs
     from swarm_forage_env.cli.worlds import default_file, default_folder, described_world
     from swarm_forage_env.runs.plan import Plan
-    from swarm_forage_env.runs.policy_spec import policy_specs
+    from swarm_forage_env.runs.spec import policy_specs
 
     chosen, caches = described_world(world)
-    plan = Plan.product(policy_specs(policies, caches=caches), [chosen], range(seeds))
+    plan = Plan.product(policy_specs(policies, caches=caches), [chosen], range(seed, seed + seeds))
     question = Question(plan=plan, answer=summarize_runs)
     folder = options.out or default_folder(chosen)
-    return ask_and_show(question, folder, options, options.picture or default_file(folder, chosen, policies, ".png"))
+    picture = options.picture or default_file(folder, chosen, policies, ".png", seed=seed)
+    return ask_and_show(question, folder, options, picture)
 
 
 def plot(
@@ -57,7 +59,7 @@ def plot(
     *,
     performance: Performance = None,
     picture: Picture = None,
-    style: Style = SCREEN,
+    style: StyleOptions = StyleOptions(),
 ) -> None:
     """Draw stored runs anew: performance over time, one curve per policy. Nothing is run.
 
@@ -79,7 +81,7 @@ def plot(
     found = summarize_runs(table)
     file = picture or default_file(folder, found.world, [policy.label for policy in table.plan.policies], ".png")
     check_picture(file)
-    found.draw(file, style=style)
+    found.draw(file, style=style.style())
     say(f"picture {file}")
 
 
@@ -134,7 +136,7 @@ def score(
     if performance is not None:
         world = replace(world, settings=(*world.settings, f"performance={performance}"))
     if not policies:
-        raise ConfigError("Expected policies to run, or a file with --curves; 'swarm-forage list' names policies.")
+        raise NothingAskedError("Expected policies, or a file with --curves; 'swarm-forage list' names policies.")
     for word in world.settings:
         if word.partition("=")[0] in ("horizon_s", "interval_s"):
             raise ConfigError(f"Expected no --set {word}, which the budget sets; --horizon changes the length of runs.")
@@ -182,7 +184,7 @@ def check(policies: Policies, /, *, world: WorldOptions = WorldOptions()) -> Non
 
     swarm_forage_env.checks.check_policy lists the rules.
     """
-    from swarm_forage_env.checks import CheckError, check_policy
+    from swarm_forage_env.checks import CHECKED, CheckError, check_policy
     from swarm_forage_env.cli.worlds import plan_runs
 
     for spec in plan_runs(world, policies, [0]):
@@ -190,7 +192,7 @@ def check(policies: Policies, /, *, world: WorldOptions = WorldOptions()) -> Non
             check_policy(spec.policy, spec.scenario)
         except CheckError as error:
             raise CommandError(f"{spec.policy} breaks a rule: {error}") from None
-        say(f"{spec.policy} keeps the rules")
+        say(f"{spec.policy} keeps the rules in {spec.world.title()}. {CHECKED}")
 
 
 def rerun(file: Path, /, *, as_json: AsJson = False) -> int:
@@ -202,11 +204,11 @@ def rerun(file: Path, /, *, as_json: AsJson = False) -> int:
     import json
     import traceback
 
-    from swarm_forage_env.runs import runner as again
+    from swarm_forage_env.runs import runner
     from swarm_forage_env.runs.record import RecordError
 
     try:
-        answer = again.rerun(file)
+        again, is_same = runner.rerun(file)
     except RecordError:
         raise
     except Exception as error:  # of a failure it is the run's own, whatever it is, and what its user wants to see
@@ -214,9 +216,10 @@ def rerun(file: Path, /, *, as_json: AsJson = False) -> int:
             raise
         note(traceback.format_exc().rstrip())
         raise CommandError("the run failed again") from error
-    say(json.dumps(answer.to_mapping(), indent=1) if as_json else answer.record.describe())
-    if answer.is_same is False:
+    told = {**again.keys, "file": str(file), "is_same": is_same}
+    say(json.dumps(told, indent=1) if as_json else f"run {again.describe()}")
+    if is_same is False:
         raise CommandError(f"the results differ from those in {file}")
-    if answer.is_same and not as_json:
+    if is_same and not as_json:
         say(f"bit for bit the same as {file}")
     return 0

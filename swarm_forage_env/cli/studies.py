@@ -10,9 +10,8 @@ from cyclopts.types import PositiveInt
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli import EXIT_FAILURE
-from swarm_forage_env.cli.options import AsJson, DryRun, Jobs, Names, Style
+from swarm_forage_env.cli.options import AsJson, DryRun, Jobs, Names, StyleOptions
 from swarm_forage_env.cli.printer import note, say, show
-from swarm_forage_env.rendering.figures import SCREEN
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,7 +26,7 @@ Places = Annotated[tuple[Path, ...], Parameter(help="Folders of studies, or thei
 
 
 @app.command(name="list")
-def list_studies(*, budget: str = "paper", as_json: AsJson = False) -> None:
+def list_studies(*, budget: str = "paper") -> None:
     """List the experiment sets of the paper: how many runs they make, and what a budget leaves out.
 
     Args:
@@ -35,7 +34,7 @@ def list_studies(*, budget: str = "paper", as_json: AsJson = False) -> None:
     """
     from swarm_forage_env.studies.description import paper_sets
 
-    show(paper_sets(budget), as_json=as_json)
+    show(paper_sets(budget))
 
 
 @app.command
@@ -69,7 +68,6 @@ def run(
     from swarm_forage_env.runs.plan import planned_line
     from swarm_forage_env.runs.store import failure_file
     from swarm_forage_env.studies import results
-    from swarm_forage_env.studies.description import FAILURES_SHOWN
     from swarm_forage_env.studies.description import status as status_of
     from swarm_forage_env.studies.study import load_study
     from swarm_forage_env.studies.study_file import RULES_NAMES
@@ -90,8 +88,8 @@ def run(
         show(status_of(table))
     else:
         say(f"shard {shard}: {found.n_done:,} runs done, {len(found.failures):,} failed, in {folder}")
-    for run_id in list(found.failures)[:FAILURES_SHOWN]:
-        say(f"  again, alone: swarm-forage rerun {failure_file(folder / 'runs', run_id)}")
+    for run_id in list(found.failures)[:1]:
+        note(f"again, alone: swarm-forage rerun {failure_file(folder / 'runs', run_id)}")
     return EXIT_FAILURE if found.failures else 0
 
 
@@ -116,14 +114,13 @@ def _read(place: Path) -> "StudyTable":
 
 
 @app.command
-def verdict(places: Places, /, *, table: bool = False, file: Path | None = None, as_json: AsJson = False) -> None:
+def verdict(places: Places, /, *, file: Path | None = None, as_json: AsJson = False) -> None:
     """Test the claims of the paper with runs of its sets: which claims they support, contradict or leave open.
 
     First come the counts of each answer and one table of all claims; then the evidence for each answer. The same
     follows for the paper's intuitions, what the authors expected of each algorithm before the experiments.
 
     Args:
-        table: Show only the counts and the table of all claims.
         file: Also write the answer to a file: .txt, .md, .csv or .json, with more numbers.
     """
     from metrics import verdict as verdict_of
@@ -135,7 +132,7 @@ def verdict(places: Places, /, *, table: bool = False, file: Path | None = None,
     tables = [_read(place) for place in places]
     if file is not None:
         check_file(file)
-    found = replace(verdict_of(*tables, tell=note), is_short=table)
+    found = verdict_of(*tables, tell=note)
     for remark in found.remarks:
         note(f"note: {remark}")
     if as_json:
@@ -156,7 +153,7 @@ def plot(
     band: bool = False,
     variant: Names = ("corrected",),
     formats: Annotated[Names, Parameter(name="--format")] = ("svg", "png"),
-    style: Style = SCREEN,
+    style: StyleOptions = StyleOptions(),
 ) -> None:
     """Draw the figures of a study, with their numbers as CSV tables: each measure over what the study varies.
 
@@ -175,7 +172,7 @@ def plot(
         band="sd" if band else "ci",
         variants=cast("Sequence[Variant]", variant),
         formats=formats,
-        style=style,
+        style=style.style(),
     )
     for file in plotted.files:
         say(file)

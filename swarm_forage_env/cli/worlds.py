@@ -109,7 +109,7 @@ def default_folder(world: World) -> Path:
     return RESULTS / world.file_name
 
 
-def default_file(folder: Path, world: World, policies: Sequence[str], ending: str) -> Path:
+def default_file(folder: Path, world: World, policies: Sequence[str], ending: str, *, seed: int = 0) -> Path:
     """Return a file named by its world and policies, so that no other question overwrites it.
 
     Args:
@@ -117,11 +117,14 @@ def default_file(folder: Path, world: World, policies: Sequence[str], ending: st
         world: Where policies act; another performance than the preset's is part of the name.
         policies: Names and files.
         ending: Of the name, such as "_scores.png".
+        seed: The first seed; another one than 0 is part of the name.
     """
     preset = preset_of(world.scenario)
     words = [world.file_name, *map(policy_label, policies)]
     if preset is not None and world.scenario.performance != preset.performance:
         words.append(world.scenario.performance)
+    if seed:
+        words.append(f"seed_{seed}")
     name = as_file_name("_".join(words))
     if len(name) > LONGEST_NAME:
         name = f"{name[:LONGEST_NAME]}_{digest_of(words, 6)}"

@@ -93,7 +93,7 @@ def _lines(name: str) -> Iterator[str]:
     else:
         known_name("scenario or policy", name, (*presets.SCENARIO_NAMES, *POLICIES))
         if name in presets.PRESETS:
-            yield from _scenario_lines(presets.scenario(name), _first_line(presets.PRESETS[name]))
+            yield from _scenario_lines(presets.scenario(name), f"{name}: {_first_line(presets.PRESETS[name])}")
         else:
             yield from _policy_lines(name)
 
@@ -101,16 +101,16 @@ def _lines(name: str) -> Iterator[str]:
 def _scenario_lines(config: ScenarioConfig, headline: str) -> Iterator[str]:
     spec = SwarmSpec.of(config)
     interface = LearnerInterface(InterfaceConfig(), spec)
-    yield f"{config.name}: {headline}"
+    yield headline
     yield "\nFields (change them with --set name=value):"
     for item in dataclasses.fields(config):
         value = getattr(config, item.name)
         if dataclasses.is_dataclass(value):
             yield f"  [{item.name}]"
             for inner in dataclasses.fields(value):
-                yield f"    {inner.name:<34}{in_words(getattr(value, inner.name))}"
+                yield f"    {inner.name:<34}{as_setting(getattr(value, inner.name))}"
         else:
-            yield f"  {item.name:<36}{in_words(value)}"
+            yield f"  {item.name:<36}{as_setting(value)}"
     yield "\nSpaces, per robot:"
     yield f"  action       {interface.action_space}: left wheel, right wheel, gripper"
     yield f"  observation  {interface.observation_space}"
@@ -180,6 +180,15 @@ def _network_lines(file: Path, network: Network) -> Iterator[str]:
         yield f"  [{part}]"
         for name, value in values.items() if isinstance(values, Mapping) else (("", values),):
             yield f"    {name:<24}{textwrap.shorten(in_words(value), _MOST_LETTERS, placeholder=' ...')}".rstrip()
+
+
+def as_setting(value: Any) -> str:
+    """Return the value of a field as --set takes it: "4,6", places as "1,2+3,4"."""
+    if isinstance(value, tuple):
+        return ("+" if value and isinstance(value[0], tuple) else ",").join(map(as_setting, value))
+    if isinstance(value, bool):
+        return str(value).lower()
+    return repr(value) if isinstance(value, float) else str(value)
 
 
 def in_words(value: Any) -> str:

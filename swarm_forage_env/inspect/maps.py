@@ -123,7 +123,7 @@ def floor_maps(replay: Replay, *, side_m: float = 2 * CELL_M) -> FloorMaps:
 
 
 def maps_of_runs(
-    specs: Sequence[RunSpec], *, jobs: int | None, advance: Callable[[float], None] | None = None
+    specs: Sequence[RunSpec], *, jobs: int | None = None, advance: Callable[[float], None] | None = None
 ) -> list[FloorMaps]:
     """Make runs and return the mean of the maps of each policy, and what is more in each than in the first.
 

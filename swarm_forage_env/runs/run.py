@@ -129,7 +129,14 @@ def run_policy(policy: Policy, spec: RunSpec) -> Record:
     recorder = build_stack(spec.scenario, spec.wrappers, reads=getattr(policy, "reads", None))
     LiveRun(recorder, policy, spec.seed).advance()
     recorder.close()
-    return record_of_run(recorder, spec, started)
+    wall_time_s, cpu_time_s = started.spent_s()
+    origin = {
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "wall_time_s": f"{wall_time_s:.3f}",
+        "cpu_time_s": f"{cpu_time_s:.3f}",
+    }
+    contributed = {name: values.astype(np.float64) for name, values in recorder.contributed().items()}
+    return Record(spec=spec, columns={**contributed, **recorder.columns()}, made_with=software_versions() | origin)
 
 
 class Started(NamedTuple):
@@ -147,25 +154,6 @@ class Started(NamedTuple):
     def spent_s(self) -> tuple[float, float]:
         """Return the time since then and its processor time, s."""
         return time.perf_counter() - self.wall_s, time.process_time() - self.cpu_s
-
-
-def record_of_run(recorder: RunRecorder, spec: RunSpec, started: Started) -> Record:
-    """Return the record of a run that has ended.
-
-    Args:
-        recorder: Outermost wrapper of the run.
-        spec: The run.
-        started: When it began.
-    """
-    wall_time_s, cpu_time_s = started.spent_s()
-    origin = {
-        "created": datetime.now(UTC).isoformat(timespec="seconds"),
-        "wall_time_s": f"{wall_time_s:.3f}",
-        "cpu_time_s": f"{cpu_time_s:.3f}",
-    }
-    contributed = {name: values.astype(np.float64) for name, values in recorder.contributed().items()}
-    columns = {**contributed, **recorder.columns()}
-    return Record(spec=spec, columns=columns, made_with=software_versions() | origin)
 
 
 def run_one(spec: RunSpec) -> Record:

@@ -290,7 +290,8 @@ def _built_here(given: Any, label: str, parameters: Mapping[str, Any], caches: s
     elif parameters:
         raise ValueError(f"Expected parameters with a name, a file or a class only, got them with {given!r}.")
     else:
-        factory = partial(copy.deepcopy, given) if is_policy else partial(from_callable, given, name=name)
+        acts: Any = given
+        factory = partial(copy.deepcopy, given) if is_policy else partial(from_callable, acts, name=name)
     return PolicySpec(
         label=name,
         policy=name,

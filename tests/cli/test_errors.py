@@ -1,9 +1,12 @@
 """How commands end that fail: what a user can mend is a line on stderr, all else a traceback."""
 
+import os
 import subprocess
 import sys
 
 import pytest
+
+from swarm_forage_env._internal.files import check_file, replacing
 
 
 def test_what_nobody_foresaw_is_raised(command, monkeypatch):
@@ -29,8 +32,36 @@ def test_what_happens_to_a_user_is_one_line(command, monkeypatch, error, code, t
     assert command("list") == (code, "", f"swarm-forage: {told}\n")
 
 
-def test_whoever_reads_the_output_may_stop(tmp_path):
-    words = f"{sys.executable} -m swarm_forage_env.cli info warehouse_small | head -1"
+MAIN = f"{sys.executable} -c 'from swarm_forage_env.cli import main; main()'"
+
+
+@pytest.mark.parametrize(
+    ("words", "out", "err"),
+    [
+        (f"{MAIN} info warehouse_small | head -1", "warehouse_small: ", ""),
+        (f"{MAIN} info warehouse_small >&-", "", "swarm-forage: Expected a standard output to write to, got a closed"),
+        (f"{MAIN} info nobody 2>&-", "", ""),
+        (f"mkdir gone; cd gone; rmdir ../gone; {MAIN} info a.toml", "", "swarm-forage: The working folder is gone; "),
+    ],
+)
+def test_where_a_command_reads_and_writes_may_be_gone(tmp_path, words, out, err):
+    """Whoever reads the output may stop, too."""
     ended = subprocess.run(words, shell=True, capture_output=True, text=True, timeout=120, check=False, cwd=tmp_path)
-    assert ended.stdout.startswith("warehouse_small:")
-    assert ended.stderr == ""
+    assert ended.stdout.startswith(out)
+    assert ended.stderr.startswith(err)
+    assert (ended.stdout.count("\n"), ended.stderr.count("\n")) == (bool(out), bool(err))
+
+
+def test_a_file_is_written_where_a_link_leads_and_nothing_but_a_file_is_replaced(tmp_path):
+    (tmp_path / "link").symlink_to("behind")
+    with replacing(tmp_path / "link") as draft:
+        draft.write_text("new")
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "behind").read_text() == "new"
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "device").symlink_to(os.devnull)
+    for place in (tmp_path, tmp_path / "pipe", tmp_path / "device"):
+        with pytest.raises(OSError, match="Expected a file to write, got a"):
+            check_file(place)
+        with pytest.raises(OSError, match="Expected a file to write, got a"), replacing(place):
+            pytest.fail("it would have been replaced")

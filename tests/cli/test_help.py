@@ -56,6 +56,8 @@ def test_a_command_that_lacks_its_words_shows_its_help(command):
     assert (code, out.startswith("Usage: swarm-forage run ")) == (2, True)
     assert err.count("\n") == 1
     assert command("run", "--seeds", "2")[:2] == (2, "")
+    code, out, err = command("score")
+    assert (code, out.startswith("Usage: swarm-forage score "), err.count("\n")) == (2, True, 1)
 
 
 def test_only_what_is_asked_for_is_imported():

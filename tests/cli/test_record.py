@@ -38,4 +38,4 @@ def test_record_draws_one_picture_of_the_run_it_films(command, monkeypatch):
         gif.seek(gif.n_frames - 1)
         off = np.abs(np.asarray(gif.convert("RGB"), float) - filmed[40]).mean()
     assert off < 4.0, "the last picture of the film, but for the colours of a GIF and the length of trails"
-    assert command("record", *words, "--at", "0")[1] == "wrote results/warehouse_small_3_robots_random.png\n"
+    assert command("record", *words, "--at", "0")[1] == "wrote results/warehouse_small_3_robots_random_0_s.png\n"

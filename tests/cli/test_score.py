@@ -86,53 +86,6 @@ def test_a_dry_run_shows_the_experiments_and_runs_nothing(command):
     assert {run["policy"] for run in json.loads(out)} == {"random", "crw"}
 
 
-@pytest.mark.parametrize(
-    ("words", "reason"),
-    [
-        (("score",), "Expected policies to run, or a file with --curves"),
-        (("score", "crw", "--curves", "x.csv", "--budget", "quick"), "Expected no --budget"),
-        (("score", "--curves", "x.csv", "--robots", "3"), "Expected policies to run in a world beside --curves"),
-        (("score", "--columns", "seed=0"), "Expected a file with --curves for --columns"),
-        (("score", "--curves", "curves.csv", "--columns", "seed:0"), "Expected --columns OURS=THEIRS"),
-        (("score", "--curves", "curves.csv", "--events"), "the length of an interval"),
-        (("score", "crw", "--curves", "good.csv"), "Expected equal intervals of known length in good.csv"),
-        (("score", "crww"), "Unknown policy 'crww'. Did you mean 'crw'?"),
-        (("score", "gone.zip"), "Cannot read the policy file"),
-        (("score", "bad.npz"), "Expected"),
-        (("score", "crw", "--scenario", "warehouse"), "Unknown scenario 'warehouse'"),
-        (("score", "crw", "--measures", "reactivty"), "Did you mean 'reactivity'?"),
-        (("score", "crw", "--measures", ","), "Expected one or more names"),
-        (("score", "crw", "--disturbance", "noise"), "one of throttle, handling_cost, got 'noise'"),
-        (("score", "crw", "--variant", "papr"), "Unknown variant 'papr'. Did you mean 'paper'?"),
-        (("score", "crw,dpo", "--form", "single"), "Unknown form 'single'"),
-        (("score", "--curves", "good.csv", "--form", "single"), "Unknown form 'single'"),
-        (("score", "crw", "--budget", "huge"), "Unknown budget 'huge'"),
-        (("score", "crw", "--performance", "n_carying"), "Did you mean 'n_carrying'?"),
-        (("score", "crw,dpo", "--set", "performance=colected"), "Did you mean 'collected'?"),
-        (
-            ("score", "--curves", "curves.csv", "--performance", "x"),
-            "Expected a column x for performance in curves.csv",
-        ),
-        (("score", "crw", "--seeds", "0"), "seeds"),
-        (("score", "crw", "--horizon", "150"), "whole number of intervals"),
-        (("score", "crw", "--robots", "1"), "at least 2 robots"),
-        (("score", "crw", "--set", "interval_s=2"), "which the budget sets"),
-        (("score", "crw,dpoo"), "Unknown policy 'dpoo'"),
-        (("score", "--curves", "gone.csv"), "Cannot read gone.csv: No such file"),
-        (("score", "--curves", "curves.csv", "--measures", "scalability"), "Expected the columns seed, interval"),
-    ],
-)
-def test_what_a_person_gets_wrong_is_one_line(command, words, reason):
-    Path("bad.npz").write_bytes(b"no network")
-    Path("curves.csv").write_text("n_robots,performance\n1,2\n")
-    Path("good.csv").write_text(CURVES)
-    code, out, err = command(*words)
-    assert (code, out) == (2, "")
-    assert len(err.splitlines()) == 1
-    assert err.startswith("swarm-forage: ")
-    assert reason in err
-
-
 def test_curves_from_elsewhere_are_scored(command):
     Path("curves.csv").write_text(CURVES)
     code, out, _ = command("score", "--curves", "curves.csv")
@@ -181,16 +134,3 @@ def test_failed_runs_are_told_and_the_exit_code_says_so(command, monkeypatch):
     code, out, _ = command(*SCORE, "--measures", "t_lost_fraction")
     assert code == 1
     assert "RuntimeError: no idea" in out
-
-
-def test_ctrl_c_says_what_is_kept_and_how_to_go_on(command, monkeypatch):
-    def interrupt(self, task, rng):
-        raise KeyboardInterrupt
-
-    command(*SCORE, *FEW, "--seeds", "1")
-    monkeypatch.setattr(RandomPolicy, "reset", interrupt)
-    code, out, err = command(*SCORE, *FEW)
-    assert (code, out) == (130, "")
-    folder = "results/warehouse_small_3_robots_bcf754"
-    expected = f"swarm-forage: Interrupted: 4 of 8 runs are finished. They are in {folder}; "
-    assert err.splitlines()[-1] == expected + "the same command does the rest."

@@ -33,6 +33,8 @@ def heard():
     """Signals are heard as the command hears them."""
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     hook = sys.unraisablehook
+    for number in handlers:  # it may be ignored here, where tests run in the background
+        signal.signal(number, signal.default_int_handler)
     cli.hear()
     yield
     cli.came.clear()
@@ -57,8 +59,19 @@ def test_a_signal_ends_a_command_in_one_line(tmp_path, words, after_s, sent):
             started.kill()
     assert "Traceback" not in err
     if started.returncode != 0 or not out:  # else it was faster
-        assert started.returncode == 128 + sent
+        assert started.returncode == -sent, "the process dies of the signal, so that a shell's loop ends"
         assert [line[:25] for line in err.splitlines() if "nterrupt" in line] == ["swarm-forage: Interrupted"], err
+
+
+def test_a_signal_that_is_ignored_where_the_command_begins_stays_so(tmp_path):
+    """So begin commands behind nohup, and those that a script puts into the background."""
+    words = ["bash", "-c", f"trap '' INT; exec {sys.executable} -c '{HEARS}' list"]
+    with subprocess.Popen(words, cwd=tmp_path, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as started:
+        assert started.stderr.readline() == "heard\n"
+        started.send_signal(signal.SIGINT)
+        out, err = started.communicate(timeout=60)
+    assert (started.returncode, err) == (0, "")
+    assert "scenarios" in out
 
 
 def test_what_a_library_swallows_is_raised_again(heard, monkeypatch, capsys):

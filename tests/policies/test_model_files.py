@@ -26,7 +26,7 @@ from swarm_forage_env.policies.model_files import (
 )
 from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.policies.registry import is_policy_file, load_policy, local_policy, policy_class, split_interface
-from swarm_forage_env.runs.spec import RunSpec, pin_policy, plan_run
+from swarm_forage_env.runs.spec import RunSpec, plan_run
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.studies.ladders import Budget
 from swarm_forage_env.views.pettingzoo import parallel_env
@@ -222,11 +222,11 @@ def test_an_interface_is_said_with_the_file(tmp_path):
     said = plan_run(world, f"{path}:decision_ticks=2,site_memory=false")
     given = {"interface": {"decision_ticks": 2, "site_memory": False}}
     assert said == plan_run(world, str(path), parameters=given)
-    assert RunSpec.from_json(said.to_json()) == said
+    assert RunSpec.from_mapping(said.to_mapping()) == said
     assert score_question([f"{path}:decision_ticks=7"], world, budget=TINY).plan.policies[0].label == "model"
     with pytest.raises(ConfigError, match="Did you mean 'decision_ticks'"):
         load_policy(f"{path}:decision_tick=7")
-    for once in (load_policy, pin_policy):
+    for once in (load_policy, lambda words, given: policy_spec(words, parameters=given)):
         with pytest.raises(ConfigError, match="once, got it with the file and as a parameter"):
             once(f"{path}:decision_ticks=2", given)
 

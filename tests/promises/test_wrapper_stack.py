@@ -228,7 +228,7 @@ def test_a_foreign_wrapper_belongs_outside(name):
 @each_stack
 def test_runs_survive_json_and_parquet(wrappers, tmp_path):
     spec = plan_run(world_config(horizon_s=4.0, interval_s=2.0), "random", caches="dynamic", wrappers=wrappers, seed=7)
-    assert RunSpec.from_json(spec.to_json()) == spec
+    assert RunSpec.from_mapping(spec.to_mapping()) == spec
     record = run_one(spec)
     record.write(tmp_path / "run.parquet")
     again = Record.read(tmp_path / "run.parquet")

@@ -33,7 +33,7 @@ def test_the_estimate_goes_by_work_where_runs_differ(clock, capsys):
         clock[0] = 105.0
         shown.advance(small, math.nan)
     assert capsys.readouterr().err.splitlines() == [
-        "2/5 runs, an estimate follows when the first run ends",
+        "2/5 runs, an estimate follows the first run",
         "3/5 runs, about 10 s left",
         "4/5 runs, about 2 s left, 1 failed",
     ]

@@ -49,7 +49,7 @@ def test_a_file_gives_back_the_record_bit_for_bit(record, file):
 
 def test_the_file_is_a_plain_table_with_keys_on_each_row(record, file):
     table = pl.read_parquet(file)
-    assert table.columns == [*record.keys(), *INTERVAL_COLUMNS, "queue_length", "throttle"]
+    assert table.columns == [*record.keys, *INTERVAL_COLUMNS, "queue_length", "throttle"]
     assert table["controller"].to_list() == ["crw"] * 3
     assert table["collected"].to_list() == [10, 0, 20]
     assert json.loads(pl.read_parquet_metadata(file)["swarm_forage_env.spec"])["policy"] == "crw"
@@ -139,7 +139,7 @@ def test_rates_and_lengths(record):
     assert record.per_1000_s("collected") == pytest.approx(50.0)
     assert np.isnan(replace(record, made_with={}).wall_time_s)
     told = record.describe()
-    assert all(part in told for part in (record.run_id, "noise = 0.1", "30 (50.0 per 1,000 s)", "numpy 2.0"))
+    assert all(part in told for part in (record.run_id, "noise = 0.1", "600 s, delivered 30 (50.0 per 1,000 s)"))
 
 
 def test_whole_intervals():

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from swarm_forage_env.runs.plan import Condition, Plan, Table, run_plan
-from swarm_forage_env.runs.spec import PolicySpec, policy_spec
 from swarm_forage_env.runs.run import run_one
+from swarm_forage_env.runs.spec import PolicySpec, policy_spec
 from swarm_forage_env.scenarios.columns import INTERVAL_COLUMNS
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.noise import SensorNoiseConfig
@@ -30,7 +30,7 @@ def test_each_condition_has_its_records_in_the_order_of_the_seeds(table):
     for condition in (FIRST, SECOND):
         for record, spec in zip(table.of(condition), PLAN.specs_of(condition), strict=True):
             assert record.equals(run_one(spec))
-    assert (table.n_stored, table.folder) == (0, None)
+    assert table.folder is None
 
 
 def test_runs_that_failed_are_told_by_condition(table):
@@ -68,16 +68,6 @@ def test_runs_that_are_missing_are_left_out(table):
     fewer = Table(plan=PLAN, records={one.run_id: one})
     assert fewer.of(FIRST) == (one,)
     assert fewer.curves(FIRST, "collected")[0] == (1,)
-
-
-def test_the_frame_has_all_records_with_their_place(table):
-    frame = table.frame
-    assert frame.columns[:2] == ["policy", "world"]
-    assert len(frame) == 4 * 2
-    assert frame["world"].unique(maintain_order=True).to_list() == [QUIET.name, NOISY.name]
-    assert frame["seed"].to_list() == [1, 1, 0, 0] * 2
-    assert frame["believed_interference_fraction"].null_count() == 4
-    assert Table(plan=PLAN, records={}).frame.is_empty()
 
 
 def test_worlds_that_differ_in_performance_alone_share_runs_and_read_them_their_own_way(table):

@@ -169,7 +169,7 @@ def _steps_of_batch(sampler: ScenarioSampler, seed: int) -> list[bytes]:
 def _walk(world: RandomWorld, seen: Visit, *, by_dicts: bool, is_disturbed: bool) -> list[bytes]:
     """Walk through a world; returns a digest of all that could be seen in each tick."""
     stack = build_stack(world.scenario, world.wrappers)
-    assert RunSpec.from_json(_spec(world).to_json()) == _spec(world), "a specification comes back from its text"
+    assert RunSpec.from_mapping(_spec(world).to_mapping()) == _spec(world), "a specification comes back from its text"
     chance, may_go_back = Random(world.seed), is_disturbed and world.scenario.physics == "compiled"
     if is_disturbed:
         seen.figures["wrong calls"] += misuse_before_reset(stack)

@@ -13,10 +13,7 @@ _VARYING_FIELDS = {
     "traceback", "versions", "wall_time_s",
 }  # fmt: skip
 """Fields of JSON documents; the digest of an entry is also of its versions and hours."""
-_PROGRESS = re.compile(
-    r"\d+/\d+ runs, .*|\d+ of \d+ runs (is|are) stored already\.|swarm-forage: Compiling what is used .*"
-    r"|\d+ of them (was|were) made by other code .*"
-)
+_PROGRESS = re.compile(r"\d+/\d+ runs, .*|\d+ of \d+ runs stored already.*|swarm-forage: Compiling what is used .*")
 """Lines that depend on what is stored and compiled already."""
 _REPLACED: tuple[tuple[str, str], ...] = (
     (r"\d{4}-\d\d-\d\dT[\d:.+Z-]+", "<date>"),

@@ -9,8 +9,8 @@ from gymnasium.spaces import flatdim
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.policies.network import Network, NetworkAbout
-from swarm_forage_env.runs.spec import policy_spec
 from swarm_forage_env.runs.run import run_one
+from swarm_forage_env.runs.spec import policy_spec
 from swarm_forage_env.scenarios.presets import warehouse_small
 from swarm_forage_env.training.evaluation_plan import EvaluationPlan, EvaluationWorld
 from swarm_forage_env.training.evaluations import read_training
