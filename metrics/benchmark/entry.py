@@ -27,9 +27,8 @@ from swarm_forage_env._internal.typed import Amount, Count, Name, Within, typed
 from swarm_forage_env.contract.policy import sees_world
 from swarm_forage_env.policies.registry import file_of, is_policy_file, policy_class, policy_label
 from swarm_forage_env.runs.plan import Plan, Table, run_plan
-from swarm_forage_env.runs.spec import policy_specs
 from swarm_forage_env.runs.record import Record
-from swarm_forage_env.runs.spec import identity_of
+from swarm_forage_env.runs.spec import identity_of, policy_specs
 from swarm_forage_env.runs.versions import software_versions
 
 from ..controllers import PAPER_POLICIES

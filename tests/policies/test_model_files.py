@@ -26,7 +26,7 @@ from swarm_forage_env.policies.model_files import (
 )
 from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.policies.registry import is_policy_file, load_policy, local_policy, policy_class, split_interface
-from swarm_forage_env.runs.spec import RunSpec, plan_run
+from swarm_forage_env.runs.spec import RunSpec, plan_run, policy_spec
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.studies.ladders import Budget
 from swarm_forage_env.views.pettingzoo import parallel_env
