@@ -178,49 +178,48 @@ class NoAct:
         pass
 
 
-class RaisesWhenNobodyIsActive(Sound):
-    def act(self, obs, active):
-        np.flatnonzero(active)[0]
-        return super().act(obs, active)
+def still(obs):
+    return np.zeros((len(obs), 3), np.float32)
 
 
-class ActiveRowsOnly(Sound):
-    def act(self, obs, active):
-        return super().act(obs, active)[active]
+def not_a_number(self, obs, active):
+    actions = still(obs)
+    actions[2, 1] = np.nan
+    return actions
 
 
-class Lists(Sound):
-    def act(self, obs, active):
-        return super().act(obs, active).tolist()
+def writes_into_observations(self, obs, active):
+    obs[:, 0] = 0.25
+    return still(obs)
 
 
-class Double(Sound):
-    def act(self, obs, active):
-        return super().act(obs, active).astype(np.float64)
+def writes_into_active(self, obs, active):
+    active[0] = False
+    return still(obs)
 
 
-class TooFast(Sound):
-    def act(self, obs, active):
-        return super().act(obs, active) + np.float32(1.5)
-
-
-class NotANumber(Sound):
-    def act(self, obs, active):
-        actions = super().act(obs, active)
-        actions[2, 1] = np.nan
-        return actions
-
-
-class WritesIntoObservations(Sound):
-    def act(self, obs, active):
-        obs[:, 0] = 0.25
-        return super().act(obs, active)
-
-
-class WritesIntoActive(Sound):
-    def act(self, obs, active):
-        active[0] = False
-        return super().act(obs, active)
+@pytest.mark.parametrize(
+    ("act", "fault"),
+    [
+        (
+            lambda self, obs, active: still(obs) * np.float32(np.flatnonzero(active)[0]),
+            "got IndexError at tick 75, with 0",
+        ),
+        (
+            lambda self, obs, active: still(obs)[active],
+            r"got float32 of shape \(3, 3\) .*at tick 37; return one row per",
+        ),
+        (lambda self, obs, active: still(obs).tolist(), "got list at tick 0; return one row"),
+        (lambda self, obs, active: still(obs).astype(np.float64), "got float64 of shape .* at tick 0"),
+        (lambda self, obs, active: still(obs) + np.float32(1.5), r"in \[-1, 1\], got \[1.5, 1.5, 1.5\] for robot 0"),
+        (not_a_number, r"got \[0.0, nan, 0.0\] for robot 2"),
+        (writes_into_observations, "leave obs and active as they are"),
+        (writes_into_active, "leave obs and active as they are"),
+    ],
+)
+def test_each_fault_of_an_act_is_found(act, fault):
+    with pytest.raises(CheckError, match=fault):
+        check_policy(type("Faulty", (Sound,), {"act": act}), SMALL)
 
 
 class UnknownSlice(Sound):
@@ -319,17 +318,6 @@ class UnknownCaches(Sound):
     [
         (NoAct, "without act; a function from observations to actions becomes a policy by from_callable"),
         (drive, "without reset and act"),
-        (RaisesWhenNobodyIsActive, "got IndexError at tick 75, with 0 of 5 robots active"),
-        (
-            ActiveRowsOnly,
-            r"got float32 of shape \(3, 3\) .*at tick 37; return one row per robot, inactive",
-        ),
-        (Lists, "got list at tick 0; return one row"),
-        (Double, "got float64 of shape .* at tick 0"),
-        (TooFast, r"in \[-1, 1\], got \[1.5, 1.5, 1.5\] for robot 0"),
-        (NotANumber, r"got \[0.0, nan, 0.0\] for robot 2"),
-        (WritesIntoObservations, "leave obs and active as they are"),
-        (WritesIntoActive, "leave obs and active as they are"),
         (UnknownSlice, "got 'proximty'. Did you mean 'proximity'"),
         (TextForReads, r"got 'proximity'; write \('proximity',\)"),
         (ReadsMore, r"not in reads = \('proximity',\) hold other numbers, got other actions at tick 0"),

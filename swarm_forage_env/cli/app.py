@@ -101,8 +101,9 @@ def carry_out(words: Sequence[str]) -> int:
 
 def _files_typed(words: Sequence[str]) -> Iterator[str]:
     """Yield what may be a policy file among the words of a command."""
-    from swarm_forage_env.policies.registry import file_of
-
     for word in words:
-        for piece in (word, *word.split(","), *word.partition("=")[2].split(",")):
-            yield from filter(None, (piece.strip(), file_of(piece.strip())))
+        for piece in map(str.strip, (word, *word.split(","), *word.partition("=")[2].split(","))):
+            if "." in piece:
+                from swarm_forage_env.policies.registry import file_of  # late: help names no files
+
+                yield from (piece, file_of(piece))

@@ -192,7 +192,7 @@ def check(policies: Policies, /, *, world: WorldOptions = WorldOptions()) -> Non
             check_policy(spec.policy, spec.scenario)
         except CheckError as error:
             raise CommandError(f"{spec.policy} breaks a rule: {error}") from None
-        say(f"{spec.policy} keeps the rules in {spec.world.title()}. {CHECKED}")
+        say(f"{spec.policy} keeps the rules in {spec.world.name}. {CHECKED}")
 
 
 def rerun(file: Path, /, *, as_json: AsJson = False) -> int:

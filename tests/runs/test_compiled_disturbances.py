@@ -87,7 +87,7 @@ def assert_same(one: LiveRun, other: LiveRun) -> None:
         np.testing.assert_array_equal(values, theirs[name], err_msg=name)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(6))
 def test_a_run_of_any_stack_is_the_run_tick_by_tick(seed):
     chance = np.random.default_rng(seed)
     policy, wrappers = POLICIES[seed % len(POLICIES)], random_stack(chance)
@@ -133,15 +133,6 @@ def test_robots_killed_between_two_ticks_end_the_run_in_the_next():
 
 
 ALL = ("sensor_noise:sigma=0.02", POOLS[1][0], POOLS[2][0], "actuator_noise:sigma=0.2")
-
-
-def test_a_few_ticks_under_all_wrappers_are_those_tick_by_tick():
-    fast, slow = (
-        started("crw", [parse_wrapper(word) for word in ALL], by_ticks=by_ticks) for by_ticks in (False, True)
-    )
-    fast.advance(to_tick=30)
-    slow.advance(to_tick=30)
-    assert_same(fast, slow)
 
 
 def test_a_run_goes_on_from_a_snapshot_and_from_a_copy():

@@ -36,11 +36,8 @@ def recorded(world: ScenarioConfig, policy: Policy, *stops: int) -> RunRecorder:
 
 WORLDS = [
     ("crw", "warehouse_small", {"n_robots": 1}),
-    ("crw", "warehouse_small", {}),
-    ("dpo", "search_and_rescue", {}),
     ("cpfa", "search_and_rescue", {}),
     ("stochm", "warehouse_small", {"nest_centre_m": (3.2, 8.0), "nest_size_m": (3.2, 12.8)}),
-    ("stochx", "warehouse_medium", {}),
     # Where objects lie still, robots look at the floor again only near what has changed.
     ("dpo", "search_and_rescue", {"walk_probability": 0.0}),
     ("stochm", "warehouse_dual", {"walk_probability": 0.0, "nest_size_m": (3.2, 12.8)}),
@@ -75,7 +72,7 @@ def test_in_a_large_swarm_memory_is_asked_ahead_and_nothing_else_changes():
     np.testing.assert_array_equal(one.unwrapped.arena.obs, other.unwrapped.arena.obs)
 
 
-@pytest.mark.parametrize("ticks", [1, 3])
+@pytest.mark.parametrize("ticks", [3])
 def test_what_somebody_writes_into_the_observation_between_two_pieces_is_gone_after_the_next_tick(ticks):
     world = scenario("warehouse_small", n_robots=40, interval_s=1000.0, horizon_s=1000.0)
     seen = []

@@ -8,7 +8,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.runs.plan import Condition, Plan
 from swarm_forage_env.runs.spec import plan_run, policy_spec
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.wrappers.world import SIZE, World
+from swarm_forage_env.wrappers.world import World
 from tests.support.wrapper_configs import InnerConfig
 
 WORLD = scenario("warehouse_small", n_robots=3, n_objects=20, horizon_s=4.0, interval_s=2.0)
@@ -50,15 +50,6 @@ def test_its_runs_are_those_that_are_planned_one_by_one(policy, world):
     assert plan.specs == tuple(
         plan_run(world, policy.policy, parameters=policy.parameters, seed=seed) for seed in (0, 1)
     )
-
-
-def test_policies_may_have_worlds_of_their_own():
-    large = World(scenario("warehouse_small", n_robots=9), criterion=SIZE, value=9)
-    plan = Plan(conditions=(Condition(CRW, QUIET), Condition(STOCHM, large), Condition(CRW, large)), seeds=(0,))
-    assert plan.policies == (CRW, STOCHM)
-    assert plan.of_policy("crw") == (plan.conditions[0], plan.conditions[2])
-    assert [spec.scenario.robots.n_robots for spec in plan.specs] == [3, 9, 9]
-    assert [spec.scenario.caches for spec in plan.specs] == ["none", "static", "none"]
 
 
 @pytest.mark.parametrize(

@@ -61,16 +61,6 @@ def test_starting_is_not_in_the_estimate_and_no_more_processes_work_than_there_a
         assert shown.remaining_s() == pytest.approx(4.0)
 
 
-def test_of_workers_elsewhere_the_number_is_seen_from_what_they_do(clock):
-    """Three runs of 20 seconds within 40 seconds, the start of the workers left out: one and a half at a time."""
-    todo = runs(12)
-    with RunProgress(todo, n_stored=0, n_processes=None, shown=False) as shown:
-        for number, seconds in enumerate((120.0, 120.0, 140.0)):
-            clock[0] = seconds
-            shown.advance(todo[number], 20.0)
-        assert shown.remaining_s() == pytest.approx(120.0)
-
-
 @pytest.mark.parametrize(
     ("seconds", "told"), [(0.2, "1 s"), (89.0, "89 s"), (720.0, "12 min"), (5399.0, "90 min"), (12_600.0, "3.5 h")]
 )

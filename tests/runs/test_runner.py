@@ -14,21 +14,19 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Grip
-from swarm_forage_env.policies.registry import RandomPolicy, from_callable
+from swarm_forage_env.policies.registry import RandomPolicy
 from swarm_forage_env.policies.trust import UntrustedModelError, only_typed
 from swarm_forage_env.runs import runner
 from swarm_forage_env.runs.plan import Condition, Plan, planned_line, run_plan
 from swarm_forage_env.runs.record import RecordError
-from swarm_forage_env.runs.run import WARM_UP_TICKS, build_stack, run_one, run_policy, warm_up
+from swarm_forage_env.runs.run import WARM_UP_TICKS, run_one, run_policy, warm_up
 from swarm_forage_env.runs.runner import longest_first, rerun, run_all
 from swarm_forage_env.runs.spec import RunSpec, policy_spec
 from swarm_forage_env.runs.store import failure_file, load, read_failure, record_file
 from swarm_forage_env.runs.workers import WorkerError, each_run
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.arena import ForagingArena
-from swarm_forage_env.wrappers.base import STACK_ORDER
 from swarm_forage_env.wrappers.world import World
-from tests.support.wrapper_configs import InnerConfig, OuterConfig
 
 WORLD = scenario("warehouse_small", n_robots=3, n_objects=20, horizon_s=4.0, interval_s=2.0)
 SPECS = tuple(RunSpec(world=World(WORLD), policy="random", seed=seed) for seed in range(4))
@@ -53,10 +51,6 @@ class Refusing(Executor):
         pytest.fail("nothing should have been run")
 
 
-def idle(obs):
-    return np.zeros((3, 3), np.float32)
-
-
 def refuse(self, obs, active):
     raise RuntimeError("I would rather not")
 
@@ -75,12 +69,6 @@ def test_a_policy_object_drives_the_same_run_as_its_name():
     assert by_object.equals(run_one(SPECS[0]))
 
 
-def test_a_plain_callable_can_be_run():
-    record = run_policy(from_callable(idle), SPECS[0])
-    assert record["first_picked"].sum() == 0
-    assert record["n_active"].tolist() == [3.0, 3.0]
-
-
 def test_tasks_of_a_policy_are_recorded():
     class Tasked(RandomPolicy):
         task = np.array([1, 1, 2], np.int8)
@@ -88,14 +76,6 @@ def test_tasks_of_a_policy_are_recorded():
     record = run_policy(Tasked(), SPECS[0])
     np.testing.assert_allclose(record["task_share_generalist"], 2 / 3)
     np.testing.assert_allclose(record["task_share_harvester"], 1 / 3)
-
-
-def test_the_stack_is_built_in_the_documented_order():
-    env, names = build_stack(WORLD, (InnerConfig(), OuterConfig())), []
-    while env is not env.unwrapped:
-        names.append(STACK_ORDER[env.stack_position])
-        env = env.env
-    assert names == ["RunRecorder", "SensorNoise", "ActuatorNoise"]
 
 
 def test_warm_up_stops_after_a_few_ticks_and_reaches_the_interactions(monkeypatch):
@@ -164,14 +144,6 @@ def test_the_run_of_a_damaged_file_is_made_again(tmp_path, capsys):
     assert told[1].startswith(f"Cannot read {one}: ")
     assert told[1].endswith("Its run is made again. So are those of 1 more files.")
     assert run_here(SPECS, tmp_path, executor=Refusing()).n_stored == 4
-
-
-def test_records_stay_in_the_folder_alone_if_nobody_asks_for_them(tmp_path):
-    for n_stored in (0, 4):
-        found = run_here([*SPECS, UNKNOWN], tmp_path, keep=False)
-        assert (found.records, found.n_stored, found.n_done) == ({}, n_stored, 4)
-        assert list(found.failures) == [UNKNOWN.run_id]
-    assert len(load(tmp_path)) == 4
 
 
 def test_ctrl_c_keeps_what_is_finished_and_says_so(tmp_path, monkeypatch):
@@ -245,14 +217,6 @@ def test_closing_the_iterator_cancels_the_rest():
     assert [future.cancelled() for future in executor.futures] == [False, True, True, True]
 
 
-def test_any_executor_gives_the_same_records():
-    with ThreadPoolExecutor(2) as pool:
-        threaded = run_here([*SPECS, UNKNOWN], executor=pool)
-        assert pool.submit(int).result() == 0  # still open
-    assert same(threaded.records, run_here(SPECS).records)
-    assert [failure.spec for failure in threaded.failures.values()] == [UNKNOWN]
-
-
 def test_local_processes_give_the_same_records_and_a_killed_one_ends_the_call(tmp_path):
     found = run_all([*SPECS, UNKNOWN], jobs=2, progress=False)
     assert same(found.records, run_here(SPECS).records)
@@ -302,10 +266,6 @@ def test_long_runs_come_first_and_then_a_run_of_each_policy():
 def test_jobs_must_be_positive(jobs):
     with pytest.raises(ValueError, match="Expected jobs to be a whole number >= 1"):
         run_all(SPECS, jobs=jobs)
-
-
-def test_nothing_to_do_is_no_error():
-    assert run_all([]).n_done == 0
 
 
 def test_progress_where_stderr_is_no_terminal_is_plain(tmp_path, capsys):

@@ -78,12 +78,3 @@ def test_runs_of_a_policy_that_failed_for_one_reason_share_a_line():
         f"{runs[1].describe()}: killed",
         f"{other.describe()}: no room",
     )
-
-
-@pytest.mark.parametrize("text", ["", "{", "[]", "{}", '{"spec": {}, "error": "e", "traceback": []}'])
-def test_a_file_that_is_no_failure_is_refused(tmp_path, text):
-    (tmp_path / "x.json").write_text(text)
-    with pytest.raises(RecordError, match=r"x\.json: "):
-        read_failure(tmp_path / "x.json")
-    with pytest.raises(RecordError, match="No such file"):
-        read_failure(tmp_path / "y.json")

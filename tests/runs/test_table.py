@@ -63,13 +63,6 @@ def test_a_column_that_only_some_runs_have_is_left_out(table):
     assert (seeds, list(curves)) == ((1, 0), ["n_active"])
 
 
-def test_runs_that_are_missing_are_left_out(table):
-    one, _ = table.of(FIRST)
-    fewer = Table(plan=PLAN, records={one.run_id: one})
-    assert fewer.of(FIRST) == (one,)
-    assert fewer.curves(FIRST, "collected")[0] == (1,)
-
-
 def test_worlds_that_differ_in_performance_alone_share_runs_and_read_them_their_own_way(table):
     at_work = World(replace(QUIET.scenario, performance="n_active"))
     plan = Plan(conditions=(Condition(RANDOM, at_work), FIRST), seeds=PLAN.seeds)
