@@ -8,7 +8,11 @@ from typing import Any
 
 import gymnasium
 import lazy_loader
-import pettingzoo
+
+try:
+    import pettingzoo
+except FileNotFoundError:  # it asks for the working folder, before any command of ours could answer
+    raise SystemExit("swarm-forage: The working folder is gone; go to one that is there (cd).") from None
 
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES as _SCENARIO_NAMES
 

@@ -7,7 +7,6 @@ import signal
 import sys
 import warnings
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 EXIT_FAILURE = 1
@@ -114,23 +113,13 @@ def _told(error: Exception) -> int | None:
     if isinstance(error, BrokenPipeError):  # whoever read our output has enough, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the last flush fails again
         return EXIT_FAILURE
-    if isinstance(error, FileNotFoundError) and not _has_working_folder():
-        complain("The working folder is gone; go to one that is there (cd).")
-    elif isinstance(error, OSError) and error.strerror and error.filename:
+    if isinstance(error, OSError) and error.strerror and error.filename:
         complain(f"{error.strerror}: {error.filename}")
     elif isinstance(error, ImportError | OSError) or type(error).__module__.partition(".")[0] in PACKAGES:
         complain(str(error))
     else:
         return None
     return EXIT_USAGE if isinstance(error, ValueError) else EXIT_FAILURE
-
-
-def _has_working_folder() -> bool:
-    try:
-        Path.cwd()
-    except FileNotFoundError:
-        return False
-    return True
 
 
 def _interrupt(number: int, _: object = None) -> None:

@@ -188,7 +188,9 @@ def as_setting(value: Any) -> str:
         return ("+" if value and isinstance(value[0], tuple) else ",").join(map(as_setting, value))
     if isinstance(value, bool):
         return str(value).lower()
-    return repr(value) if isinstance(value, float) else str(value)
+    if isinstance(value, float) and value == float(f"{value:.9g}"):
+        return f"{value:.9g}"
+    return str(value)
 
 
 def in_words(value: Any) -> str:

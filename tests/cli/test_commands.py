@@ -168,8 +168,8 @@ def test_list_names_everything(command):
 
 @pytest.mark.parametrize("name", SCENARIO_NAMES)
 def test_info_prints_each_field_as_set_takes_it(name):
-    places = {"object_positions_m": ((4.1, 3.1), (5.1, 4.1)), "obstacles": ((4.0, 1.0, 4.4, 1.4), (6.0, 1.0, 6.4, 1.4))}
-    config = scenario(name, **(places if name == "classroom" else {}))
+    walls = ((4.0, 1.0, 4.4, 1.4), (6.0, 1.0, 6.4, 1.4))
+    config = scenario(name, **({"obstacles": walls} if name == "classroom" else {}))
     told = dict(line.strip().split(maxsplit=1) for line in _scenario_lines(config, "") if len(line.split()) > 1)
     fields = [field for field in field_sections() if field in told]
     assert len(fields) > 50
