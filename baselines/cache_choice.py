@@ -17,9 +17,10 @@ from .tasks import DRAW_POINT_X, DRAW_POINT_Y
 def cache_utility(
     cache_x: float, cache_y: float, count: float, x: float, y: float, pheromone: float, c: np.record
 ) -> float:
-    """Utility of an existing cache: U = exp(density) count / (|cache - robot| |cache - nest|).
+    """Utility of a cache: U = exp(density) count / (|cache - robot| |cache - nest|).
 
-    Full caches near the robot and near the nest are good, for taking and for adding alike.
+    Full caches near the robot and near the nest are good, for taking and for adding alike. An isolated object, at which
+    a cache can be created, is one of a single object.
 
     Args:
         cache_x: Centre of the cache, m.
@@ -27,14 +28,15 @@ def cache_utility(
         count: Remembered number of objects.
         x: Robot position, m.
         y: The same along y.
-        pheromone: Density of the cache.
+        pheromone: Density of the cache, or of the object.
         c: Constants of the run.
     """
     robot_x, robot_y = cache_x - x, cache_y - y
     nest_x, nest_y = nearest_nest(cache_x, cache_y, c)
     nest_x, nest_y = cache_x - nest_x, cache_y - nest_y
     product = (robot_x * robot_x + robot_y * robot_y) * (nest_x * nest_x + nest_y * nest_y)
-    return math.exp(pheromone) * count / math.sqrt(product)
+    # The lower limit is for a robot exactly on an object.
+    return math.exp(pheromone) * count / math.sqrt(max(product, 1e-12))
 
 
 @part
@@ -110,28 +112,6 @@ def cache_is_known(robot: np.record, c: np.record, memory: OneTaskMemory) -> boo
     return entry >= 0 and (robot.activity == TRANSPORT or is_large_enough(memory.caches[entry], c))
 
 
-@kernel
-def isolated_object_utility(
-    object_x: float, object_y: float, x: float, y: float, pheromone: float, c: np.record
-) -> float:
-    """Utility of an isolated object for creating a cache: U = exp(density) / (|object - robot| |object - nest|).
-
-    Args:
-        object_x: Centre of the object, m.
-        object_y: The same along y.
-        x: Robot position, m.
-        y: The same along y.
-        pheromone: Density of the object.
-        c: Constants of the run.
-    """
-    robot_x, robot_y = object_x - x, object_y - y
-    nest_x, nest_y = nearest_nest(object_x, object_y, c)
-    nest_x, nest_y = object_x - nest_x, object_y - nest_y
-    product = (robot_x * robot_x + robot_y * robot_y) * (nest_x * nest_x + nest_y * nest_y)
-    # The lower limit is for a robot exactly on the object.
-    return math.exp(pheromone) / math.sqrt(max(product, 1e-12))
-
-
 @part
 def is_isolated(robot: np.record, entry: int, c: np.record, memory: OneTaskMemory) -> bool:
     """Whether an object is remembered without another one within the proximity distance, and far enough from caches."""
@@ -172,7 +152,7 @@ def select_isolated_object(robot: np.record, senses: Senses, c: np.record, memor
         x = objects.cell_x[entry] * c.cell_m + half
         y = objects.cell_y[entry] * c.cell_m + half
         pheromone = density(robot.clock - objects.seen[entry], c.log_keep)
-        utility = isolated_object_utility(x, y, senses.x, senses.y, pheromone, c)
+        utility = cache_utility(x, y, 1, senses.x, senses.y, pheromone, c)
         if utility > best:
             best = utility
             best_entry = entry

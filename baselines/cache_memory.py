@@ -22,22 +22,15 @@ from swarm_forage_env.contract.types import IntArray, Row
 
 from .memory import ObjectMemory, OneMemory, forget, memory_of, new_memory, object_row_of
 
-CACHE = np.dtype(
-    (
-        np.record,
-        np.dtype(
-            [
-                ("cell_x", np.int32),  # centre cell
-                ("cell_y", np.int32),
-                ("serial", np.int32),  # identity
-                ("count", np.int32),  # objects when last seen
-                ("seen", np.int32),  # tick of the robot's own clock at which it was last seen
-                ("has_refused", np.bool_),  # it is known that the world refuses to start another cache near it
-            ],
-            align=True,
-        ),
-    )
-)
+_FIELDS: list[tuple[str, type]] = [
+    ("cell_x", np.int32),  # centre cell
+    ("cell_y", np.int32),
+    ("serial", np.int32),  # identity
+    ("count", np.int32),  # objects when last seen
+    ("seen", np.int32),  # tick of the robot's own clock at which it was last seen
+    ("has_refused", np.bool_),  # it is known that the world refuses to start another cache near it
+]
+CACHE = np.dtype((np.record, np.dtype(_FIELDS, align=True)))
 """One remembered cache."""
 
 

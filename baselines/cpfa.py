@@ -37,13 +37,14 @@ from .machines import (
     start_vector,
     stop_vector,
 )
-from .parameters import ControllerParameters, ParameterError, chosen_parameters, kernel_constants
+from .parameters import ControllerParameters, ParameterError, kernel_constants
 from .robots import (
     ACQUIRE,
     ACTIVITY_WORDS,
     DRAW_WANDER,
     DRAWS,
     HOMING,
+    READS,
     VECTOR_IDLE,
     WAIT_DROP,
     WAIT_PICKUP,
@@ -364,34 +365,12 @@ class CPFAPolicy(ScriptedPolicy):
     """Search, and return to rich places.
 
     CPFA stands for central-place foraging algorithm, the baseline of many works on swarm foraging.
-
-    An instance drives one run.
-
-    Args:
-        parameters: All numbers of the controller; default those that were evolved.
-        overrides: Single fields of `CPFAParameters` by name.
-
-    Raises:
-        ParameterError: parameters of another controller, an unknown name, or a value that makes no sense.
     """
 
     caches: ClassVar[str] = "none"
-    reads: ClassVar[tuple[str, ...]] = (
-        "proximity",
-        "light if carrying",
-        "ground",
-        "wheel_speed",
-        "position",
-        "heading",
-        "carrying",
-        "event",
-        "los_cell",
-        "los_object",
-    )
+    reads: ClassVar[tuple[str, ...]] = (*READS, "los_cell", "los_object")
+    default_parameters: ClassVar[CPFAParameters] = CPFAParameters()
     _kernel = staticmethod(step_cpfa)
-
-    def __init__(self, parameters: CPFAParameters | None = None, **overrides: float) -> None:
-        self.parameters = chosen_parameters(CPFAParameters(), parameters, overrides)
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run: every robot sets out from where it stands, in a direction of its own."""

@@ -31,7 +31,7 @@ from .machines import (
     follow_cargo,
     hold,
 )
-from .parameters import ControllerParameters, chosen_parameters, kernel_constants
+from .parameters import ControllerParameters, kernel_constants
 from .robots import ACQUIRE, DRAWS, HOMING, WAIT_PICKUP, fetch_ahead, new_robots, sense
 from .scripted import ScriptedPolicy
 
@@ -72,24 +72,12 @@ def step_crw(
 
 
 class CRWPolicy(ScriptedPolicy):
-    """Search by a correlated random walk.
-
-    An instance drives one run.
-
-    Args:
-        parameters: All numbers of the controller; default those of the paper's study.
-        overrides: Single fields of `ControllerParameters` by name.
-
-    Raises:
-        ParameterError: parameters of another controller, an unknown name, or a value that makes no sense.
-    """
+    """Search by a correlated random walk."""
 
     caches: ClassVar[str] = "none"
     reads: ClassVar[tuple[str, ...]] = ("proximity", "light if carrying", "ground", "position", "carrying", "event")
+    default_parameters: ClassVar[ControllerParameters] = ControllerParameters()
     _kernel = staticmethod(step_crw)
-
-    def __init__(self, parameters: ControllerParameters | None = None, **overrides: float) -> None:
-        self.parameters = chosen_parameters(ControllerParameters(), parameters, overrides)
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run: every robot explores."""

@@ -33,8 +33,8 @@ from .memory import (
     object_row_of,
 )
 from .object_choice import MemoryParameters, object_is_known, object_is_reached, select_object
-from .parameters import chosen_parameters, kernel_constants
-from .robots import ACQUIRE, DRAWS, HOMING, VECTOR_IDLE, WAIT_PICKUP, fetch_ahead, new_robots, sense
+from .parameters import kernel_constants
+from .robots import ACQUIRE, DRAWS, HOMING, READS, VECTOR_IDLE, WAIT_PICKUP, fetch_ahead, new_robots, sense
 from .scripted import ScriptedPolicy
 
 
@@ -92,35 +92,12 @@ class DPOPolicy(ScriptedPolicy):
     """Random walk with a memory of objects.
 
     DPO stands for decaying pheromone objects: what a robot remembers of an object fades.
-
-    An instance drives one run.
-
-    Args:
-        parameters: All numbers of the controller; default those of the paper's study.
-        overrides: Single fields of `MemoryParameters` by name.
-
-    Raises:
-        ParameterError: parameters of another controller, an unknown name, or a value that makes no sense.
     """
 
     caches: ClassVar[str] = "none"
-    reads: ClassVar[tuple[str, ...]] = (
-        "proximity",
-        "light if carrying",
-        "ground",
-        "wheel_speed",
-        "position",
-        "heading",
-        "carrying",
-        "cargo",
-        "event",
-        "los_cell",
-        "los_object",
-    )
+    reads: ClassVar[tuple[str, ...]] = (*READS, "cargo", "los_cell", "los_object")
+    default_parameters: ClassVar[MemoryParameters] = MemoryParameters()
     _kernel = staticmethod(step_dpo)
-
-    def __init__(self, parameters: MemoryParameters | None = None, **overrides: float) -> None:
-        self.parameters = chosen_parameters(MemoryParameters(), parameters, overrides)
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run: every robot explores and remembers nothing."""
@@ -129,14 +106,9 @@ class DPOPolicy(ScriptedPolicy):
         self._start_script(spec, rng, DRAWS, constants, new_robots(spec.n_robots), self._memory)
 
     @property
-    def n_known(self) -> IntArray:
+    def n_remembered(self) -> IntArray:
         """(N,) number of objects that each robot remembers, a copy."""
         return self._robots["n_known"].copy()
-
-    @property
-    def n_remembered(self) -> IntArray:
-        """(N,) the same: a robot remembers objects only."""
-        return self.n_known
 
     def describe_memories(self) -> Memories:
         """Return where all robots remember objects."""

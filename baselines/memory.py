@@ -12,9 +12,7 @@ otherwise the objects in view are just stamped with the time. Source: object mem
 controllers; there is no limit on its size and no forgetting by age.
 """
 
-import logging
 import math
-import os
 from typing import NamedTuple
 
 import numpy as np
@@ -59,36 +57,13 @@ class OneMemory(NamedTuple):
     shown: Row
 
 
-BYTES_PER_PAIR = 20
-"""Of memory, per robot and object."""
-
-
-def _announce(n_robots: int, n_objects: int) -> None:
-    """Say on stderr when memories may outgrow the machine: the system then ends the process without a reason."""
-    wanted, there = n_robots * n_objects * BYTES_PER_PAIR, memory_of_machine()
-    if there is not None and wanted > there:
-        logging.getLogger("baselines").warning(
-            f"{n_robots:,} robots that remember {n_objects:,} objects may need {wanted / 1e9:,.1f} GB, and there are "
-            f"{there / 1e9:,.1f} GB: take fewer robots or objects, or a controller without memory (crw)."
-        )
-
-
-def memory_of_machine() -> int | None:
-    """Return the bytes of memory that the machine has; None where it does not tell (Windows)."""
-    try:
-        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, ValueError, OSError):
-        return None
-
-
 def new_memory(n_robots: int, n_objects: int) -> ObjectMemory:
     """Return empty memories of `n_robots` robots for `n_objects` objects.
 
-    `BYTES_PER_PAIR` bytes per robot and object are reserved; zeroed pages are only touched as objects become known, so
-    that a run may well need less. If the machine has less in all, a line on stderr says so.
+    They reserve 20 bytes per robot and object. Zeroed pages are only touched as objects become known, so that a run
+    may well need less.
     """
     shape = (n_robots, n_objects)
-    _announce(n_robots, n_objects)
     return ObjectMemory(
         row=np.zeros(shape, np.int32),
         cell_x=np.zeros(shape, np.int32),

@@ -163,38 +163,36 @@ def kernel_constants(parameters: ControllerParameters, spec: SwarmSpec, **derive
     Returns:
         (1,) record array; `constants[0].name` works compiled and uncompiled.
     """
-    layout = spec.layout
-    scales = layout.part("position").scale
-    whole: dict[str, Any] = {name: layout.part(name).start for name in COLUMNS}
-    whole["n_objects"] = spec.n_objects
-    whole["exploration_lock_ticks"] = round(parameters.exploration_lock_s / spec.dt_s)
-    whole["longest_turn_ticks"] = round(parameters.longest_turn_s / spec.dt_s)
-    whole["recovery_ticks"] = round(parameters.recovery_s / spec.dt_s)
-    whole["has_obstacles"] = int(spec.has_obstacles)
-    whole["detour_after_ticks"] = round(parameters.detour_after_s / spec.dt_s)
-    whole["detour_longest_ticks"] = round(parameters.detour_longest_s / spec.dt_s)
-    whole.update({name: int(is_on) for name, is_on in dataclasses.asdict(spec.quirks).items()})
-    real: dict[str, Any] = {field.name: getattr(parameters, field.name) for field in dataclasses.fields(parameters)}
-    real.update(
-        half_width_m=scales[0],
-        half_height_m=scales[1],
-        cell_m=spec.cell_m,
-        wheel_scale_mps=spec.wheel_scale_mps,
-        max_speed_mps=spec.max_speed_mps,
-        soft_turn_rad=math.radians(parameters.soft_turn_deg),
-        per_soft_turn=1.0 / math.radians(parameters.soft_turn_deg),
-        per_wheel_scale=1.0 / spec.wheel_scale_mps,
-        wander_wheel_share=min(parameters.wander_speed_mps, spec.max_speed_mps) / spec.wheel_scale_mps,
-    )
-    for name, value in (derived | wander_series(parameters)).items():
-        (whole if isinstance(value, int) else real)[name] = value
+    half_width_m, half_height_m = spec.layout.part("position").scale
+    values: dict[str, Any] = {name: spec.layout.part(name).start for name in COLUMNS}
+    values |= {name: int(is_on) for name, is_on in dataclasses.asdict(spec.quirks).items()}
+    values |= {field.name: float(getattr(parameters, field.name)) for field in dataclasses.fields(parameters)}
+    values |= {
+        "n_objects": spec.n_objects,
+        "has_obstacles": int(spec.has_obstacles),
+        "exploration_lock_ticks": round(parameters.exploration_lock_s / spec.dt_s),
+        "longest_turn_ticks": round(parameters.longest_turn_s / spec.dt_s),
+        "recovery_ticks": round(parameters.recovery_s / spec.dt_s),
+        "detour_after_ticks": round(parameters.detour_after_s / spec.dt_s),
+        "detour_longest_ticks": round(parameters.detour_longest_s / spec.dt_s),
+        "half_width_m": float(half_width_m),
+        "half_height_m": float(half_height_m),
+        "cell_m": float(spec.cell_m),
+        "wheel_scale_mps": float(spec.wheel_scale_mps),
+        "max_speed_mps": float(spec.max_speed_mps),
+        "soft_turn_rad": math.radians(parameters.soft_turn_deg),
+        "per_soft_turn": 1.0 / math.radians(parameters.soft_turn_deg),
+        "per_wheel_scale": 1.0 / spec.wheel_scale_mps,
+        "wander_wheel_share": min(parameters.wander_speed_mps, spec.max_speed_mps) / spec.wheel_scale_mps,
+        **derived,
+        **wander_series(parameters),
+    }
     nests_m = [((left + right) / 2, (bottom + top) / 2) for left, bottom, right, top in spec.nest_boxes_m]
-    places: Any = ("nests_m", np.float64, (len(nests_m), 2))
-    numbers = [*((name, np.int64) for name in whole), *((name, np.float64) for name in real)]
-    fields = np.dtype([*numbers, places], align=True)
+    numbers = [(name, np.int64 if isinstance(value, int) else np.float64) for name, value in values.items()]
+    fields = np.dtype([*numbers, ("nests_m", np.float64, (len(nests_m), 2))], align=True)
     # np.record makes fields readable as attributes also in uncompiled kernels; compiled kernels need no help.
     constants = np.zeros(1, np.dtype((np.record, fields)))
-    for name, value in (whole | real).items():
+    for name, value in values.items():
         constants[name] = value
     constants["nests_m"] = nests_m
     return constants

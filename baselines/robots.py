@@ -62,6 +62,10 @@ ACTIVITY_WORDS = (
 """What the codes of `Activity`, and the two behind them, mean to people."""
 
 
+READS = ("proximity", "light if carrying", "ground", "wheel_speed", "position", "heading", "carrying", "event")
+"""Observation slices that a robot looks at which goes to points."""
+
+
 class VectorState(IntEnum):
     """Stages of going to a point."""
 

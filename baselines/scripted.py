@@ -1,6 +1,6 @@
 """What the scripted controllers have in common: records of robots, one kernel for all of them, and words for people."""
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -8,6 +8,7 @@ from swarm_forage_env.contract.kernel_policy import KernelPolicy
 from swarm_forage_env.contract.policy import RobotStates, SwarmSpec
 from swarm_forage_env.contract.types import CodeArray, IntArray
 
+from .parameters import ControllerParameters, chosen_parameters
 from .robots import ACTIVITY_WORDS, activity_codes, describe_robot
 
 
@@ -16,7 +17,20 @@ class ScriptedPolicy(KernelPolicy):
 
     A subclass names its kernel and calls `_start_script` at the end of its `reset`. The state of the kernel is
     (constants, robots, *memory, actions).
+
+    Args:
+        parameters: All numbers of the controller; default those of `default_parameters`.
+        overrides: Single fields of them by name.
+
+    Raises:
+        ParameterError: parameters of another controller, an unknown name, or a value that makes no sense.
     """
+
+    default_parameters: ClassVar[Any]
+    """Of the class of parameters that the controller takes."""
+
+    def __init__(self, parameters: ControllerParameters | None = None, **overrides: float) -> None:
+        self.parameters: Any = chosen_parameters(self.default_parameters, parameters, overrides)
 
     def _start_script(
         self,

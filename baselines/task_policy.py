@@ -7,16 +7,16 @@ import numpy as np
 
 from swarm_forage_env.contract.codes import Goal
 from swarm_forage_env.contract.policy import Memories, SwarmSpec
-from swarm_forage_env.contract.types import CodeArray, FloatArray, IntArray
+from swarm_forage_env.contract.types import CodeArray, IntArray
 
 from .cache_memory import new_task_memory
 from .memory import object_memories
-from .parameters import chosen_parameters, kernel_constants
-from .robots import describe_robot
+from .parameters import kernel_constants
+from .robots import READS, describe_robot
 from .scripted import ScriptedPolicy
 from .stoch_n1 import new_allocation
 from .task_machines import new_task_robots, step_tasks
-from .tasks import N_TASKS, TASK_DRAWS, TaskParameters
+from .tasks import TASK_DRAWS, TaskParameters
 
 
 def site_box_m(spec: SwarmSpec) -> tuple[float, float, float, float]:
@@ -61,38 +61,20 @@ class TaskPolicy(ScriptedPolicy):
     """Every robot chooses its own tasks, from its own experience. An instance drives one run.
 
     Subclasses say which part of the task graph they use and with which numbers.
-
-    Args:
-        parameters: All numbers of the controller; default those of the paper's study.
-        overrides: Single fields of `TaskParameters` by name.
-
-    Raises:
-        ParameterError: parameters of another controller, an unknown name, or a value that makes no sense.
     """
 
-    default_parameters: ClassVar[TaskParameters]
     n_tabs: ClassVar[int]
     """Task allocation blocks in use, from the root of the graph."""
     reads: ClassVar[tuple[str, ...]] = (
-        "proximity",
-        "light if carrying",
-        "ground",
-        "wheel_speed",
-        "position",
-        "heading",
-        "carrying",
+        *READS,
         "cargo",
         "event_object",
-        "event",
         "event_cache",
         "los_cell",
         "los_object",
         "los_cache",
     )
     _kernel = staticmethod(step_tasks)
-
-    def __init__(self, parameters: TaskParameters | None = None, **overrides: float) -> None:
-        self.parameters = chosen_parameters(self.default_parameters, parameters, overrides)
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run: estimates are drawn, no robot has a task, and all memories are empty."""
@@ -107,26 +89,11 @@ class TaskPolicy(ScriptedPolicy):
         """(N,) int8 `Task` codes; a live view, read only."""
         return self._allocation.task
 
-    @property
-    def task_shares(self) -> FloatArray:
-        """(8,) share of robots in each task, by `Task` code; robots that have not acted yet have none."""
-        return np.bincount(self._allocation.task, minlength=N_TASKS) / len(self._allocation.task)
-
     def describe_robot(self, row: int) -> str:
         """Return what one robot is up to, in one line for people."""
         robot = self._robots[row]
         goal = Goal(int(robot.goal_kind)).name.lower().replace("_", " ")
         return f"{describe_robot(robot)}; {goal} wanted, {robot.n_known} objects and {robot.n_caches} caches known"
-
-    @property
-    def n_known(self) -> IntArray:
-        """(N,) number of objects that each robot remembers, a copy."""
-        return self._robots["n_known"].copy()
-
-    @property
-    def n_caches(self) -> IntArray:
-        """(N,) number of caches that each robot remembers, a copy."""
-        return self._robots["n_caches"].copy()
 
     @property
     def n_remembered(self) -> IntArray:
