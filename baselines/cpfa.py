@@ -24,7 +24,7 @@ from swarm_forage_env._internal.compiling import kernel, part
 from swarm_forage_env.contract.detection import sees_object
 from swarm_forage_env.contract.layout import GROUND_SENSORS, WINDOW_CELLS
 from swarm_forage_env.contract.policy import Memories, RobotStates, SwarmSpec
-from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, IntArray, ObsArray, Row
+from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, ObsArray, Row
 
 from .machines import (
     DELIVER,
@@ -378,17 +378,12 @@ class CPFAPolicy(ScriptedPolicy):
         constants = kernel_constants(self.parameters, spec, search_step_ticks=step_ticks)
         self._start_script(spec, rng, CPFA_DRAWS, constants, new_robots(spec.n_robots, TRIP_FIELDS))
 
-    @property
-    def n_remembered(self) -> IntArray:
-        """(N,) number of places that each robot remembers, 0 or 1."""
-        return self._robots["has_site"].astype(np.int32)
-
     def describe_robots(self) -> RobotStates:
         """Return what all robots are up to, as arrays."""
         on_a_trip = self._robots["activity"] == ACQUIRE
         stage = (len(ACTIVITY_WORDS) + self._robots["stage"]).astype(np.int8)
         codes = np.where(on_a_trip, stage, activity_codes(self._robots))
-        return RobotStates(codes, (*ACTIVITY_WORDS, *STAGE_WORDS), self.n_remembered)
+        return RobotStates(codes, (*ACTIVITY_WORDS, *STAGE_WORDS))
 
     def describe_memories(self) -> Memories:
         """Return where all robots found their last object."""

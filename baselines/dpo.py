@@ -10,7 +10,7 @@ import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.policy import Memories, SwarmSpec
-from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, ObsArray
 
 from .machines import (
     DELIVER,
@@ -104,11 +104,6 @@ class DPOPolicy(ScriptedPolicy):
         constants = kernel_constants(self.parameters, spec, **self.parameters.derived())
         self._memory = new_memory(spec.n_robots, spec.n_objects)
         self._start_script(spec, rng, DRAWS, constants, new_robots(spec.n_robots), self._memory)
-
-    @property
-    def n_remembered(self) -> IntArray:
-        """(N,) number of objects that each robot remembers, a copy."""
-        return self._robots["n_known"].copy()
 
     def describe_memories(self) -> Memories:
         """Return where all robots remember objects."""

@@ -143,19 +143,6 @@ def new_robots(n_robots: int, more_fields: Sequence[tuple[str, type]] = ()) -> n
     return robots
 
 
-def describe_robot(robot: np.record) -> str:
-    """Return what a robot is up to in one line for people: activity, and how it goes to which point, if to any."""
-    told = Activity(int(robot.activity)).name.lower()
-    if robot.vector_state != VectorState.IDLE:
-        stage = VectorState(int(robot.vector_state)).name.lower()
-        purpose = "start of a search" if robot.is_searching else "goal"
-        goal = f"({robot.goal_x_m:.2f}, {robot.goal_y_m:.2f}) within {robot.goal_tolerance_m:g} m"
-        return f"{told}, {stage}, {purpose} {goal}"
-    if robot.explore_ticks != NOT_EXPLORING:
-        told += f", exploring for {robot.explore_ticks} ticks"
-    return told
-
-
 def activity_codes(robots: np.ndarray) -> CodeArray:
     """Return what every robot is up to, (N,) indices into `ACTIVITY_WORDS`."""
     codes = robots["activity"].copy()

@@ -6,10 +6,10 @@ import numpy as np
 
 from swarm_forage_env.contract.kernel_policy import KernelPolicy
 from swarm_forage_env.contract.policy import RobotStates, SwarmSpec
-from swarm_forage_env.contract.types import CodeArray, IntArray
+from swarm_forage_env.contract.types import CodeArray
 
 from .parameters import ControllerParameters, chosen_parameters
-from .robots import ACTIVITY_WORDS, activity_codes, describe_robot
+from .robots import ACTIVITY_WORDS, activity_codes
 
 
 class ScriptedPolicy(KernelPolicy):
@@ -61,15 +61,6 @@ class ScriptedPolicy(KernelPolicy):
         """(N,) `robots.Activity` codes, a copy."""
         return self._robots["activity"].copy()
 
-    def describe_robot(self, row: int) -> str:
-        """Return what one robot is up to, in one line for people."""
-        return describe_robot(self._robots[row])
-
-    @property
-    def n_remembered(self) -> IntArray | None:
-        """(N,) number of things that each robot remembers; None for a policy without memory."""
-        return None
-
     def describe_robots(self) -> RobotStates:
         """Return what all robots are up to, as arrays."""
-        return RobotStates(activity_codes(self._robots), ACTIVITY_WORDS, self.n_remembered)
+        return RobotStates(activity_codes(self._robots), ACTIVITY_WORDS)

@@ -5,14 +5,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from swarm_forage_env.contract.codes import Goal
 from swarm_forage_env.contract.policy import Memories, SwarmSpec
-from swarm_forage_env.contract.types import CodeArray, IntArray
+from swarm_forage_env.contract.types import CodeArray
 
 from .cache_memory import new_task_memory
 from .memory import object_memories
 from .parameters import kernel_constants
-from .robots import READS, describe_robot
+from .robots import READS
 from .scripted import ScriptedPolicy
 from .stoch_n1 import new_allocation
 from .task_machines import new_task_robots, step_tasks
@@ -88,17 +87,6 @@ class TaskPolicy(ScriptedPolicy):
     def task(self) -> CodeArray:
         """(N,) int8 `Task` codes; a live view, read only."""
         return self._allocation.task
-
-    def describe_robot(self, row: int) -> str:
-        """Return what one robot is up to, in one line for people."""
-        robot = self._robots[row]
-        goal = Goal(int(robot.goal_kind)).name.lower().replace("_", " ")
-        return f"{describe_robot(robot)}; {goal} wanted, {robot.n_known} objects and {robot.n_caches} caches known"
-
-    @property
-    def n_remembered(self) -> IntArray:
-        """(N,) number of objects and caches that each robot remembers."""
-        return self._robots["n_known"] + self._robots["n_caches"]
 
     def describe_memories(self) -> Memories:
         """Return where all robots remember objects and caches."""

@@ -169,8 +169,6 @@ class RobotStates(NamedTuple):
     """(N,) indices into `words`."""
     words: tuple[str, ...]
     """What an activity is called; the same all through a run."""
-    n_remembered: IntArray | None
-    """(N,) number of things that a robot remembers, None for robots without memory."""
 
 
 class RememberedPlaces(NamedTuple):
@@ -218,10 +216,8 @@ def sees_world(policy: object) -> bool:
 class Policy(Protocol):
     """Controls every robot at once. An instance drives one run; its memory is created by `reset`.
 
-    Optional attributes: `task`, an (N,) int8 array of `Task` codes; `describe_robot(row) -> str`, what one robot is
-    doing, for people (`inspect.play` shows it); `describe_robots() -> RobotStates`, the same of all robots as arrays
-    (`inspect.replay` keeps it); `describe_memories() -> Memories`, where all robots remember things (`inspect.replay`
-    keeps it, and `inspect.play` shows those of one);
+    Optional attributes: `task`, an (N,) int8 array of `Task` codes; `describe_robots() -> RobotStates`, what all robots
+    are doing, and `describe_memories() -> Memories`, where they remember things (replays keep both for people);
     `see_world(env)`, called by runs after `reset` with the `ForageEnv`, which a policy may read and must not change: a
     policy that has it is a yardstick and no contestant, so that `check_policy` and the benchmark refuse it;
     `compiled() -> CompiledPolicy | None`, for runs without Python between ticks (`KernelPolicy` has it); the class

@@ -30,8 +30,6 @@ _OBSTACLE = {"facecolor": "white", "edgecolor": "black", "hatch": "////", "linew
 """Hatched: neither a map nor a difference has that."""
 _MAP_IN = 3.6
 """Width of a map with its scale, inches."""
-_MOST_OF_FLOOR = 0.5
-"""What happens in a smaller part of the floor is shown without the rest (our choice)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -44,8 +42,6 @@ class FloorMaps:
     """Side of a square."""
     size_m: tuple[float, float]
     """Extent of the arena along x and y."""
-    n_robots: int
-    """Swarm size; of a difference, that of the first swarm."""
     arrays: Mapping[str, FloatArray]
     """Name, as in `MEANINGS` -> (ny, nx), row = y from below."""
     is_difference: bool = False
@@ -74,7 +70,7 @@ class FloorMaps:
 
     def write(self, path: str | Path) -> None:
         """Write the arrays to an .npz file, whole or not at all."""
-        sizes: dict[str, Any] = {"side_m": self.side_m, "size_m": self.size_m, "n_robots": self.n_robots}
+        sizes: dict[str, Any] = {"side_m": self.side_m, "size_m": self.size_m}
         with replacing(Path(path)) as draft, draft.open("wb") as file:
             np.savez_compressed(file, **self.arrays, **sizes)
 
@@ -110,7 +106,6 @@ def floor_maps(replay: Replay, *, side_m: float = 2 * CELL_M) -> FloorMaps:
         label=replay.label,
         side_m=side_m,
         size_m=(arena.width_m, arena.height_m),
-        n_robots=replay.scenario.robots.n_robots,
         obstacles_m=arena.obstacles,
         nests_m=arena.nest_boxes_m,
         arrays={
@@ -162,8 +157,7 @@ def write_maps(picture: str | Path, maps: Sequence[FloorMaps]) -> None:
 def draw_maps(path: str | Path, maps: Sequence[FloorMaps]) -> None:
     """Draw maps of floors of the same proportions: a row of panels per map or difference, a column per quantity.
 
-    All maps in a column share one scale, and so do all differences, where white is 0. What happened in a small part of
-    the floor only is shown there.
+    All maps in a column share one scale, and so do all differences, where white is 0.
 
     Args:
         path: File to write; as in `saved_figure`, whose errors this has.
@@ -173,11 +167,10 @@ def draw_maps(path: str | Path, maps: Sequence[FloorMaps]) -> None:
     names = [name for name in MEANINGS if name in maps[0].arrays]
     size_in = _MAP_IN * len(names), (0.75 * height_m / width_m * _MAP_IN + 0.25) * len(maps) + 0.6
     with saved_figure(path, size_in) as figure:
-        panels = figure.subplots(len(maps), len(names), squeeze=False)
+        panels = figure.subplots(len(maps), len(names), squeeze=False, sharex=True, sharey=True)
         for column, name in enumerate(names):
             what, unit = MEANINGS[name]
             panels[0, column].set_title(what)
-            x_low, y_low, x_high, y_high = _busy_part([one.arrays[name] for one in maps])
             for is_difference in (False, True):
                 rows = [row for row, one in enumerate(maps) if one.is_difference == is_difference]
                 if not rows:
@@ -186,9 +179,6 @@ def draw_maps(path: str | Path, maps: Sequence[FloorMaps]) -> None:
                 image: Any = None
                 for row in rows:
                     image = _draw_map(panels[row, column], maps[row], name, top)
-                    panels[row, column].set(
-                        xlim=(x_low * width_m, x_high * width_m), ylim=(y_low * height_m, y_high * height_m)
-                    )
                 ends = "both" if is_difference else "max"
                 scale = figure.colorbar(image, ax=[panels[row, column] for row in rows], extend=ends)
                 scale.set_label(f"more {unit}" if is_difference else unit)
@@ -209,24 +199,6 @@ def _draw_map(panel: Panel, maps: FloorMaps, name: str, top: float) -> Any:
             panel.fill([x_low, x_high, x_high, x_low], [y_low, y_low, y_high, y_high], **look)
     panel.grid(visible=False)
     return image
-
-
-def _busy_part(arrays: Sequence[FloatArray]) -> Rectangle:
-    """Return the part of the floor to show, in shares of it: all, or where something is if that is less than half.
-
-    It has the proportions of the floor, and one square around whatever is there.
-    """
-    ny, nx = arrays[0].shape
-    y, x = np.nonzero(np.any([array != 0.0 for array in arrays], axis=0))
-    if not len(x):
-        return 0.0, 0.0, 1.0, 1.0
-    lows = np.maximum([(x.min() - 1) / nx, (y.min() - 1) / ny], 0.0)
-    highs = np.minimum([(x.max() + 2) / nx, (y.max() + 2) / ny], 1.0)
-    side = float((highs - lows).max())
-    if side**2 >= _MOST_OF_FLOOR:
-        return 0.0, 0.0, 1.0, 1.0
-    x_low, y_low = np.clip(0.5 * (lows + highs - side), 0.0, 1.0 - side).tolist()
-    return x_low, y_low, x_low + side, y_low + side
 
 
 def _map_top(arrays: Sequence[FloatArray]) -> float:

@@ -7,7 +7,6 @@ import pytest
 
 from baselines.cache_choice import (
     cache_utility,
-    isolated_object_utility,
     object_is_near,
     select_cache,
     select_isolated_object,
@@ -38,6 +37,9 @@ def test_utility_of_a_cache():
     expected = math.e * 4 / (9.5005 * 11.3004)
     assert expected == pytest.approx(0.1013, abs=5e-5)
     assert cache_utility(14.5, 8.1, 4, 24.0, 8.0, 1.0, robot.constants) == pytest.approx(expected, rel=1e-4)
+    # An isolated object 3 m from the robot and 4 m from the nest centre at (3.2, 8), and one under the robot.
+    assert cache_utility(7.2, 8.0, 1, 7.2, 11.0, 0.5, robot.constants) == pytest.approx(math.exp(0.5) / 12)
+    assert cache_utility(7.2, 8.0, 1, 7.2, 8.0, 0.5, robot.constants) > 1e5
 
 
 def test_the_cache_of_highest_utility_is_chosen():
@@ -62,29 +64,11 @@ def test_the_point_is_uniform_in_the_square_shrunk_by_a_cell_per_side(x, y):
     assert robot.goal == pytest.approx((14.5 + 5.8 * (x - 0.5), 8.1 + 5.8 * (y - 0.5)))
 
 
-def test_stochx_takes_only_from_caches_of_three_but_adds_to_any():
-    robot = robot_at(24.0, 8.0)
-    robot.know_cache(1, CACHE, 2)
-    assert not select(robot)
-    robot.record.activity = Activity.TRANSPORT
-    assert select(robot)
-    robot = robot_at(24.0, 8.0)
-    robot.know_cache(1, CACHE, 3)
-    assert select(robot)
-
-
 # Isolated objects
 
 
 def isolated(robot: TaskRobot) -> bool:
     return select_isolated_object(robot.record, robot.senses, robot.constants, robot.memory)
-
-
-def test_utility_of_an_isolated_object():
-    robot = TaskRobot()
-    # 3 m from the robot and 4 m from the nest centre at (3.2, 8).
-    assert isolated_object_utility(7.2, 8.0, 7.2, 11.0, 0.5, robot.constants) == pytest.approx(math.exp(0.5) / 12)
-    assert isolated_object_utility(7.2, 8.0, 7.2, 8.0, 0.5, robot.constants) > 1e5
 
 
 @pytest.mark.parametrize(("mismatch", "tolerance"), [(False, 0.8), (True, 4.8)])

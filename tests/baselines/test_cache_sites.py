@@ -70,7 +70,7 @@ def test_quirk_site_box_truncated(changes, box):
     assert sides == pytest.approx(box)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(6))
 def test_no_allowed_point_is_nearer(seed):
     """Caches anywhere, even overlapping, as a memory of caches that are long gone may have them."""
     rng = np.random.default_rng(seed)
@@ -128,7 +128,7 @@ def in_scatter(**changes: object) -> TaskRobot:
     return TaskRobot(quirks=Quirks(scattered_sites=True), **changes)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(4))
 def test_quirk_scattered_sites_as_the_slow_twin(seed):
     rng = np.random.default_rng(seed)
     robot = in_scatter(**(MEDIUM if seed % 2 else {}))
@@ -153,23 +153,3 @@ def test_scattered_sites_have_a_heavy_tail_and_a_share_that_lies_anywhere(x, sca
     assert np.mean(distance > 8 * scale_m) == pytest.approx(far + 1 / 8, rel=0.1)
     anywhere = np.mean(distance > 3.0)
     assert anywhere == pytest.approx(far + scale_m / 3.0, rel=0.25), "few of the tail reach so far"
-
-
-def test_a_far_site_is_uniform_over_what_is_allowed():
-    robot = in_scatter()
-    robot.know_cache(1, (72, 40), 5)
-    rng = np.random.default_rng(5)
-    sites = np.array([choose(robot, 24.0, 8.0, rng.random(), 0.05 * rng.random()) for _ in range(4000)])
-    c = robot.constants
-    assert all(is_allowed(robot.record, x, y, c, robot.memory) for x, y in sites)
-    grid = rng.uniform((c.site_x_low_m, c.site_y_low_m), (c.site_x_high_m, c.site_y_high_m), (40_000, 2))
-    allowed = np.array([(x, y) for x, y in grid if is_allowed(robot.record, x, y, c, robot.memory)])
-    for axis in range(2):
-        edges = np.quantile(allowed[:, axis], np.linspace(0, 1, 9)[1:-1])
-        counts = np.bincount(np.searchsorted(edges, sites[:, axis]), minlength=8)
-        assert counts == pytest.approx(500, abs=100)
-
-
-def test_a_scattered_site_that_fits_nowhere_is_the_best_place():
-    robot = in_scatter()
-    assert choose(robot, 24.0, 8.0, u=0.3, v=1.0 - 1e-9) == pytest.approx((13.6, 8.0)), "a million metres off"

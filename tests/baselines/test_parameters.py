@@ -9,27 +9,13 @@ from baselines.cpfa import CPFAPolicy
 from baselines.crw import CRWPolicy
 from baselines.dpo import DPOPolicy
 from baselines.object_choice import MemoryParameters
-from baselines.parameters import ControllerParameters, ParameterError, kernel_constants
+from baselines.parameters import ControllerParameters, ParameterError
 from baselines.stochm import STOCHMPolicy
 from baselines.stochx import STOCHXPolicy
+from baselines.tasks import NO_TAB, ROOTED_TAB, STOCHM_PARAMETERS, STOCHX_PARAMETERS
+from swarm_forage_env.contract.codes import TAB_CHILDREN, TAB_ROOT, Tab, Task
 from swarm_forage_env.contract.kernel_policy import ObservationError
-from swarm_forage_env.contract.policy import Policy
-from swarm_forage_env.policies.registry import load_policy
-from swarm_forage_env.scenarios.quirks import Quirks
 from tests.support.observations import make_spec
-
-
-@pytest.mark.parametrize("name", ["crw", "dpo"])
-def test_controllers_are_found_by_name(name):
-    policy = load_policy(name, {"wander_speed_mps": 0.07})
-    assert isinstance(policy, Policy)
-    assert isinstance(policy, CRWPolicy | DPOPolicy)
-    assert policy.parameters.wander_speed_mps == 0.07
-
-
-def test_overrides_build_on_given_parameters():
-    policy = DPOPolicy(MemoryParameters(object_priority=2.0), evaporation_per_tick=0.1)
-    assert policy.parameters == MemoryParameters(object_priority=2.0, evaporation_per_tick=0.1)
 
 
 def test_unknown_parameter_names_the_nearest_one():
@@ -45,14 +31,6 @@ def test_every_parameter_must_be_a_finite_number_from_zero(value):
     for field in NUMBERS:
         with pytest.raises(ParameterError, match=field):
             MemoryParameters(**{field: value})
-
-
-def test_durations_become_ticks_and_quirks_reach_the_kernels():
-    constants = kernel_constants(ControllerParameters(), make_spec(dt_s=0.1))[0]
-    assert (constants.exploration_lock_ticks, constants.recovery_ticks) == (100, 20)
-    assert constants.explore_double_start == 0
-    task = make_spec(quirks=Quirks(explore_double_start=True))
-    assert kernel_constants(ControllerParameters(), task)[0].explore_double_start == 1
 
 
 @pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy, CPFAPolicy, STOCHMPolicy, STOCHXPolicy])
@@ -78,3 +56,24 @@ def test_observations_of_another_swarm_are_refused(policy_class):
 def test_parameters_of_another_controller_are_refused(policy_class, parameters, message):
     with pytest.raises(ParameterError, match=message):
         policy_class(parameters)
+
+
+def test_every_task_but_the_root_is_a_subtask_once():
+    children = TAB_CHILDREN.ravel().tolist()
+    assert sorted(children) == sorted(set(Task) - {Task.NONE, Task.GENERALIST})
+    for tab in Tab:
+        assert ROOTED_TAB[TAB_ROOT[tab]] == tab
+    assert [Task(code) for code in np.flatnonzero(ROOTED_TAB != NO_TAB)] == [
+        Task.GENERALIST,
+        Task.HARVESTER,
+        Task.COLLECTOR,
+    ]
+
+
+def test_numbers_that_the_two_controllers_do_not_share():
+    names = ("partition_reactivity", "partition_gamma", "subtask_reactivity", "subtask_gamma", "smallest_cache")
+    assert [getattr(STOCHM_PARAMETERS, name) for name in names] == [4.0, 1.75, 0.5, 0.75, 0.0]
+    assert [getattr(STOCHX_PARAMETERS, name) for name in names] == [1.0, 1.0, 1.0, 1.0, 3.0]
+    assert STOCHMPolicy().parameters == STOCHM_PARAMETERS
+    assert STOCHXPolicy().parameters == STOCHX_PARAMETERS
+    assert STOCHXPolicy(estimate_weight=0.25).parameters.estimate_weight == 0.25

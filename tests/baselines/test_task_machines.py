@@ -30,24 +30,6 @@ def robot() -> TaskRobot:
 # Sources
 
 
-@pytest.mark.parametrize("task", [*HARVESTS, *COLLECTS])
-def test_a_task_starts_by_acquiring_in_the_same_tick(robot, task):
-    assert robot.start(task)[2] == np.float32(Grip.RELEASE)
-    assert robot.activity is Activity.ACQUIRE
-    assert robot.record.explore_ticks == 1
-
-
-@pytest.mark.parametrize("task", HARVESTS)
-def test_free_objects_are_found_by_ground_sensor_after_ten_seconds(robot, task):
-    robot.start(task)
-    robot.finish_soon()
-    robot.seen.ground("object")
-    robot.act(49)
-    assert robot.activity is Activity.ACQUIRE
-    robot.act()
-    assert robot.activity is Activity.WAIT_PICKUP
-
-
 @pytest.mark.parametrize("task", COLLECTS)
 def test_quirk_waits_for_cache(task):
     robot = TaskRobot(quirks=Quirks(waits_for_cache=True))
@@ -59,15 +41,6 @@ def test_quirk_waits_for_cache(task):
     robot.seen.caches()
     robot.act()
     assert robot.activity is Activity.ACQUIRE, "nothing to wait for"
-
-
-def test_a_collector_gives_way_when_others_have_emptied_the_cache_too_far(robot):
-    wait_for_pickup(robot, Task.COLLECTOR)
-    robot.seen.caches((7, CACHE, 3))
-    assert robot.act()[2] == Grip.GRASP
-    robot.seen.caches((7, CACHE, 2))
-    assert robot.act()[2] == np.float32(Grip.RELEASE)
-    assert robot.activity is Activity.ACQUIRE
 
 
 @pytest.mark.parametrize("doubled", [False, True])
@@ -154,15 +127,6 @@ def test_quirk_finisher_tolerance_mismatch(mismatch):
     assert robot.activity is (Activity.TRANSPORT if mismatch else Activity.WAIT_DROP)
 
 
-def test_starting_within_tolerance_is_arrival():
-    robot = TaskRobot()
-    pick_up(robot, Task.FINISHER)
-    robot.know_object(9, (80, 10))
-    robot.seen.pose(16.1, 2.7)
-    robot.act()
-    assert robot.activity is Activity.WAIT_DROP
-
-
 # How tasks end
 
 
@@ -176,14 +140,6 @@ def test_a_drop_ends_the_task_and_the_next_one_starts_in_the_same_tick(robot, ta
     assert robot.activity is Activity.ACQUIRE
     has_begun = robot.record.explore_ticks == 1 or robot.stage is VectorState.VECTOR
     assert has_begun
-
-
-def test_giving_up_empty_starts_the_next_task_at_once(robot):
-    wait_for_pickup(robot, Task.HARVESTER)
-    robot.seen.window({})
-    robot.seen.ground("floor")
-    assert give_up(robot)[2] == np.float32(Grip.RELEASE)
-    assert robot.activity is Activity.ACQUIRE
 
 
 @pytest.mark.parametrize("task", [*HARVESTS, *COLLECTS])
@@ -221,13 +177,3 @@ def test_dropped_objects_add_up_over_successive_tasks_that_drop(robot):
 
 
 # The policies
-
-
-def test_a_robot_whose_drop_was_completed_in_repair_has_finished(robot):
-    wait_for_drop(robot, Task.STARTER)
-    estimate = estimates_of(robot.policy, 0)[Task.STARTER]
-    robot.seen.carry(None)
-    robot.act(3, active=False)
-    robot.act()
-    assert estimates_of(robot.policy, 0)[Task.STARTER] != estimate
-    assert robot.activity is Activity.ACQUIRE

@@ -6,7 +6,7 @@ from baselines.robots import VectorState
 from swarm_forage_env.contract.codes import Event, Task
 from swarm_forage_env.scenarios.quirks import Quirks
 from tests.support.task_robot import TaskRobot
-from tests.support.task_work import CACHE_SEEN, NEARER, drop, give_up, wait_for_drop
+from tests.support.task_work import CACHE_SEEN, NEARER, drop, wait_for_drop
 
 
 @pytest.fixture
@@ -24,22 +24,6 @@ def next_is(robot: TaskRobot, task: Task) -> None:
     """Let the next task after a transfer be another one, or the block's root."""
     robot.policy._constants["partition_gamma"] = 1e9 if task is Task.TRANSFERER else 0.0
     robot.policy._constants["tab_gamma"] = 0.0
-
-
-def test_a_transferer_does_not_take_back_what_it_has_just_added():
-    robot = TaskRobot()
-    wait_for_drop(robot, Task.TRANSFERER)
-    next_is(robot, Task.TRANSFERER)
-    drop(robot, Event.JOINED_CACHE, object_row=3, cache=(8, NEARER, 6))
-    robot.finish_soon()
-    robot.record.n_caches = 0
-    robot.seen.pose(20.5, 8.1)
-    robot.seen.caches((8, NEARER, 6))
-    robot.act(2)
-    assert robot.stage is VectorState.IDLE or robot.record.is_searching
-    robot.seen.caches((9, NEARER, 6))
-    robot.act(2)
-    assert robot.record.target == 9
 
 
 @pytest.mark.parametrize("by_identity", [False, True])
@@ -67,13 +51,3 @@ def test_caches_of_a_transfer_are_left_alone_by_the_next_transfer_only(robot, ne
     drop(robot, Event.JOINED_CACHE, object_row=3, cache=(8, NEARER, 6))
     assert robot.task is next_task
     assert left_alone(robot) == (([8], [7]) if next_task is Task.TRANSFERER else ([], []))
-
-
-def test_a_transfer_that_moved_nothing_ends_the_shielding_of_caches(robot):
-    wait_for_drop(robot, Task.TRANSFERER)
-    next_is(robot, Task.TRANSFERER)
-    drop(robot, Event.JOINED_CACHE, object_row=3, cache=(8, NEARER, 6))
-    assert left_alone(robot) == ([8], [7])
-    give_up(robot)
-    assert robot.task is Task.TRANSFERER
-    assert left_alone(robot) == ([], [])

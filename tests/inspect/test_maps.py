@@ -40,8 +40,6 @@ def replay() -> Replay:
         status=status,
         activity=None,
         activities=(),
-        remembered=None,
-        remembered_frames=5,
         counters=np.zeros((4, 16), np.int32),
         object_events=np.array(events, np.int32),
         deliveries=np.zeros((0, 4), np.int32),
@@ -90,7 +88,7 @@ def test_arrays_go_to_a_file(replay, tmp_path):
     maps = floor_maps(replay)
     maps.write(tmp_path / "maps.npz")
     with np.load(tmp_path / "maps.npz") as stored:
-        assert {*stored} == {*MEANINGS, "side_m", "size_m", "n_robots"}
+        assert {*stored} == {*MEANINGS, "side_m", "size_m"}
         assert np.array_equal(stored["density"], maps.arrays["density"])
 
 
@@ -104,7 +102,7 @@ def images_of(monkeypatch, tmp_path, *maps: FloorMaps):
 
 def test_maps_of_one_quantity_have_one_scale_and_differences_a_symmetric_one(monkeypatch, tmp_path):
     few, many = (
-        FloorMaps(label=name, side_m=1.0, size_m=(2.0, 1.0), n_robots=1, arrays={"density": np.array([[0.0, value]])})
+        FloorMaps(label=name, side_m=1.0, size_m=(2.0, 1.0), arrays={"density": np.array([[0.0, value]])})
         for name, value in (("few", 1.0), ("many", 10.0))
     )
     panels = images_of(monkeypatch, tmp_path, few, many, many.minus(few), few.minus(many))
@@ -113,16 +111,9 @@ def test_maps_of_one_quantity_have_one_scale_and_differences_a_symmetric_one(mon
     assert scales[2] == scales[3] == pytest.approx((-9.0, 9.0), rel=0.02)
 
 
-def test_maps_show_where_something_is_and_outline_nests(monkeypatch, tmp_path):
-    crowd = np.zeros((10, 20))
-    crowd[2, 5] = 1.0
-    arrays = {"density": crowd, "drops": np.ones((10, 20))}
-    nests = ((2.0, 4.0, 6.0, 16.0),)
-    one = FloorMaps(label="few", side_m=2.0, size_m=(40.0, 20.0), n_robots=1, arrays=arrays, nests_m=nests)
-    part, whole = images_of(monkeypatch, tmp_path, one)
-    assert (whole.get_xlim(), whole.get_ylim()) == ((0.0, 40.0), (0.0, 20.0))
-    (x_low, x_high), (y_low, y_high) = part.get_xlim(), part.get_ylim()
-    assert x_low < 10.0 < 12.0 < x_high < 20.0
-    assert y_low < 4.0 < 6.0 < y_high < 10.0
-    assert (x_high - x_low) / (y_high - y_low) == pytest.approx(2.0)
-    assert [patch.get_linestyle() for patch in whole.patches] == ["--"]
+def test_maps_outline_nests(monkeypatch, tmp_path):
+    arrays, nests = {"density": np.ones((10, 20))}, ((2.0, 4.0, 6.0, 16.0),)
+    one = FloorMaps(label="few", side_m=2.0, size_m=(40.0, 20.0), arrays=arrays, nests_m=nests)
+    (panel,) = images_of(monkeypatch, tmp_path, one)
+    assert (panel.get_xlim(), panel.get_ylim()) == ((0.0, 40.0), (0.0, 20.0))
+    assert [patch.get_linestyle() for patch in panel.patches] == ["--"]

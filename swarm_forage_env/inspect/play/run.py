@@ -6,7 +6,7 @@ Looking changes nothing: until a level is changed or a robot killed by hand, the
 import time
 from typing import Any
 
-from swarm_forage_env.contract.codes import Counter, Task
+from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.policy import RememberedPlaces
 from swarm_forage_env.inspect.play.levels import Levels, with_idle
 from swarm_forage_env.inspect.replay.capture import Capture, ticks_between_frames
@@ -82,15 +82,6 @@ class RunByHand:
     def remembered_places(self, robot: int) -> RememberedPlaces | None:
         """Return where a robot remembers things, None where the policy does not tell."""
         return self.policy.describe_memories().of_robot(robot) if hasattr(self.policy, "describe_memories") else None
-
-    def told_of(self, robot: int) -> list[tuple[str, str]]:
-        """Return what the policy tells of a robot, as names and texts: task, what it does."""
-        told: list[tuple[str, str]] = []
-        if hasattr(self.policy, "task"):
-            told.append(("task", Task(int(self.policy.task[robot])).name.lower().replace("_", " ")))
-        if hasattr(self.policy, "describe_robot"):
-            told.append(("does", self.policy.describe_robot(robot)))
-        return told
 
     def summary(self) -> str:
         """Return one line about the run so far."""

@@ -211,8 +211,6 @@ class PlaySession:
         if hasattr(policy, "describe_robots"):
             states = policy.describe_robots()
             told = {"activity": states.activity.tolist(), "words": list(states.words)}
-            if states.n_remembered is not None:
-                told["remembered"] = states.n_remembered.tolist()
         return told | {
             "x": np.round(swarm.position[:, 0], 3).tolist(),
             "y": np.round(swarm.position[:, 1], 3).tolist(),
@@ -271,7 +269,7 @@ class PlaySession:
         places = [] if remembered is None else [*enumerate(remembered, start=1)]
         return {
             "row": robot,
-            "told": [*run.told_of(robot), ("wheels", f"{left:.1f}, {right:.1f} cm/s")],
+            "wheels": f"{left:.1f}, {right:.1f} cm/s",
             "places": [[kind, *place] for kind, places_m in places for place in places_m.tolist()],
         }
 

@@ -24,8 +24,6 @@ MOST_POSES = 5_000_000
 """Frames times robots that a replay has by default at most: about 12 MB in the page, and 40 MB where it is opened."""
 FRAME_STEPS_S = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
 """Times between frames to choose from (our choice: a robot drives half its diameter in the first)."""
-REMEMBERED_FRAMES = 5
-"""The size of memories is looked at in every frame of this number."""
 _MOST_STEPS = 2**16 - 1
 _STILL = {ThrottleConfig.name: 0.0, HandlingCostConfig.name: IDEAL_COST}
 """Wrapper with a waveform of time -> what this is while it changes nothing."""
@@ -129,7 +127,6 @@ class Capture:
         self._heading: list[np.ndarray] = []
         self._status: list[np.ndarray] = []
         self._activity: list[np.ndarray] = []
-        self._remembered: list[np.ndarray] = []
         self._signals: list[dict[str, float]] = []
         self._deliveries: list[np.ndarray] = [np.zeros((0, 4), np.int32)]
         self._activities: tuple[str, ...] = ()
@@ -180,8 +177,6 @@ class Capture:
             status=np.array(self._status),
             activity=np.array(self._activity) if self._activity else None,
             activities=self._activities,
-            remembered=np.array(self._remembered) if self._remembered else None,
-            remembered_frames=REMEMBERED_FRAMES,
             counters=np.array(self.counters, np.int32),
             object_events=self._objects.events(),
             deliveries=deliveries[deliveries[:, 0] <= self.ticks[-1]],
@@ -208,8 +203,6 @@ class Capture:
             states = self._tell()
             self._activities = states.words
             self._activity.append(states.activity.astype(np.uint8))
-            if states.n_remembered is not None and frame % REMEMBERED_FRAMES == 0:
-                self._remembered.append(np.minimum(states.n_remembered, _MOST_STEPS).astype(np.uint16))
         if self._remember is not None:
             self._memories.look(frame, self._remember(), self.step_m)
 

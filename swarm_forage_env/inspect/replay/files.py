@@ -35,7 +35,6 @@ _ARRAYS = {
     "heading": "u1",
     "status": "u1",
     "activity": "u1",
-    "remembered": "u2",
     "counters": "i4",
     "object_events": "i4",
     "deliveries": "i4",
@@ -43,7 +42,7 @@ _ARRAYS = {
     "memory_events": "i4",
 }
 """Arrays of a `Replay` and their types in a file; those that are None are left out."""
-_PLAIN = ("label", "frame_ticks", "end_tick", "activities", "remembered_frames", "versions", "has_tasks")
+_PLAIN = ("label", "frame_ticks", "end_tick", "activities", "versions", "has_tasks")
 """Fields of a `Replay` that a header has as they are."""
 _SIGNAL = "signal_"
 """What the name of an array begins with that is a waveform, by the name of its wrapper."""
@@ -208,7 +207,7 @@ def _replay_of(about: dict[str, Any], block: bytes) -> Replay:
         arrays[place["name"]] = unpack(packed, place["dtype"], tuple(place["shape"]))
     plain: dict[str, Any] = {name: about[name] for name in _PLAIN} | {"activities": tuple(about["activities"])}
     own: dict[str, Any] = {name: arrays.get(name) for name in _ARRAYS}
-    signals = {name.removeprefix(_SIGNAL): array for name, array in arrays.items() if name not in _ARRAYS}
+    signals = {name.removeprefix(_SIGNAL): array for name, array in arrays.items() if name.startswith(_SIGNAL)}
     return Replay(spec=RunSpec.from_mapping(about["spec"]), signals=signals, **plain, **own)
 
 

@@ -65,9 +65,6 @@ class Replay:
     """(F, N) indices into `activities`; None where the policy does not tell."""
     activities: tuple[str, ...]
     """What robots may be up to, as the policy calls it."""
-    remembered: Middle | None
-    """(R, N) number of things that a robot remembers, at every `remembered_frames`-th frame; None without memory."""
-    remembered_frames: int
     counters: Whole
     """(F, counters) what the world has counted since the start, by `Counter` code."""
     object_events: Whole

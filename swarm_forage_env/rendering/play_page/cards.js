@@ -26,10 +26,8 @@ class RobotCard {
   show(swarm, robot) {
     if (robot !== this.shown) this.begin(robot);
     if (robot < 0) return;
-    const told = swarm.now.robot?.row === robot ? swarm.now.robot.told : [];
-    const facts = robotFacts(swarm, robot);
-    const known = new Set(facts.map(([name]) => name));
-    this.table.replaceChildren(tableOf([swarm], [...facts, ...told.filter(([name]) => !known.has(name))]));
+    const wheels = swarm.now.robot?.row === robot ? [["wheels", swarm.now.robot.wheels]] : [];
+    this.table.replaceChildren(tableOf([swarm], [...robotFacts(swarm, robot), ...wheels]));
     const state = swarm.status[robot];
     this.buttons.kill.disabled = Boolean(state & ABSENT);
     this.buttons.break.disabled = Boolean(state & (ABSENT | REPAIR));

@@ -60,10 +60,6 @@ class LiveSwarm extends Run {
     return this.now.activity ? this.now.words[this.now.activity[robot]] : null;
   }
 
-  remembered(robot) {
-    return this.now.remembered?.[robot] ?? null;
-  }
-
   places(robot) {
     return this.now.robot?.row === robot ? this.now.robot.places : null;
   }

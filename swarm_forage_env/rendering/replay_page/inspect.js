@@ -8,8 +8,8 @@ function robotFacts(run, robot) {
   if (run.header.has_tasks) facts.push(["task", run.header.tasks[run.task(robot)]]);
   const activity = run.activity(robot);
   if (activity) facts.push(["activity", activity]);
-  const remembered = run.remembered(robot);
-  if (remembered !== null) facts.push(["remembers", remembered === 1 ? "1 thing" : `${remembered} things`]);
+  const places = run.places(robot);
+  if (places) facts.push(["remembers", places.length === 1 ? "1 thing" : `${places.length} things`]);
   const cargo = state & CARRYING ? run.cargo(robot) : -1;
   facts.push(["cargo", cargo >= 0 ? `object ${cargo}` : "none"]);
   facts.push(["place", `${run.x[robot].toFixed(1)}, ${run.y[robot].toFixed(1)} m`]);

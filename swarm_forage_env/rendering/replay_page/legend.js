@@ -1,29 +1,22 @@
 // What the signs mean, and what is shown.
 
-/** Paint one sign of the legend in the middle of a small canvas. */
+/** Paints one robot in the middle of a small canvas. */
+const stamp = Object.assign(new Painter({ x: [0], y: [0], turn: [0.5] }, { px: () => 11, py: () => 11 }), { radius: 5 });
+
+/** Paint one sign of the legend. */
 const signs = {
-  empty: (pen) => robotSign(pen, theme.colours.empty),
+  empty: (pen) => stamp.bodies(pen, [0], theme.colours.empty),
   carrying: (pen) => {
-    robotSign(pen, theme.colours.carrying);
-    pen.fillStyle = theme.colours.floor;
-    pen.fillRect(8.8, 8.8, 4.4, 4.4);
+    stamp.bodies(pen, [0], theme.colours.carrying);
+    stamp.cargo(pen, [0]);
   },
   "in interference": (pen) => {
-    robotSign(pen, theme.colours.empty);
-    ringSign(pen, theme.colours.interference, 8.5, 2);
+    stamp.bodies(pen, [0], theme.colours.empty);
+    stamp.rings(pen, [0], 8.5, 2, theme.colours.interference);
   },
-  "in repair": (pen) => ringSign(pen, theme.colours.repair, 4.5, 2.6),
-  dead: (pen) => {
-    pen.strokeStyle = theme.colours.repair;
-    pen.lineWidth = 2;
-    pen.beginPath();
-    for (const way of [-1, 1]) {
-      pen.moveTo(11 - 4, 11 - 4 * way);
-      pen.lineTo(11 + 4, 11 + 4 * way);
-    }
-    pen.stroke();
-  },
-  delivered: (pen) => ringSign(pen, theme.colours.nest, 7, 2),
+  "in repair": (pen) => stamp.rings(pen, [0], 4.5, 2.6, theme.colours.repair),
+  dead: (pen) => stamp.crosses(pen, [0]),
+  delivered: (pen) => stamp.rings(pen, [0], 7, 2, theme.colours.nest),
   object: (pen) => {
     pen.fillStyle = theme.colours.object;
     pen.fillRect(8, 8, 6, 6);
@@ -34,26 +27,6 @@ const signs = {
   cache: (pen) => areaSign(pen, theme.colours.cache, 0.3),
 };
 
-function robotSign(pen, colour) {
-  pen.fillStyle = pen.strokeStyle = colour;
-  pen.beginPath();
-  disc(pen, 11, 11, 5);
-  pen.fill();
-  pen.lineWidth = 2;
-  pen.beginPath();
-  pen.moveTo(11, 11);
-  pen.lineTo(19, 6);
-  pen.stroke();
-}
-
-function ringSign(pen, colour, radius, width) {
-  pen.strokeStyle = colour;
-  pen.lineWidth = width;
-  pen.beginPath();
-  disc(pen, 11, 11, radius);
-  pen.stroke();
-}
-
 function areaSign(pen, colour, opacity, framed = true) {
   pen.fillStyle = pen.strokeStyle = colour;
   pen.globalAlpha = opacity;
@@ -61,10 +34,6 @@ function areaSign(pen, colour, opacity, framed = true) {
   pen.globalAlpha = 1;
   pen.lineWidth = 1.5;
   if (framed) pen.strokeRect(3, 3, 16, 16);
-}
-
-function taskSign(task) {
-  return (pen) => robotSign(pen, theme.colours[`task-${task}`]);
 }
 
 class Legend {
@@ -90,7 +59,7 @@ class Legend {
     if (anyRun((run) => run.header.world.obstacles_m.length > 0)) names.push("obstacle");
     if (anyRun((run) => run.header.world.sources_m.length > 0)) names.push("source");
     if (anyRun((run) => run.header.world.caches !== "none")) names.push("cache");
-    const tasks = byTask ? this.tasksInUse().map((task) => [this.runs[0].header.tasks[task], taskSign(task)]) : [];
+    const tasks = byTask ? this.tasksInUse().map((task) => [this.runs[0].header.tasks[task], (pen) => stamp.bodies(pen, [0], theme.colours[`task-${task}`])]) : [];
     return [...tasks, ...names.map((name) => [name, signs[name]])];
   }
 

@@ -121,17 +121,6 @@ class Run {
     return [...places.values()];
   }
 
-  /** Number of things that a robot remembers, or null. */
-  remembered(robot) {
-    const { remembered } = this.arrays;
-    if (!remembered) return null;
-    const places = this.places(robot);
-    if (places) return places.length; // of this frame; numbers are kept of fewer frames
-    const samples = remembered.length / this.nRobots;
-    const sample = Math.min(samples - 1, Math.floor(this.frame / this.header.remembered_frames));
-    return remembered[robot * samples + sample];
-  }
-
   /** Row of the object that a robot carries, or -1. */
   cargo(robot) {
     const values = this.objects.at(this.frame);
