@@ -1,36 +1,34 @@
-"""ForageEnv: the arena as a PettingZoo environment. It works on arrays; only `reset` and `step` make dicts."""
+"""ForageEnv: the arena as a PettingZoo environment. It works on arrays; see `layer` for the dict API."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeAlias
+from math import isfinite
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium import spaces
 from pettingzoo import ParallelEnv
 
-from swarm_forage_env._internal.fields import as_whole, instance
+from swarm_forage_env._internal.fields import instance, whole
 from swarm_forage_env.contract.layout import ObservationLayout
-from swarm_forage_env.contract.policy import COMMANDS, ActionError, SwarmSpec
-from swarm_forage_env.contract.reset_and_step import as_actions, checked_gain, is_over, no_options, refuse_not_finite
+from swarm_forage_env.contract.policy import ActionError, SwarmSpec, as_actions, refused_action
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
+from swarm_forage_env.layer import BatchStep, SwarmLayer
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.world.rewards import RewardModel
 from swarm_forage_env.world.sensors import global_state
-from swarm_forage_env.world.snapshots import Origin, Snapshot, read, take
 from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
 
 if TYPE_CHECKING:
     from swarm_forage_env.rendering.window import Window
 
-BatchStep: TypeAlias = tuple[ObsArray, np.ndarray, BoolArray, bool]
-"""Observations (N, D), rewards (N,) float32, terminated (N,), truncated."""
 
-_STATE = ("_rewards", "_seeds", "_terminated", "agents", "seed_value")
-"""Attributes of a ForageEnv that are state; the arena holds the rest."""
+class NotResetError(RuntimeError, AttributeError):
+    """There is no world yet; an AttributeError, too, so that `hasattr(env, "active")` is False before a reset."""
 
 
-class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
+class ForageEnv(SwarmLayer, ParallelEnv[str, np.ndarray, np.ndarray]):
     """A swarm that forages: one agent per robot, named robot_0, robot_1, ...
 
     Observations are flat float32 rows in named slices (`env.layout`, printed by `env.layout.describe()`); actions are
@@ -71,18 +69,17 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"Expected render_mode None, 'rgb_array' or 'human', got {render_mode!r}.")
         if max_cycles is not None:
-            max_cycles = as_whole("max_cycles", max_cycles, at_least=1, or_none=True)
+            max_cycles = whole("max_cycles (or None)", max_cycles, at_least=1)
         self.scenario = scenario
         self.render_mode = render_mode
         self._window = _new_window() if render_mode == "human" else None
         self.max_cycles = scenario.horizon_ticks if max_cycles is None else max_cycles
         self.arena = ForagingArena(scenario, reads=reads)
-        self._reads = ("all",) if reads is None else tuple(sorted(set(reads)))
+        self.reads = ("all",) if reads is None else tuple(sorted(set(reads)))
         n_robots = scenario.robots.n_robots
         self._terminated = np.zeros(n_robots, np.bool_)
         self.possible_agents = [f"robot_{row}" for row in range(n_robots)]
         self.agents: list[str] = []
-        self._actions = np.zeros((n_robots, COMMANDS + scenario.robots.message_size), np.float32)
         self._seeds = np.random.default_rng()
         self.seed_value: int | None = None
         self._is_half_done = False
@@ -93,6 +90,11 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
     def unwrapped(self) -> "ForageEnv":
         """The environment itself, at the bottom of every stack."""
         return self
+
+    @property
+    def stack(self) -> tuple[()]:
+        """No wrappers are inside of the environment."""
+        return ()
 
     @property
     def layout(self) -> ObservationLayout:
@@ -107,18 +109,15 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         """(A,) float32 in [-1, 1]: left wheel, right wheel, gripper, message; one space object per agent."""
         return self._action_spaces[agent]
 
-    @cached_property  # like the spaces made when asked for: runs of a policy never look, and there may be a million
-    def _row_of(self) -> dict[str, int]:
-        return {agent: row for row, agent in enumerate(self.possible_agents)}
-
-    @cached_property
+    @cached_property  # made when asked for: runs of a policy never look, and there may be a million robots
     def _observation_spaces(self) -> dict[str, spaces.Box]:
         columns = self.layout.size
         return {agent: spaces.Box(-1.0, 1.0, (columns,), np.float32) for agent in self.possible_agents}
 
     @cached_property
     def _action_spaces(self) -> dict[str, spaces.Box]:
-        return {agent: spaces.Box(-1.0, 1.0, self._actions.shape[1:], np.float32) for agent in self.possible_agents}
+        columns = self.swarm_spec.action_size
+        return {agent: spaces.Box(-1.0, 1.0, (columns,), np.float32) for agent in self.possible_agents}
 
     @cached_property
     def state_space(self) -> spaces.Box:
@@ -148,7 +147,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
 
     def _require_reset(self) -> None:
         if self.seed_value is None:
-            raise RuntimeError(
+            raise NotResetError(
                 "There is no world before the first reset. Call reset before step, state, render or snapshot."
             )
 
@@ -161,11 +160,15 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
             )
 
     def break_off(self) -> None:
-        """Refuse every step and snapshot until a reset or a restore, because something failed in the middle of a tick.
+        """Refuse every step and snapshot until a reset or a restore; the state can be read as it is.
 
-        A sensor, a reward, a wrapper or a compiled policy of the user may. The state can be read as it is.
+        That is so from the begin of a tick to its end: whatever fails in between, Ctrl-C included, leaves it half done.
         """
         self._is_half_done = True
+
+    def make_whole(self) -> None:
+        """Take `break_off` back, at the end of a tick."""
+        self._is_half_done = False
 
     @property
     def swarm(self) -> SwarmState:
@@ -190,7 +193,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
     @property
     def active(self) -> BoolArray:
         """(N,) robots of the tasked swarm; read only."""
-        return self._world.swarm.active
+        return read_only(self._world.swarm.active)
 
     @property
     def tick(self) -> int:
@@ -205,7 +208,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
     @property
     def terminated(self) -> BoolArray:
         """(N,) robots that are dead for good; read only."""
-        return self._terminated
+        return read_only(self._terminated)
 
     @property
     def reward_model(self) -> RewardModel:
@@ -243,7 +246,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         if seed is None:
             seed = int(self._seeds.integers(2**31))
         else:
-            seed = as_whole("seed", seed, at_least=0, or_none=True)
+            seed = checked_seed(seed)
             self._seeds = np.random.default_rng(seed)
         self.break_off()  # should the reset fail
         obs = self.arena.reset(seed)
@@ -253,7 +256,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         self.seed_value = seed
         self._terminated[:] = False
         self.agents = list(self.possible_agents)
-        self._is_half_done = False
+        self.make_whole()
         if self._window is not None:
             self.render()
         return obs
@@ -267,19 +270,26 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         """
         self._require_reset()
         self.require_whole()
-        return as_actions(actions, len(self._actions), self.scenario.robots.message_size)
+        return as_actions(actions, len(self._terminated), self.scenario.robots.message_size)
 
     def refuse_bad_step(self, actions: ActionArray, wheel_gain: FloatArray | None) -> None:
-        """Refuse what the arena would refuse, for wrappers, which have to know it before they do anything.
+        """Refuse what the arena would refuse, for those who have to know it before they do anything.
 
         Args:
             actions: (N, A) as `checked_actions` returns them.
             wheel_gain: As in `step_batch`.
 
         Raises:
-            ActionError: a gain of the wrong shape, or an action or gain of an active robot that is not finite.
+            ActionError: an action or gain of an active robot that is not finite.
         """
-        refuse_not_finite(self.active, actions, checked_gain(wheel_gain, len(self._actions)))
+        # A sum of squares is finite only if all its numbers are; where it is not, which is rare, one looks at each.
+        if isfinite(np.vdot(actions, actions)) and (wheel_gain is None or isfinite(np.vdot(wheel_gain, wheel_gain))):
+            return
+        gain = np.ones((len(actions), 2)) if wheel_gain is None else wheel_gain
+        bad = self.active & ~(np.isfinite(actions).all(axis=1) & np.isfinite(gain).all(axis=1))
+        if bad.any():
+            row = int(np.argmax(bad))
+            raise refused_action(row, actions[row], gain[row])
 
     def step_batch(
         self,
@@ -301,178 +311,27 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
 
         Raises:
             ActionError: values that are not numbers, a wrong shape, or an action or gain of an active robot that is not
-                finite.
+                finite; the world was not stepped.
             RuntimeError: before the first reset, or after a step that failed half done.
-        """
-        actions, wheel_gain = self.begin_step(actions, wheel_gain)
-        self.arena.step(actions, wheel_gain=wheel_gain, tasks=tasks)
-        return self.end_step(tasks)
-
-    def begin_step(
-        self, actions: ActionArray, wheel_gain: FloatArray | None = None
-    ) -> tuple[ActionArray, FloatArray | None]:
-        """Do what comes before the arena's step, and return what the arena is to be stepped with.
-
-        `begin_step`, the arena's step and `end_step` are `step_batch`.
         """
         actions = self.checked_actions(actions)
         wheel_gain = checked_gain(wheel_gain, len(actions))
-        self._rewards.remember()
-        return actions, wheel_gain
+        self.break_off()
+        try:
+            step = self.advance(actions, wheel_gain, tasks)
+        except ActionError:
+            self.make_whole()
+            raise
+        self.make_whole()
+        return step
 
-    def end_step(self, tasks: CodeArray | None = None) -> BatchStep:
-        """Return the result of a step, after the arena's; see `step_batch`. `tasks` is for wrappers."""
+    def advance(self, actions: ActionArray, wheel_gain: FloatArray | None, tasks: CodeArray | None) -> BatchStep:
+        """Do what `step_batch` does with arguments that are checked; for whoever has begun a tick by `break_off`."""
+        self._rewards.remember()
+        obs = self.arena.step(actions, wheel_gain=wheel_gain, tasks=tasks)
         if self._window is not None:
             self.render()
-        return self.arena.obs, self._rewards.reward(), self._terminated, self.arena.tick >= self.max_cycles
-
-    # Snapshots
-
-    def snapshot(self) -> Snapshot:
-        """Return the state of the run as a value, which does not change when the run goes on; it can be pickled.
-
-        Random generators of the spaces are no part of it, nor attributes that a subclass adds.
-
-        Raises:
-            RuntimeError: before the first reset, or after a step that failed half done.
-            SnapshotError: physics is "chipmunk", whose bodies cannot be copied.
-        """
-        return self.snapshot_through(())
-
-    def restore(self, snapshot: Snapshot) -> dict[str, np.ndarray]:
-        """Go back to a snapshot, of this environment or of one that was made alike; returns observations per agent.
-
-        From here on the run goes on as it did from the snapshot, bit for bit, with the same actions. No reset is needed
-        before. Arrays that were taken from the environment earlier, such as `env.swarm.position`, are not updated.
-
-        Raises:
-            SnapshotError: not a snapshot, or one of another scenario or stack of wrappers; nothing changes.
-        """
-        return self.per_agent(self.restore_batch(snapshot))
-
-    def restore_batch(self, snapshot: Snapshot) -> ObsArray:
-        """Restore at array level: as `restore`, but returns observations (N, D), a buffer that the next step reuses."""
-        self.restore_through(snapshot, ())
-        return self.last_obs
-
-    def snapshot_through(self, wrappers: Sequence[Any]) -> Snapshot:
-        """Return a snapshot of a stack: this environment and the wrappers around it, outermost first."""
-        self.require_whole()
-        arena, seed = self._world, self.seed_value
-        assert seed is not None, "there is a world"
-        own = {name: getattr(self, name) for name in _STATE}
-        states = [own, dict(vars(arena)), *(wrapper.__getstate__() for wrapper in wrappers)]
-        return take(self._origin(wrappers), seed, self.tick, states, self._parts(wrappers))
-
-    def restore_through(self, snapshot: Snapshot, wrappers: Sequence[Any]) -> None:
-        """Restore a stack: this environment and the wrappers around it, outermost first."""
-        own, of_arena, *of_wrappers = read(snapshot, self._origin(wrappers), self._parts(wrappers))
-        vars(self).update(own)
-        self._is_half_done = False
-        vars(self.arena).update(of_arena)
-        for wrapper, state in zip(wrappers, of_wrappers, strict=True):
-            wrapper.__setstate__(state)
-
-    def _origin(self, wrappers: Sequence[Any]) -> Origin:
-        return Origin(
-            scenario=self.scenario,
-            max_cycles=self.max_cycles,
-            reads=self._reads,
-            wrappers=tuple((type(wrapper).__qualname__, wrapper.made_from) for wrapper in wrappers),
-        )
-
-    def _parts(self, wrappers: Sequence[Any]) -> list[object]:
-        """What a stack is made of, state aside."""
-        configs = (wrapper.made_from for wrapper in wrappers if wrapper.made_from is not None)
-        return [self, self.arena, self.scenario, self.layout, *wrappers, *configs]
-
-    # Dict level
-
-    def reset(
-        self, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, np.ndarray], dict[str, dict[str, Any]]]:
-        """Start a run; returns observations and infos per agent.
-
-        Raises:
-            ConfigError: there are `options`; this environment takes none.
-        """
-        no_options(options)
-        return self.reset_through(self.reset_batch, seed)
-
-    def step(
-        self, actions: dict[str, np.ndarray]
-    ) -> tuple[dict[str, np.ndarray], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
-        """Advance one tick with one action per agent in `agents`; without agents and actions nothing happens."""
-        return self.step_through(self.step_batch, actions)
-
-    def reset_through(
-        self, reset_batch: Callable[[int | None], ObsArray], seed: int | None
-    ) -> tuple[dict[str, np.ndarray], dict[str, dict[str, Any]]]:
-        """Reset by `reset_batch` (a wrapper's or our own) and unpack per agent."""
-        return self.per_agent(reset_batch(seed)), self._infos(self.agents)
-
-    def per_agent(self, obs: ObsArray) -> dict[str, np.ndarray]:
-        """Return copies of the rows of observations (N, D) by agent, of those in `agents`."""
-        rows = dict(zip(self.possible_agents, obs.copy(), strict=True))
-        return {agent: rows[agent] for agent in self.agents}
-
-    def step_through(
-        self, step_batch: Callable[[ActionArray], BatchStep], actions: dict[str, np.ndarray]
-    ) -> tuple[dict[str, np.ndarray], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
-        """Pack actions, step by `step_batch` (a wrapper's or our own) and unpack per agent."""
-        agents = self.agents
-        if is_over(agents, actions, is_reset=self.seed_value is not None):
-            return {}, {}, {}, {}, {}
-        obs, reward, terminated, truncated = step_batch(self._pack(actions))
-        # One copy of the whole batch; the agents' rows are views of it and stay valid.
-        rows = dict(zip(self.possible_agents, obs.copy(), strict=True))
-        rewards = dict(zip(self.possible_agents, reward.tolist(), strict=True))
-        terminations = dict(zip(self.possible_agents, terminated.tolist(), strict=True))
-        if len(agents) < len(self.possible_agents):
-            rows = {agent: rows[agent] for agent in agents}
-            rewards = {agent: rewards[agent] for agent in agents}
-            terminations = {agent: terminations[agent] for agent in agents}
-        truncations = dict.fromkeys(agents, truncated)
-        infos = self._infos(agents)
-        if truncated:
-            self.agents = []
-        elif terminated.any():
-            self.agents = [agent for agent in agents if not terminations[agent]]
-        return rows, rewards, terminations, truncations, infos
-
-    def _pack(self, actions: dict[str, np.ndarray]) -> ActionArray:
-        agents = self.agents
-        if not isinstance(actions, Mapping):
-            raise ActionError(f"Expected actions as a dict by agent, got {type(actions).__name__}.")
-        if actions.keys() != self._row_of.keys() and set(actions) != set(agents):
-            missing = [agent for agent in agents if agent not in actions]
-            foreign = [agent for agent in actions if agent not in agents]
-            raise ActionError(
-                f"Expected one action for each of the {len(agents)} agents in env.agents, "
-                f"missing {missing[:3] or 'none'}, not in env.agents {foreign[:3] or 'none'}."
-            )
-        packed = self._actions
-        complete = len(agents) == len(self.possible_agents)
-        size = packed.shape[1]
-        rows = packed if complete else np.empty((len(agents), size), np.float32)
-        try:
-            given = np.array([actions[agent] for agent in agents])  # a third of the time of numpy.stack
-            if given.shape != rows.shape:  # copying would spread single numbers
-                raise ValueError("another shape")
-            np.copyto(rows, given, casting="same_kind")
-        except (TypeError, ValueError) as error:
-            shapes = {np.shape(actions[agent]) for agent in agents}
-            raise ActionError(
-                f"Expected each action as {size} numbers, shape ({size},), got shapes {sorted(shapes)}: {error}."
-            ) from error
-        if not complete:
-            packed[:] = 0.0
-            packed[[self._row_of[agent] for agent in agents]] = rows
-        return packed
-
-    def _infos(self, agents: list[str]) -> dict[str, dict[str, Any]]:
-        active = dict(zip(self.possible_agents, self.active.tolist(), strict=True))
-        return {agent: {"active": active[agent]} for agent in agents}
+        return obs, self._rewards.reward(), self._terminated, self.arena.tick >= self.max_cycles
 
     def state(self) -> np.ndarray:
         """Global view of fixed size, (6 N + 3 M,) float32 in [-1, 1]; see `world.sensors`.
@@ -507,3 +366,23 @@ def _new_window() -> "Window":
     from swarm_forage_env.rendering.window import Window  # an optional extra, imported only for a window
 
     return Window()
+
+
+def read_only(array: np.ndarray) -> np.ndarray:
+    """Return a view of an array that nobody writes into by mistake."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+def checked_seed(seed: Any) -> int:
+    """Return the seed of a run; raises ConfigError unless it is a whole number of at least 0."""
+    return whole("seed (or None)", seed, at_least=0)
+
+
+def checked_gain(wheel_gain: FloatArray | None, n_robots: int) -> FloatArray | None:
+    """Return factors on the wheel speeds, (N, 2) or None; raises ActionError for another shape."""
+    expected = (n_robots, 2)
+    if wheel_gain is not None and np.shape(wheel_gain) != expected:
+        raise ActionError(f"Expected wheel_gain with shape (n_robots, 2) = {expected}, got {np.shape(wheel_gain)}.")
+    return wheel_gain

@@ -20,10 +20,10 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 
-from swarm_forage_env._internal.fields import text, whole
+from swarm_forage_env._internal.fields import Amount, Count, Name, Share, checked, read
 from swarm_forage_env._internal.files import read_json, replacing
-from swarm_forage_env._internal.typed import Amount, Count, Name, Within, typed
 from swarm_forage_env.contract.policy import sees_world
 from swarm_forage_env.policies.registry import file_of, is_policy_file, policy_class, policy_label
 from swarm_forage_env.runs.plan import Plan, Table, run_plan
@@ -54,7 +54,7 @@ class Training:
     def __post_init__(self) -> None:
         if self.worlds not in TRAINED_IN:
             raise BenchmarkError(f"Expected training worlds to be one of {', '.join(TRAINED_IN)}, got {self.worlds!r}.")
-        whole("decisions of a training", self.decisions, at_least=0, or_none=True)
+        checked("decisions of a training", self.decisions, Count | None)
 
     def check_track(self, protocol: Protocol, n_policies: int) -> None:
         """Refuse a training that does not fit its track.
@@ -110,7 +110,7 @@ class WorldRuns:
 
     performance: tuple[tuple[Amount, ...], ...]
     """Per 1,000 s."""
-    interference: tuple[tuple[Annotated[float, Within(at_least=0, at_most=1)], ...], ...]
+    interference: tuple[tuple[Share, ...], ...]
     """Share of robot time."""
 
 
@@ -123,7 +123,7 @@ class Entry:
     name: Name
     command: str
     """What makes it again."""
-    policies: Annotated[tuple[EntryPolicy, ...], Within(at_least=1)]
+    policies: Annotated[tuple[EntryPolicy, ...], Meta(min_length=1)]
     runs: Mapping[str, WorldRuns]
     """World -> its runs."""
     training: Training = field(default_factory=Training)
@@ -213,7 +213,7 @@ def read_entry(path: str | Path, protocol: Protocol | None = None) -> Entry:
     content = dict(read_json(Path(path), BenchmarkError))
     digest = content.pop("digest", None)
     try:
-        entry: Entry = typed(Entry, content, "")
+        entry: Entry = read(Entry, content)
     except ValueError as error:
         raise BenchmarkError(f"Cannot use the entry {path}: {error}") from error
     entry.check(protocol or load_protocol(), str(path))
@@ -268,7 +268,7 @@ def run_benchmark(
         ValueError: an unknown policy, or a file that cannot be opened.
         KeyboardInterrupt: Ctrl-C; finished runs are in `out`.
     """
-    text("the name of an entry", name)
+    checked("the name of an entry", name, Name)
     chosen, told = protocol or load_protocol(), training or Training()
     if name in PAPER_POLICIES and (tuple(policies) != (name,) or chosen.is_quick):
         raise BenchmarkError(

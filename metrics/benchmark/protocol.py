@@ -113,7 +113,7 @@ def load_protocol(file: str | Path | None = None, *, quick: bool = False) -> Pro
 
 
 def _protocol(content: Mapping[str, Any], *, quick: bool) -> Protocol:
-    from swarm_forage_env._internal.fields import known_keys, unique_names
+    from swarm_forage_env._internal.fields import ConfigError, known_keys
     from swarm_forage_env.runs.spec import identity_of
 
     known_keys(content, _KEYS, "key of a protocol")
@@ -130,7 +130,9 @@ def _protocol(content: Mapping[str, Any], *, quick: bool) -> Protocol:
     for entry in content["group"]:
         known_keys(entry, _GROUP_KEYS, prefix="group.")
         worlds += _of_group(entry, chosen)
-    unique_names("worlds", tuple(world.name for world in worlds))
+    names = [world.name for world in worlds]
+    if len(set(names)) < len(names):
+        raise ConfigError(f"Expected each world once, got {', '.join(names)}.")
     return Protocol(
         identity=identity_of({**content, "is_quick": quick}),
         is_quick=quick,
@@ -144,13 +146,12 @@ def _protocol(content: Mapping[str, Any], *, quick: bool) -> Protocol:
 
 
 def _scenario(entry: Mapping[str, Any], of_all: Mapping[str, Any]) -> "ScenarioConfig":
-    from swarm_forage_env._internal.fields import as_tuples
     from swarm_forage_env.scenarios.presets import scenario
 
     settings = {**of_all, **entry.get("set", {})}
     if "sources" in settings:
         settings |= {"placement": POSITIONS, "object_positions_m": _cell_middles(settings.pop("sources"))}
-    return scenario(entry["scenario"], **{name: as_tuples(value) for name, value in settings.items()})
+    return scenario(entry["scenario"], **settings)
 
 
 def _cell_middles(boxes: Sequence[Sequence[float]]) -> list[tuple[float, float]]:

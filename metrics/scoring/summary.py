@@ -102,7 +102,7 @@ class RunSummary(Answer):
         if n_worlds > 1:
             return f"{scenario.name} and others: {counted(n_worlds, 'world')}"
         sizes = counted(self.world.n_robots, "robot"), counted(scenario.objects.n_objects, "object")
-        return self.world.title(*sizes, f"{scenario.horizon_s:g} s", digests=False)
+        return self.world.title(*sizes, f"{scenario.horizon_s:g} s")
 
     def to_mapping(self) -> dict[str, Any]:
         """Return policies, runs and failures as plain values."""

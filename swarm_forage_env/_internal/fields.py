@@ -1,30 +1,60 @@
-"""Checks of the fields of configurations: functions that raise ConfigError where a value makes no sense.
+"""Values of configurations: types with bounds, declared once, that constructors and the reader of files check.
 
-Every message says "Expected <where> to be <what>, got <value>"; `where` is the name that people know the value by, such
-as `robots.n_robots`. A value of an unknown name is refused with the nearest known one.
+    @dataclass(frozen=True, kw_only=True, slots=True)
+    class Part(Checked):
+        called: ClassVar[str] = "part"
+        name: Name
+        shares: tuple[Share, ...] = ()
 
-Which numbers are accepted: fields of configurations are stored with runs as plain values, so they are Python's own int
-and float (numpy's float64 is a float, all its other numbers are not); a number of another kind is refused with a hint
-to convert it. True and False are no numbers. Arguments that are only used, such as a seed of a reset, may be numpy
-integers as well: `as_whole` takes both and returns an int.
+    Part(name="a", shares=(0.5, 1))                   # Part(name="a", shares=(0.5, 1.0))
+    read(Part, {"name": "a", "shares": [2]}, "part")  # ConfigError: Expected part.shares[0] to be a number ..., got 2.
+
+A value of another type is refused with the name that people know it by, and never guessed at; only a list becomes a
+tuple, a whole number a float, a number of numpy one of Python, and a table a dataclass, where that is declared.
 """
 
-import math
-import operator
-import sys
+import dataclasses
 from collections.abc import Iterable, Mapping
-from numbers import Integral, Real
-from typing import Any, cast
+from functools import cache
+from types import NoneType, UnionType
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias, Union, cast, get_args, get_origin, get_type_hints
 
-from swarm_forage_env._internal.wording import is_printable, nearest, shown, suggestion
+import msgspec
+import numpy as np
+from msgspec import Meta
 
-MAX_NAME = 60
-"""Longest name that files are named by (our choice: with four bytes a character, endings still fit into 255 bytes)."""
+from swarm_forage_env._internal.wording import nearest, shown, suggestion
+
 MOST = 1e15
 """Largest number of a configuration, and 1 over it the smallest that has to be above 0; our choice. All that is
 computed of such numbers, ticks and cells and squares, stays far from the ends of float and of 64-bit whole numbers."""
 MOST_SEEDS = 100_000
 """Runs of one kind that a command or a study may ask for; our choice: five hundred times those of the paper."""
+_UNSEEN = r"\x00-\x1f\x7f-\x9f\ud800-\udfff\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069"
+"""Characters that steer a terminal or the direction of writing, or that no encoding has."""
+
+Number: TypeAlias = Annotated[float, Meta(ge=-MOST, le=MOST, description="a finite number")]
+Positive: TypeAlias = Annotated[float, Meta(ge=1.0 / MOST, le=MOST, description="a finite number > 0")]
+Amount: TypeAlias = Annotated[float, Meta(ge=0.0, le=MOST, description="a finite number >= 0")]
+Share: TypeAlias = Annotated[float, Meta(ge=0.0, le=1.0)]
+Count: TypeAlias = Annotated[int, Meta(ge=0, le=int(MOST))]
+Whole: TypeAlias = Annotated[int, Meta(ge=1, le=int(MOST))]
+Name: TypeAlias = Annotated[
+    str, Meta(pattern=rf"^[^{_UNSEEN}]+\Z", description="a non-empty text without control characters")
+]
+FileName: TypeAlias = Annotated[
+    str,
+    Meta(
+        pattern=rf"^(?!\.)[^{_UNSEEN}/\\:\u200b-\u200f\u2028\u2029\u2060-\u206f\ufeff]{{1,60}}\Z",
+        description="at most 60 characters that can be a part of a file name, without / \\ : and no dot first",
+    ),
+]
+"""With four bytes a character, endings still fit into the 255 bytes of a name."""
+
+Several: TypeAlias = Annotated[tuple[Any, ...], Meta(min_length=1)]
+
+_WORDS = {float: "a number", int: "a whole number", bool: "True or False", str: "a text"}
+_SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 
 
 class ConfigError(ValueError):
@@ -35,147 +65,168 @@ class UnknownNameError(ConfigError, TypeError):
     """A name of a value that there is not; a TypeError, too, as Python's own of an unknown keyword argument."""
 
 
+class Checked:
+    """Base of frozen dataclasses whose values are checked, and converted, as their fields declare when one is made."""
+
+    __slots__ = ()
+    called: ClassVar[str] = ""
+    """What people know it by; put before the names of its fields in messages."""
+
+    def __post_init__(self) -> None:
+        where = f"{self.called}." if self.called else ""
+        for name, (kind, _) in _fields_of(type(self)).items():
+            object.__setattr__(self, name, checked(where + name, getattr(self, name), kind))
+        self.check()
+
+    def check(self) -> None:
+        """Refuse values that do not fit together; ConfigError."""
+
+
+def checked(where: str, value: Any, kind: Any) -> Any:
+    """Return a value as a declared type has it.
+
+    Args:
+        where: Name of the value, for the message.
+        value: What was given.
+        kind: A type with bounds, such as `Share`; one of several, `Literal` words, a tuple, a list or a mapping of such
+            types; a dataclass; a type of our own, of which it must be an instance.
+
+    Raises:
+        ConfigError: it is of another type, or out of bounds.
+    """
+    bare, notes = _apart(kind)
+    origin, parts = get_origin(bare), get_args(bare)
+    if isinstance(value, np.generic):
+        value = cast("Any", value.item())
+    if bare is Any or (isinstance(bare, type) and bare not in _WORDS and origin is None):
+        return _of_class(where, value, bare)
+    if origin is Literal:
+        one_of(where, value, parts)
+        return value
+    if origin in (Union, UnionType):
+        return _one_of_kinds(where, value, parts)
+    if origin is tuple:
+        return _listed(where, value, parts, notes)
+    if origin is list:
+        return list(_listed(where, value, (*parts, Ellipsis), notes))
+    if origin is not None:
+        return {key: checked(f"{where}.{key}", item, parts[-1]) for key, item in table(where, value).items()}
+    try:
+        return msgspec.convert(value, kind)
+    except msgspec.ValidationError:
+        raise ConfigError(f"Expected {where} to be {_wanted(bare, notes)}, got {shown(value)}.") from None
+
+
 def number(
     where: str,
     value: Any,
     *,
-    at_least: float = -math.inf,
-    above: float = -math.inf,
-    at_most: float = math.inf,
-    below: float = math.inf,
-) -> None:
-    """Refuse what is no finite number, or one out of range.
+    at_least: float | None = None,
+    above: float | None = None,
+    at_most: float | None = None,
+    below: float | None = None,
+) -> float:
+    """Return a number between bounds that only the caller knows; raises ConfigError otherwise."""
+    low: dict[str, Any] = {"ge": -MOST if at_least is None else at_least} if above is None else {"gt": above}
+    high: dict[str, Any] = {"le": MOST if at_most is None else at_most} if below is None else {"lt": below}
+    return checked(where, value, Annotated[float, Meta(**low, **high)])
+
+
+def whole(where: str, value: Any, *, at_least: int | None = None, at_most: int | None = None) -> int:
+    """Return a whole number between bounds that only the caller knows; raises ConfigError otherwise."""
+    return checked(where, value, Annotated[int, Meta(ge=at_least, le=int(MOST) if at_most is None else at_most)])
+
+
+def read(kind: type, given: Any, where: str = "") -> Any:
+    """Return a dataclass of the values of a table, as JSON and TOML have it.
 
     Args:
-        where: Name of the value, for the message.
-        value: What was given.
-        at_least: Smallest allowed value.
-        above: The value must be larger than this.
-        at_most: Largest allowed value.
-        below: The value must be smaller than this.
+        kind: The dataclass.
+        given: Its values by name; fields with a default may be missing.
+        where: Name of the table, for messages.
 
     Raises:
-        ConfigError: see above.
+        ConfigError: no table, an unknown name (with the nearest known one), a missing one, or a value that is refused.
     """
-    is_in_range = _is_number(value) and at_least <= value <= at_most and above < value < below
-    is_too_small = above == 0.0 and is_in_range and value < 1.0 / MOST
-    if not is_in_range or is_too_small or abs(value) > MOST:
-        wanted = _number_in_range(max(at_least, above), min(at_most, below), above >= at_least, below <= at_most)
-        if is_in_range:
-            wanted += f", no closer to 0 than {1.0 / MOST:g}" if is_too_small else f", at most {MOST:g} in size"
-        hint = _conversion_hint(value, Real, "float")
-        raise ConfigError(f"Expected {where} to be {wanted}, got {shown(value)}{hint}.")
+    own, prefix = _fields_of(kind), f"{where}." if where else ""
+    values = table(where or f"a {kind.__name__}", given)
+    known_keys(values, own, prefix=prefix)
+    missing = [name for name, (_, is_needed) in own.items() if is_needed and name not in values]
+    if missing:
+        raise ConfigError(f"Missing key {prefix + missing[0]!r}.")
+    return kind(**{name: checked(prefix + name, item, own[name][0]) for name, item in values.items()})
 
 
-def whole(
-    where: str, value: Any, *, at_least: int | None = None, at_most: int | None = None, or_none: bool = False
-) -> None:
-    """Refuse what is no whole number, or one out of range.
-
-    Args:
-        where: Name of the value, for the message.
-        value: What was given.
-        at_least: Smallest allowed value.
-        at_most: Largest allowed value.
-        or_none: Whether None is allowed, too.
-
-    Raises:
-        ConfigError: see above.
-    """
-    if or_none and value is None:
-        return
-    is_whole = isinstance(value, int) and not isinstance(value, bool) and _is_between(value, at_least, at_most)
-    is_too_large = is_whole and at_most is None and abs(value) > MOST
-    if not is_whole or is_too_large:
-        wanted = _whole_in_range(at_least, at_most, or_none)
-        wanted += f", at most {MOST:,.0f} in size" if is_too_large else ""
-        hint = _conversion_hint(value, Integral, "int")
-        raise ConfigError(f"Expected {where} to be {wanted}, got {shown(value)}{hint}.")
+@cache
+def _fields_of(kind: Any) -> Mapping[str, tuple[Any, bool]]:
+    """Field of a dataclass -> its type, and whether it must be given."""
+    hints, lacking = get_type_hints(kind, include_extras=True), dataclasses.MISSING
+    return {
+        item.name: (hints[item.name], item.default is lacking and item.default_factory is lacking)
+        for item in dataclasses.fields(kind)
+    }
 
 
-def as_whole(where: str, value: Any, *, at_least: int, at_most: int | None = None, or_none: bool = False) -> int:
-    """Return a whole number, one of numpy's included, as an int; for arguments that no configuration stores.
-
-    Args:
-        where: Name of the value, for the message.
-        value: What was given.
-        at_least: Smallest allowed value.
-        at_most: Largest allowed value.
-        or_none: Whether the message says that the caller takes None, too.
-
-    Raises:
-        ConfigError: no whole number, or one out of range.
-    """
-    is_whole = not isinstance(value, bool) and isinstance(value, Integral)
-    if not (is_whole and _is_between(operator.index(value), at_least, at_most)):
-        raise ConfigError(f"Expected {where} to be {_whole_in_range(at_least, at_most, or_none)}, got {shown(value)}.")
-    return operator.index(value)
+def _of_class(where: str, value: Any, kind: Any) -> Any:
+    if kind is Any or isinstance(value, kind):
+        return value
+    if dataclasses.is_dataclass(kind) and isinstance(value, Mapping):
+        return read(cast("type", kind), value, where)
+    raise _no_instance(where, value, kind)
 
 
-def switch(where: str, value: Any) -> None:
-    """Refuse what is neither True nor False."""
-    if not isinstance(value, bool):
-        raise ConfigError(f"Expected {where} to be True or False, got {shown(value)}.")
+def _one_of_kinds(where: str, value: Any, kinds: tuple[Any, ...]) -> Any:
+    if value is None and NoneType in kinds:
+        return None
+    others = [kind for kind in kinds if kind is not NoneType]
+    refusals: list[ConfigError] = []
+    for kind in others:
+        try:
+            return checked(where, value, kind)
+        except ConfigError as error:
+            refusals.append(error)
+            if dataclasses.is_dataclass(kind) and isinstance(value, Mapping):
+                raise
+    if len(refusals) == 1:
+        raise refusals[0]
+    wanted = " or ".join(_wanted(*_apart(kind)) for kind in others)
+    raise ConfigError(f"Expected {where} to be {wanted}, got {shown(value)}.")
 
 
-def text(where: str, value: Any) -> None:
-    """Refuse what is no text, an empty one, or one that no terminal and no file shows as it is."""
-    if not isinstance(value, str) or not value or not is_printable(value):
-        raise ConfigError(f"Expected {where} to be a non-empty text without control characters, got {shown(value)}.")
+def _apart(kind: Any) -> tuple[Any, tuple[Any, ...]]:
+    """Return a type without its notes, and the notes."""
+    return (kind.__origin__, kind.__metadata__) if get_origin(kind) is Annotated else (kind, ())
 
 
-def check_file_name(where: str, value: Any) -> None:
-    """Refuse what is no text that can be a part of a file name: it would lead files of results to other folders."""
-    text(where, value)
-    if value.startswith(".") or len(value) > MAX_NAME or not value.isprintable() or any(c in value for c in "/\\:"):
-        raise ConfigError(
-            f"Expected {where} to be at most {MAX_NAME} characters that can be a part of a file name, without / \\ : "
-            f"and no dot first, got {value[: 2 * MAX_NAME]!r}."
+def _listed(where: str, value: Any, parts: tuple[Any, ...], notes: tuple[Meta, ...]) -> tuple[Any, ...]:
+    if not isinstance(value, list | tuple):
+        raise ConfigError(f"Expected {where} to be a list, got {shown(value)}.")
+    given = cast("list[Any] | tuple[Any, ...]", value)
+    is_long = parts[-1] is Ellipsis
+    least, most = len(parts), len(parts)
+    if is_long:
+        least = max([0, *(note.min_length for note in notes if note.min_length)])
+        most = min([len(given), *(note.max_length for note in notes if note.max_length)])
+    if not least <= len(given) <= most:
+        wanted = (
+            f"{least} entries" if least == most else f"at least {least}" if len(given) < least else f"at most {most}"
         )
+        raise ConfigError(f"Expected {where} to have {wanted}, got {len(given)}: {shown(value)}.")
+    kinds = parts[:1] * len(given) if is_long else parts
+    return tuple(checked(f"{where}[{k}]", item, kind) for k, (kind, item) in enumerate(zip(kinds, given, strict=True)))
 
 
-def unique_names(where: str, value: Any) -> None:
-    """Check a tuple of names, none of them twice; raises ConfigError."""
-    parts = _parts(value)
-    if not isinstance(value, tuple) or not all(isinstance(name, str) and name for name in parts):
-        raise ConfigError(f"Expected {where} as a tuple of names, such as ('one', 'two'), got {value!r}.")
-    if len(set(parts)) < len(parts):
-        raise ConfigError(f"Expected each name once in {where}, got {value!r}.")
-
-
-def pair(where: str, value: Any) -> None:
-    """Refuse what is no tuple (x, y) of numbers > 0."""
-    parts = _parts(value)
-    if len(parts) != 2:
-        raise ConfigError(f"Expected {where} to be (x, y), got {shown(value)}.")
-    for index, part in enumerate(parts):
-        number(f"{where}[{index}]", part, above=0.0)
-
-
-def pairs(where: str, value: Any) -> None:
-    """Refuse what is no tuple of tuples (x, y) of numbers > 0; it may be empty."""
-    if not isinstance(value, tuple):
-        raise ConfigError(f"Expected {where} to be a tuple of places (x, y), got {shown(value)}.")
-    for index, part in enumerate(_parts(value)):
-        pair(f"{where}[{index}]", part)
-
-
-def as_tuples(value: Any) -> Any:
-    """Return lists, the only sequences of TOML and JSON, as the tuples of configurations, and all else as it is."""
-    return tuple(map(as_tuples, cast("list[Any]", value))) if isinstance(value, list) else value
-
-
-def shares(where: str, value: Any) -> None:
-    """Refuse what is no tuple of positive numbers that sum to 1."""
-    parts = _parts(value)
-    if not all(_is_number(part) and part > 0 for part in parts) or abs(sum(parts) - 1.0) >= 1e-9:
-        raise ConfigError(f"Expected {where} to be positive shares that sum to 1, got {shown(value)}.")
-
-
-def several(where: str, value: Any, what: str) -> None:
-    """Refuse what is no tuple, or an empty one; `what` names its members, for the message."""
-    if not _parts(value):
-        raise ConfigError(f"Expected {where} to be one or more {what}, got {shown(value)}.")
+def _wanted(bare: Any, notes: Iterable[Meta]) -> str:
+    """Return a declared type in words."""
+    words = _WORDS.get(bare, f"a {bare.__name__}")
+    for note in notes:
+        if note.description:
+            return note.description
+        if note.ge is not None and note.le is not None and note.ge > -MOST and note.le < MOST:
+            return f"{words} from {note.ge:,.15g} to {note.le:,.15g}"
+        limits = [(sign, getattr(note, name)) for name, sign in _SIGNS.items()]
+        words += " and".join(f" {sign} {at:,.15g}" for sign, at in limits if at is not None and abs(at) < MOST)
+    return words
 
 
 def one_of(where: str, value: Any, known: Iterable[str]) -> None:
@@ -189,8 +240,12 @@ def one_of(where: str, value: Any, known: Iterable[str]) -> None:
 def instance(where: str, value: Any, kind: type, *, hint: str = "") -> None:
     """Refuse what is no instance of `kind`; `hint` follows what was given and says what to do."""
     if not isinstance(value, kind):
-        article = "an" if kind.__name__[0] in "AEIOU" else "a"
-        raise ConfigError(f"Expected {where} to be {article} {kind.__name__}, got {shown(value)}{hint}.")
+        raise _no_instance(where, value, kind, hint)
+
+
+def _no_instance(where: str, value: Any, kind: Any, hint: str = "") -> ConfigError:
+    article = "an" if kind.__name__[0] in "AEIOU" else "a"
+    return ConfigError(f"Expected {where} to be {article} {kind.__name__}, got {shown(value)}{hint}.")
 
 
 def table(where: str, value: Any) -> Mapping[str, Any]:
@@ -200,7 +255,7 @@ def table(where: str, value: Any) -> Mapping[str, Any]:
     return cast("Mapping[str, Any]", value)
 
 
-def known_keys(mapping: Mapping[str, Any], known: Iterable[str], what: str = "key", *, prefix: str = "") -> None:
+def known_keys(mapping: Iterable[str], known: Iterable[str], what: str = "key", *, prefix: str = "") -> None:
     """Refuse keys that are not among `known`.
 
     Args:
@@ -235,44 +290,3 @@ def known_name(what: str, name: Any, known: Iterable[str], *, all_by: str = "") 
         near = nearest(str(name), names)
         others = (f"Near it: {', '.join(near)}. " if near[1:] else "") + f"All {len(names)}: {all_by}."
     raise ConfigError(f"Unknown {what} {name!r}.{suggestion(str(name), names)} {others}")
-
-
-def _is_number(value: Any) -> bool:
-    # Compared, not asked with math.isfinite, which fails for whole numbers too large for a float.
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
-
-
-def _is_between(value: int, at_least: int | None, at_most: int | None) -> bool:
-    return (at_least is None or value >= at_least) and (at_most is None or value <= at_most)
-
-
-def _parts(value: Any) -> tuple[Any, ...]:
-    """Return the members of a tuple; nothing else has any."""
-    return cast("tuple[Any, ...]", value) if isinstance(value, tuple) else ()
-
-
-def _conversion_hint(value: Any, kind: type, converter: str) -> str:
-    is_foreign = isinstance(value, kind) and not isinstance(value, int | float)
-    return f"; convert it with {converter}()" if is_foreign else ""
-
-
-def _number_in_range(low: float, high: float, is_low_open: bool, is_high_open: bool) -> str:
-    has_low, has_high = low > -math.inf, high < math.inf
-    if has_low and has_high:
-        return f"a number in {'(' if is_low_open else '['}{low:g}, {high:g}{')' if is_high_open else ']'}"
-    if has_low:
-        return f"a finite number {'>' if is_low_open else '>='} {low:g}"
-    if has_high:
-        return f"a finite number {'<' if is_high_open else '<='} {high:g}"
-    return "a finite number"
-
-
-def _whole_in_range(at_least: int | None, at_most: int | None, or_none: bool) -> str:
-    wanted = "a whole number"
-    if at_least is not None and at_most is not None:
-        wanted += f" from {at_least:,} to {at_most:,}"
-    elif at_least is not None:
-        wanted += f" >= {at_least}"
-    elif at_most is not None:
-        wanted += f" <= {at_most}"
-    return f"{wanted} or None" if or_none else wanted

@@ -13,10 +13,6 @@ _MOST_SHOWN = 200
 """Characters of a value that a message shows; our choice: two lines of a terminal."""
 _UNSEEN = ("Cc", "Cf", "Cs")
 """Unicode categories of characters that steer a terminal, that nobody sees, or that no encoding has."""
-_REFUSED = ("Cc", "Cs")
-"""Those that no text may have. Others that nobody sees are part of ordinary words, such as U+200C in Persian."""
-_TURNING = frozenset("\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
-"""Characters that steer the direction of writing, Bidi_Control of Unicode; those of `metrics.scoring.curves_file`."""
 _NOTHING = "<!-- -->"
 """Nothing, in Markdown."""
 _MOST_NEAR = 4
@@ -110,11 +106,6 @@ def limits(lower: float, upper: float) -> str:
 def plain(value: float | None) -> float | None:
     """Return the value, or None where JSON has no such number."""
     return value if value is not None and math.isfinite(value) else None
-
-
-def is_printable(text: str) -> bool:
-    """Return whether a text is one line that shows as what it is: no control characters, no broken encoding."""
-    return not any(unicodedata.category(character) in _REFUSED or character in _TURNING for character in text)
 
 
 def printable(text: str) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from swarm_forage_env._internal.fields import ConfigError, as_tuples
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import as_file_name
 from swarm_forage_env.cli.options import WorldOptions
 from swarm_forage_env.policies.registry import policy_label
@@ -82,10 +82,8 @@ def parse_setting(word: str) -> tuple[str, Any]:
     if not equals:
         raise ConfigError(f"Expected --set key=value, got {word!r}.")
     if name in LISTS_OF_PLACES:
-        return name, tuple(
-            as_tuples([_value(number) for number in place.split(",")]) for place in text.split("+") if place
-        )
-    return name, as_tuples(_value(text))
+        return name, [[_value(number) for number in place.split(",")] for place in text.split("+") if place]
+    return name, _value(text)
 
 
 def _value(text: str) -> Any:

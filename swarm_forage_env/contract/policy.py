@@ -7,7 +7,7 @@ A policy, scripted or trained, sees observations and never the state of the worl
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -46,6 +46,46 @@ def refused_tasks(tasks: CodeArray, n_robots: int) -> ValueError:
         f"Expected tasks with shape (n_robots,) = ({n_robots},) and codes of Task (0 to {len(Task) - 1}), "
         f"got shape {tasks.shape} with codes {np.unique(tasks).tolist()}."
     )
+
+
+def as_actions(actions: ActionArray, n_robots: int, message_size: int = 0) -> ActionArray:
+    """Return `actions` as a contiguous (N, A) float32 array, the same array if it is one; values are not checked.
+
+    Args:
+        actions: (N, A); where robots can say something, also (N, 3), which says zeros.
+        n_robots: N.
+        message_size: Numbers that a robot may say, A - 3.
+
+    Raises:
+        ActionError: values that are not numbers, or another shape.
+    """
+    expected = (n_robots, COMMANDS + message_size)
+    columns = f"{COMMANDS} + message_size" if message_size else f"{COMMANDS}"
+    wanted = f"Expected actions with shape (n_robots, {columns}) = {expected}"
+    try:
+        checked = real_numbers(actions)
+    except (TypeError, ValueError) as error:
+        raise ActionError(f"{wanted}: {error}.") from error
+    if message_size and checked.shape == (n_robots, COMMANDS):
+        return np.pad(checked, ((0, 0), (0, message_size)))
+    if checked.shape != expected:
+        raise ActionError(f"{wanted}, got {checked.shape}; pass one row per robot, inactive ones included.")
+    return checked
+
+
+def real_numbers(values: Any) -> np.ndarray:
+    """Return real numbers as a contiguous float32 array, the same array if it is one.
+
+    Kernels are compiled for such arrays only; another type would have all compiled anew.
+
+    Raises:
+        TypeError: text, dates or complex numbers, which numpy would convert, too.
+        ValueError: no array.
+    """
+    given = np.asarray(values)
+    if given.dtype.kind not in "biufO":  # objects say themselves whether they are numbers
+        raise TypeError(f"real numbers are needed, not {given.dtype}")
+    return np.ascontiguousarray(given, np.float32)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

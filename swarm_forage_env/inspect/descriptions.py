@@ -89,7 +89,7 @@ def _lines(name: str) -> Iterator[str]:
         yield from _file_lines(Path(file_of(name)))
     elif Path(name).suffix == FILE:
         world = read_world(name)
-        yield from _scenario_lines(world.scenario, world.title(digests=False))
+        yield from _scenario_lines(world.scenario, world.title())
     else:
         known_name("scenario or policy", name, (*presets.SCENARIO_NAMES, *POLICIES))
         if name in presets.PRESETS:

@@ -92,7 +92,7 @@ def record_run(
         name = getattr(policy, "name", type(policy).__name__)
         given = given.with_caches(caches or stated_caches(policy))
     scenario = given.scenario
-    title = given.title(name, f"{scenario.arena.width_m:g} x {scenario.arena.height_m:g} m", digests=False)
+    title = given.title(name, f"{scenario.arena.width_m:g} x {scenario.arena.height_m:g} m")
     stack = build_env(scenario, given.wrappers, reads=getattr(policy, "reads", None))
     trails = Trails(scenario.robots.n_robots, n_samples) if n_samples > 1 else None
 

@@ -10,13 +10,14 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property, lru_cache
-from typing import Any, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias, get_args
 
 import numpy as np
 from gymnasium import spaces
+from msgspec import Meta
 
 from swarm_forage_env._internal.compiling import Callback, Calls
-from swarm_forage_env._internal.fields import ConfigError, known_keys, number, one_of, switch, whole
+from swarm_forage_env._internal.fields import Checked, ConfigError, Count, Positive, Whole, known_keys
 from swarm_forage_env._internal.held import hold
 from swarm_forage_env.contract.kernel_policy import example_of
 from swarm_forage_env.contract.layout import (
@@ -49,8 +50,10 @@ from swarm_forage_env.policies.kernels.network import carry_out, keep_on, see
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.presets import scenario
 
-OBSERVATIONS = ("full", "compact")
-ACTIONS = ("continuous", "discrete")
+Observation: TypeAlias = Literal["full", "compact"]
+OBSERVATIONS = get_args(Observation)
+Actions: TypeAlias = Literal["continuous", "discrete"]
+ACTIONS = get_args(Actions)
 EXTRA = "extra"
 """Name of the slice with the columns of the user's `extra_observation`."""
 MOST_EXTRA_COLUMNS = 1024
@@ -63,55 +66,47 @@ GRIPS = tuple(GRIP_COMMANDS)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class InterfaceConfig:
+class InterfaceConfig(Checked):
     """Choices of a learner, plain values.
 
     Raises:
         ConfigError: an unknown word, or a number of ticks below 1.
     """
 
-    observation: str = "full"
+    called: ClassVar[str] = "interface"
+
+    observation: Observation = "full"
     """"full": the (D,) row of the environment; "compact": the columns of `compact_layout`."""
-    actions: str = "continuous"
+    actions: Actions = "continuous"
     """"continuous": left wheel, right wheel, unless automatic gripper, and the message, in [-1, 1]; "discrete": a
     number, see `MOTIONS` and `GRIPS`."""
     automatic_gripper: bool = False
     """Grasp when empty and over an object or a cache, deliver when carrying in the nest; the learner only drives."""
-    decision_ticks: int = 1
+    decision_ticks: Whole = 1
     """Ticks for which an action is kept; rewards add up. An automatic gripper decides in every tick."""
-    neighbours_seen: int | None = None
+    neighbours_seen: Count | None = None
     """How many neighbours the learner sees, as many as its scenario shows, or 0. Where nothing is said (None),
     environments and trainings fill in those of their scenario, and a policy sees none."""
-    neighbour_range_m: float | None = None
+    neighbour_range_m: Positive | None = None
     """How far it sees them: what a column of 1.0 means. None: as for `neighbours_seen`."""
-    message_size: int | None = None
+    message_size: Count | None = None
     """Numbers of the messages that the learner sends and hears, as many as in its scenario, or 0: it says zeros and
     hears nothing. None: as for `neighbours_seen`. Messages need continuous actions."""
     site_memory: bool = False
     """Two places that a robot remembers, see `policies.kernels.learner`: eight more columns."""
-    frame_decisions: int = 0
+    frame_decisions: Count = 0
     """Decisions for which each robot sees the world in a frame of its own, turned and mirrored in one of eight ways,
     before it takes another, see `policies.kernels.frames`. 0: all see the world as it is."""
-    extra_columns: int = 0
+    extra_columns: Annotated[int, Meta(ge=0, le=MOST_EXTRA_COLUMNS)] = 0
     """Columns K of the user's `extra_observation`, which come last; environments and trainings fill them in."""
 
-    def __post_init__(self) -> None:
-        one_of("interface.observation", self.observation, OBSERVATIONS)
-        one_of("interface.actions", self.actions, ACTIONS)
-        switch("interface.automatic_gripper", self.automatic_gripper)
-        whole("interface.decision_ticks", self.decision_ticks, at_least=1)
-        for name in ("neighbours_seen", "message_size"):
-            whole(f"interface.{name}", getattr(self, name), at_least=0, or_none=True)
-        if self.neighbour_range_m is not None:
-            number("interface.neighbour_range_m", self.neighbour_range_m, above=0.0)
+    def check(self) -> None:
+        """Refuse messages of discrete actions, and frames of what only its author can turn."""
         if self.message_size and self.actions != "continuous":
             raise ConfigError(
                 f"Expected interface.actions 'continuous' for messages of {self.message_size} numbers, got "
                 f"{self.actions!r}; choose continuous actions, or message_size=0 for a learner without messages."
             )
-        switch("interface.site_memory", self.site_memory)
-        whole("interface.frame_decisions", self.frame_decisions, at_least=0)
-        whole("interface.extra_columns", self.extra_columns, at_least=0, at_most=MOST_EXTRA_COLUMNS)
         if self.extra_columns and self.frame_decisions:
             raise ConfigError(
                 f"Expected interface.frame_decisions of 0 beside extra_observation, because only its author knows what "

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from swarm_forage_env._internal.fields import ConfigError, one_of, switch, table
+from swarm_forage_env._internal.fields import ConfigError, checked, one_of, table
 from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ObsArray
@@ -173,7 +173,7 @@ def _read_note(note: Any, name: str) -> tuple[InterfaceConfig, str, bool]:
         values = table("it", note)
         interface = interface_from_mapping(table("interface", values.get("interface")))
         one_of("caches", values.get("caches"), CACHE_KINDS)
-        switch("samples", values.get("samples"))
+        checked("samples", values.get("samples"), bool)
     except ConfigError as error:
         raise ModelError(f"Cannot use the note in {name}: {error}") from error
     return interface, values["caches"], values["samples"]

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from swarm_forage_env._internal.archives import ArchiveError, read_arrays
-from swarm_forage_env._internal.fields import ConfigError, known_keys, number, one_of, switch, table
+from swarm_forage_env._internal.fields import ConfigError, checked, known_keys, number, one_of, table
 from swarm_forage_env._internal.files import parse_json, replacing
 from swarm_forage_env.contract.kernel_policy import KernelPolicy
 from swarm_forage_env.contract.policy import SwarmSpec
@@ -61,7 +61,7 @@ class NetworkAbout:
     def __post_init__(self) -> None:
         one_of("activation", self.activation, ACTIVATIONS)
         one_of("caches", self.caches, CACHE_KINDS)
-        switch("samples", self.samples)
+        checked("samples", self.samples, bool)
 
     def to_json(self) -> str:
         """Return the text that files hold."""

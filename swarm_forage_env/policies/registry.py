@@ -12,8 +12,7 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.wording import suggestion
-from swarm_forage_env.contract.policy import Policy, SwarmSpec
-from swarm_forage_env.contract.reset_and_step import real_numbers
+from swarm_forage_env.contract.policy import Policy, SwarmSpec, real_numbers
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.policies import trust
 

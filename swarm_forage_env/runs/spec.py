@@ -9,7 +9,7 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from swarm_forage_env._internal.fields import ConfigError, instance, known_keys, one_of, table, whole
+from swarm_forage_env._internal.fields import ConfigError, instance, known_keys, one_of, read, table, whole
 from swarm_forage_env.policies.registry import (
     file_of,
     from_callable,
@@ -20,7 +20,7 @@ from swarm_forage_env.policies.registry import (
     policy_label,
     whole_path,
 )
-from swarm_forage_env.scenarios.config import CACHE_KINDS, ScenarioConfig, from_mapping, to_mapping, whole_intervals
+from swarm_forage_env.scenarios.config import CACHE_KINDS, ScenarioConfig, to_mapping, whole_intervals
 from swarm_forage_env.wrappers.registry import wrapper_config_class, wrapper_configs
 from swarm_forage_env.wrappers.world import UNDISTURBED, World, WorldLike, world_of
 
@@ -126,7 +126,7 @@ class RunSpec:
             raise ConfigError(f"Missing key {missing[0]!r} in a run specification.")
         values = dict(mapping)
         world = World(
-            from_mapping(ScenarioConfig, values.pop("scenario"), where="scenario."),
+            read(ScenarioConfig, values.pop("scenario"), "scenario"),
             wrappers_from_list(values.pop("wrappers", ())),
             criterion=values.pop("criterion", UNDISTURBED),
             value=values.pop("criterion_value", 0.0),

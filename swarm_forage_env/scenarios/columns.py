@@ -30,6 +30,16 @@ def _total(unit: str, meaning: str, words: str = "") -> Column:
     return Column("amount", unit, meaning, is_total=True, words=words)
 
 
+def _mean(unit: str, meaning: str, words: str = "") -> Column:
+    return Column("amount", unit, meaning, words=words)
+
+
+def _share(meaning: str) -> Column:
+    return Column("fraction", "1", meaning)
+
+
+_TASKS = ("generalist", "harvester", "collector", "starter", "finisher", "transferer", "cache_collector")
+
 KEY_COLUMNS: Mapping[str, Column] = {
     "run_id": Column("text", "", "hash of the run's specification"),
     "scenario": Column("text", "", "name of the scenario"),
@@ -43,7 +53,7 @@ KEY_COLUMNS: Mapping[str, Column] = {
 
 INTERVAL_COLUMNS: Mapping[str, Column] = {
     "interval": Column("whole", "", "index of the interval, from 0"),
-    "t_end_s": Column("amount", "s", "end of the interval"),
+    "t_end_s": _mean("s", "end of the interval"),
     "performance": Column("amount", "", "what `performance` of the scenario names, in its unit"),
     "collected": _total("objects", "delivered to the nest", "deliveries"),
     "first_picked": _total("objects", "picked up that no robot had carried since they were placed", "first pick-ups"),
@@ -56,20 +66,12 @@ INTERVAL_COLUMNS: Mapping[str, Column] = {
     "caches_created": _total("caches", "created"),
     "caches_depleted": _total("caches", "dissolved because one object was left"),
     "interference_ticks": _total("robot-ticks", "active robots in interference, summed over ticks"),
-    "interference_fraction": Column("fraction", "1", "share of active robots in interference, mean over ticks"),
-    "n_active": Column(
-        "amount", "robots", "mean over ticks of the tasked swarm: present and not in repair", words="robots at work"
-    ),
-    "n_present": Column(
-        "amount", "robots", "mean over ticks of robots that are born and alive", words="robots present"
-    ),
-    "n_carrying": Column(
-        "amount", "robots", "mean over ticks of active robots that carry an object", words="robots carrying"
-    ),
-    "n_caches": Column("amount", "caches", "mean over ticks", words="caches"),
-    "n_objects_cached": Column(
-        "amount", "objects", "mean over ticks of objects inside caches", words="objects in caches"
-    ),
+    "interference_fraction": _share("share of active robots in interference, mean over ticks"),
+    "n_active": _mean("robots", "mean over ticks of the tasked swarm: present and not in repair", "robots at work"),
+    "n_present": _mean("robots", "mean over ticks of robots that are born and alive", "robots present"),
+    "n_carrying": _mean("robots", "mean over ticks of active robots that carry an object", "robots carrying"),
+    "n_caches": _mean("caches", "mean over ticks", "caches"),
+    "n_objects_cached": _mean("objects", "mean over ticks of objects inside caches", "objects in caches"),
     "adversity": Column(
         "number", "1 or ticks", "mean over ticks of a throttle, else of the ticks that handling takes, else 0"
     ),
@@ -83,44 +85,30 @@ CONTRIBUTED_COLUMNS: Mapping[str, Column] = {
     "interference_ticks_near_caches": _total(
         "robot-ticks", f"those of interference_ticks within {NEAR_CACHE_M:g} m of the centre of a cache"
     ),
-    "n_searching": Column(
-        "amount",
+    "n_searching": _mean(
         "robots",
         "mean over ticks of active robots that neither avoid, nor handle an object, nor carry one",
-        words="robots searching",
+        "robots searching",
     ),
-    "n_homing": Column(
-        "amount",
+    "n_homing": _mean(
         "robots",
         "the same of robots that carry an object, to the nest or elsewhere, and neither avoid nor handle it",
-        words="robots homing",
+        "robots homing",
     ),
-    "n_handling": Column(
-        "amount",
-        "robots",
-        "the same of robots in a pick-up or a drop away from caches, and not avoiding",
-        words="robots handling",
+    "n_handling": _mean(
+        "robots", "the same of robots in a pick-up or a drop away from caches, and not avoiding", "robots handling"
     ),
-    "n_at_caches": Column(
-        "amount",
+    "n_at_caches": _mean(
         "robots",
         "the same of robots in a pick-up from a cache or a drop into one, their wait for their turn included",
-        words="robots waiting at caches",
+        "robots waiting at caches",
     ),
-    "task_share_none": Column("fraction", "1", "mean over ticks of the share of active robots without a task"),
-    "task_share_generalist": Column("fraction", "1", "the same for the task Generalist"),
-    "task_share_harvester": Column("fraction", "1", "the same for the task Harvester"),
-    "task_share_collector": Column("fraction", "1", "the same for the task Collector"),
-    "task_share_starter": Column("fraction", "1", "the same for the task Cache Starter"),
-    "task_share_finisher": Column("fraction", "1", "the same for the task Cache Finisher"),
-    "task_share_transferer": Column("fraction", "1", "the same for the task Cache Transferer"),
-    "task_share_cache_collector": Column("fraction", "1", "the same for the task Cache Collector"),
+    "task_share_none": _share("mean over ticks of the share of active robots without a task"),
+    **{f"task_share_{task}": _share(f"the same for the task {task.replace('_', ' ')}") for task in _TASKS},
     "throttle": Column("number", "1", "waveform V(t) of the throttle at the last tick of the interval"),
     "throttle_mean": Column("number", "1", "waveform V(t) of the throttle, mean over the ticks of the interval"),
-    "believed_interference_fraction": Column(
-        "fraction",
-        "1",
-        "share of active robots that see an obstacle under sensor noise, false ones included, mean over ticks",
+    "believed_interference_fraction": _share(
+        "share of active robots that see an obstacle under sensor noise, false ones included, mean over ticks"
     ),
     "handling_cost": Column(
         "number", "ticks", "mean ticks of a pick-up and a drop that start in the last tick of the interval"
@@ -130,19 +118,15 @@ CONTRIBUTED_COLUMNS: Mapping[str, Column] = {
     "births": _total("robots", "that were born"),
     "malfunctions": _total("robots", "that went into repair"),
     "repairs": _total("robots", "that came back from repair"),
-    "n_in_repair": Column("amount", "robots", "length of the repair queue, mean over ticks", words="robots in repair"),
-    "time_at_work_s": Column(
-        "amount", "s", "mean length of the stays in the tasked swarm that ended in the interval; 0 = none ended"
+    "n_in_repair": _mean("robots", "length of the repair queue, mean over ticks", "robots in repair"),
+    "time_at_work_s": _mean(
+        "s", "mean length of the stays in the tasked swarm that ended in the interval; 0 = none ended"
     ),
-    "time_in_repair_s": Column(
-        "amount", "s", "mean length of the absences that ended with a repair in the interval; 0 = none ended"
+    "time_in_repair_s": _mean(
+        "s", "mean length of the absences that ended with a repair in the interval; 0 = none ended"
     ),
 }
 """One value per interval, in records of runs to which they apply."""
 
-ALL_COLUMNS: Mapping[str, Column] = {
-    **KEY_COLUMNS,
-    **INTERVAL_COLUMNS,
-    **CONTRIBUTED_COLUMNS,
-}
+ALL_COLUMNS: Mapping[str, Column] = {**KEY_COLUMNS, **INTERVAL_COLUMNS, **CONTRIBUTED_COLUMNS}
 """All columns of records, in the order of the schema."""

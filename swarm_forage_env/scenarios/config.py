@@ -5,13 +5,23 @@ A warehouse and a disaster zone are two configurations of the same environment. 
 
 import dataclasses
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any, TypeVar, cast
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias, cast, get_args
 
-from swarm_forage_env._internal import fields
-from swarm_forage_env._internal.fields import ConfigError
+from msgspec import Meta
+
+from swarm_forage_env._internal.fields import (
+    Amount,
+    Checked,
+    ConfigError,
+    FileName,
+    Number,
+    Positive,
+    Share,
+    Whole,
+    one_of,
+)
 from swarm_forage_env.scenarios.floor import (
     CELL_M,
     CELLS_PER_M,
@@ -27,20 +37,21 @@ from swarm_forage_env.scenarios.floor import (
     overlap_cells,
     source_boxes,
 )
-from swarm_forage_env.scenarios.obstacles import Rectangle, blocked_cells, check_boxes, covered_area_m2
+from swarm_forage_env.scenarios.obstacles import Boxes, Rectangle, blocked_cells, check_boxes, covered_area_m2
 from swarm_forage_env.scenarios.performance import performance_of
 from swarm_forage_env.scenarios.quirks import Quirks
 
-CACHE_KINDS = ("none", "static", "dynamic")
-PHYSICS_ENGINES = ("compiled", "chipmunk")
-MAX_NEIGHBOURS_SEEN = 64
-"""Most neighbours in an observation (our choice: 256 columns, twice those of all other sensors)."""
-MAX_MESSAGE_SIZE = 64
-"""Most numbers in a message (our choice, as for neighbours)."""
+CacheKind: TypeAlias = Literal["none", "static", "dynamic"]
+CACHE_KINDS = get_args(CacheKind)
+Physics: TypeAlias = Literal["compiled", "chipmunk"]
+PHYSICS_ENGINES = get_args(Physics)
+Place: TypeAlias = tuple[Positive, Positive]
+"""x, y in m."""
 MAX_DISC_SHARE = 0.4
 """Robot discs may cover at most this share of the start area; with more, random start poses cannot be drawn."""
 MAX_HANDLING_TICKS = 1_000_000
 """Longest pick-up or drop (our choice: twenty runs of the paper, far below what a 32-bit tick holds)."""
+HandlingTicks: TypeAlias = Annotated[int, Meta(ge=1, le=MAX_HANDLING_TICKS)]
 MAX_CELLS = 2**30
 """Largest floor, 6.5 km square (our choice: its codes take 4 GiB where something lies everywhere; a million robots at
 5 % density need half of it, and the largest floor of the paper has 409,600 cells)."""
@@ -79,47 +90,43 @@ def _lights_over(nest: Rectangle) -> tuple[tuple[float, float], ...]:
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class ArenaConfig:
+class ArenaConfig(Checked):
     """A rectangular floor with walls and one nest or several. Origin at the lower left corner."""
 
-    width_m: float
+    called: ClassVar[str] = "arena"
+
+    width_m: Positive
     """Extent X along x, a multiple of the 0.2 m cell."""
-    height_m: float
+    height_m: Positive
     """Extent Y along y, a multiple of the 0.2 m cell."""
-    nest_centre_m: tuple[float, float]
-    nest_size_m: tuple[float, float]
+    nest_centre_m: Place
+    nest_size_m: Place
     """The nest is snapped to whole cells."""
-    further_nests: tuple[Rectangle, ...] = ()
+    further_nests: Boxes = ()
     """Boxes (x low, y low, x high, y high) in m, snapped to whole cells, that are nests like the first one: they have
     lights and take deliveries. Static caches lie between the sources and the first nest."""
-    obstacles: tuple[Rectangle, ...] = ()
+    obstacles: Boxes = ()
     """Boxes (x low, y low, x high, y high) in m that robots cannot enter (`scenarios.obstacles`)."""
 
-    def __post_init__(self) -> None:
+    def check(self) -> None:
+        """Refuse a floor that is too large, and nests and obstacles that do not fit on it."""
         for name, extent in (("width_m", self.width_m), ("height_m", self.height_m)):
-            fields.number(f"arena.{name}", extent, above=0.0)
             cells = extent / CELL_M
             _require(
                 abs(cells - round(cells)) < 1e-6 and cells >= 10,
                 f"Expected arena.{name} to be a multiple of {CELL_M} m and at least 2 m, got {extent}.",
             )
+        nx, ny = self.n_cells
         _require(
-            math.prod(self.n_cells) <= MAX_CELLS,
+            nx * ny <= MAX_CELLS,
             f"Expected an arena of at most {MAX_CELLS:,} cells of {CELL_M} m, whose floor takes up to 4 GiB of memory, "
             f"got {self.width_m} x {self.height_m} m; choose a smaller one, or fewer robots where a density sets it.",
         )
-        fields.pair("arena.nest_centre_m", self.nest_centre_m)
-        fields.pair("arena.nest_size_m", self.nest_size_m)
         x_low, y_low, x_high, y_high = self.nest_cells
-        nx, ny = self.n_cells
         _require(
-            x_low < x_high and y_low < y_high,
-            f"Expected arena.nest_size_m of at least one cell ({CELL_M} m), got {self.nest_size_m}.",
-        )
-        _require(
-            x_low >= 0 and y_low >= 0 and x_high <= nx and y_high <= ny,
-            f"Expected the nest inside the {self.width_m} x {self.height_m} m arena, got centre "
-            f"{self.nest_centre_m} and size {self.nest_size_m}.",
+            0 <= x_low < x_high <= nx and 0 <= y_low < y_high <= ny,
+            f"Expected a nest of at least one cell ({CELL_M} m) inside the {self.width_m} x {self.height_m} m arena, "
+            f"got centre {self.nest_centre_m} and size {self.nest_size_m}.",
         )
         extent = self.width_m, self.height_m
         check_boxes("further_nests", self.further_nests, *extent, clear_of=(self.nest_box_m,), are_apart=True)
@@ -181,163 +188,142 @@ class ArenaConfig:
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class RobotConfig:
+class RobotConfig(Checked):
     """Differential-drive robots, all alike; defaults are those of the foot-bot used by the paper."""
 
-    n_robots: int
-    radius_m: float = 0.085036758
-    wheel_base_m: float = 0.14
-    max_speed_mps: float = 0.10
+    called: ClassVar[str] = "robots"
+
+    n_robots: Whole
+    radius_m: Positive = 0.085036758
+    wheel_base_m: Positive = 0.14
+    max_speed_mps: Positive = 0.10
     """Limit of the centre speed."""
-    max_wheel_difference_mps: float = 0.20
+    max_wheel_difference_mps: Positive = 0.20
     """Limit of right minus left wheel speed."""
-    start_margin_m: float = 2.8
+    start_margin_m: Positive = 2.8
     """Robots start at uniform positions at least this far from the arena border."""
-    neighbours_seen: int = 0
-    """How many of the nearest robots a robot observes; 0 = none, as in the paper."""
-    neighbour_range_m: float = 2.0
+    neighbours_seen: Annotated[int, Meta(ge=0, le=64)] = 0
+    """How many of the nearest robots a robot observes; 0 = none, as in the paper. At most 64 (our choice: 256 columns,
+    twice those of all other sensors)."""
+    neighbour_range_m: Positive = 2.0
     """How far it sees them, between centres (our choice: twice the side of its window on the floor)."""
-    message_size: int = 0
-    """Numbers that a robot may broadcast in every tick; 0 = robots say nothing, as in the paper."""
-    message_range_m: float = 2.0
+    message_size: Annotated[int, Meta(ge=0, le=64)] = 0
+    """Numbers that a robot may broadcast in every tick, at most 64; 0 = robots say nothing, as in the paper."""
+    message_range_m: Positive = 2.0
     """How far a message is heard, between centres (our choice, as for neighbours)."""
 
-    def __post_init__(self) -> None:
-        fields.whole("robots.n_robots", self.n_robots, at_least=1)
-        for name in ("radius_m", "wheel_base_m", "max_speed_mps", "max_wheel_difference_mps", "start_margin_m"):
-            fields.number(f"robots.{name}", getattr(self, name), above=0.0)
+    def check(self) -> None:
+        """Refuse start poses inside of a wall."""
         least = EAST_WALL_M + self.radius_m
         _require(
             self.start_margin_m >= least,
             f"Expected robots.start_margin_m >= {least:.3f} (wall plus radius), got {self.start_margin_m}.",
         )
-        fields.whole("robots.neighbours_seen", self.neighbours_seen, at_least=0, at_most=MAX_NEIGHBOURS_SEEN)
-        fields.whole("robots.message_size", self.message_size, at_least=0, at_most=MAX_MESSAGE_SIZE)
-        for name in ("neighbour_range_m", "message_range_m"):
-            fields.number(f"robots.{name}", getattr(self, name), above=0.0)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class ObjectConfig:
+class ObjectConfig(Checked):
     """One-cell objects: how many, where they appear, whether they wander, how long handling one takes."""
 
-    n_objects: int
+    called: ClassVar[str] = "objects"
+
+    n_objects: Whole
     placement: str
     """One of `floor.PLACEMENTS`, or `floor.POSITIONS`."""
-    object_positions_m: tuple[tuple[float, float], ...] = ()
+    object_positions_m: tuple[Place, ...] = ()
     """With placement "positions": places (x, y) in m; an object lies on the cell around one of them."""
-    walk_probability: float = 0.0
+    walk_probability: Share = 0.0
     """Probability p_rw that a free object takes a one-cell step, per object and tick."""
-    pickup_ticks: int = 1
+    pickup_ticks: HandlingTicks = 1
     """Ticks from the start of a pick-up, from the floor or a cache, to its effect; the robot stands still."""
-    drop_ticks: int = 1
+    drop_ticks: HandlingTicks = 1
     """The same for a drop in the nest, into a cache or at a cache site. Letting go over open floor acts at once."""
 
-    def __post_init__(self) -> None:
-        fields.whole("objects.n_objects", self.n_objects, at_least=1)
-        fields.one_of("objects.placement", self.placement, (*PLACEMENTS, POSITIONS))
-        fields.pairs("objects.object_positions_m", self.object_positions_m)
+    def check(self) -> None:
+        """Refuse an unknown placement, and positions that it does not need or lacks."""
+        one_of("objects.placement", self.placement, (*PLACEMENTS, POSITIONS))
         _require(
             bool(self.object_positions_m) == (self.placement == POSITIONS),
             f"Expected objects.object_positions_m with placement {POSITIONS!r}, and only with it, got "
             f"{len(self.object_positions_m)} positions with {self.placement!r}.",
         )
-        fields.number("objects.walk_probability", self.walk_probability, at_least=0.0, at_most=1.0)
-        for name in ("pickup_ticks", "drop_ticks"):
-            fields.whole(f"objects.{name}", getattr(self, name), at_least=1, at_most=MAX_HANDLING_TICKS)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class CacheConfig:
+class CacheConfig(Checked):
     """Caches: square floor areas that hold objects for robots to add to or take from."""
 
-    side_share: float = 0.2
-    """Nominal side as a share of max(X, Y)."""
-    distance_share: float = 0.2
-    """min_dist as a share of min(X, Y): objects this close to a CREATE_CACHE drop join a dynamic cache."""
-    static_size: int = 2
-    """Objects that a static cache is created with."""
-    respawn_scale: float = 0.05
-    """Scale s of the restoration probability of static caches."""
+    called: ClassVar[str] = "cache"
 
-    def __post_init__(self) -> None:
-        fields.number("cache.side_share", self.side_share, above=0.0, at_most=0.5)
-        fields.number("cache.distance_share", self.distance_share, above=0.0)
-        fields.whole("cache.static_size", self.static_size, at_least=2)
-        fields.number("cache.respawn_scale", self.respawn_scale, at_least=0.0)
+    side_share: Annotated[float, Meta(gt=0.0, le=0.5)] = 0.2
+    """Nominal side as a share of max(X, Y)."""
+    distance_share: Positive = 0.2
+    """min_dist as a share of min(X, Y): objects this close to a CREATE_CACHE drop join a dynamic cache."""
+    static_size: Annotated[int, Meta(ge=2, le=MAX_CELLS)] = 2
+    """Objects that a static cache is created with."""
+    respawn_scale: Amount = 0.05
+    """Scale s of the restoration probability of static caches."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class RewardConfig:
+class RewardConfig(Checked):
     """Weights of the reward terms in `world.kernels.reward`; only learners use them. Zero switches a term off."""
 
-    delivery: float = 1.0
+    called: ClassVar[str] = "reward"
+
+    delivery: Number = 1.0
     """Per object delivered to the nest."""
-    first_pickup: float = 0.1
+    first_pickup: Number = 0.1
     """Per pick-up of an object that no robot had carried since it was placed."""
-    nest_progress: float = 0.0
+    nest_progress: Number = 0.0
     """Per metre that a carrying robot comes closer to the centre of the nearest nest."""
-    interference: float = 0.0
+    interference: Number = 0.0
     """Per tick in interference; give a negative weight for a penalty."""
-    tick: float = 0.0
+    tick: Number = 0.0
     """Per tick of an active robot; give a negative weight for a cost of living."""
     team: bool = False
     """Every active robot receives the mean over active robots instead of its own reward."""
 
-    def __post_init__(self) -> None:
-        for name in ("delivery", "first_pickup", "nest_progress", "interference", "tick"):
-            fields.number(f"reward.{name}", getattr(self, name))
-        fields.switch("reward.team", self.team)
-
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class ScenarioConfig:
+class ScenarioConfig(Checked):
     """A complete scenario: everything that a run needs except the policy, the wrappers and the seed."""
 
-    name: str
+    called: ClassVar[str] = "scenario"
+
+    name: FileName
     arena: ArenaConfig
     robots: RobotConfig
     objects: ObjectConfig
-    caches: str = "none"
+    caches: CacheKind = "none"
     """Which caches there are: "none", "static" or "dynamic"."""
     cache: CacheConfig = field(default_factory=CacheConfig)
     reward: RewardConfig = field(default_factory=RewardConfig)
     performance: str = "collected"
     """What of a run is its performance: a recorded column ("n_carrying"), "1/" and a column of which less is better, or
     "task_balance", "cache_load" (`scenarios.performance`). It changes how a run is read, not the run."""
-    dt_s: float = 0.2
+    dt_s: Positive = 0.2
     """Length of a control step (tick)."""
-    horizon_s: float = 10_000.0
-    interval_s: float = 200.0
+    horizon_s: Positive = 10_000.0
+    interval_s: Positive = 200.0
     """Length of a recording interval."""
-    physics: str = "compiled"
+    physics: Physics = "compiled"
     """What moves the bodies and resolves contacts: "chipmunk" (`world.chipmunk`) or "compiled" (`world.bodies`), which
     has the same model of contact and is faster. Runs agree until heaps of several robots part them."""
-    physics_substeps: tuple[float, ...] = (0.25,) * 4
+    physics_substeps: Annotated[tuple[Share, ...], Meta(max_length=MAX_SUBSTEPS)] = (0.25,) * 4
     """Substeps of the engine as equal shares of a tick, `MIN_SUBSTEPS` to `MAX_SUBSTEPS`. Free motion is exact for any
     shares. A contact is resolved one substep late, so a substep limits how deep two robots are pushed into each other
     when a tick ends: 6 % of a diameter when they drive head-on (`tests/science/test_physics_convergence.py`)."""
     quirks: Quirks = field(default_factory=Quirks)
 
-    def __post_init__(self) -> None:
-        fields.check_file_name("scenario.name", self.name)
-        for section, section_class in SECTIONS.items():
-            fields.instance(section, getattr(self, section), section_class)
-        for name, value in dataclasses.asdict(self.quirks).items():
-            fields.switch(f"quirks.{name}", value)
-        fields.one_of("caches", self.caches, CACHE_KINDS)
-        fields.one_of("physics", self.physics, PHYSICS_ENGINES)
+    def check(self) -> None:
+        """Refuse a world that cannot be: its clock, its physics, and its room for robots, objects and caches."""
         performance_of(self.performance)  # refuses unknown names
-        for name in ("dt_s", "horizon_s", "interval_s"):
-            fields.number(f"scenario.{name}", getattr(self, name), above=0.0)
-        fields.shares("scenario.physics_substeps", self.physics_substeps)
-        n_substeps = len(self.physics_substeps)
+        substeps = self.physics_substeps
         _require(
-            MIN_SUBSTEPS <= n_substeps <= MAX_SUBSTEPS
-            and max(self.physics_substeps) - min(self.physics_substeps) < 1e-6,
-            f"Expected scenario.physics_substeps to be at least {MIN_SUBSTEPS} equal shares of a tick (others squeeze "
-            f"robots in a crowd through each other) and at most {MAX_SUBSTEPS}, got "
-            f"{self.physics_substeps if n_substeps <= MAX_SUBSTEPS else n_substeps}.",
+            len(substeps) >= MIN_SUBSTEPS and abs(sum(substeps) - 1.0) < 1e-9 and max(substeps) - min(substeps) < 1e-6,
+            f"Expected scenario.physics_substeps to be at least {MIN_SUBSTEPS} equal shares of a tick that sum to 1 "
+            f"(others squeeze robots in a crowd through each other), got {substeps}.",
         )
         for name in ("horizon_s", "interval_s"):
             ticks = getattr(self, name) / self.dt_s
@@ -503,36 +489,7 @@ SECTIONS: dict[str, type] = {
 }
 """Sections of a ScenarioConfig and their classes."""
 
-_C = TypeVar("_C")
-
 
 def to_mapping(config: Any) -> dict[str, Any]:
-    """Return a configuration as nested dicts of plain values, ready for JSON or TOML; `from_mapping` reads it back."""
+    """Return a configuration as nested dicts of plain values, ready for JSON or TOML; `read` reads it back."""
     return dataclasses.asdict(config)
-
-
-def from_mapping(config_class: type[_C], mapping: Mapping[str, Any], *, where: str = "") -> _C:
-    """Build a configuration dataclass from nested mappings (TOML, JSON).
-
-    Raises:
-        ConfigError: `mapping` is no mapping, a missing key, or an unknown one (with the nearest known one).
-    """
-    own = dataclasses.fields(config_class)  # pyright: ignore[reportArgumentType] - no public type means any dataclass
-    items = {item.name: item for item in own}
-    fields.table(where.rstrip(".") or config_class.__name__, mapping)
-    fields.known_keys(mapping, items, prefix=where)
-    values: dict[str, Any] = {}
-    for key, value in mapping.items():
-        nested = SECTIONS.get(key)
-        if nested is not None and isinstance(value, Mapping):
-            values[key] = from_mapping(nested, cast("Mapping[str, Any]", value), where=f"{where}{key}.")
-        else:
-            values[key] = fields.as_tuples(value)
-    missing = [
-        name
-        for name, item in items.items()
-        if name not in values and item.default is dataclasses.MISSING and item.default_factory is dataclasses.MISSING
-    ]
-    if missing:
-        raise ConfigError(f"Missing key {where + missing[0]!r} for {config_class.__name__}.")
-    return config_class(**values)

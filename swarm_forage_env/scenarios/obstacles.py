@@ -7,21 +7,19 @@ Obstacles may touch and overlap each other, and reach into the walls.
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import Any, TypeAlias, cast
+from typing import Annotated, TypeAlias
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
-from swarm_forage_env._internal import fields
-from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.wording import shown
+from swarm_forage_env._internal.fields import ConfigError, Number
 from swarm_forage_env.scenarios.floor import CELL_M, CELLS_PER_M, Box
 
-Rectangle: TypeAlias = tuple[float, float, float, float]
+Rectangle: TypeAlias = tuple[Number, Number, Number, Number]
 """x low, y low, x high, y high in m."""
-
-MAX_BOXES = 200
-"""Most obstacles, and most further nests (our choice: every robot looks at all of them in every tick)."""
+Boxes: TypeAlias = Annotated[tuple[Rectangle, ...], Meta(max_length=200)]
+"""Obstacles, or further nests; at most 200 (our choice: every robot looks at all of them in every tick)."""
 MIN_SIDE_M = CELL_M
 """Shortest side: a cell, as of the nest. A robot that is pushed never gets past the middle of one in a tick."""
 _ROUNDING_CELLS = 1e-6
@@ -29,50 +27,30 @@ _ROUNDING_CELLS = 1e-6
 
 
 def check_boxes(
-    name: str, given: Any, width_m: float, height_m: float, *, clear_of: Sequence[Rectangle], are_apart: bool = False
+    name: str,
+    boxes: Sequence[Rectangle],
+    width_m: float,
+    height_m: float,
+    *,
+    clear_of: Sequence[Rectangle],
+    are_apart: bool = False,
 ) -> None:
-    """Refuse what is no tuple of boxes inside of an arena and clear of its nests.
-
-    Args:
-        name: Of the arena's field.
-        given: What was given.
-        width_m: Extent of the arena along x, m.
-        height_m: Along y, m.
-        clear_of: Rectangles of nests, m.
-        are_apart: Whether boxes must also be clear of each other.
+    """Refuse boxes that are too thin, outside of an arena, on its nests, or, if they have to be apart, on each other.
 
     Raises:
-        ConfigError: names the first box that cannot be.
+        ConfigError: names the first box of `arena.name` that cannot be.
     """
-    if not isinstance(given, tuple):
-        raise ConfigError(
-            f"Expected arena.{name} to be a tuple of boxes (x low, y low, x high, y high) in m, such as "
-            f"((14.0, 4.0, 14.4, 12.0),), got {shown(given)}."
-        )
-    boxes = cast("tuple[Any, ...]", given)
-    if len(boxes) > MAX_BOXES:
-        raise ConfigError(f"Expected at most {MAX_BOXES} arena.{name}, got {len(boxes)}.")
     for index, box in enumerate(boxes):
-        nests = (*clear_of, *boxes[:index]) if are_apart else clear_of
-        _check_box(f"arena.{name}[{index}]", box, width_m, height_m, nests)
-
-
-def _check_box(where: str, box: Any, width_m: float, height_m: float, nests: Sequence[Rectangle]) -> None:
-    edges = cast("tuple[Any, ...]", box) if isinstance(box, tuple) else ()
-    if len(edges) != 4:
-        raise ConfigError(f"Expected {where} to be (x low, y low, x high, y high) in m, got {shown(box)}.")
-    for index, edge in enumerate(edges):
-        fields.number(f"{where}[{index}]", edge)
-    x_low, y_low, x_high, y_high = edges
-    if min(x_high - x_low, y_high - y_low) < MIN_SIDE_M - 1e-9:
-        raise ConfigError(
-            f"Expected {where} with x low < x high and y low < y high, at least {MIN_SIDE_M} m apart, got {edges}."
-        )
-    if min(x_low, y_low) < 0.0 or x_high > width_m or y_high > height_m:
-        raise ConfigError(f"Expected {where} inside the {width_m} x {height_m} m arena, got {edges}.")
-    for nest in nests:
-        if x_low < nest[2] and nest[0] < x_high and y_low < nest[3] and nest[1] < y_high:
-            raise ConfigError(f"Expected {where} clear of the nest {nest}, got {edges}; move the box or the nest.")
+        where, (x_low, y_low, x_high, y_high) = f"arena.{name}[{index}]", box
+        if min(x_high - x_low, y_high - y_low) < MIN_SIDE_M - 1e-9:
+            raise ConfigError(
+                f"Expected {where} with x low < x high and y low < y high, at least {MIN_SIDE_M} m apart, got {box}."
+            )
+        if min(x_low, y_low) < 0.0 or x_high > width_m or y_high > height_m:
+            raise ConfigError(f"Expected {where} inside the {width_m} x {height_m} m arena, got {box}.")
+        for nest in (*clear_of, *boxes[:index]) if are_apart else clear_of:
+            if x_low < nest[2] and nest[0] < x_high and y_low < nest[3] and nest[1] < y_high:
+                raise ConfigError(f"Expected {where} clear of the nest {nest}, got {box}; move the box or the nest.")
 
 
 def blocked_cells(box: Rectangle, nx: int, ny: int, radius_m: float) -> Box:

@@ -4,15 +4,14 @@ Such an arena has the proportions of the scenario and is as large as a swarm nee
 200 robots at 5 %: 200 / 0.05 = 4,000 m^2, so 89.6 x 44.8 m = 4,014 m^2.
 """
 
-import dataclasses
 import math
 from collections.abc import Mapping
+from dataclasses import fields, replace
 from functools import cache
 from types import MappingProxyType
 from typing import Any, get_args, get_origin, get_type_hints
 
-from swarm_forage_env._internal import fields
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import ConfigError, known_keys, known_name, number, whole
 from swarm_forage_env.scenarios.config import SECTIONS, ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M, CELLS_PER_M
 from swarm_forage_env.scenarios.obstacles import stretched
@@ -25,39 +24,28 @@ ARENA_FIELDS = ("width_m", "height_m", "nest_centre_m", "nest_size_m", "further_
 @cache  # each world asks
 def field_sections() -> Mapping[str, str]:
     """Map every overridable field name to the section that holds it ("" = the scenario itself)."""
-    table = {item.name: "" for item in dataclasses.fields(ScenarioConfig) if item.name not in SECTIONS}
-    for section, section_class in SECTIONS.items():
-        table.update({item.name: section for item in dataclasses.fields(section_class)})
-    return MappingProxyType(table)
+    table = {item.name: "" for item in fields(ScenarioConfig) if item.name not in SECTIONS}
+    return MappingProxyType(table | {item.name: name for name, kind in SECTIONS.items() for item in fields(kind)})
 
 
 def field_types() -> dict[str, Any]:
-    """Return the type of every scenario field that can be set by name."""
-    hints = {section: get_type_hints(section_class) for section, section_class in SECTIONS.items()}
-    hints[""] = get_type_hints(ScenarioConfig)
+    """Return the type, without its bounds, of every scenario field that can be set by name."""
+    hints = {section: get_type_hints(kind) for section, kind in {"": ScenarioConfig, **SECTIONS}.items()}
     return {name: hints[section][name] for name, section in field_sections().items()}
 
 
 def parse_tuple(text: str, kind: Any) -> tuple[Any, ...]:
-    """Return the tuple that a text stands for, by its type; an empty text is an empty tuple where there can be one.
+    """Return the tuple of numbers that a text stands for, by the type of a field; no text is an empty tuple.
 
     Example: "1.6,8" for a pair of numbers; "10,4,11,12+20,4,21,12" for any number of boxes.
 
-    Args:
-        text: Entries between commas. Of a tuple of tuples: tuples between plus signs.
-        kind: Type of a scenario field, such as `tuple[float, float]`.
-
     Raises:
-        ValueError: another number of entries, or an entry of another type.
+        ValueError: an entry that is no number.
     """
-    kinds = get_args(kind)
-    is_nested = get_origin(kinds[0]) is tuple
-    words = [word.strip() for word in text.split("+" if is_nested else ",")]
-    if kinds[-1] is Ellipsis:
-        words = [word for word in words if word]
-        kinds = kinds[:1] * len(words)
-    pieces = zip(words, kinds, strict=True)
-    return tuple(parse_tuple(word, part) if is_nested else part(word) for word, part in pieces)
+    inner = get_args(kind)[0]
+    if get_origin(inner) is tuple:
+        return tuple(parse_tuple(part, inner) for part in text.split("+") if part.strip())
+    return tuple(float(word) for word in text.split(",") if word.strip())
 
 
 def with_overrides(config: ScenarioConfig, **overrides: Any) -> ScenarioConfig:
@@ -70,52 +58,37 @@ def with_overrides(config: ScenarioConfig, **overrides: Any) -> ScenarioConfig:
         ConfigError: unknown name (with the nearest known one), or values that do not fit together.
     """
     table = field_sections()
-    fields.known_keys(overrides, (*table, *SECTIONS), "scenario field")
-    per_section: dict[str, dict[str, Any]] = {}
-    top: dict[str, Any] = {}
+    known_keys(overrides, (*table, *SECTIONS), "scenario field")
+    if isinstance(rules := overrides.get("quirks"), str):
+        known_name("rules", rules, RULES)
+        overrides["quirks"] = RULES[rules]
+    config = replace(config, **{name: value for name, value in overrides.items() if name in SECTIONS})
+    changed: dict[str, dict[str, Any]] = {}
     for name, value in overrides.items():
-        if name == "quirks" and isinstance(value, str):
-            fields.known_name("rules", value, RULES)
-            top[name] = RULES[value]
-        elif name in SECTIONS:
-            own = ", ".join(item.name for item in dataclasses.fields(SECTIONS[name]))
-            fields.instance(name, value, SECTIONS[name], hint=f"; single fields of it are given by their names: {own}")
-            top[name] = value
-        elif table[name]:
-            per_section.setdefault(table[name], {})[name] = value
-        else:
-            top[name] = value
-    for section, values in per_section.items():
-        top[section] = dataclasses.replace(top.get(section, getattr(config, section)), **values)
-    return dataclasses.replace(config, **top)
+        if name in table:
+            changed.setdefault(table[name], {})[name] = value
+    top = changed.pop("", {})
+    return replace(config, **top, **{name: replace(getattr(config, name), **own) for name, own in changed.items()})
 
 
 def scenario_of_same_size(scenario: ScenarioConfig, overrides: Mapping[str, Any]) -> ScenarioConfig:
-    """Return the scenario with fields overridden by name; the number of robots must stay the same.
+    """Return the scenario with fields overridden by name; what decides the shapes of spaces must stay the same.
 
     Raises:
-        ConfigError: unknown fields, values that do not fit together, or another number of robots.
+        ConfigError: unknown fields, values that do not fit together, or another size or scale.
     """
     changed = with_overrides(scenario, **overrides)
-    n_robots = scenario.robots.n_robots
-    for name in ("neighbours_seen", "message_size"):
+    fixed = ["n_robots", "neighbours_seen", "message_size"]
+    if changed.robots.neighbours_seen:
+        fixed.append("neighbour_range_m")  # seen distances are shares of the range
+    for name in fixed:
         before, now = getattr(scenario.robots, name), getattr(changed.robots, name)
         if now != before:
+            birth = ", or let robots be born during the run (the population wrapper with initial_robots)"
             raise ConfigError(
-                f"Expected {name} to stay {before}, as spaces promise, got {now}; make another environment."
+                f"Expected {name} to stay {before:g}, as spaces promise, got {now:g}; make another environment"
+                f"{birth if name == 'n_robots' else ''}."
             )
-    before, now = scenario.robots.neighbour_range_m, changed.robots.neighbour_range_m
-    if changed.robots.neighbours_seen and now != before:  # seen distances are shares of the range
-        raise ConfigError(
-            f"Expected neighbour_range_m to stay {before:g}, the scale of columns that spaces promise, got {now:g}; "
-            "make another environment."
-        )
-    if changed.robots.n_robots != n_robots:
-        raise ConfigError(
-            f"Expected n_robots to stay {n_robots}, the number of rows that spaces promise, got "
-            f"{changed.robots.n_robots}; make another environment, or let robots be born during the run (the "
-            "population wrapper with initial_robots)."
-        )
     return changed
 
 
@@ -127,8 +100,7 @@ def robots_at_density(area_m2: float, density: float) -> int:
 
 def checked_density(density: Any) -> float:
     """Return a density; raises ConfigError unless it is a share above 0 and at most 1."""
-    fields.number("density (robots per m^2; 0.05 is 5 %)", density, above=0.0, at_most=1.0)
-    return float(density)
+    return number("density (robots per m^2; 0.05 is 5 %)", density, above=0.0, at_most=1.0)
 
 
 def arena_at_density(config: ScenarioConfig, density: float, n_robots: int) -> dict[str, Any]:
@@ -146,7 +118,7 @@ def arena_at_density(config: ScenarioConfig, density: float, n_robots: int) -> d
         ConfigError: a density or a number of robots that cannot be.
     """
     density = checked_density(density)
-    fields.whole("robots.n_robots", n_robots, at_least=1)
+    whole("robots.n_robots", n_robots, at_least=1)
     nx, ny = config.arena.n_cells
     common = math.gcd(nx, ny)
     unit_x, unit_y = nx // common, ny // common
@@ -167,14 +139,10 @@ def arena_at_density(config: ScenarioConfig, density: float, n_robots: int) -> d
 
 
 def in_arena(config: ScenarioConfig, arena: dict[str, Any], *, n_robots: int, n_objects: int | None) -> ScenarioConfig:
-    """Return a scenario in another arena with another swarm.
+    """Return a scenario in another arena, fields as from `arena_at_density`, with another swarm.
 
-    Args:
-        config: The scenario.
-        arena: Fields as from `arena_at_density`.
-        n_robots: Size of the swarm.
-        n_objects: Number of objects; None = as many per m^2 as in `config` (our choice: what a robot meets on a way
-            of a given length then depends on neither the size of the arena nor that of the swarm).
+    `n_objects` None = as many per m^2 as in `config` (our choice: what a robot meets on a way of a given length then
+    depends on neither the size of the arena nor that of the swarm).
 
     Raises:
         ConfigError: an arena that is too small for its robots.

@@ -18,10 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.wording import suggestion
-from swarm_forage_env.scenarios.columns import (
-    CONTRIBUTED_COLUMNS,
-    INTERVAL_COLUMNS,
-)
+from swarm_forage_env.scenarios.columns import CONTRIBUTED_COLUMNS, INTERVAL_COLUMNS
 
 if TYPE_CHECKING:
     import polars as pl
@@ -137,15 +134,13 @@ def performance_of(name: str) -> Performance:
     Raises:
         ConfigError: there is no such performance; the message has the nearest one.
     """
-    is_text = isinstance(name, str)  # pyright: ignore[reportUnnecessaryIsInstance] - files and users give anything
-    sign, own = _split(name) if is_text else ("", "")
+    sign, own = _split(str(name))
     found = _FORMULAS[own][0] if own in _FORMULAS else PERFORMANCE_COLUMNS.get(own)
     if found is None:
         known = [sign + each for each in (*PERFORMANCE_COLUMNS, *_FORMULAS)]
-        meant = sign + _NAME_OF_WORDS.get(own, own)
         raise ConfigError(
             f"Expected performance to be a recorded column (swarm-forage list columns), {', '.join(_FORMULAS)}, or one "
-            f"of them after {INVERTED!r}, got {name!r}.{suggestion(meant, known)}"
+            f"of them after {INVERTED!r}, got {name!r}.{suggestion(sign + _NAME_OF_WORDS.get(own, own), known)}"
         )
     if not sign:
         return found
@@ -168,14 +163,9 @@ def performance_curve(name: str, columns: Columns) -> Curve:
     """
     performance_of(name)
     sign, own = _split(name)
-    if own in _FORMULAS:
-        values = _FORMULAS[own][1](columns)
-    else:
-        values = _column(own, columns)
-    if not sign:
-        return values
+    values = _FORMULAS[own][1](columns) if own in _FORMULAS else _column(own, columns)
     # 1/0 is 0, because distances between curves cannot take infinities. It suits columns that are rarely 0.
-    return np.divide(1.0, values, out=np.zeros_like(values), where=values != 0.0)
+    return np.divide(1.0, values, out=np.zeros_like(values), where=values != 0.0) if sign else values
 
 
 def _split(name: str) -> tuple[str, str]:

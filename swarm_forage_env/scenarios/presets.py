@@ -6,10 +6,10 @@ Section numbers refer to the paper, "Improved Swarm Engineering: Aligning Intuit
 """
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
-from swarm_forage_env._internal import fields
-from swarm_forage_env._internal.fields import ConfigError, known_name
+from swarm_forage_env._internal.fields import ConfigError, known_name, whole
 from swarm_forage_env.scenarios.config import ArenaConfig, ObjectConfig, RewardConfig, RobotConfig, ScenarioConfig
 from swarm_forage_env.scenarios.obstacles import stretched
 from swarm_forage_env.scenarios.overrides import (
@@ -26,8 +26,6 @@ SEARCH_AND_RESCUE_OBJECTS = {16: 80, 32: 272, 48: 368, 64: 448, 80: 544, 96: 124
 number (our choice: the study asked for 4,000 everywhere and placed what fitted)."""
 DENSITY = 0.05
 """Robots per square metre in search and rescue: 5 % (scenario 2 of the paper)."""
-_SIZES = ("n_robots", "n_objects", "side_m", *ARENA_FIELDS)
-"""Fields that a density decides or goes by; the others are overridden first."""
 
 
 def warehouse_small(**overrides: Any) -> ScenarioConfig:
@@ -45,7 +43,6 @@ def warehouse_small(**overrides: Any) -> ScenarioConfig:
         ),
         robots=RobotConfig(n_robots=50),  # scenario 1: 50 robots in all sweeps but size
         objects=ObjectConfig(n_objects=200, placement="single_source"),  # study: 200 (512 in the size sweep)
-        performance="collected",  # scenario 1: objects delivered per interval
     )
     return with_overrides(base, **overrides)
 
@@ -65,7 +62,6 @@ def warehouse_medium(**overrides: Any) -> ScenarioConfig:
         ),
         robots=RobotConfig(n_robots=200),  # scenario 1: 200 robots in all sweeps but size
         objects=ObjectConfig(n_objects=800, placement="random"),  # study: 800 (2,048 in the size sweep)
-        performance="collected",
     )
     return with_overrides(base, **overrides)
 
@@ -75,17 +71,11 @@ def warehouse_dual(**overrides: Any) -> ScenarioConfig:
 
     32 x 16 m, nest in the middle, 50 robots, 200 objects.
     """
-    base = ScenarioConfig(
+    base = with_overrides(
+        warehouse_small(),  # our choice: so that only nest and sources differ (study: twice as wide as high)
         name="warehouse_dual",
-        arena=ArenaConfig(
-            width_m=32.0,  # our choice: as the small warehouse (study: twice as wide as high)
-            height_m=16.0,
-            nest_centre_m=(16.0, 8.0),  # study: centre of the arena
-            nest_size_m=(3.2, 12.8),  # study: 0.1 X by 0.8 Y
-        ),
-        robots=RobotConfig(n_robots=50),  # our choice: as the small warehouse, so that only the sources differ
-        objects=ObjectConfig(n_objects=200, placement="dual_source"),
-        performance="collected",
+        nest_centre_m=(16.0, 8.0),  # study: centre of the arena; 0.1 X by 0.8 Y as in the small warehouse
+        placement="dual_source",
     )
     return with_overrides(base, **overrides)
 
@@ -95,19 +85,10 @@ def warehouse_quad(**overrides: Any) -> ScenarioConfig:
 
     48 x 48 m, nest in the middle, 200 robots, 800 objects.
     """
-    base = ScenarioConfig(
-        name="warehouse_quad",
-        arena=ArenaConfig(
-            width_m=48.0,  # our choice: as the medium warehouse (study: as wide as high)
-            height_m=48.0,
-            nest_centre_m=(24.0, 24.0),  # study: centre of the arena
-            nest_size_m=(9.6, 9.6),  # study: 0.2 X square
-        ),
-        robots=RobotConfig(n_robots=200),  # our choice: as the medium warehouse, so that only the sources differ
-        objects=ObjectConfig(n_objects=800, placement="quad_source"),
-        performance="collected",
+    # Our choice: as the medium warehouse, so that only the sources differ (study: as wide as high, nest in the centre).
+    return with_overrides(
+        with_overrides(warehouse_medium(), name="warehouse_quad", placement="quad_source"), **overrides
     )
-    return with_overrides(base, **overrides)
 
 
 def classroom(**overrides: Any) -> ScenarioConfig:
@@ -128,7 +109,6 @@ def classroom(**overrides: Any) -> ScenarioConfig:
             start_margin_m=0.8,  # our choice: with the 2.8 m of the study 20 robots have no room
         ),
         objects=ObjectConfig(n_objects=40, placement="single_source"),  # our choice: 4 per robot, as in the warehouses
-        performance="collected",
         horizon_s=2_000.0,  # our choice: ten intervals, a second of computing
     )
     return with_overrides(base, **overrides)
@@ -145,29 +125,22 @@ def search_and_rescue(*, side_m: float | None = None, n_robots: int | None = Non
         n_robots: Swarm size; default the size for 5 % density at `side_m`.
         overrides: Any other scenario field.
     """
-    robots = None if n_robots is None else RobotConfig(n_robots=n_robots)  # checks the number before a side is chosen
     if side_m is None:
         side_m = 48.0 if n_robots is None else side_for(n_robots)
-    n_objects = overrides.pop("n_objects", None)
-    if n_objects is None:
-        if side_m not in SEARCH_AND_RESCUE_OBJECTS:
-            sides = ", ".join(str(side) for side in SEARCH_AND_RESCUE_OBJECTS)
-            raise ConfigError(
-                f"Expected side_m to be one of {sides}, got {side_m}; for another side give n_objects too."
-            )
-        n_objects = SEARCH_AND_RESCUE_OBJECTS[int(side_m)]
-    arena = ArenaConfig(
-        width_m=float(side_m),
-        height_m=float(side_m),
-        nest_centre_m=(side_m / 2, side_m / 2),  # study: centre of the arena
-        nest_size_m=(0.2 * side_m, 0.2 * side_m),  # study: 0.2 X square
-    )
+    if "n_objects" not in overrides and side_m not in SEARCH_AND_RESCUE_OBJECTS:
+        sides = ", ".join(map(str, SEARCH_AND_RESCUE_OBJECTS))
+        raise ConfigError(f"Expected side_m to be one of {sides}, got {side_m}; for another side give n_objects too.")
     base = ScenarioConfig(
         name="search_and_rescue",
-        arena=arena,
-        robots=robots or RobotConfig(n_robots=robots_at_density(side_m * side_m, DENSITY)),
+        arena=ArenaConfig(
+            width_m=side_m,
+            height_m=side_m,
+            nest_centre_m=(side_m / 2, side_m / 2),  # study: centre of the arena
+            nest_size_m=(0.2 * side_m, 0.2 * side_m),  # study: 0.2 X square
+        ),
+        robots=RobotConfig(n_robots=robots_at_density(side_m * side_m, DENSITY) if n_robots is None else n_robots),
         objects=ObjectConfig(
-            n_objects=n_objects,
+            n_objects=overrides.pop("n_objects", SEARCH_AND_RESCUE_OBJECTS.get(int(side_m))),
             placement="power_law",
             walk_probability=0.001,  # study: in the flexibility and robustness sets
         ),
@@ -183,6 +156,7 @@ def side_for(n_robots: int, density: float = DENSITY) -> float:
     Raises:
         ConfigError: not even the largest holds so many.
     """
+    whole("robots.n_robots", n_robots, at_least=1)
     for side in SEARCH_AND_RESCUE_OBJECTS:
         if robots_at_density(side * side, density) >= n_robots:
             return float(side)
@@ -213,24 +187,13 @@ def at_density(
     n_robots = config.robots.n_robots if n_robots is None else n_robots
     if config.objects.placement != "power_law":
         return in_arena(config, arena_at_density(config, density, n_robots), n_robots=n_robots, n_objects=n_objects)
-    fields.whole("robots.n_robots", n_robots, at_least=1)
     side_m = side_for(n_robots, checked_density(density))
-    of_side = search_and_rescue(side_m=side_m).arena
-    arena = {name: getattr(of_side, name) for name in ARENA_FIELDS}
-    extents_m = of_side.width_m, of_side.height_m
-    factors = of_side.width_m / config.arena.width_m, of_side.height_m / config.arena.height_m
+    arena = {name: getattr(search_and_rescue(side_m=side_m).arena, name) for name in ARENA_FIELDS}
+    factors = side_m / config.arena.width_m, side_m / config.arena.height_m
     for name in ("further_nests", "obstacles"):
-        arena[name] = stretched(getattr(config.arena, name), factors, extents_m)
+        arena[name] = stretched(getattr(config.arena, name), factors, (side_m, side_m))
     objects = SEARCH_AND_RESCUE_OBJECTS[int(side_m)] if n_objects is None else n_objects
     return in_arena(config, arena, n_robots=n_robots, n_objects=objects)
-
-
-def _with_density(config: ScenarioConfig, density: float, overrides: Mapping[str, Any]) -> ScenarioConfig:
-    """Return `config` at a density; `overrides` are what the user gave beside it."""
-    given = [name for name in ("side_m", *ARENA_FIELDS) if name in overrides]
-    if given:
-        raise ConfigError(f"Expected either density, which chooses the arena, or {', '.join(given)}; got both.")
-    return at_density(config, density, n_robots=overrides.get("n_robots"), n_objects=overrides.get("n_objects"))
 
 
 PRESETS: dict[str, Callable[..., ScenarioConfig]] = {
@@ -258,16 +221,13 @@ def scenario(name: str, /, *, density: float | None = None, **overrides: Any) ->
     Raises:
         ConfigError: unknown name or field (with the nearest known one), or values that do not fit together.
     """
-    if density is not None:
-        others = {key: value for key, value in overrides.items() if key not in _SIZES}
-        return _with_density(scenario(name, **others), density, overrides)
     known_name("scenario", name, SCENARIO_NAMES)
     if "side_m" in overrides and name != "search_and_rescue":
         raise ConfigError(
             f"Expected side_m with search_and_rescue only, got it with {name}; "
             "other arenas change by width_m and height_m."
         )
-    return PRESETS[name](**overrides)
+    return _changed(PRESETS[name], density, overrides)
 
 
 def chosen_scenario(given: str | ScenarioConfig, overrides: Mapping[str, Any]) -> ScenarioConfig:
@@ -278,8 +238,16 @@ def chosen_scenario(given: str | ScenarioConfig, overrides: Mapping[str, Any]) -
     """
     if not isinstance(given, ScenarioConfig):
         return scenario(given, **overrides)
-    density = overrides.get("density")
+    others = dict(overrides)
+    return _changed(partial(with_overrides, given), others.pop("density", None), others)
+
+
+def _changed(make: Callable[..., ScenarioConfig], density: float | None, overrides: dict[str, Any]) -> ScenarioConfig:
+    """Return what `make` makes of overrides, in an arena at a density if there is one."""
     if density is None:
-        return with_overrides(given, **overrides)
-    others = {key: value for key, value in overrides.items() if key not in (*_SIZES, "density")}
-    return _with_density(with_overrides(given, **others), density, overrides)
+        return make(**overrides)
+    given = [name for name in ("side_m", *ARENA_FIELDS) if name in overrides]
+    if given:
+        raise ConfigError(f"Expected either density, which chooses the arena, or {', '.join(given)}; got both.")
+    sizes = {name: overrides.pop(name, None) for name in ("n_robots", "n_objects")}  # overridden in the new arena
+    return at_density(make(**overrides), density, **sizes)

@@ -11,11 +11,16 @@ of the controllers (`approach_ignores_obstacles`).
 """
 
 from dataclasses import dataclass, fields
+from typing import ClassVar
+
+from swarm_forage_env._internal.fields import Checked
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Quirks:
+class Quirks(Checked):
     """Deviations of the authors' program; every field is False for the behaviour as described."""
+
+    called: ClassVar[str] = "quirks"
 
     integer_estimates: bool = False
     """Task estimates in integer arithmetic; the partition probability starts at gamma/2 before estimates are seeded."""
@@ -67,35 +72,9 @@ class Quirks:
     """At most one interaction per kind finishes in a tick, swarm-wide."""
 
 
-AUTHORS_PROGRAM = Quirks(
-    integer_estimates=True,
-    exec_time_since_last_completion=True,
-    interface_flag_survives_abort=True,
-    transferer_interface_never_leaves=True,
-    transferer_goes_anywhere=True,
-    cache_forget_unit_mismatch=True,
-    cache_goal_by_identity=True,
-    last_cache_at_every_sight=True,
-    finisher_tolerance_mismatch=True,
-    refusals_not_remembered=True,
-    no_walk_at_site=True,
-    scattered_sites=True,
-    waits_for_cache=True,
-    only_delivering_counts=True,
-    obstacle_behind_counts=True,
-    pose_sensors_exact=True,
-    nest_left_at_random=True,
-    explore_double_start=True,
-    site_box_truncated=True,
-    dynamic_cache_merges_all=True,
-    dynamic_cache_avoids_clusters=True,
-    large_clusters_likelier=True,
-    motion_self_conflict=True,
-    serialized_interactions=True,
-)
-"""All quirks on: the authors' program as far as this package reproduces it."""
-
 QUIRK_NAMES = tuple(field.name for field in fields(Quirks))
 """Every switch, in the order of the class."""
+AUTHORS_PROGRAM = Quirks(**dict.fromkeys(QUIRK_NAMES, True))
+"""All quirks on: the authors' program as far as this package reproduces it."""
 RULES = {"DESCRIBED": Quirks(), "AUTHORS_PROGRAM": AUTHORS_PROGRAM}
 """Both rules by name: as the paper describes them, and as its program has them."""

@@ -74,8 +74,10 @@ class Budget:
 
     def __post_init__(self) -> None:
         whole("n_seeds of a budget", self.n_seeds, at_least=1)
-        whole("n_sizes of a budget", self.n_sizes, at_least=2, or_none=True)
-        whole("n_levels of a budget", self.n_levels, at_least=1, or_none=True)
+        if self.n_sizes is not None:
+            whole("n_sizes of a budget", self.n_sizes, at_least=2)
+        if self.n_levels is not None:
+            whole("n_levels of a budget", self.n_levels, at_least=1)
 
 
 BUDGETS: dict[str, Budget] = {

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import msgspec
 
-from swarm_forage_env._internal.fields import ConfigError, check_file_name, known_keys, known_name, several, table
+from swarm_forage_env._internal.fields import ConfigError, FileName, Several, checked, known_keys, known_name, table
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.policies.registry import is_policy_file
 from swarm_forage_env.runs.plan import Condition, Plan
@@ -78,17 +78,17 @@ class StudySpec:
     run: RunTable
 
     def __post_init__(self) -> None:
-        check_file_name("name of a study", self.name)
-        check_file_name("budget", self.budget)  # the folder of the study is named by both
+        checked("name of a study", self.name, FileName)
+        checked("budget", self.budget, FileName)  # the folder of the study is named by both
         known_name("scenario", self.file.scenario, SCENARIO_NAMES)
         for name in self.file.set:
             if name in OF_THE_STUDY:
                 raise ConfigError(f"Expected no {name} in set: {OF_THE_STUDY[name]}.")
         known_keys(self.file.set, SCENARIO_FIELDS, "scenario field")
-        several("rules", self.rules, f"of {', '.join(RULES_NAMES)}")
+        checked("rules", self.rules, Several)
         for rules in self.rules:
             known_name("rules", rules, RULES_NAMES)
-        several("policies", self.policies, "policies")
+        checked("policies", self.policies, Several)
         for what, names in (
             ("policies", [policy.label for policy in self.policies]),
             ("axes", [axis.name for axis in self.axes]),

@@ -39,10 +39,10 @@ import msgspec
 from swarm_forage_env._internal.fields import (
     MOST_SEEDS,
     ConfigError,
-    as_tuples,
+    Several,
+    checked,
     known_keys,
     known_name,
-    several,
     whole,
 )
 from swarm_forage_env._internal.files import parse_toml
@@ -140,7 +140,7 @@ class StudyFile(_Strict, frozen=True):
     @property
     def settings(self) -> dict[str, Any]:
         """Scenario fields as scenarios take them: lists are tuples."""
-        return {name: as_tuples(value) for name, value in self.set.items()}
+        return dict(self.set)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -167,7 +167,7 @@ class Axis:
             others = ", ".join((*CRITERIA, QUIRK))
             shown_by = f"{others}, and the fields that swarm-forage info warehouse_small lists"
             known_name("axis", self.name, allowed, all_by=shown_by)
-        several(f"the values of axis {self.name}", self.values, "values")
+        checked(f"the values of axis {self.name}", self.values, Several)
         for value in self.values if self.name == QUIRK else ():
             known_name("quirk", value, (NOTHING, *QUIRK_NAMES))
         kinds = {"text" if isinstance(v, str) else "truth" if isinstance(v, bool) else "number" for v in self.values}
@@ -231,7 +231,7 @@ def axes_of(file: StudyFile, asked: Mapping[str, Any]) -> tuple[tuple[Axis, ...]
 
 def _words(name: str, given: Sequence[Any]) -> list[Value]:
     """Values of an axis; lists become texts."""
-    several(f"the values of axis {name}", tuple(given), "values")
+    checked(f"the values of axis {name}", tuple(given), Several)
     return [list_word(value) if isinstance(value, list) else value for value in given]
 
 

@@ -22,11 +22,10 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env._internal.archives import ArchiveError, read_arrays
-from swarm_forage_env._internal.fields import ConfigError, known_keys, several, whole
+from swarm_forage_env._internal.archives import ArchiveError, check_array, read_arrays
+from swarm_forage_env._internal.fields import ConfigError, Several, checked, known_keys, whole
 from swarm_forage_env._internal.files import alone_in, check_folder, read_json, replacing
 from swarm_forage_env._internal.rng import Stream, stream_rng
-from swarm_forage_env._internal.typed import check_array
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
@@ -173,7 +172,7 @@ def record_dataset(
         DatasetError: the folder holds another data set, or another call is writing to it.
         ValueError: the policy refuses the swarm.
     """
-    several("seeds", tuple(seeds), "seeds")
+    checked("seeds", tuple(seeds), Several)
     for seed in seeds:
         whole("a seed", seed, at_least=0)
     if len(set(seeds)) < len(seeds):

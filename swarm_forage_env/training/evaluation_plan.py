@@ -16,20 +16,20 @@ import numpy as np
 from swarm_forage_env._internal.fields import (
     MOST_SEEDS,
     ConfigError,
-    as_tuples,
-    check_file_name,
+    FileName,
+    Name,
+    checked,
     known_keys,
     number,
     one_of,
+    read,
     table,
-    text,
     whole,
 )
 from swarm_forage_env.policies.registry import policy_class
 from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.spec import PolicySpec
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.config import from_mapping as config_from_mapping
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import scenario as preset
 from swarm_forage_env.training.defaults import EVALUATE_EVERY
@@ -63,7 +63,7 @@ class EvaluationWorld(World):
 
     def __post_init__(self) -> None:
         World.__post_init__(self)
-        check_file_name("evaluation.worlds.name", self.name)
+        checked("evaluation.worlds.name", self.name, FileName)
         if self.name == ALL_WORLDS:
             raise ConfigError(f"Expected a name for an evaluation world, got {ALL_WORLDS!r}, which means all of them.")
         one_of("performance of a world to evaluate in", self.scenario.performance, COUNTED)
@@ -131,7 +131,7 @@ class EvaluationPlan:
         whole("evaluation.first_seed", self.first_seed, at_least=0)
         if self.horizon_s is not None:
             number("evaluation.horizon_s", self.horizon_s, above=0.0)
-        text("evaluation.baseline", self.baseline)
+        checked("evaluation.baseline", self.baseline, Name)
         try:
             policy_class(self.baseline)
         except ValueError as error:
@@ -187,9 +187,9 @@ def scenario_of(given: Any) -> ScenarioConfig:
     fields = dict(table("scenario", given))
     if "preset" in fields:
         return preset(fields.pop("preset"), **tuples(fields))
-    return config_from_mapping(ScenarioConfig, fields, where="scenario.")
+    return read(ScenarioConfig, fields, "scenario")
 
 
 def tuples(mapping: Mapping[str, Any]) -> dict[str, Any]:
     """Turn lists, the only sequences of TOML and JSON, into the tuples of configurations."""
-    return {key: as_tuples(value) for key, value in mapping.items()}
+    return {key: tuple(value) if isinstance(value, list) else value for key, value in mapping.items()}

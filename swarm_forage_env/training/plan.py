@@ -9,10 +9,10 @@ from typing import Any
 
 from swarm_forage_env._internal.fields import (
     ConfigError,
+    checked,
     known_keys,
     number,
     one_of,
-    switch,
     table,
     whole,
 )
@@ -132,7 +132,7 @@ class TrainingPlan:
         unfit = {"dqn": "continuous", "sac": "discrete"}.get(self.algorithm)
         if self.interface.actions == unfit:
             raise ConfigError(f"Expected actions that {self.algorithm} can choose, got {unfit} ones.")
-        switch("samples", self.samples)
+        checked("samples", self.samples, bool)
         if self.samples and self.interface.actions != "discrete":
             raise ConfigError(f"Expected samples only with discrete actions, got {self.interface.actions} ones.")
         number("temperature", self.temperature, at_least=TEMPERATURES[0], at_most=TEMPERATURES[1])

@@ -19,7 +19,7 @@ from typing import Any, Protocol, cast
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import as_whole
+from swarm_forage_env._internal.fields import whole
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.contract.types import BoolArray, IntArray, ObsArray
@@ -128,7 +128,7 @@ class ArenaBatch:
         Raises:
             ConfigError: n_arenas below 1, or a plan that cannot be built.
         """
-        n_arenas = as_whole("n_arenas", n_arenas, at_least=1)
+        n_arenas = whole("n_arenas", n_arenas, at_least=1)
         shares = [None] * n_arenas if plan.sampler is None else plan.sampler.shares(n_arenas)
         self.arenas = [LearnerArena(plan, share) for share in shares]
         self.interface = self.arenas[0].interface

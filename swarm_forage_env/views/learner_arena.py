@@ -9,9 +9,9 @@ import numpy as np
 from swarm_forage_env._internal.compiling import is_compiled
 from swarm_forage_env._internal.fields import ConfigError, table
 from swarm_forage_env.contract.policy import ActionError
-from swarm_forage_env.contract.reset_and_step import OPTION_OF_TESTS
 from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.layer import OPTION_OF_TESTS
 from swarm_forage_env.policies.extras import ExtraFunctionError, extra_columns, extra_rewards
 from swarm_forage_env.policies.interface import MOTIONS, LearnerInterface
 from swarm_forage_env.policies.kernels.network import keep_on

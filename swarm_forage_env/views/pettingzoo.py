@@ -8,8 +8,8 @@ from pettingzoo import ParallelEnv
 from pettingzoo.utils.conversions import parallel_to_aec
 
 from swarm_forage_env.contract.policy import state_size
-from swarm_forage_env.contract.reset_and_step import is_over
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.layer import is_over
 from swarm_forage_env.policies.interface import LearnerInterface
 from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.plans import constructor_takes, plan_arena, takes

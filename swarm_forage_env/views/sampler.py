@@ -26,12 +26,12 @@ from typing import Any, cast, get_type_hints
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError, as_whole, known_keys, number, table
+from swarm_forage_env._internal.fields import ConfigError, known_keys, number, read, table, whole
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.layout import BUILT_IN_SLICES, LayoutRow
 from swarm_forage_env.contract.policy import layout_for
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping
+from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M
 from swarm_forage_env.scenarios.overrides import field_types
 from swarm_forage_env.scenarios.presets import chosen_scenario
@@ -121,7 +121,7 @@ class ScenarioSampler:
             ConfigError: no whole number from 0 up as seed, a share outside of [0, 1), or values that do not fit
                 together.
         """
-        rng = stream_rng(as_whole("seed", seed, at_least=0), Stream.SCENARIO)
+        rng = stream_rng(whole("seed", seed, at_least=0), Stream.SCENARIO)
         if share is not None:
             number("share", share, at_least=0.0, below=1.0)
         by_chance = rng.random()
@@ -136,7 +136,7 @@ class ScenarioSampler:
         values: dict[str, Any] = {}
         try:
             if isinstance(preset, Mapping):
-                preset = from_mapping(ScenarioConfig, cast("dict[str, Any]", preset), where="scenario.preset.")
+                preset = read(ScenarioConfig, preset, "scenario.preset")
             if preset is None:
                 raise ConfigError("Expected a scenario with a preset, got none.")
             values = _values(fields, draw)

@@ -4,6 +4,7 @@ The dict API packs actions once, the whole stack runs on arrays, and observation
 wrapper costs microseconds, not a pass over all agents.
 """
 
+import dataclasses
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -11,15 +12,15 @@ from typing import Any, ClassVar
 import numpy as np
 from pettingzoo.utils import BaseParallelWrapper
 
-from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.contract.reset_and_step import no_options
+from swarm_forage_env._internal.fields import Checked, ConfigError, known_keys, read
+from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
-from swarm_forage_env.env import BatchStep, ForageEnv
-from swarm_forage_env.scenarios import config as configs
+from swarm_forage_env.env import ForageEnv, checked_gain
+from swarm_forage_env.layer import BatchStep, SwarmLayer
+from swarm_forage_env.scenarios.config import to_mapping
 from swarm_forage_env.world.arena import UNDISTURBED
 from swarm_forage_env.world.kernels.disturbances import Disturbances
-from swarm_forage_env.world.snapshots import Snapshot
-from swarm_forage_env.wrappers.waveform import gather_waveform
+from swarm_forage_env.wrappers.waveform import Waveform
 
 STACK_ORDER = (
     "RunRecorder",
@@ -31,37 +32,15 @@ STACK_ORDER = (
     "ForageEnv",
 )
 """The documented stack, outermost first; `SwarmWrapper.stack_position` counts along it."""
-_STEPS = ("step", "step_batch", "begin_step", "end_step")
+_STEPS = ("step", "step_batch")
 """Methods of a wrapper that are called on the outermost one only."""
 _HOOKS = ("before_step", "gain", "observe", "after_step")
 """Methods that are called on every wrapper in each step."""
 
-_NO_REWARDS: ObsArray = np.zeros(0, np.float32)
+_WAVE_FIELDS = tuple(item.name for item in dataclasses.fields(Waveform) if item.name != "kind")
 
 
-def _refuse_unreadable(told: Disturbances, n_ticks: int) -> None:
-    """Refuse what compiled code would read wrongly, or beyond its end; ValueError."""
-    per_tick = {"throttles"} if len(told.throttles) else set[str]()
-    per_tick |= {"wheel_factors"} if len(told.wheel_lanes) else set[str]()
-    for name, expected in UNDISTURBED._asdict().items():
-        value = getattr(told, name)
-        if not isinstance(expected, np.ndarray):
-            continue
-        n_rows = n_ticks if name in per_tick else 0
-        if (
-            not isinstance(value, np.ndarray)
-            or (value.dtype, value.ndim) != (expected.dtype, expected.ndim)
-            or not value.flags.c_contiguous
-            or len(value) < n_rows
-        ):
-            raise ValueError(
-                f"Expected `ahead` to tell {name} as a contiguous array of {expected.dtype} with {expected.ndim} "
-                f"dimensions and at least {n_rows} rows, got {np.shape(value)} of "
-                f"{getattr(value, 'dtype', type(value))}."
-            )
-
-
-class SwarmWrapper(BaseParallelWrapper):
+class SwarmWrapper(SwarmLayer, BaseParallelWrapper):
     """Base of all wrappers of this package; a subclass sets `stack_position` and overrides the hooks it needs.
 
     Hooks of one step, each called once per tick: `before_step` and `gain` from the outermost wrapper inwards, then
@@ -100,12 +79,17 @@ class SwarmWrapper(BaseParallelWrapper):
                 "put other wrappers outside of the swarm wrappers."
             )
         if isinstance(env, SwarmWrapper):
-            self._check_hooks_only(type(env))
-        if isinstance(env, SwarmWrapper) and self.stack_position >= env.stack_position:
-            raise ConfigError(
-                f"Expected {type(env).__name__} not inside of {type(self).__name__}; the order, outermost first and "
-                f"each at most once, is {', '.join(STACK_ORDER)}."
-            )
+            replaced = [name for name in _STEPS if getattr(type(env), name) is not getattr(SwarmWrapper, name)]
+            if replaced:
+                raise TypeError(
+                    f"Expected {type(env).__name__} inside of {type(self).__name__} to override hooks only, got its "
+                    f"own {' and '.join(replaced)}, which would never be called; override {', '.join(_HOOKS)} instead."
+                )
+            if self.stack_position >= env.stack_position:
+                raise ConfigError(
+                    f"Expected {type(env).__name__} not inside of {type(self).__name__}; the order, outermost first "
+                    f"and each at most once, is {', '.join(STACK_ORDER)}."
+                )
         super().__init__(env)
         self.made_from = config
         self._inner = env
@@ -113,14 +97,6 @@ class SwarmWrapper(BaseParallelWrapper):
         self._inside: tuple[SwarmWrapper, ...] = env.stack if isinstance(env, SwarmWrapper) else ()
         hooks = SwarmWrapper.before_step, SwarmWrapper.gain
         self._acts_first = any((type(each).before_step, type(each).gain) != hooks for each in self.stack)
-
-    def _check_hooks_only(self, inner: "type[SwarmWrapper]") -> None:
-        replaced = [name for name in _STEPS if getattr(inner, name) is not getattr(SwarmWrapper, name)]
-        if replaced:
-            raise TypeError(
-                f"Expected {inner.__name__} inside of {type(self).__name__} to override hooks only, got its own "
-                f"{' and '.join(replaced)}, which would never be called; override {', '.join(_HOOKS)} instead."
-            )
 
     @property
     def unwrapped(self) -> ForageEnv:
@@ -225,7 +201,14 @@ class SwarmWrapper(BaseParallelWrapper):
         # The last death may have come between two ticks; then the coming one ends the run.
         n_ticks = 0 if self._unwrapped.terminated.all() else max(0, n_ticks)
         disturbances = Disturbances(**fields)
-        _refuse_unreadable(disturbances, n_ticks)
+        for name, value in fields.items():
+            usual, n_rows = getattr(UNDISTURBED, name), n_ticks if name in _PER_TICK else 0
+            if isinstance(usual, np.ndarray) and not _is_readable(value, usual, n_rows):
+                raise ValueError(
+                    f"Expected `ahead` to tell {name} as a contiguous array of {usual.dtype} with {usual.ndim} "
+                    f"dimensions and at least {n_rows} rows, got {np.shape(value)} of "
+                    f"{getattr(value, 'dtype', type(value))}."
+                )
         return n_ticks, disturbances
 
     def pass_ticks(self, n_ticks: int, n_observed: int, tasks: CodeArray | None = None) -> None:
@@ -239,12 +222,7 @@ class SwarmWrapper(BaseParallelWrapper):
         for wrapper in self.stack:
             wrapper.count_ticks(n_ticks)
         if n_observed < n_ticks:
-            self._after(self.stepped(), tasks)
-
-    def stepped(self) -> BatchStep:
-        """Return the result of the environment's last step, without rewards."""
-        env = self._unwrapped
-        return env.arena.obs, _NO_REWARDS, env.terminated, env.tick >= env.max_cycles
+            self.after(tasks)
 
     def interval_columns(self) -> dict[str, float]:
         """Return this wrapper's own columns of the run record for the recording interval that ends now.
@@ -278,77 +256,45 @@ class SwarmWrapper(BaseParallelWrapper):
             ActionError: as `ForageEnv.step_batch`, before any wrapper has done anything. Only a robot that comes back
                 to work in this very tick is looked at later.
         """
-        actions, wheel_gain = self._before(actions, wheel_gain)
-        return self._after(self._unwrapped.step_batch(actions, wheel_gain=wheel_gain, tasks=tasks), tasks)
-
-    def begin_step(
-        self, actions: ActionArray, wheel_gain: FloatArray | None = None
-    ) -> tuple[ActionArray, FloatArray | None]:
-        """Do what comes before the arena's step, from here inwards; see `ForageEnv.begin_step`."""
-        return self._unwrapped.begin_step(*self._before(actions, wheel_gain))
-
-    def end_step(self, tasks: CodeArray | None = None) -> BatchStep:
-        """Return the result of a step as seen from here, after the arena's; see `ForageEnv.end_step`."""
-        return self._after(self._unwrapped.end_step(tasks), tasks)
-
-    def _before(self, actions: ActionArray, wheel_gain: FloatArray | None) -> tuple[ActionArray, FloatArray | None]:
         env = self._unwrapped
         actions = env.checked_actions(actions)
+        wheel_gain = checked_gain(wheel_gain, len(actions))
         self._require_reset()
         if self._acts_first:
             env.refuse_bad_step(actions, wheel_gain)  # before any wrapper draws a number or lets a robot die
+        env.break_off()
         try:
-            for wrapper in self.stack:
-                wrapper.before_step()
-                wheel_gain = wrapper.gain(actions, wheel_gain)
-        except Exception:
-            env.break_off()
+            _, reward, terminated, truncated = env.advance(actions, self.before(actions, wheel_gain), tasks)
+        except ActionError:
+            if not self._acts_first:
+                env.make_whole()
             raise
-        return actions, wheel_gain
-
-    def _after(self, step: BatchStep, tasks: CodeArray | None) -> BatchStep:
-        obs, reward, terminated, truncated = step
-        try:
-            for wrapper in reversed(self.stack):
-                obs = wrapper._last_obs = wrapper.observe(obs)
-                wrapper.after_step(tasks, terminated, truncated)
-        except Exception:
-            self._unwrapped.break_off()
-            raise
+        obs = self.after(tasks)
+        env.make_whole()
         return obs, reward, terminated, truncated
 
-    def snapshot(self) -> Snapshot:
-        """Return the state of the whole stack; see `ForageEnv.snapshot`."""
-        return self.unwrapped.snapshot_through(self.stack)
+    def before(self, actions: ActionArray, wheel_gain: FloatArray | None = None) -> FloatArray | None:
+        """Call the hooks that come before the arena's step, from here inwards; returns the wheel gain for it."""
+        for wrapper in self.stack:
+            wrapper.before_step()
+            wheel_gain = wrapper.gain(actions, wheel_gain)
+        return wheel_gain
 
-    def restore(self, snapshot: Snapshot) -> dict[str, Any]:
-        """Go back to a snapshot of a whole stack; returns observations per agent. See `ForageEnv.restore`."""
-        return self.unwrapped.per_agent(self.restore_batch(snapshot))
-
-    def restore_batch(self, snapshot: Snapshot) -> ObsArray:
-        """Restore at array level and return the last observations, (N, D) float32; see `ForageEnv.restore_batch`."""
-        self.unwrapped.restore_through(snapshot, self.stack)
-        return self._last_obs
+    def after(self, tasks: CodeArray | None) -> ObsArray:
+        """Call the hooks that come after the arena's step, from the innermost outwards; returns what is seen here."""
+        env = self._unwrapped
+        obs, terminated, truncated = env.last_obs, env.terminated, env.tick >= env.max_cycles
+        for wrapper in reversed(self.stack):
+            obs = wrapper._last_obs = wrapper.observe(obs)
+            wrapper.after_step(tasks, terminated, truncated)
+        return obs
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
 
-    def reset(
-        self, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
-        """Reset through the dict API; returns observations and infos by agent. See `ForageEnv.reset`."""
-        no_options(options)
-        return self.unwrapped.reset_through(self.reset_batch, seed)
-
-    def step(
-        self, actions: dict[str, Any]
-    ) -> tuple[dict[str, Any], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
-        """Step through the dict API; returns observations, rewards, terminations, truncations, infos by agent."""
-        return self.unwrapped.step_through(self.step_batch, actions)
-
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class WrapperConfig:
+class WrapperConfig(Checked):
     """A wrapper as data, part of a run's specification. Subclasses are frozen dataclasses of plain values."""
 
     name: ClassVar[str]
@@ -356,17 +302,13 @@ class WrapperConfig:
     wrapper: ClassVar[type[SwarmWrapper]]
     """What it is a configuration of."""
     waveform_field: ClassVar[str] = ""
-    """The field that may hold a waveform, "" for none; plain values say it as `waveform.gather_waveform` reads it."""
+    """The field that may hold a waveform, "" for none."""
     example: ClassVar[str] = ""
     """Settings as words of a command line that work with every scenario; errors show them."""
 
     def __init_subclass__(cls) -> None:
-        """Refuse a class that does not say what it configures; TypeError."""
-        if not hasattr(cls, "wrapper") and cls.wrap is WrapperConfig.wrap:
-            raise TypeError(
-                f"Expected {cls.__name__} to say what it is a configuration of; add a line "
-                '"wrapper: ClassVar[type[SwarmWrapper]] = ..." with your subclass of SwarmWrapper.'
-            )
+        """Call the fields of a wrapper by its name in messages."""
+        cls.called = getattr(cls, "name", "")
 
     @property
     def stack_position(self) -> int:
@@ -391,17 +333,37 @@ class WrapperConfig:
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the fields as plain values, ready for JSON."""
-        return configs.to_mapping(self)
+        return to_mapping(self)
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "WrapperConfig":
-        """Build the configuration back from `to_mapping`; a class with other nested dataclasses overrides this.
+        """Build the configuration back from `to_mapping`.
+
+        A waveform is a table of its fields, or the name of its kind with its fields beside it, which is shorter:
+        `{"waveform": "square", "amplitude": 0.2, "period_s": 5000}`.
 
         Raises:
             ConfigError: an unknown or missing key, or a value that the class refuses.
         """
-        values = gather_waveform(mapping, cls.waveform_field, cls) if cls.waveform_field else dict(mapping)
-        return configs.from_mapping(cls, values)
+        values, key = dict(mapping), cls.waveform_field
+        if isinstance(kind := values.get(key), str):
+            known_keys(values, (*(item.name for item in dataclasses.fields(cls)), *_WAVE_FIELDS), prefix=f"{cls.name}.")
+            values[key] = {"kind": kind, **{name: values.pop(name) for name in _WAVE_FIELDS if name in values}}
+        return read(cls, values, cls.name)
+
+
+_PER_TICK = ("throttles", "wheel_factors")
+"""What `ahead` tells with one row per tick."""
+
+
+def _is_readable(value: Any, usual: np.ndarray, n_rows: int) -> bool:
+    """Whether compiled code can read an array where it expects one like `usual`, with at least so many rows."""
+    return (
+        isinstance(value, np.ndarray)
+        and (value.dtype, value.ndim) == (usual.dtype, usual.ndim)
+        and value.flags.c_contiguous
+        and len(value) >= n_rows
+    )
 
 
 def wrap_in_order(env: ForageEnv, wrappers: Iterable[WrapperConfig]) -> ForageEnv | SwarmWrapper:

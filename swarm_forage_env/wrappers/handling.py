@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from swarm_forage_env._internal.fields import ConfigError, instance
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import MAX_HANDLING_TICKS
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
@@ -78,9 +78,8 @@ class HandlingCostConfig(WrapperConfig):
     """Ticks that a pick-up or a drop takes; values below those of the scenario change nothing."""
     example: ClassVar[str] = "waveform=constant,amplitude=50"
 
-    def __post_init__(self) -> None:
-        hint = "; for example Waveform(kind='constant', amplitude=10)"
-        instance("handling_cost.waveform", self.waveform, Waveform, hint=hint)
+    def check(self) -> None:
+        """Refuse what takes longer than any handling may."""
         if self.waveform.ends[1] > MAX_HANDLING_TICKS:
             raise ConfigError(
                 f"Expected a handling cost of at most {MAX_HANDLING_TICKS:,} ticks, got a waveform that reaches "

@@ -3,15 +3,15 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, ClassVar, TypeAlias
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
+from msgspec import Meta
 
-from swarm_forage_env._internal.fields import known_name, several, table
+from swarm_forage_env._internal.fields import known_name
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.scenarios.config import from_mapping
 from swarm_forage_env.world.kernels.disturbances import (
     NOT_NOISY,
     Noise,
@@ -27,11 +27,9 @@ from swarm_forage_env.wrappers.waveform import (
     Signal,
     Waveform,
     WaveformAhead,
-    check_sigma,
-    gather_waveform,
     is_noisy,
     sigma_in_words,
-    sigma_signal,
+    wave_of,
 )
 
 NOISE_GROUPS = ("proximity", "light", "ground", "wheel_speed", "position", "heading")
@@ -45,22 +43,6 @@ _READINGS = ("proximity", "light", "ground")
 """Groups with values in [0, 1]; those of the others lie in [-1, 1]."""
 _NATURAL_UNITS = {"wheel_speed": 0.01}
 """What sigma = 1 is in the natural unit of a group's columns: 1 cm/s in m/s; for the others 1 (reading, m, rad)."""
-
-
-_Span: TypeAlias = tuple[int, int, int, int]
-
-
-def _append_span(spans: list[_Span], span: _Span) -> None:
-    """Append a run of columns, as `Noise` has it.
-
-    Where it goes on from the end of the last, it makes that longer, because few long runs are faster.
-    """
-    if spans:
-        start, first, size, of_carriers = spans[-1]
-        if (start + size, first + size, of_carriers) == (*span[:2], span[3]):
-            spans[-1] = start, first, size + span[2], of_carriers
-            return
-    spans.append(span)
 
 
 class SensorNoise(SwarmWrapper):
@@ -97,41 +79,42 @@ class SensorNoise(SwarmWrapper):
 
     def _place_groups(self, sigmas: dict[str, Sigma]) -> None:
         """Give each noisy group its columns of the draws, in a fixed order, and the factors from draws to noise."""
-        parts = {part.noise_group: part for part in self.unwrapped.layout if part.noise_group in sigmas}
+        env = self.unwrapped
+        parts = {part.noise_group: part for part in env.layout if part.noise_group in sigmas}
         units: list[float] = []
-        spans: list[_Span] = []
         lows: list[float] = []
-        constant: list[float] = []
+        spans: list[tuple[int, int, int, int]] = []
         self._varying: list[tuple[slice, WaveformAhead]] = []
         heading = 0, NOT_NOISY
         for name in (name for name in NOISE_GROUPS if name in sigmas):
-            part, sigma, first = parts[name], sigmas[name], len(units)
-            # Other slices are not read, and the environment does not rewrite them: noise would add up there.
-            is_read = part.name in self.unwrapped.arena.reads
-            if name == "heading":
-                units.append(1.0)
-                if is_read:
-                    heading = part.start, first
-            else:
-                units += [_NATURAL_UNITS.get(name, 1.0) / scale for scale in part.scale]
-                if is_read:
-                    of_carriers = part.name == "light" and self.unwrapped.arena.light_of_carriers_only
-                    span = part.start, first, part.size, int(of_carriers)
-                    _append_span(spans, span)
+            part, first = parts[name], len(units)
+            units += [1.0] if name == "heading" else [_NATURAL_UNITS.get(name, 1.0) / scale for scale in part.scale]
+            columns = slice(first, len(units))
             lows += [0.0 if name in _READINGS else -1.0] * (len(units) - first)
-            if isinstance(sigma, Waveform):
-                signal = sigma.signal(self.unwrapped.scenario.dt_s)
-                self._varying.append((slice(first, len(units)), WaveformAhead(signal)))
-            constant += [0.0 if isinstance(sigma, Waveform) else sigma] * (len(units) - first)
+            self._varying.append((columns, WaveformAhead(wave_of(sigmas[name]).signal(env.scenario.dt_s))))
+            # Other slices are not read, and the environment does not rewrite them: noise would add up there.
+            if part.name not in env.arena.reads:
+                continue
+            if name == "heading":
+                heading = part.start, first
+                continue
+            of_carriers = int(part.name == "light" and env.arena.light_of_carriers_only)
+            start, begun, size, of_same = spans[-1] if spans else (0, 0, 0, 0)
+            if size and (start + size, begun + size, of_same) == (part.start, first, of_carriers):
+                spans[-1] = start, begun, size + part.size, of_same  # few long runs of columns are faster
+            else:
+                spans.append((part.start, first, part.size, of_carriers))
         self._units: ObsArray = np.array(units, np.float32)
-        self._constant: ObsArray = np.array(constant, np.float32) * self._units
         self._noise = Noise(np.array(spans, np.int32).reshape(-1, 4), np.array(lows, np.float32), heading)
+        self._constant = None
+        if not any(isinstance(sigma, Waveform) for sigma in sigmas.values()):
+            self._constant = self._factors(0, 1)
 
     def _factors(self, tick: int, n_ticks: int) -> ObsArray:
         """Return the factors (n_ticks, C) from draws to noise of some ticks, or (1, C) where they do not change."""
-        if not self._varying:
-            return self._constant[None]
-        factors = np.tile(self._constant, (n_ticks, 1))
+        if self._constant is not None:
+            return self._constant
+        factors = np.empty((n_ticks, len(self._units)), np.float32)
         for columns, waveform in self._varying:
             sigmas = np.maximum(0.0, waveform.of(tick)[:n_ticks]).astype(np.float32)
             factors[:, columns] = sigmas[:, None] * self._units[columns]
@@ -202,7 +185,7 @@ class ActuatorNoise(SwarmWrapper):
         self.made_from = config
         sigma = config.sigma
         self._is_noisy = is_noisy(sigma)
-        self._factors = WaveformAhead(partial(_factor, sigma_signal(sigma, self.unwrapped.scenario.dt_s)))
+        self._factors = WaveformAhead(partial(_factor, wave_of(sigma).signal(self.unwrapped.scenario.dt_s)))
 
     def on_reset(self, seed: int) -> None:
         """Start the random stream."""
@@ -246,24 +229,21 @@ class SensorNoiseConfig(WrapperConfig):
 
     name: ClassVar[str] = "sensor_noise"
     wrapper: ClassVar[type[SwarmWrapper]] = SensorNoise
+    waveform_field: ClassVar[str] = "sigma"
 
     sigma: Sigma = 0.0
     """Standard deviation for all of `groups`, in the unit of each."""
-    groups: tuple[str, ...] = NOISE_GROUPS
+    groups: Annotated[tuple[str, ...], Meta(min_length=1)] = NOISE_GROUPS
     """Which of `NOISE_GROUPS` are noisy; kept in that order."""
     sigmas: Mapping[str, Sigma] = field(default_factory=dict, hash=False)
     """Group -> its own standard deviation, instead of `sigma`; the group need not be among `groups`."""
     example: ClassVar[str] = "sigma=0.03"
 
-    def __post_init__(self) -> None:
-        several("sensor_noise.groups", self.groups, "names of sensors")
-        for name in (*self.groups, *table("sensor_noise.sigmas", self.sigmas)):
+    def check(self) -> None:
+        """Refuse unknown groups, and put the others in order."""
+        for name in (*self.groups, *self.sigmas):
             known_name("group of sensors", name, NOISE_GROUPS)
-        check_sigma("sensor_noise.sigma", self.sigma)
-        for name, sigma in self.sigmas.items():
-            check_sigma(f"sensor_noise.sigmas.{name}", sigma)
         object.__setattr__(self, "groups", tuple(name for name in NOISE_GROUPS if name in self.groups))
-        object.__setattr__(self, "sigmas", dict(self.sigmas))
 
     def group_sigmas(self) -> dict[str, Sigma]:
         """Return the standard deviation of each group that is named."""
@@ -281,21 +261,12 @@ class SensorNoiseConfig(WrapperConfig):
         return f"sensor noise: {'; '.join(parts)}"
 
     @classmethod
-    def from_mapping(cls, mapping: Mapping[str, Any]) -> "SensorNoiseConfig":
-        """Build the configuration from plain values.
-
-        A waveform in place of a sigma is read as by `waveform.gather_waveform`; groups may be one text, joined by "+".
-        """
-        values = gather_waveform(mapping, "sigma", cls)
+    def from_mapping(cls, mapping: Mapping[str, Any]) -> WrapperConfig:
+        """Build the configuration from plain values; groups may be one text, joined by "+"."""
+        values = dict(mapping)
         if isinstance(values.get("groups"), str):
             values["groups"] = values["groups"].split("+")
-        sigmas = values.get("sigmas")
-        if isinstance(sigmas, Mapping):
-            values["sigmas"] = {
-                name: Waveform.from_mapping(sigma) if isinstance(sigma, Mapping) else sigma
-                for name, sigma in sigmas.items()
-            }
-        return from_mapping(cls, values)
+        return super(SensorNoiseConfig, cls).from_mapping(values)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -313,9 +284,6 @@ class ActuatorNoiseConfig(WrapperConfig):
     sigma: Sigma
     """Standard deviation of the factor on a wheel's speed."""
     example: ClassVar[str] = "sigma=0.1"
-
-    def __post_init__(self) -> None:
-        check_sigma("actuator_noise.sigma", self.sigma)
 
     def in_words(self, dt_s: float) -> str:
         """Return how noisy wheels are; see `WrapperConfig.in_words`."""

@@ -2,11 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError, number, one_of, whole
+from swarm_forage_env._internal.fields import Amount, ConfigError, Whole
 from swarm_forage_env.contract.types import BoolArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.obstacles import distances_m
@@ -26,7 +26,6 @@ BIRTH_MARGIN_M = 2.0
 """Robots are born at least this far from the border of the arena (study configuration), or the start margin if less."""
 BIRTH_TRIALS = 1000
 """Positions that are tried in one tick (study configuration)."""
-DEATHS = ("terminate", "absorbing")
 _RATES = ("death_per_tick", "birth_per_tick", "malfunction_per_tick", "repair_per_tick")
 
 _STUDY_REPAIR_PER_TICK = {50: 0.001022222, 200: 0.001005556}
@@ -187,25 +186,17 @@ class PopulationConfig(WrapperConfig):
     name: ClassVar[str] = "population"
     wrapper: ClassVar[type[SwarmWrapper]] = PopulationDynamics
 
-    death_per_tick: float = 0.0
-    birth_per_tick: float = 0.0
-    malfunction_per_tick: float = 0.0
-    repair_per_tick: float = 0.0
-    initial_robots: int | None = None
+    death_per_tick: Amount = 0.0
+    birth_per_tick: Amount = 0.0
+    malfunction_per_tick: Amount = 0.0
+    repair_per_tick: Amount = 0.0
+    initial_robots: Whole | None = None
     """Robots at the start of a run, the first rows; the others wait to be born. Default: all of the scenario."""
-    max_robots: int | None = None
+    max_robots: Whole | None = None
     """No births while this many robots are present. Default: all of the scenario."""
-    deaths: str = "terminate"
+    deaths: Literal["terminate", "absorbing"] = "terminate"
     """Whether the agent of a dead robot terminates, or stays until the end ("absorbing")."""
     example: ClassVar[str] = "death_per_tick=0.0005"
-
-    def __post_init__(self) -> None:
-        for process in ("death", "birth", "malfunction", "repair"):
-            field = f"{process}_per_tick"
-            number(f"population.{field}", getattr(self, field), at_least=0.0)
-        for field in ("initial_robots", "max_robots"):
-            whole(f"population.{field}", getattr(self, field), at_least=1, or_none=True)
-        one_of("population.deaths", self.deaths, DEATHS)
 
     @property
     def rates(self) -> EventRates:

@@ -19,7 +19,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError, number
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.types import BoolArray, IntArray
 
@@ -29,20 +29,12 @@ FindPlace: TypeAlias = Callable[[int, np.random.Generator], bool]
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class EventRates:
-    """Events per tick of the whole swarm; 0 = never.
-
-    Raises:
-        ConfigError: a rate that is negative or no number.
-    """
+    """Events per tick of the whole swarm; 0 = never."""
 
     death: float = 0.0
     birth: float = 0.0
     malfunction: float = 0.0
     repair: float = 0.0
-
-    def __post_init__(self) -> None:
-        for process in ("death", "birth", "malfunction", "repair"):
-            number(f"the rate of {process}", getattr(self, process), at_least=0.0)
 
 
 class EventClock:

@@ -83,7 +83,7 @@ class RunRecorder(SwarmWrapper):
         """Count the tick; close the interval at its end and at the end of the run."""
         if self._complete:
             return
-        if tasks is not None and not add_task_shares(tasks, self.unwrapped.active, self._task_sums):
+        if tasks is not None and not add_task_shares(tasks, self.unwrapped.swarm.active, self._task_sums):
             raise refused_tasks(tasks, len(self.unwrapped.active))
         self._ticks_left -= 1
         # Checking the first row alone is fast, and in almost every tick it is enough.
@@ -104,36 +104,28 @@ class RunRecorder(SwarmWrapper):
         arena, end = env.arena, min(env.tick + n_ticks, env.max_cycles)
         inner, kept = self._inner, False
         env.require_whole()
-        try:
-            while env.tick < end and not self._complete:
-                n_ahead, disturbances = min(end - env.tick, self._ticks_left), UNDISTURBED
-                if isinstance(inner, SwarmWrapper):
-                    n_ahead, disturbances = inner.told_ahead(n_ahead)
-                if n_ahead == 0:
-                    self._run_with_hooks(policy)
-                    kept = False
-                    continue
-                before = env.tick
-                n_observed = arena.run(policy, n_ahead, self._task_sums, disturbances, kept=kept)
-                kept = len(disturbances.lanes) == 0
-                n_done = env.tick - before
-                if isinstance(inner, SwarmWrapper):
-                    inner.pass_ticks(n_done, n_observed, policy.task)
-                self._ticks_left -= n_done
-                self._complete = env.tick >= env.max_cycles
-                if self._ticks_left == 0 or self._complete:
-                    self._close_interval(has_tasks=policy.task is not None)
-        except Exception:
-            env.break_off()  # what wrappers do ahead they have not counted; their noise is for later ticks already
-            raise
-
-    def _run_with_hooks(self, policy: CompiledPolicy) -> None:
-        """Run one tick as a step of the stack does: what robots want to do stands before any wrapper acts."""
-        arena = self.unwrapped.arena
-        arena.run(policy, 0, None)
-        _, wheel_gain = self.begin_step(policy.state[-1])
-        arena.run(policy, 1, None, wheel_gain=wheel_gain, acts=False)
-        self._after(self.stepped(), policy.task)
+        env.break_off()  # a run that fails is gone on with by nobody: wrappers are ahead of it, or behind
+        while env.tick < end and not self._complete:
+            n_ahead, disturbances = min(end - env.tick, self._ticks_left), UNDISTURBED
+            if isinstance(inner, SwarmWrapper):
+                n_ahead, disturbances = inner.told_ahead(n_ahead)
+            if n_ahead == 0:  # one tick as a step of the stack does it
+                arena.run(policy, 0, None)  # what robots want to do stands before any wrapper acts
+                arena.run(policy, 1, None, wheel_gain=self.before(policy.state[-1]), acts=False)
+                self.after(policy.task)
+                kept = False
+                continue
+            before = env.tick
+            n_observed = arena.run(policy, n_ahead, self._task_sums, disturbances, kept=kept)
+            kept = len(disturbances.lanes) == 0
+            n_done = env.tick - before
+            if isinstance(inner, SwarmWrapper):
+                inner.pass_ticks(n_done, n_observed, policy.task)
+            self._ticks_left -= n_done
+            self._complete = env.tick >= env.max_cycles
+            if self._ticks_left == 0 or self._complete:
+                self._close_interval(has_tasks=policy.task is not None)
+        env.make_whole()
 
     def columns(self) -> dict[str, np.ndarray]:
         """Return the columns of the finished run that every record has by name, (T,) each.

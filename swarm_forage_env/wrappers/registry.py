@@ -18,8 +18,6 @@ WRAPPERS: dict[str, str] = {
 }
 """Name -> "module:class" of a `WrapperConfig`. Strings, so that reading a specification imports only what it names."""
 
-_WORDS = {"true": True, "false": False}
-
 
 def wrapper_config_class(name: str) -> "type[WrapperConfig]":
     """Return the configuration class registered under `name`.
@@ -44,34 +42,41 @@ def parse_wrapper(text: str) -> "WrapperConfig":
         ConfigError: an unknown name or key, a word that is no key=value, no settings, or values that the
             wrapper refuses; the message has an example.
     """
-    name, colon, settings = text.strip().partition(":")
+    name, _, settings = text.strip().partition(":")
     config_class = wrapper_config_class(name)
     try:
-        if not settings:
-            where = "after the colon" if colon else "after its name and a colon"
-            raise ConfigError(f"Expected the settings of wrapper {name} {where}, got none.")
-        return config_class.from_mapping(_settings(text, name, settings))
+        return config_class.from_mapping(_settings(settings))
     except ConfigError as error:
         raise ConfigError(f"{error} For example: {name}:{config_class.example}") from error
 
 
-def _settings(text: str, name: str, settings: str) -> dict[str, Any]:
-    """Return the words key=value of one wrapper as a mapping; `text` is all of it, for messages."""
+def _settings(text: str) -> dict[str, Any]:
+    """Return the words key=value of one wrapper as a mapping."""
     mapping: dict[str, Any] = {}
-    for setting in filter(None, settings.split(",")):
+    for setting in text.split(","):
         key, equals, value = (part.strip() for part in setting.partition("="))
         if not (key and equals and value):
-            raise ConfigError(f"Expected the settings of wrapper {name} as key=value, got {setting!r} in {text!r}.")
+            raise ConfigError(f"Expected the settings of a wrapper as key=value, got {setting!r} in {text!r}.")
         *parents, last = key.split(".")
         target = mapping
         for parent in parents:
             target = target.setdefault(parent, {})
-            if not isinstance(target, dict):
-                raise ConfigError(f"Expected {parent} of wrapper {name} either as a value or as a table, in {text!r}.")
-        if last in target:
-            raise ConfigError(f"Expected {key} of wrapper {name} once, got it twice in {text!r}.")
+        if not isinstance(target, dict) or last in target:
+            raise ConfigError(f"Expected {key} once, and either as a value or as a table, got {text!r}.")
         target[last] = _plain_value(value)
     return mapping
+
+
+def _plain_value(text: str) -> Any:
+    """Read a word as a truth value, a number or a text; if it is no number and has a "+", as a list."""
+    if text.lower() in ("true", "false"):
+        return text.lower() == "true"
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return [_plain_value(word) for word in text.split("+")] if "+" in text else text
 
 
 def wrapper_configs(given: "Iterable[WrapperConfig | str]") -> "tuple[WrapperConfig, ...]":
@@ -85,13 +90,11 @@ def wrapper_configs(given: "Iterable[WrapperConfig | str]") -> "tuple[WrapperCon
     expected = "Expected wrappers as a list of configurations or words such as 'sensor_noise:sigma=0.1', got"
     if isinstance(given, str | Mapping) or not isinstance(given, Iterable):
         raise ConfigError(f"{expected} {given!r}.")
-    configs = []
-    for one in given:
-        config = parse_wrapper(one) if isinstance(one, str) else one
+    configs = tuple(parse_wrapper(one) if isinstance(one, str) else one for one in given)
+    for config in configs:
         if not isinstance(config, WrapperConfig):
-            raise ConfigError(f"{expected} {one!r} in it.")
-        configs.append(config)
-    return tuple(configs)
+            raise ConfigError(f"{expected} {config!r} in it.")
+    return configs
 
 
 def wrappers_from_mapping(tables: Mapping[str, Any]) -> "tuple[WrapperConfig, ...]":
@@ -106,22 +109,8 @@ def wrappers_from_mapping(tables: Mapping[str, Any]) -> "tuple[WrapperConfig, ..
     Raises:
         ConfigError: an unknown name or key, or values that a wrapper refuses.
     """
-    configs = []
-    for name, settings in tables.items():
-        config_class = wrapper_config_class(name)
-        configs.append(config_class.from_mapping(dict(table(f"the settings of wrapper {name}", settings))))
+    configs = [
+        wrapper_config_class(name).from_mapping(table(f"the settings of wrapper {name}", settings))
+        for name, settings in tables.items()
+    ]
     return tuple(sorted(configs, key=lambda config: config.stack_position))
-
-
-def _plain_value(text: str) -> Any:
-    """Read a word as a truth value, a number or a text; if it is no number and has a "+", as a list."""
-    if text.lower() in _WORDS:
-        return _WORDS[text.lower()]
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
-    if "+" in text:
-        return [_plain_value(word) for word in text.split("+")]
-    return text

@@ -1,11 +1,11 @@
 """Throttle: robots lose part of their speed, by a waveform of time."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError, instance, switch
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.types import ActionArray, FloatArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.world.kernels.disturbances import throttle
@@ -103,15 +103,13 @@ class ThrottleConfig(WrapperConfig):
     """Whether only robots that carry an object at the start of the step are throttled."""
     example: ClassVar[str] = "waveform=constant,amplitude=0.2"
 
-    def __post_init__(self) -> None:
-        hint = "; for example Waveform(kind='constant', amplitude=0.1)"
-        instance("throttle.waveform", self.waveform, Waveform, hint=hint)
+    def check(self) -> None:
+        """Refuse a loss of more than all speed."""
         if self.waveform.ends[1] > 1.0:
             raise ConfigError(
                 f"Expected a throttle of at most 1 (robots stand still), got a waveform that reaches "
                 f"{self.waveform.ends[1]:g}; lower its amplitude or its offset."
             )
-        switch("throttle.carriers", self.carriers)
 
     def in_words(self, dt_s: float) -> str:
         """Return who loses which share of its speed; see `WrapperConfig.in_words`."""
@@ -137,7 +135,9 @@ def sine_throttles() -> tuple[ThrottleConfig, ...]:
     return _throttles("sine", 8, 10_000.0, carriers=False)
 
 
-def _throttles(kind: str, n_levels: int, period_s: float, *, carriers: bool) -> tuple[ThrottleConfig, ...]:
+def _throttles(
+    kind: Literal["square", "sine"], n_levels: int, period_s: float, *, carriers: bool
+) -> tuple[ThrottleConfig, ...]:
     ideal = Waveform(kind="constant", amplitude=IDEAL_THROTTLE)
     # Hundredths are exact as whole numbers: 0.10 + 0.05 + ... would not be.
     levels = [(10 + 5 * level) / 100 for level in range(1, n_levels)]

@@ -9,12 +9,11 @@ n_robots = 30
 sigma = 0.03
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from swarm_forage_env._internal.fields import ConfigError, as_tuples, instance, known_keys, number, table, text
+from swarm_forage_env._internal.fields import ConfigError, Name, Number, checked, instance, known_keys, table
 from swarm_forage_env._internal.files import as_file_name, parse_toml
 from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -37,6 +36,8 @@ _DIGITS = 6
 """Hexadecimal digits in names of files; our choice: of a hundred worlds, two share theirs once in 3,000 times."""
 _PRESET = "warehouse_small"
 """What a file without a preset changes."""
+_SETTABLE = (*field_sections(), "density", "side_m")
+"""What may stand under [set]."""
 
 
 class _DefaultName(str):
@@ -67,9 +68,8 @@ class World:
 
     def __post_init__(self) -> None:
         instance("scenario", self.scenario, ScenarioConfig)
-        text("criterion", self.criterion)
-        number("criterion_value", self.value)
-        object.__setattr__(self, "value", float(self.value))
+        checked("criterion", self.criterion, Name)
+        object.__setattr__(self, "value", checked("criterion_value", self.value, Number))
         ordered = tuple(sorted(self.wrappers, key=lambda config: config.stack_position))
         positions = [config.stack_position for config in ordered]
         if len(set(positions)) < len(positions):
@@ -106,22 +106,16 @@ class World:
     @property
     def changes(self) -> tuple[str, ...]:
         """What differs from the preset, the engine where it is another one, and disturbances with their levels."""
-        return self._changes(digests=True)
+        disturbances = (config.in_words(self.scenario.dt_s) for config in self.wrappers)
+        return (*difference_words(self.scenario), *disturbances)
 
-    def _changes(self, *, digests: bool) -> tuple[str, ...]:
-        words = difference_words(self.scenario, digests=digests)
-        return (*words, *(config.in_words(self.scenario.dt_s) for config in self.wrappers))
-
-    def title(self, *facts: str, digests: bool = True) -> str:
+    def title(self, *facts: str) -> str:
         """Name the world for people: "warehouse_small: 50 robots, with 3 objects, throttle: robots lose 20 % ...".
 
-        Titles, tables and legends use this, so that no two worlds are called the same.
-
-        Args:
-            facts: What a title says of the runs, such as how many robots there are; changes among them appear once.
-            digests: Tell long lists apart by digests; what is about this world alone does without.
+        Titles, tables and legends use this, so that no two worlds are called the same. `facts` are what a title says of
+        the runs, such as how many robots there are; changes among them appear once.
         """
-        changes = [words for words in self._changes(digests=digests) if words not in facts]
+        changes = [words for words in self.changes if words not in facts]
         words = f"{self.place}: {', '.join(facts)}," if facts else self.place
         return f"{words} with {', '.join(changes)}" if changes else words.removesuffix(",")
 
@@ -178,19 +172,6 @@ class WorldDescription:
         return World(scenario(self.preset, **self.fields), self.wrappers, name=self.name)
 
 
-def _check_places(tables: Mapping[str, Any]) -> None:
-    """Refuse scenario fields outside of their table, with the place where they belong."""
-    if isinstance(preset := tables.get("preset"), str):
-        raise ConfigError(f'Expected the scenario that the file starts from as scenario = "{preset}", got preset.')
-    outside = [
-        name
-        for name in tables
-        if name in (*field_sections(), "density", "side_m") and not isinstance(tables[name], Mapping)
-    ]
-    if outside:
-        raise ConfigError(f"Expected {', '.join(outside)} under [set], where scenario fields go, got it above.")
-
-
 def describe_file(file: str | Path) -> WorldDescription:
     """Read a file of a world, and look at no values of scenario fields.
 
@@ -200,13 +181,14 @@ def describe_file(file: str | Path) -> WorldDescription:
     path = Path(file)
     try:
         tables = parse_toml(path.read_text(encoding="utf-8"))
-        _check_places(tables)
+        outside = [name for name in tables if name in _SETTABLE]
+        if outside:
+            raise ConfigError(f"Expected {', '.join(outside)} under [set], where scenario fields go, got it above.")
         known_keys(tables, ("scenario", "set", "wrappers"), "key of a world")
-        preset = tables.get("scenario", _PRESET)
-        text("scenario", preset)
+        preset = checked("scenario", tables.get("scenario", _PRESET), Name)
         wrappers = wrappers_from_mapping(table("wrappers", tables.get("wrappers", {})))
-        given = {name: as_tuples(value) for name, value in table("set", tables.get("set", {})).items()}
-        known_keys(given, (*field_sections(), "quirks", "density", "side_m"), "scenario field")
+        given = dict(table("set", tables.get("set", {})))
+        known_keys(given, (*_SETTABLE, "quirks"), "scenario field")
     except OSError as error:
         raise ConfigError(f"Cannot use {path}: {error.strerror or error}.") from error
     except ValueError as error:

@@ -1,124 +1,182 @@
-"""One check per kind of value: what passes, what is refused, and with which message."""
+"""Declared types: what passes, what is converted, and what is refused by which message."""
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 import pytest
+from msgspec import Meta
 
-from swarm_forage_env._internal import fields
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.archives import check_array
+from swarm_forage_env._internal.fields import (
+    Amount,
+    Checked,
+    ConfigError,
+    Count,
+    FileName,
+    Name,
+    Number,
+    Positive,
+    Share,
+    Whole,
+    checked,
+    known_keys,
+    known_name,
+    number,
+    read,
+    whole,
+)
 
-
-def refusal(check, *given, **limits) -> str:
-    with pytest.raises(ConfigError) as caught:
-        check("box.side", *given, **limits)
-    return str(caught.value)
-
-
-@pytest.mark.parametrize("value", [0, 2, -1.5, 1e15, np.float64(0.5)])
-def test_numbers(value):
-    fields.number("box.side", value)
-
-
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, None, "3", True, 1j, (1.0,), np.ones(1)])
-def test_what_is_no_finite_number_is_refused(value):
-    assert refusal(fields.number, value) == f"Expected box.side to be a finite number, got {value!r}."
+Place = tuple[Positive, Positive]
 
 
 @pytest.mark.parametrize(
-    ("limits", "inside", "outside", "wanted"),
+    ("kind", "value", "kept"),
     [
-        ({"at_least": 0.5}, (0.5, 9), (0.49, math.nan), "a finite number >= 0.5"),
-        ({"above": 0.5}, (0.51, 9), (0.5, -1), "a finite number > 0.5"),
-        ({"at_most": 2}, (2, -9), (2.1, math.inf), "a finite number <= 2"),
-        ({"below": 2}, (1.9, -9), (2, True), "a finite number < 2"),
-        ({"at_least": 0, "at_most": 1}, (0, 1), (-0.1, 1.1), "a number in [0, 1]"),
-        ({"above": 0, "at_most": 1}, (0.1, 1), (0, 1.1), "a number in (0, 1]"),
-        ({"at_least": 0, "below": 1}, (0, 0.9), (-0.1, 1), "a number in [0, 1)"),
-        ({"above": 0, "below": 1}, (0.1, 0.9), (0, 1), "a number in (0, 1)"),
+        (Number, -2, -2.0),
+        (Number, np.float32(0.5), 0.5),
+        (Positive, 1e-15, 1e-15),
+        (Amount, 0, 0.0),
+        (Share, 1, 1.0),
+        (Count, np.uint8(3), 3),
+        (Whole, 10**15, 10**15),
+        (bool, np.True_, True),
+        (Name, "a \u200c b", "a \u200c b"),
+        (FileName, "n" * 60, "n" * 60),
+        (Place, [1, 2.5], (1.0, 2.5)),
+        (tuple[Place, ...], [[1, 2]], ((1.0, 2.0),)),
+        (Mapping[str, Count], {"a": 1}, {"a": 1}),
+        (Whole | None, None, None),
+        (bool | int | float | str, 1, 1),
+        (Literal["left", "right"], "left", "left"),
+        (Any, [None], [None]),
     ],
 )
-def test_numbers_in_a_range(limits, inside, outside, wanted):
-    for value in inside:
-        fields.number("box.side", value, **limits)
-    for value in outside:
-        assert refusal(fields.number, value, **limits) == f"Expected box.side to be {wanted}, got {value!r}."
+def test_values_become_what_is_declared(kind, value, kept):
+    found = checked("box", value, kind)
+    assert found == kept
+    assert type(found) is type(kept)
 
 
 @pytest.mark.parametrize(
-    ("limits", "inside", "outside", "wanted"),
+    ("kind", "values", "wanted"),
     [
-        ({}, (-3, 0, 10**15), (1.0, "1", None, True), "a whole number"),
-        ({"at_least": 1}, (1, 5), (0, 1.5, None), "a whole number >= 1"),
-        ({"at_most": 1}, (1, -5), (2, math.nan), "a whole number <= 1"),
-        ({"at_least": 0, "at_most": 1000}, (0, 1000), (-1, 1001), "a whole number from 0 to 1,000"),
-        ({"at_least": 1, "or_none": True}, (1, None), (0, False), "a whole number >= 1 or None"),
+        (Number, (math.nan, -math.inf, 1e16, 10**400, None, "3", True, 1j, np.ones(1)), "to be a finite number"),
+        (Positive, (0, -1.0, 1e-16), "to be a finite number > 0"),
+        (Amount, (-1e-9,), "to be a finite number >= 0"),
+        (Share, (1.1, -0.1, math.nan), "to be a number from 0 to 1"),
+        (Count, (-1, 1.0, True, "1", None), "to be a whole number >= 0"),
+        (Whole, (0, 10**15 + 1, 10**30), "to be a whole number >= 1"),
+        (Annotated[int, Meta(ge=1, le=1000)], (0, 1001), "to be a whole number from 1 to 1,000"),
+        (bool, (1, None, "yes"), "to be True or False"),
+        (Name, ("", 3, "a\nb", "\x1b[0m", "\u202eb", "\ud800"), "to be a non-empty text without control characters"),
+        (FileName, ("../x", "a/b", "a\\b", "C:x", ".a", "", "a\x00", "n" * 61, 7), "to be at most 60 characters"),
+        (Place, ("ab", 4, {}), "to be a list"),
+        (Place, ((1.0,), [1, 2, 3]), "to have 2 entries"),
+        (Annotated[tuple[int, ...], Meta(min_length=1, max_length=2)], ((),), "to have at least 1"),
+        (Annotated[tuple[int, ...], Meta(min_length=1, max_length=2)], ((1, 2, 3),), "to have at most 2"),
+        (Mapping[str, int], ([], "a", None), "to be a table of values by name"),
+        (Whole | None, (0, "a"), "to be a whole number >= 1"),
+        (float | bool, ("a", None, []), "to be a number or True or False"),
+        (Literal["left", "right"], ("Lefd", ["left"], None), "to be one of left, right"),
     ],
 )
-def test_whole_numbers(limits, inside, outside, wanted):
-    for value in inside:
-        fields.whole("box.side", value, **limits)
-    for value in outside:
-        assert refusal(fields.whole, value, **limits) == f"Expected box.side to be {wanted}, got {value!r}."
+def test_others_are_refused_by_their_name(kind, values, wanted):
+    for value in values:
+        with pytest.raises(ConfigError) as caught:
+            checked("box", value, kind)
+        assert str(caught.value).startswith(f"Expected box {wanted}")
+        assert ", got " in str(caught.value)
 
 
-@pytest.mark.parametrize("value", [3, np.int64(3), np.uint8(3)])
-def test_arguments_may_be_integers_of_numpy(value):
-    taken = fields.as_whole("seed", value, at_least=3)
-    assert taken == 3
-    assert type(taken) is int
+def test_bounds_may_be_those_of_the_caller():
+    assert number("box", 1, at_least=0, below=2) == 1.0
+    assert whole("box", 5, at_least=5, at_most=5) == 5
+    for refused in (
+        lambda: number("box", 2, below=2),
+        lambda: number("box", 0, above=0),
+        lambda: number("box", 3, at_most=2),
+        lambda: number("box", math.inf, at_least=0),
+        lambda: whole("box", 4, at_least=5),
+        lambda: whole("box", 10**16),
+    ):
+        with pytest.raises(ConfigError, match="Expected box to be a"):
+            refused()
 
 
-@pytest.mark.parametrize(
-    ("check", "good", "bad", "wanted"),
-    [
-        (fields.switch, (True, False), (1, None, "yes", np.bool_(True)), "True or False"),
-        (fields.text, ("a",), ("", 3, None), "a non-empty text without control characters"),
-        (fields.pair, ((1.0, 2),), ((1.0,), (1.0, 2.0, 3.0), [1.0, 2.0], 4, "ab"), "(x, y)"),
-        (
-            fields.shares,
-            ((1.0,), (0.5, 0.2, 0.3)),
-            ((), (0.5, 0.4), (1.5, -0.5), [1.0], 1.0, (True,), (math.nan,), ("1",)),
-            "positive shares that sum to 1",
-        ),
-        (fields.table, ({}, {"a": 1}), ([], "a", None), "a table of values by name"),
-    ],
-    ids=["switch", "text", "pair", "shares", "table"],
-)
-def test_other_values(check, good, bad, wanted):
-    for value in good:
-        check("box.side", value)
-    for value in bad:
-        assert refusal(check, value) == f"Expected box.side to be {wanted}, got {value!r}."
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Part(Checked):
+    called: ClassVar[str] = "part"
+
+    name: Name
+    sizes: Annotated[tuple[Count, ...], Meta(min_length=1)] = (1,)
+    least: Number = 0.0
+
+    def check(self):
+        if min(self.sizes) < self.least:
+            raise ConfigError("too small")
 
 
-def test_one_of_a_few_words():
-    fields.one_of("box.side", "left", ("left", "right"))
-    expected = "Expected box.side to be one of left, right, got 'Lefd'. Did you mean 'left'?"
-    assert refusal(fields.one_of, "Lefd", ("left", "right")) == expected
-    assert refusal(fields.one_of, ["left"], {"left": 1}).startswith(
-        "Expected box.side to be one of left, got ['left']."
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Box(Checked):
+    parts: tuple[Part, ...]
+    lid: Part | Amount = 0.0
+
+
+def test_constructors_check_and_convert():
+    part = Part(name="a", sizes=[1, 2], least=1)
+    assert part == Part(name="a", sizes=(1, 2), least=1.0)
+    assert hash(part) == hash(replace(part, least=1))
+    with pytest.raises(ConfigError, match=r"^Expected part\.sizes\[1\] to be a whole number >= 0, got -2\.$"):
+        replace(part, sizes=(1, -2))
+    with pytest.raises(ConfigError, match="too small"):
+        replace(part, least=5)
+
+
+def test_tables_become_dataclasses():
+    assert read(Box, {"parts": [{"name": "a"}], "lid": {"name": "b"}}) == Box(
+        parts=(Part(name="a"),), lid=Part(name="b")
     )
-
-
-def test_instances():
-    fields.instance("box.side", 3, int)
-    assert refusal(fields.instance, 3, str) == "Expected box.side to be a str, got 3."
-    expected = "Expected box.side to be an Exception, got 3; raise one."
-    assert refusal(fields.instance, 3, type("Exception", (), {}), hint="; raise one") == expected
-
-
-def test_unknown_keys_are_refused_with_the_nearest():
-    fields.known_keys({"side": 1}, ("side", "top"))
-    with pytest.raises(ConfigError, match=r"^Unknown key 'box\.sied'\. Did you mean 'side'\?$"):
-        fields.known_keys({"top": 1, "sied": 1}, ("side", "top"), prefix="box.")
-    with pytest.raises(ConfigError, match=r"^Unknown option '3'\.$"):
-        fields.known_keys({3: 1}, {"side": 1}, "option")
+    assert read(Box, {"parts": [], "lid": 1}).lid == 1.0
 
 
 @pytest.mark.parametrize(
-    "name", ["../x", "/etc/x", "a/b", "a\\b", "C:x", ".hidden", "..", "a\nb", "a\x00", "n" * 61, "", 7]
+    ("given", "message"),
+    [
+        ([], "Expected box to be a table"),
+        ({}, r"Missing key 'box\.parts'\."),
+        ({"parts": [], "lids": 1}, r"Unknown key 'box\.lids'\. Did you mean 'lid'\?"),
+        ({"parts": [{}]}, r"Missing key 'box\.parts\[0\]\.name'"),
+        ({"parts": [[]]}, r"Expected box\.parts\[0\] to be a Part, got \[\]"),
+        (
+            {"parts": [{"name": "a", "sizes": [1, True]}]},
+            r"box\.parts\[0\]\.sizes\[1\] to be a whole number >= 0, got True",
+        ),
+        ({"parts": [], "lid": {"name": ""}}, r"box\.lid\.name to be a non-empty text"),
+        ({"parts": [], "lid": "x"}, "box.lid to be a Part or a finite number >= 0, got 'x'"),
+    ],
 )
-def test_names_that_would_lead_files_elsewhere_are_refused(name):
-    with pytest.raises(ConfigError, match="Expected the name to be"):
-        fields.check_file_name("the name", name)
+def test_what_is_wrong_in_a_table_is_named_by_its_path(given, message):
+    with pytest.raises(ConfigError, match=message):
+        read(Box, given, "box")
+
+
+def test_unknown_names_are_refused_with_the_nearest():
+    known_keys({"side": 1}, ("side", "top"))
+    with pytest.raises(TypeError, match=r"^Unknown option 'box\.sied'\. Did you mean 'side'\?$"):
+        known_keys({"top": 1, "sied": 1}, ("side", "top"), "option", prefix="box.")
+    with pytest.raises(ConfigError, match=r"^Unknown side 'lefd'\. Did you mean 'left'\? Known: left, right\.$"):
+        known_name("side", "lefd", ("left", "right"))
+    with pytest.raises(ConfigError, match=r"Near it: left, loft\. All 3: list sides\."):
+        known_name("side", "leftt", ("left", "loft", "top"), all_by="list sides")
+
+
+def test_arrays_are_of_one_type_and_shape():
+    check_array("a", np.zeros((3, 2), np.float32), np.float32, (3, None))
+    for given in (np.zeros((3, 2)), np.zeros((3, 2), ">f4"), np.zeros(3, np.float32), np.zeros((2, 2), np.float32)):
+        with pytest.raises(ConfigError, match=r"Expected a to be an array \(3, any\) of float32, got"):
+            check_array("a", given, np.float32, (3, None))
+    with pytest.raises(ConfigError, match="Expected a to hold finite numbers"):
+        check_array("a", np.array([np.nan], np.float32), np.float32, (1,))

@@ -1,36 +1,17 @@
-"""Several nests: what is refused, which cells they take, where their lights hang, and that they take deliveries."""
+"""Several nests: which cells they take, where their lights hang, and that they take deliveries."""
 
 import numpy as np
 import pytest
 
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import CELL_NEST, Event, Grip
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.config import PHYSICS_ENGINES
-from swarm_forage_env.scenarios.presets import at_density, scenario
-from swarm_forage_env.training.recipe import small_arena
+from swarm_forage_env.scenarios.presets import scenario
 from tests.support.stage import load, put, tidy_world
 
 EAST = (28.0, 6.0, 30.0, 10.0)
 SQUARE = (16.0, 2.0, 18.0, 4.0)
-
-
-@pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        ([EAST], ("arena.further_nests to be a tuple of boxes", "got [(28.0")),
-        (((30.0, 4.0, 33.0, 12.0),), ("arena.further_nests[0] inside the 32.0 x 16.0 m arena",)),
-        (((4.0, 4.0, 6.0, 5.0),), ("clear of the nest (1.6, 1.6, 4.8, 14.4)",)),
-        ((EAST, (29.0, 7.0, 31.0, 8.0)), ("arena.further_nests[1] clear of the nest (28.0, 6.0, 30.0, 10.0)",)),
-        (((28.0, 6.0, 28.1, 10.0),), ("at least 0.2 m apart",)),
-    ],
-)
-def test_nonsense_is_refused_with_one_clear_line(given, words):
-    with pytest.raises(ConfigError) as caught:
-        scenario("warehouse_small", further_nests=given)
-    assert all(word in str(caught.value) for word in words)
-    assert "\n" not in str(caught.value)
 
 
 def test_nests_are_whole_cells_with_lights_of_their_own():
@@ -42,14 +23,6 @@ def test_nests_are_whole_cells_with_lights_of_their_own():
     places = [(29.0, 7.0), (29.0, 8.0), (29.0, 9.0), (17.0, 3.0), (10.1, 8.1)]
     assert arena.lights_m[3:] == tuple(pytest.approx((x, y, height)) for x, y in places)
     assert arena.lights_m[:3] == scenario("warehouse_small").arena.lights_m
-
-
-def test_nests_keep_their_share_of_an_arena_of_another_size():
-    config = scenario("warehouse_small", further_nests=(EAST,))
-    small = small_arena(config)
-    assert small["further_nests"][0] == pytest.approx((11.2, 6.0, 12.0, 10.0))
-    grown = at_density(config, 0.05, n_robots=200).arena
-    assert grown.nest_boxes_m[1] == pytest.approx(tuple(edge * 2.8 for edge in EAST), abs=0.11)
 
 
 @pytest.mark.parametrize("physics", PHYSICS_ENGINES)
@@ -73,7 +46,7 @@ def test_every_nest_takes_deliveries_and_holds_no_objects(physics):
     ("policy", "caches"), [("crw", "none"), ("dpo", "none"), ("stochm", "static"), ("stochx", "dynamic")]
 )
 def test_the_controllers_bring_objects_to_both_nests(policy, caches):
-    """Two nests of one size with objects between them: each gets its part."""
+    """Half a second each: two nests of one size with objects between them, and each gets its part."""
     world = scenario(
         "warehouse_small", n_robots=30, n_objects=300, horizon_s=2000.0, caches=caches, placement="random",
         nest_centre_m=(3.2, 8.0), nest_size_m=(2.0, 8.0), further_nests=((27.8, 4.0, 29.8, 12.0),),

@@ -262,7 +262,7 @@ def test_a_wrapper_that_a_criterion_varies_is_refused_in_the_world():
         (lambda: planned("warehouse_small", "population_size", n_robots=1), "at least 2 robots"),
         (lambda: Budget(horizon_s=1.0, interval_s=1.0, n_seeds=0, n_sizes=2, n_levels=1), "n_seeds .* >= 1, got 0"),
         (lambda: Budget(horizon_s=1.0, interval_s=1.0, n_seeds=None, n_sizes=2, n_levels=1), "n_seeds .* got None"),
-        (lambda: Budget(horizon_s=1.0, interval_s=1.0, n_seeds=1, n_sizes=1, n_levels=1), "n_sizes .* >= 2 .*got 1"),
+        (lambda: Budget(horizon_s=1.0, interval_s=1.0, n_seeds=1, n_sizes=1, n_levels=1), "n_sizes .* >= 2, got 1"),
         (lambda: Budget(horizon_s=1.0, interval_s=1.0, n_seeds=1, n_sizes=2, n_levels=0.5), "n_levels .* got 0.5"),
     ],
 )

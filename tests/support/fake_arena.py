@@ -4,7 +4,8 @@ import numpy as np
 
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.types import BoolArray, ObsArray
-from swarm_forage_env.env import BatchStep, ForageEnv
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.layer import BatchStep
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.state import StepEvents, SwarmState
@@ -38,6 +39,7 @@ class FakeArena(ForageEnv):
     swarm = property(lambda self: self._fake_swarm)
     events = property(lambda self: self._fake_events)
     active = property(lambda self: self._fake_swarm.active)
+    last_obs = property(lambda self: self._obs())
     tick = property(lambda self: self._fake_tick)
 
     def set_population(self, *, active: BoolArray, present: BoolArray, terminated: BoolArray | None = None) -> None:
@@ -51,7 +53,7 @@ class FakeArena(ForageEnv):
         self._start()
         return self._obs()
 
-    def step_batch(self, actions, *, wheel_gain=None, tasks=None) -> BatchStep:
+    def advance(self, actions, wheel_gain, tasks) -> BatchStep:
         self.calls.append({"wheel_gain": wheel_gain, "tasks": tasks})
         self._fake_tick += 1
         counters, swarm = self.events.counters, self.swarm
@@ -65,6 +67,7 @@ class FakeArena(ForageEnv):
         counters[Counter.SEARCHING] += swarm.active.sum() - 1
         self.events.interference_sum[0] += 0.25
         dead = np.full(len(swarm.active), self.tick >= self.dies_at)
+        self._terminated[:] = dead
         return self._obs(), np.zeros(len(dead), np.float32), dead, self.tick >= self.max_cycles
 
     def _obs(self) -> ObsArray:

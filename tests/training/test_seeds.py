@@ -134,9 +134,9 @@ def test_a_training_that_fails_ends_no_other(tmp_path, monkeypatch):
 def test_what_cannot_begin_is_refused_before_anything_is_trained(tmp_path, monkeypatch):
     calls = fake(monkeypatch)
     for jobs in (0, -1):
-        with pytest.raises(ConfigError, match=rf"jobs to be a whole number >= 1 or None, got {jobs}"):
+        with pytest.raises(ConfigError, match=rf"jobs .or None. to be a whole number >= 1, got {jobs}"):
             train_seeds(PLAN, (0, 1), tmp_path, jobs=jobs)
-    for seeds, message in (((), "seeds to be one or more"), ((1, 1), "Expected different seeds, got 1, 1")):
+    for seeds, message in (((), "seeds to have at least 1"), ((1, 1), "Expected different seeds, got 1, 1")):
         with pytest.raises(ConfigError, match=message):
             train_seeds(PLAN, seeds, tmp_path)
     with pytest.raises(ConfigError, match="Unknown option 'gama'"):

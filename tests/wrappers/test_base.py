@@ -106,29 +106,6 @@ def test_what_the_arena_would_refuse_is_refused_before_any_hook(stack, action, g
     assert stack.unwrapped.calls == []
 
 
-@pytest.mark.parametrize("hook", ["before_step", "gain", "observe", "after_step"])
-def test_a_hook_that_fails_leaves_a_tick_that_is_not_gone_on_with(hook):
-    """Some hooks of the tick have been called, and others not."""
-
-    def fails(*_):
-        raise OSError("no network")
-
-    env = ForageEnv(small_scenario())
-    wrapper = type("Own", (SwarmWrapper,), {"stack_position": 4, hook: fails})(env)
-    env.reset_batch(7)
-    if hook == "observe":
-        vars(wrapper)["observe"] = lambda obs: obs
-    wrapper.reset_batch(7)
-    vars(wrapper).pop("observe", None)
-    actions = np.zeros((4, 3), np.float32)
-    with pytest.raises(OSError, match="no network"):
-        wrapper.step_batch(actions)
-    with pytest.raises(RuntimeError, match="A tick is half done"):
-        wrapper.step_batch(actions)
-    env.reset_batch(7)
-    env.step_batch(actions)
-
-
 def test_gains_multiply_and_tasks_pass_through(stack):
     stack.reset_batch(0)
     tasks = np.array([1, 2, 3, 0], np.int8)
@@ -144,14 +121,6 @@ def test_gains_multiply_and_tasks_pass_through(stack):
     assert Logging.log[-1][2] is tasks
 
 
-def test_without_overrides_a_wrapper_changes_nothing():
-    wrapped = wrapper_at(2)(FakeArena())
-    np.testing.assert_array_equal(wrapped.reset_batch(1), FakeArena().reset_batch(1))
-    wrapped.step_batch(np.zeros((4, 3), np.float32))
-    assert wrapped.unwrapped.calls == [{"wheel_gain": None, "tasks": None}]
-    assert wrapped.interval_columns() == {}
-
-
 @pytest.mark.parametrize(("outer", "inner"), list(itertools.product(range(5), repeat=2)))
 def test_only_the_documented_order_can_be_stacked(outer, inner):
     base = wrapper_at(inner)(FakeArena())
@@ -160,12 +129,6 @@ def test_only_the_documented_order_can_be_stacked(outer, inner):
     else:
         with pytest.raises(ValueError, match=", ".join(STACK_ORDER)):
             wrapper_at(outer)(base)
-
-
-def test_the_recorder_is_outermost():
-    assert STACK_ORDER[RunRecorder.stack_position] == "RunRecorder"
-    with pytest.raises(ValueError, match="RunRecorder not inside of Throttle"):
-        wrapper_at(3)(RunRecorder(FakeArena()))
 
 
 def test_dict_api_packs_once_steps_the_stack_and_unpacks_once(stack):
@@ -203,3 +166,55 @@ def test_dict_and_array_level_give_the_same_run():
 
 def test_a_wrapped_environment_passes_pettingzoos_own_test():
     parallel_api_test(RunRecorder(ForageEnv(small_scenario(horizon_s=10.0))), num_cycles=60)
+
+
+# Born safe
+
+
+@pytest.mark.parametrize("fault", [KeyboardInterrupt, OSError])
+@pytest.mark.parametrize("hook", ["before_step", "gain", "observe", "after_step"])
+def test_whatever_fails_within_a_tick_is_not_gone_on_with(hook, fault):
+    """Some hooks of the tick have been called, and others not; Ctrl-C is no Exception."""
+    env = ForageEnv(small_scenario())
+    wrapper = wrapper_at(4)(env)
+    wrapper.reset_batch(7)
+    kept = wrapper.snapshot()
+
+    def fails(*_):
+        raise fault
+
+    vars(wrapper)[hook] = fails
+    actions = np.zeros((4, 3), np.float32)
+    with pytest.raises(fault):
+        wrapper.step_batch(actions)
+    del vars(wrapper)[hook]
+    for refused in (lambda: wrapper.step_batch(actions), lambda: env.step_batch(actions), wrapper.snapshot):
+        with pytest.raises(RuntimeError, match="A tick is half done"):
+            refused()
+    wrapper.restore(kept)
+    wrapper.step_batch(actions)
+
+
+def test_an_interrupted_world_is_not_gone_on_with():
+    env = ForageEnv(small_scenario())
+    env.reset_batch(7)
+
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    env.arena.step = interrupted
+    with pytest.raises(KeyboardInterrupt):
+        env.step_batch(np.zeros((4, 3), np.float32))
+    with pytest.raises(RuntimeError, match="A tick is half done"):
+        env.step_batch(np.zeros((4, 3), np.float32))
+
+
+def test_what_is_only_to_be_read_cannot_be_written():
+    env = ForageEnv(small_scenario())
+    assert not hasattr(env, "active")
+    with pytest.raises(RuntimeError, match="no world before the first reset"):
+        env.last_obs  # noqa: B018 - the asking is the fault
+    env.reset_batch(7)
+    for array in (env.active, env.terminated):
+        with pytest.raises(ValueError, match="read-only"):
+            array[:] = True

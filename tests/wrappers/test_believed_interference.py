@@ -27,11 +27,3 @@ def test_the_believed_share_of_interference_counts_false_obstacles():
     obs, *_ = stack.step_batch(np.zeros((40, 3), np.float32))
     expected = np.mean([sees_obstacle(ring, False) for ring in obs[:10, env.layout["proximity"]]])
     assert stack.interval_columns()["believed_interference_fraction"] == pytest.approx(expected)
-
-
-def test_without_noise_on_proximity_robots_believe_what_is_true():
-    env = ForageEnv(scenario("warehouse_small", n_robots=40, n_objects=5, start_margin_m=6.5))
-    stack = SensorNoise(env, SensorNoiseConfig(sigma=0.03, groups=("light", "position")))
-    stack.reset_batch(0)
-    stack.step_batch(np.zeros((40, 3), np.float32))
-    assert stack.interval_columns()["believed_interference_fraction"] == env.events.interference_sum[0] > 0

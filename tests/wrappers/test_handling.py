@@ -9,7 +9,6 @@ from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.wrappers.handling import HandlingCost, HandlingCostConfig
 from swarm_forage_env.wrappers.recorder import RunRecorder
-from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.waveform import Waveform
 from tests.support.foraging import quick_world
 from tests.support.stage import NEST_CELL, OPEN_CELL, begin, lay, load, stand, tidy_world
@@ -53,12 +52,6 @@ def test_the_integer_part_counts_and_at_least_one_tick(event, value, ticks):
     assert ticks_until(event, constant(value)) == ticks
 
 
-def test_nothing_gets_faster_than_the_scenario_says():
-    slow = {"pickup_ticks": 5, "drop_ticks": 3}
-    assert ticks_until(Event.PICKED_UP, constant(4.0), **slow) == 5
-    assert ticks_until(Event.DELIVERED, constant(4.0), **slow) == 4
-
-
 def recorded(*configs, **options: int) -> RunRecorder:
     env = tidy_world(n_robots=1, horizon_s=3.0, interval_s=1.0, **options)
     stack = env
@@ -82,22 +75,6 @@ def test_last_value_and_mean_are_recorded_and_the_mean_is_the_adversity():
     assert contributed["handling_cost"].tolist() == pytest.approx([5.0, 10.0, 15.0])
     assert contributed["handling_cost_mean"].tolist() == pytest.approx([3.0, 8.0, 13.0])
     assert recorder.columns()["adversity"].tolist() == contributed["handling_cost_mean"].tolist()
-
-
-@pytest.mark.parametrize("policy", ["crw", "dpo", "stochm", "ppo_warehouse_small"])
-def test_policies_wait_and_deliver_less(policy):
-    """Pick-ups and drops of 20 s each: policies send their band until the event comes.
-
-    STOCHX is left out: it delivers nothing within these 180 s, with or without a cost.
-    """
-    world = quick_world("warehouse_small", interval_s=60.0)
-    word = "handling_cost:waveform=constant,amplitude=100"
-    easy, hard = (
-        run_one(plan_run(world, policy, caches="none", wrappers=wrappers, seed=3))
-        for wrappers in ((), (parse_wrapper(word),))
-    )
-    assert hard["free_pickups"].sum() > 0
-    assert 0 < hard["collected"].sum() < easy["collected"].sum()
 
 
 def test_a_world_with_slow_handling_equals_the_wrapper_that_makes_it_slow():

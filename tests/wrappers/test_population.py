@@ -17,7 +17,7 @@ from swarm_forage_env.wrappers.recorder import RunRecorder
 from tests.support import engines
 from tests.support.engines import in_each_engine
 from tests.support.population import simulate_population
-from tests.support.stage import assert_same_world, begin, cell_centre, lay, load, put, snapshot, stand, tidy_world
+from tests.support.stage import assert_same_world, begin, cell_centre, load, put, snapshot, stand, tidy_world
 
 
 def at_hand(env: ForageEnv, *, deaths: str = "terminate", **fields) -> PopulationDynamics:
@@ -77,20 +77,6 @@ def test_a_robot_in_repair_stops_but_stays(lone_carrier):
     assert env.active[0]
     assert env.swarm.carried_object[0] == 0
     assert env.swarm.position[0, 0] > where[0, 0]
-
-
-@in_each_engine
-def test_a_running_interaction_completes_in_repair():
-    env = tidy_world(n_robots=1)
-    stand(env, 0, (60, 40))
-    lay(env, 0, (60, 40))
-    stack = at_hand(env)
-    stack.step_batch(hold(env))
-    assert env.swarm.pending_kind[0] != 0
-    strike(stack, "malfunction", hold(env, 0.0, Grip.RELEASE))
-    assert env.events.code[0] == Event.PICKED_UP
-    assert env.swarm.carried_object[0] == 0
-    assert not env.active[0]
 
 
 @in_each_engine
@@ -158,17 +144,6 @@ def kill_all(deaths: str) -> list[tuple[list[str], dict[str, bool]]]:
         }
         seen.append((list(stack.agents), terminations))
     return seen
-
-
-@in_each_engine
-def test_permanent_death_terminates_the_agent():
-    agents = [f"robot_{row}" for row in range(3)]
-    seen = kill_all("terminate")
-    assert [len(left) for left, _ in seen] == [2, 1, 0]
-    for left, terminations in seen:
-        assert set(terminations) == set(agents)
-        assert {agent for agent, is_dead in terminations.items() if is_dead} == set(agents) - set(left)
-        agents = left
 
 
 @in_each_engine
@@ -248,18 +223,6 @@ def test_births_bring_working_robots_at_free_places():
     assert env.active.all(), "nobody is left to be born"
 
 
-@pytest.mark.parametrize(("start_margin_m", "nearest_m"), [(1.0, 1.0), (2.5, 2.0)])
-def test_births_are_as_near_to_the_border_as_starts_but_no_farther_than_two_metres(start_margin_m, nearest_m):
-    config = scenario("warehouse_small", n_robots=200, n_objects=9, start_margin_m=start_margin_m)
-    stack = PopulationDynamics(ForageEnv(config), PopulationConfig(initial_robots=1))
-    stack.reset_batch(0)
-    rng = np.random.default_rng(0)
-    assert all(stack._find_place(row, rng) for row in range(1, 200))
-    x, y = stack.unwrapped.swarm.position[1:].T
-    for distance in (x.min(), y.min(), 32.0 - x.max(), 16.0 - y.max()):
-        assert nearest_m <= distance < nearest_m + 0.4
-
-
 # Events and record
 
 
@@ -299,19 +262,6 @@ def test_events_queue_and_times_are_recorded():
     assert 0 < record["time_at_work_s"].max() <= 60.0
 
 
-def test_times_at_work_are_means_over_the_stays_that_ended():
-    config = scenario("warehouse_small", n_robots=12, n_objects=20, horizon_s=60.0, interval_s=20.0)
-    population = PopulationConfig(malfunction_per_tick=0.05, repair_per_tick=0.02)
-    recorder = RunRecorder(population.wrap(ForageEnv(config)))
-    recorder.reset_batch(2)
-    while not recorder.complete:
-        recorder.step_batch(hold(recorder.unwrapped))
-    record = recorder.contributed()
-    tally = simulate_population(population.rates, 12, 300, 2).tally
-    assert tally.stays == record["malfunctions"].sum() > record["repairs"].sum() > 0
-    assert record["time_at_work_s"] @ record["malfunctions"] == pytest.approx(tally.stay_ticks * 0.2)
-
-
 # Configuration
 
 
@@ -340,25 +290,3 @@ def test_rates_change_while_a_run_goes_on_and_nothing_else():
     with pytest.raises(ConfigError, match=r"initial_robots below 4.*a robot can be born, got None"):
         env.reconfigure(PopulationConfig(birth_per_tick=0.1))
     assert env.made_from.malfunction_per_tick == 50.0
-
-
-def test_a_snapshot_after_a_change_of_rates_goes_on_as_the_run_did():
-    stack = PopulationConfig(malfunction_per_tick=0.5).wrap(
-        ForageEnv(scenario("warehouse_small", n_robots=8, n_objects=9))
-    )
-    stack.reset_batch(3)
-
-    def active_later() -> list[list[bool]]:
-        looks = []
-        for _ in range(40):
-            stack.step_batch(hold(stack.unwrapped))
-            looks.append(stack.unwrapped.active.tolist())
-        return looks
-
-    active_later()
-    stack.reconfigure(PopulationConfig(malfunction_per_tick=0.5, repair_per_tick=0.6))
-    kept = stack.snapshot()
-    seen = active_later()
-    stack.restore_batch(kept)
-    assert active_later() == seen
-    assert len({tuple(look) for look in seen}) > 5

@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from metrics.queues import PopulationRates, mean_away
 from swarm_forage_env.wrappers.population import death_levels, malfunction_levels
 from swarm_forage_env.wrappers.population_process import (
     EventClock,
@@ -54,25 +53,6 @@ def test_waiting_times_are_floored_exponentials(rate):
     assert stats.chisquare(counts, expected).pvalue > SURE
 
 
-def test_gaps_between_events_follow_the_clock():
-    """At most one event per tick: a wait of 0 ends in the next tick, like a wait of 1."""
-    rate, n_robots = 0.4, 8_000
-    history = simulate_population(EventRates(death=rate), n_robots, 10_000, seed=3)
-    deaths = np.flatnonzero(np.diff(history.n_present, prepend=n_robots)) + 1
-    gaps = np.diff(deaths, prepend=0)
-    counts = np.bincount(gaps, minlength=12)
-    assert counts[0] == 0
-    probability = np.exp(-rate * np.arange(12)) * (1 - np.exp(-rate))
-    expected = [probability[0] + probability[1], *probability[2:11], np.exp(-rate * 11)]
-    observed = [*counts[1:11], counts[11:].sum()]
-    assert stats.chisquare(observed, np.array(expected) * len(gaps)).pvalue > SURE
-
-
-def test_a_rate_of_zero_never_fires():
-    assert clock(0.0).next_tick == np.inf
-    assert simulate_population(EventRates(), 5, 100, seed=0).n_active.tolist() == [5] * 100
-
-
 LEVELS = malfunction_levels(50)
 N_SEEDS = 60
 
@@ -101,14 +81,6 @@ def test_robots_at_work_are_those_of_the_chain_with_few_seeds_too(at_work):
 # Choices
 
 
-def test_victims_are_uniform_among_candidates():
-    candidates = np.array([True, False, True, True, False, True])
-    events = clock(1.0)
-    chosen = np.bincount([events.choose(candidates) for _ in range(4_000)], minlength=6)
-    assert np.all(chosen[~candidates] == 0)
-    assert stats.chisquare(chosen[candidates]).pvalue > SURE
-
-
 # The four processes
 
 
@@ -125,37 +97,6 @@ def test_a_malfunction_without_a_victim_waits_for_one():
     assert advance_population(state, clocks, 8)
     assert not state.active[0]
     assert clocks.malfunction.next_tick > 8
-
-
-def test_the_dead_leave_the_repair_queue_and_stay_dead():
-    state = PopulationState.start(2)
-    advance_population(state, due({"malfunction": 1}), 1)
-    broken = state.repair_queue[0]
-    survivor = 1 - broken
-    state.present[survivor] = state.active[survivor] = False  # so that the broken one must be the victim
-    assert advance_population(state, due({"death": 2}), 2)
-    assert state.repair_queue == []
-    assert state.dead[broken]
-    assert not state.present[broken]
-    assert not advance_population(state, due({"repair": 3}), 3)
-    assert not state.active[broken]
-
-
-def test_births_bring_the_next_row_while_there_is_room():
-    state, clocks = PopulationState.start(4, initial_robots=2, max_robots=3), due({"birth": 3})
-    assert state.present.tolist() == [True, True, False, False]
-    assert advance_population(state, clocks, 3)
-    assert state.active.tolist() == [True, True, True, False]
-    clocks.birth.next_tick = 4
-    assert not advance_population(state, clocks, 4), "three are the most"
-    clocks.death.next_tick = 5
-    assert advance_population(state, clocks, 5), "a death makes room within the tick"
-    assert state.present[3]
-    assert np.count_nonzero(state.present) == 3
-    clocks.birth.next_tick, clocks.death.next_tick = 6, 6
-    assert advance_population(state, clocks, 6)
-    assert np.count_nonzero(state.present) == 2, "nobody is left to be born"
-    assert clocks.birth.next_tick == 6
 
 
 def test_stays_and_absences_are_measured_in_ticks():
@@ -196,17 +137,6 @@ def test_equals_the_slow_twin_in_every_tick(seed, death, birth, malfunction, rep
 
 
 # The study
-
-
-@pytest.mark.parametrize(("level", "expected", "deviation"), [(0, 45.4, 3.0), (7, 37.7, 7.0)])
-def test_mean_active_robots_of_the_small_warehouse(level, expected, deviation):
-    config, n_runs = malfunction_levels(50)[level], 100
-    means = [simulate_population(config.rates, 50, RUN_TICKS, seed).n_active.mean() for seed in range(n_runs)]
-    error = deviation / np.sqrt(n_runs)
-    assert np.mean(means) == pytest.approx(expected, abs=0.05 + 3 * error)
-    assert np.std(means) == pytest.approx(deviation, rel=0.2)
-    rates = PopulationRates(lambda_bd=config.malfunction_per_tick, mu_bd=config.repair_per_tick)
-    assert np.mean(means) == pytest.approx(50 - mean_away(rates, 50, RUN_TICKS), abs=3 * error)
 
 
 def test_deaths_per_run_of_search_and_rescue():

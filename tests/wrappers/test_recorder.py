@@ -53,12 +53,6 @@ def test_every_counter_of_the_world_is_recorded():
     assert {*TOTALS.values(), *TICK_MEANS.values()} == set(Counter)
 
 
-def test_performance_is_what_the_scenario_declares():
-    columns = drive(RunRecorder(FakeArena(small_scenario(performance="first_picked")))).columns()
-    assert columns["performance"].tolist() == columns["first_picked"].tolist() == [0, 0, 0]
-    assert columns["collected"].sum() > 0
-
-
 def test_performance_may_be_any_column_and_what_is_computed_from_them():
     def performance(name, recorder=RunRecorder, **run):
         return drive(recorder(FakeArena(small_scenario(performance=name))), **run).columns()["performance"].tolist()
@@ -69,16 +63,6 @@ def test_performance_may_be_any_column_and_what_is_computed_from_them():
     assert performance("throttle") == [0.0, 0.0, 0.0]
     halves = performance("task_balance", tasks=np.array([1, 1, 2, 2], np.int8))
     np.testing.assert_allclose(halves, np.log(2) / np.log(7))
-
-
-def test_robots_that_carry_are_counted_as_a_mean_over_ticks():
-    recorder = RunRecorder(FakeArena())
-    recorder.reset_batch(0)
-    for tick in range(15):
-        if tick == 7:
-            recorder.unwrapped.swarm.carried_object[:] = [3, -1, 0, -1]
-        recorder.step_batch(STILL)
-    assert recorder.columns()["n_carrying"].tolist() == [0.0, 3 * 2 / 5, 2.0]
 
 
 def test_robots_that_are_away_lower_the_mean():
@@ -105,19 +89,6 @@ def test_after_the_last_death_the_rest_is_zero_even_if_the_world_is_stepped_on(f
     np.testing.assert_allclose(columns["interference_fraction"], [0.25, 2 * 0.25 / 5, 0.0])
     np.testing.assert_allclose(columns["t_end_s"], [1.0, 2.0, 3.0])
     assert recorder.contributed()["throttle"].tolist() == [5.0, 7.0, 0.0]
-
-
-def test_a_reset_starts_anew():
-    recorder = drive(RunRecorder(FakeArena()), ticks=9)
-    again = drive(recorder).columns()
-    for name, column in drive(RunRecorder(FakeArena())).columns().items():
-        np.testing.assert_array_equal(again[name], column)
-
-
-def test_other_wrappers_contribute_columns():
-    recorder = drive(RunRecorder(Contributor(FakeArena())))
-    assert recorder.contributed()["throttle"].tolist() == [5.0, 10.0, 15.0]
-    assert recorder.columns()["adversity"].tolist() == [2.5, 5.0, 7.5]
 
 
 def test_task_shares_are_means_over_ticks_of_active_robots():

@@ -1,17 +1,13 @@
 """Snapshots of a whole stack: every wrapper goes on as it would have, and so does the record."""
 
 import copy
-import hashlib
-import pickle
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from swarm_forage_env import SnapshotError, load_policy
-from swarm_forage_env.runs.run import LiveRun, build_env
+from swarm_forage_env.runs.run import build_env
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.support.branches import Branch, pickled, whole_stack
 from tests.support.fake_arena import small_scenario
@@ -49,30 +45,6 @@ fresh = whole_stack("warehouse_small", "compiled", "dynamic")
 for branch in (run.beside(fresh, fresh.restore_batch(snapshot)), run.beside(stack, run.obs)):
     print(hashlib.sha256(b"".join(branch.go_on(200).seen)).hexdigest(), branch.columns())
 """
-
-
-def test_another_process_goes_on_from_a_file(tmp_path):
-    stack = whole_stack("warehouse_small", "compiled", "dynamic")
-    run, file = Branch(stack, load_policy("stochx")).go_on(300), tmp_path / "run"
-    file.write_bytes(pickle.dumps((stack.snapshot(), run.beside(None, run.obs), stack)))
-    end = run.beside(stack, run.obs).go_on(200)
-    expected = [f"{hashlib.sha256(b''.join(end.seen)).hexdigest()} {end.columns()}"] * 2
-    child = subprocess.run([sys.executable, "-c", CHILD, file], cwd=ROOT, capture_output=True, text=True, check=False)
-    assert child.stdout.splitlines() == expected, child.stderr
-
-
-def test_a_live_run_is_resumed_from_its_pickle():
-    def started() -> LiveRun:
-        return LiveRun(whole_stack("warehouse_small", "compiled"), load_policy("crw"), 3)
-
-    run = started()
-    run.advance(to_tick=120)
-    resumed = pickled(run)
-    run.advance()
-    resumed.advance()
-    assert resumed.over
-    np.testing.assert_array_equal(resumed.forage_env.state(), run.forage_env.state())
-    assert resumed.forage_env.events.counters.tolist() == run.forage_env.events.counters.tolist()
 
 
 @pytest.mark.parametrize(

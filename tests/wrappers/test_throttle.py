@@ -12,7 +12,7 @@ from swarm_forage_env.wrappers.recorder import RunRecorder
 from swarm_forage_env.wrappers.throttle import Throttle, ThrottleConfig, sine_throttles, square_throttles
 from swarm_forage_env.wrappers.waveform import Waveform
 from tests.reference.adversity import throttle_gain
-from tests.reference.motion import limited_wheels, steered_wheels
+from tests.reference.motion import steered_wheels
 from tests.support.fake_arena import FakeArena
 from tests.support.stage import begin, lay, load, put, stand, tidy_world
 
@@ -62,13 +62,6 @@ def test_driving_straight(lone_robot, strength, force_cms, expected_cms):
     assert moved == pytest.approx(expected_cms / 100 * 0.2, abs=1e-8)
 
 
-def test_the_gain_is_taken_of_the_limited_command(lone_robot):
-    """(1, -0.5) asks for 5 cm/s and a difference of 30 cm/s; the drive gives the difference 20 cm/s."""
-    assert limited_wheels(1.0, -0.5) == pytest.approx((0.15, -0.05))
-    wheels = wheels_after(lone_robot, constant(0.8), (0.20, -0.10))
-    assert wheels == pytest.approx([15 * 0.6, -5 * 0.6], abs=1e-6)
-
-
 @given(
     left=st.floats(-2.0, 2.0, width=32),
     right=st.floats(-2.0, 2.0, width=32),
@@ -81,16 +74,6 @@ def test_equals_the_slow_twin(left, right, strength):
         assert gain is None
     else:
         assert gain[0] == pytest.approx([expected, expected], abs=1e-12)
-
-
-def test_between_straight_and_on_the_spot_the_gain_is_continuous():
-    commands = [(0.4, right) for right in np.linspace(-0.4, 0.4, 801)]
-    gains = [throttle_gain(command, 0.5) for command in commands]
-    assert gains[0] == pytest.approx(1.0)
-    assert gains[-1] == 0.5
-    assert np.abs(np.diff(gains)).max() < 0.003
-    ours = [gain_of(constant(0.5), [command])[0, 0] for command in commands[::100]]
-    assert ours == pytest.approx(gains[::100], abs=1e-6)
 
 
 def test_whoever_carries_at_the_start_of_a_step_is_throttled_in_it():
@@ -118,18 +101,6 @@ def ramp(n_ticks: int) -> ThrottleConfig:
     """V(t) = t / 100 up to `n_ticks`."""
     times = (0.0, n_ticks * 0.2)
     return ThrottleConfig(waveform=Waveform(kind="table", times_s=times, values=(0.0, n_ticks / 100)))
-
-
-def test_the_first_tick_is_tick_1():
-    world = FakeArena()
-    stack = ramp(50).wrap(world)
-    stack.reset_batch(0)
-    actions = np.full((4, 3), 0.4, np.float32)
-    seen = []
-    for _ in range(3):
-        stack.step_batch(actions)
-        seen.append(world.calls[-1]["wheel_gain"][0, 0])
-    assert seen == pytest.approx([0.99, 0.98, 0.97])
 
 
 @pytest.mark.parametrize("carriers", [False, True])

@@ -1,18 +1,14 @@
 """Waveforms: their formulas, their samples in the study, their conversion from and to plain values."""
 
-import json
 import math
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import metrics
-from swarm_forage_env.scenarios.config import to_mapping
-from swarm_forage_env.wrappers.noise import ActuatorNoiseConfig
 from swarm_forage_env.wrappers.throttle import IDEAL_THROTTLE, ThrottleConfig, sine_throttles, square_throttles
-from swarm_forage_env.wrappers.waveform import Waveform, gather_waveform
+from swarm_forage_env.wrappers.waveform import Waveform
 
 DT_S = 0.2
 SAMPLES = range(1_000, 50_001, 1_000)
@@ -42,21 +38,6 @@ def test_distances_from_ideal_conditions_are_those_of_the_study(throttles, dista
     assert measured == pytest.approx(distances, abs=0.0051)
 
 
-def test_square_wave_of_the_study_is_high_in_24_of_50_samples():
-    values = sampled(square_throttles()[2].waveform)
-    high, low = 0.4, 0.0
-    assert values == [high] * 12 + [low] * 13 + [high] * 12 + [low] * 13
-
-
-def test_sine_of_the_study_runs_once_from_zero_to_twice_the_amplitude():
-    waveform = sine_throttles()[-1].waveform
-    values = sampled(waveform, range(1, 50_001))
-    assert max(values) == pytest.approx(0.9)
-    assert values[12_499] == pytest.approx(0.9)
-    assert min(values) == values[37_499] == 0.0
-    assert values[24_999] == pytest.approx(0.45)
-
-
 # Formulas
 
 
@@ -74,13 +55,6 @@ def test_values_at_chosen_ticks():
     assert sampled(down, [1, 49, 50, 51]) == [0.4, 0.4, 0.0, 0.0]
     table = Waveform(kind="table", times_s=(2.0, 4.0, 4.2), values=(0.0, 1.0, 0.5))
     assert sampled(table, [0, 10, 15, 20, 21, 99]) == pytest.approx([0.0, 0.0, 0.5, 1.0, 0.5, 0.5])
-
-
-def test_phase_shifts_waves_and_raises_sawteeth():
-    late = Waveform(kind="sine", amplitude=0.5, period_s=20.0, phase=math.pi / 2)
-    assert sampled(late, [0, 50]) == pytest.approx([0.5, -0.5])
-    raised = Waveform(kind="sawtooth", amplitude=0.5, period_s=20.0, phase=0.25)
-    assert sampled(raised, [0]) == [0.25]
 
 
 @pytest.mark.parametrize("start_s", [0.0, 0.6, 3 * DT_S, 1.4, 200.0])  # 3 * 0.2 / 0.2 is more than 3
@@ -110,21 +84,6 @@ def test_the_measures_know_the_same_waveforms(kind, amplitude, offset, period, p
         assert mine == pytest.approx(float(theirs), abs=1e-8)
 
 
-@pytest.mark.parametrize("throttles", [square_throttles(), sine_throttles()], ids=["square", "sine"])
-def test_the_measures_sample_the_study_alike(throttles):
-    for config in throttles[1:]:
-        wave = config.waveform
-        assert wave.period_s is not None
-        theirs = metrics.waveform(
-            wave.kind,  # type: ignore[arg-type] - the kinds have the same names
-            np.array(SAMPLES),
-            frequency=DT_S / wave.period_s,
-            amplitude=wave.amplitude,
-            offset=wave.offset,
-        )
-        np.testing.assert_allclose(sampled(wave), theirs, rtol=0, atol=1e-12)
-
-
 EXAMPLES = {
     "constant": Waveform(kind="constant", amplitude=-0.2),
     "sine": Waveform(kind="sine", amplitude=-0.2, offset=0.1, period_s=7.0, phase=0.3),
@@ -147,17 +106,9 @@ def test_the_ends_are_the_nearest_bounds(kind):
 # Plain values
 
 
-@pytest.mark.parametrize("kind", EXAMPLES)
-def test_waveforms_survive_json(kind):
-    stored = json.loads(json.dumps(to_mapping(EXAMPLES[kind])))
-    assert Waveform.from_mapping(stored) == EXAMPLES[kind]
-
-
 def test_a_waveform_may_be_named_with_its_fields_beside_it():
     flat = {"waveform": "square", "amplitude": 0.2, "period_s": 5_000, "carriers": True}
-    expected = Waveform(kind="square", amplitude=0.2, period_s=5_000)
-    assert gather_waveform(flat, "waveform", ThrottleConfig) == {"waveform": expected, "carriers": True}
     nested = {"waveform": {"kind": "square", "amplitude": 0.2, "period_s": 5_000}, "carriers": True}
-    assert gather_waveform(nested, "waveform", ThrottleConfig) == {"waveform": expected, "carriers": True}
-    assert gather_waveform({"sigma": 0.1}, "sigma", ActuatorNoiseConfig) == {"sigma": 0.1}
+    expected = ThrottleConfig(waveform=Waveform(kind="square", amplitude=0.2, period_s=5_000), carriers=True)
+    assert ThrottleConfig.from_mapping(flat) == ThrottleConfig.from_mapping(nested) == expected
     assert flat["waveform"] == "square", "the given mapping is left alone"

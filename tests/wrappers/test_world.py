@@ -4,10 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from swarm_forage_env._internal.fields import ConfigError, check_file_name
+from swarm_forage_env._internal.fields import ConfigError, FileName, checked
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.wrappers.noise import SensorNoiseConfig
-from swarm_forage_env.wrappers.population import PopulationConfig
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.world import SIZE, UNDISTURBED, World, read_world, world_of
 from tests.support.wrapper_configs import InnerConfig, OuterConfig
@@ -79,7 +77,7 @@ def test_no_two_worlds_share_a_file_name():
         "warehouse_small_20_robots_400_s",
     ]
     for world in WORLDS:
-        check_file_name("file_name", world.file_name)
+        checked("file_name", world.file_name, FileName)
 
 
 def test_wrappers_are_kept_in_stack_order_and_at_most_once():
@@ -115,21 +113,6 @@ def test_a_world_is_given_as_itself_a_scenario_or_a_preset():
         world_of("warehouse_smal")
     with pytest.raises(ConfigError, match="ScenarioConfig"):
         world_of(7)
-
-
-def test_the_rates_of_its_population_are_found_among_its_wrappers():
-    rates = PopulationConfig(death_per_tick=0.001)
-    assert World(SMALL, (SensorNoiseConfig(sigma=0.1), rates)).population == rates
-    assert World(SMALL, (SensorNoiseConfig(sigma=0.1),)).population is None
-
-
-def test_other_caches_leave_the_rest_as_it_is():
-    world = World(SMALL, (InnerConfig(),), criterion="noise", value=0.1, name="mine")
-    assert world.with_caches(None) is world.with_caches("none") is world
-    assert world.with_caches("static") == replace(world, scenario=replace(SMALL, caches="static"))
-    assert world.with_caches("static").name == "mine"
-    with pytest.raises(ConfigError, match="caches"):
-        world.with_caches("heaps")
 
 
 def test_a_world_may_stand_in_a_file(tmp_path):

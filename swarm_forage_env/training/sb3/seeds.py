@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
 from swarm_forage_env._internal.faults import in_words
-from swarm_forage_env._internal.fields import ConfigError, as_whole, several
+from swarm_forage_env._internal.fields import ConfigError, Several, checked, whole
 from swarm_forage_env._internal.files import alone_in, check_folder
 from swarm_forage_env.policies import trust
 from swarm_forage_env.runs.run import warm_up
@@ -79,8 +79,8 @@ def train_seeds(
             or another call that trains in the folder.
     """
     if jobs is not None:
-        jobs = as_whole("jobs", jobs, at_least=1, or_none=True)
-    several("seeds", tuple(seeds), "seeds")
+        jobs = whole("jobs (or None)", jobs, at_least=1)
+    checked("seeds", tuple(seeds), Several)
     if len(set(seeds)) < len(seeds):
         raise ConfigError(f"Expected different seeds, got {', '.join(map(str, seeds))}.")
     check_plan(plan)

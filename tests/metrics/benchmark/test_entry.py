@@ -65,7 +65,7 @@ def put(*path_and_value):
         (put("runs", "room, 2 robots", "performance", [[1.0], [1.0]]), "for each of 2 policies and 2 seeds"),
         (put("runs", "room, 2 robots", "beauty", [[1.0, 1.0]] * 2), "Unknown key .*beauty"),
         (put("runs", "mars", {"performance": [[1.0, 1.0]] * 2, "interference": [[0.1, 0.1]] * 2}), "see 'mars'"),
-        (put("runs", "room, 2 robots", "interference", 0, 0, 1.5), r"interference.* to be a number in \[0, 1\]"),
+        (put("runs", "room, 2 robots", "interference", 0, 0, 1.5), r"interference.* to be a number from 0 to 1"),
         (put("policies", []), "Expected policies to have at least 1"),
         (put("policies", 0, "colour", "red"), "colour"),
         (put("training", "worlds", "everywhere"), "Expected training worlds to be one of given, other"),

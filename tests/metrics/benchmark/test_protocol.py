@@ -9,7 +9,6 @@ import pytest
 
 from metrics.benchmark import BenchmarkError, Training, load_protocol
 from swarm_forage_env import plan_run, scenario
-from swarm_forage_env._internal.fields import as_tuples
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies import pretrained
 from tests.support.entries import TINY
@@ -102,7 +101,7 @@ def variants(fields):
         if name != "preset" and not (isinstance(value, dict) and "uniform" in value)
     }
     for picked in itertools.product(*choices.values()):
-        yield dict(zip(choices, map(as_tuples, picked), strict=True))
+        yield dict(zip(choices, picked, strict=True))
 
 
 def test_a_swarm_of_one_does_not_count():

@@ -1,0 +1,203 @@
+"""SwarmLayer: what an environment and each wrapper around it offer alike, the dict API and snapshots of the stack."""
+
+from abc import abstractmethod
+from collections.abc import Collection, Mapping
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.contract.policy import ActionError
+from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
+from swarm_forage_env.world.snapshots import Origin, Snapshot, read, take
+
+if TYPE_CHECKING:
+    from swarm_forage_env.env import ForageEnv
+
+BatchStep: TypeAlias = tuple[ObsArray, np.ndarray, BoolArray, bool]
+"""Observations (N, D), rewards (N,) float32, terminated (N,), truncated."""
+DictStep: TypeAlias = tuple[
+    dict[str, np.ndarray], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
+]
+"""Observations, rewards, terminations, truncations and infos by agent."""
+OPTION_OF_TESTS = "options"
+"""A reset option without a meaning: PettingZoo's own `parallel_api_test` gives it to every environment."""
+_STATE = ("_rewards", "_seeds", "_terminated", "agents", "seed_value")
+"""Attributes of a ForageEnv that are state; the arena holds the rest."""
+
+
+class SwarmLayer:
+    """A ForageEnv, or a wrapper around one. It works on arrays; only `reset`, `step` and `restore` make dicts."""
+
+    @property
+    @abstractmethod
+    def unwrapped(self) -> "ForageEnv":
+        """The ForageEnv at the bottom of the stack."""
+
+    @property
+    @abstractmethod
+    def stack(self) -> tuple[Any, ...]:
+        """All wrappers from this layer inwards."""
+
+    @property
+    @abstractmethod
+    def last_obs(self) -> ObsArray:
+        """(N, D) observations as they are since the last reset, step or restore; another buffer after a restore."""
+
+    @abstractmethod
+    def reset_batch(self, seed: int | None = None) -> ObsArray:
+        """Start a run and return the first observations, (N, D) float32."""
+
+    @abstractmethod
+    def step_batch(
+        self, actions: ActionArray, *, wheel_gain: FloatArray | None = None, tasks: CodeArray | None = None
+    ) -> BatchStep:
+        """Advance by one tick."""
+
+    # Dict level
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, np.ndarray], dict[str, dict[str, Any]]]:
+        """Start a run; returns observations and infos per agent.
+
+        Raises:
+            ConfigError: there are `options`; this environment takes none.
+        """
+        for name in options or ():
+            if name != OPTION_OF_TESTS:
+                raise ConfigError(
+                    f"Expected no reset options, got {name!r}. An environment with an interface changes its scenario "
+                    "at a reset: parallel_env(..., interface={}), then reset(options={'scenario': {'n_objects': 50}})."
+                )
+        return self._by_agent(self.reset_batch(seed).copy()), self._infos()
+
+    def step(self, actions: dict[str, np.ndarray]) -> DictStep:
+        """Advance one tick with one action per agent in `agents`; without agents and actions nothing happens."""
+        env = self.unwrapped
+        if is_over(env.agents, actions, is_reset=env.seed_value is not None):
+            return {}, {}, {}, {}, {}
+        obs, reward, terminated, truncated = self.step_batch(self._packed(actions))
+        rows = self._by_agent(obs.copy())  # one copy of the whole batch; the agents' rows are views and stay valid
+        rewards, terminations = self._by_agent(reward.tolist()), self._by_agent(terminated.tolist())
+        infos, truncations = self._infos(), dict.fromkeys(env.agents, truncated)
+        if truncated:
+            env.agents = []
+        elif terminated.any():
+            env.agents = [agent for agent in env.agents if not terminations[agent]]
+        return rows, rewards, terminations, truncations, infos
+
+    def _by_agent(self, rows: Any) -> dict[str, Any]:
+        """Return rows by agent, of those in `agents`."""
+        env = self.unwrapped
+        found = dict(zip(env.possible_agents, rows, strict=True))
+        return found if len(env.agents) == len(found) else {agent: found[agent] for agent in env.agents}
+
+    def _infos(self) -> dict[str, dict[str, Any]]:
+        return {agent: {"active": active} for agent, active in self._by_agent(self.unwrapped.active.tolist()).items()}
+
+    def _packed(self, actions: dict[str, np.ndarray]) -> ActionArray:
+        """Return actions by agent as an array (N, A)."""
+        env, agents = self.unwrapped, self.unwrapped.agents
+        if not isinstance(actions, Mapping):
+            raise ActionError(f"Expected actions as a dict by agent, got {type(actions).__name__}.")
+        if actions.keys() != set(agents) and actions.keys() != set(
+            env.possible_agents
+        ):  # those of the dead may be there
+            missing = [agent for agent in agents if agent not in actions]
+            foreign = [agent for agent in actions if agent not in agents]
+            raise ActionError(
+                f"Expected one action for each of the {len(agents)} agents in env.agents, "
+                f"missing {missing[:3] or 'none'}, not in env.agents {foreign[:3] or 'none'}."
+            )
+        size = env.swarm_spec.action_size
+        try:
+            given = np.array([actions[agent] for agent in agents])  # a third of the time of numpy.stack
+            if given.shape != (len(agents), size):
+                raise ValueError("another shape")
+            rows = given.astype(np.float32, casting="same_kind")
+        except (TypeError, ValueError) as error:
+            shapes = {np.shape(actions[agent]) for agent in agents}
+            raise ActionError(
+                f"Expected each action as {size} numbers, shape ({size},), got shapes {sorted(shapes)}: {error}."
+            ) from error
+        if len(agents) == len(env.possible_agents):
+            return rows
+        packed = np.zeros((len(env.possible_agents), size), np.float32)
+        packed[[int(agent.removeprefix("robot_")) for agent in agents]] = rows
+        return packed
+
+    # Snapshots
+
+    def snapshot(self) -> Snapshot:
+        """Return the state of the run, of all layers from here inwards, as a value that can be pickled.
+
+        It does not change when the run goes on. Random generators of the spaces are no part of it, nor attributes that
+        a subclass of ForageEnv adds.
+
+        Raises:
+            RuntimeError: before the first reset, or after a step that failed half done.
+            SnapshotError: physics is "chipmunk", whose bodies cannot be copied.
+        """
+        env = self.unwrapped
+        env.require_whole()
+        _, seed = env.swarm, env.seed_value  # the first refuses to be asked before a reset
+        assert seed is not None, "there is a world"
+        own = {name: getattr(env, name) for name in _STATE}
+        states = [own, dict(vars(env.arena)), *(wrapper.__getstate__() for wrapper in self.stack)]
+        return take(self._origin(), seed, env.tick, states, self._parts())
+
+    def restore(self, snapshot: Snapshot) -> dict[str, np.ndarray]:
+        """Go back to a snapshot, of this stack or of one that was made alike; returns observations per agent.
+
+        From here on the run goes on as it did from the snapshot, bit for bit, with the same actions. No reset is needed
+        before. Arrays that were taken from the environment earlier, such as `env.swarm.position`, are not updated.
+
+        Raises:
+            SnapshotError: not a snapshot, or one of another scenario or stack of wrappers; nothing changes.
+        """
+        return self._by_agent(self.restore_batch(snapshot).copy())
+
+    def restore_batch(self, snapshot: Snapshot) -> ObsArray:
+        """Restore at array level: as `restore`, but returns observations (N, D), a buffer that the next step reuses."""
+        env = self.unwrapped
+        own, of_arena, *of_wrappers = read(snapshot, self._origin(), self._parts())
+        vars(env).update(own)
+        vars(env.arena).update(of_arena)
+        for wrapper, state in zip(self.stack, of_wrappers, strict=True):
+            wrapper.__setstate__(state)
+        env.make_whole()
+        return self.last_obs
+
+    def _origin(self) -> Origin:
+        env = self.unwrapped
+        wrappers = tuple((type(wrapper).__qualname__, wrapper.made_from) for wrapper in self.stack)
+        return Origin(scenario=env.scenario, max_cycles=env.max_cycles, reads=env.reads, wrappers=wrappers)
+
+    def _parts(self) -> list[object]:
+        """What a stack is made of, state aside."""
+        env = self.unwrapped
+        configs = (wrapper.made_from for wrapper in self.stack if wrapper.made_from is not None)
+        return [env, env.arena, env.scenario, env.layout, *self.stack, *configs]
+
+
+def is_over(agents_left: Collection[str], actions: Any, *, is_reset: bool) -> bool:
+    """Return whether a step has nothing to do, because no agent is left and no action was given.
+
+    Libraries that step many environments side by side ask for it until all of them are done.
+
+    Args:
+        agents_left: Agents of the environment.
+        actions: What its `step` was given.
+        is_reset: Whether it was reset.
+
+    Raises:
+        RuntimeError: no agent is left, but there are actions, or it was never reset.
+    """
+    if agents_left:
+        return False
+    if not is_reset:
+        raise RuntimeError("Call reset before step.")
+    if actions:
+        raise RuntimeError("All agents are done; call reset first.")
+    return True
