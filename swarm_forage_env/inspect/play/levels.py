@@ -39,7 +39,7 @@ class LevelKind:
 LEVELS = {
     "sensor_noise": LevelKind("sensor noise (sigma, of a range of 1)", SensorNoise, "sigma", 0.1, 0.005),
     "wheel_noise": LevelKind("wheel noise (sigma, of full speed)", ActuatorNoise, "sigma", 0.5, 0.01),
-    "throttle": LevelKind("throttle (share of speed that is lost)", Throttle, "waveform", 0.9, 0.05),
+    "throttle": LevelKind("throttle (share of speed lost)", Throttle, "waveform", 0.9, 0.05),
     "failures": LevelKind("failures per 1,000 s", PopulationDynamics, "malfunction_per_tick", 20.0, 0.5, True),
     "repairs": LevelKind("repairs per 1,000 s", PopulationDynamics, "repair_per_tick", 20.0, 0.5, True),
     "deaths": LevelKind("deaths per 1,000 s", PopulationDynamics, "death_per_tick", 20.0, 0.5, True),

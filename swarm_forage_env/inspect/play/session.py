@@ -23,6 +23,7 @@ from swarm_forage_env.inspect.play.run import SPEEDS, RunByHand
 from swarm_forage_env.inspect.replay.capture import caches_now, objects_now, status_now
 from swarm_forage_env.inspect.replay.files import for_page, page_of
 from swarm_forage_env.policies.registry import POLICIES, policy_label
+from swarm_forage_env.rendering.figures import places_of
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.obstacles import MIN_SIDE_M, Rectangle
@@ -289,7 +290,7 @@ class PlaySession:
             ],
             "header": {
                 "label": policy_label(self.setting.policy),
-                "look": 0,
+                "look": places_of([policy_label(self.setting.policy)])[0],
                 "scenario": here.name,
                 "seed": self.setting.seed,
                 "n_robots": here.robots.n_robots,
