@@ -69,7 +69,8 @@ def same_order(
             return "supported"
         return "contradicted" if upper <= (LOOSE if least > LOOSE else 0.0) else "undecided"
 
-    return _of_tau(first, second, policies, better, rule, decide, f"above {least:.2g} is the same order")
+    turned = "" if better[0] == better[1] else ", the second turned round"
+    return _of_tau(first, second, policies, better, rule, decide, f"above {least:.2g} is the same order{turned}")
 
 
 def unrelated(first: Panel, second: Panel, *, policies: Names, rule: Rule = "intervals") -> Outcome:

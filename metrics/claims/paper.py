@@ -6,6 +6,8 @@ the paper does not name a direction but its text implies one, the text of a clai
 text, captions, file names or program disagree, `otherwise` holds the other possible meanings of a claim.
 """
 
+from itertools import pairwise
+
 from . import rules, shapes
 from .claim import Claim, Statement
 from .orders import LOOSE, differs_more, same_order, unrelated
@@ -455,12 +457,16 @@ _FURTHER = {11: _NOT_IN_THE_SMALL, 14: (states(rules.stays_alike, "S2a still P",
 """Number of an intuition -> what it says by other rules."""
 
 
+def _steps(chain: str) -> list[Says]:
+    return [better(f"{winners} > {losers}") for winners, losers in pairwise(chain.split(" > "))]
+
+
 INTUITIONS: dict[str, Claim] = {
     f"H{number}": Claim(
         f"H{number}",
         text,
         f"scenario {scenario}, intuitions",
-        (*of_each(filter(None, places(where)), better(chain)), *_FURTHER.get(number, ())),
+        (*of_each(filter(None, places(where)), *_steps(chain)), *_FURTHER.get(number, ())),
     )
     for number, (scenario, text, where, chain) in enumerate(_EXPECTED, 1)
 }

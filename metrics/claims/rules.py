@@ -291,7 +291,7 @@ def leads_by_little(
     part = panel.part(levels)
     pairs, limit = [(leader, other) for other in others], FLAT * part.scale
     means = mean_over_runs(part.of((leader, *others)))
-    gaps = means[0] - means[1:]
+    gaps: FloatArray = means[0] - means[1:]
     if rule == "intervals":
         ends = np.array([intervals_of(part, pair, part.confidence) for pair in pairs])  # (others, L, 2)
     else:
@@ -440,11 +440,12 @@ def is_less_available(*, few: int, many: int, needed: Sequence[tuple[int, int]],
     the second swarm has also dropped more steeply. `needed` has pairs: robots needed of the first and of the second.
     """
     ratio = ratio_for_team(team)
-    found = [(availability(few, a, ratio), availability(many, b, ratio)) for a, b in needed]
-    share = float(np.mean([of_many < of_few for of_few, of_many in found]))
+    robots = dict(zip((few, many), zip(*needed, strict=True), strict=True))
+    found = {n: [availability(n, n_min, ratio) for n_min in robots[n]] for n in (many, few)}
+    share = float(np.mean(np.array(found[many]) < found[few]))
     told = (
-        f"{p_many:.4f} of {b} of {many}, {p_few:.4f} of {a} of {few}"
-        for (a, b), (p_few, p_many) in zip(needed, found, strict=True)
+        f"{', '.join(f'{p_v:.4f}' for p_v in of)} for {', '.join(map(str, robots[n]))} of {n}"
+        for n, of in found.items()
     )
     why = f"{'; '.join(told)}; mean team {team:g}"
     return Outcome("supported" if share == 1.0 else "contradicted", share, why=why)

@@ -6,7 +6,7 @@ A place is an experiment and the symbol of a measure, policies are names between
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from itertools import combinations, pairwise
+from itertools import combinations
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -106,16 +106,14 @@ def tie(policies: str, **given: Any) -> Says:
     return says(ties, pairs=policies, **given)
 
 
-def better(chain: str, levels: str = "all") -> Says:
-    """Policies are better than those that follow them in a chain: "stochx > crw > dpo"; lower distances are better."""
+def better(sides: str, levels: str = "all") -> Says:
+    """Each policy on the left is better than each on the right: "crw stochx > dpo"; distances are better if lower."""
+    winners, losers = sides.split(" > ")
 
     def say(where: str) -> tuple[Statement, ...]:
-        panel, steps = place(where), chain.split(" > ")
-        if panel.measure in LOWER_IS_BETTER:
-            steps.reverse()
-        return tuple(
-            states(is_higher, panel, upper=upper, lower=lower, levels=levels) for upper, lower in pairwise(steps)
-        )
+        panel = place(where)
+        upper, lower = (losers, winners) if panel.measure in LOWER_IS_BETTER else (winners, losers)
+        return (states(is_higher, panel, upper=upper, lower=lower, levels=levels),)
 
     return say
 

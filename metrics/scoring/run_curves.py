@@ -379,7 +379,7 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
         read_as = performance_of(performance or spec.world(first).scenario.performance)
         runs = [(spec.world(place), _place_curves(table, place, performance)) for place in places]
         n_planned = len(spec.seeds)
-        if spec.looks:
+        if spec.run.looks:
             n_planned = _n_first_runs(spec, [seeds for _, (seeds, _) in runs])
             runs = [(world, _first(curves, n_planned)) for world, curves in runs]
         lines.append(

@@ -5,7 +5,7 @@ A panel has the scores of every run. It is drawn as it is, and the claims of the
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, TypeAlias, get_args
+from typing import TYPE_CHECKING, Any, TypeAlias, cast, get_args
 
 import numpy as np
 import polars as pl
@@ -196,9 +196,9 @@ def study_panels(
     is_scored = bool(table.spec.axes) and table.spec.axes[-1].is_criterion
     for together in lines.values() if is_scored else ():
         about: dict[str, Any] = {}
-        if table.spec.looks:  # each look is wrong in its share of 5 % (Bonferroni)
+        if table.spec.run.looks:  # each look is wrong in its share of 5 % (Bonferroni)
             about["n_runs_of"] = {line.policy: len(line.curves.experiments[0].seeds) for line in together}
-            about["confidence"] = 1.0 - (1.0 - CONFIDENCE) / len(table.spec.looks)
+            about["confidence"] = 1.0 - (1.0 - CONFIDENCE) / len(table.spec.run.looks)
         for variant in variants:
             for measure, form in _measures_in(measures, variant, together[0].curves):
                 scored = {line.policy: _scores(line.curves, measure, variant, form) for line in together}
@@ -339,14 +339,14 @@ def _performance_panels(table: "StudyTable", groups: Sequence[Sequence[StudyLine
         first = lines[0].curves
         values = {
             line.policy: {
-                float(level): dict(zip(runs.seeds, runs.performance.sum(axis=-1).tolist(), strict=True))
+                float(cast(Any, level)): dict(zip(runs.seeds, runs.performance.sum(axis=-1).tolist(), strict=True))
                 if runs.seeds
                 else {}
                 for level, runs in zip(levels, line.curves.experiments, strict=True)
             }
             for line in lines
         }
-        over = f"in {table.spec.horizon_s:,.0f} s" if first.read_as.is_total else "summed over intervals"
+        over = f"in {table.spec.length.horizon_s:,.0f} s" if first.read_as.is_total else "summed over intervals"
         about = {"measure": "raw_performance", "variant": "corrected", "form": "marginal"}
         about |= {"criterion": table.spec.axes[-1].name, "unit": f"{first.read_as.amount} {over}"}
         panels.append(_panel(table, lines[0], values, {}, **about))

@@ -246,9 +246,9 @@ class StudyVerdict(Answer):
         others = [table.spec.name for table in self.tables if not is_set_of_paper(table.spec)]
         remarks = [f"{name} has the name of one of the paper's sets and other settings" for name in others]
         remarks += _other_than_the_paper([table.spec for table in self.tables if is_set_of_paper(table.spec)])
-        several = [table.spec for table in self.tables if table.spec.looks]
-        for looks in dict.fromkeys(spec.looks for spec in several):
-            names = ", ".join(spec.name for spec in several if spec.looks == looks)
+        several = [table.spec for table in self.tables if table.spec.run.looks]
+        for looks in dict.fromkeys(spec.run.looks for spec in several):
+            names = ", ".join(spec.name for spec in several if spec.run.looks == looks)
             remarks.append(
                 f"{names}: judged after {', '.join(map(str, looks))} runs, and stopped where claims were decided; "
                 "intervals are wider, so that all looks together are wrong once in twenty"
@@ -332,8 +332,8 @@ def _other_than_the_paper(specs: "Sequence[StudySpec]") -> Iterator[str]:
         words: dict[str, None] = {}
         for spec in some:
             whole = load_study(spec.name, PAPER, rules=spec.rules[:1])
-            if spec.horizon_s != whole.horizon_s:
-                words[f"runs of {spec.horizon_s:,g} s instead of {whole.horizon_s:,g} s"] = None
+            if spec.length.horizon_s != whole.length.horizon_s:
+                words[f"runs of {spec.length.horizon_s:,g} s instead of {whole.length.horizon_s:,g} s"] = None
             for axis, planned in zip(spec.axes, whole.axes, strict=True):
                 if len(axis.values) < len(planned.values):
                     fewer = f"{len(axis.values)} of {len(planned.values)} values of {axis.name}"

@@ -4,10 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import polars as pl
+
 from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.sheet import Answer, Sheet
 from swarm_forage_env.studies.results import StudyTable
-from swarm_forage_env.studies.study import StudySpec, left_out, load_study, set_names
+from swarm_forage_env.studies.study import left_out, load_study, set_names
 from swarm_forage_env.studies.study_file import PAPER
 
 FAILURES_SHOWN = 10
@@ -15,56 +17,32 @@ FAILURES_SHOWN = 10
 STATES = ("done", "failed", "missing")
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PaperSets(Answer):
-    """The sets of the paper at one budget, under one of the rules."""
-
-    budget: str
-    specs: tuple[StudySpec, ...]
-
-    def _rows(self) -> list[dict[str, Any]]:
-        return [
-            {
-                "set": spec.name,
-                "about": spec.title,
-                "left out": "; ".join(f"{axis} {', '.join(values)}" for axis, values in left_out(spec).items()),
-                "runs each": len(spec.seeds),
-                "length, s": spec.horizon_s,
-                "experiments": len(spec.places) // len(spec.policies),
-                "runs": len(spec.places) * len(spec.seeds),
-                "robot-ticks": float(spec.plan.robot_ticks),
-            }
-            for spec in self.specs
-        ]
-
-    def sheets(self) -> Sequence[Sheet]:
-        """Return one row per set, and their sum."""
-        rows = self._rows()
-        sums = {name: sum(row[name] for row in rows) for name in ("experiments", "runs", "robot-ticks")}
-        hidden = {"left out", "runs each", "length, s"} if self.budget == PAPER else {"about"}
-        header = [name for name in rows[0] if name not in hidden]
-        shown = [
-            ["" if name not in row else f"{row[name]:,g}" if name == "length, s" else f"{row[name]:.2e}"
-             if name == "robot-ticks" else f"{row[name]:,}" if isinstance(row[name], int) else row[name]
-             for name in header]
-            for row in (*rows, {"set": "all", **sums})
-        ]  # fmt: skip
-        title = f"experiment sets of the paper, budget {self.budget}"
-        notes = ("of four controllers, under each of the two rules",)
-        return (Sheet.of(title=title, header=header, rows=shown, notes=notes),)
-
-    def to_mapping(self) -> dict[str, Any]:
-        """Return the sets."""
-        return {"budget": self.budget, "sets": self._rows()}
-
-
-def paper_sets(budget: str = PAPER) -> PaperSets:
+def paper_sets(budget: str = PAPER) -> Sheet:
     """List the experiment sets of the paper: how many runs they make, and what a budget leaves out.
 
     Raises:
         ConfigError: the sets do not have this budget.
     """
-    return PaperSets(budget=budget, specs=tuple(load_study(name, budget, rules=("described",)) for name in set_names()))
+    rows = [
+        {
+            "set": spec.name,
+            "about": spec.file.title,
+            "left out": "; ".join(f"{axis} {', '.join(values)}" for axis, values in left_out(spec).items()),
+            "runs each": len(spec.seeds),
+            "length, s": round(spec.length.horizon_s),
+            "experiments": len(spec.places) // len(spec.policies),
+            "runs": len(spec.places) * len(spec.seeds),
+            "robot-ticks": spec.plan.robot_ticks,
+        }
+        for spec in (load_study(name, budget, rules=("described",)) for name in set_names())
+    ]
+    frame = pl.DataFrame(rows).drop(["left out", "runs each", "length, s"] if budget == PAPER else ["about"])
+    sums = frame.select(pl.lit("all").alias("set"), pl.col("experiments", "runs", "robot-ticks").sum())
+    title = f"experiment sets of the paper, budget {budget}"
+    notes = ("of four controllers, under each of the two rules",)
+    listed = pl.concat([frame, sums], how="diagonal")
+    ticks = pl.Series("robot-ticks", [f"{count:.2e}" for count in listed["robot-ticks"]])
+    return Sheet(title=title, frame=listed.with_columns(ticks), notes=notes)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -88,16 +66,17 @@ class StudyStatus(Answer):
         lines = [f"{len(places) - len(left):,} of {counted(len(places), 'condition')} complete"]
         if len(self.table.versions) > 1:
             lines.append(f"The runs were made by {len(self.table.versions)} versions or commits of the packages.")
-        sheets = [Sheet(title=f"{spec.name}, budget {spec.budget}: {', '.join(told)}", notes=lines)]
-        if len(left):
-            words = list(spec.place_words().values())
-            rows = [(*words[row["condition"]], *(str(row[name]) for name in STATES)) for row in left.to_dicts()]
-            sheets.append(Sheet.of(header=("rules", "policy", *(axis.name for axis in spec.axes), *STATES), rows=rows))
-        if failed := self._failed():
-            notes = [f"  {row['policy']}, seed {row['seed']}: {row['error']}" for row in failed[:FAILURES_SHOWN]]
-            more = len(failed) - FAILURES_SHOWN
-            sheets.append(Sheet(title="failed", notes=[*notes, *([f"  and {more} more"] if more > 0 else [])]))
-        return sheets
+        words, failed = list(spec.place_words().values()), self._failed()
+        notes = [f"  {row['policy']}, seed {row['seed']}: {row['error']}" for row in failed[:FAILURES_SHOWN]]
+        if len(failed) > FAILURES_SHOWN:
+            notes.append(f"  and {len(failed) - FAILURES_SHOWN} more")
+        rows = [(*words[row["condition"]], *(row[name] for name in STATES)) for row in left.to_dicts()]
+        header = ("rules", "policy", *(axis.name for axis in spec.axes), *STATES)
+        return [
+            Sheet(title=f"{spec.name}, budget {spec.budget}: {', '.join(told)}", notes=lines),
+            *([Sheet.of(header=header, rows=rows)] if rows else []),
+            *([Sheet(title="failed", notes=notes)] if notes else []),
+        ]
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the states of all conditions, and all failed runs."""

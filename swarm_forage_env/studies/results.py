@@ -28,6 +28,7 @@ from swarm_forage_env.runs.store import failure_file, read_failure, stored_recor
 from swarm_forage_env.runs.versions import VERSION_NAMES
 from swarm_forage_env.scenarios.columns import INTERVAL_COLUMNS
 from swarm_forage_env.studies.study import Place, StudySpec, study_of
+from swarm_forage_env.studies.study_file import Value, word_of
 
 if TYPE_CHECKING:
     import polars as pl
@@ -238,12 +239,15 @@ class StudyTable:
 
 
 def _address(spec: StudySpec, place: Place) -> dict[str, Any]:
-    """The address of a condition by column: rules, policy, and its value on each axis; numbers are floats."""
-    values = {
-        AXIS + axis.name: value if isinstance(value, str | bool) else float(value)
-        for axis, value in zip(spec.axes, place.values, strict=True)
-    }
+    """The address of a condition by column: rules, policy, and its value on each axis; whole numbers are floats."""
+    values = {AXIS + axis.name: _cell(value) for axis, value in zip(spec.axes, place.values, strict=True)}
     return {"rules": place.rules, "policy": place.policy, **values}
+
+
+def _cell(value: Value) -> float | str | bool:
+    if isinstance(value, str | bool):
+        return value
+    return word_of(value) if isinstance(value, tuple) else float(value)
 
 
 def read_study(path: str | Path) -> StudyTable:

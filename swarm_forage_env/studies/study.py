@@ -4,6 +4,7 @@ A condition is one policy under one of the rules at one value of every axis, and
 runs once per seed, and all conditions share the seeds.
 """
 
+import itertools
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import msgspec
 
-from swarm_forage_env._internal.fields import ConfigError, FileName, Several, checked, known_keys, known_name, table
+from swarm_forage_env._internal.fields import ConfigError, FileName, checked, known_keys, known_name, table
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.policies.registry import is_policy_file
 from swarm_forage_env.runs.plan import Condition, Plan
@@ -40,7 +41,6 @@ from swarm_forage_env.studies.study_file import (
     Value,
     axes_of,
     content_of,
-    field_value,
     seeds_of,
     value_words,
 )
@@ -85,19 +85,14 @@ class StudySpec:
             if name in OF_THE_STUDY:
                 raise ConfigError(f"Expected no {name} in set: {OF_THE_STUDY[name]}.")
         known_keys(self.file.set, SCENARIO_FIELDS, "scenario field")
-        checked("rules", self.rules, Several)
         for rules in self.rules:
             known_name("rules", rules, RULES_NAMES)
-        checked("policies", self.policies, Several)
-        for what, names in (
-            ("policies", [policy.label for policy in self.policies]),
-            ("axes", [axis.name for axis in self.axes]),
-        ):
-            if len(set(names)) < len(names):
-                raise ConfigError(f"Expected different {what} in study {self.name}, got {', '.join(map(str, names))}.")
-        varied = {axis.name for axis in self.axes}
+        labels, varied = [policy.label for policy in self.policies], [axis.name for axis in self.axes]
+        for what, names in (("rules", self.rules), ("policies", labels), ("axes", varied)):
+            if len({*names}) < len(names) or not (names or what == "axes"):
+                raise ConfigError(f"Expected different {what}, one or more, in study {self.name}, got {[*names]!r}.")
         names = {*self.file.set, *varied}
-        if {SIZE, "n_robots"} <= varied:
+        if {SIZE, "n_robots"} <= {*varied}:
             raise ConfigError(f"Expected one axis for the swarm size, got {SIZE} and n_robots.")
         if QUIRK in names and names & {*QUIRK_NAMES}:
             raise ConfigError(f"Expected quirks from one place, got the axis {QUIRK} and a quirk of its own.")
@@ -120,16 +115,6 @@ class StudySpec:
         return self.file.name
 
     @property
-    def title(self) -> str:
-        """What it is about, for people."""
-        return self.file.title
-
-    @property
-    def horizon_s(self) -> float:
-        """Length of a run, s."""
-        return self.length.horizon_s
-
-    @property
     def budget(self) -> str:
         """Name of the budget."""
         return self.run.budget
@@ -143,11 +128,6 @@ class StudySpec:
     def rules(self) -> tuple[str, ...]:
         """Some of `RULES_NAMES`."""
         return self.run.rules
-
-    @property
-    def looks(self) -> tuple[int, ...]:
-        """See `RunTable.looks`."""
-        return self.run.looks
 
     @property
     def length(self) -> BudgetTable:
@@ -190,8 +170,8 @@ class StudySpec:
     def places(self) -> tuple[Place, ...]:
         """All conditions: rules by rules, policy by policy, the last axis fastest."""
         labels = [policy.label for policy in self.policies]
-        addresses = product(self.rules, labels, product(*(axis.values for axis in self.axes)))
-        return tuple(Place(*address) for address in addresses)
+        values = product(*(axis.values for axis in self.axes))
+        return tuple(itertools.starmap(Place, product(self.rules, labels, values)))
 
     def place_words(self) -> dict[Place, tuple[str, ...]]:
         """Return conditions as shown to people: rules, policy, values."""
@@ -211,20 +191,16 @@ class StudySpec:
 
     def world(self, place: Place) -> World:
         """Return the world of a condition, with the criterion that labels its runs."""
-        return self._conditions[place].world
-
-    def condition(self, place: Place) -> Condition:
-        """Return the policy and the world of a condition."""
-        return self._conditions[place]
+        return self.conditions[place].world
 
     @cached_property
     def plan(self) -> Plan:
         """All runs, in the order of the conditions."""
-        return Plan(conditions=tuple(self._conditions.values()), seeds=self.seeds)
+        return Plan(conditions=tuple(self.conditions.values()), seeds=self.seeds)
 
     def specs_of(self, place: Place) -> tuple[RunSpec, ...]:
         """Return the runs of a condition, one per seed."""
-        return self.plan.specs_of(self.condition(place))
+        return self.plan.specs_of(self.conditions[place])
 
     def with_run(self, **changes: Any) -> "StudySpec":
         """Return the study with other choices: seeds, rules, ..."""
@@ -240,7 +216,8 @@ class StudySpec:
         return self.text + RUN + "\n".join(lines) + "\n"
 
     @cached_property
-    def _conditions(self) -> dict[Place, Condition]:
+    def conditions(self) -> dict[Place, Condition]:
+        """Address -> policy and world."""
         has_caches = "caches" in (*self.file.set, *(axis.name for axis in self.axes))
         policies = {policy.label: policy for policy in self.policies}
         if has_caches:
@@ -260,8 +237,8 @@ class StudySpec:
         found: dict[tuple[Value, ...], ScenarioConfig] = {}
         for values in product(*(axis.values for axis in self.axes if axis.name != SIZE)):
             here: dict[str, Any] = dict(zip((name for name in names if name != SIZE), values, strict=True))
-            overrides: dict[str, Any] = {**length, **self.file.settings} | {
-                name: field_value(name, value) for name, value in here.items() if name in SCENARIO_FIELDS
+            overrides: dict[str, Any] = {**length, **self.file.set} | {
+                name: value for name, value in here.items() if name in SCENARIO_FIELDS
             }
             density = None if at is None else overrides.pop("density", None)
             quirks = _switched(RULES[RULES_NAMES[rules]], here.get(QUIRK))
@@ -409,6 +386,6 @@ def _with_value(mapping: Mapping[str, Any], path: Sequence[str], value: Value) -
 
 
 def _as_number(name: str, value: Value) -> float:
-    if isinstance(value, str | bool):
+    if isinstance(value, str | bool | tuple):
         raise ConfigError(f"Expected numbers on axis {name}, got {value!r}.")
     return float(value)

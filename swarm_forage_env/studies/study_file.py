@@ -30,31 +30,22 @@ files of the paper's sets are in the folder `sets`.
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
-from typing import Any, TypeAlias, get_origin
+from typing import Any, TypeAlias
 
 import msgspec
 
-from swarm_forage_env._internal.fields import (
-    MOST_SEEDS,
-    ConfigError,
-    Several,
-    checked,
-    known_keys,
-    known_name,
-    whole,
-)
+from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, known_keys, known_name, whole
 from swarm_forage_env._internal.files import parse_toml
-from swarm_forage_env.scenarios.overrides import field_sections, field_types, parse_tuple
+from swarm_forage_env.scenarios.overrides import field_sections
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import QUIRK_NAMES
 from swarm_forage_env.studies.ladders import BUDGETS, CRITERIA, spread, study_values
 from swarm_forage_env.wrappers.registry import wrapper_config_class
 from swarm_forage_env.wrappers.world import SIZE
 
-Value: TypeAlias = float | str | bool
-"""Value on an axis."""
+Value: TypeAlias = float | str | bool | tuple[Any, ...]
+"""Value on an axis; a tuple for a field that holds a list."""
 
 SETS = Path(__file__).parent / "sets"
 """Folder of the paper's sets."""
@@ -71,7 +62,7 @@ OF_THE_STUDY = {
 }
 """Scenario field that a study must not set -> what decides it instead."""
 NOTHING = "none"
-"""Name of the empty list on an axis of lists, and of no switched quirk."""
+"""An empty list in words, and no switched quirk."""
 QUIRK = "quirk"
 """Axis whose values are `NOTHING` and names of quirks, each of which is switched alone: on under the described rules,
 off under the program's."""
@@ -137,11 +128,6 @@ class StudyFile(_Strict, frozen=True):
     budget: dict[str, BudgetTable] = {}
     run: RunTable | None = None
 
-    @property
-    def settings(self) -> dict[str, Any]:
-        """Scenario fields as scenarios take them: lists are tuples."""
-        return dict(self.set)
-
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Axis:
@@ -155,8 +141,6 @@ class Axis:
     """A criterion (`ladders.CRITERIA`), a scenario field, a field of a wrapper ("sensor_noise.sigma",
     "throttle.waveform.amplitude"), or `QUIRK`."""
     values: tuple[Value, ...]
-    """Numbers, texts or truth values. For a field that holds a list, texts with its entries between commas
-    (`list_word`)."""
 
     def __post_init__(self) -> None:
         wrapper, dot, _ = self.name.partition(".")
@@ -167,17 +151,13 @@ class Axis:
             others = ", ".join((*CRITERIA, QUIRK))
             shown_by = f"{others}, and the fields that swarm-forage info warehouse_small lists"
             known_name("axis", self.name, allowed, all_by=shown_by)
-        checked(f"the values of axis {self.name}", self.values, Several)
         for value in self.values if self.name == QUIRK else ():
             known_name("quirk", value, (NOTHING, *QUIRK_NAMES))
-        kinds = {"text" if isinstance(v, str) else "truth" if isinstance(v, bool) else "number" for v in self.values}
-        if len(kinds) > 1 or len(set(self.values)) < len(self.values):
+        kinds = {float if isinstance(value, int) and type(value) is not bool else type(value) for value in self.values}
+        if len(kinds) != 1 or len({*self.values}) < len(self.values):
             raise ConfigError(
-                f"Expected different numbers, texts or truth values on axis {self.name}, got {list(self.values)!r}."
-            )
-        if self.name in _list_fields() and kinds != {"text"}:
-            raise ConfigError(
-                f"Expected lists on axis {self.name}, such as values = [[], [...]], got {list(self.values)!r}."
+                f"Expected one or more different numbers, texts, truth values or lists on axis {self.name}, got "
+                f"{list(self.values)!r}."
             )
 
     @property
@@ -216,41 +196,36 @@ def axes_of(file: StudyFile, asked: Mapping[str, Any]) -> tuple[tuple[Axis, ...]
     axes: list[Axis] = []
     reference: Value | None = None
     for number, one in enumerate(file.axis, 1):
-        name, is_last = _name_of(one), number == len(file.axis)
-        values = _words(name, _usual_values(file, name) if one.values is None else one.values)
+        name, is_last = one.field if one.criterion is None else one.criterion, number == len(file.axis)
+        if name is None or (one.criterion is not None and one.field is not None):
+            raise ConfigError("Expected either criterion or field of an axis, got both or none of them.")
+        if one.criterion is not None:
+            known_name("criterion", name, (*CRITERIA, QUIRK))
+        values = _usual_values(file, name) if one.values is None else _plain(one.values)
+        if not values:
+            raise ConfigError(f"Expected the values of axis {name} to be one or more values, got none.")
         if one.reference is not None and not is_last:
             raise ConfigError(f"Expected a reference on the last axis only, got one on {name}.")
         if is_last:
-            (reference,) = (_usual_reference(name, values),) if one.reference is None else _words(name, [one.reference])
+            reference = _usual_reference(name, values) if one.reference is None else _plain(one.reference)
             if reference is not None and reference not in values:
-                values = [reference, *values]
+                values = (reference, *values)
         axes.append(Axis(name=name, values=_chosen(name, values, reference, asked.get(name))))
     known_keys(asked, [axis.name for axis in axes], "axis", prefix="values.")
     return tuple(axes), reference
 
 
-def _words(name: str, given: Sequence[Any]) -> list[Value]:
-    """Values of an axis; lists become texts."""
-    checked(f"the values of axis {name}", tuple(given), Several)
-    return [list_word(value) if isinstance(value, list) else value for value in given]
+def _plain(value: Any) -> Any:
+    """Return a value of the file with tuples in place of lists."""
+    return tuple(map(_plain, value)) if isinstance(value, list | tuple) else value
 
 
-def _usual_values(file: StudyFile, name: str) -> Sequence[Value]:
+def _usual_values(file: StudyFile, name: str) -> tuple[Value, ...]:
     if name == QUIRK:
-        return [NOTHING, *QUIRK_NAMES]
+        return (NOTHING, *QUIRK_NAMES)
     if name not in CRITERIA:
         raise ConfigError(f"Missing key 'values' of axis {name}; only criteria have values of their own.")
-    return study_values(scenario(file.scenario, **file.settings), name)
-
-
-def _name_of(one: AxisTable) -> str:
-    """Name of an axis, a criterion or a field."""
-    names = [name for name in (one.criterion, one.field) if name is not None]
-    if len(names) != 1:
-        raise ConfigError(f"Expected either criterion or field of an axis, got {len(names)} of them.")
-    if one.criterion is not None:
-        known_name("criterion", one.criterion, (*CRITERIA, QUIRK))
-    return names[0]
+    return tuple(study_values(scenario(file.scenario, **file.set), name))
 
 
 def _usual_reference(name: str, values: Sequence[Any]) -> Value | None:
@@ -259,58 +234,33 @@ def _usual_reference(name: str, values: Sequence[Any]) -> Value | None:
     return NOTHING if name == QUIRK else 0.0 if name in CRITERIA else None
 
 
-def _chosen(name: str, values: list[Value], reference: Value | None, asked: Any) -> tuple[Value, ...]:
+def _chosen(name: str, values: tuple[Value, ...], reference: Value | None, asked: Any) -> tuple[Value, ...]:
     """The values that a budget runs: all, a list, or a number of values besides the reference."""
     if asked is None:
-        return tuple(values)
+        return values
     if isinstance(asked, tuple):
-        wanted = _words(name, asked)
+        wanted: Sequence[Value] = _plain(asked)
         unknown = [value for value in wanted if value not in values]
         if unknown:
-            raise ConfigError(f"Expected values.{name} to be some of {values!r}, got {unknown[0]!r}.")
+            raise ConfigError(f"Expected values.{name} to be some of {list(values)!r}, got {unknown[0]!r}.")
     else:
         whole(f"values.{name}", asked, at_least=1)
-        wanted = list(spread([value for value in values if value != reference], asked))
+        wanted = spread([value for value in values if value != reference], asked)
     return tuple(value for value in values if value in wanted or value == reference)
-
-
-def list_word(entries: Sequence[Any]) -> str:
-    """Return a list as a value on an axis: ["nest_distance", "x"] is "nest_distance,x", [] is "none".
-
-    Plus signs join lists within it: [[1, 2], [3, 4]] is "1,2+3,4".
-    """
-    if any(isinstance(entry, list | tuple) for entry in entries):
-        return "+".join(map(list_word, entries))
-    return ",".join(map(str, entries)) or NOTHING
-
-
-@cache
-def _list_fields() -> dict[str, Any]:
-    """Scenario fields that hold a list -> their type."""
-    return {name: kind for name, kind in field_types().items() if get_origin(kind) is tuple}
-
-
-def field_value(name: str, value: Value) -> Any:
-    """Return the value that a scenario takes for a value on the axis of a field."""
-    kind = _list_fields().get(name)
-    if kind is None:
-        return value
-    try:
-        return parse_tuple("" if value == NOTHING else str(value), kind)
-    except ConfigError:
-        raise
-    except ValueError as error:
-        raise ConfigError(f"Expected lists of numbers on axis {name}, got {value!r}.") from error
 
 
 def value_words(values: Iterable[Value]) -> dict[Value, str]:
     """Return the values of an axis in words: 2/7 as 0.285714, but with all digits if two values would look alike."""
-    short = {value: _short(value) for value in values}
+    short = {value: word_of(value) for value in values}
     shown = Counter(short.values())
     return {value: word if shown[word] == 1 else str(value) for value, word in short.items()}
 
 
-def _short(value: Value) -> str:
+def word_of(value: Any) -> str:
+    """Return a value in a word: true, 0.25, "3.2,12.8" for a list, "1,2+3,4" for one of lists, "none" for none."""
+    if isinstance(value, tuple):
+        between = "+" if any(isinstance(entry, tuple) for entry in value) else ","
+        return between.join(map(word_of, value)) or NOTHING
     if isinstance(value, bool):
         return str(value).lower()
     return f"{value:g}" if isinstance(value, float) else str(value)

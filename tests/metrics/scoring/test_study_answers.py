@@ -90,5 +90,5 @@ def test_a_status_tells_what_is_missing():
 
 
 def test_sets_and_studies_are_described():
-    sets = {row["set"]: row for row in paper_sets("reduced").to_mapping()["sets"]}
+    sets = {row["set"]: row for row in paper_sets("reduced").frame.to_dicts()}
     assert sets["S2a"]["left out"] == "walk_probability 0.026; population_size 460, 627, 819"
