@@ -14,7 +14,7 @@ try:
 except FileNotFoundError:  # it asks for the working folder, before any command of ours could answer
     raise SystemExit("swarm-forage: The working folder is gone; go to one that is there (cd).") from None
 
-from swarm_forage_env.scenarios.presets import SCENARIO_NAMES as _SCENARIO_NAMES
+from swarm_forage_env.scenarios import SCENARIO_NAMES as _SCENARIO_NAMES
 
 _load, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 

@@ -24,7 +24,7 @@ from swarm_forage_env.policies.registry import policy_label
 from swarm_forage_env.runs.record import Record
 from swarm_forage_env.runs.runner import run_all
 from swarm_forage_env.runs.spec import PolicySpec, RunSpec
-from swarm_forage_env.runs.store import DONE, RunFailure, failure_lines, load, state_of
+from swarm_forage_env.runs.store import RunFailure, failure_lines, is_stored, load
 from swarm_forage_env.scenarios.differences import preset_of
 from swarm_forage_env.wrappers.world import UNDISTURBED, World
 
@@ -163,7 +163,7 @@ def run_plan(
 def planned_line(specs: Iterable[RunSpec], out: str | Path) -> str:
     """Say in one line which runs there would be."""
     planned = {spec.run_id: spec for spec in specs}
-    todo = [spec for spec in planned.values() if state_of(Path(out), spec) != DONE]
+    todo = [spec for spec in planned.values() if not is_stored(Path(out), spec)]
     robot_ticks = sum(spec.robot_ticks for spec in todo)
     return (
         f"{counted(len(planned), 'run')}, {len(planned) - len(todo):,} stored, {len(todo):,} to do with "

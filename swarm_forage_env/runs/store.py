@@ -18,10 +18,6 @@ from swarm_forage_env._internal.files import read_json, replacing
 from swarm_forage_env.runs.record import Record, RecordError
 from swarm_forage_env.runs.spec import RunSpec
 
-DONE, FAILED, MISSING = "done", "failed", "missing"
-STATES = (DONE, FAILED, MISSING)
-"""What a planned run is: recorded; tried in vain; not there, or its file is damaged."""
-
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class RunFailure:
@@ -92,14 +88,12 @@ def stored_record(folder: Path, spec: RunSpec) -> Record | None:
     return record.read_as(spec.scenario.performance)
 
 
-def state_of(folder: Path, spec: RunSpec) -> str:
-    """Return the state of a run, one of `STATES`."""
+def is_stored(folder: Path, spec: RunSpec) -> bool:
+    """Return whether a folder holds the record of a run, undamaged."""
     try:
-        if stored_record(folder, spec) is not None:
-            return DONE
+        return stored_record(folder, spec) is not None
     except RecordError:
-        return MISSING
-    return FAILED if failure_file(folder, spec.run_id).exists() else MISSING
+        return False
 
 
 def read_failure(path: str | os.PathLike[str]) -> RunFailure:

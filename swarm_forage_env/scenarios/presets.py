@@ -10,6 +10,7 @@ from functools import partial
 from typing import Any
 
 from swarm_forage_env._internal.fields import ConfigError, known_name, whole
+from swarm_forage_env.scenarios import SCENARIO_NAMES
 from swarm_forage_env.scenarios.config import ArenaConfig, ObjectConfig, RewardConfig, RobotConfig, ScenarioConfig
 from swarm_forage_env.scenarios.obstacles import stretched
 from swarm_forage_env.scenarios.overrides import (
@@ -196,17 +197,8 @@ def at_density(
     return in_arena(config, arena, n_robots=n_robots, n_objects=objects)
 
 
-PRESETS: dict[str, Callable[..., ScenarioConfig]] = {
-    "warehouse_small": warehouse_small,
-    "warehouse_medium": warehouse_medium,
-    "warehouse_dual": warehouse_dual,
-    "warehouse_quad": warehouse_quad,
-    "search_and_rescue": search_and_rescue,
-    "classroom": classroom,
-}
-"""Name -> what builds the scenario. A new one of this package is registered here, and nowhere else."""
-SCENARIO_NAMES = tuple(PRESETS)
-"""What `scenario` takes."""
+PRESETS: dict[str, Callable[..., ScenarioConfig]] = {name: globals()[name] for name in SCENARIO_NAMES}
+"""Name -> what builds the scenario."""
 
 
 def scenario(name: str, /, *, density: float | None = None, **overrides: Any) -> ScenarioConfig:

@@ -10,16 +10,13 @@ from swarm_forage_env.runs.record import RecordError
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import (
-    DONE,
-    FAILED,
-    MISSING,
     RunFailure,
     failure_file,
     failure_lines,
+    is_stored,
     load,
     read_failure,
     record_file,
-    state_of,
     store,
 )
 from swarm_forage_env.scenarios.presets import scenario
@@ -60,12 +57,11 @@ def test_a_failure_is_kept_until_the_run_succeeds(folder):
     assert not file.exists()
 
 
-def test_a_run_is_done_failed_or_missing(folder):
+def test_a_run_is_stored_unless_it_is_missing_failed_or_damaged(folder):
     failed = replace(SPEC, seed=3)
     store(folder, RunFailure(spec=failed, error="ValueError: no", traceback="line 1"))
     record_file(folder, replace(SPEC, seed=1).run_id).write_bytes(b"damaged")
-    states = [state_of(folder, replace(SPEC, seed=seed)) for seed in range(4)]
-    assert states == [DONE, MISSING, MISSING, FAILED]
+    assert [is_stored(folder, replace(SPEC, seed=seed)) for seed in range(4)] == [True, False, False, False]
 
 
 def test_runs_of_a_policy_that_failed_for_one_reason_share_a_line():
