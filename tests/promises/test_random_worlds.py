@@ -10,7 +10,6 @@ from random import Random
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.wrappers.world import World
 from tests.support.random_scenarios import random_scenario
 from tests.support.random_worlds import random_world, visit
 
@@ -48,9 +47,3 @@ def test_every_kind_of_world_is_drawn():
     robots = ("neighbours", "messages")
     assert min(found[name] for name in (*robots, "obstacles", "positions")) > 3
     assert min(found[name] for name in ("power_law", "quad_source", "none", "static", "dynamic")) > 3
-
-
-def test_a_world_may_come_from_a_sampler():
-    world = next(world for world in map(random_world, map(Random, range(400))) if world.sampler)
-    assert world.sampler is not None
-    assert world.sampler.world_of(world.seed) == World(world.scenario, world.wrappers)

@@ -3,13 +3,12 @@
 from random import Random
 from typing import Any
 
-from swarm_forage_env.scenarios.config import CACHE_KINDS, PHYSICS_ENGINES, RewardConfig, ScenarioConfig, to_mapping
+from swarm_forage_env.scenarios.config import CACHE_KINDS, PHYSICS_ENGINES, RewardConfig, ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELLS_PER_M, PLACEMENTS, POSITIONS
 from swarm_forage_env.scenarios.obstacles import MIN_SIDE_M
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, QUIRK_NAMES, Quirks
-from swarm_forage_env.views.sampler import ScenarioSampler
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.handling import HandlingCostConfig
 from swarm_forage_env.wrappers.noise import (
@@ -199,39 +198,3 @@ def _waveform(random: Random, peak: float) -> Waveform:
 
 def _sigma(random: Random) -> float | Waveform:
     return random.choice((0.0, 10 ** random.uniform(-3.0, 2.0), _waveform(random, 0.2)))
-
-
-def random_sampler(random: Random, config: ScenarioConfig, most_ticks: int) -> ScenarioSampler:
-    """Draw a distribution of worlds of which one is `config` with fewer robots and objects, perhaps disturbed.
-
-    Raises:
-        ConfigError: what was drawn does not fit together; draw again.
-    """
-    first = {
-        "preset": to_mapping(config),
-        "n_robots": {random.choice(("uniform", "log_uniform")): [1, config.robots.n_robots]},
-        "n_objects": {"uniform": [1, config.objects.n_objects]},
-        "physics": {"choice": list(PHYSICS_ENGINES)},
-    }
-    alike = (
-        "neighbours_seen",
-        "neighbour_range_m",
-        "message_size",
-    )  # so that rows have the same columns
-    columns = {name: getattr(config.robots, name) for name in alike}
-    other = with_overrides(random_scenario(random, None, most_ticks), **columns)
-    wrappers: dict[str, dict[str, Any]] = {
-        "sensor_noise": {"probability": random.choice((0.5, 1.0)), "sigma": {"uniform": [0.0, 0.2]}},
-        "throttle": {"waveform": "constant", "amplitude": {"choice": [0.1, 0.4]}},
-    }
-    named = random.sample(list(wrappers), random.randint(0, len(wrappers)))
-    noisy = {"actuator_noise": {"probability": 0.3, "sigma": 0.1}}
-    return ScenarioSampler(
-        {
-            "worlds": [
-                {"scenario": first, "weight": random.choice((0.5, 3))},
-                {"scenario": {"preset": to_mapping(other)}, "wrappers": noisy},
-            ],
-            "wrappers": {name: wrappers[name] for name in named},
-        }
-    )

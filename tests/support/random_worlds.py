@@ -7,7 +7,6 @@ snapshot, and walks through it once more without any of that: both walks must sh
 
 import copy
 import hashlib
-import json
 import traceback
 from collections import Counter
 from dataclasses import dataclass, field
@@ -22,8 +21,6 @@ from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import build_stack
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.views.gymnasium import SwarmVectorEnv
-from swarm_forage_env.views.sampler import ScenarioSampler
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.recorder import RunRecorder
 from swarm_forage_env.wrappers.world import World
@@ -31,7 +28,7 @@ from tests.support.busy import BusyPolicy
 from tests.support.drivers import Beyond, Corners, Driven, Driver, Uniform, Wall
 from tests.support.invariants import look_at, look_at_record
 from tests.support.misuse import misuse, misuse_before_reset
-from tests.support.random_scenarios import random_sampler, random_scenario, random_wrappers
+from tests.support.random_scenarios import random_scenario, random_wrappers
 
 SCRIPTED = {
     "crw": "none",
@@ -45,8 +42,6 @@ SCRIPTED = {
 DRIVERS = ("uniform", "corners", "beyond", "wall", "busy", *SCRIPTED)
 MOST_TRIALS = 200
 """Drawn scenarios, of which many are refused; one in a few is valid."""
-BATCH_STEPS = 12
-"""Steps of a batch of drawn worlds, beside the two walks through one of them."""
 
 
 @dataclass(frozen=True)
@@ -61,20 +56,17 @@ class RandomWorld:
     """Whether the first walk uses dictionaries and the second arrays, or the other way round."""
     detour_at: int
     """Tick of a snapshot, from which the walk goes on twice."""
-    sampler: ScenarioSampler | None = None
-    """What the scenario and its wrappers were drawn from; None = they were drawn alone."""
 
     def describe(self) -> str:
         """One line for people."""
         config = self.scenario
         kinds = ", ".join(wrapper.name for wrapper in self.wrappers) or "no wrappers"
         company = f"{config.robots.neighbours_seen} neighbours seen, messages of {config.robots.message_size}"
-        drawn = ", from a sampler" if self.sampler else ""
         return (
             f"{config.name}, {config.arena.width_m:g} x {config.arena.height_m:g} m, {config.robots.n_robots} robots, "
             f"{config.objects.n_objects} objects, {config.objects.placement}, {len(config.arena.obstacles)} obstacles, "
             f"{company}, caches {config.caches}, {config.physics}, {config.horizon_ticks} ticks, {kinds}, driven by "
-            f"{self.driver}, seed {self.seed}{drawn}"
+            f"{self.driver}, seed {self.seed}"
         )
 
 
@@ -106,14 +98,8 @@ def random_world(random: Random, *, most_ticks: int = 400) -> RandomWorld:
 def _drawn(random: Random, driver: str, most_ticks: int) -> RandomWorld:
     """Draw a world; raises ConfigError where what was drawn does not fit together."""
     config = random_scenario(random, SCRIPTED.get(driver), most_ticks)
-    wrappers, sampler = random_wrappers(random, config), None
+    wrappers = random_wrappers(random, config)
     seed = random.choice((0, 1, 2**63 - 1, random.randrange(2**31)))
-    if driver not in SCRIPTED and random.random() < 0.15:
-        sampler = random_sampler(random, config, most_ticks)
-        drawn = sampler.world_of(seed)
-        config, wrappers = drawn.scenario, drawn.wrappers
-        if any(corner.objects.placement == "power_law" for corner in sampler.ends):
-            _steps_of_batch(sampler, seed % 2**31)  # refuses clusters without room
     return RandomWorld(
         scenario=config,
         wrappers=wrappers,
@@ -121,7 +107,6 @@ def _drawn(random: Random, driver: str, most_ticks: int) -> RandomWorld:
         seed=seed,
         by_dicts=random.random() < 0.5,
         detour_at=random.randrange(config.horizon_ticks),
-        sampler=sampler,
     )
 
 
@@ -133,37 +118,9 @@ def visit(world: RandomWorld) -> Visit:
         second = _walk(world, seen, by_dicts=not world.by_dicts, is_disturbed=False)
         for tick, (one, other) in enumerate(zip(first, second, strict=True)):
             assert one == other, f"the same run, without wrong calls and snapshots, differs from tick {tick} on"
-        if world.sampler is not None:
-            _look_at_sampler(world.sampler, world, seen)
     except Exception:  # noqa: BLE001 - whatever it is, it is a fault
         seen.fault = f"{world.describe()}\n{traceback.format_exc()}"
     return seen
-
-
-def _look_at_sampler(sampler: ScenarioSampler, world: RandomWorld, seen: Visit) -> None:
-    """Check that a sampler comes back from its text with the same worlds, and step a batch of them twice."""
-    again = ScenarioSampler(json.loads(json.dumps(sampler.table)))
-    assert again.world_of(world.seed) == World(world.scenario, world.wrappers), "a seed is a world"
-    first, second = (_steps_of_batch(each, world.seed % 2**31) for each in (sampler, again))
-    assert first == second, "the same batch of drawn worlds goes another way"
-    seen.figures["steps of drawn batches"] += len(first) + len(second)
-
-
-def _steps_of_batch(sampler: ScenarioSampler, seed: int) -> list[bytes]:
-    """Step a batch of two arenas by chance; returns digests of what is told."""
-    envs, chance, digests = SwarmVectorEnv(sampler=sampler, n_arenas=2), np.random.default_rng(seed), list[bytes]()
-    try:
-        obs, _ = envs.reset(seed=seed)
-        for _ in range(BATCH_STEPS):
-            assert envs.observation_space.contains(obs), "a batch sees what its space does not hold"
-            actions = chance.uniform(-1.0, 1.0, envs.action_space.shape).astype(np.float32)
-            obs, rewards, terminated, truncated, _ = envs.step(actions)
-            assert np.isfinite(rewards).all(), "rewards are numbers"
-            told = b"".join(part.tobytes() for part in (obs, rewards, terminated, truncated))
-            digests.append(hashlib.sha256(told).digest())
-    finally:
-        envs.close()
-    return digests
 
 
 def _walk(world: RandomWorld, seen: Visit, *, by_dicts: bool, is_disturbed: bool) -> list[bytes]:
