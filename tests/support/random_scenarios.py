@@ -16,7 +16,7 @@ from swarm_forage_env.wrappers.noise import (
     ActuatorNoiseConfig,
     SensorNoiseConfig,
 )
-from swarm_forage_env.wrappers.population import DEATHS, PopulationConfig
+from swarm_forage_env.wrappers.population import PopulationConfig
 from swarm_forage_env.wrappers.throttle import ThrottleConfig
 from swarm_forage_env.wrappers.waveform import Waveform
 
@@ -173,7 +173,7 @@ def random_wrappers(random: Random, config: ScenarioConfig) -> tuple[WrapperConf
             repair_per_tick=random.choice((0.0, rate)),
             initial_robots=random.randint(1, n_robots - 1) if are_born else None,
             max_robots=random.choice((None, random.randint(1, n_robots))),
-            deaths=random.choice(DEATHS),
+            deaths=random.choice(("terminate", "absorbing")),
         ),
         ThrottleConfig(waveform=_waveform(random, 1.0), carriers=random.random() < 0.5),
         ActuatorNoiseConfig(sigma=_sigma(random)),
