@@ -22,7 +22,7 @@ RUN, SCORE = "run crw", "score crw"
         (f"{RUN} --set n_robots=x", "Expected robots.n_robots to be a whole number >= 1, got 'x'"),
         (f"{RUN} --set n_robots=3 --robots 4", "Expected n_robots once"),
         (f"{RUN} --wrapper throtle:amplitude=1", "Unknown wrapper 'throtle'. Did you mean 'throttle'?"),
-        (f"{RUN} --wrapper actuator_noise:sigma", "Expected the settings of wrapper actuator_noise"),
+        (f"{RUN} --wrapper actuator_noise:sigma", "as key=value, got 'sigma'"),
         (f"{RUN} --scenario world.toml", "Cannot use world.toml: Expected n_robots under [set]"),
         (f"{RUN} --out file/inside", "Not a directory: file"),
         ("list colums", "Did you mean 'columns'?"),
