@@ -27,7 +27,7 @@ from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.spec import PolicySpec, policy_spec
 from swarm_forage_env.sheet import Sheet
-from swarm_forage_env.training.evaluations import finished_runs
+from swarm_forage_env.training.evaluation import finished_runs
 from swarm_forage_env.wrappers.world import World
 
 YARDSTICK = "dpo"

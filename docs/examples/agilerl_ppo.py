@@ -8,7 +8,7 @@ import torch
 from agilerl.algorithms import PPO
 
 from swarm_forage_env.policies.network import Network, NetworkAbout
-from swarm_forage_env.training.evaluator import Evaluator
+from swarm_forage_env.training.evaluation import Evaluator
 from swarm_forage_env.training.plan import TrainingPlan
 from swarm_forage_env.views.gymnasium import SwarmVectorEnv
 
@@ -61,4 +61,4 @@ while decisions < N_DECISIONS:
     if evaluator.is_due(decisions):
         about = NetworkAbout(interface=plan.interface, activation="tanh", samples=plan.samples)
         network = Network.from_state_dict(agent.actor.state_dict(), about)
-        print(decisions, evaluator.evaluate(network, decisions).performance)
+        print(decisions, evaluator.evaluate(network, decisions).reached)

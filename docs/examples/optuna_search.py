@@ -7,7 +7,7 @@ from pathlib import Path
 
 import optuna
 
-from swarm_forage_env.training.evaluations import Evaluation
+from swarm_forage_env.training.evaluation import Evaluation
 from swarm_forage_env.training.recipe import recipe
 from swarm_forage_env.training.sb3.training import train
 
@@ -31,8 +31,8 @@ def objective(trial: optuna.Trial) -> float:
     def report(news):
         nonlocal best
         if isinstance(news, Evaluation):  # not the status in between
-            best = max(best, news.performance)
-            trial.report(news.performance, news.steps)
+            best = max(best, news.reached)
+            trial.report(news.reached, news.steps)
             if trial.should_prune():
                 raise optuna.TrialPruned
 

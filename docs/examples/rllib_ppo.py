@@ -9,7 +9,7 @@ from ray.rllib.env.wrappers.pettingzoo_env import ParallelPettingZooEnv
 from ray.tune import register_env
 
 from swarm_forage_env.policies.network import Network, NetworkAbout
-from swarm_forage_env.training.evaluator import Evaluator
+from swarm_forage_env.training.evaluation import Evaluator
 from swarm_forage_env.training.plan import TrainingPlan
 from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv
 
@@ -56,5 +56,5 @@ while decisions < N_DECISIONS:
         network = Network.from_state_dict(
             state, NetworkAbout(interface=plan.interface, activation="tanh", samples=plan.samples)
         )
-        print(decisions, evaluator.evaluate(network, decisions).performance)
+        print(decisions, evaluator.evaluate(network, decisions).reached)
 algorithm.stop()

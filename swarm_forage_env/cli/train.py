@@ -50,18 +50,19 @@ def train(
 
     Args:
         algo: ppo, a2c, dqn or sac; default ppo.
-        steps: Decisions, counted per robot; default 5,000,000. With --resume a new total.
+        steps: Decisions, counted per robot; default 3,400,000. With --resume a new total.
         seed: Seed of the training; default 0, or the plan's.
         seeds: Train so many seeds, from 0 or the plan's upwards, into --out/seed_0 and so on, and show a table.
         out: Folder of the training; default results/training/NAME.
         resume: Continue from the checkpoint in --out (needs --trust-models).
     """
     from swarm_forage_env.cli.training_report import run_seeds, run_training
-    from swarm_forage_env.training.evaluations import resumed_plan
 
     if seed is not None and seeds is not None:
         raise ConfigError("Expected --seed for one training or --seeds for several, got both.")
-    if plan is None:
+    if resume and out is not None and plan is None and world == WorldOptions() and not algo and seed is None:
+        chosen, name = _kept_plan(out, steps), ""
+    elif plan is None:
         chosen = _by_recipe(world, algo, steps, seed)
         name = f"{chosen.scenario.name}_{chosen.algorithm}"
     elif replace(world, settings=()) != WorldOptions() or algo or steps:
@@ -70,12 +71,20 @@ def train(
         chosen = _of_file(plan, world.settings, seed)
         name = Path(plan).stem if seed is None else f"{Path(plan).stem}_seed_{seed}"
     folder = out or Path("results/training") / (name if seeds is None else f"{name}_seeds")
-    if resume and plan is None:
-        says_more = world != WorldOptions() or algo or seed is not None
-        chosen = resumed_plan(folder, chosen if says_more else None, steps, is_shared=seeds is not None)
     if seeds is None:
         return run_training(chosen, folder, resume=resume)
     return run_seeds(chosen, range(chosen.seed, chosen.seed + seeds), folder, jobs=jobs, resume=resume)
+
+
+def _kept_plan(folder: Path, steps: int | None) -> "TrainingPlan":
+    """Return the plan of the training in a folder, or of several, with so many steps in all."""
+    from swarm_forage_env.training.evaluation import PLAN_FILE
+    from swarm_forage_env.training.plan import read_plan
+
+    if not (folder / PLAN_FILE).exists():
+        raise ConfigError(f"Expected {folder} to hold a training to resume, found no {PLAN_FILE}.")
+    kept = read_plan(folder / PLAN_FILE)
+    return kept if steps is None else kept.longer(steps)
 
 
 def _by_recipe(options: WorldOptions, algo: str | None, steps: int | None, seed: int | None) -> "TrainingPlan":
@@ -169,7 +178,7 @@ def dataset(
     (spec,) = plan_runs(world, [policy], [0])
     folder = out or default_file(RESULTS / "datasets", spec.world, [policy], "")
     if minari is not None:
-        from swarm_forage_env.training.minari_export import check_minari
+        from swarm_forage_env.training.datasets import check_minari
 
         check_minari(minari)  # before hours of work
     recorded = {"observation": observation, "site_memory": site_memory}
@@ -182,7 +191,7 @@ def dataset(
         ) from None
     say(f"{counted(n_new, 'run')} recorded in {folder}, {seeds - n_new} there before")
     if minari is not None:
-        from swarm_forage_env.training.minari_export import export_minari
+        from swarm_forage_env.training.datasets import export_minari
 
         say(f"wrote the Minari data set {export_minari(folder, minari).spec.dataset_id}")
 

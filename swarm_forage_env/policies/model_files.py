@@ -86,7 +86,8 @@ class ModelPolicy(LearnedPolicy):
         found, self._n_robots = describe_spaces(network), _n_rows(network.observation_space)
         config, caches, draws = None, None, has_probabilities(network)
         if note is not None:
-            config, caches, draws = _read_note(note, name)
+            config, caches, samples = _read_note(note, name)
+            draws = draws and samples
         if note is None and not isinstance(interface, InterfaceConfig):
             said = dict(interface or {})
             interface_from_mapping(said)  # refuses unknown fields and values

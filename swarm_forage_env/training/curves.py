@@ -8,105 +8,160 @@ found.draw("curves.png")        # performance and interference over decisions
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.wording import counted, plain
+from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
-from swarm_forage_env.runs.spec import policy_specs
+from swarm_forage_env.runs.plan import Plan
+from swarm_forage_env.runs.policy_spec import policy_specs
+from swarm_forage_env.runs.progress import duration
 from swarm_forage_env.scenarios.performance import performance_of
 from swarm_forage_env.sheet import Answer, Sheet
-from swarm_forage_env.training.evaluations import (
-    TrainingCurve,
-    chosen,
+from swarm_forage_env.training.evaluation import (
+    EVALUATIONS_FILE,
+    EXPORTABLE,
+    MODEL_FILE,
+    PLAN_FILE,
+    POLICY_FILE,
+    Evaluation,
+    best_of,
     finished_runs,
-    in_all_worlds,
     judged,
-    known_baselines,
-    read_training,
+    reached_in,
+    read_evaluations,
 )
-from swarm_forage_env.training.plan import TrainingPlan
+from swarm_forage_env.training.plan import TrainingPlan, read_plan
 
 if TYPE_CHECKING:
     from swarm_forage_env.rendering.plots import MeanCurve
 
 
+@dataclass(frozen=True, kw_only=True)
+class Training:
+    """What the folder of a training holds."""
+
+    label: str
+    folder: Path
+    plan: TrainingPlan
+    evaluations: tuple[Evaluation, ...]
+    """At least one, oldest first."""
+
+    @property
+    def kept(self) -> Evaluation:
+        """The evaluation of what it leaves to be used: the best network, or the last model where a file holds none."""
+        return best_of(self.evaluations) if self.plan.algorithm in EXPORTABLE else self.evaluations[-1]
+
+    @property
+    def policy(self) -> str:
+        """File of that network or model."""
+        return (self.folder / (POLICY_FILE if self.plan.algorithm in EXPORTABLE else MODEL_FILE)).as_posix()
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether it was carried out to its end, the last evaluation included."""
+        return self.evaluations[-1].steps >= self.plan.total_steps and (self.folder / MODEL_FILE).exists()
+
+
+def read_training(folder: Path) -> Training:
+    """Return how the training of a folder went.
+
+    Raises:
+        ConfigError: there is no training in the folder, it has not been evaluated yet, or a file is damaged.
+    """
+    if not (folder / PLAN_FILE).exists():
+        raise ConfigError(f"Expected the folder of a training, got {folder} without {PLAN_FILE}.")
+    evaluations = read_evaluations(folder / EVALUATIONS_FILE)
+    if not evaluations:
+        below = " ".join(str(path.parent) for path in sorted(folder.glob(f"*/{EVALUATIONS_FILE}")))
+        hint = f"; name those below it: {below}" if below else ""
+        raise ConfigError(f"Expected a training with evaluations, got {folder} without any{hint}.")
+    plan = read_plan(folder / PLAN_FILE)
+    return Training(label=folder.resolve().name, folder=folder, plan=plan, evaluations=tuple(evaluations))
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
-class TrainingCurves(Answer):
+class Trainings(Answer):
     """Trainings that are judged by the same runs, and other policies in them.
 
-    The picture shows the mean over trainings of one plan as far as all of them have come, with a band: Student's 95 %
-    interval of that mean. Between evaluations, which a resumed training makes at other times, curves are straight.
+    Those of one plan that differ in their seeds have a mean, with Student's 95 % interval of the mean over trainings.
+    In the picture it reaches as far as all of them have come; between evaluations, which a resumed training makes at
+    other times, curves are straight.
     """
 
-    trainings: tuple[TrainingCurve, ...]
-    beside: Mapping[str, tuple[float, float]]
+    trainings: tuple[Training, ...]
+    beside: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """Policy -> what counts of it in the evaluations, and its interference; NaN where it is not known."""
-    averaged: tuple[str, ...] = ()
-    """Labels of trainings of one plan, whose mean is drawn; fewer than two have none."""
+    failures: Mapping[str, str] = field(default_factory=dict)
+    """Label of a training that failed -> why; it is in no mean."""
 
     @property
     def plan(self) -> TrainingPlan:
         """The plan of the first one; the others are judged alike."""
         return self.trainings[0].plan
 
+    @property
+    def averaged(self) -> tuple[Training, ...]:
+        """Those whose mean is told: several of one plan that did not fail."""
+        alike = all(replace(one.plan, seed=0) == replace(self.plan, seed=0) for one in self.trainings)
+        found = tuple(one for one in self.trainings if one.label not in self.failures)
+        return found if alike and len(found) > 1 else ()
+
     def sheets(self) -> tuple[Sheet, ...]:
-        """Return the best evaluation of each training, and the others."""
-        in_worlds = bool(self.plan.evaluation.worlds)
-        digits = 2 if in_worlds else 1  # ratios are about 1
+        """Return a row per training as it is kept, mean and interval, the others, and how to score what is kept."""
+        failed = [f"{label} failed and is in no mean: {reason}" for label, reason in self.failures.items()]
+        if not self.trainings:
+            return (Sheet(title="no training was evaluated", notes=failed),)
+        is_ratio = bool(self.plan.evaluation.worlds)
+        digits = (2 if is_ratio else 1, 3)  # ratios are about 1
+        kept = [(one, one.kept, (one.kept.reached, one.kept.interference_fraction)) for one in self.trainings]
         rows = [
-            (f"{label}, at its best", f"{steps:,}", f"{performance:.{digits}f}", f"{interference:.3f}")
-            for label, steps, performance, interference in self._best()
+            (one.label, f"{best.steps:,}", *_texts(values, digits), duration(one.evaluations[-1].cpu_time_s))
+            for one, best, values in kept
         ]
-        rows += [(name, "", f"{value:.{digits}f}", f"{lost:.3f}") for name, (value, lost) in self.beside.items()]
-        heading = counted_in(self.plan) if in_worlds else "per 1,000 s"
-        return (Sheet.of(("policy", "decisions", heading, "interference"), rows),)
+        notes: list[str] = []
+        if self.averaged:
+            columns = np.transpose([values for one, _, values in kept if one in self.averaged])
+            means = [_mean(column) for column in columns]
+            rows.append(("mean", "", *_texts([mean for mean, *_ in means], digits), ""))
+            bounds = [
+                " to ".join(f"{bound:.{n}f}" for bound in ends) for (_, *ends), n in zip(means, digits, strict=True)
+            ]
+            rows.append(("95 %", "", *bounds, ""))
+            notes.append("95 %: Student's interval of the mean over trainings.")
+        rows += [(name, "", *_texts(values, digits), "") for name, values in self.beside.items()]
+        notes += failed
+        if self.averaged:
+            from metrics.benchmark.entry import entry_command  # late: see evaluation.baseline_runs
 
-    def _best(self) -> list[tuple[str, int, float, float]]:
-        best = [(one.label, chosen(one.evaluations)) for one in self.trainings]
-        return [(label, each.steps, each.performance, each.interference_fraction) for label, each in best]
+            notes.append("These evaluations chose the networks and flatter them. To score all in runs of their own:")
+            name = self.averaged[0].folder.resolve().parent.name
+            notes.append(entry_command([one.policy for one in self.averaged], name))
+        header = ("policy", "decisions", counted_in(self.plan), "interference", "processor time")
+        return (Sheet.of(header, rows, title=f"at their best in {place_of(self.plan)}", notes=notes),)
 
-    def to_mapping(self) -> dict[str, Any]:
-        """Return all evaluations and the others as plain values."""
-        return {
-            "place": place_of(self.plan),
-            "performance": counted_in(self.plan),
-            "trainings": {one.label: [each.to_mapping() for each in one.evaluations] for one in self.trainings},
-            "beside": {
-                name: {"performance": value, "interference_fraction": plain(lost)}
-                for name, (value, lost) in self.beside.items()
-            },
-        }
+    @property
+    def has_picture(self) -> bool:
+        """Whether there is an evaluation to draw."""
+        return bool(self.trainings)
 
     def draw(self, path: str | Path, *, style: FigureStyle = SCREEN) -> None:
-        """Draw performance and interference over decisions.
-
-        Raises:
-            ImportError: matplotlib is not installed.
-        """
+        """Draw performance and interference over decisions; raises ImportError without matplotlib."""
         from swarm_forage_env.rendering.plots import draw_trainings
 
-        plan, mean = self.plan, self._mean()
-        is_one_plan = len(self.trainings) == 1 or mean is not None
+        mean = self._mean()
         draw_trainings(
             Path(path),
-            {
-                one.label: (
-                    [each.steps for each in one.evaluations],
-                    [each.performance for each in one.evaluations],
-                    [each.interference_fraction for each in one.evaluations],
-                )
-                for one in self.trainings
-            },
+            {one.label: tuple(_curves(one.evaluations)) for one in self.trainings},  # type: ignore[arg-type] - three
             mean=mean,
             beside=dict(self.beside),
-            stage_ends=self._stage_ends() if is_one_plan else (),
-            title=f"{'training' if len(self.trainings) == 1 else 'trainings'} in {place_of(plan)}",
-            ylabel=counted_in(plan),
+            stage_ends=self._stage_ends() if len(self.trainings) == 1 or mean is not None else (),
+            title=f"{'training' if len(self.trainings) == 1 else 'trainings'} in {place_of(self.plan)}",
+            ylabel=counted_in(self.plan),
             style=style,
         )
 
@@ -118,27 +173,49 @@ class TrainingCurves(Answer):
 
     def _mean(self) -> "MeanCurve | None":
         """The mean of those that are averaged, as far as all of them have come; None where there is none."""
-        from metrics.statistics import aggregate  # late: see training.evaluations
         from swarm_forage_env.rendering.plots import MeanCurve
 
-        averaged = [one.evaluations for one in self.trainings if one.label in self.averaged]
-        if len(averaged) < 2:
-            return None
-        steps = [np.array([each.steps for each in one]) for one in averaged]
-        first, last = max(each[0] for each in steps), min(each[-1] for each in steps)
-        common = [step for step in np.unique(np.concatenate(steps)).tolist() if first <= step <= last]
+        each = [_curves(one.evaluations) for one in self.averaged]
+        first, last = max((one[0][0] for one in each), default=0), min((one[0][-1] for one in each), default=-1)
+        common = [step for step in sorted({step for one in each for step in one[0]}) if first <= step <= last]
         if not common:
             return None
-
-        def of(name: str) -> Any:
-            values = [[getattr(each, name) for each in one] for one in averaged]
-            found = [np.interp(common, x, y) for x, y in zip(steps, values, strict=True)]
-            each_step = [aggregate(column) for column in np.transpose(found)]
-            return np.array([(one.mean, one.lower, one.upper) for one in each_step]).T
-
-        return MeanCurve(
-            "mean with its\n95 % interval\n(Student's)", common, of("performance"), of("interference_fraction")
+        performance, interference = (
+            np.transpose(
+                [_mean(column) for column in np.transpose([np.interp(common, one[0], one[k]) for one in each])]
+            )
+            for k in (1, 2)
         )
+        return MeanCurve("mean with its\n95 % interval\n(Student's)", common, performance, interference)
+
+
+def _curves(evaluations: Sequence[Evaluation]) -> list[list[Any]]:
+    """Return decisions, what counts, and interference of each evaluation."""
+    rows = [(each.steps, each.reached, each.interference_fraction) for each in evaluations]
+    return [list(column) for column in zip(*rows, strict=True)]
+
+
+def _mean(values: Sequence[float]) -> tuple[float, float, float]:
+    """Return the mean of one value per training, and the bounds of its 95 % interval."""
+    from metrics.statistics import aggregate  # late: see evaluation.baseline_runs
+
+    found = aggregate(values)
+    return found.mean, found.lower, found.upper
+
+
+def _texts(values: Sequence[float], digits: Sequence[int]) -> list[str]:
+    return ["" if math.isnan(value) else f"{value:.{n}f}" for value, n in zip(values, digits, strict=True)]
+
+
+def beside_baseline(trainings: Sequence[Training], failures: Mapping[str, str] | None = None) -> Trainings:
+    """Return how trainings that are judged by the same runs went, beside the baseline of their evaluations."""
+    if not trainings:
+        return Trainings(trainings=(), failures=failures or {})
+    first, (world, *others) = trainings[0], trainings[0].evaluations[-1].worlds
+    is_ratio = bool(first.plan.evaluation.worlds)
+    name = "baseline of each world" if others else world.baseline_policy
+    level = (1.0 if is_ratio else world.baseline), math.nan
+    return Trainings(trainings=tuple(trainings), beside={name: level}, failures=failures or {})
 
 
 def curves(
@@ -147,7 +224,7 @@ def curves(
     beside: Sequence[str] | None = None,
     jobs: int | None = None,
     progress: bool = True,
-) -> TrainingCurves:
+) -> Trainings:
     """Return how trainings went, beside policies that make the runs of their evaluations.
 
     Args:
@@ -162,21 +239,25 @@ def curves(
     """
     found = read_trainings(folders)
     if beside is None:
-        from metrics.controllers import PAPER_POLICIES  # late: see training.evaluations
+        from metrics.controllers import PAPER_POLICIES  # late: see evaluation.baseline_runs
 
         beside = PAPER_POLICIES
-    return TrainingCurves(trainings=found, beside=_levels(found[0], beside, jobs, progress=progress))
+    levels: dict[str, tuple[float, float]] = {}
+    plan, last = found[0].plan, found[0].evaluations[-1]
+    baselines = {world.world: (world.baseline_policy, world.baseline) for world in last.worlds}
+    if beside:
+        specs = policy_specs({name: name for name in beside})
+        table = finished_runs(
+            Plan.product(specs, plan.judging_worlds, plan.evaluation.seeds), jobs=jobs, progress=progress
+        )
+        for name in beside:
+            worlds = judged(plan.evaluation, table, name, baselines)
+            interference = float(np.mean([world.interference_fraction for world in worlds]))
+            levels[name] = reached_in(plan.evaluation, worlds), interference
+    return Trainings(trainings=found, beside=levels)
 
 
-def beside_baseline(*trainings: TrainingCurve, averaged: Sequence[str] = ()) -> TrainingCurves:
-    """Return how trainings that are judged by the same runs went, beside the baseline of their evaluations."""
-    first = trainings[0]
-    name = "baseline of each world" if first.plan.evaluation.worlds else first.plan.evaluation.baseline
-    level = first.evaluations[-1].baseline, math.nan
-    return TrainingCurves(trainings=trainings, beside={name: level}, averaged=tuple(averaged))
-
-
-def read_trainings(folders: Sequence[str | Path]) -> tuple[TrainingCurve, ...]:
+def read_trainings(folders: Sequence[str | Path]) -> tuple[Training, ...]:
     """Read trainings that are judged by the same runs; those of folders of the same name are named by their paths.
 
     Raises:
@@ -187,16 +268,14 @@ def read_trainings(folders: Sequence[str | Path]) -> tuple[TrainingCurve, ...]:
     if twice:
         raise ConfigError(f"Expected each training once, got {twice[0]} twice.")
     found = [read_training(path) for path in paths]
-    for path, one in zip(paths[1:], found[1:], strict=True):
+    for one in found[1:]:
         if _judged_by(one.plan) != _judged_by(found[0].plan):
             raise ConfigError(
-                f"Expected trainings that are judged by the same runs, got {paths[0]} and {path}, whose "
+                f"Expected trainings that are judged by the same runs, got {found[0].folder} and {one.folder}, whose "
                 "plans differ in scenario, wrappers or evaluation; draw them one by one."
             )
     counts = Counter(one.label for one in found)
-    return tuple(
-        replace(one, label=str(path)) if counts[one.label] > 1 else one for path, one in zip(paths, found, strict=True)
-    )
+    return tuple(replace(one, label=str(one.folder)) if counts[one.label] > 1 else one for one in found)
 
 
 def _judged_by(plan: TrainingPlan) -> tuple[Any, ...]:
@@ -205,27 +284,14 @@ def _judged_by(plan: TrainingPlan) -> tuple[Any, ...]:
     return plan.evaluation.chosen_by, plan.evaluation.seeds, worlds, [world.name for world in worlds]
 
 
-def _levels(
-    curve: TrainingCurve, names: Sequence[str], jobs: int | None, *, progress: bool
-) -> dict[str, tuple[float, float]]:
-    """What counts of other policies in the runs of the evaluations, and their interference."""
-    if not names:
-        return {}
-    plan = curve.plan
-    table = finished_runs(plan.judging(*policy_specs({name: name for name in names})), jobs=jobs, progress=progress)
-    baselines = known_baselines(plan, curve.evaluations[-1])
-    return {label: in_all_worlds(plan.evaluation, judged(table, label, baselines)) for label in dict.fromkeys(names)}
-
-
 def place_of(plan: TrainingPlan) -> str:
     """Say where policies of a plan are judged."""
-    if plan.evaluation.worlds:
-        return counted(len(plan.evaluation.worlds), "world")
-    return plan.world.name
+    n_worlds = len(plan.evaluation.worlds)
+    return counted(n_worlds, "world") if n_worlds else plan.world.name
 
 
 def counted_in(plan: TrainingPlan) -> str:
-    """Say what the numbers of a plan's evaluations are."""
+    """Say what counts in a plan's evaluations."""
     if plan.evaluation.worlds:
         return f"{plan.evaluation.chosen_by} ratio to the baselines"
     return f"{performance_of(plan.scenario.performance).title} per 1,000 s"

@@ -11,21 +11,30 @@ whole or not at all. With T decisions of N robots, row i being robot i:
     observations  (T + 1, N, d) float32     actions     (T, N) int64, or (T, N, k) float32
     rewards       (T, N) float64            terminated  (T, N) bool, robots that died in this decision
     truncated     (T, N) bool, at the end   active      (T + 1, N) bool, robots at work; others do not act
+
+`export_minari` makes a Minari data set of the central view: one agent that sees and steers the whole swarm, as
+`views.gymnasium.JointForageEnv` with the same scenario, wrappers, interface and seed has it.
 """
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+import re
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.vector.utils import batch_space
 
-from swarm_forage_env._internal.archives import ArchiveError, check_array, read_arrays
-from swarm_forage_env._internal.fields import ConfigError, Several, checked, known_keys, whole
+from swarm_forage_env._internal.archives import ArchiveError, read_arrays
+from swarm_forage_env._internal.fields import ConfigError, known_keys
+from swarm_forage_env._internal.fields_next import Count, checked
 from swarm_forage_env._internal.files import alone_in, check_folder, read_json, replacing
 from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
@@ -34,10 +43,15 @@ from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import build_env
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.workers import each_run
+from swarm_forage_env.views.gymnasium import JointForageEnv
+
+if TYPE_CHECKING:
+    from minari import MinariDataset
 
 CARD_FILE = "dataset.json"
 ARRAYS = ("observations", "actions", "rewards", "terminated", "truncated", "active")
 _LONGER_BY_ONE = ("observations", "active")
+_MINARI_ID = re.compile(r"(?:[\w-]+/)*[\w-]+-v\d+")
 
 
 class DatasetError(ValueError):
@@ -97,6 +111,12 @@ class Dataset:
         """Yield all runs, one in memory at a time; raises DatasetError for a damaged one."""
         yield from map(read_steps, self.files)
 
+    def whole_runs(self) -> Iterator[Steps]:
+        """Yield all runs; raises DatasetError where there is none."""
+        if not self.files:
+            raise DatasetError(f"Expected a run in {self.folder}, found none; record it to its end.")
+        return self.runs()
+
     def episodes(self) -> Iterator[Steps]:
         """Yield the episode of every robot, run by run."""
         for run in self.runs():
@@ -108,10 +128,8 @@ class Dataset:
         `observations`, `next_observations`, `actions`, `rewards`, `terminated`, `truncated`; for torch,
         `torch.from_numpy` each.
         """
-        if not self.files:
-            raise DatasetError(f"Expected a run in {self.folder}, found none; record it to its end.")
         found: dict[str, list[np.ndarray]] = {}
-        for run in self.runs():
+        for run in self.whole_runs():
             working = run.active[:-1]
             rows = {name: getattr(run, name)[working] for name in ARRAYS if name not in _LONGER_BY_ONE}
             rows |= {"observations": run.observations[:-1][working], "next_observations": run.observations[1:][working]}
@@ -126,17 +144,20 @@ def read_steps(file: str | Path) -> Steps:
         arrays: dict[str, Any] = read_arrays(Path(file))
         if {*arrays} != {*ARRAYS}:
             raise ArchiveError(f"Expected the arrays {', '.join(ARRAYS)}, got {', '.join(arrays)}.")
-        check_array("rewards", arrays["rewards"], np.float64, (None, None))
-        steps = arrays["rewards"].shape
-        longer = (steps[0] + 1, steps[1])
-        check_array("observations", arrays["observations"], np.float32, (*longer, None))
-        wanted = (np.int64, steps) if arrays["actions"].ndim == len(steps) else (np.float32, (*steps, None))
-        check_array("actions", arrays["actions"], *wanted)
-        for name, shape in (("terminated", steps), ("truncated", steps), ("active", longer)):
-            check_array(name, arrays[name], np.bool_, shape)
+        n_steps, n_robots = (*arrays["rewards"].shape, 0, 0)[:2]
+        whole_numbers = arrays["actions"].ndim == 2
+        wanted = {"observations": ("f4", 3), "actions": ("i8", 2) if whole_numbers else ("f4", 3), "rewards": ("f8", 2)}
+        for name, array in arrays.items():
+            kind, n_axes = wanted.get(name, ("?", 2))
+            shape = (n_steps + (name in _LONGER_BY_ONE), n_robots)
+            if array.dtype != np.dtype(kind) or array.ndim != n_axes or array.shape[:2] != shape:
+                raise ArchiveError(
+                    f"Expected {name} as {np.dtype(kind).name} with {n_axes} axes, the first two {shape}, got "
+                    f"{array.dtype.name} of shape {array.shape}."
+                )
     except OSError as error:
         raise DatasetError(f"Cannot read {file}: {error.strerror or error}.") from error
-    except (ArchiveError, ConfigError) as error:
+    except ArchiveError as error:
         raise DatasetError(f"Expected {file} to be a run of a data set: {error} Record it again.") from error
     return Steps(seed=int(Path(file).stem.removeprefix("seed_")), **arrays)
 
@@ -172,11 +193,8 @@ def record_dataset(
         DatasetError: the folder holds another data set, or another call is writing to it.
         ValueError: the policy refuses the swarm.
     """
-    checked("seeds", tuple(seeds), Several)
-    for seed in seeds:
-        whole("a seed", seed, at_least=0)
-    if len(set(seeds)) < len(seeds):
-        raise ConfigError(f"Expected different seeds, got {', '.join(map(str, seeds))}.")
+    if not seeds or len(set(checked("seeds", tuple(seeds), tuple[Count, ...]))) < len(seeds):
+        raise ConfigError(f"Expected one or more different seeds, got {', '.join(map(str, seeds)) or 'none'}.")
     folder, world = Path(folder), SwarmSpec.of(spec.scenario)
     config = _interface_of(spec, world, observation, site_memory)
     columns = [part.name for part in LearnerInterface(config, world).layout for _ in range(part.size)]
@@ -188,10 +206,7 @@ def record_dataset(
             there = read_json(folder / CARD_FILE, DatasetError)
             differing = [name for name in card if there.get(name) != card[name]]
             if differing:
-                raise DatasetError(
-                    f"Expected the data set in {folder} to go on, but it has another {differing[0]}; give another "
-                    "folder."
-                )
+                raise DatasetError(f"The data set in {folder} has another {differing[0]}; give another folder.")
         with replacing(folder / CARD_FILE) as draft:
             draft.write_text(json.dumps(card, indent=1), encoding="utf-8")
         todo = [replace(spec, seed=seed) for seed in seeds if not _file(folder, seed).exists()]
@@ -228,25 +243,21 @@ def _keep(config: InterfaceConfig, folder: Path, spec: RunSpec) -> None:
 def record_steps(spec: RunSpec, config: InterfaceConfig) -> Steps:
     """Make a run and return what its robots saw and did."""
     policy = load_policy(spec.policy, spec.parameters)
+    is_learned = isinstance(policy, InterfacePolicy)
     env = build_env(spec.scenario, spec.wrappers, reads=None)
     world = env.unwrapped
     policy.reset(world.swarm_spec, stream_rng(spec.seed, Stream.POLICY))
     obs = env.reset_batch(spec.seed)
     interface = LearnerInterface(config, world.swarm_spec)
     found: dict[str, list[Any]] = {name: [] for name in ARRAYS}
-
-    def see(decision: int) -> None:
-        found["observations"].append(interface.observe(obs, decision=decision))
-        found["active"].append(world.active.copy())
-
-    see(0)
+    found["observations"].append(interface.observe(obs, decision=0))
+    found["active"].append(world.active.copy())
     gone, is_over = np.zeros(len(obs), np.bool_), False
     while not is_over:
         earned, dead, truncated = np.zeros(len(obs)), gone, False
         for tick in range(config.decision_ticks):
             commands = policy.act(obs, world.active)
             if tick == 0:
-                is_learned = isinstance(policy, InterfacePolicy)
                 chosen = np.array(policy.chosen if is_learned else world.checked_actions(commands))
                 found["actions"].append(chosen.astype(np.int64) if chosen.dtype.kind == "i" else chosen)
             obs, rewards, dead, truncated = env.step_batch(commands, tasks=getattr(policy, "task", None))
@@ -258,7 +269,84 @@ def record_steps(spec: RunSpec, config: InterfaceConfig) -> Steps:
         found["terminated"].append(dead & ~gone)
         found["truncated"].append(~dead & truncated)
         gone = dead.copy()
-        see(config.decisions_in(world.tick))
+        found["observations"].append(interface.observe(obs, decision=config.decisions_in(world.tick)))
+        found["active"].append(world.active.copy())
     env.close()
     arrays: dict[str, Any] = {name: np.array(rows) for name, rows in found.items()}
     return Steps(seed=spec.seed, **arrays)
+
+
+def check_minari(dataset_id: str) -> None:
+    """Refuse a name under which `export_minari` could make nothing.
+
+    Raises:
+        ImportError: minari is not installed.
+        DatasetError: it is no name of a Minari data set, or there is one of that name.
+    """
+    try:
+        import minari
+    except ImportError as error:
+        raise ImportError(f"A Minari data set needs minari: {install_command('minari')}.") from error
+    if not _MINARI_ID.fullmatch(dataset_id):
+        raise DatasetError(f"Expected a name of a Minari data set, such as swarm_forage/dpo-v0, got {dataset_id!r}.")
+    if dataset_id in minari.list_local_datasets():
+        raise DatasetError(f"There is a Minari data set {dataset_id!r}; name another.")
+
+
+def recorded_env(spec: Mapping[str, Any], interface: Mapping[str, Any], **options: Any) -> JointForageEnv:
+    """Return the environment of a recorded run: what `recover_environment` of a Minari data set calls.
+
+    Args:
+        spec: Of a run, `RunSpec.to_mapping`; its policy plays no part.
+        interface: Fields of the interface that was recorded.
+        options: Others of `JointForageEnv`, such as `render_mode`.
+    """
+    run = RunSpec.from_mapping(spec)
+    seen = interface_from_mapping(dict(interface))
+    return JointForageEnv(run.scenario, wrappers=run.wrappers, interface=seen, **options)
+
+
+def export_minari(folder: str | Path, dataset_id: str, **about: Any) -> "MinariDataset":
+    """Make a Minari data set in its usual place (the environment variable `MINARI_DATASETS_PATH` chooses another).
+
+    Args:
+        folder: A data set of `record_dataset`; one episode for each run that is whole.
+        dataset_id: Name of the new data set, such as "swarm_forage/dpo-v0".
+        about: More, or other values, for `minari.create_dataset_from_buffers`, such as `author` or `description`.
+
+    Raises:
+        ImportError: minari is not installed.
+        DatasetError: the folder holds no data set or no whole run, or see `check_minari`.
+    """
+    check_minari(dataset_id)
+    import minari
+    from minari.data_collector import EpisodeBuffer
+
+    dataset = Dataset(folder)
+    spec, interface = dataset.spec, LearnerInterface(dataset.interface, SwarmSpec.of(dataset.spec.scenario))
+    episodes: list[EpisodeBuffer] = []
+    for number, steps in enumerate(dataset.whole_runs()):
+        is_last = np.arange(len(steps)) == len(steps) - 1
+        arrays: dict[str, Any] = {  # it takes arrays, but declares lists
+            "observations": steps.observations,
+            "actions": steps.actions,
+            "rewards": steps.rewards.sum(axis=1),
+            "terminations": is_last & bool(steps.terminated.any(axis=0).all()),
+            "truncations": is_last & bool(steps.truncated[-1].any()),
+        }
+        episodes.append(EpisodeBuffer(id=number, seed=steps.seed, infos={"active": steps.active}, **arrays))
+    told: dict[str, Any] = {
+        "env": EnvSpec(
+            f"swarm_forage/{spec.scenario.name}-v0",
+            entry_point=f"{__name__}:{recorded_env.__name__}",
+            kwargs={"spec": spec.to_mapping(), "interface": asdict(dataset.interface)},
+        ),
+        "algorithm_name": spec.policy,
+        "description": f"{spec.world.name}, policy {spec.policy}",
+        "observation_space": batch_space(interface.observation_space, spec.scenario.robots.n_robots),
+        "action_space": batch_space(interface.action_space, spec.scenario.robots.n_robots),
+    }
+    with warnings.catch_warnings():
+        # It advises to name an author, links and environments; `about` is for those who want to.
+        warnings.simplefilter("ignore", UserWarning)
+        return minari.create_dataset_from_buffers(dataset_id, buffer=episodes, **{**told, **about})

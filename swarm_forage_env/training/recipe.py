@@ -2,47 +2,50 @@
 
 Deliveries are too rare to learn from them alone. Where they count, the recipe also rewards first pick-ups and the way
 home, makes it cost a little to be in the way of others, and begins in a smaller arena. The last third of a training
-learns more slowly. `recipes.toml` holds what was measured to suit single scenarios better.
+learns more slowly. All numbers are our choice.
 """
 
-import dataclasses
-import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from functools import cache
-from pathlib import Path
+from dataclasses import replace
 from typing import Any
 
-from swarm_forage_env._internal.fields import ConfigError, known_keys, table, whole
+from swarm_forage_env._internal.fields import ConfigError, table, whole
+from swarm_forage_env._internal.fields_next import read
 from swarm_forage_env.policies.interface import GivenInterface, InterfaceConfig, chosen_interface
+from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELLS_PER_M
 from swarm_forage_env.scenarios.obstacles import stretched
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import chosen_scenario
-from swarm_forage_env.training.defaults import (
-    DECISION_TICKS,
-    DEFAULT_ACTIVATION,
-    DEFAULT_ARENAS,
-    DEFAULT_HIDDEN,
-    DEFAULT_REWARDS,
-    DEFAULT_ROBOTS,
-    DEFAULT_STEPS,
-    EPISODE_S,
-    EVALUATE_EVERY,
-    EVALUATION_SHARE,
-    FRAME_DECISIONS,
-    JAMMING_S,
-)
-from swarm_forage_env.training.evaluation_plan import EvaluationPlan, EvaluationWorld
-from swarm_forage_env.training.plan import LEARNING, SAMPLING, Stage, TrainingPlan
+from swarm_forage_env.training.evaluation import EVALUATE_EVERY, LEARNING, EvaluationPlan, EvaluationWorld
+from swarm_forage_env.training.plan import DEFAULT_STEPS, SAMPLING, Stage, TrainingPlan
 from swarm_forage_env.views.plans import DEFAULT_SCENARIO
 from swarm_forage_env.views.sampler import ScenarioSampler
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import wrapper_configs
 from swarm_forage_env.wrappers.world import World
 
-DEFAULT_OPTIONS: dict[str, dict[str, Any]] = {
+MOST_ARENAS = 8
+"""Arenas side by side, at most."""
+MOST_ROBOTS = 400
+"""Robots in all arenas, at most, but for one whole swarm: where more of them share the decisions, there are fewer
+rollouts, and so few seconds of each arena that no jam is ever seen."""
+REWARDS = {"first_pickup": 1.0, "nest_progress": 0.05, "interference": -0.002}
+"""Rewards where deliveries count: the whole way home is worth about one delivery. Each tick in the way of others costs
+a little."""
+EPISODE_S = 4000.0
+"""Length of an episode, s, at most. Jams build up slowly: with 1,000 s and no price for being in the way, two
+trainings of two ended in them."""
+JAMMING_S = 1000.0
+"""Shortest time in which the recipe lets an episode end, s; in less, jams hardly begin."""
+EVALUATION_SHARE = 0.5
+"""Most that evaluations may add to the simulated time of all robots; large swarms are evaluated less often for it."""
+INTERFACE = {"observation": "compact", "automatic_gripper": True, "decision_ticks": 5, "site_memory": True}
+"""How robots see and act: a decision is a second."""
+FRAME_DECISIONS = 200
+"""Decisions for which each robot sees the world in a frame of its own, so that the swarm spreads."""
+OPTIONS: dict[str, dict[str, Any]] = {
     "ppo": {
         "n_steps": 128,
         "batch_size": 3200,
@@ -56,11 +59,21 @@ DEFAULT_OPTIONS: dict[str, dict[str, Any]] = {
     "dqn": {"buffer_size": 1_000_000, "learning_starts": 50_000, "batch_size": 1024, "train_freq": 4},
     "sac": {"buffer_size": 1_000_000, "learning_starts": 50_000, "batch_size": 1024},
 }
-"""Arguments that suit hundreds of robots at once; our choice, the rest is the library's."""
+"""Arguments that suit hundreds of robots at once; the rest is the library's."""
 LATE_OPTIONS: dict[str, dict[str, Any]] = {"ppo": {"learning_rate": 0.0003, "gamma": 0.995}}
-"""Arguments of an algorithm in the last third of a training: smaller steps, further ahead; our choice."""
+"""Arguments of an algorithm in the last third of a training: smaller steps, further ahead."""
 SMALL_START = 0.4
-"""Share of its size that an arena has in a small start; our choice."""
+"""Share of its size that an arena has in a small start."""
+MEASURED: dict[str, dict[str, Any]] = {
+    # Objects lie anywhere, so that a smaller arena is no shorter way, only a fuller one.
+    "warehouse_medium": {"small_start": False, "options": {"ppo": {"ent_coef": 0.01}}},
+    # It counts first pick-ups, but a robot that does not come home cannot find the next object: deliveries pay, too.
+    "search_and_rescue": {
+        "rewards": {"delivery": 1.0, "nest_progress": 0.05, "interference": -0.002},
+        "options": {"ppo": {"ent_coef": 0.01}},
+    },
+}
+"""Preset -> what was measured to teach it better than the general recipe."""
 
 
 def recipe(
@@ -72,8 +85,8 @@ def recipe(
     n_arenas: int | None = None,
     interface: GivenInterface = None,
     wrappers: Iterable[WrapperConfig | str] = (),
-    hidden: tuple[int, ...] = DEFAULT_HIDDEN,
-    activation: str = DEFAULT_ACTIVATION,
+    hidden: tuple[int, ...] = (64, 64),
+    activation: str = "relu",
     options: Mapping[str, Any] | None = None,
     small_start: bool | None = None,
     evaluation: EvaluationPlan | Mapping[str, Any] | None = None,
@@ -86,32 +99,29 @@ def recipe(
     Args:
         scenario: Name of a preset (default warehouse_small), which gets the recipe's length of episodes (`EPISODE_S`,
             or that of its runs or of a third of the training if these are shorter), where deliveries count its rewards
-            (`DEFAULT_REWARDS`), and what `recipes.toml` says; or a complete configuration, which is taken as it is.
+            (`REWARDS`), and what `MEASURED` says; or a complete configuration, which is taken as it is.
         sampler: Draws the world of each episode, instead of `scenario`, `wrappers`, `small_start` and `overrides`; its
             worlds are taken as they are, with their rewards and horizons. Evaluations take place in the largest world
             of each name that it draws, unless `evaluation` has worlds.
-        algorithm: One of `plan.ALGORITHMS`.
+        algorithm: See `TrainingPlan.algorithm`.
         steps: Decisions of single robots in all stages, 1 or more. There is a single stage where a third of them is
             less than a rollout (of ppo and a2c), unless `small_start` is asked for.
-        n_arenas: Arenas side by side; default `DEFAULT_ARENAS`, fewer of swarms that make more than `DEFAULT_ROBOTS`
-            in all.
-        interface: What a learner sees and does: an `InterfaceConfig`, or fields by name that differ from the
-            recipe's (compact observations, discrete actions or for sac continuous ones, an automatic gripper,
-            `DECISION_TICKS`, site memory, `FRAME_DECISIONS` unless robots send messages).
+        n_arenas: Arenas side by side; default `MOST_ARENAS`, fewer of swarms that make more than `MOST_ROBOTS` in all.
+        interface: What a learner sees and does: an `InterfaceConfig`, or fields by name that differ from `INTERFACE`,
+            `FRAME_DECISIONS` (none where robots send messages) and discrete actions (continuous for sac).
         wrappers: What disturbs the swarm, in training and in evaluations: configurations, or words as on the command
             line ("population:death_per_tick=0.01").
         hidden: Sizes of the hidden layers.
-        activation: What hidden layers do to their sums, see `TrainingPlan.activation`.
-        options: Arguments of the algorithm that differ from `DEFAULT_OPTIONS` and, to the end, from `LATE_OPTIONS`.
+        activation: What hidden layers do to their sums.
+        options: Arguments of the algorithm that differ from `OPTIONS` and, to the end, from `LATE_OPTIONS`.
         small_start: Spend the first third of the steps in a smaller arena; default where deliveries count, unless
-            `recipes.toml` says otherwise or there are few `steps`.
+            `MEASURED` says otherwise or there are few `steps`.
         evaluation: How the policy is judged meanwhile: an `EvaluationPlan`, or fields by name that differ from the
             recipe's (whole runs, as often as `EVALUATE_EVERY` and `EVALUATION_SHARE` allow).
         seed: Seed of everything.
-        samples: Whether the trained policy draws its actions, see `TrainingPlan.samples`; default where it
-            has probabilities: discrete actions of ppo and a2c.
-        overrides: Scenario fields by name; they go before the recipe's (`nest_progress=0.1`). `horizon_s` is the length
-            of the episodes; evaluations last as long as the scenario.
+        samples: Whether the policy draws its actions; default where it has probabilities.
+        **overrides: Fields of the scenario by name; they go before the recipe's (`nest_progress=0.1`). `horizon_s` is
+            the length of the episodes; evaluations last as long as the scenario.
 
     Raises:
         ConfigError: an unknown name or field, values that are refused by what they are for (see `TrainingPlan`), or
@@ -125,157 +135,92 @@ def recipe(
             raise ConfigError(f"Expected either a sampler or {', '.join(given)}, which it decides; got both.")
         scenario = sampler.largest
     scenario = scenario or DEFAULT_SCENARIO
-    measured = Measured() if isinstance(scenario, ScenarioConfig) else measured_recipe(scenario)
+    is_preset = not isinstance(scenario, ScenarioConfig)
+    measured = MEASURED.get(scenario, {}) if isinstance(scenario, str) else {}
     fields = {name: value for name, value in overrides.items() if name != "horizon_s"}
-    config = _training_scenario(scenario, fields, measured)
-    chosen = chosen_interface(interface, _default_interface(algorithm, config))
-    n_arenas = _default_arenas(config, sampler) if n_arenas is None else n_arenas
+    config = chosen_scenario(scenario, fields)
+    if is_preset and "reward" not in fields:
+        general = REWARDS if config.performance == "collected" else {}
+        config = chosen_scenario(scenario, {**general, **measured.get("rewards", {}), **fields})
+    chosen = chosen_interface(interface, _interface(algorithm, config))
+    if n_arenas is None:  # a sampler needs many, so that every batch holds all kinds of worlds
+        n_arenas = MOST_ARENAS if sampler else min(MOST_ARENAS, max(1, MOST_ROBOTS // config.robots.n_robots))
     n_rows = n_arenas * config.robots.n_robots
     episodes: dict[str, Any] = {}
-    if not isinstance(scenario, ScenarioConfig):
+    if is_preset:
         episodes = {"horizon_s": _episode_s(config, steps // 3 / n_rows * chosen.decision_ticks * config.dt_s)}
     episodes |= {name: value for name, value in overrides.items() if name not in fields}
     with_overrides(config, **episodes)  # refuses an impossible length
-    chosen_options = _algorithm_options(algorithm, n_rows, {**measured.options.get(algorithm, {}), **(options or {})})
-    shortest = 1 if small_start else n_rows * _rollout_steps(algorithm, chosen_options)
+    given_options = dict(options or {})
+    all_options = _options(algorithm, n_rows, measured.get("options", {}).get(algorithm, {}) | given_options)
+    shortest = 1 if small_start else n_rows * (all_options.get("n_steps", 1) if algorithm in SAMPLING else 1)
     if small_start is None:
-        small_start = config.performance == "collected" and sampler is None and measured.small_start
-    late = _late_options(algorithm, options or {})
+        small_start = config.performance == "collected" and sampler is None and bool(measured.get("small_start", True))
+    late = {name: value for name, value in LATE_OPTIONS.get(algorithm, {}).items() if name not in given_options}
     return TrainingPlan(
         world=World(config, wrapper_configs(wrappers)),
-        algorithm=algorithm,
+        algorithm=algorithm,  # type: ignore[arg-type] - words are checked there
         interface=chosen,
         n_arenas=n_arenas,
         hidden=hidden,
-        activation=activation,
-        options=chosen_options,
+        activation=activation,  # type: ignore[arg-type] - likewise
+        options=all_options,
         stages=_stages(config, steps, episodes, late=late, small_start=small_start, shortest=shortest),
         evaluation=_evaluation(evaluation, config, chosen.decision_ticks, sampler),
         seed=seed,
-        samples=_can_draw(algorithm, chosen) if samples is None else samples,
+        samples=algorithm in SAMPLING and chosen.actions == "discrete" if samples is None else samples,
         sampler=sampler,
     )
 
 
-def _default_arenas(scenario: ScenarioConfig, sampler: ScenarioSampler | None) -> int:
-    """Return how many arenas are side by side; a sampler needs many, so that every batch holds all kinds of worlds."""
-    if sampler is not None:
-        return DEFAULT_ARENAS
-    return min(DEFAULT_ARENAS, max(1, DEFAULT_ROBOTS // scenario.robots.n_robots))
-
-
-def _late_options(algorithm: str, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return `LATE_OPTIONS` but for those that are given, which hold to the end."""
-    return {name: value for name, value in LATE_OPTIONS.get(algorithm, {}).items() if name not in given}
-
-
-def _can_draw(algorithm: str, interface: InterfaceConfig) -> bool:
-    """Return whether a policy has probabilities to draw its actions by, so that it needs no temperature."""
-    return algorithm in SAMPLING and interface.actions == "discrete"
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Measured:
-    """What was measured to suit a scenario better than the general recipe; see `recipes.toml`."""
-
-    rewards: Mapping[str, float] = field(default_factory=dict, hash=False)
-    """Fields of `RewardConfig` by name."""
-    options: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
-    """Arguments by algorithm."""
-    small_start: bool = True
-    """Whether a training begins in a smaller arena where deliveries count."""
-
-
-@cache
-def _measured_recipes() -> dict[str, Measured]:
-    tables = tomllib.loads((Path(__file__).parent / "recipes.toml").read_text(encoding="utf-8"))
-    return {name: Measured(**values) for name, values in tables.items()}
-
-
-def measured_recipe(name: str) -> Measured:
-    """Return what `recipes.toml` says about a preset; for others, what the general recipe says."""
-    return _measured_recipes().get(name, Measured())
-
-
-def _training_scenario(given: str | ScenarioConfig, overrides: Mapping[str, Any], measured: Measured) -> ScenarioConfig:
-    config = chosen_scenario(given, overrides)
-    if isinstance(given, ScenarioConfig) or "reward" in overrides:
-        return config
-    general = DEFAULT_REWARDS if config.performance == "collected" else {}
-    return chosen_scenario(given, {**general, **measured.rewards, **overrides})
+def _interface(algorithm: str, config: ScenarioConfig) -> InterfaceConfig:
+    return InterfaceConfig(
+        **INTERFACE,
+        actions="continuous" if algorithm == "sac" else "discrete",
+        frame_decisions=0 if config.robots.message_size else FRAME_DECISIONS,  # no frame turns what is said
+    )
 
 
 def _evaluation(
     given: EvaluationPlan | Mapping[str, Any] | None,
-    scenario: ScenarioConfig,
+    config: ScenarioConfig,
     decision_ticks: int,
     sampler: ScenarioSampler | None,
 ) -> EvaluationPlan:
+    """Return the plan of evaluations, which take at most `EVALUATION_SHARE` of the time of the training."""
     if isinstance(given, EvaluationPlan):
         return given
-    fields = dict(table("evaluation", given or {}))
-    known_keys(fields, [item.name for item in dataclasses.fields(EvaluationPlan)], prefix="evaluation.")
-    if sampler is not None:
-        fields.setdefault("worlds", _largest_worlds(sampler))
-    plan = EvaluationPlan(**fields)
+    fields = {**table("evaluation", given or {})}
+    if sampler is not None and "worlds" not in fields:  # the largest of each name, undisturbed
+        largest = {world.name: world for world in sorted(sampler.ends, key=lambda world: world.robots.n_robots)}
+        fields["worlds"] = tuple(EvaluationWorld(world) for world in largest.values())
+    plan = read(EvaluationPlan, fields, "evaluation")
     if "every_steps" in fields:
         return plan
-    robot_ticks = plan.runs(plan.worlds or (World(scenario),), LEARNING).robot_ticks
-    return dataclasses.replace(
-        plan, every_steps=max(EVALUATE_EVERY, round(robot_ticks / decision_ticks / EVALUATION_SHARE))
-    )
+    worlds = plan.worlds_of(World(config))
+    decisions = Plan.product([LEARNING], worlds, plan.seeds).robot_ticks / decision_ticks
+    return replace(plan, every_steps=max(EVALUATE_EVERY, round(decisions / EVALUATION_SHARE)))
 
 
-def _largest_worlds(sampler: ScenarioSampler) -> tuple[EvaluationWorld, ...]:
-    """Return the world with the most robots of each name that a sampler draws, undisturbed."""
-    largest: dict[str, ScenarioConfig] = {}
-    for config in sorted(sampler.ends, key=lambda config: config.robots.n_robots):
-        largest[config.name] = config
-    return tuple(EvaluationWorld(scenario=config) for config in largest.values())
-
-
-def _default_interface(algorithm: str, scenario: ScenarioConfig) -> InterfaceConfig:
-    """Return the recipe's interface, without frames where these would not turn all that tells of directions."""
-    robots = scenario.robots
-    return InterfaceConfig(
-        observation="compact",
-        actions="continuous" if algorithm == "sac" else "discrete",
-        automatic_gripper=True,
-        decision_ticks=DECISION_TICKS,
-        site_memory=True,
-        frame_decisions=0 if robots.message_size else FRAME_DECISIONS,
-    )
-
-
-def _algorithm_options(algorithm: str, n_rows: int, given: Mapping[str, Any]) -> dict[str, Any]:
-    chosen = {**DEFAULT_OPTIONS.get(algorithm, {}), **given}
+def _options(algorithm: str, n_rows: int, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return arguments of an algorithm; batches of ppo share a rollout without a rest where they can."""
+    chosen = {**OPTIONS.get(algorithm, {}), **given}
     n_steps = chosen.get("n_steps")
     if algorithm == "ppo" and "batch_size" not in given and isinstance(n_steps, int):
-        chosen["batch_size"] = _fitting_batch(n_steps * n_rows, DEFAULT_OPTIONS["ppo"]["batch_size"])
+        n_samples, most = n_steps * n_rows, chosen["batch_size"]
+        fitting = (size for size in range(most, most // 2, -1) if n_samples % size == 0)
+        chosen["batch_size"] = n_samples if 1 < n_samples <= most else next(fitting, most)
     return chosen
 
 
-def _episode_s(scenario: ScenarioConfig, third_s: float) -> float:
+def _episode_s(config: ScenarioConfig, third_s: float) -> float:
     """Return how long episodes last, so that one ends in each third of a training; not where thirds show no jam."""
-    ending_s = third_s // scenario.interval_s * scenario.interval_s
-    return min(EPISODE_S, scenario.horizon_s, ending_s if ending_s >= JAMMING_S else EPISODE_S)
-
-
-def _rollout_steps(algorithm: str, options: Mapping[str, Any]) -> int:
-    """Return how many decisions of each robot come before one update; of algorithms without rollouts one."""
-    n_steps = options.get("n_steps", 1)
-    return n_steps if algorithm in SAMPLING and isinstance(n_steps, int) else 1
-
-
-def _fitting_batch(n_samples: int, most: int) -> int:
-    """Return the largest size from `most` down to half of it that divides `n_samples`, else `most`; or all of few."""
-    if 1 < n_samples <= most:
-        return n_samples
-    return next((size for size in range(most, most // 2, -1) if n_samples % size == 0), most)
+    ending_s = third_s // config.interval_s * config.interval_s
+    return min(EPISODE_S, config.horizon_s, ending_s if ending_s >= JAMMING_S else EPISODE_S)
 
 
 def _stages(
-    scenario: ScenarioConfig,
+    config: ScenarioConfig,
     steps: int,
     episodes: Mapping[str, Any],
     *,
@@ -290,23 +235,19 @@ def _stages(
     third = steps // 3
     if third < shortest:
         return (Stage(steps=steps, scenario=episodes),)
-    small = {**_fitting_small_arena(scenario), **episodes} if small_start else {}
+    first = (Stage(steps=third, scenario={**_fitting_small_arena(config), **episodes}),) if small_start else ()
     middle = Stage(steps=steps - third * (small_start + bool(late)), scenario=episodes)
-    first = (Stage(steps=third, scenario=small),) if small_start else ()
     last = (Stage(steps=third, scenario=episodes, options=late),) if late else ()
     return (*first, middle, *last)
 
 
-def _fitting_small_arena(scenario: ScenarioConfig) -> dict[str, Any]:
+def _fitting_small_arena(config: ScenarioConfig) -> dict[str, Any]:
     """Return `small_arena`; raises ConfigError where there cannot be one."""
-    if scenario.objects.object_positions_m:
-        raise ConfigError(
-            "Expected no object_positions_m where a training begins in a smaller arena (small_start), which may not "
-            "hold these places; train in the whole arena from the start: small_start=False (--set small_start=false)."
-        )
-    small = small_arena(scenario)
+    small = small_arena(config)
     try:
-        with_overrides(scenario, **small)
+        if config.objects.object_positions_m:
+            raise ConfigError("Expected no object_positions_m, which it may not hold.")
+        with_overrides(config, **small)
     except ConfigError as error:
         raise ConfigError(
             f"Cannot begin in a smaller arena (small_start) of {small['width_m']} x {small['height_m']} m: {error} "
@@ -315,13 +256,13 @@ def _fitting_small_arena(scenario: ScenarioConfig) -> dict[str, Any]:
     return small
 
 
-def small_arena(scenario: ScenarioConfig) -> dict[str, Any]:
+def small_arena(config: ScenarioConfig) -> dict[str, Any]:
     """Return fields that shrink the arena to SMALL_START of its size with nest and obstacles in proportion.
 
     Only along x for a single and a dual source, which lie beside the nest: the other axis is no way home.
     """
-    arena = scenario.arena
-    is_beside = scenario.objects.placement in ("single_source", "dual_source")
+    arena = config.arena
+    is_beside = config.objects.placement in ("single_source", "dual_source")
     shares = (SMALL_START, 1.0 if is_beside else SMALL_START)
     width_m, height_m = (
         round(extent * share * CELLS_PER_M) / CELLS_PER_M

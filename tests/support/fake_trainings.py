@@ -2,37 +2,31 @@
 
 import os
 import signal
+import sys
 import time
-from pathlib import Path
 from typing import Any
 
-from swarm_forage_env.training.evaluations import TrainingStatus
+from swarm_forage_env.training.sb3.seeds import _interrupt
+from swarm_forage_env.training.sb3.training import TrainingStatus
 
-STATUS = TrainingStatus(steps=1, wall_time_s=1.0, episode_return=0.0)
+STATUS = TrainingStatus(steps=1, episode_return=0.0)
 
 
 def one_is_killed(job: Any, driver: Any) -> None:
     """Tell a status and end, but for seed 1, whose process is killed."""
     driver.send(STATUS)
-    if job.plan.seed == 1:
+    if job[0].seed == 1:
         os.kill(os.getpid(), signal.SIGKILL)
     driver.send(None)
 
 
-def last_for_ever(job: Any, report: Any) -> None:
+def last_for_ever_apart(job: Any, driver: Any) -> None:
     """Train until an interrupt, and keep something then."""
+    signal.signal(signal.SIGTERM, _interrupt)
     try:
-        report(STATUS)
+        driver.send(STATUS)
         time.sleep(600.0)
     except KeyboardInterrupt:
-        Path(job.folder, "kept").touch()
-        raise
-
-
-def last_for_ever_apart(job: Any, driver: Any) -> None:
-    """The same in a process that hears as that of a training does."""
-    from swarm_forage_env.training.sb3 import seeds
-
-    seeds._train = last_for_ever
-    job.folder.mkdir()
-    seeds._train_here(job, driver)
+        job[1].mkdir(parents=True)
+        (job[1] / "kept").touch()
+        sys.exit(143)

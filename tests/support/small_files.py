@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from swarm_forage_env.training.evaluations import Evaluation, write_evaluations
 
 from metrics.benchmark import load_protocol
 from swarm_forage_env.inspect.replay.capture import record_replay
@@ -22,7 +23,6 @@ from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.studies.results import pack_study, run_study
 from swarm_forage_env.studies.study_file import Axis
 from swarm_forage_env.training.datasets import record_dataset
-from swarm_forage_env.training.evaluations import Evaluation, write_evaluations
 from swarm_forage_env.training.plan import read_plan
 from tests.support.entries import TINY, made_up_entry
 from tests.support.tiny_study import tiny_study

@@ -11,10 +11,10 @@ from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.config import PHYSICS_ENGINES, RewardConfig
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import scenario, warehouse_small
-from swarm_forage_env.training.defaults import EVALUATE_EVERY
-from swarm_forage_env.training.evaluation_plan import EvaluationPlan
+from swarm_forage_env.training.evaluation import EVALUATE_EVERY, EvaluationPlan
 from swarm_forage_env.training.plan import Stage, read_plan
 from swarm_forage_env.training.recipe import LATE_OPTIONS, recipe, small_arena
+from tests.support.sampled import sampler
 
 
 def test_defaults_are_what_a_driver_needs():
@@ -37,6 +37,11 @@ def test_defaults_are_what_a_driver_needs():
     assert plan.evaluation == EvaluationPlan()
     assert {world.scenario.horizon_s for world in plan.judging_worlds} == {10_000.0}
     assert recipe(algorithm="sac").interface.actions == "continuous"
+    assert recipe(message_size=2, interface={"actions": "continuous"}).interface.frame_decisions == 0
+    assert {stage.scenario["horizon_s"] for stage in recipe("classroom").stages} == {scenario("classroom").horizon_s}
+    for steps in (0, -5, 2.5, True):
+        with pytest.raises(ConfigError, match="Expected steps to be a whole number"):
+            recipe(steps=steps)
 
 
 def test_where_deliveries_count_the_way_to_them_is_rewarded_and_short_at_first():
@@ -48,12 +53,10 @@ def test_where_deliveries_count_the_way_to_them_is_rewarded_and_short_at_first()
         Stage(steps=1_133_333, scenario={"horizon_s": 2800.0}, options=LATE_OPTIONS["ppo"]),
     )
     assert plan == recipe("warehouse_small", small_start=True, nest_progress=0.05, first_pickup=1.0)
-
-
-def test_where_deliveries_do_not_count_the_scenario_says_the_rewards():
-    plan = recipe("search_and_rescue", interference=0.0, delivery=0.0, nest_progress=0.0)
-    assert plan.scenario == scenario("search_and_rescue")
-    assert [stage.steps for stage in plan.stages] == [2_266_667, 1_133_333]
+    assert [len(recipe("warehouse_medium", small_start=start).stages) for start in (None, True)] == [2, 3]
+    other = recipe("search_and_rescue", interference=0.0, delivery=0.0, nest_progress=0.0)
+    assert other.scenario == scenario("search_and_rescue")
+    assert [stage.steps for stage in other.stages] == [2_266_667, 1_133_333]
     counting = recipe("search_and_rescue", performance="collected", side_m=64.0)
     assert counting.scenario.reward.nest_progress == 0.05
 
@@ -72,10 +75,6 @@ def test_where_deliveries_do_not_count_the_scenario_says_the_rewards():
 def test_rewards_that_are_given_go_before_those_of_the_recipe(overrides, expected):
     plan = recipe("warehouse_small", horizon_s=400.0, **overrides)
     assert plan.scenario.reward == expected
-
-
-def test_an_episode_is_not_longer_than_a_run():
-    assert {stage.scenario["horizon_s"] for stage in recipe("classroom").stages} == {scenario("classroom").horizon_s}
 
 
 def test_the_last_third_learns_more_slowly_unless_people_say_how_fast():
@@ -110,12 +109,6 @@ def test_the_page_shows_the_default_training_as_a_plan(tmp_path):
     settings = default.settings()
     assert shown.settings().keys() == settings.keys()
     assert {name: value for name, value in shown.settings().items() if value != pytest.approx(settings[name])} == {}
-
-
-@pytest.mark.parametrize("steps", [0, -5, 2.5, True])
-def test_a_training_without_steps_is_refused(steps):
-    with pytest.raises(ConfigError, match="Expected steps to be a whole number"):
-        recipe(steps=steps)
 
 
 @pytest.mark.parametrize(
@@ -163,34 +156,12 @@ def test_what_was_measured_for_a_scenario_goes_before_the_general_recipe(name):
     assert recipe(scenario(name)).scenario == scenario(name)
 
 
-def test_a_small_start_is_left_out_where_that_was_measured_to_be_better():
-    assert len(recipe("warehouse_medium").stages) == 2
-    assert len(recipe("warehouse_medium", small_start=True).stages) == 3
-
-
 def test_large_swarms_are_evaluated_less_often():
     assert recipe("warehouse_medium").evaluation.every_steps == 4_000_000
     assert recipe("warehouse_medium", evaluation={"horizon_s": 2000.0}).evaluation.every_steps == EVALUATE_EVERY
     assert recipe("warehouse_medium", evaluation={"every_steps": 7}).evaluation == EvaluationPlan(every_steps=7)
     with pytest.raises(ConfigError, match=r"evaluation\.every_step'.*Did you mean"):
         recipe(evaluation={"every_step": 7})
-
-
-def test_an_interface_is_given_whole_or_by_what_differs():
-    assert recipe(interface={"decision_ticks": 2}).interface == InterfaceConfig(
-        observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=2,
-        site_memory=True, frame_decisions=200,
-    )  # fmt: skip
-    assert not recipe(interface={"site_memory": False}).interface.site_memory
-    numbered = InterfaceConfig(actions="discrete")
-    assert recipe(interface=numbered).interface is numbered
-    with pytest.raises(ConfigError, match="Did you mean 'decision_ticks'"):
-        recipe(interface={"decision_tick": 2})
-
-
-def test_robots_with_messages_see_the_world_as_it_is():
-    assert recipe(neighbours_seen=4).interface.frame_decisions == 200
-    assert recipe(message_size=2, interface={"actions": "continuous"}).interface.frame_decisions == 0
 
 
 def test_the_other_arguments_reach_the_plan():
@@ -250,3 +221,11 @@ def test_a_small_start_that_cannot_hold_the_objects_is_refused():
     with pytest.raises(ConfigError, match=r"objects for placement .* small_start=False"):
         recipe("warehouse_small", n_objects=800, small_start=True)
     assert len(recipe("warehouse_small", n_objects=800, small_start=False).stages) == 2
+
+
+def test_a_sampler_is_judged_in_the_largest_world_of_each_name():
+    plan = recipe(sampler=sampler())
+    assert [world.name for world in plan.evaluation.worlds] == ["warehouse_small_6", "search_and_rescue_4"]
+    assert ([dict(stage.scenario) for stage in plan.stages], plan.n_arenas) == ([{}, {}], 8)
+    with pytest.raises(ConfigError, match="either a sampler or n_robots"):
+        recipe(sampler=sampler(), n_robots=3)

@@ -3,10 +3,11 @@
 import dataclasses
 import json
 import math
-import re
 import signal
 import time
+from multiprocessing import Pipe
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,20 +18,20 @@ from metrics.statistics import aggregate
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.presets import warehouse_small
-from swarm_forage_env.training.evaluation_plan import EvaluationPlan, EvaluationWorld
-from swarm_forage_env.training.evaluations import (
+from swarm_forage_env.training.curves import read_training
+from swarm_forage_env.training.evaluation import (
     EVALUATIONS_FILE,
     MODEL_FILE,
     PLAN_FILE,
     Evaluation,
+    EvaluationPlan,
     WorldEvaluation,
     write_evaluations,
 )
 from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.sb3 import seeds as module
-from swarm_forage_env.training.sb3.seeds import train_seeds
+from swarm_forage_env.training.sb3.seeds import read_seeds, seed_folder, train_seeds
 from swarm_forage_env.training.sb3.training import train
-from swarm_forage_env.training.seeds import TrainingFailure, is_finished, read_seeds, seed_folder
 from swarm_forage_env.wrappers.world import World
 from tests.support import fake_trainings
 from tests.support.fake_trainings import STATUS
@@ -47,135 +48,105 @@ PLAN = TrainingPlan(
 )
 
 
-def evaluated(steps: int, performance: float, cpu_time_s: float = 60.0) -> Evaluation:
-    return Evaluation(
-        steps=steps,
-        wall_time_s=1.0,
-        performance=performance,
+def evaluated(steps: int, reached: float, interference: float = 0.25) -> Evaluation:
+    world = WorldEvaluation(
+        world=PLAN.world.name,
+        baseline_policy="random",
+        performance=reached,
         baseline=5.0,
-        interference_fraction=0.25,
-        cpu_time_s=cpu_time_s,
+        ratio=reached / 5.0,
+        interference_fraction=interference,
     )
+    return Evaluation(steps=steps, wall_time_s=1.0, cpu_time_s=60.0, reached=reached, worlds=(world,))
 
 
-def made(folder: Path, seed: int, curve: dict[int, float], plan: TrainingPlan = PLAN, **others) -> None:
+def made(folder: Path, seed: int, *evaluations: Evaluation, plan: TrainingPlan = PLAN) -> None:
     """A folder as a training leaves it."""
     place = seed_folder(folder, seed)
-    place.mkdir(parents=True)
+    place.mkdir(parents=True, exist_ok=True)
     dataclasses.replace(plan, seed=seed).write(place / PLAN_FILE)
     (place / MODEL_FILE).touch()
-    write_evaluations(
-        place / EVALUATIONS_FILE, [evaluated(steps, reached, **others) for steps, reached in curve.items()]
-    )
+    write_evaluations(place / EVALUATIONS_FILE, evaluations)
 
 
 def fake(monkeypatch, *, fails=()) -> list[tuple[int, bool]]:
-    """Trainings are made in no time, or fail; returns seeds, and whether they were resumed."""
+    """Trainings are made in no time, or fail, in this process; returns seeds, and whether they were resumed."""
     calls: list[tuple[int, bool]] = []
 
-    def train(plan, folder, *, resume, report):
+    def started(job):
+        plan, folder, resume = job
+        ours, theirs = Pipe()
         calls.append((plan.seed, resume))
         if plan.seed in fails:
-            raise MemoryError("too large")
-        if not resume:
-            made(folder.parent, plan.seed, {})
-        write_evaluations(folder / EVALUATIONS_FILE, [evaluated(128, 4.0 + plan.seed)])
-        report(evaluated(128, 4.0 + plan.seed))
+            theirs.send("too large")
+        else:
+            made(folder.parent, plan.seed, evaluated(plan.total_steps, 4.0 + plan.seed), plan=plan)
+            theirs.send(evaluated(128, 4.0 + plan.seed))
+        theirs.send(None)
+        return ours, SimpleNamespace(join=lambda *_: None, terminate=list, kill=list)
 
-    monkeypatch.setattr(module, "train", train)
+    monkeypatch.setattr(module, "_started", started)
     return calls
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
-def test_each_seed_is_trained_in_its_folder_as_alone(jobs, tmp_path, tmp_path_factory):
+def test_each_seed_is_trained_in_its_folder_as_alone(tmp_path, tmp_path_factory):
+    """Real processes, so it takes seconds."""
     told = []
-    found = train_seeds(PLAN, [3, 4], tmp_path, jobs=jobs, report=lambda seed, news: told.append((seed, type(news))))
+    found = train_seeds(PLAN, [3, 4], tmp_path, jobs=2, report=lambda seed, news: told.append((seed, type(news))))
+    assert not found.failures
     assert sorted(seed for seed, kind in told if kind is Evaluation) == [3, 4]
     assert {path.name for path in tmp_path.iterdir()} == {"plan.json", "seed_3", "seed_4"}
     alone = tmp_path_factory.mktemp("alone") / "run"
     train(dataclasses.replace(PLAN, seed=4), alone)
     same, other = (np.load(folder / "policy.npz") for folder in (alone, tmp_path / "seed_4"))
     names = [name for name in same.files if name != "about"]  # which tells when it was trained
-    assert "weight_0" in names
     assert all(np.array_equal(same[name], other[name]) for name in names)
     assert read_plan(tmp_path / "plan.json") == PLAN
-    for seed in (3, 4):
-        assert read_plan(tmp_path / f"seed_{seed}" / "plan.json") == dataclasses.replace(PLAN, seed=seed)
-        assert is_finished(PLAN, tmp_path / f"seed_{seed}")
-    assert [(one.seed, one.policy) for one in found.kept()] == [
-        (seed, (tmp_path / f"seed_{seed}" / "policy.npz").as_posix()) for seed in (3, 4)
-    ]
-    assert all(one.cpu_time_s > 0.0 for one in found.kept())
+    assert [(one.plan.seed, one.is_finished) for one in found.trainings] == [(3, True), (4, True)]
 
 
 def test_what_is_finished_is_kept_and_the_rest_goes_on(tmp_path, monkeypatch):
-    calls = fake(monkeypatch)
-    made(tmp_path, 0, {128: 4.0})
-    made(tmp_path, 1, {64: 4.0})
-    found = train_seeds(PLAN, range(3), tmp_path, jobs=1, resume=True)
-    assert calls == [(1, True), (2, False)]
-    assert [*found.trainings] == [0, 1, 2]
-    longer = PLAN.longer(256)
-    train_seeds(longer, range(1), tmp_path, jobs=1, resume=True)
-    assert calls[2:] == [(0, True)]
-    assert read_plan(tmp_path / "plan.json") == longer
-
-
-def test_a_training_that_fails_ends_no_other(tmp_path, monkeypatch):
-    fake(monkeypatch, fails={1})
+    calls = fake(monkeypatch, fails={3})
+    made(tmp_path, 0, evaluated(128, 4.0))
+    made(tmp_path, 1, evaluated(64, 4.0))
     told = []
-    found = train_seeds(PLAN, range(3), tmp_path, jobs=1, report=lambda seed, news: told.append((seed, news)))
-    assert [*found.failures] == [1]
-    assert found.failures[1].startswith(f"MemoryError: too large ({__file__}, line "), "this file is the user's"
-    assert told[1] == (1, TrainingFailure(found.failures[1]))
-    assert [*found.trainings] == [0, 2]
+    found = train_seeds(PLAN, range(4), tmp_path, resume=True, report=lambda *news: told.append(news))
+    assert calls == [(1, True), (2, False), (3, False)]
+    assert ([one.label for one in found.trainings], found.failures) == (
+        ["seed_0", "seed_1", "seed_2"],
+        {"seed_3": "too large"},
+    )
+    assert (3, "too large") in told
+    longer = PLAN.longer(256)
+    train_seeds(longer, range(1), tmp_path, resume=True)
+    assert calls[3:] == [(0, True)]
+    assert read_plan(tmp_path / "plan.json") == longer
 
 
 def test_what_cannot_begin_is_refused_before_anything_is_trained(tmp_path, monkeypatch):
     calls = fake(monkeypatch)
-    for jobs in (0, -1):
-        with pytest.raises(ConfigError, match=rf"jobs .or None. to be a whole number >= 1, got {jobs}"):
-            train_seeds(PLAN, (0, 1), tmp_path, jobs=jobs)
-    for seeds, message in (((), "seeds to have at least 1"), ((1, 1), "Expected different seeds, got 1, 1")):
-        with pytest.raises(ConfigError, match=message):
-            train_seeds(PLAN, seeds, tmp_path)
-    with pytest.raises(ConfigError, match="Unknown option 'gama'"):
-        train_seeds(dataclasses.replace(PLAN, options={"gama": 0.9}), range(2), tmp_path)
-    replay = {"buffer_size": 400, "learning_starts": 128, "batch_size": 16}
-    with pytest.raises(ConfigError, match=r"more steps than the 128 after which dqn begins to learn .*, got 128"):
-        train_seeds(dataclasses.replace(PLAN, algorithm="dqn", options=replay), range(2), tmp_path)
-    late = dataclasses.replace(
-        PLAN,
-        algorithm="dqn",
-        options=replay,
-        stages=tuple(
-            Stage(steps=steps, options={"learning_starts": starts}) for steps, starts in ((100, 500), (9, 150))
-        ),
-    )
-    with pytest.raises(ConfigError, match="more steps than the 150 after which"):
-        train_seeds(late, range(2), tmp_path)
-    assert not list(tmp_path.iterdir())
-    made(tmp_path, 1, {64: 4.0})
-    with pytest.raises(ConfigError, match=r"an unused folder, got .*seed_1 with a training run; resume it"):
-        train_seeds(PLAN, range(2), tmp_path)
-    with pytest.raises(ConfigError, match=r"seed_1.plan\.json to resume its training, got another plan: hidden"):
-        train_seeds(dataclasses.replace(PLAN, hidden=(16,)), range(2), tmp_path, resume=True)
-    PLAN.write(tmp_path / "plan.json")
-    with pytest.raises(ConfigError, match=r"for further trainings there, got another plan: hidden"):
-        train_seeds(dataclasses.replace(PLAN, hidden=(16,)), range(5, 7), tmp_path)
-    with pytest.raises(ConfigError, match=r"several trainings, got .*seed_1, which is that of one"):
-        train_seeds(PLAN, range(2), tmp_path / "seed_1")
-    assert calls == []
-
-
-def test_a_second_command_in_the_folder_is_refused_while_the_first_is_under_way(tmp_path, monkeypatch):
-    calls = fake(monkeypatch)
+    made(tmp_path / "old", 1, evaluated(64, 4.0))
+    PLAN.write(tmp_path / "old" / "plan.json")
+    wide = dataclasses.replace(PLAN, hidden=(16,))
+    for plan, seeds, folder, words, reason in (
+        (PLAN, (0, 1), "new", {"jobs": 0}, "jobs to be a whole number >= 1"),
+        (PLAN, (), "new", {}, "one or more different seeds, got none"),
+        (PLAN, (1, 1), "new", {}, "different seeds, got 1, 1"),
+        (dataclasses.replace(PLAN, options={"gama": 0.9}), (0, 1), "new", {}, "Unknown option of ppo 'gama'"),
+        (PLAN, (0, 1), "old", {}, r"an unused folder, got .*seed_1 with a training run; resume it"),
+        (wide, (0, 1), "old", {"resume": True}, "for further trainings there, got another plan: hidden"),
+        (PLAN, (0, 1), "old/seed_1", {}, r"several trainings, got .*seed_1, which is that of one"),
+    ):
+        with pytest.raises(ConfigError, match=reason):
+            train_seeds(plan, seeds, tmp_path / folder, **words)
+    assert not (tmp_path / "new").exists()
 
     def again(seed, news):
         with pytest.raises(ConfigError, match="Expected to be the only one that writes to"):
-            train_seeds(PLAN, range(2), tmp_path, jobs=1, resume=True)
+            train_seeds(PLAN, range(2), tmp_path / "new", resume=True)
 
-    assert not train_seeds(PLAN, range(1), tmp_path, jobs=1, report=again).failures
+    assert calls == []
+    train_seeds(PLAN, range(1), tmp_path / "new", report=again)
     assert calls == [(0, False)]
 
 
@@ -184,134 +155,72 @@ def test_a_process_that_is_killed_ends_no_other_training(tmp_path, monkeypatch):
     told = []
     found = train_seeds(PLAN, range(3), tmp_path, jobs=2, report=lambda *news: told.append(news))
     assert sorted(seed for seed, news in told if news == STATUS) == [0, 1, 2]
-    assert [*found.failures] == [1]
-    assert "its process was killed, most likely because memory ran out" in found.failures[1]
-    assert not found.trainings
-
-
-@pytest.mark.parametrize(("code", "how"), [(3, "exit code 3"), (0, "exit code 0"), (-signal.SIGSEGV, "signal 11")])
-def test_how_a_process_ended_is_no_guess(code, how):
-    assert module._how_it_ended(code).startswith(f"its process ended with {how} before")
+    assert [*found.failures] == ["seed_1"]
+    assert "its process was killed, most likely because memory ran out" in found.failures["seed_1"]
+    assert not found.has_picture
+    assert found.text().endswith(found.failures["seed_1"])
+    assert module._how_it_ended(3).startswith("its process ended with exit code 3;")
+    assert module._how_it_ended(-signal.SIGSEGV).startswith("its process ended with signal 11;")
 
 
 def test_an_interrupt_lets_processes_keep_what_they_have(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "_train_here", fake_trainings.last_for_ever_apart)
     begun = set()
 
-    def stop(seed, news):
+    def report(seed, news):
         begun.add(seed)
-        if begun == {0, 1}:
+        if len(begun) == 2:
             raise KeyboardInterrupt
 
-    started = time.monotonic()
+    before = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
-        train_seeds(PLAN, range(4), tmp_path, jobs=2, report=stop)
-    assert time.monotonic() - started < 300.0  # nobody slept to the end
-    assert sorted(path.parent.name for path in tmp_path.glob("*/kept")) == ["seed_0", "seed_1"]
+        train_seeds(PLAN, range(2), tmp_path, jobs=2, report=report)
+    assert time.monotonic() - before < module.KEEP_S
+    assert all((tmp_path / f"seed_{seed}" / "kept").exists() for seed in range(2))
 
 
-def test_the_table_has_what_is_kept_and_its_mean(tmp_path):
-    for seed, best in ((0, 10.0), (1, 14.0), (2, 15.0)):
-        made(tmp_path, seed, {64: best, 128: 1.0}, cpu_time_s=60.0 * (seed + 2))
-    made(tmp_path, 3, {64: 99.0})
-    found = read_seeds(PLAN, tmp_path, range(5), {3: "diverged"})
-    title, header, *rows, law, failed, flatter, command = found.text().splitlines()
-    assert title.startswith("4 trainings by ppo in warehouse_small")
-    assert header.split("  ")[0] == "seed"
-    cells = {row.split()[0]: row.split()[1:] for row in rows}
-    assert cells["0"] == ["64", "10.0", "2.00", "0.250", "2", "min"]
-    of_means = aggregate([10.0, 14.0, 15.0])
-    assert cells["mean"] == ["13.0", "2.60", "0.250"]
-    assert cells["95"][1:4] == [f"{of_means.lower:.1f}", "to", f"{of_means.upper:.1f}"]
-    assert law == "95 %: Student's interval of the mean over trainings."
-    assert failed == "Seed 3 failed and is not in the mean: diverged"
-    assert "flatter" in flatter
-    assert command.startswith("swarm-forage benchmark ")
-    assert [Path(word).parent.name for word in command.split() if word.endswith("policy.npz")] == [
-        f"seed_{seed}" for seed in range(3)
-    ], "one that failed is in no entry"
-    assert command.endswith(f"--name {tmp_path.name}")
-    mapping = json.loads(found.json())
-    assert mapping["means"]["ratio"]["mean"] == pytest.approx(2.6)
-    assert [one["cpu_time_s"] for one in mapping["trainings"]] == [120.0, 180.0, 240.0, 60.0]
-    assert mapping["failures"] == {"3": "diverged"}
-
-
-def test_the_interval_of_a_share_ends_at_0(tmp_path):
-    for seed, share in enumerate((0.0, 0.0, 0.3)):
-        made(tmp_path, seed, {128: 10.0})
-        one = dataclasses.replace(evaluated(128, 10.0), interference_fraction=share)
-        write_evaluations(seed_folder(tmp_path, seed) / EVALUATIONS_FILE, [one])
-    of = read_seeds(PLAN, tmp_path, range(3)).means()["interference_fraction"]
-    assert (of.mean, of.lower) == (pytest.approx(0.1), 0.0)
-    assert of.upper == pytest.approx(aggregate([0.0, 0.0, 0.3]).upper)
-
-
-def test_one_training_has_a_mean_and_no_interval(tmp_path):
-    made(tmp_path, 0, {64: 10.0})
-    found = read_seeds(PLAN, tmp_path, range(1))
-    assert "95 %" not in found.text()
-    assert json.loads(found.json())["means"]["performance"] == {"mean": 10.0, "lower": None, "upper": None, "n": 1}
-    assert not read_seeds(PLAN, tmp_path / "elsewhere", range(1)).has_picture
-
-
-def test_in_several_worlds_ratios_are_what_counts(tmp_path):
-    judged_in = EvaluationWorld(scenario=PLAN.scenario, name="one", baseline="crw")
-    plan = dataclasses.replace(PLAN, evaluation=EvaluationPlan(worlds=(judged_in,)))
-    world = WorldEvaluation(
-        world="one", performance=3.0, baseline=2.0, ratio=1.5, interference_fraction=0.2, baseline_policy="crw"
+def test_means_are_over_trainings_as_they_are_kept(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for seed, best in enumerate((10.0, 20.0, 60.0)):
+        made(tmp_path, seed, evaluated(64, best, 0.1), evaluated(128, best / 2, 0.2))
+    found = read_seeds(tmp_path, range(4), {2: "diverged"})
+    assert [one.kept.steps for one in found.trainings] == [64, 64, 64]
+    interval = aggregate([10.0, 20.0])
+    bounds = f"{interval.lower:.1f} to {interval.upper:.1f}"
+    rows = {row[0]: row[1:] for row in found.sheets()[0].frame.rows()}
+    assert rows["mean"] == ("", "15.0", "0.100", "")
+    assert rows["95 %"] == ("", bounds, "0.100 to 0.100", "")
+    assert rows["random"] == ("", "5.0", "", "")
+    assert "seed_2 failed and is in no mean: diverged" in found.text()
+    assert found.text().splitlines()[-1] == (
+        f"swarm-forage benchmark seed_0/policy.npz seed_1/policy.npz --name {tmp_path.name}"
     )
-    one = dataclasses.replace(evaluated(64, 1.5), worlds=(world,), baseline=1.0)
-    made(tmp_path, 0, {64: 1.5}, plan)
-    write_evaluations(seed_folder(tmp_path, 0) / EVALUATIONS_FILE, [one])
-    found = read_seeds(plan, tmp_path, range(1))
-    assert [(kept.ratio, kept.performance) for kept in found.kept()] == [(1.5, 1.5)]
-    assert re.search(
-        r"decisions +mean ratio to the baselines +interference +processor time\n0 +64 +1\.50 ", found.text()
-    )
-
-
-def test_an_algorithm_without_network_file_keeps_its_last_model(tmp_path):
-    plan = dataclasses.replace(
-        PLAN, algorithm="sac", options={}, interface=dataclasses.replace(PLAN.interface, actions="continuous")
-    )
-    made(tmp_path, 0, {64: 10.0, 128: 4.0}, plan)
-    (kept,) = read_seeds(plan, tmp_path, range(1)).kept()
-    assert (Path(kept.policy).name, kept.steps) == ("model.zip", 128)
-
-
-def test_dotted_lines_stand_where_stages_really_ended(tmp_path, monkeypatch):
-    pytest.importorskip("matplotlib")
-    figures = keep_figures(monkeypatch)
-    plan = dataclasses.replace(PLAN, stages=(Stage(steps=60), Stage(steps=60), Stage(steps=60)))
-    made(tmp_path, 0, {102: 10.0}, plan)  # rollouts of 51, so the first stage has two
-    read_seeds(plan, tmp_path, range(1)).draw(tmp_path / "one.png")
-    made(tmp_path, 1, {102: 10.0, 153: 20.0, 204: 30.0}, plan)
-    read_seeds(plan, tmp_path, [1]).draw(tmp_path / "two.png")
-    dotted = [
-        [line.get_xdata()[0] for line in figure.axes[0].lines if line.get_linestyle() == ":"] for figure in figures
-    ]
-    np.testing.assert_allclose(dotted, np.array([[102, 120], [102, 153]]) / 1e6)
+    assert json.loads(found.json())
+    one = read_seeds(tmp_path, range(1), {})
+    assert "95 %" not in one.text()
+    driven = dataclasses.replace(PLAN.interface, actions="continuous")
+    sac = dataclasses.replace(PLAN, algorithm="sac", options={}, interface=driven)
+    made(tmp_path, 5, evaluated(64, 10.0), evaluated(128, 4.0), plan=sac)
+    last = read_training(tmp_path / "seed_5")
+    assert (Path(last.policy).name, last.kept.steps) == ("model.zip", 128), "its network is in no file"
 
 
 def test_the_mean_is_drawn_as_far_as_all_have_come(tmp_path, monkeypatch):
     pytest.importorskip("matplotlib")
     figures = keep_figures(monkeypatch)
-    made(tmp_path, 0, {64: 10.0, 128: 20.0, 192: 30.0})
-    read_seeds(PLAN, tmp_path, range(3)).draw(tmp_path / "one.png")
-    made(tmp_path, 1, {96: 11.0, 160: 21.0})
-    made(tmp_path, 2, {64: 0.0})
-    read_seeds(PLAN, tmp_path, range(3), {2: "diverged"}).draw(tmp_path / "three.png")
+    plan = dataclasses.replace(PLAN, stages=(Stage(steps=60), Stage(steps=120)))
+    made(tmp_path, 0, evaluated(64, 10.0), evaluated(128, 20.0), evaluated(192, 30.0), plan=plan)
+    read_seeds(tmp_path, range(1), {}).draw(tmp_path / "one.png")
+    made(tmp_path, 1, evaluated(96, 11.0), evaluated(160, 21.0), plan=plan)
+    made(tmp_path, 2, evaluated(64, 0.0), plan=plan)
+    read_seeds(tmp_path, range(3), {2: "diverged"}).draw(tmp_path / "three.png")
     alone, together = (figure.axes[0] for figure in figures)
     assert not alone.collections
-    assert [line.get_label() for line in alone.lines[:1]] == ["seed_0"]
+    dotted = [line.get_xdata()[0] for line in alone.lines if line.get_linestyle() == ":"]
+    np.testing.assert_allclose(dotted, [64 / 1e6])  # where the first stage really ended
     *each, mean, _ = together.lines[:5]
     assert len(each) == 3
-    assert {line.get_label() for line in each} == {"each of 3"}
     np.testing.assert_allclose(mean.get_xdata(), np.array([96, 128, 160]) / 1e6)
     np.testing.assert_allclose(mean.get_ydata(), [13.0, 18.0, 23.0])
     band = together.collections[0].get_paths()[0].vertices
     assert math.isclose(band[:, 1].max(), aggregate([25.0, 21.0]).upper)
-    assert [text.get_text().split("\n")[0] for text in figures[1].legends[0].get_texts()] == [
-        "each of 3", "mean with its", "random"
-    ]  # fmt: skip
