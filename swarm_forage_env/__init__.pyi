@@ -48,7 +48,7 @@ from .rendering.figures import FigureStyle as FigureStyle
 
 # training
 from .views.sampler import ScenarioSampler as ScenarioSampler
-from .training.export.exporting import export_policy as export_policy
+from .training.export import export_policy as export_policy
 from .policies.extras import ExtraFunctionError as ExtraFunctionError
 
 # studies

@@ -205,7 +205,7 @@ def export(policy: Policy, /, *, file: Path, scenario: Scenario = "warehouse_sma
     Args:
         file: File to write, .h (C99) or .onnx.
     """
-    from swarm_forage_env.training.export.exporting import export_policy
+    from swarm_forage_env.training.export import export_policy
     from swarm_forage_env.wrappers.world import world_of
 
     say(f"wrote {export_policy(policy, file, world_of(scenario).scenario)}")

@@ -13,7 +13,7 @@ from swarm_forage_env.policies.network import Network, NetworkError
 from swarm_forage_env.runs.record import RecordError
 from swarm_forage_env.runs.store import read_failure
 from swarm_forage_env.training.datasets import Dataset, DatasetError
-from swarm_forage_env.training.evaluations import read_evaluations
+from swarm_forage_env.training.evaluation import read_evaluations
 from swarm_forage_env.training.plan import read_plan
 from tests.support.entries import TINY
 from tests.support.small_files import small_file

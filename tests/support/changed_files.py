@@ -7,8 +7,6 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from swarm_forage_env.training.evaluations import read_evaluations
-
 from metrics.benchmark import BenchmarkError, load_protocol, read_entry
 from metrics.checks import CurveError
 from metrics.scoring.curves_file import read_curves
@@ -20,6 +18,7 @@ from swarm_forage_env.runs.record import Record, RecordError
 from swarm_forage_env.runs.store import read_failure
 from swarm_forage_env.studies.results import read_study
 from swarm_forage_env.training.datasets import Dataset, DatasetError
+from swarm_forage_env.training.evaluation import read_evaluations
 from swarm_forage_env.training.plan import read_plan
 from tests.support.curve_tables import CROWDING
 from tests.support.entries import TINY

@@ -8,7 +8,6 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from swarm_forage_env.training.evaluations import Evaluation, write_evaluations
 
 from metrics.benchmark import load_protocol
 from swarm_forage_env.inspect.replay.capture import record_replay
@@ -23,6 +22,7 @@ from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.studies.results import pack_study, run_study
 from swarm_forage_env.studies.study_file import Axis
 from swarm_forage_env.training.datasets import record_dataset
+from swarm_forage_env.training.evaluation import Evaluation, WorldEvaluation, write_evaluations
 from swarm_forage_env.training.plan import read_plan
 from tests.support.entries import TINY, made_up_entry
 from tests.support.tiny_study import tiny_study
@@ -71,8 +71,10 @@ def _plan(file: Path) -> None:
 
 
 def _evaluations(file: Path) -> None:
-    numbers = {"performance": 1.5, "baseline": 2.0, "interference_fraction": 0.1}
-    write_evaluations(file, [Evaluation(steps=384, wall_time_s=28.0, cpu_time_s=28.0, **numbers)])
+    world = WorldEvaluation(
+        world="small", baseline_policy="crw", performance=1.5, baseline=2.0, ratio=0.75, interference_fraction=0.1
+    )
+    write_evaluations(file, [Evaluation(steps=384, wall_time_s=28.0, cpu_time_s=28.0, reached=1.5, worlds=(world,))])
 
 
 MAKERS: dict[str, Callable[[Path], None]] = {

@@ -194,10 +194,9 @@ def test_damaged_files_are_named(tmp_path):
     with np.load(run) as stored:
         arrays = dict(stored)
     damages = {
-        "finite": {"rewards": arrays["rewards"] * np.nan},
-        "active to be an array": {"active": arrays["active"][1:]},
-        "observations to be an array": {"observations": arrays["observations"][:, 1:]},
-        "actions to be an array": {"actions": arrays["actions"][1:]},
+        "active as bool": {"active": arrays["active"][1:]},
+        "observations as float32": {"observations": arrays["observations"][:, 1:]},
+        "actions as float32": {"actions": arrays["actions"].astype(np.float64)},
     }
     for told, change in damages.items():
         np.savez(run, **arrays | change)
@@ -225,14 +224,14 @@ def test_bad_seeds_are_refused(seeds, tmp_path):
 @pytest.mark.parametrize("policy", ["crw", "ppo_warehouse_small"])
 def test_minari_gets_the_same_numbers(policy, tmp_path, monkeypatch):
     minari = pytest.importorskip("minari")
-    from swarm_forage_env.training.minari_export import check_minari, export_minari
+    from swarm_forage_env.training.datasets import check_minari, export_minari
 
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "minari"))
     folder = tmp_path / "ours"
     ours = recorded(folder, policy, seeds=(3, 5))
     check_minari("swarm_forage/test-v0")
     export_minari(folder, "swarm_forage/test-v0", author="somebody")
-    with pytest.raises(DatasetError, match="a new Minari data set"):
+    with pytest.raises(DatasetError, match="There is a Minari data set"):
         check_minari("swarm_forage/test-v0")
     with pytest.raises(DatasetError, match=r"such as swarm_forage/dpo-v0, got 'test'"):
         check_minari("test")
@@ -248,14 +247,14 @@ def test_minari_gets_the_same_numbers(policy, tmp_path, monkeypatch):
         assert np.flatnonzero(episode.truncations).tolist() == [len(steps) - 1]
 
 
-def test_minari_recovers_the_environment_and_knows_reference_scores(tmp_path, monkeypatch):
+def test_minari_recovers_the_environment(tmp_path, monkeypatch):
     minari = pytest.importorskip("minari")
-    from swarm_forage_env.training.minari_export import export_minari
+    from swarm_forage_env.training.datasets import export_minari
 
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "minari"))
     noisy = (parse_wrapper("sensor_noise:sigma=0.02"),)
     recorded(tmp_path / "ours", "dpo", seeds=(3, 5), wrappers=noisy, observation="compact")
-    export_minari(tmp_path / "ours", "swarm_forage/test-v0", author="somebody", ref_max_score=8.0)
+    export_minari(tmp_path / "ours", "swarm_forage/test-v0", author="somebody")
     found = minari.load_dataset("swarm_forage/test-v0")
     env = found.recover_environment()
     one = next(found.iterate_episodes())
@@ -264,13 +263,11 @@ def test_minari_recovers_the_environment_and_knows_reference_scores(tmp_path, mo
         obs, gained, *_ = env.step(action)
         np.testing.assert_array_equal(obs, seen)
         assert gained == reward
-    assert found.storage.metadata["ref_max_score"] == 8.0
-    low = found.storage.metadata["ref_min_score"]
-    assert minari.get_normalized_score(found, np.array([low, 8.0])).tolist() == [0.0, 1.0]
+    assert found.storage.metadata["author"] == {"somebody"}
 
 
 def test_without_minari_the_error_says_what_to_install(tmp_path, monkeypatch):
-    from swarm_forage_env.training.minari_export import export_minari
+    from swarm_forage_env.training.datasets import export_minari
 
     monkeypatch.setitem(sys.modules, "minari", None)
     with pytest.raises(ImportError, match=r'pip install "\.\[minari\]"'):

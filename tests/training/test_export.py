@@ -17,8 +17,8 @@ from swarm_forage_env.policies.kernels.frames import take_frames
 from swarm_forage_env.policies.kernels.network import pick
 from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.policies.pretrained import network_file
-from swarm_forage_env.training.export.c_header import c_header
-from swarm_forage_env.training.export.manual import manual_of
+from swarm_forage_env.training.c_header import c_header
+from swarm_forage_env.training.manual import manual_of
 
 PROGRAM = """\
 #include <stdio.h>

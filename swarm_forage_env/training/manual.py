@@ -5,10 +5,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from textwrap import wrap
 
-import numpy as np
-
 from swarm_forage_env.contract.policy import COMMANDS, SwarmSpec
-from swarm_forage_env.policies.interface import GRIPS, MOTIONS, InterfaceConfig
+from swarm_forage_env.policies.interface import GRIPS, MOTIONS, InterfaceConfig, LearnerInterface
 from swarm_forage_env.policies.kernels.frames import (
     APART,
     FIRST_FACTOR,
@@ -19,7 +17,7 @@ from swarm_forage_env.policies.kernels.frames import (
     Frames,
 )
 from swarm_forage_env.policies.kernels.learner import GRIP_COMMANDS, MOTION_WHEELS
-from swarm_forage_env.policies.network import Network, NetworkPolicy
+from swarm_forage_env.policies.network import Network
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.floor import WHEEL_SCALE_MPS
 
@@ -67,9 +65,9 @@ def manual_of(network: Network, scenario: ScenarioConfig, name: str) -> Manual:
         ConfigError: the scenario lacks what the network sees.
         NetworkError: the network does not fit its interface.
     """
-    policy = NetworkPolicy(network)
-    policy.reset(SwarmSpec.of(scenario), np.random.default_rng(0))  # refuses what does not fit
-    about, interface, arena = network.about, policy.interface, scenario.arena
+    about, arena = network.about, scenario.arena
+    interface = LearnerInterface(about.interface, SwarmSpec.of(scenario))
+    network.check_fits(interface)
     is_discrete = interface.translation.is_discrete
     every_s = about.interface.decision_ticks * scenario.dt_s
     return Manual(

@@ -10,7 +10,7 @@ from textwrap import wrap
 import numpy as np
 
 from swarm_forage_env.policies.network import Network
-from swarm_forage_env.training.export.manual import WIDTH, Manual
+from swarm_forage_env.training.manual import WIDTH, Manual
 
 _TANH = """\
 /* tanh, at most 4e-7 of its value from the true one: Lambert's fraction at a quarter of x, then tanh 2y twice. */
