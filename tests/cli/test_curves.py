@@ -38,7 +38,7 @@ def training(folder: str, plan: TrainingPlan = PLAN, *, best: float = 40.0) -> N
             reached=per,
             worlds=(
                 WorldEvaluation(
-                    world=PLAN.world.name,
+                    world=PLAN.judging_worlds[0].name,
                     baseline_policy="crw",
                     performance=per,
                     baseline=5.0,
