@@ -21,7 +21,7 @@ class Stage(gymnasium.Env):
 def test_a_model_without_a_note_is_run_after_a_line_about_what_is_guessed(command):
     library = pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-baselines3 and torch")
     library.A2C("MlpPolicy", Stage(), device="cpu", seed=1).save("model.zip")
-    with pytest.warns(UserWarning, match="model.zip does not tell its interface"):
+    with pytest.warns(UserWarning, match=r"model\.zip has no note of its training"):
         assert command("run", "model.zip", *WORLD)[0] == 0
     code, out, err = command("run", "random,model.zip:decision_ticks=5", *WORLD)
     assert code == 0, err
