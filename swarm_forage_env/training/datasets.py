@@ -30,8 +30,7 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector.utils import batch_space
 
 from swarm_forage_env._internal.archives import ArchiveError, read_arrays
-from swarm_forage_env._internal.fields import ConfigError, known_keys
-from swarm_forage_env._internal.fields_next import Count, checked
+from swarm_forage_env._internal.fields import ConfigError, Count, checked, known_keys
 from swarm_forage_env._internal.files import alone_in, check_folder, read_json, replacing
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env._internal.wording import install_command

@@ -20,8 +20,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import polars as pl
 
-from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.fields_next import MOST_SEEDS, Checked, Count, Name, Positive, Whole, whole
+from swarm_forage_env._internal.fields import MOST_SEEDS, Checked, ConfigError, Count, Name, Positive, Whole, whole
 from swarm_forage_env._internal.files import check_folder, replacing
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.network import Network, NetworkPolicy

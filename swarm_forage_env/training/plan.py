@@ -9,15 +9,14 @@ from typing import Annotated, Any, Literal
 
 from msgspec import Meta
 
-from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.fields_next import Checked, Count, Whole, known_keys, read, table, whole
+from swarm_forage_env._internal.fields import Checked, ConfigError, Count, Whole, known_keys, read, table, whole
 from swarm_forage_env._internal.files import parse_json, parse_toml, replacing
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.policy import layout_for
 from swarm_forage_env.policies.interface import InterfaceConfig, any_swarm, interface_from_mapping, learner_layout
 from swarm_forage_env.policies.network import TEMPERATURES, Network
 from swarm_forage_env.policies.pretrained import plan_file, plan_names
-from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping
+from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import scenario_of_same_size
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.training.evaluation import EXPORTABLE, EvaluationPlan, EvaluationWorld
@@ -327,7 +326,7 @@ def _world(values: dict[str, Any], kind: Any) -> Any:
     wrappers = wrappers_from_mapping(table("wrappers", values.pop("wrappers", {})))
     preset = fields.pop("preset", None)
     if preset is None:
-        config = from_mapping(ScenarioConfig, fields, where="scenario.")
+        config = read(ScenarioConfig, fields, "scenario")
     else:
         config = scenario(preset, **_tuples(fields))
     if kind is World:

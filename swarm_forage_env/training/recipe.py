@@ -9,8 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from swarm_forage_env._internal.fields import ConfigError, table, whole
-from swarm_forage_env._internal.fields_next import read
+from swarm_forage_env._internal.fields import ConfigError, read, table, whole
 from swarm_forage_env.policies.interface import GivenInterface, InterfaceConfig, chosen_interface
 from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.scenarios.config import ScenarioConfig

@@ -18,8 +18,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from swarm_forage_env._internal.faults import in_words
-from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.fields_next import Count, checked
+from swarm_forage_env._internal.fields import ConfigError, Count, checked
 from swarm_forage_env._internal.files import alone_in, check_folder
 from swarm_forage_env.policies import trust
 from swarm_forage_env.runs.workers import (
