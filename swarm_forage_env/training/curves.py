@@ -18,8 +18,8 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 from swarm_forage_env.runs.plan import Plan
-from swarm_forage_env.runs.policy_spec import policy_specs
 from swarm_forage_env.runs.progress import duration
+from swarm_forage_env.runs.spec import policy_specs
 from swarm_forage_env.scenarios.performance import performance_of
 from swarm_forage_env.sheet import Answer, Sheet
 from swarm_forage_env.training.evaluation import (

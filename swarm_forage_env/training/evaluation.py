@@ -25,8 +25,8 @@ from swarm_forage_env._internal.files import check_folder, replacing
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.runs.plan import Condition, Plan, Table, run_plan
-from swarm_forage_env.runs.policy_spec import PolicySpec, policy_spec
 from swarm_forage_env.runs.run import Started
+from swarm_forage_env.runs.spec import PolicySpec, policy_spec
 from swarm_forage_env.runs.versions import software_versions
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.wrappers.world import World
