@@ -171,6 +171,7 @@ EXAMPLES = {
         [0.1, 0.35, 0.59975, -0.4, -0.15],
     ),
     "sawtooth, phase in cycles": (lambda: wave("sawtooth", 0.0, 0.0, 0.5, phase=0.25), 0.25),
+    "noise floor of two runs": (lambda: metrics.noise_floor([[0.0, 0.0], [1.0, 1.0]]), [2.0]),
     "ideal conditions": (lambda: metrics.environment_distance(np.full(50, 0.1), 0.1), 0.0),
 }  # fmt: skip
 
