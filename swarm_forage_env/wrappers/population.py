@@ -140,11 +140,9 @@ class PopulationDynamics(SwarmWrapper):
     def interval_columns(self) -> dict[str, float]:
         """Return the events since the last call, the mean repair queue, and how long stays and absences were."""
         scenario, tally = self.unwrapped.scenario, self._state.tally
+        counted = ("deaths", "births", "malfunctions", "repairs")
         columns = {
-            "deaths": float(tally.deaths),
-            "births": float(tally.births),
-            "malfunctions": float(tally.malfunctions),
-            "repairs": float(tally.repairs),
+            **{name: float(getattr(tally, name)) for name in counted},
             "n_in_repair": self._repair_ticks / scenario.interval_ticks,
             "time_at_work_s": tally.stay_ticks * scenario.dt_s / max(1, tally.stays),
             "time_in_repair_s": tally.absence_ticks * scenario.dt_s / max(1, tally.repairs),
@@ -201,24 +199,13 @@ class PopulationConfig(WrapperConfig):
     @property
     def rates(self) -> EventRates:
         """The four rates."""
-        return EventRates(
-            death=self.death_per_tick,
-            birth=self.birth_per_tick,
-            malfunction=self.malfunction_per_tick,
-            repair=self.repair_per_tick,
-        )
+        return EventRates(*(getattr(self, name) for name in _RATES))
 
     def in_words(self, dt_s: float) -> str:
         """Return how often what happens to the swarm; see `WrapperConfig.in_words`."""
-        rates = self.rates
         words = [
             f"a {what} every {dt_s / rate:,.4g} s on average"
-            for what, rate in (
-                ("death", rates.death),
-                ("birth", rates.birth),
-                ("malfunction", rates.malfunction),
-                ("repair", rates.repair),
-            )
+            for what, rate in zip(EventRates._fields, self.rates, strict=True)
             if rate > 0.0
         ]
         if self.initial_robots is not None:

@@ -14,12 +14,11 @@ Source: section on population dynamics of the paper; the clocks are those of the
 """
 
 from collections.abc import Callable
-from dataclasses import astuple, dataclass
-from typing import TypeAlias
+from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.types import BoolArray, IntArray
 
@@ -27,8 +26,7 @@ FindPlace: TypeAlias = Callable[[int, np.random.Generator], bool]
 """Places the robot that is to be born, drawing from the generator; returns False if there is no room now."""
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class EventRates:
+class EventRates(NamedTuple):
     """Events per tick of the whole swarm; 0 = never."""
 
     death: float = 0.0
@@ -76,12 +74,11 @@ class EventClocks:
 
     def __init__(self, rates: EventRates, seed: int, *, tick: int = 0) -> None:
         """Start all clocks of the run with `seed` at a tick; those of each tick have chance of their own."""
-        level = (*astuple(rates), tick) if tick else astuple(rates)
-        sources = stream_rng(seed, Stream.POPULATION, level).spawn(8)
-        self.death = EventClock(rates.death, sources[0], sources[1], tick=tick)
-        self.birth = EventClock(rates.birth, sources[2], sources[3], tick=tick)
-        self.malfunction = EventClock(rates.malfunction, sources[4], sources[5], tick=tick)
-        self.repair = EventClock(rates.repair, sources[6], sources[7], tick=tick)
+        level = (*rates, tick) if tick else rates
+        sources = iter(stream_rng(seed, Stream.POPULATION, level).spawn(8))
+        self.death, self.birth, self.malfunction, self.repair = (
+            EventClock(rate, next(sources), next(sources), tick=tick) for rate in rates
+        )
 
     def change(self, rates: EventRates, seed: int, tick: int) -> None:
         """Go on under other rates; processes that keep their rate keep their clock.
@@ -95,7 +92,7 @@ class EventClocks:
             tick: The tick that is about to be executed.
         """
         anew = EventClocks(rates, seed, tick=tick)
-        for process in ("death", "birth", "malfunction", "repair"):
+        for process in EventRates._fields:
             old, new = getattr(self, process), getattr(anew, process)
             if new.rate == old.rate:
                 continue
@@ -106,7 +103,7 @@ class EventClocks:
     @property
     def next_tick(self) -> float:
         """First tick at which anything may happen."""
-        return min(self.death.next_tick, self.birth.next_tick, self.malfunction.next_tick, self.repair.next_tick)
+        return min(getattr(self, process).next_tick for process in EventRates._fields)
 
 
 @dataclass(slots=True)
@@ -157,12 +154,8 @@ class PopulationState:
             initial_robots: Robots at the start; default all.
             max_robots: Most robots that may be present at once; default N.
 
-        Raises:
-            ConfigError: no robots at the start, or more than there are rows.
         """
         born = n_robots if initial_robots is None else initial_robots
-        if not 1 <= born <= n_robots:
-            raise ConfigError(f"Expected initial_robots from 1 to n_robots = {n_robots}, got {born}.")
         present = np.arange(n_robots) < born
         return cls(
             present=present,
