@@ -108,3 +108,4 @@ def test_a_nest_is_snapped_to_whole_cells():
     arena = ArenaConfig(width_m=16, height_m=16, nest_centre_m=(8.03, 8.0), nest_size_m=(3.25, 3.2))
     assert arena.nest_cells == (32, 32, 48, 48)
     assert arena.nest_box_m == (6.4, 6.4, 9.6, 9.6)
+    assert ArenaConfig(width_m=2, height_m=2, nest_centre_m=(1, 1), nest_size_m=(0.4, 0.4)).n_cells == (10, 10)
