@@ -87,12 +87,12 @@ class Witness(RandomPolicy):
         ({"path": "run.png"}, "at_s in Python"),
         ({"at_s": 1.0}, r"to end in .png, got"),
         ({"at_s": -1.0, "path": "run.png"}, "at_s"),
-        ({"fps": 51.0}, r"fps of a \.gif to be a number in \[1, 50\]"),
-        ({"fps": 61.0, "path": "run.mp4"}, r"fps of a \.mp4 to be a number in \[1, 60\]"),
+        ({"fps": 51.0}, r"fps of a \.gif to be a number from 1 to 50"),
+        ({"fps": 61.0, "path": "run.mp4"}, r"fps of a \.mp4 to be a number from 1 to 60"),
         ({"fps": 0.0}, "fps"),
         ({"seconds": 2000.0}, "at most 1500 frames for a GIF, got 2001"),
         ({"seconds": 0.0}, "seconds"),
-        ({"seconds": 20_000.0}, r"seconds .* in \(0, 10000\]"),
+        ({"seconds": 20_000.0}, "seconds .* <= 10,000"),
         ({"seconds": 0.5}, "seconds .*two pictures.* >= 1"),
         ({"speedup": 1.0}, "speedup .* >= 4"),
         ({"size_px": 10}, "size_px"),
@@ -170,7 +170,7 @@ DISTURBED = (
 @pytest.mark.parametrize(("policy", "wrappers"), [("crw", ()), ("crw", DISTURBED), ("stochm", DISTURBED)])
 def test_a_film_shows_the_run_that_its_name_promises(filmed, tmp_path, monkeypatch, policy, wrappers):
     spec = plan_run(CROWDED, policy, wrappers=wrappers, seed=5)
-    step, states = ForageEnv.step_batch, {}
+    step, states = ForageEnv.advance, {}
 
     def note(self, *arguments, **options):
         result = step(self, *arguments, **options)
@@ -178,7 +178,7 @@ def test_a_film_shows_the_run_that_its_name_promises(filmed, tmp_path, monkeypat
         return result
 
     with monkeypatch.context() as patch:
-        patch.setattr(ForageEnv, "step_batch", note)
+        patch.setattr(ForageEnv, "advance", note)
         record = run_policy(tick_by_tick(load_policy(policy)), spec)
     options = {"seconds": 80.0, "speedup": 40.0, "fps": 20.0, "seed": 5}
     record_run(World(CROWDED, wrappers), policy, tmp_path / "run.gif", **options)
