@@ -243,10 +243,10 @@ class ForageEnv(SwarmLayer, ParallelEnv[str, np.ndarray, np.ndarray]):
             seed: Non-negative integer. None takes the next of a sequence of seeds, which the last given seed (or the
                 operating system) started.
         """
+        seed = checked_seed(seed)
         if seed is None:
             seed = int(self._seeds.integers(2**31))
         else:
-            seed = checked_seed(seed)
             self._seeds = np.random.default_rng(seed)
         self.break_off()  # should the reset fail
         obs = self.arena.reset(seed)
@@ -375,9 +375,9 @@ def read_only(array: np.ndarray) -> np.ndarray:
     return view
 
 
-def checked_seed(seed: Any) -> int:
-    """Return the seed of a run; raises ConfigError unless it is a whole number of at least 0."""
-    return whole("seed (or None)", seed, at_least=0)
+def checked_seed(seed: Any) -> int | None:
+    """Return the seed of a run, None for none; raises ConfigError unless it is a whole number of at least 0."""
+    return None if seed is None else whole("seed (or None)", seed, at_least=0)
 
 
 def checked_gain(wheel_gain: FloatArray | None, n_robots: int) -> FloatArray | None:

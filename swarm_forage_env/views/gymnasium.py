@@ -11,7 +11,7 @@ from gymnasium.vector.utils import batch_space
 
 from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.contract.types import BoolArray, ObsArray
-from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.env import ForageEnv, checked_seed
 from swarm_forage_env.policies.interface import LearnerInterface
 from swarm_forage_env.views.arenas import ArenaStep, open_arenas
 from swarm_forage_env.views.learner_arena import LearnerArena
@@ -73,7 +73,7 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
             seed: Seed of this episode and of the sequence of those after it.
             options: `{"scenario": {field: value}}` overrides scenario fields from now on; see `LearnerArena.reset`.
         """
-        super().reset(seed=seed)
+        super().reset(seed=checked_seed(seed))
         self._arena.reset(seed, options)
         return self._arena.observe(), self._info()
 
@@ -168,13 +168,14 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
         Raises:
             ValueError: a list of seeds that is not as long as there are arenas.
         """
-        if seed is None or isinstance(seed, int | np.integer):
-            seeds = [None if seed is None else int(seed) + arena for arena in range(self.n_arenas)]
-        else:
+        if isinstance(seed, Sequence | np.ndarray):
             seeds = list(seed)
+        else:
+            first = checked_seed(seed)
+            seeds = [None if first is None else first + arena for arena in range(self.n_arenas)]
         if len(seeds) != self.n_arenas:
             raise ValueError(f"Expected one seed per arena ({self.n_arenas}), got {len(seeds)}.")
-        super().reset(seed=seeds[0])
+        super().reset(seed=checked_seed(seeds[0]))
         obs, active = self._arenas.reset(seeds, [options] * self.n_arenas)
         return obs, self._now(active)
 

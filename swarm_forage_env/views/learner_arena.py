@@ -10,7 +10,7 @@ from swarm_forage_env._internal.compiling import is_compiled
 from swarm_forage_env._internal.fields import ConfigError, table
 from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
-from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.env import ForageEnv, checked_seed
 from swarm_forage_env.layer import OPTION_OF_TESTS
 from swarm_forage_env.policies.extras import ExtraFunctionError, extra_columns, extra_rewards
 from swarm_forage_env.policies.interface import MOTIONS, LearnerInterface
@@ -88,6 +88,7 @@ class LearnerArena:
         overrides = _scenario_overrides(options)
         if overrides is None:
             overrides = self._overrides
+        seed = checked_seed(seed)
         seeds = copy.deepcopy(self._seeds) if seed is None else np.random.default_rng(seed)
         if seed is None:
             seed = int(seeds.integers(2**31))

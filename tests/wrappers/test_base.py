@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 from pettingzoo.test import parallel_api_test
 
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.views.gymnasium import JointForageEnv, SwarmVectorEnv
+from swarm_forage_env.views.pettingzoo import parallel_env
 from swarm_forage_env.wrappers.base import STACK_ORDER, SwarmWrapper
 from swarm_forage_env.wrappers.recorder import RunRecorder
 from tests.support.fake_arena import FakeArena, small_scenario
@@ -207,6 +210,20 @@ def test_an_interrupted_world_is_not_gone_on_with():
         env.step_batch(np.zeros((4, 3), np.float32))
     with pytest.raises(RuntimeError, match="A tick is half done"):
         env.step_batch(np.zeros((4, 3), np.float32))
+
+
+def test_a_seed_that_cannot_be_is_one_kind_of_error_everywhere():
+    world = small_scenario()
+    for env in (
+        ForageEnv(world),
+        RunRecorder(ForageEnv(world)),
+        parallel_env(world, interface={}),
+        JointForageEnv(world),
+        SwarmVectorEnv(world, n_arenas=2),
+    ):
+        for seed in (-1, 1.5):
+            with pytest.raises(ConfigError, match=rf"seed \(or None\) to be a whole number >= 0, got {seed}"):
+                env.reset(seed=seed)
 
 
 def test_what_is_only_to_be_read_cannot_be_written():
