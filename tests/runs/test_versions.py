@@ -29,7 +29,7 @@ def test_every_library_that_computes_in_a_run_is_in_its_record():
     modules |= {alias.name for node in imports if isinstance(node, ast.Import) for alias in node.names}
     libraries = {module.split(".")[0] for module in modules} - sys.stdlib_module_names - {package.name}
     assert "numpy" in libraries
-    assert libraries <= set(PACKAGES)
+    assert libraries - {"msgspec"} <= set(PACKAGES), "msgspec reads configurations, and computes nothing"
 
 
 def _without_types(tree):
