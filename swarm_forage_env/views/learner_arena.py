@@ -53,7 +53,7 @@ class LearnerArena:
         self.n_rows = plan.world.n_robots
         self._overrides: dict[str, Any] = {}
         self._world: World | None = None
-        self._seeds = np.random.default_rng()
+        self._seeds: np.random.Generator | None = None  # not before it is used: copies draw worlds of their own
         self._adopt(*self._built({}, None))
 
     @property
@@ -89,7 +89,7 @@ class LearnerArena:
         if overrides is None:
             overrides = self._overrides
         seed = checked_seed(seed)
-        seeds = copy.deepcopy(self._seeds) if seed is None else np.random.default_rng(seed)
+        seeds = np.random.default_rng(seed) if seed is not None or self._seeds is None else copy.deepcopy(self._seeds)
         if seed is None:
             seed = int(seeds.integers(2**31))
         sampler = self._plan.sampler

@@ -60,6 +60,12 @@ def test_a_copy_of_a_learners_environment_goes_on_as_the_original(make, go_on):
     assert {one.forage_env.seed_value for one in twins} == {learner.forage_env.seed_value}
 
 
+def test_copies_before_the_first_reset_draw_worlds_of_their_own():
+    original = joint()
+    twins = original, copy.deepcopy(original), pickled(original)
+    assert len({twin.reset()[0].tobytes() for twin in twins}) == 3
+
+
 def test_agent_by_agent_is_copied():
     one = env("warehouse_small", n_robots=3, n_objects=5, physics="compiled", wrappers=DEATHS[1:])
     one.reset(seed=1)
