@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from swarm_forage_env._internal.compiling import Callback, Calls
+from swarm_forage_env._internal.held import hold
 from swarm_forage_env._internal.rng import TickDraws
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
@@ -41,36 +42,62 @@ def require_inputs(obs: ObsArray, active: BoolArray, spec: SwarmSpec | None) -> 
         )
 
 
-class CompiledPolicy:
-    """A policy that was reset, for a run without Python between ticks. Policies offer it by a method `compiled`.
+NO_DRAWS = np.zeros((1, 1, 1))
+"""Draws of a driver that reads none."""
+
+
+class Driver:
+    """What drives robots in the compiled loop of the world: a kernel and its state.
 
     Attributes:
-        callback: The kernel. It must not raise: an exception inside of it is printed, but does not stop the run.
-        state: What the kernel edits; the last are the actions, (N, A) float32.
-        task: (N,) `Task` codes that the kernel keeps up to date, None for a policy without tasks.
+        held: State and kernel as compiled code takes them. The kernel must not raise: an exception inside of it is
+            printed, but does not stop the run.
+        actions: (N, A) float32 that the kernel writes, the last of the state.
+        task: (N,) `Task` codes that the kernel keeps up to date, None for a driver without tasks.
         decision_ticks: See `KernelPolicy`.
-        call: Calls of the compiled loop of the world, whose types depend on `state`.
+        call: Calls of the loop, whose types depend on the state.
     """
 
     def __init__(
-        self, kernel: Callable[..., None], state: tuple[Any, ...], policy: "KernelPolicy", chance: TickDraws
+        self,
+        kernel: Callable[..., None],
+        state: tuple[Any, ...],
+        *,
+        task: CodeArray | None = None,
+        decision_ticks: int = 1,
     ) -> None:
         """Take the kernel as one that other kernels call; it is compiled when it is used. See `KernelPolicy._start`."""
-        self.state = state
-        self.task: CodeArray | None = getattr(policy, "task", None)
-        self.decision_ticks = policy.decision_ticks
+        self.held = hold((state, Callback(kernel, *example_of(state))))
+        self.actions: ActionArray = state[-1]
+        self.task = task
+        self.decision_ticks = decision_ticks
         self.call = Calls()
-        self._policy = policy
-        self._chance = chance
-        self.callback = Callback(kernel, *example_of(state))
 
     def next_ticks(self) -> tuple[int, FloatArray]:
         """Return the number of the next tick, and the draws (ticks, N, draws) of it and of some that follow."""
+        return 1, NO_DRAWS
+
+    def count_ticks(self, n_ticks: int) -> None:
+        """Note that the kernel has done so many ticks."""
+
+
+class CompiledPolicy(Driver):
+    """A policy that was reset, for a run without Python between ticks. Policies offer it by a method `compiled`."""
+
+    def __init__(self, policy: "KernelPolicy", state: tuple[Any, ...], chance: TickDraws) -> None:
+        """Take kernel and tasks of the policy."""
+        task, decision_ticks = getattr(policy, "task", None), policy.decision_ticks
+        super().__init__(policy._kernel, state, task=task, decision_ticks=decision_ticks)
+        self._policy = policy
+        self._chance = chance
+
+    def next_ticks(self) -> tuple[int, FloatArray]:
+        """Count on from the ticks that the policy has done."""
         tick = self._policy.n_ticks + 1
         return tick, self._chance.rows(tick)
 
     def count_ticks(self, n_ticks: int) -> None:
-        """Note that the kernel has done so many ticks, and see `KernelPolicy.check_ticks`."""
+        """Note the ticks, and see `KernelPolicy.check_ticks`."""
         self._policy.n_ticks += n_ticks
         self._policy.check_ticks()
 
@@ -143,7 +170,7 @@ class KernelPolicy:
         is_own = type(self).act is KernelPolicy.act and "act" not in vars(self)
         is_own = is_own and getattr(self, "task", None) is getattr(self, "task", None)
         if is_own and self._compiled is None:  # kept, because its types take milliseconds to find out
-            self._compiled = CompiledPolicy(self._kernel, self._state, self, self._chance)
+            self._compiled = CompiledPolicy(self, self._state, self._chance)
         return self._compiled if is_own else None
 
     def __getstate__(self) -> dict[str, Any]:

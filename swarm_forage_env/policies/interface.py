@@ -16,10 +16,10 @@ import numpy as np
 from gymnasium import spaces
 from msgspec import Meta
 
-from swarm_forage_env._internal.compiling import Callback, Calls
+from swarm_forage_env._internal.compiling import Calls
 from swarm_forage_env._internal.fields import Checked, ConfigError, Count, Positive, Whole, known_keys
 from swarm_forage_env._internal.held import hold
-from swarm_forage_env.contract.kernel_policy import example_of
+from swarm_forage_env.contract.kernel_policy import Driver
 from swarm_forage_env.contract.layout import (
     BUILT_IN_SLICES,
     MESSAGES,
@@ -335,16 +335,14 @@ class LearnerInterface:
         self._call(carry_out, np.ascontiguousarray(obs), self._held, *self._kept(actions), self._commands)
         return self._commands
 
-    def driver(self, actions: np.ndarray) -> tuple[tuple[tuple[Any, ...], Callback], ActionArray]:
-        """Return a kernel and its state, held, that do what `carry_out` does, and the actions that they write.
-
-        `ForagingArena.decide` takes both.
+    def driver(self, actions: np.ndarray) -> Driver:
+        """Return what does in the compiled loop of the world what `carry_out` does, tick by tick.
 
         Args:
             actions: As in `carry_out`.
         """
         self._kept(actions)
-        return self._driver, self._commands
+        return self._driver
 
     def _kept(self, actions: np.ndarray) -> tuple[IntArray, ObsArray]:
         """Keep actions in the buffers that kernels read, and return both; only one of them is in use."""
@@ -357,9 +355,9 @@ class LearnerInterface:
         return hold(self.translation)
 
     @cached_property
-    def _driver(self) -> tuple[tuple[Any, ...], Callback]:
+    def _driver(self) -> Driver:
         state = (self.translation, *self._chosen, self._commands)
-        return hold((state, Callback(keep_on, *example_of(state))))
+        return Driver(keep_on, state, decision_ticks=self.config.decision_ticks)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what copies and pickles have; addresses of compiled code are no others' than this one's."""

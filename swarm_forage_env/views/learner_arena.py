@@ -134,7 +134,7 @@ class LearnerArena:
         start = before = arena.tick
         if isinstance(self.env, SwarmWrapper):  # wrappers may draw numbers before the world looks at actions
             env.refuse_bad_step(env.checked_actions(interface.carry_out(chosen, self.env.last_obs)), None)
-        driver, commands = interface.driver(chosen)
+        driver = interface.driver(chosen)
         end = min(start + self._plan.interface.decision_ticks, env.max_cycles)
         try:
             while True:
@@ -142,9 +142,9 @@ class LearnerArena:
                 if n_ahead == 0:
                     rewards += self.env.step_batch(interface.carry_out(chosen, self.env.last_obs))[1]
                 else:
-                    n_observed = arena.decide(driver, commands, n_ahead, env.reward_model, rewards, disturbances)
+                    stop = arena.run(driver, n_ahead, disturbances=disturbances, rewards=env.reward_model, paid=rewards)
                     if isinstance(self.env, SwarmWrapper):
-                        self.env.pass_ticks(arena.tick - before, n_observed)
+                        self.env.pass_ticks(stop.tick - before, stop)
                 before = arena.tick
                 if before >= end or self.is_over:
                     break

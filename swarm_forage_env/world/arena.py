@@ -2,16 +2,16 @@
 
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import Callback, Calls
+from swarm_forage_env._internal.compiling import Calls
 from swarm_forage_env._internal.fields import whole
 from swarm_forage_env._internal.held import hold
 from swarm_forage_env._internal.rng import Stream, TickDraws, stream_rng
 from swarm_forage_env.contract.codes import ObjectStatus
-from swarm_forage_env.contract.kernel_policy import CompiledPolicy
+from swarm_forage_env.contract.kernel_policy import NO_DRAWS, Driver
 from swarm_forage_env.contract.layout import MESSAGES, NEIGHBOURS
 from swarm_forage_env.contract.policy import layout_for, refused_action, refused_tasks
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
@@ -40,7 +40,16 @@ from swarm_forage_env.world.sensors import light_of_carriers_only, new_sensors, 
 from swarm_forage_env.world.state import Source, listed
 
 UNDISTURBED = Disturbances()
-_NO_TASKS, _NO_SHARES = np.zeros(0, np.int8), np.zeros(1)
+_NO_TASKS, _NO_SHARES, _UNPAID = np.zeros(0, np.int8), np.zeros(1), np.zeros(0, np.float32)
+
+
+class Stop(NamedTuple):
+    """Where a run of the arena has stopped."""
+
+    tick: int
+    """Ticks done since reset."""
+    by_python: bool
+    """Whether Python has ended the last of them. Then wrappers have not disturbed what robots saw after it."""
 
 
 class ForagingArena:
@@ -219,31 +228,32 @@ class ForagingArena:
 
     def run(
         self,
-        policy: CompiledPolicy,
+        driver: Driver,
         n_ticks: int,
-        task_shares: FloatArray | None,
-        disturbances: Disturbances = UNDISTURBED,
         *,
+        disturbances: Disturbances = UNDISTURBED,
         wheel_gain: FloatArray | None = None,
         acts: bool = True,
         kept: bool = False,
-    ) -> int:
-        """Let a compiled policy drive the world for a while; what happens is what `act` and `step` do by turns.
+        task_shares: FloatArray | None = None,
+        rewards: RewardModel | None = None,
+        paid: ObsArray = _UNPAID,
+    ) -> Stop:
+        """Let a driver and the world act in turn for a while; what happens is what `act` and `step` do by turns.
 
         Bodies must be compiled, too.
 
         Args:
-            policy: The policy.
+            driver: A compiled policy, or a decision of a learner.
             n_ticks: At most so many ticks, and at least one; it ends earlier where Python draws numbers or places
-                objects. With 0 the policy acts, and that is all.
-            task_shares: (codes,) gets the share of active robots in each task, tick by tick; None = they do not count.
+                objects. With 0 the driver acts, and that is all.
             disturbances: What wrappers do in so many ticks.
             wheel_gain: See `step`.
-            acts: Whether the policy acts; else its actions stand as they are.
+            acts: Whether the driver acts; else its actions stand as they are.
             kept: Whether nobody has written into the observation since the last call.
-
-        Returns:
-            How many ticks left their observation disturbed: of the last one it is true where Python had to end it.
+            task_shares: (codes,) gets the share of active robots in each task, tick by tick; None = they do not count.
+            rewards: What makes the rewards; it must have a `payment`. None = there are none.
+            paid: (N,) float32, the rewards are added.
 
         Raises:
             ActionError: as in `step`; the ticks before have happened.
@@ -251,85 +261,46 @@ class ForagingArena:
             RuntimeError: bodies that are not compiled.
         """
         first = self.tick + 1
-        tasks = _NO_TASKS if task_shares is None or policy.task is None else policy.task
+        tasks = _NO_TASKS if task_shares is None or driver.task is None else driver.task
         gain = self._unit_gain if wheel_gain is None else np.ascontiguousarray(wheel_gain, np.float64)
-        now, policy_draws = policy.next_ticks()
+        now, driver_draws = driver.next_ticks()
         picks, walks = self.draws(first)
-        n_drawn = min(len(rows) for rows in (policy_draws, picks, walks) if rows is not self._nothing)
+        drawn = [rows for rows in (driver_draws, picks, walks) if rows is not NO_DRAWS and rows is not self._nothing]
+        n_drawn = min(map(len, drawn), default=n_ticks)
         with self._observation_kept(kept):
-            n_begun, outcome, tasks_counted = policy.call(
+            n_begun, outcome, tasks_counted = driver.call(
                 kernels.run,
                 self._held,
                 self._bodies.held,
                 disturbances,
+                driver.held,
+                None if rewards is None else rewards.payment,
+                paid,
                 gain,
                 first,
                 min(n_ticks, n_drawn),
                 self.has_changed,
                 acts,
-                policy.callback,
-                policy.state,
                 now,
-                policy.decision_ticks,
-                policy_draws,
+                driver.decision_ticks,
+                driver_draws,
                 picks,
                 walks,
                 tasks,
                 _NO_SHARES if task_shares is None else task_shares,
             )
             if acts:
-                policy.count_ticks(max(1, n_begun))
+                driver.count_ticks(max(1, n_begun))
             if not n_begun:
-                return 0
+                return Stop(self.tick, by_python=False)
             self.tick, self.has_changed = first + n_begun - 2, self.has_changed and n_begun == 1
             own_gain = disturbances.gain if len(disturbances.gain) else gain
-            self.conclude(outcome, policy.state[-1], own_gain, policy.task)
+            self.conclude(outcome, driver.actions, own_gain, driver.task)
+        if rewards is not None and outcome != DONE:
+            paid += rewards.reward()
         if not tasks_counted:
             raise refused_tasks(tasks, len(self.swarm.active))
-        return n_begun - (outcome != DONE)
-
-    def decide(
-        self,
-        driver: tuple[tuple[Any, ...], Callback],
-        actions: ActionArray,
-        n_ticks: int,
-        rewards: RewardModel,
-        paid: ObsArray,
-        disturbances: Disturbances = UNDISTURBED,
-    ) -> int:
-        """Carry out a decision of a learner; what is not said here is as in `run`. `needs_python` must be false.
-
-        Args:
-            driver: State and kernel as a `CompiledPolicy` has them, held; the kernel draws nothing.
-            actions: (N, A) float32, the same actions.
-            n_ticks: At most so many ticks, and at least one; it ends earlier where Python has to act.
-            rewards: What makes the rewards; it must have a `payment`.
-            paid: (N,) float32, the rewards are added.
-            disturbances: What wrappers do in so many ticks.
-        """
-        first = self.tick + 1
-        picks, walks = self.draws(first)
-        n_drawn = min((len(rows) for rows in (picks, walks) if rows is not self._nothing), default=n_ticks)
-        n_begun, outcome = self._call(
-            kernels.decide,
-            self._held,
-            self._bodies.held,
-            disturbances,
-            rewards.payment,
-            self._unit_gain,
-            first,
-            min(n_ticks, n_drawn),
-            self.has_changed,
-            driver,
-            picks,
-            walks,
-            paid,
-        )
-        self.tick, self.has_changed = first + n_begun - 2, self.has_changed and n_begun == 1
-        self.conclude(outcome, actions, disturbances.gain if len(disturbances.gain) else self._unit_gain)
-        if outcome != DONE:  # Python has ended the tick
-            paid += rewards.reward()
-        return n_begun - (outcome != DONE)
+        return Stop(self.tick, by_python=outcome != DONE)
 
     @contextmanager
     def _observation_kept(self, kept: bool) -> Iterator[None]:

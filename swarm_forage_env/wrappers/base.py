@@ -18,7 +18,7 @@ from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, F
 from swarm_forage_env.env import ForageEnv, checked_gain
 from swarm_forage_env.layer import BatchStep, SwarmLayer
 from swarm_forage_env.scenarios.config import to_mapping
-from swarm_forage_env.world.arena import UNDISTURBED
+from swarm_forage_env.world.arena import UNDISTURBED, Stop
 from swarm_forage_env.world.kernels.disturbances import Disturbances
 from swarm_forage_env.wrappers.waveform import Waveform
 
@@ -211,17 +211,17 @@ class SwarmWrapper(SwarmLayer, BaseParallelWrapper):
                 )
         return n_ticks, disturbances
 
-    def pass_ticks(self, n_ticks: int, n_observed: int, tasks: CodeArray | None = None) -> None:
+    def pass_ticks(self, n_ticks: int, stop: Stop, tasks: CodeArray | None = None) -> None:
         """Note, from here inwards, that ticks have passed as `told_ahead` said.
 
         Args:
             n_ticks: How many.
-            n_observed: After how many of them robots saw what wrappers let them see; Python has ended a further one.
+            stop: Where the arena has stopped after them.
             tasks: (N,) as in `step_batch`.
         """
         for wrapper in self.stack:
             wrapper.count_ticks(n_ticks)
-        if n_observed < n_ticks:
+        if stop.by_python:
             self.after(tasks)
 
     def interval_columns(self) -> dict[str, float]:

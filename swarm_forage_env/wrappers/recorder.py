@@ -110,17 +110,17 @@ class RunRecorder(SwarmWrapper):
             if isinstance(inner, SwarmWrapper):
                 n_ahead, disturbances = inner.told_ahead(n_ahead)
             if n_ahead == 0:  # one tick as a step of the stack does it
-                arena.run(policy, 0, None)  # what robots want to do stands before any wrapper acts
-                arena.run(policy, 1, None, wheel_gain=self.before(policy.state[-1]), acts=False)
+                arena.run(policy, 0)  # what robots want to do stands before any wrapper acts
+                arena.run(policy, 1, wheel_gain=self.before(policy.actions), acts=False)
                 self.after(policy.task)
                 kept = False
                 continue
             before = env.tick
-            n_observed = arena.run(policy, n_ahead, self._task_sums, disturbances, kept=kept)
+            stop = arena.run(policy, n_ahead, disturbances=disturbances, kept=kept, task_shares=self._task_sums)
             kept = len(disturbances.lanes) == 0
-            n_done = env.tick - before
+            n_done = stop.tick - before
             if isinstance(inner, SwarmWrapper):
-                inner.pass_ticks(n_done, n_observed, policy.task)
+                inner.pass_ticks(n_done, stop, policy.task)
             self._ticks_left -= n_done
             self._complete = env.tick >= env.max_cycles
             if self._ticks_left == 0 or self._complete:

@@ -264,22 +264,23 @@ def run(
     a: ArenaArrays,
     b: BodyState,
     d: Disturbances,
+    driver: tuple[tuple[Any, ...], Callable[..., None]],
+    payment: Payment | None,
+    paid: ObsArray,
     wheel_gain: FloatArray,
     first: int,
     n_ticks: int,
     look_first: bool,
     acts: bool,
-    policy: Callable[..., None],
-    policy_state: tuple[Any, ...],
-    policy_first: int,
+    driver_first: int,
     decision_ticks: int,
-    policy_draws: FloatArray,
+    driver_draws: FloatArray,
     chances: FloatArray,
     walk_chances: FloatArray,
     tasks: CodeArray,
     task_shares: FloatArray,
 ) -> tuple[int, int, bool]:
-    """Let policy and world act in turn for up to `n_ticks` ticks.
+    """Let a driver and the world act in turn for up to `n_ticks` ticks.
 
     It ends early with a tick that is not `DONE`, or of which the tasks cannot be counted.
 
@@ -287,37 +288,42 @@ def run(
         a: The arena.
         b: Its bodies.
         d: What disturbs the robots. The observation after a tick that is not `DONE` is left as it is.
+        driver: Its state, of which the last are the actions, and a function (obs, active, draws, state, tick) that
+            writes them.
+        payment: What rewards are made of; None = there are none.
+        paid: (N,) float32, the rewards of ticks that are `DONE` are added.
         wheel_gain: (N, 2), see `set_out`.
         first: Number of the first tick.
-        n_ticks: How many, at most as many as there are draws. With 0 the policy acts in the first, and that is all.
+        n_ticks: How many, at most as many as there are draws. With 0 the driver acts in the first, and that is all.
         look_first: See `set_out`.
-        acts: Whether the policy acts; else its actions stand as they are.
-        policy: (obs, active, draws, state, tick); writes the actions, which are last in its state.
-        policy_state: Its state.
-        policy_first: Number of the first tick as the policy counts.
+        acts: Whether the driver acts; else its actions stand as they are.
+        driver_first: Number of the first tick as the driver counts.
         decision_ticks: See `KernelPolicy`; light, the dearest sense, is left out until the next decision, or the end.
-        policy_draws: (ticks, N, draws of a robot).
+        driver_draws: (ticks, N, draws of a robot) or, where they are not read, (1, N, 1).
         chances: (ticks, N) or, where they are not read, (1, N).
         walk_chances: (ticks, M) or, where they are not read, (1, N).
-        tasks: (N,) codes that the policy keeps up to date; (0,) for a policy without tasks.
+        tasks: (N,) codes that the driver keeps up to date; (0,) for one without tasks.
         task_shares: (codes,) the shares of active robots in each task are added, tick by tick.
 
     Returns:
         How many ticks have begun, the outcome of the last of them, and whether its tasks were codes of `Task`, one per
         robot. Tasks of a tick with a refused action are not looked at.
     """
-    a, b = opened(a), opened(b)
-    obs, swarm, s, actions = a.sensors.obs, a.state.swarm, a.sensors, policy_state[-1]
+    a, b, driver = opened(a), opened(b), opened(driver)
+    state, act = driver
+    obs, swarm, s, actions = a.sensors.obs, a.state.swarm, a.sensors, state[-1]
     light_is_due = s.light_is_due
     gain = d.gain if d.gain.shape[0] > 0 else wheel_gain
     if n_ticks == 0:
-        policy(obs, swarm.active, policy_draws[0], policy_state, policy_first)
+        act(obs, swarm.active, driver_draws[0], state, driver_first)
     for k in range(n_ticks):
+        if payment is not None:
+            remember(opened(payment))
         if acts:
-            policy(obs, swarm.active, policy_draws[k], policy_state, policy_first + k)
+            act(obs, swarm.active, driver_draws[k % driver_draws.shape[0]], state, driver_first + k)
         disturb_wheels(d, k, actions, swarm.carried_object, a.motion.drive_limits, wheel_gain)
         chance, walk_chance = chances[k % chances.shape[0]], walk_chances[k % walk_chances.shape[0]]
-        now_then = policy_first + k + 1  # the tick in which the policy sees what is sensed here
+        now_then = driver_first + k + 1  # the tick in which the driver sees what is sensed here
         is_due = (now_then - 1) % decision_ticks == 0 or k == n_ticks - 1
         light_is_due[0] = is_due
         outcome = whole(a, b, actions, gain, first + k, look_first and k == 0, chance, walk_chance)
@@ -325,60 +331,9 @@ def run(
         if outcome == DONE:
             disturb_senses(d, k, a)
             s.kept[0] = d.draws.shape[0] == 0 and (is_due or s.kept[0])
+            if payment is not None:
+                pay(opened(payment), paid)
         counted = outcome >= 0 or tasks.shape[0] == 0 or add_task_shares(tasks, swarm.active, task_shares)
         if outcome != DONE or not counted:
             return k + 1, outcome, counted
     return n_ticks, DONE, True
-
-
-@kernel
-def decide(
-    a: ArenaArrays,
-    b: BodyState,
-    d: Disturbances,
-    payment: Payment,
-    wheel_gain: FloatArray,
-    first: int,
-    n_ticks: int,
-    look_first: bool,
-    driver: tuple[tuple[Any, ...], Callable[..., None]],
-    chances: FloatArray,
-    walk_chances: FloatArray,
-    paid: ObsArray,
-) -> tuple[int, int]:
-    """Carry out a decision of a learner for up to `n_ticks` ticks; it ends early with a tick that is not `DONE`.
-
-    Args:
-        a: The arena.
-        b: Its bodies.
-        d: See `run`.
-        payment: What rewards are made of.
-        wheel_gain: (N, 2), see `set_out`.
-        first: Number of the first tick.
-        n_ticks: How many, at most as many as there are draws. Light is left out but in the last one.
-        look_first: See `set_out`.
-        driver: State and function as the policy of `run` has them; the function does not look at its draws.
-        chances: See `run`.
-        walk_chances: See `run`.
-        paid: (N,) float32, the rewards of ticks that are `DONE` are added.
-
-    Returns:
-        How many ticks have begun, and the outcome of the last of them.
-    """
-    a, b, payment, driver = opened(a), opened(b), opened(payment), opened(driver)
-    state, act = driver
-    sensors, swarm = a.sensors, a.state.swarm
-    gain = d.gain if d.gain.shape[0] > 0 else wheel_gain
-    for k in range(n_ticks):
-        remember(payment)
-        act(sensors.obs, swarm.active, wheel_gain, state, first + k)
-        disturb_wheels(d, k, state[-1], swarm.carried_object, a.motion.drive_limits, wheel_gain)
-        sensors.light_is_due[0] = k == n_ticks - 1
-        chance, walk_chance = chances[k % chances.shape[0]], walk_chances[k % walk_chances.shape[0]]
-        outcome = whole(a, b, state[-1], gain, first + k, look_first and k == 0, chance, walk_chance)
-        sensors.light_is_due[0] = True  # for what Python may have to finish
-        if outcome != DONE:
-            return k + 1, outcome
-        disturb_senses(d, k, a)
-        pay(payment, paid)
-    return n_ticks, DONE
