@@ -74,7 +74,7 @@ def outcome(run: LiveRun) -> dict[str, np.ndarray]:
     """Everything that a run shows and records."""
     recorder, swarm = run._stack, run.forage_env.swarm
     assert isinstance(recorder, RunRecorder)
-    shown = {"obs": recorder.last_obs.copy(), "actions": run._policy.compiled().state[-1].copy()}
+    shown = {"obs": recorder.last_obs.copy(), "actions": run._policy.compiled().actions.copy()}
     shown |= {name: np.array(getattr(swarm, name)) for name in swarm._fields}
     shown |= {"tick": np.array(run.forage_env.tick)}
     return shown | (recorder.columns() | recorder.contributed() if recorder.complete else {})
