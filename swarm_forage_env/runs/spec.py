@@ -257,7 +257,7 @@ def policy_specs(
     parameters: Mapping[str, Any] | None = None,
     caches: str | None = None,
 ) -> tuple[PolicySpec, ...]:
-    """Return several policies as they are run, each with a name of its own; files of one name by their whole paths.
+    """Return several policies as they are run, each with a name of its own; files of one name go by folder or path.
 
     Args:
         policies: Policies, or a mapping from names to policies.
@@ -269,8 +269,14 @@ def policy_specs(
     """
     named = policies.items() if isinstance(policies, Mapping) else [("", policy) for policy in policies]
     specs = [policy_spec(policy, label=name, parameters=parameters, caches=caches) for name, policy in named]
+    for parts in (slice(-2, None), slice(None)):
+        labels = [spec.label for spec in specs]
+        names = [str(Path(*Path(spec.policy).parts[parts])) for spec in specs]
+        specs = [
+            replace(spec, label=name) if labels.count(spec.label) > 1 else spec
+            for spec, name in zip(specs, names, strict=True)
+        ]
     labels = [spec.label for spec in specs]
-    specs = [replace(spec, label=spec.policy) if labels.count(spec.label) > 1 else spec for spec in specs]
     if len({spec.label for spec in specs}) < len(specs):
         raise ConfigError(f"Expected policies of different names, got {', '.join(labels)}; give a mapping from names.")
     return tuple(specs)

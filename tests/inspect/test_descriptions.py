@@ -1,5 +1,7 @@
 """What `info` says about a network file."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -31,7 +33,7 @@ def test_the_layers_and_every_field_of_the_interface_are_told(told):
     first, *lines = told(activation="relu", caches="static")
     assert first.endswith("mine.npz: a network of 23 x 4 x 6 units (relu)")
     fields = {line.split()[0]: line.split()[-1] for line in lines if line.startswith("    ")}
-    assert {*InterfaceConfig.__dataclass_fields__, "samples", "caches"} == set(fields)
+    assert {*(item.name for item in dataclasses.fields(InterfaceConfig)), "samples", "caches"} == set(fields)
     assert (fields["decision_ticks"], fields["frame_decisions"], fields["caches"]) == ("5", "200", "static")
 
 

@@ -111,7 +111,7 @@ def test_a_temperature_makes_likely_actions_likelier():
     )
     assert sharp == pytest.approx(learnt**2 / np.sum(learnt**2), rel=1e-5), "to the power of 1 / 0.5"
     assert network.at_temperature(1.0) is network
-    with pytest.raises(ConfigError, match=r"temperature to be a number in \[0.0001, 100\], got 0"):
+    with pytest.raises(ConfigError, match=r"temperature to be a number from 0\.0001 to 100, got 0"):
         network.at_temperature(0.0)
     for wrong in (about(NUMBERED), about(samples=True)):
         with pytest.raises(NetworkError, match="draws discrete actions, got one that takes the likeliest"):

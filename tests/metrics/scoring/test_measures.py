@@ -20,7 +20,7 @@ DOCS = Path(__file__).resolve().parents[3] / "docs"
 def test_a_measure_is_named_after_a_public_function_and_stands_on_its_page(name):
     measure = MEASURES[name]
     assert callable(getattr(metrics, name))
-    assert f"`{name}`" in (DOCS / "metrics.md").read_text()
+    assert f"`{name}`" in (DOCS / "equations.md").read_text()
     assert measure.lowest < measure.highest
     assert measure.neutral is None or measure.lowest <= measure.neutral <= measure.highest
     assert not measure.is_distance or (measure.higher_is_better, measure.neutral, measure.lowest) == (False, 0.0, 0.0)
