@@ -16,13 +16,22 @@ from typing import Any, get_args
 import numpy as np
 import polars as pl
 
-from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.wrappers.world import SIZE
 
-from ..checks import CurveError
 from ..curves import FloatArray, Form, Variant
 from ..statistics import SIGNIFICANT, Summary, aggregate, holm, paired_p
-from .measures import MEASURES, Compared, Level, Measure, Uncomputable, check_measures, levels, remark_on, unit_of
+from .measures import (
+    MEASURES,
+    Compared,
+    Level,
+    Measure,
+    Uncomputable,
+    check_measures,
+    check_words,
+    levels,
+    remark_on,
+    unit_of,
+)
 from .run_curves import RunCurves, StudyCurves
 
 SCHEMA: dict[str, Any] = {
@@ -96,15 +105,6 @@ def scores(
                     except Uncomputable as reason:
                         missing[study.controller, label_of(name, variant, form)] = str(reason)
     return pl.concat([pl.DataFrame(schema=SCHEMA), *parts]), missing
-
-
-def check_words(what: str, words: Sequence[str], known: Sequence[str]) -> None:
-    """Refuse unknown words, or none; raises CurveError."""
-    for word in words:
-        if word not in known:
-            raise CurveError(f"Unknown {what} {word!r}.{suggestion(word, known)} Known: {', '.join(known)}.")
-    if not words:
-        raise CurveError(f"Expected one or more {what}s of {', '.join(known)}, got none.")
 
 
 def _rows(name: str, study: StudyCurves, form: Form, level: Level) -> pl.DataFrame:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.wrappers.world import SIZE
 
 from ..checks import CurveError, PopulationError
@@ -21,6 +22,7 @@ from ..environment import environment_distance
 from ..flexibility import adaptability, noise_robustness, reactivity
 from ..interference import performance_lost
 from ..population import availability, population_robustness, recorded_population_robustness
+from ..queues import PopulationRates
 from ..scaling import efficiency, raw_performance, scalability
 from .run_curves import HANDLING, NOISE, POPULATION, THROTTLE, RunCurves, StudyCurves, common_runs
 
@@ -126,17 +128,22 @@ def _reactivity(c: Compared) -> FloatArray:
     return reactivity(c.base.performance, c.runs.performance, v=given, i_ec=wanted, model=model)
 
 
-def _population_robustness(c: Compared) -> FloatArray:
-    runs, ideal = c.runs, c.base
+def _rates(runs: RunCurves) -> PopulationRates:
     if runs.rates is None:
         raise Uncomputable(f"there are no rates (deaths_per_s, malfunctions_per_s, ...) for {runs.describe()}")
+    return runs.rates
+
+
+def _population_robustness(c: Compared) -> FloatArray:
+    runs, ideal = c.runs, c.base
+    rates = _rates(runs)
     if runs.horizon_s is None:
         raise Uncomputable("there is no column t_end_s, which gives the length of a run")
     try:
         return population_robustness(
             runs.performance,
             ideal.performance,
-            runs.rates,
+            rates,
             horizon=runs.horizon_s,
             n=runs.n_robots,
             ideal_rates=ideal.rates,
@@ -451,9 +458,7 @@ def _ratios(experiments: Sequence[RunCurves]) -> Iterator[Level]:
 
 def ratio_out(runs: RunCurves) -> float:
     """Return lambda / mu of a population: how much oftener robots leave than come."""
-    rates = runs.rates
-    if rates is None:
-        raise Uncomputable(f"there are no rates (deaths_per_s, malfunctions_per_s, ...) for {runs.describe()}")
+    rates = _rates(runs)
     return 0.0 if rates.lam == 0.0 else math.inf if rates.mu == 0.0 else round(rates.lam / rates.mu, 6)
 
 
@@ -493,19 +498,19 @@ def remark_on(name: str, study: StudyCurves, variant: Variant, *, misleads: bool
 
 
 def check_measures(measures: Sequence[str] | None) -> tuple[str, ...]:
-    """Return measures in the order of tables, each once; None = all.
-
-    Raises:
-        CurveError: an unknown name, or none at all.
-    """
-    from swarm_forage_env._internal.wording import suggestion
-
-    for word in measures or ():
-        if word not in MEASURES:
-            raise CurveError(f"Unknown measure {word!r}.{suggestion(word, MEASURES)} Known: {', '.join(MEASURES)}.")
-    if measures is not None and not measures:
-        raise CurveError(f"Expected one or more measures of {', '.join(MEASURES)}, got none.")
+    """Return measures in the order of tables, each once; None = all. Raises CurveError on unknown ones, or none."""
+    if measures is not None:
+        check_words("measure", measures, tuple(MEASURES))
     return tuple(name for name in MEASURES if measures is None or name in measures)
+
+
+def check_words(what: str, words: Sequence[str], known: Sequence[str]) -> None:
+    """Refuse unknown words, or none; raises CurveError."""
+    for word in words:
+        if word not in known:
+            raise CurveError(f"Unknown {what} {word!r}.{suggestion(word, known)} Known: {', '.join(known)}.")
+    if not words:
+        raise CurveError(f"Expected one or more {what}s of {', '.join(known)}, got none.")
 
 
 def criteria_of(measures: Sequence[str], disturbance: str) -> set[str]:

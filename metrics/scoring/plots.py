@@ -70,6 +70,16 @@ def draw_scores(summary: pl.DataFrame, path: str | Path, *, title: str = "", sty
             _draw_panel(panel, rows, of_look)
 
 
+def interval_words(n_runs: Sequence[int]) -> str:
+    """Return what stands behind ±, of means over so many runs; of few, why it is wide."""
+    most = max(n_runs, default=0)
+    if most < 2:
+        return "one seed, so no interval"
+    if most < FEWEST_RUNS:
+        return f"± 95% t interval over {most} seeds, wide because so few say little (make {FEWEST_RUNS} or more)"
+    return "± 95% t interval over seeds"
+
+
 def _about_bars(n_runs: Sequence[int]) -> str:
     """Return what is drawn of scores of so many runs."""
     with_bar = {n >= FEWEST_RUNS for n in n_runs}

@@ -33,9 +33,9 @@ from ..checks import CurveError, chosen_seeds
 from ..curves import Form, Variant
 from ..statistics import ROUNDING
 from .curves_file import read_curves
-from .frame import ROW, check_words, differences, label_of, scores, summarized, words_of
-from .measures import MEASURES, PICTURED, check_measures, criteria_of
-from .plots import draw_scores
+from .frame import ROW, differences, label_of, scores, summarized, words_of
+from .measures import MEASURES, PICTURED, check_measures, check_words, criteria_of
+from .plots import draw_scores, interval_words
 from .question import Question
 from .run_curves import THROTTLE, PerformanceLike, StudyCurves, own_performance, policy_curves
 
@@ -47,9 +47,12 @@ TEST = (
     "certain: two-sided paired t test, p at most 0.05 after Holm's correction over all levels and pairs of a measure."
 )
 """How differences are tested, as a text for readers."""
-VALUES = "± half of Student's 95 % interval over seeds; %: share of the performance compared with"
-MARKS = {"!": "runs are missing, or have no value or no share", "?": "misleads, see below"}
-_PAIRS_PER_TABLE = 6
+SIGNS = {
+    "%": "share of the performance compared with",
+    "!": "runs are missing, or have no value or no share",
+    "?": "misleads, see below",
+}
+"""Sign in a cell -> what it says."""
 _NO_AMOUNT = 1e-12
 """Smaller amounts are rounding errors and are shown as zero."""
 
@@ -137,104 +140,80 @@ class Scores(Answer):
     def sheets(self) -> tuple[Sheet, ...]:
         """Return sentences, a table and notes; with `is_full`, all levels and differences."""
         said = Sheet(title=self._title(), notes=self.sentences())
-        tables = (*self._long(), *self._pairs()) if self.is_full else (self._short(),)
+        tables = tuple(self._long()) if self.is_full else (self._short(),)
         return said, *tables, Sheet(notes=self._notes())
 
     def _title(self) -> str:
-        words = ", ".join(self.policies) + (f" in {self.world}" if self.world else "")
-        if self.settings.get("performance", "collected") != "collected":
-            words += f", performance {self.settings['performance']}"
-        if "budget" in self.settings:
-            seeds = counted(len(self.settings["seeds"]), "seed")
-            words += f", budget {self.settings['budget']}, {seeds}, {self.settings['horizon_s']:,g} s"
-        return words
+        told = self.settings
+        places = [f"in {self.world}"] if self.world else []
+        places += [f"from {told['curves']}"] if "curves" in told else []
+        words = [" ".join([", ".join(self.policies), " and ".join(places)]).rstrip()]
+        if told.get("performance", "collected") != "collected":
+            words.append(f"performance {told['performance']}")
+        words += [f"budget {told['budget']}"] if "budget" in told else []
+        words += [counted(len(told["seeds"]), "seed")] if "seeds" in told else []
+        words += [f"{told['horizon_s']:,g} s"] if told.get("horizon_s") else []
+        return ", ".join(words)
 
     def _short(self) -> Sheet:
         """The strongest level of each measure, policies side by side."""
         rows: list[list[str]] = []
         for part in self._strongest():
             first = part.row(0, named=True)
-            arrow = "higher" if MEASURES[first["measure"]].higher_is_better else "lower"
-            of = {row["policy"]: row for row in part.iter_rows(named=True)}
-            cells = [_cell(of[name]) if name in of else "-" for name in self.policies]
-            rows.append([words_of(first["measure"]), first["at"], arrow, *cells])
-        marks = [f"{mark} = {words}" for mark, words in MARKS.items() if any(mark in "".join(row) for row in rows)]
-        notes = [VALUES, *(["; ".join(marks)] if marks else [])] if rows else []
+            of = {row["policy"]: _cell(row) for row in part.iter_rows(named=True)}
+            cells = [of.get(name, "-") for name in self.policies]
+            rows.append([words_of(first["measure"]), first["at"], _better(first["measure"]), *cells])
+        notes = self._legend("".join(cell for row in rows for cell in row)) if rows else ()
         return Sheet.of(["measure", "at", "better", *self.policies], rows, notes=notes)
 
-    def _long(self) -> Iterator[Sheet]:
-        """All levels, a row per policy."""
-        header = [
-            "measure",
-            "at",
-            "policy",
-            "value",
-            "95 % interval",
-            "noise floor",
-            "relative",
-            "runs",
-            "better",
-            "unit",
-        ]
-        rows: list[tuple[str, ...]] = []
-        for _, part in self.summary.group_by(*ROW, maintain_order=True):
-            for row in part.iter_rows(named=True):
-                floor, share = row["floor"], row["relative"]
-                rows.append(
-                    (
-                        label_of(row["measure"], row["variant"], row["form"]),
-                        row["at"],
-                        row["policy"],
-                        number(row["mean"]) + _marks(row),
-                        limits(row["lower"], row["upper"]),
-                        "" if floor is None else number(floor),
-                        "" if math.isnan(share) else percent(share),
-                        str(row["runs"]),
-                        "higher" if MEASURES[row["measure"]].higher_is_better else "lower",
-                        row["unit"],
-                    )
-                )
-        yield Sheet.of(header, rows)
+    def _legend(self, cells: str) -> list[str]:
+        """What the signs in some cells are."""
+        n_runs = self.summary["runs"].to_list()
+        intervals = [interval_words(n_runs)] if "±" in cells or max(n_runs) == 1 else []
+        signs = [f"{sign} = {words}" for sign, words in SIGNS.items() if sign in cells]
+        return [*intervals, *(["; ".join(signs)] if signs else [])]
 
-    def _pairs(self) -> Iterator[Sheet]:
-        """All differences, pairs side by side."""
-        if self.differences.is_empty():
-            return
-        pairs = self.differences.select("first", "second").unique(maintain_order=True).rows()
-        for start in range(0, len(pairs), _PAIRS_PER_TABLE):
-            shown = pairs[start : start + _PAIRS_PER_TABLE]
-            rows: list[list[str]] = []
-            for (measure, variant, form, at, *_, is_relative), part in self.differences.group_by(
-                *ROW, "is_relative", maintain_order=True
-            ):
-                of = {(row["first"], row["second"]): row for row in part.iter_rows(named=True)}
-                name = label_of(measure, variant, form) + (", relative" if is_relative else "")
-                rows.append([name, at, *(_gap(of[pair]) if pair in of else "-" for pair in shown)])
-            is_last = start + _PAIRS_PER_TABLE >= len(pairs)
-            header = ["measure", "at", *(f"{first} - {second}" for first, second in shown)]
-            yield Sheet.of(header, rows, notes=(TEST,) if is_last else ())
+    def _long(self) -> Iterator[Sheet]:
+        """All levels and differences, a measure after the other, and what their signs are."""
+        by_measure = self.differences.partition_by(*ROW[:3], as_dict=True) if len(self.differences) else {}
+        for key, part in self.summary.group_by(*ROW[:3], maintain_order=True):
+            first = part.row(0, named=True)
+            title = f"{words_of(label_of(*key))}, {first['unit']}, {_better(first['measure'])} is better"
+            columns = {"at": part["at"].to_list(), "policy": part["policy"].to_list()}
+            levels = part.to_dicts()
+            columns["value"] = [number(row["mean"]) + _marks(row) for row in levels]
+            columns["95 % interval"] = [limits(row["lower"], row["upper"]) for row in levels]
+            columns["noise floor"] = ["" if row["floor"] is None else number(row["floor"]) for row in levels]
+            columns["relative"] = ["" if math.isnan(row["relative"]) else percent(row["relative"]) for row in levels]
+            columns["runs"] = [str(row["runs"]) for row in levels]
+            shown = {name: cells for name, cells in columns.items() if set(cells) - {"", "-"}}
+            yield Sheet(title=title, frame=pl.DataFrame(shown))
+            if key in by_measure:
+                yield _pairs_of(by_measure[key])
+        if len(self.summary):
+            yield Sheet(notes=[*self._legend("".join(("±", *SIGNS))), *([TEST] if by_measure else [])])
 
     def _notes(self) -> list[str]:
-        remarks: dict[str, list[str]] = {}
         shown = self.summary if self.is_full else pl.concat([self.summary.clear(), *self._strongest()])
+        remarks: dict[str, dict[str, None]] = {}  # remark -> places, each once
         for row in shown.filter(pl.col("remark") != "").iter_rows(named=True):
-            where = remarks.setdefault(row["remark"], [])
             place = f"{words_of(label_of(row['measure'], row['variant'], row['form']))}, {row['at']}"
-            if place not in where:
-                where.append(place)
-        without: dict[tuple[str, str], list[str]] = {}  # label and reason -> policies
-        for (policy, label), reason in self.missing.items():
-            without.setdefault((label, reason), []).append(policy)
-        absent: dict[tuple[str, str], list[str]] = {}  # policies and reason -> labels
-        for (label, reason), policies in without.items():
-            of = "" if len(policies) == len(self.policies) else f" of {', '.join(policies)}"
-            absent.setdefault((of, reason), []).append(label)
+            remarks.setdefault(row["remark"], {})[place] = None
+        absent: dict[tuple[str, str], list[str]] = {}  # policies and reason -> measures
+        for label, reason in dict.fromkeys((label, reason) for (_, label), reason in self.missing.items()):
+            of = [policy for policy in self.policies if self.missing.get((policy, label)) == reason]
+            words = "" if len(of) == len(self.policies) else f" of {', '.join(of)}"
+            absent.setdefault((words, reason), []).append(words_of(label))
         return [
             *self.notes,
-            *(f"{'; '.join(where)}: {remark}" for remark, where in remarks.items()),
+            *(f"{'; '.join(places)}: {remark}" for remark, places in remarks.items()),
             *(f"not computed{of}: {', '.join(labels)}: {reason}" for (of, reason), labels in absent.items()),
             *(f"failed: {line}" for lines in self.failures.values() for line in lines),
         ]
+
+    def csv(self) -> str:
+        """Return the means with intervals as CSV, see `summary`."""
+        return self.summary.write_csv()
 
     def to_mapping(self) -> dict[str, Any]:
         """Return everything as plain values, ready for JSON; numbers that do not exist are None."""
@@ -295,9 +274,20 @@ def _cell(row: Mapping[str, Any]) -> str:
     return spread(row["relative"], row["relative_upper"] - row["relative"], is_share=True) + _marks(row)
 
 
-def _gap(row: Mapping[str, Any]) -> str:
-    half = row["upper"] - row["difference"]
-    return spread(row["difference"], half, is_share=row["is_relative"]) + (" *" if row["better"] else "")
+def _better(name: str) -> str:
+    return "higher" if MEASURES[name].higher_is_better else "lower"
+
+
+def _pairs_of(rows: pl.DataFrame) -> Sheet:
+    """The differences of a measure, a row per level and pair, values beside shares."""
+    cells: dict[tuple[str, str], dict[str, str]] = {}
+    for row in rows.iter_rows(named=True):
+        column = "relative" if row["is_relative"] else "value"
+        gap = spread(row["difference"], row["upper"] - row["difference"], is_share=row["is_relative"])
+        pair = f"{row['first']} - {row['second']}"
+        cells.setdefault((row["at"], pair), {})[column] = gap + (" *" if row["better"] else "")
+    told = [{"at": at, "difference": pair, **of} for (at, pair), of in cells.items()]
+    return Sheet(frame=pl.DataFrame(told, infer_schema_length=None))
 
 
 def spread(mean: float, half: float, *, is_share: bool = False) -> str:
@@ -317,53 +307,23 @@ def score(
     policies: PolicyLike | Sequence[PolicyLike] | Mapping[str, PolicyLike],
     world: WorldLike = "warehouse_small",
     *,
-    measures: Sequence[str] | None = None,
-    budget: str | Budget = "standard",
-    seeds: int | Sequence[int] | None = None,
-    horizon_s: float | None = None,
-    performance: PerformanceLike | None = None,
-    parameters: Mapping[str, Any] | None = None,
-    caches: str | None = None,
-    density: float | None = None,
-    disturbance: str = THROTTLE,
-    variants: Sequence[Variant] = ("corrected",),
-    forms: Sequence[Form] = ("marginal",),
-    against: str | None = None,
     out: str | Path | None = None,
     jobs: int | None = None,
     executor: "Executor | None" = None,
     progress: bool = True,
+    **asked: Any,
 ) -> Scores:
     """Run policies in all experiments that the measures need, score them, and compare them seed by seed.
 
     Args:
-        policies: One (see `PolicyLike`), several, or a mapping from names to policies. Objects, classes and functions
-            run in this process, one run at a time, each with its own copy of an object. With `out` they need a name.
-        world: Name of a preset, a complete configuration, or a world with wrappers, which then act in all runs. The
-            budget sets horizon and interval.
-        measures: Names in `MEASURES`; default all.
-        budget: "quick", "standard", "paper" (`swarm_forage_env.studies.ladders.BUDGETS`), or one of your own.
-        seeds: Their number, or a list; default those of the budget. All experiments use the same seeds, so runs are
-            paired.
-        horizon_s: Length of a run in seconds, whole intervals; default that of the budget.
-        performance: What P(N, t) is: a recorded column ("n_carrying"), "1/" and a column in which less is better
-            ("1/interference_fraction"), "task_balance", "cache_load", or a function of a record (`Performance`).
-            Default: the performance of the scenario. It only changes how runs are read, so runs in `out` are not
-            repeated.
-        parameters: Keyword arguments of a registered policy or a class.
-        caches: "none", "static", "dynamic"; default those that each policy states, else those of the world.
-        density: Robots per m^2 at all swarm sizes: the arena grows with the swarm, and one robot is in the smallest
-            arena. Default: all sizes are in the scenario's arena (in search and rescue: at its density).
-        disturbance: Disturbance for reactivity and adaptability: "throttle" (robots lose speed) or "handling_cost"
-            (picking up and dropping take longer).
-        variants: Of the measures, "corrected" or "paper"; a measure without these is scored in the corrected one.
-        forms: "marginal" compares a swarm size with the next smaller one, "interactive" with as many lone robots.
-        against: Label of a policy that all others are compared with; default all pairs are compared.
+        policies: As in `score_question`. With `out` objects, classes and functions need a name.
+        world: As in `score_question`.
         out: Folder for run records. Runs that it already holds are not made again, so you can repeat an interrupted
             call.
         jobs: Processes; default one per core.
         executor: Makes the runs in place of the processes, for example Dask's `client.get_executor()`.
         progress: Show progress and an estimate on stderr.
+        asked: All further arguments of `score_question`: measures, budget, seeds, performance, against and others.
 
     Raises:
         CurveError: unknown measures, or a performance that is negative or not a number.
@@ -371,22 +331,7 @@ def score(
         ImportError: the policy is a model, and stable-baselines3 is not installed.
         KeyboardInterrupt: Ctrl-C; finished runs are in `out`.
     """
-    question = score_question(
-        policies,
-        world,
-        measures=measures,
-        budget=budget,
-        seeds=seeds,
-        horizon_s=horizon_s,
-        performance=performance,
-        parameters=parameters,
-        caches=caches,
-        density=density,
-        disturbance=disturbance,
-        variants=variants,
-        forms=forms,
-        against=against,
-    )
+    question = score_question(policies, world, **asked)
     return question.ask(out=out, jobs=jobs, executor=executor, progress=progress)
 
 
@@ -408,7 +353,33 @@ def score_question(
     against: str | None = None,
     is_full: bool = False,
 ) -> Question[Scores]:
-    """Return the question of `score`; arguments and errors as there."""
+    """Return the question of `score`, which has its runs before any is made; errors as there.
+
+    Args:
+        policies: One (see `PolicyLike`), several, or a mapping from names to policies. Objects, classes and functions
+            run in this process, one run at a time, each with its own copy of an object.
+        world: Name of a preset, a complete configuration, or a world with wrappers, which then act in all runs. The
+            budget sets horizon and interval.
+        measures: Names in `MEASURES`; default all.
+        budget: "quick", "standard", "paper" (`swarm_forage_env.studies.ladders.BUDGETS`), or one of your own.
+        seeds: Their number, or a list; default those of the budget. All experiments use the same seeds, so runs are
+            paired.
+        horizon_s: Length of a run in seconds, whole intervals; default that of the budget.
+        performance: What P(N, t) is: a recorded column ("n_carrying"), "1/" and a column in which less is better
+            ("1/interference_fraction"), "task_balance", "cache_load", or a function of a record (`Performance`).
+            Default: the performance of the scenario. It only changes how runs are read, so stored ones are not
+            repeated.
+        parameters: Keyword arguments of a registered policy or a class.
+        caches: "none", "static", "dynamic"; default those that each policy states, else those of the world.
+        density: Robots per m^2 at all swarm sizes: the arena grows with the swarm, and one robot is in the smallest
+            arena. Default: all sizes are in the scenario's arena (in search and rescue: at its density).
+        disturbance: Disturbance for reactivity and adaptability: "throttle" (robots lose speed) or "handling_cost"
+            (picking up and dropping take longer).
+        variants: Of the measures, "corrected" or "paper"; a measure without these is scored in the corrected one.
+        forms: "marginal" compares a swarm size with the next smaller one, "interactive" with as many lone robots.
+        against: Label of a policy that all others are compared with; default all pairs are compared.
+        is_full: Whether the text has all levels, numbers and differences.
+    """
     wanted = check_measures(measures)
     check_words("variant", variants, get_args(Variant))
     check_words("form", forms, get_args(Form))
@@ -481,36 +452,31 @@ def score_curves(
     forms: Sequence[Form] = ("marginal",),
     against: str | None = None,
     is_full: bool = False,
-    out: str | Path | None = None,
-    jobs: int | None = None,
-    executor: "Executor | None" = None,
-    progress: bool = True,
+    **run: Any,
 ) -> Scores:
     """Score curves of any simulator or of real robots, beside those of policies that are run here.
 
     Args:
         path: A file as `read_curves` reads it.
         policies: As in `score`. They run in `world` with swarm sizes, numbers of runs and clock of the file.
-        world: As in `score`; where policies run.
+        world: Where policies run, as in `score`.
         columns: Our name of a column -> its name in the file, or a number for all rows.
         events: Whether a row is a delivery with a time, and not an interval.
         interval_s: Length of an interval, s; needed for events.
         performance: Column of the file that is its performance, or "1/" and a column; default "performance".
         measures: Names of measures; default all that the columns allow. `missing` says why others are not computed.
-        variants: As in `score`.
-        forms: As in `score`.
-        against: As in `score`.
-        is_full: Whether the text has all levels, numbers and differences.
-        out: As in `score`.
-        jobs: As in `score`.
-        executor: As in `score`.
-        progress: As in `score`.
+        variants: This and the next three as in `score_question`.
+        forms: See there.
+        against: See there.
+        is_full: See there.
+        run: How runs are made: out, jobs, executor, progress, as in `score`.
 
     Raises:
         CurveError: a file with an error, a measure that you name and that cannot be computed, or a clock or swarm sizes
             that no policy can be run with.
         ValueError: as `score`.
     """
+    check_measures(measures)
     check_words("variant", variants, get_args(Variant))
     check_words("form", forms, get_args(Form))
     given = read_curves(path, performance, columns=columns, events=events, interval_s=interval_s)
@@ -519,7 +485,7 @@ def score_curves(
     failures: dict[str, Sequence[str]] = {}
     if policies:
         plan = _plan_beside(given, policy_specs(policies), chosen)
-        table = run_plan(plan, out=out, jobs=jobs, executor=executor, progress=progress)
+        table = run_plan(plan, **run)
         simulated = [policy_curves(table, each.label) for each in plan.policies]
         failures = {each.label: lines for each in plan.policies if (lines := table.failure_lines(each.label))}
     studies = [*simulated, *given]
@@ -529,6 +495,7 @@ def score_curves(
         if reasons and (measures is not None or frame.filter(policy=study.controller).is_empty()):
             label, reason = next(iter(reasons.items()))
             raise CurveError(f"Cannot compute {label} for {study.controller} from {path}: {reason}.")
+    seeds = sorted({seed for study in studies for runs in study.experiments for seed in runs.seeds})
     told = {} if performance is None else {"performance": performance}
     return Scores(
         frame=frame,
@@ -536,7 +503,7 @@ def score_curves(
         world=chosen.title() if simulated else "",
         missing=missing,
         failures=failures,
-        settings={"curves": str(path), "horizon_s": given[0].horizon_s, **told},
+        settings={"curves": str(path), "seeds": seeds, "horizon_s": given[0].horizon_s, **told},
         notes=(f"{path}: {given[0].note}",) if given[0].note else (),
         against=against,
         is_full=is_full,

@@ -27,8 +27,6 @@ from ..curves import FloatArray
 from ..queues import PopulationRates
 
 if TYPE_CHECKING:
-    import polars as pl
-
     from swarm_forage_env.studies.results import StudyTable
     from swarm_forage_env.studies.study import Place, StudySpec
     from swarm_forage_env.studies.study_file import Value
@@ -94,21 +92,6 @@ def own_performance(given: PerformanceLike | None) -> Performance | None:
             f"Expected performance to be the name of a recorded column, or a function of a record, got {given!r}."
         )
     return Performance(getattr(given, "__name__", type(given).__name__), function=given)
-
-
-def own_curve(performance: Performance, frame: "pl.DataFrame", where: str) -> FloatArray:
-    """Return the performance of one run by its function, (T,).
-
-    Args:
-        performance: One with a function.
-        frame: Record of the run.
-        where: Name of the run in error messages.
-
-    Raises:
-        CurveError: the function returns something else than (T,) finite numbers >= 0.
-    """
-    assert performance.function is not None, "others are columns"
-    return checked_performance(performance.function(frame), performance.name, len(frame), where)
 
 
 def checked_performance(values: ArrayLike, name: str, n_intervals: int, where: str) -> FloatArray:
@@ -309,16 +292,17 @@ def policy_curves(table: Table, policy: str, performance: Performance | None = N
 
 def _curves(table: Table, condition: Condition, performance: Performance | None) -> Curves:
     """The runs of a condition, with the performance that is asked for."""
-    records = table.of(condition)
     seeds, columns = table.curves(condition, *INTERVAL_COLUMNS)
-    checked: list[FloatArray] = []
-    for record in records:
-        where = f"run {record.run_id}"
-        if performance is None:
-            name = performance_of(condition.world.scenario.performance).name
-            checked.append(checked_performance(record["performance"], name, len(record["interval"]), where))
-        else:
-            checked.append(own_curve(performance, record.frame, where))
+    read_as = performance or performance_of(condition.world.scenario.performance)
+    checked = [
+        checked_performance(
+            record["performance"] if read_as.function is None else read_as.function(record.frame),
+            read_as.name,
+            len(record["interval"]),
+            f"run {record.run_id}",
+        )
+        for record in table.of(condition)
+    ]
     if checked:
         columns["performance"] = np.stack(checked)
     return seeds, columns

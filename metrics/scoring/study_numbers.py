@@ -16,8 +16,8 @@ from ..claims.claim import DISTANCES
 from ..claims.panel import TIE
 from ..curves import FloatArray, Form, Variant
 from ..statistics import CONFIDENCE
-from .frame import SCHEMA, check_words, label_of, scores
-from .measures import DISTURBANCES, MEASURES
+from .frame import SCHEMA, label_of, scores
+from .measures import DISTURBANCES, MEASURES, check_words
 from .run_curves import THROTTLE, StudyCurves, StudyLine, study_lines
 
 if TYPE_CHECKING:

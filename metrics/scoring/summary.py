@@ -24,7 +24,7 @@ from swarm_forage_env.wrappers.world import World
 
 from ..statistics import Summary, aggregate
 from .limits import ABOUT_LIMIT, share_of_limit
-from .plots import FEWEST_RUNS
+from .plots import FEWEST_RUNS, interval_words
 
 LEVEL = 0.95
 """Confidence level of all intervals."""
@@ -82,20 +82,9 @@ class RunSummary(Answer):
             numbers += ["-" if row.share_of_limit is None else percent(row.share_of_limit)] if has_limit else []
             tail = [f"{row.of['interference_fraction'].mean:.3f}", f"{row.simulated_s_per_wall_s:,.0f}"]
             lines.append([*about, row.caches, str(row.n_runs), *numbers, *tail])
-        notes = [f"{self._about_interval}; interference: share of active robot time"]
+        notes = [f"{interval_words([row.n_runs for row in self.rows])}; interference: share of active robot time"]
         notes += [ABOUT_LIMIT] if has_limit else []
         return Sheet.of(title=self._title(n_worlds), header=header, rows=lines, notes=notes), failures
-
-    @property
-    def _about_interval(self) -> str:
-        """What stands behind ±; of few seeds why it is wide, because readers take it for a fault."""
-        most = max(row.n_runs for row in self.rows)
-        if most == 1:
-            return "one seed, so no interval"
-        interval = f"± {LEVEL:.0%} t interval over"
-        if most < FEWEST_RUNS:
-            return f"{interval} {most} seeds, wide because so few say little (make {FEWEST_RUNS} or more)"
-        return f"{interval} seeds"
 
     def _title(self, n_worlds: int) -> str:
         scenario = self.world.scenario

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from swarm_forage_env._internal.fields import ConfigError, known_name, whole
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.overrides import arena_at_density, in_arena, robots_at_density
+from swarm_forage_env.scenarios.overrides import arena_at_density, robots_at_density
 from swarm_forage_env.scenarios.presets import DENSITY, SEARCH_AND_RESCUE_OBJECTS, at_density, search_and_rescue
 from swarm_forage_env.scenarios.presets import scenario as preset_scenario
 from swarm_forage_env.wrappers.base import WrapperConfig
@@ -54,7 +54,6 @@ AWAY_SHARE = 0.9
 """Share of the swarm away in the equilibrium of an unlimited queue at the study's malfunction and repair rates."""
 
 _T = TypeVar("_T")
-_Waved = TypeVar("_Waved", ThrottleConfig, HandlingCostConfig)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -187,9 +186,22 @@ def size_ladder(
     else:
         # Halves of halves, so that neighbours differ by the same factor: 1, 25, 50 or 1, 6, 12, 25, 50.
         sizes = {1, *(max(2, n_robots >> halvings) for halvings in range(count - 1))}
+    rungs = sorted(sizes)
     if density is not None:
-        return _growing_with_swarm(scenario, sorted(sizes), density)
-    return _in_one_arena(scenario, sorted(sizes))
+        rungs = [1, *(size for size in rungs if size > 1 and _has_room(scenario, density, size))]
+        if len(rungs) == 1:
+            raise ConfigError(
+                f"Expected a swarm whose arena at a density of {density:g} is larger than twice robots.start_margin_m "
+                f"= {scenario.robots.start_margin_m} m, got {max(sizes)} robots; ask for more robots or a lower "
+                "density."
+            )
+    return tuple(swarms_of_sizes(scenario, rungs, density).values())
+
+
+def _has_room(scenario: ScenarioConfig, density: float, n_robots: int) -> bool:
+    """Whether the arena of so many robots at a density is larger than its margins."""
+    arena = arena_at_density(scenario, density, n_robots)
+    return min(arena["width_m"], arena["height_m"]) > 2.0 * scenario.robots.start_margin_m
 
 
 def swarms_of_sizes(
@@ -209,7 +221,11 @@ def swarms_of_sizes(
     for size in sizes:
         whole("population_size", size, at_least=1)
     if density is None and scenario.name != "search_and_rescue":
-        return dict(zip(sizes, _in_one_arena(scenario, sizes), strict=True))
+        # A warehouse with its usual number of objects gets more, so that large swarms have enough.
+        usual = preset_scenario(scenario.name).objects.n_objects if scenario.name in SIZE_SWEEP_OBJECTS else None
+        if scenario.objects.n_objects == usual:
+            scenario = replace(scenario, objects=replace(scenario.objects, n_objects=SIZE_SWEEP_OBJECTS[scenario.name]))
+        return {size: replace(scenario, robots=replace(scenario.robots, n_robots=size)) for size in sizes}
     # One robot is in the smallest arena of the others, because at the density alone it would have next to none.
     smallest = min((size for size in sizes if size > 1), default=1)
     worlds = {size: at_density(scenario, density or DENSITY, n_robots=max(size, smallest)) for size in sizes}
@@ -250,32 +266,6 @@ def wrappers_at(scenario: ScenarioConfig, criterion: str, value: float) -> tuple
     return tuple(adversity.at(config, level, value) for config in wrappers)
 
 
-def _in_one_arena(scenario: ScenarioConfig, sizes: Sequence[int]) -> tuple[ScenarioConfig, ...]:
-    """The scenario with each size; a warehouse with its usual number of objects gets more, for the size sweep."""
-    if scenario.objects.n_objects == _preset_objects(scenario.name):
-        scenario = replace(scenario, objects=replace(scenario.objects, n_objects=SIZE_SWEEP_OBJECTS[scenario.name]))
-    return tuple(replace(scenario, robots=replace(scenario.robots, n_robots=size)) for size in sizes)
-
-
-def _preset_objects(name: str) -> int | None:
-    """Number of objects in the size sweep of a preset, if it differs from the usual one; else None."""
-    return preset_scenario(name).objects.n_objects if name in SIZE_SWEEP_OBJECTS else None
-
-
-def _growing_with_swarm(scenario: ScenarioConfig, sizes: Sequence[int], density: float) -> tuple[ScenarioConfig, ...]:
-    """The scenario at constant density, one robot in the smallest arena first."""
-    arenas = {size: arena_at_density(scenario, density, size) for size in sizes if size > 1}
-    least = 2.0 * scenario.robots.start_margin_m
-    arenas = {size: arena for size, arena in arenas.items() if min(arena["width_m"], arena["height_m"]) > least}
-    if not arenas:
-        raise ConfigError(
-            f"Expected a swarm whose arena at a density of {density:g} is larger than twice robots.start_margin_m = "
-            f"{least / 2} m, got {max(sizes)} robots; ask for more robots or a lower density."
-        )
-    grown = [in_arena(scenario, arena, n_robots=size, n_objects=None) for size, arena in arenas.items()]
-    return replace(grown[0], robots=replace(grown[0].robots, n_robots=1)), *grown
-
-
 def _growing_arenas(scenario: ScenarioConfig, count: int | None, density: float | None) -> tuple[ScenarioConfig, ...]:
     """Search and rescue at constant density, one robot in the smallest arena first."""
     base_side = scenario.arena.width_m
@@ -309,27 +299,30 @@ def _in_arena(scenario: ScenarioConfig, side_m: float, n_robots: int) -> Scenari
 
 _Level = tuple[float, tuple[WrapperConfig, ...]]
 """Criterion value, and the wrappers that make it."""
+_Levels = tuple[list[_Level], list[_Level]]
+"""The reference, if it has wrappers, and the disturbed levels."""
 
 
-def _throttle_levels(scenario: ScenarioConfig) -> tuple[list[_Level], list[_Level]]:
-    configs = sine_throttles() if scenario.name == "search_and_rescue" else square_throttles()
-    ideal, *levels = (_compressed(config, scenario.horizon_s / STUDY_HORIZON_S) for config in configs)
-    return [(0.0, (ideal,))], [(config.waveform.amplitude, (config,)) for config in levels]
+def _throttle_levels(scenario: ScenarioConfig) -> _Levels:
+    return _waved(sine_throttles() if scenario.name == "search_and_rescue" else square_throttles(), scenario)
 
 
-def _handling_levels(scenario: ScenarioConfig) -> tuple[list[_Level], list[_Level]]:
-    ideal, *levels = (_compressed(config, scenario.horizon_s / STUDY_HORIZON_S) for config in square_costs())
-    return [(0.0, (ideal,))], [(config.waveform.amplitude, (config,)) for config in levels]
+def _handling_levels(scenario: ScenarioConfig) -> _Levels:
+    return _waved(square_costs(), scenario)
 
 
-def _compressed(config: _Waved, factor: float) -> _Waved:
-    period_s = config.waveform.period_s
-    if period_s is None:
-        return config
-    return replace(config, waveform=replace(config.waveform, period_s=period_s * factor))
+def _waved(configs: Sequence[ThrottleConfig] | Sequence[HandlingCostConfig], scenario: ScenarioConfig) -> _Levels:
+    """Levels of waveforms compressed to the length of a run; the first is the ideal one."""
+    levels: list[_Level] = []
+    for config in configs:
+        wave = config.waveform
+        if wave.period_s is not None:
+            wave = replace(wave, period_s=wave.period_s * (scenario.horizon_s / STUDY_HORIZON_S))
+        levels.append((wave.amplitude, (replace(config, waveform=wave),)))
+    return [(0.0, levels[0][1])], levels[1:]
 
 
-def _noise_levels(scenario: ScenarioConfig) -> tuple[list[_Level], list[_Level]]:
+def _noise_levels(scenario: ScenarioConfig) -> _Levels:
     levels: list[_Level] = []
     for sensor, actuator in noise_levels(SIGMA_MAX.get(scenario.name, max(SIGMA_MAX.values()))):
         assert isinstance(actuator.sigma, float), "levels are constant"
@@ -337,7 +330,7 @@ def _noise_levels(scenario: ScenarioConfig) -> tuple[list[_Level], list[_Level]]
     return [], levels[1:]  # the first is sigma = 0, the undisturbed run
 
 
-def _population_levels(scenario: ScenarioConfig) -> tuple[list[_Level], list[_Level]]:
+def _population_levels(scenario: ScenarioConfig) -> _Levels:
     if scenario.name == "search_and_rescue":
         return [], [(config.death_per_tick, (config,)) for config in death_levels()]
     return [], [(float(factor), (config,)) for factor, config in enumerate(_malfunctions(scenario.robots.n_robots), 1)]
@@ -363,7 +356,7 @@ def _malfunctions(n_robots: int) -> tuple[PopulationConfig, ...]:
     )
 
 
-def _waved_at(config: _Waved, level: float, value: float) -> _Waved:
+def _waved_at(config: Any, level: float, value: float) -> Any:
     wave = config.waveform
     return replace(config, waveform=replace(wave, amplitude=value, offset=wave.offset - level + value))
 
@@ -372,21 +365,15 @@ def _noise_at(config: Any, level: float, value: float) -> Any:
     return replace(config, sigma=config.sigma - level + value)
 
 
-def _population_at(config: PopulationConfig, level: float, value: float) -> PopulationConfig:
-    factor = value / level
-    return replace(
-        config,
-        death_per_tick=config.death_per_tick * factor,
-        malfunction_per_tick=config.malfunction_per_tick * factor,
-        repair_per_tick=config.repair_per_tick * factor,
-    )
+def _population_at(config: Any, level: float, value: float) -> Any:
+    rates = ("death_per_tick", "malfunction_per_tick", "repair_per_tick")
+    return replace(config, **{name: getattr(config, name) * (value / level) for name in rates})
 
 
 class _Adversity(NamedTuple):
     """One kind of adversity: the levels of the study, and a function that makes another level from one of them."""
 
-    levels: Callable[[ScenarioConfig], tuple[list[_Level], list[_Level]]]
-    """Scenario -> the reference, if it has wrappers, and the disturbed levels."""
+    levels: Callable[[ScenarioConfig], _Levels]
     at: Callable[[Any, float, float], Any]
     """Wrapper of a level, value of that level, another value -> the wrapper of the other value."""
 

@@ -27,7 +27,7 @@ def test_score_shows_every_measure_keeps_records_and_draws_a_picture(command, pa
     code, out, err = command(*SCORE)
     assert code == 0
     assert out.splitlines()[0] == "random in warehouse_small with 20 objects, budget tiny, 2 seeds, 4 s"
-    for word in ("reactivity", "throttle 0.4", "higher", "half of Student's 95 % interval"):
+    for word in ("reactivity", "throttle 0.4", "higher", "95% t interval over 2 seeds, wide"):
         assert word in out
     folder = Path("results/warehouse_small_3_robots_bcf754")
     assert len(load(folder)) == 14
@@ -44,6 +44,8 @@ def test_compare_shows_values_differences_and_the_test(command):
     _, out, _ = command(*COMPARE, *FEW, "--out", "here", "--all", "--against", "crw")
     for word in ("95 % interval", "noise floor", "objects (DTW)", "random - crw", "paired t test", "Holm"):
         assert word in out
+    rows = [line for line in out.splitlines() if line.startswith(("at ", "N = ", "throttle ", "sigma "))]
+    assert max(map(len, rows)) <= 100
     assert list(Path("here").glob("*_random_crw_scores.png"))
 
 
@@ -90,6 +92,7 @@ def test_curves_from_elsewhere_are_scored(command):
     Path("curves.csv").write_text(CURVES)
     code, out, _ = command("score", "--curves", "curves.csv")
     assert code == 0
+    assert out.startswith("curves from curves.csv, ")
     assert "task emergence" in out
     assert "not computed: reactivity, adaptability: there are no runs with criterion throttle" in out
     assert not Path("results").exists()
@@ -110,7 +113,7 @@ def test_real_robots_stand_beside_policies_in_one_table_and_picture(command, pai
         "score", "random", "--curves", "real.csv", *words, "--set", "n_objects=20", "--out", "here"
     )
     assert code == 0
-    assert out.splitlines()[0] == "random, real in warehouse_small with 20 objects"
+    assert out.splitlines()[0] == "random, real in warehouse_small with 20 objects and from real.csv, 2 seeds, 4 s"
     header, first = [line.split() for line in out.splitlines() if line.startswith(("measure ", "raw performance  "))]
     assert header == ["measure", "at", "better", "random", "real"]
     assert first[-3:] == ["2", "±", "0"]

@@ -139,6 +139,12 @@ def test_an_interval_is_chosen_and_splits_steps_evenly():
     assert only(TWO_SIZES, interval_s=10.0).horizon_s == 20.0
 
 
+def test_a_fraction_after_many_whole_numbers_is_read(tmp_path):
+    text = "n_robots,seed,interval,performance\n" + "".join(f"2,0,{i},{i if i < 200 else 0.5}\n" for i in range(201))
+    (study,) = read_curves(written(tmp_path, "long.csv", text))
+    assert by_size(study)[2][0][-2:] == [199.0, 0.5]
+
+
 LOG = pl.DataFrame({"n_robots": [2, 2, 2, 1, 1], "seed": 0, "time_s": [12.0, 3.0, 40.0, 0.0, 25.0]})
 
 

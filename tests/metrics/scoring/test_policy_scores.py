@@ -295,6 +295,18 @@ def test_the_short_table_fits_a_page_and_the_full_one_has_everything():
         assert words in text
 
 
+def test_no_interval_is_explained_where_there_is_none():
+    single = str(made({("a", "raw_performance"): [10.0], ("b", "raw_performance"): [1.0]}))
+    assert "±" not in single
+    assert "one seed, so no interval" in single
+
+
+def test_csv_has_a_row_per_policy_and_level():
+    header, first, *_ = made({("a", "raw_performance"): HIGH}).csv().splitlines()
+    assert header.startswith("policy,measure,variant,form,at,")
+    assert first.startswith("a,raw_performance,corrected,marginal,N = 4,")
+
+
 def test_json_has_every_number(found):
     told = json.loads(found.json())
     assert set(told) >= {"policies", "world", "settings", "scores", "differences", "missing", "failures"}

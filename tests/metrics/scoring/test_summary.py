@@ -5,6 +5,7 @@ import json
 import pytest
 
 from metrics import summarize_runs
+from metrics.scoring.plots import interval_words
 from swarm_forage_env import Plan, World, parse_wrapper, policy_specs, run_plan, scenario
 from tests.support.pictures import keep_figures
 
@@ -38,3 +39,15 @@ def test_failed_runs_are_in_the_answer_and_leave_nothing_to_draw(tmp_path):
     assert str(summary).endswith("RuntimeError: I would rather not")
     with pytest.raises(ValueError, match="nothing to draw"):
         summary.draw(tmp_path / "runs.png")
+
+
+@pytest.mark.parametrize(
+    ("n_runs", "words"),
+    [
+        ([1, 1], "one seed, so no interval"),
+        ([1, 3], "± 95% t interval over 3 seeds, wide because so few say little (make 4 or more)"),
+        ([0, 4], "± 95% t interval over seeds"),
+    ],
+)
+def test_wide_and_absent_intervals_are_explained(n_runs, words):
+    assert interval_words(n_runs) == words
