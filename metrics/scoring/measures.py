@@ -60,8 +60,6 @@ class Measure:
 
     symbol: str
     """Symbol in the paper."""
-    equation: str
-    """Displayed equation of the paper, or where else it comes from; "ours" is not in the paper."""
     varies: str
     """What has to be varied for it."""
     of: Callable[[Compared], FloatArray]
@@ -164,7 +162,6 @@ _LOST = ("interference_fraction",)
 MEASURES: dict[str, Measure] = {
     "raw_performance": Measure(
         symbol="P(N)",
-        equation="raw performance figures",
         varies=SIZE,
         of=lambda c: raw_performance(c.runs.performance, reduce="sum"),
         unit="{amount} {span}",
@@ -173,7 +170,6 @@ MEASURES: dict[str, Measure] = {
     ),
     "efficiency": Measure(
         symbol="P(N) / N",
-        equation="Hecker and Moses 2015",
         varies=SIZE,
         of=lambda c: efficiency(c.runs.performance, c.runs.n_robots, reduce="sum"),
         unit="{amount} per robot {span}",
@@ -182,7 +178,6 @@ MEASURES: dict[str, Measure] = {
     ),
     "t_lost_fraction": Measure(
         symbol="t_lost(N, t)",
-        equation="notation table",
         varies=SIZE,
         of=lambda c: c.runs.interference.mean(axis=-1),
         unit="share of robot time",
@@ -193,7 +188,6 @@ MEASURES: dict[str, Measure] = {
     ),
     "performance_lost": Measure(
         symbol="P_lost(N, t)",
-        equation="Eq. (1)",
         varies=SIZE,
         of=_performance_lost,
         unit="{amount} {span}",
@@ -205,7 +199,6 @@ MEASURES: dict[str, Measure] = {
     ),
     "spatial_emergence": Measure(
         symbol="E_S(N1, N2)",
-        equation="Eq. (2)",
         varies=SIZE,
         of=_spatial_emergence,
         unit="{amount} {span}",
@@ -217,7 +210,6 @@ MEASURES: dict[str, Measure] = {
     ),
     "time_emergence": Measure(
         symbol="E_R(N1, N2)",
-        equation="ours, Eq. (2) in robot time",
         varies=SIZE,
         of=lambda c: time_emergence(c.base.interference, c.base.n_robots, c.runs.interference, c.runs.n_robots),
         unit="robots",
@@ -226,7 +218,6 @@ MEASURES: dict[str, Measure] = {
     ),
     "task_emergence": Measure(
         symbol="E_T(N1, N2)",
-        equation="Eq. (3)",
         varies=SIZE,
         of=lambda c: task_emergence(c.base.performance, c.base.n_robots, c.runs.performance, c.runs.n_robots),
         unit="{amount} {span}",
@@ -235,7 +226,6 @@ MEASURES: dict[str, Measure] = {
     ),
     "interference_gain": Measure(
         symbol="E_I(N1, N2)",
-        equation="ours, part of Eq. (3)",
         varies=SIZE,
         of=lambda c: interference_gain(*_losses(c.base), *_losses(c.runs)),
         unit="{amount} {span}",
@@ -245,7 +235,6 @@ MEASURES: dict[str, Measure] = {
     ),
     "undisturbed_gain": Measure(
         symbol="E_U(N1, N2)",
-        equation="ours, part of Eq. (3)",
         varies=SIZE,
         of=lambda c: undisturbed_gain(*_losses(c.base), *_losses(c.runs)),
         unit="{amount} {span}",
@@ -255,7 +244,6 @@ MEASURES: dict[str, Measure] = {
     ),
     "scalability": Measure(
         symbol="C(N1, N2)",
-        equation="Eq. (4)",
         varies=SIZE,
         of=lambda c: scalability(
             c.base.performance, c.base.n_robots, c.runs.performance, c.runs.n_robots, variant=c.variant
@@ -267,7 +255,6 @@ MEASURES: dict[str, Measure] = {
     ),
     "reactivity": Measure(
         symbol="R(N)",
-        equation="Eqs. (5) and (6)",
         varies=THROTTLE,
         of=_reactivity,
         unit="{amount} (DTW)",
@@ -280,7 +267,6 @@ MEASURES: dict[str, Measure] = {
     ),
     "adaptability": Measure(
         symbol="A(N)",
-        equation="Eq. (7)",
         varies=THROTTLE,
         of=lambda c: adaptability(c.base.performance, c.runs.performance),
         unit="{amount} (DTW)",
@@ -291,7 +277,6 @@ MEASURES: dict[str, Measure] = {
     ),
     "noise_robustness": Measure(
         symbol="B_sa",
-        equation="Eq. (8)",
         varies=NOISE,
         of=lambda c: noise_robustness(c.base.performance, c.runs.performance),
         unit="{amount} (DTW)",
@@ -302,7 +287,6 @@ MEASURES: dict[str, Measure] = {
     ),
     "population_robustness": Measure(
         symbol="B_pd",
-        equation="Eq. (12)",
         varies=POPULATION,
         of=_population_robustness,
         unit="{amount} {span}",
@@ -311,7 +295,6 @@ MEASURES: dict[str, Measure] = {
     ),
     "recorded_population_robustness": Measure(
         symbol="B_pd'",
-        equation="ours, Eq. (12) with the robots recorded at work",
         varies=POPULATION,
         of=_recorded_population_robustness,
         unit="{amount} {span}",
@@ -320,7 +303,6 @@ MEASURES: dict[str, Measure] = {
     ),
     "availability": Measure(
         symbol="p_v",
-        equation="Eq. (13)",
         varies=POPULATION,
         of=lambda c: np.array([availability(c.runs.n_robots, _enough(c.runs), ratio_out(c.runs))]),
         unit="probability",

@@ -127,20 +127,16 @@ def plan_worlds(
             reference, disturbed = adversity.levels(scenario)
             chosen = spread(disturbed, budget.n_levels)
             worlds += [
-                World(scenario, joined_wrappers(always, wrappers, criterion), criterion=criterion, value=value)
+                World(scenario, _joined(always, wrappers, criterion), criterion=criterion, value=value)
                 for value, wrappers in (*reference, *chosen)
             ]
     return tuple(worlds)
 
 
-def joined_wrappers(
+def _joined(
     always: Sequence[WrapperConfig], varied: Sequence[WrapperConfig], criterion: str
 ) -> tuple[WrapperConfig, ...]:
-    """Return the wrappers of all worlds, followed by the wrappers of a level.
-
-    Raises:
-        ConfigError: both contain a wrapper of the same kind.
-    """
+    """Return the wrappers of all worlds, then those of a level; raises ConfigError if both have one of a kind."""
     taken = sorted({config.name for config in always} & {config.name for config in varied})
     if taken:
         raise ConfigError(
@@ -303,14 +299,6 @@ _Levels = tuple[list[_Level], list[_Level]]
 """The reference, if it has wrappers, and the disturbed levels."""
 
 
-def _throttle_levels(scenario: ScenarioConfig) -> _Levels:
-    return _waved(sine_throttles() if scenario.name == "search_and_rescue" else square_throttles(), scenario)
-
-
-def _handling_levels(scenario: ScenarioConfig) -> _Levels:
-    return _waved(square_costs(), scenario)
-
-
 def _waved(configs: Sequence[ThrottleConfig] | Sequence[HandlingCostConfig], scenario: ScenarioConfig) -> _Levels:
     """Levels of waveforms compressed to the length of a run; the first is the ideal one."""
     levels: list[_Level] = []
@@ -379,8 +367,11 @@ class _Adversity(NamedTuple):
 
 
 _ADVERSITIES: dict[str, _Adversity] = {
-    "throttle": _Adversity(_throttle_levels, _waved_at),
-    "handling_cost": _Adversity(_handling_levels, _waved_at),
+    "throttle": _Adversity(
+        lambda given: _waved(sine_throttles() if given.name == "search_and_rescue" else square_throttles(), given),
+        _waved_at,
+    ),
+    "handling_cost": _Adversity(lambda given: _waved(square_costs(), given), _waved_at),
     "noise": _Adversity(_noise_levels, _noise_at),
     "population_dynamics": _Adversity(_population_levels, _population_at),
 }
