@@ -9,9 +9,9 @@ from .plots import draw_scores
 from .policy_scores import Scores, score, score_curves, score_question
 from .question import Question
 from .run_curves import StudyLine, study_lines
-from .study_numbers import StudyPanel, StudyPanels, study_panels
-from .study_plots import PlottedStudy, StudyFigure, draw_figure, plot, study_figures
-from .study_verdict import Judged, StudyVerdict, Waiting, judge_claims, verdict
+from .study_numbers import StudyPanel, study_panels
+from .study_plots import StudyFigure, draw_figure, plot, study_figures
+from .study_verdict import StudyVerdict, verdict
 from .summary import RunSummary, summarize_runs
 
 __all__ = [
@@ -30,7 +30,6 @@ __all__ = [
     "study_panels",
     "study_figures",
     "draw_figure",
-    "judge_claims",
     "verdict",
     "plot",
     "draw_scores",
@@ -38,12 +37,8 @@ __all__ = [
     "Question",
     "StudyLine",
     "StudyPanel",
-    "StudyPanels",
     "StudyFigure",
     "StudyVerdict",
-    "PlottedStudy",
-    "Judged",
-    "Waiting",
     "Performance",
     "RunSummary",
 ]

@@ -3,77 +3,56 @@
 A panel has the scores of every run. It is drawn as it is, and the claims of the paper are held against it.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
 from typing import TYPE_CHECKING, Any, TypeAlias, cast, get_args
 
 import numpy as np
 import polars as pl
 
 from ..checks import CurveError
-from ..claims import Panel, PanelName
-from ..claims.claim import DISTANCES
+from ..claims import EXPERIMENTS, Panel, PanelName
 from ..claims.panel import TIE
 from ..curves import FloatArray, Form, Variant
 from ..statistics import CONFIDENCE
-from .frame import SCHEMA, label_of, scores
-from .measures import DISTURBANCES, MEASURES, check_words
-from .run_curves import THROTTLE, StudyCurves, StudyLine, study_lines
+from .frame import SCHEMA, scores
+from .measures import DISTURBANCES, MEASURES, PICTURED, check_words
+from .run_curves import THROTTLE, StudyLine, study_lines
 
 if TYPE_CHECKING:
     from swarm_forage_env.studies.results import StudyTable
-    from swarm_forage_env.studies.study_file import Value
+    from swarm_forage_env.studies.study import StudySpec
 
-FIGURE_MEASURES = (
-    "raw_performance",
-    "spatial_emergence",
-    "task_emergence",
-    "scalability",
-    "reactivity",
-    "adaptability",
-    "noise_robustness",
-    "population_robustness",
-    "recorded_population_robustness",
+Key: TypeAlias = tuple[str, Variant, Form]
+"""Measure, variant and form."""
+FIGURES: tuple[tuple[str, Form], ...] = (
+    ("raw_performance", "marginal"),
+    ("spatial_emergence", "interactive"),
+    *((measure, "marginal") for measure in PICTURED if measure not in ("raw_performance", "t_lost_fraction")),
+    ("recorded_population_robustness", "marginal"),
 )
-"""Measures that the paper's figures show, and population robustness with the robots that were at work."""
-FIGURE_FORMS: dict[str, tuple[Form, ...]] = {"spatial_emergence": ("interactive", "marginal")}
-"""Measure -> forms that the figures show, where it is not the marginal one alone: in the warehouses a swarm is held
-beside as many robots that work alone, in search and rescue, where no robot works alone, beside the next smaller swarm.
-"""
+"""Measures that the paper's figures show, and population robustness with the robots that were at work.
 
-_EXPERIMENTS: dict[tuple[Any, ...], str] = {
-    **{(name,): name for name in ("S1a", "S1b", "S1c", "S1d", "S1e", "S1f", "S1g", "S1h")},
-    ("S2a", 0.0): "S2a still",
-    ("S2a", 0.001): "S2a slow",
-    ("S2a", 0.051): "S2a fast",
-    ("S2b", 12): "S2b 12",
-    ("S2b", 115): "S2b 115",
-    ("S2b", 320): "S2b 320",
-    ("S2c", 115): "S2c 115",
-    ("S2c", 320): "S2c 320",
-    ("S2d", 115): "S2d 115",
-    ("S2d", 320): "S2d 320",
-}
-"""Name of a set, and value on its first axis where it has two -> experiment that claims speak of."""
+Spatial emergence has two forms: in the warehouses a swarm is held beside as many robots that work alone, in search and
+rescue, where no robot works alone, beside the next smaller swarm.
+"""
+_PACES = {0.0: "still", 0.001: "slow", 0.051: "fast"}
+"""Value on the first axis of S2a -> its word in the name of an experiment."""
 TIE_OF_FRACTIONS = 0.02
 """Largest difference of fractions that is a tie (our choice)."""
-
-_ByLevel: TypeAlias = Mapping[str, Mapping[float, Mapping[int, float]]]
-"""Policy -> level -> seed -> value."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StudyPanel:
     """One measure in one variant, of all policies under one of the rules, at one value of each other axis."""
 
-    study: str
-    """Name of the study."""
-    rules: str
-    """Which rules: "described" or "program"."""
-    others: "Mapping[str, Value]"
-    """Value on each axis but the last, by its name."""
-    words: Mapping[str, str]
-    """How these values are shown."""
+    spec: "StudySpec"
+    lines: tuple[StudyLine, ...]
+    """One per policy."""
+    frame: pl.DataFrame
+    """Their scores, as in `frame.SCHEMA`."""
     measure: str
     """Name in `MEASURES`."""
     variant: Variant
@@ -81,100 +60,106 @@ class StudyPanel:
     """With what a swarm size is compared; "marginal" for measures that compare none."""
     criterion: str
     """What is varied along x."""
-    x: FloatArray
-    """Its values, rising, (L,): swarm sizes, amplitudes, ...; the level that others are compared with is left out."""
-    levels: FloatArray
-    """Where they are in the paper's figures, rising, (L,): of throttles the distance of conditions from the ideal."""
     unit: str
-    seeds: tuple[int, ...]
-    """Seed of each run, (R,)."""
-    scores: Mapping[str, FloatArray]
-    """Policy -> one score per level and run, (L, R); NaN is a run without a score."""
-    relative: Mapping[str, FloatArray] = field(default_factory=dict[str, FloatArray])
-    """The same as shares of the performance that they are compared with; empty for measures without such shares."""
-    compared_with: FloatArray | None = None
-    """That performance, mean of runs and policies, (L,)."""
-    of_mean_curves: Mapping[str, FloatArray] = field(default_factory=dict[str, FloatArray])
-    """For distances, policy -> pseudo-values of the distance of mean curves per level and run, (L, R)."""
-    relative_of_mean_curves: Mapping[str, FloatArray] = field(default_factory=dict[str, FloatArray])
-    """The same as shares of the performance that they are compared with."""
-    floors: Mapping[str, FloatArray] = field(default_factory=dict[str, FloatArray])
-    """For distances, policy -> distances between undisturbed runs, (R,)."""
-    departures: FloatArray | None = None
-    """Of a changing population, robots that die or fail per 1,000 s at each level, (L,)."""
-    n_runs_of: Mapping[str, int] = field(default_factory=dict[str, int])
-    """As in `Panel`."""
-    confidence: float = CONFIDENCE
-    """As in `Panel`."""
 
     @property
-    def drawn_at(self) -> FloatArray:
-        """Where the levels are in our figures, (L,): rates of a population in events, not in the paper's words."""
-        return self.levels if self.departures is None else self.departures
-
-    @property
-    def experiment(self) -> str | None:
-        """Name of the experiment in `metrics.claims.EXPERIMENTS`; None if the paper's claims are not about it."""
-        return experiment_of(self.study, tuple(self.others.values()))
+    def rules(self) -> str:
+        """Which rules: "described" or "program"."""
+        return self.lines[0].rules
 
     @property
     def name(self) -> PanelName:
         """Its name in claims; without an experiment if they are not about it."""
-        return PanelName(self.experiment or "", self.measure, self.form)
+        values = self.lines[0].others.values()
+        experiment = " ".join([self.spec.name, *(str(_PACES.get(cast(Any, value), value)) for value in values)])
+        return PanelName(experiment if experiment in EXPERIMENTS else "", self.measure, self.form)
+
+    @cached_property
+    def x(self) -> FloatArray:
+        """What is varied, rising, (L,): swarm sizes, amplitudes, ..., without what the others are compared with."""
+        return self.frame["x"].unique().sort().to_numpy()
+
+    @cached_property
+    def levels(self) -> FloatArray:
+        """Where they are in the paper's figures, rising, (L,): of throttles the distance from ideal conditions."""
+        distances = dict(self.frame.select("x", "distance").drop_nulls().iter_rows())
+        far = np.array([distances.get(x, np.nan) for x in self.x])
+        return far if np.isfinite(far).all() and (np.diff(far) > 0.0).all() else self.x
+
+    @cached_property
+    def departures(self) -> FloatArray | None:
+        """Of a changing population, robots that die or fail per 1,000 s at each level, (L,)."""
+        rates = {runs.value: runs.rates for runs in self.lines[0].curves.experiments}
+        known = [1000.0 * of.lam for x in self.x if (of := rates.get(x)) is not None]
+        return np.array(known) if len(known) == len(self.x) else None
+
+    @cached_property
+    def _cells(self) -> pl.DataFrame:
+        """The frame with a row for every policy, level and seed, in this order."""
+        places = product([line.policy for line in self.lines], self.x.tolist(), sorted(self.spec.seeds))
+        grid = pl.DataFrame(list(places), schema=["policy", "x", "seed"], orient="row")
+        return grid.join(self.frame, on=grid.columns, how="left", maintain_order="left")
+
+    def of(self, column: str) -> dict[str, FloatArray]:
+        """Return a column of the frame by policy, (L, R) each with seeds rising; NaN is a run without a number."""
+        values = self._cells[column].to_numpy().reshape(len(self.lines), len(self.x), len(self.spec.seeds))
+        return {line.policy: each for line, each in zip(self.lines, values, strict=True)}
 
     @property
-    def higher_is_better(self) -> bool:
-        """Direction of the measure."""
-        return MEASURES[self.measure].higher_is_better
+    def scores(self) -> dict[str, FloatArray]:
+        """Policy -> one score per level and run, (L, R)."""
+        return self.of("value")
 
-    def scores_of(self, name: PanelName) -> Mapping[str, FloatArray]:
-        """Return the scores that a panel of claims shows, (L, R) each; empty where it has none."""
-        if name.of_mean_curves:
-            return self.relative_of_mean_curves if name.is_relative else self.of_mean_curves
-        return self.relative if name.is_relative else self.scores
+    @property
+    def floors(self) -> dict[str, FloatArray]:
+        """For distances, policy -> distances between undisturbed runs, (R,); empty unless all policies have some."""
+        floors = {policy: values[0] for policy, values in self.of("floor_of_seed").items()}
+        return floors if all(np.isfinite(floor).any() for floor in floors.values()) else {}
 
-    def for_claims(self, name: PanelName | None = None) -> Panel:
-        """Return the scores as claims want them, or those of this name: shares of performance, of mean curves.
+    @property
+    def compared_with(self) -> FloatArray | None:
+        """Performance that amounts are compared with, mean of policies, (L,); performance with the mean of all runs."""
+        column, by = ("value", ["x"]) if self.measure == "raw_performance" else ("total", ["policy", "x"])
+        means = self.frame.group_by(by).agg(pl.col(column).mean())
+        total = means.group_by("x").agg(pl.col(column).mean()).sort("x")[column]
+        return total.to_numpy() if total.count() else None
+
+    def for_claims(self, name: PanelName) -> Panel | None:
+        """Return the scores that a panel of claims shows: shares of performance, of mean curves; None if it has none.
 
         Margins of ties are in the measure's own unit (our choice): a tenth of the performance that an amount is
         compared with, a tenth of 1 for scalability, 0.02 for fractions. Else, and at levels where nothing was
         delivered, they are shares of the scores.
         """
-        measure, n_levels = MEASURES[self.measure], len(self.levels)
-        total = self.compared_with
-        panel = Panel(levels=self.levels, scores=self.scores, n_runs_of=self.n_runs_of, confidence=self.confidence)
+        columns = ("mean_curve", "relative_mean_curve") if name.of_mean_curves else ("value", "relative")
+        column = columns[name.is_relative]
+        if not self.frame[column].count():
+            return None
+        panel = Panel(levels=self.levels, scores=self.of(column))
+        looks = self.spec.run.looks
+        if looks:  # each look is wrong in its share of 5 % (Bonferroni)
+            n_runs_of = {line.policy: len(line.curves.experiments[0].seeds) for line in self.lines}
+            panel = replace(panel, n_runs_of=n_runs_of, confidence=1.0 - (1.0 - CONFIDENCE) / len(looks))
+        measure, same = MEASURES[self.measure], np.ones_like(self.levels)
         if self.measure == "scalability":
-            return replace(panel, margins=np.full(n_levels, TIE), unit=1.0)
+            return replace(panel, margins=TIE * same, unit=1.0)
         if np.isfinite((measure.lowest, measure.highest)).all():
-            return replace(panel, margins=np.full(n_levels, TIE_OF_FRACTIONS), unit=1.0)
-        shown = self.name if name is None else name
-        floors = None if shown.of_mean_curves else self.floors or None  # undisturbed runs have no second mean curve
-        margins = None if total is None else np.where(total > 0.0, TIE * total, panel.tie_margins)
-        if shown.is_relative:
-            margins = np.full(n_levels, TIE)
-            if floors is not None and total is not None:
-                with np.errstate(divide="ignore", invalid="ignore"):  # where nothing was delivered there are no shares
-                    floors = {policy: floor / total[0] for policy, floor in floors.items()}
-        return replace(panel, scores=self.scores_of(shown), margins=margins, undisturbed=floors)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class StudyPanels:
-    """All panels of a study."""
-
-    panels: tuple[StudyPanel, ...]
-    missing: Mapping[tuple[str, str], str]
-    """Measure (in a form of it) and variant -> why no policy has scores, of those for what the study varies."""
-
-
-def experiment_of(study: str, others: "Sequence[Value]") -> str | None:
-    """Return the experiment in `metrics.claims.EXPERIMENTS` that a study has at these values on its first axes."""
-    return _EXPERIMENTS.get((study, *others))
+            return replace(panel, margins=TIE_OF_FRACTIONS * same, unit=1.0)
+        floors = {} if name.of_mean_curves else self.floors  # undisturbed runs have no second mean curve
+        total = self.compared_with
+        if total is None:
+            return replace(panel, undisturbed=floors or None)
+        margins = np.where(total > 0.0, TIE * total, panel.tie_margins)
+        if name.is_relative:
+            margins = TIE * same
+            with np.errstate(divide="ignore", invalid="ignore"):  # where nothing was delivered there are no shares
+                floors = {policy: floor / total[0] for policy, floor in floors.items()}
+        return replace(panel, margins=margins, undisturbed=floors or None)
 
 
 def study_panels(
-    table: "StudyTable", variants: Sequence[Variant] = ("corrected",), measures: Sequence[str] = FIGURE_MEASURES
-) -> StudyPanels:
+    table: "StudyTable", variants: Sequence[Variant] = ("corrected",)
+) -> tuple[tuple[StudyPanel, ...], dict[Key, str]]:
     """Score a study and return its panels, by rules, other axes, variant, measure and form.
 
     A study whose last axis is no criterion of these measures has panels of its performance, where the axis has numbers.
@@ -182,172 +167,62 @@ def study_panels(
     Args:
         table: From `swarm_forage_env.read_study`.
         variants: Variants of the measures; a measure has a panel in each that it has.
-        measures: Names in `MEASURES`; those of another criterion than the study's are left out.
+
+    Returns:
+        The panels, and why no policy has scores of a measure for what the study varies.
 
     Raises:
-        CurveError: an unknown measure or variant.
+        CurveError: an unknown variant.
     """
     check_words("variant", variants, get_args(Variant))
-    lines: dict[tuple[Any, ...], list[StudyLine]] = {}
+    groups: dict[tuple[Any, ...], list[StudyLine]] = {}
     for line in study_lines(table):
-        lines.setdefault((line.rules, *line.others.values()), []).append(line)
+        groups.setdefault((line.rules, *line.others.values()), []).append(line)
     panels: list[StudyPanel] = []
-    missing: dict[tuple[str, str], str] = {}
+    missing: dict[Key, str] = {}
     is_scored = bool(table.spec.axes) and table.spec.axes[-1].is_criterion
-    for together in lines.values() if is_scored else ():
-        about: dict[str, Any] = {}
-        if table.spec.run.looks:  # each look is wrong in its share of 5 % (Bonferroni)
-            about["n_runs_of"] = {line.policy: len(line.curves.experiments[0].seeds) for line in together}
-            about["confidence"] = 1.0 - (1.0 - CONFIDENCE) / len(table.spec.run.looks)
-        for variant in variants:
-            for measure, form in _measures_in(measures, variant, together[0].curves):
-                scored = {line.policy: _scores(line.curves, measure, variant, form) for line in together}
-                found = {policy: frame for policy, (frame, _) in scored.items()}
-                if any(len(each) for each in found.values()):
-                    panels.append(replace(_score_panel(table, together[0], variant, form, found), **about))
-                else:
-                    reasons = dict.fromkeys(why for _, why in scored.values() if why)
-                    missing[label_of(measure, "corrected", form), variant] = "; ".join(reasons)
-    if not panels and "raw_performance" in measures:
-        panels = _performance_panels(table, list(lines.values()))
-    return StudyPanels(panels=tuple(panels), missing=missing)
-
-
-def _measures_in(measures: Sequence[str], variant: Variant, curves: StudyCurves) -> list[tuple[str, Form]]:
-    """Return the measures that have a variant, and whose criterion is varied, in each form that figures show.
-
-    The interactive form is left out where no robot works alone: it cannot be computed, and no figure shows it.
-    """
-    varied = {experiment.criterion for experiment in curves.experiments}
-    if varied & set(DISTURBANCES):
-        varied.add(THROTTLE)
-    sizes = curves.sizes()
-    has_lone_robot = bool(sizes) and sizes[0].n_robots == 1
-    return [
-        (measure, form)
-        for measure in measures
-        for form in FIGURE_FORMS.get(measure, ("marginal",))
-        if form == "marginal" or has_lone_robot
-        if MEASURES[measure].varies in varied and variant in MEASURES[measure].variants
-    ]
-
-
-def _scores(curves: StudyCurves, measure: str, variant: Variant, form: Form) -> tuple[pl.DataFrame, str]:
-    """Return the scores of one line, and why there are none."""
-    try:
-        found, missing = scores([curves], [measure], variants=[variant], forms=[form])
-    except CurveError as error:
-        return pl.DataFrame(schema=SCHEMA), str(error)
-    return found, "; ".join(missing.values())
-
-
-def _panel(
-    table: "StudyTable",
-    line: StudyLine,
-    values: _ByLevel,
-    distances: Mapping[float, float],
-    **told: Any,
-) -> StudyPanel:
-    """Put the values of several policies beside each other.
-
-    Args:
-        table: The study.
-        line: Of one of the policies.
-        values: Policy -> level -> seed -> value.
-        distances: Level -> distance of its conditions from the ideal ones, where it is known.
-        told: Fields of `StudyPanel` that no value tells.
-    """
-    x = _levels_of(values)
-    seeds = tuple(sorted(table.spec.seeds))
-    far = np.array([distances.get(level, np.nan) for level in x])
-    leaving = {runs.value: 1000.0 * runs.rates.lam for runs in line.curves.experiments if runs.rates is not None}
-    return StudyPanel(
-        study=table.spec.name,
-        rules=line.rules,
-        others=line.others,
-        words=line.words,
-        x=np.array(x),
-        levels=far if np.isfinite(far).all() and (np.diff(far) > 0.0).all() else np.array(x),
-        seeds=seeds,
-        scores=_arrays(values, seeds),
-        departures=np.array([leaving[level] for level in x]) if x and leaving.keys() >= {*x} else None,
-        **told,
-    )
-
-
-def _levels_of(values: _ByLevel) -> list[float]:
-    return sorted({level for of_policy in values.values() for level in of_policy})
-
-
-def _arrays(values: _ByLevel, seeds: Sequence[int]) -> dict[str, FloatArray]:
-    """Return policy -> (L, R), NaN where there is no value."""
-    x = _levels_of(values)
-    return {
-        policy: np.array([[of_policy.get(level, {}).get(seed, np.nan) for seed in seeds] for level in x])
-        for policy, of_policy in values.items()
-    }
-
-
-def _score_panel(
-    table: "StudyTable", line: StudyLine, variant: Variant, form: Form, found: Mapping[str, pl.DataFrame]
-) -> StudyPanel:
-    frame, seeds = pl.concat(found.values()), sorted(table.spec.seeds)
-    first = frame.row(0, named=True)
-    about: dict[str, Any] = {name: first[name] for name in ("measure", "criterion", "unit")}
-    if first["measure"] == "raw_performance":  # an amount that is compared with itself
-        about["compared_with"] = frame.group_by("x").agg(pl.col("value").mean()).sort("x")["value"].to_numpy()
-    elif frame["total"].count():
-        means = frame.group_by("policy", "x").agg(pl.col("total").mean())
-        about["compared_with"] = means.group_by("x").agg(pl.col("total").mean()).sort("x")["total"].to_numpy()
-    of = {column: _by_level(found, column) for column in ("value", "relative", "mean_curve", "relative_mean_curve")}
-    if frame["relative"].count():
-        about["relative"] = _arrays(of["relative"], seeds)
-    if first["measure"] in DISTANCES:
-        about["of_mean_curves"] = _arrays(of["mean_curve"], seeds)
-        about["relative_of_mean_curves"] = _arrays(of["relative_mean_curve"], seeds)
-    floors = {policy: _floors(each) for policy, each in found.items() if len(each)}
-    if all(floors.values()):
-        about["floors"] = {policy: np.array([of.get(seed, np.nan) for seed in seeds]) for policy, of in floors.items()}
-    distances = dict(frame.select("x", "distance").drop_nulls().iter_rows())
-    return _panel(table, line, of["value"], distances, variant=variant, form=form, **about)
-
-
-def _floors(frame: pl.DataFrame) -> dict[int, float]:
-    """Return seed -> distance of undisturbed runs, of the first level; those of others are the same runs."""
-    first = frame.filter(pl.col("x") == frame["x"][0])
-    return dict(first.select("seed", "floor_of_seed").drop_nulls().iter_rows())
-
-
-def _by_level(found: Mapping[str, pl.DataFrame], column: str) -> _ByLevel:
-    """Return the values of a column, policy -> level -> seed; levels whose runs all failed have none."""
-    values: dict[str, dict[float, dict[int, float]]] = {policy: {} for policy in found}
-    for policy, frame in found.items():
-        for x, seed, value in frame.select("x", "seed", column).iter_rows():
-            of_level = values[policy].setdefault(x, {})
-            if value is not None:
-                of_level[seed] = value
-    return values
-
-
-def _performance_panels(table: "StudyTable", groups: Sequence[Sequence[StudyLine]]) -> list[StudyPanel]:
-    """Return the performance of each run over the last axis, whatever that is, where it has numbers."""
+    for lines, variant, (measure, form) in product(groups.values(), variants, FIGURES) if is_scored else ():
+        criteria = {runs.criterion for runs in lines[0].curves.experiments}
+        varied = {THROTTLE if name in DISTURBANCES else name for name in criteria}
+        if MEASURES[measure].varies in varied and variant in MEASURES[measure].variants:
+            frame, why = _scores(lines, measure, variant, form)
+            if len(frame):
+                panels.append(_panel(table, lines, frame))
+            else:
+                missing[measure, variant, form] = why
     levels = table.spec.axes[-1].values if table.spec.axes else ()
-    if not levels or any(isinstance(level, str | bool) for level in levels):
-        return []
-    panels: list[StudyPanel] = []
-    for lines in groups:
-        first = lines[0].curves
-        values = {
-            line.policy: {
-                float(cast(Any, level)): dict(zip(runs.seeds, runs.performance.sum(axis=-1).tolist(), strict=True))
-                if runs.seeds
-                else {}
-                for level, runs in zip(levels, line.curves.experiments, strict=True)
-            }
-            for line in lines
-        }
-        over = f"in {table.spec.length.horizon_s:,.0f} s" if first.read_as.is_total else "summed over intervals"
-        about = {"measure": "raw_performance", "variant": "corrected", "form": "marginal"}
-        about |= {"criterion": table.spec.axes[-1].name, "unit": f"{first.read_as.amount} {over}"}
-        panels.append(_panel(table, lines[0], values, {}, **about))
-    return panels
+    if levels and not panels and not any(isinstance(level, str | bool) for level in levels):
+        panels = [_panel(table, lines, _performance(table, lines)) for lines in groups.values()]
+    return tuple(panels), missing
+
+
+def _panel(table: "StudyTable", lines: Sequence[StudyLine], frame: pl.DataFrame) -> StudyPanel:
+    about = frame.select("measure", "variant", "form", "criterion", "unit").row(0, named=True)
+    return StudyPanel(spec=table.spec, lines=tuple(lines), frame=frame, **about)
+
+
+def _scores(lines: Sequence[StudyLine], measure: str, variant: Variant, form: Form) -> tuple[pl.DataFrame, str]:
+    """Return the scores of all policies that have some, and why others have none."""
+    frames, reasons = [pl.DataFrame(schema=SCHEMA)], dict[str, None]()
+    for line in lines:
+        try:
+            frame, missing = scores([line.curves], [measure], variants=[variant], forms=[form])
+            frames.append(frame)
+            reasons |= dict.fromkeys(missing.values())
+        except CurveError as error:
+            reasons[str(error)] = None
+    return pl.concat(frames), "; ".join(reasons)
+
+
+def _performance(table: "StudyTable", lines: Sequence[StudyLine]) -> pl.DataFrame:
+    """Return the performance of each run over the last axis, whatever that is."""
+    axis, counted = table.spec.axes[-1], lines[0].curves.read_as
+    over = f"in {table.spec.length.horizon_s:,.0f} s" if counted.is_total else "summed over intervals"
+    about = {"measure": "raw_performance", "variant": "corrected", "form": "marginal", "criterion": axis.name}
+    rows: list[dict[str, Any]] = []
+    for line in lines:
+        for level, runs in zip(axis.values, line.curves.experiments, strict=True):
+            place = {**about, "unit": f"{counted.amount} {over}", "policy": line.policy, "x": float(cast(Any, level))}
+            totals = zip(runs.seeds, runs.performance.sum(axis=-1), strict=True) if runs.seeds else [(None, None)]
+            rows += [{**place, "seed": seed, "value": total} for seed, total in totals]
+    return pl.DataFrame(rows, schema=SCHEMA)

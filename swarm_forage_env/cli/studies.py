@@ -1,7 +1,6 @@
 """The commands of studies: what there is, running them, and what came of them."""
 
 from contextlib import nullcontext
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
@@ -135,10 +134,7 @@ def verdict(places: Places, /, *, file: Path | None = None, as_json: AsJson = Fa
     found = verdict_of(*tables, tell=note)
     for remark in found.remarks:
         note(f"note: {remark}")
-    if as_json:
-        say(found.json())
-    else:
-        show(replace(found, is_folded=True))
+    show(found, as_json=as_json)
     if file is not None:
         found.write(file)
         note(f"written {file}")
@@ -166,7 +162,7 @@ def plot(
     from metrics import plot as plot_study
 
     table = _read(place)
-    plotted = plot_study(
+    files, missing = plot_study(
         table,
         out or Path("results", "figures", table.spec.name),
         band="sd" if band else "ci",
@@ -174,7 +170,7 @@ def plot(
         formats=formats,
         style=style.style(),
     )
-    for file in plotted.files:
+    for file in files:
         say(file)
-    for line in plotted.missing:
+    for line in missing:
         note(line)

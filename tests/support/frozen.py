@@ -16,6 +16,7 @@ import numpy as np
 import polars as pl
 
 from metrics import score, verdict
+from metrics.claims import CLAIMS
 from swarm_forage_env import scenario
 from swarm_forage_env.studies.ladders import Budget
 from swarm_forage_env.studies.results import read_study, run_study
@@ -62,9 +63,9 @@ def verdict_answers() -> dict[str, str]:
         run_study(study, folder, jobs=1)
         found = verdict(read_study(folder))
     return {
-        f"{one.claim.name} {one.rules} {one.variant}": f"{one.verdict.answer}, by bands {one.verdict.by_bands}"
-        for one in found.judged
-        if one.variant in ("corrected", "paper")
+        "{claim} {rules} {measures}".format(**row): "{answer}, by bands {by_bands}".format(**row)
+        for row in found.frame.filter(pl.col("answer") != "waits", sense="").iter_rows(named=True)
+        if row["claim"] in CLAIMS
     }
 
 
