@@ -15,7 +15,7 @@ rows (`LearnerArena`) are absent from the first step of the run to the last. The
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol, cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -75,30 +75,6 @@ class ArenaStep:
     """Runs that ended."""
 
 
-class Rows(Protocol):
-    """Sizes of a batch."""
-
-    n_arenas: int
-    n_robots: int
-    n_rows: int
-
-
-def checked_rows(actions: Any, batch: Rows) -> np.ndarray:
-    """Return actions as an array; raises ValueError unless there is one per row of the batch."""
-    actions = np.asarray(actions)
-    if actions.ndim == 0 or len(actions) != batch.n_rows:
-        raise ValueError(
-            f"Expected actions for {batch.n_rows} rows ({batch.n_arenas} arenas of {batch.n_robots} robots), "
-            f"got shape {actions.shape}."
-        )
-    return actions
-
-
-def closed_error() -> RuntimeError:
-    """Return the error for a call of closed arenas."""
-    return RuntimeError("Expected open arenas, but they were closed.")
-
-
 def _owner(env: ForageEnv | SwarmWrapper, name: str) -> ForageEnv | SwarmWrapper:
     """Return the wrapper or environment of a stack that has the attribute itself and does not only pass it on."""
     while isinstance(env, SwarmWrapper) and name not in vars(env) and not hasattr(type(env), name):
@@ -155,7 +131,7 @@ class ArenaBatch:
             RuntimeError: closed.
         """
         if self._is_closed:
-            raise closed_error()
+            raise RuntimeError("Expected open arenas, but they were closed.")
         self._is_reset = False  # and stays False if a seed or an option is refused before every arena has started
         obs = np.empty((*self._shape, self.interface.layout.size), np.float32)
         for number, (seed, option) in enumerate(zip(seeds, options, strict=True)):
@@ -195,7 +171,7 @@ class ArenaBatch:
             ValueError: wrong shape, or actions that the interface or the drive refuses. A note names the arena.
         """
         self._require_reset("step")
-        actions = checked_rows(actions, self)
+        actions = self._checked_rows(actions)
         obs = np.empty((*self._shape, self.interface.layout.size), np.float32)
         rewards = np.zeros(self._shape, np.float32)
         present = self._present.copy()
@@ -271,9 +247,19 @@ class ArenaBatch:
         self._require_reset("action_masks")
         return np.concatenate([arena.mask() for arena in self.arenas])
 
+    def _checked_rows(self, actions: Any) -> np.ndarray:
+        """Return actions as an array; raises ValueError unless there is one per row."""
+        actions = np.asarray(actions)
+        if actions.ndim == 0 or len(actions) != self.n_rows:
+            raise ValueError(
+                f"Expected actions for {self.n_rows} rows ({self.n_arenas} arenas of {self.n_robots} robots), "
+                f"got shape {actions.shape}."
+            )
+        return actions
+
     def _require_reset(self, what: str) -> None:
         if self._is_closed:
-            raise closed_error()
+            raise RuntimeError("Expected open arenas, but they were closed.")
         if not self._is_reset:
             raise RuntimeError(f"Call reset before {what}; after a step that failed half done, too.")
 

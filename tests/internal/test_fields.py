@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from msgspec import Meta
 
-from swarm_forage_env._internal.archives import check_array
 from swarm_forage_env._internal.fields import (
     Amount,
     Checked,
@@ -171,12 +170,3 @@ def test_unknown_names_are_refused_with_the_nearest():
         known_name("side", "lefd", ("left", "right"))
     with pytest.raises(ConfigError, match=r"Near it: left, loft\. All 3: list sides\."):
         known_name("side", "leftt", ("left", "loft", "top"), all_by="list sides")
-
-
-def test_arrays_are_of_one_type_and_shape():
-    check_array("a", np.zeros((3, 2), np.float32), np.float32, (3, None))
-    for given in (np.zeros((3, 2)), np.zeros((3, 2), ">f4"), np.zeros(3, np.float32), np.zeros((2, 2), np.float32)):
-        with pytest.raises(ConfigError, match=r"Expected a to be an array \(3, any\) of float32, got"):
-            check_array("a", given, np.float32, (3, None))
-    with pytest.raises(ConfigError, match="Expected a to hold finite numbers"):
-        check_array("a", np.array([np.nan], np.float32), np.float32, (1,))
