@@ -143,7 +143,7 @@ def direct(function: F, *example: Any) -> F:
     key = function, tuple(map(kind_of, example))
     if key not in _entry_points:
         with _collector_off():
-            _entry_points[key] = cast(Any, function).compile(tuple(map(typeof, example)))
+            _entry_points[key] = cast(Any, function).compile(tuple(map(_type_of, example)))
     return cast(F, _entry_points[key])
 
 
@@ -170,11 +170,17 @@ class Calls:
         return Calls, ()
 
 
+def _type_of(argument: Any) -> Any:
+    """Return numba's type of an argument; one version takes arrays that may be written to, and those that may not."""
+    kind = typeof(argument)
+    return kind.copy(readonly=False) if isinstance(kind, types.Array) else kind
+
+
 def kind_of(argument: Any) -> Any:
     """Return something that is equal for arguments of the same type."""
     if isinstance(argument, np.ndarray):
         flags = argument.flags
-        return argument.dtype, argument.ndim, flags.c_contiguous, flags.f_contiguous, flags.aligned, flags.writeable
+        return argument.dtype, argument.ndim, flags.c_contiguous, flags.f_contiguous, flags.aligned
     if isinstance(argument, tuple):
         return type(argument), *map(kind_of, argument)
     return type(argument) if type(argument) in (bool, int, float) else typeof(argument)

@@ -148,10 +148,8 @@ class KernelPolicy:
         """Choose actions; see `Policy.act`. The returned (N, A) array is reused by the next call."""
         if (obs.shape, active.shape) != self._shapes:
             require_inputs(obs, active, self._spec)
-        # The compiled version takes contiguous arrays of these types only, which can be written to.
-        obs, active = np.ascontiguousarray(obs, np.float32), np.array(active, np.bool_)
-        if not obs.flags.writeable:
-            obs = obs.copy()
+        # The compiled version takes contiguous arrays of these types only. Most often nothing is copied here.
+        obs, active = np.ascontiguousarray(obs, np.float32), np.ascontiguousarray(active, np.bool_)
         self.n_ticks += 1
         self._draws = self._chance.row(self.n_ticks)
         self._call(self._kernel, obs, active, self._draws, self._state, self.n_ticks)

@@ -273,8 +273,8 @@ class Policy(Protocol):
         """Choose actions.
 
         Args:
-            obs: (N, D) float32. The array is reused by the environment: copy what must be kept.
-            active: (N,) bool, robots of the tasked swarm; rows of others are ignored.
+            obs: (N, D) float32, read only. The array is reused by the environment: copy what must be kept.
+            active: (N,) bool, read only, robots of the tasked swarm; rows of others are ignored.
 
         Returns:
             (N, 3) float32 in [-1, 1]: left wheel, right wheel, gripper. Where robots can send messages,

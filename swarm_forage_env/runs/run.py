@@ -14,7 +14,7 @@ from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.contract.kernel_policy import CompiledPolicy
 from swarm_forage_env.contract.policy import Policy, sees_world
-from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.env import ForageEnv, read_only
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.record import Record
 from swarm_forage_env.runs.spec import RunSpec
@@ -81,7 +81,7 @@ class LiveRun:
         world, policy, has_tasks, obs, over = self.forage_env, self._policy, self._has_tasks, self._obs, self.over
         act, step = policy.act, self._stack.step_batch
         while not over and world.tick != to_tick:
-            actions = act(obs, world.active)
+            actions = act(read_only(obs), world.active)
             tasks = policy.task if has_tasks else None  # type: ignore[attr-defined] - optional, see Policy
             obs, _, terminated, truncated = step(actions, tasks=tasks)
             # Checking the first row alone is fast, and in almost every tick it is enough.

@@ -210,3 +210,17 @@ def test_a_fault_ends_a_run_where_it_ends_with_python(policy_class, error, messa
         ended.append(snapshot(run.forage_env))
     assert ended[0]["tick"] == ticks
     assert_same_world(*ended)
+
+
+@pytest.mark.parametrize("name", ["obs", "active"])
+def test_a_policy_cannot_write_into_what_it_sees(name):
+    class Writes:
+        def reset(self, spec, rng):
+            self.actions = np.zeros((spec.n_robots, 3), np.float32)
+
+        def act(self, obs, active):
+            {"obs": obs, "active": active}[name][:] = 1
+            return self.actions
+
+    with pytest.raises(ValueError, match="read-only"):
+        LiveRun(build_stack(scenario("classroom"), ()), Writes(), 1).advance(to_tick=1)
