@@ -186,6 +186,11 @@ def paired_tests(first: ArrayLike, second: ArrayLike) -> FloatArray:
 # -------------------------------------------------------------------------------------------------------- all runs
 
 
+def _check_resamples(n_resamples: int) -> None:
+    if n_resamples < 1:
+        raise CurveError(f"Expected n_resamples of at least 1, got {n_resamples}.")
+
+
 def interquartile_mean(
     values: ArrayLike | Sequence[ArrayLike], *, seed: int | None = None, n_resamples: int = N_RESAMPLES
 ) -> Estimate:
@@ -208,6 +213,7 @@ def interquartile_mean(
         CurveError: No values at some level.
     """
     strata = _strata("values", values)
+    _check_resamples(n_resamples)
     rng = np.random.default_rng(seed)
     drawn = [stratum[rng.integers(stratum.size, size=(n_resamples, stratum.size))] for stratum in strata]
     return _estimate(_middle_mean(np.concatenate(strata)), _middle_mean(np.concatenate(drawn, axis=1)), strata)
@@ -247,6 +253,7 @@ def probability_of_improvement(
         raise CurveError(f"Expected both policies at the same levels, got {len(ours)} and {len(theirs)} levels.")
     rng = np.random.default_rng(seed)
     shares: list[float] = []
+    _check_resamples(n_resamples)
     resampled = np.zeros(n_resamples)
     for x, y in zip(ours, theirs, strict=True):
         gaps = x[:, None] - y if higher_is_better else y - x[:, None]

@@ -10,7 +10,7 @@
     results.answers                                 how many claims have which answer, as a table
     results.contradicted, .supported, .split        claims with these answers under both rules, as tables
 
-Answers are ours, by intervals, with the corrected measures; `write_results.py` writes the files.
+Answers are ours, by intervals, with the corrected measures; `write_results` writes the files.
 """
 
 import csv

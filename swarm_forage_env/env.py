@@ -381,8 +381,15 @@ def checked_seed(seed: Any) -> int | None:
 
 
 def checked_gain(wheel_gain: FloatArray | None, n_robots: int) -> FloatArray | None:
-    """Return factors on the wheel speeds, (N, 2) or None; raises ActionError for another shape."""
-    expected = (n_robots, 2)
-    if wheel_gain is not None and np.shape(wheel_gain) != expected:
-        raise ActionError(f"Expected wheel_gain with shape (n_robots, 2) = {expected}, got {np.shape(wheel_gain)}.")
-    return wheel_gain
+    """Return factors on the wheel speeds, (N, 2) float64 or None; raises ActionError for what are none."""
+    if wheel_gain is None:
+        return None
+    try:
+        gain = np.ascontiguousarray(wheel_gain, np.float64)
+    except (TypeError, ValueError) as error:
+        raise ActionError(f"Expected wheel_gain as numbers, got {wheel_gain!r:.80}.") from error
+    if np.shape(wheel_gain) != (n_robots, 2):
+        raise ActionError(
+            f"Expected wheel_gain with shape (n_robots, 2) = {(n_robots, 2)}, got {np.shape(wheel_gain)}."
+        )
+    return gain

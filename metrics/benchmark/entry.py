@@ -14,7 +14,6 @@ import math
 import os
 import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
@@ -247,7 +246,6 @@ def run_benchmark(
     training: Training | None = None,
     out: str | Path | None = None,
     jobs: int | None = None,
-    executor: Executor | None = None,
     progress: bool = True,
 ) -> Entry:
     """Run policies in all worlds of a protocol and return the entry.
@@ -259,7 +257,6 @@ def run_benchmark(
         training: How the policies were made.
         out: Folder for run records. Runs that it already holds are not repeated, so you can repeat an interrupted call.
         jobs: Processes; default one per core.
-        executor: Runs the work instead, for example Dask's `client.get_executor()`.
         progress: Show progress and an estimate on stderr.
 
     Raises:
@@ -285,7 +282,7 @@ def run_benchmark(
             "a yardstick and no contestant: swarm-forage run puts it beside others."
         )
     plan = Plan.product(specs, [each.world for each in chosen.worlds], chosen.seeds)
-    table = run_plan(plan, out=out, jobs=jobs, executor=executor, progress=progress)
+    table = run_plan(plan, out=out, jobs=jobs, progress=progress)
     check_finished(table)
     return Entry(
         protocol=chosen.identity,

@@ -51,7 +51,6 @@ FileName: TypeAlias = Annotated[
 ]
 """With four bytes a character, endings still fit into the 255 bytes of a name."""
 
-Several: TypeAlias = Annotated[tuple[Any, ...], Meta(min_length=1)]
 
 _WORDS = {float: "a number", int: "a whole number", bool: "True or False", str: "a text"}
 _SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}

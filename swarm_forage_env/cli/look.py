@@ -187,4 +187,6 @@ def maps(
         write_maps(file, found)
     except ImportError as error:
         note(error)
-    say(f"wrote maps to {file} and .npz files beside it")
+        say(f"wrote maps as .npz files beside {file}, and no picture")
+    else:
+        say(f"wrote maps to {file} and .npz files beside it")

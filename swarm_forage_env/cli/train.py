@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from swarm_forage_env.training.plan import TrainingPlan
 
 app = App(name="train")
+CURVES_FILE = "curves.png"
 
-PICTURE_FILE = "curves.png"
 OF_THE_RECIPE = ("n_arenas", "hidden", "activation", "small_start", "samples", "interface", "options", "evaluation")
 """Arguments of `training.recipe` that --set takes beside fields of the scenario."""
 
@@ -137,7 +137,7 @@ def curves(
     from swarm_forage_env.training.curves import curves as curves_of
     from swarm_forage_env.training.curves import read_trainings
 
-    file = picture or folders[0] / PICTURE_FILE
+    file = picture or folders[0] / CURVES_FILE
     read_trainings(folders)  # refuses folders before it looks at the place of the picture
     check_picture(file)
     found = curves_of(folders, beside=() if policy == ("none",) else policy or None)

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from swarm_forage_env.training.sb3.training import TrainingStatus
 
 PICTURE_FILE = "training.png"
-CURVES_FILE = "curves.png"
 
 
 def run_training(plan: TrainingPlan, folder: Path, *, resume: bool) -> int:
@@ -78,7 +77,7 @@ def run_seeds(plan: TrainingPlan, seeds: Sequence[int], folder: Path, *, jobs: i
                 finished = sum(is_finished(seed_folder(folder, seed)) for seed in seeds)
                 words = f"Interrupted: {finished} of {counted(len(seeds), 'training')} finished. To go on: {go_on}"
             raise KeyboardInterrupt(words) from None
-    show(found, folder / CURVES_FILE)
+    show(found, folder / "curves.png")
     if found.failures:
         note(f"To go on with those that failed: {go_on}")
         return EXIT_FAILURE

@@ -62,6 +62,7 @@ class NetworkAbout:
         one_of("activation", self.activation, ACTIVATIONS)
         one_of("caches", self.caches, CACHE_KINDS)
         checked("samples", self.samples, bool)
+        table("card", self.card)
 
     def to_json(self) -> str:
         """Return the text that files hold."""

@@ -20,7 +20,18 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import polars as pl
 
-from swarm_forage_env._internal.fields import MOST_SEEDS, Checked, ConfigError, Count, Name, Positive, Whole, whole
+from swarm_forage_env._internal.fields import (
+    MOST_SEEDS,
+    Checked,
+    ConfigError,
+    Count,
+    FileName,
+    Name,
+    Positive,
+    Whole,
+    checked,
+    whole,
+)
 from swarm_forage_env._internal.files import check_folder, replacing
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.network import Network, NetworkPolicy
@@ -54,6 +65,11 @@ class EvaluationWorld(World):
 
     baseline: str = field(default=BEST, kw_only=True)
     """Policy to compare with, or "best"."""
+
+    def __post_init__(self) -> None:
+        World.__post_init__(self)
+        checked("the name of a world", self.name, FileName)
+        checked("baseline", self.baseline, Name)
 
     def _default_name(self) -> str:
         return f"{self.scenario.name}_{self.n_robots}"

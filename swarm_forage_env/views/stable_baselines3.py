@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import gymnasium
@@ -96,14 +97,8 @@ class SwarmVecEnv(VecEnv):
                 if step.is_episode[k]:
                     info["episode"] = {"r": float(step.returns[k]), "l": int(step.lengths[k]), "t": seconds}
             for outcome in step.outcomes:
-                infos[outcome.arena * self.n_robots]["run"] = {
-                    "seed": outcome.seed,
-                    "seconds": outcome.seconds,
-                    "collected": outcome.collected,
-                    "first_picked": outcome.first_picked,
-                    "scenario": outcome.scenario,
-                    "n_robots": outcome.n_robots,
-                }
+                told = asdict(outcome)
+                infos[told.pop("arena") * self.n_robots]["run"] = told
         return infos
 
     @property

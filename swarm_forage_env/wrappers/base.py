@@ -202,7 +202,8 @@ class SwarmWrapper(SwarmLayer, BaseParallelWrapper):
         n_ticks = 0 if self._unwrapped.terminated.all() else max(0, n_ticks)
         disturbances = Disturbances(**fields)
         for name, value in fields.items():
-            usual, n_rows = getattr(UNDISTURBED, name), n_ticks if name in _PER_TICK else 0
+            n_rows = n_ticks if name in _PER_TICK else self._unwrapped.scenario.robots.n_robots if name == "gain" else 0
+            usual = getattr(UNDISTURBED, name)
             if isinstance(usual, np.ndarray) and not _is_readable(value, usual, n_rows):
                 raise ValueError(
                     f"Expected `ahead` to tell {name} as a contiguous array of {usual.dtype} with {usual.ndim} "
@@ -277,7 +278,7 @@ class SwarmWrapper(SwarmLayer, BaseParallelWrapper):
         """Call the hooks that come before the arena's step, from here inwards; returns the wheel gain for it."""
         for wrapper in self.stack:
             wrapper.before_step()
-            wheel_gain = wrapper.gain(actions, wheel_gain)
+            wheel_gain = checked_gain(wrapper.gain(actions, wheel_gain), len(actions))
         return wheel_gain
 
     def after(self, tasks: CodeArray | None) -> ObsArray:
@@ -362,6 +363,8 @@ def _is_readable(value: Any, usual: np.ndarray, n_rows: int) -> bool:
         isinstance(value, np.ndarray)
         and (value.dtype, value.ndim) == (usual.dtype, usual.ndim)
         and value.flags.c_contiguous
+        and value.flags.writeable
+        and value.shape[1:] >= usual.shape[1:]
         and len(value) >= n_rows
     )
 

@@ -8,7 +8,7 @@ from swarm_forage_env.contract.codes import Counter, Task
 from swarm_forage_env.contract.kernel_policy import CompiledPolicy
 from swarm_forage_env.contract.policy import refused_tasks
 from swarm_forage_env.contract.types import BoolArray, CodeArray
-from swarm_forage_env.env import ForageEnv, checked_gain
+from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.columns import INTERVAL_COLUMNS
 from swarm_forage_env.scenarios.config import whole_intervals
 from swarm_forage_env.scenarios.performance import performance_curve
@@ -111,8 +111,7 @@ class RunRecorder(SwarmWrapper):
                 n_ahead, disturbances = inner.told_ahead(n_ahead)
             if n_ahead == 0:  # one tick as a step of the stack does it
                 arena.run(policy, 0)  # what robots want to do stands before any wrapper acts
-                gain = checked_gain(self.before(policy.actions), len(policy.actions))
-                arena.run(policy, 1, wheel_gain=gain, acts=False)
+                arena.run(policy, 1, wheel_gain=self.before(policy.actions), acts=False)
                 self.after(policy.task)
                 kept = False
                 continue

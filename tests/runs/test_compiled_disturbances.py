@@ -255,6 +255,10 @@ def test_a_gain_of_another_shape_is_refused():
     run = LiveRun(RunRecorder(stack), CRWPolicy(), seed=1)
     with pytest.raises(ActionError, match=r"wheel_gain with shape \(n_robots, 2\) = \(6, 2\), got \(6,\)"):
         run.advance(to_tick=3)
+    stack.reset_batch(1)
+    stack.given = np.ones((N_ROBOTS, 1))
+    with pytest.raises(ActionError, match=r"got \(6, 1\)"):
+        stack.step_batch(np.zeros((N_ROBOTS, 3), np.float32))
 
 
 class Teller(SwarmWrapper):

@@ -100,6 +100,7 @@ def test_each_seed_is_trained_in_its_folder_as_alone(tmp_path, tmp_path_factory)
     train(dataclasses.replace(PLAN, seed=4), alone)
     same, other = (np.load(folder / "policy.npz") for folder in (alone, tmp_path / "seed_4"))
     names = [name for name in same.files if name != "about"]  # which tells when it was trained
+    assert "weight_0" in names
     assert all(np.array_equal(same[name], other[name]) for name in names)
     assert read_plan(tmp_path / "plan.json") == PLAN
     assert [(one.plan.seed, one.is_finished) for one in found.trainings] == [(3, True), (4, True)]
@@ -195,7 +196,7 @@ def test_means_are_over_trainings_as_they_are_kept(tmp_path, monkeypatch):
     assert found.text().splitlines()[-1] == (
         f"swarm-forage benchmark seed_0/policy.npz seed_1/policy.npz --name {tmp_path.name}"
     )
-    assert json.loads(found.json())
+    assert json.loads(found.json())["rows"][0]["policy"] == "seed_0"
     one = read_seeds(tmp_path, range(1), {})
     assert "95 %" not in one.text()
     driven = dataclasses.replace(PLAN.interface, actions="continuous")

@@ -57,7 +57,7 @@ def record_replay(
     step = ticks_between_frames(scenario, end, frame_s)
     policy = load_policy(spec.policy, spec.parameters) if policy is None else policy
     stack = build_env(scenario, spec.wrappers, reads=getattr(policy, "reads", None))
-    run = LiveRun(stack, policy, spec.seed, by_ticks=True)
+    run = LiveRun(stack, policy, spec.seed)
     capture = Capture(run, policy, end_tick=end, frame_ticks=step, disturbances=lambda: spec.wrappers)
     while run.forage_env.tick < end and not run.over:
         capture.advance()

@@ -25,7 +25,6 @@ def export_network(
     *,
     samples: bool | None = None,
     caches: str = "none",
-    card: dict[str, Any] | None = None,
 ) -> Network:
     """Return the acting part of a PPO, A2C or DQN with an `MlpPolicy`.
 
@@ -35,7 +34,6 @@ def export_network(
         samples: Whether discrete actions are drawn by their probabilities; default where the model has some (PPO, A2C),
             as in its training. Those of a DQN need a temperature, see `Network.at_temperature`.
         caches: Kind of caches that it was trained with.
-        card: How it came about, plain values.
 
     Raises:
         NetworkError: a model of another kind (SAC and TD3 among them), layers that a network file cannot hold, or an
@@ -58,7 +56,6 @@ def export_network(
         activation=_NAMES[between.pop()] if between else "tanh",
         samples=has_probabilities(model.policy) if samples is None else samples,
         caches=caches,
-        card=card or {},
     )
     return Network(weights, biases, about)
 

@@ -67,7 +67,7 @@ def no_noise() -> Noise:
 class Disturbances(NamedTuple):
     """What wrappers do in some ticks that follow each other; as it is made here, nothing.
 
-    `tick.run` and `tick.decide` take it.
+    `tick.run` takes it.
     """
 
     throttles: FloatArray = np.zeros(0)
