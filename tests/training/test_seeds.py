@@ -196,7 +196,7 @@ def test_means_are_over_trainings_as_they_are_kept(tmp_path, monkeypatch):
     assert found.text().splitlines()[-1] == (
         f"swarm-forage benchmark seed_0/policy.npz seed_1/policy.npz --name {tmp_path.name}"
     )
-    assert json.loads(found.json())["rows"][0]["policy"] == "seed_0"
+    assert next(iter(json.loads(found.json()).values()))[0]["policy"] == "seed_0"
     one = read_seeds(tmp_path, range(1), {})
     assert "95 %" not in one.text()
     driven = dataclasses.replace(PLAN.interface, actions="continuous")
