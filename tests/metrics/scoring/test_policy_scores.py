@@ -12,6 +12,7 @@ import metrics
 from metrics import MEASURES, CurveError, score
 from metrics.scoring import score_question
 from metrics.scoring.frame import SCHEMA
+from metrics.scoring.measures import PICTURED
 from metrics.scoring.policy_scores import Scores, spread
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import registry as policy_module
@@ -299,6 +300,20 @@ def test_no_interval_is_explained_where_there_is_none():
     single = str(made({("a", "raw_performance"): [10.0], ("b", "raw_performance"): [1.0]}))
     assert "±" not in single
     assert "one seed, so no interval" in single
+
+
+def test_measures_that_are_missing_are_told_with_their_policies():
+    missing = {("a", "scalability"): "no sizes", ("b", "scalability"): "no sizes", ("b", "time_emergence"): "no column"}
+    text = str(made({("a", "raw_performance"): HIGH, ("b", "raw_performance"): LOW}, missing=missing))
+    assert "not computed: scalability: no sizes" in text
+    assert "not computed of b: time emergence: no column" in text
+
+
+def test_the_short_table_has_the_measures_of_the_picture_alone():
+    every = {(policy, measure): (HIGH, HIGH) for policy in "ab" for measure in (*PICTURED, "efficiency")}
+    assert "efficiency" not in str(made(every))
+    assert "efficiency, objects in 400 s" in str(made(every, is_full=True))
+    assert "efficiency" in str(made({key: every[key] for key in every if key[1] != "reactivity"}))
 
 
 def test_csv_has_a_row_per_policy_and_level():
