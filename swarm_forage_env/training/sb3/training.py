@@ -188,6 +188,7 @@ def check_place(folder: Path, plan: TrainingPlan, *, resume: bool) -> None:
                 f"Expected {folder} to hold a training to resume, with {PLAN_FILE} and the checkpoint {MODEL_FILE}, "
                 f"found no {name}; without resume a new one starts."
             )
+    trust.check(folder / MODEL_FILE)
     differences = plan.differences(read_plan(folder / PLAN_FILE))
     if differences:
         raise ConfigError(
@@ -199,7 +200,6 @@ def check_place(folder: Path, plan: TrainingPlan, *, resume: bool) -> None:
 def _opened(plan: TrainingPlan, folder: Path, **options: Any) -> BaseAlgorithm:
     """Return the checkpoint, with other options."""
     path = folder / MODEL_FILE
-    trust.check(path)
     try:
         return ALGORITHM_CLASSES[plan.algorithm].load(path, device="cpu", **options)
     except Exception as error:  # torch and the library raise many kinds
