@@ -87,7 +87,7 @@ def record(
     at: Annotated[
         float | None, Parameter(help="Draw one picture at this simulated second, in place of a film.")
     ] = None,
-    seconds: float = 300.0,
+    seconds: float | None = None,
     size: int = 900,
 ) -> None:
     """Film a run, or draw it at one time.
@@ -97,7 +97,7 @@ def record(
     Args:
         file: File to write: .gif or .mp4, or .png with --at; default results/SCENARIO_POLICY.gif.
         at: Draw one picture at this simulated second, in place of a film.
-        seconds: Simulated seconds to film.
+        seconds: Simulated seconds to film; default 300, or the whole run where that is shorter.
         size: Longer side of the arena in pixels.
     """
     from swarm_forage_env.cli.worlds import RESULTS, default_file, described_world
@@ -111,7 +111,8 @@ def record(
         record_run(chosen, policy, path, at_s=at, **look)
     else:
         with progress_bar("pictures") as progress:
-            record_run(chosen, policy, path, seconds=seconds, progress=progress, **look)
+            length = min(300.0, chosen.scenario.horizon_s) if seconds is None else seconds
+            record_run(chosen, policy, path, seconds=length, progress=progress, **look)
     say(f"wrote {path}")
 
 
