@@ -125,6 +125,8 @@ def train(
     check_folder(folder)
     with alone_in(folder, ConfigError):
         check_place(folder, plan, resume=resume)
+        if resume:
+            trust.check(folder / MODEL_FILE)
         torch.set_num_threads(1)  # networks this small gain nothing from more, and arenas want the cores
         watch = _Watch(plan, folder, report or _keep_quiet, extra_observation, resume=resume)
         return _train(plan, folder, watch, CallbackList([watch, *callbacks]), extras)
@@ -188,7 +190,6 @@ def check_place(folder: Path, plan: TrainingPlan, *, resume: bool) -> None:
                 f"Expected {folder} to hold a training to resume, with {PLAN_FILE} and the checkpoint {MODEL_FILE}, "
                 f"found no {name}; without resume a new one starts."
             )
-    trust.check(folder / MODEL_FILE)
     differences = plan.differences(read_plan(folder / PLAN_FILE))
     if differences:
         raise ConfigError(
