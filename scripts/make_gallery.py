@@ -204,8 +204,8 @@ MOST_FILM_BYTES = 400_000
 def draw(exhibit: Exhibit) -> None:
     """Draw the last run of an exhibit at its end, with trails."""
     spec, file = exhibit.specs()[-1], FOLDER / f"{exhibit.name}.png"
-    end = {"at_s": exhibit.horizon_s, "trail_s": TRAIL_S}
-    record_run(spec.world, spec.policy, file, seed=spec.seed, size_px=PICTURE_PX, **end)
+    look: dict[str, Any] = {"seed": spec.seed, "size_px": PICTURE_PX, "trail_s": TRAIL_S}
+    record_run(spec.world, spec.policy, file, at_s=exhibit.horizon_s, **look)
 
 
 def picture(name: str) -> None:
