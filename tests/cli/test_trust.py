@@ -59,6 +59,7 @@ def test_a_failure_that_names_a_model_is_refused(command, model, tmp_path):
 
 @pytest.mark.parametrize("suffix", ["zip", "ZIP"])
 def test_a_plan_that_names_a_model_is_refused_before_anything_starts(command, tmp_path, suffix):
+    pytest.importorskip("stable_baselines3")  # without it, nothing trains at all
     evil_model(tmp_path / f"evil.{suffix}")
     (tmp_path / "plan.toml").write_text(
         f'[scenario]\npreset = "warehouse_small"\n[evaluation]\nbaseline = "evil.{suffix}"\n', encoding="utf-8"
