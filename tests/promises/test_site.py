@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parents[2]
 LISTED = [
     name
     for page in (ROOT / "docs/api").glob("*.md")
-    for name in re.findall(r"^\.\. auto\w+:: ([\w.]+)$", page.read_text(), re.MULTILINE)
+    for name in re.findall(r"^\.\. (?:auto\w+|data):: ([\w.]+)$", page.read_text(), re.MULTILINE)
 ]
 
 
