@@ -16,7 +16,7 @@ NEEDS = {
     "agilerl_ppo": "agilerl",
     "benchmarl_ippo": "benchmarl",
     "cleanrl_ppo": "torch",
-    "optuna_search": "stable_baselines3",
+    "optuna_search": "optuna",
     "rllib_ppo": "ray",
     "sb3_contrib_recurrent_ppo": "sb3_contrib",
     "stable_baselines3_ppo": "stable_baselines3",
