@@ -211,6 +211,11 @@ class ForageEnv(SwarmLayer, ParallelEnv[str, np.ndarray, np.ndarray]):
         return read_only(self._terminated)
 
     @property
+    def is_over(self) -> bool:
+        """Whether the horizon is reached, or all robots are dead."""
+        return self.arena.tick >= self.max_cycles or np.count_nonzero(self._terminated) == len(self._terminated)
+
+    @property
     def reward_model(self) -> RewardModel:
         """What makes the rewards of this run; another object after a reset."""
         self._require_reset()

@@ -294,10 +294,14 @@ class LearnerInterface:
             )
         if out is None:
             out = np.empty((len(obs), self.layout.size), np.float32)
-        if extra is not None:
-            out[:, -n_extra:] = extra
-        self._call(see, np.ascontiguousarray(obs), decision or 0, self._held, out)
+        self.show(np.ascontiguousarray(obs), out, decision or 0, extra)
         return out
+
+    def show(self, obs: ObsArray, out: ObsArray, decision: int, extra: FloatArray | None) -> None:
+        """Do what `observe` does with arrays that are known to be right, for arenas; `obs` is contiguous."""
+        if extra is not None:
+            out[:, -extra.shape[1] :] = extra
+        self._call(see, obs, decision, self._held, out)
 
     def command(self, actions: np.ndarray, obs: ObsArray) -> ActionArray:
         """Return actions of the environment, (N, A) float32, in a reused buffer.

@@ -154,11 +154,10 @@ class ArenaBatch:
 
     def _look(self, number: int, out: ObsArray) -> None:
         """Note which robots of an arena are there, at work and dead, and write what they see to `out`."""
-        env, (present, active, dead) = self.arenas[number].forage_env, self._told[number]
-        np.copyto(present, env.swarm.present)
-        np.copyto(active, env.swarm.active)
-        np.copyto(dead, env.terminated)
-        self.arenas[number].observe(out)
+        arena, (present, active, dead) = self.arenas[number], self._told[number]
+        swarm = arena.forage_env.arena.swarm
+        present[:], active[:], dead[:] = swarm.present, swarm.active, arena.forage_env.terminated
+        arena.observe(out)
 
     def step(self, actions: np.ndarray) -> ArenaStep:
         """Step every arena by one decision.
@@ -189,7 +188,7 @@ class ArenaBatch:
         self._lengths += present
         self._returns += rewards
         terminated, truncated = self._dead & ~self._absent, np.zeros(self._shape, np.bool_)
-        over = [number for number, arena in enumerate(self.arenas) if arena.is_over]
+        over = [number for number, arena in enumerate(self.arenas) if arena.forage_env.is_over]
         if over:  # to index by an empty list takes longer than a small swarm's tick
             terminated[over] |= self._absent[over]
             truncated[over] = ~terminated[over]

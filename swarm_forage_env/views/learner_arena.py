@@ -146,7 +146,7 @@ class LearnerArena:
                     if isinstance(self.env, SwarmWrapper):
                         self.env.pass_ticks(stop.tick - before, stop)
                 before = arena.tick
-                if before >= end or self.is_over:
+                if before >= end or env.is_over:
                     break
             self._add_extra(rewards)
         except BaseException as error:
@@ -159,12 +159,6 @@ class LearnerArena:
         if not self._tells_ahead:
             return 0, UNDISTURBED
         return self.env.told_ahead(n_ticks) if isinstance(self.env, SwarmWrapper) else (n_ticks, UNDISTURBED)
-
-    @property
-    def is_over(self) -> bool:
-        """Whether the horizon is reached or all robots are dead."""
-        env = self.forage_env
-        return env.arena.tick >= env.max_cycles or np.count_nonzero(env.terminated) == len(env.terminated)
 
     def _add_extra(self, rewards: np.ndarray) -> None:
         """Add the user's `extra_reward` of a decision to the rewards of the robots (N,)."""
@@ -195,7 +189,7 @@ class LearnerArena:
         n_robots = self.n_robots
         if n_robots < self.n_rows:
             out[n_robots:] = 0.0
-        self.interface.observe(self.env.last_obs, out[:n_robots], decision=self._decision, extra=self._extra_columns())
+        self.interface.show(self.env.last_obs, out[:n_robots], self._decision, self._extra_columns())
         return out
 
     def _extra_columns(self) -> FloatArray | None:

@@ -1,7 +1,6 @@
 """ForagingArena: the simulated world of an environment. It owns the state arrays and fixes the order of a tick."""
 
-from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from collections.abc import Collection
 from typing import NamedTuple
 
 import numpy as np
@@ -265,9 +264,13 @@ class ForagingArena:
         gain = self._unit_gain if wheel_gain is None else np.ascontiguousarray(wheel_gain, np.float64)
         now, driver_draws = driver.next_ticks()
         picks, walks = self.draws(first)
-        drawn = [rows for rows in (driver_draws, picks, walks) if rows is not NO_DRAWS and rows is not self._nothing]
-        n_drawn = min(map(len, drawn), default=n_ticks)
-        with self._observation_kept(kept):
+        if n_ticks > 1:
+            nothing = NO_DRAWS, self._nothing
+            drawn = [len(rows) for rows in (driver_draws, picks, walks) if not any(rows is one for one in nothing)]
+            n_ticks = min([n_ticks, *drawn])
+        is_kept = self._arrays.sensors.kept
+        is_kept[0] = kept  # the world may rely on the observation, but not longer than this call lasts
+        try:
             n_begun, outcome, tasks_counted = driver.call(
                 kernels.run,
                 self._held,
@@ -278,7 +281,7 @@ class ForagingArena:
                 paid,
                 gain,
                 first,
-                min(n_ticks, n_drawn),
+                n_ticks,
                 self.has_changed,
                 acts,
                 now,
@@ -296,21 +299,13 @@ class ForagingArena:
             self.tick, self.has_changed = first + n_begun - 2, self.has_changed and n_begun == 1
             own_gain = disturbances.gain if len(disturbances.gain) else gain
             self.conclude(outcome, driver.actions, own_gain, driver.task)
+        finally:
+            is_kept[0] = False
         if rewards is not None and outcome != DONE:
             paid += rewards.reward()
         if not tasks_counted:
             raise refused_tasks(tasks, len(self.swarm.active))
         return Stop(self.tick, by_python=outcome != DONE)
-
-    @contextmanager
-    def _observation_kept(self, kept: bool) -> Iterator[None]:
-        """Let the world rely on an observation that nobody writes into, but not longer than the context lasts."""
-        is_kept = self._arrays.sensors.kept
-        is_kept[0] = kept
-        try:
-            yield
-        finally:
-            is_kept[0] = False
 
     @property
     def needs_python(self) -> bool:
