@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import App, Parameter
 from cyclopts.types import NonNegativeInt, PositiveInt
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import ConfigError, known_keys
 from swarm_forage_env.cli import CommandError
 from swarm_forage_env.cli.options import AsJson, Jobs, Names, Picture, Policy, Scenario, Seeds, WorldOptions
 from swarm_forage_env.cli.printer import progress_bar, say
@@ -90,13 +90,15 @@ def _kept_plan(folder: Path, steps: int | None) -> "TrainingPlan":
 def _by_recipe(options: WorldOptions, algo: str | None, steps: int | None, seed: int | None) -> "TrainingPlan":
     """Return the plan of a training in the world that is described; raises ConfigError where it cannot be."""
     from swarm_forage_env.cli.worlds import described_fields, parse_setting
-    from swarm_forage_env.scenarios.presets import scenario
+    from swarm_forage_env.scenarios.config import SECTIONS
+    from swarm_forage_env.scenarios.overrides import field_sections
     from swarm_forage_env.training.recipe import recipe
 
     of_recipe = [word for word in options.settings if word.partition("=")[0].partition(".")[0] in OF_THE_RECIPE]
     others = tuple(word for word in options.settings if word not in of_recipe)
     world = described_fields(replace(options, settings=others))
-    scenario(world.preset, **world.fields)  # or the recipe could take unknown fields for its own arguments
+    of_worlds = *field_sections(), *SECTIONS, "density", "side_m"
+    known_keys(world.fields, (*of_worlds, *OF_THE_RECIPE), "field of the scenario or the training")
     given: dict[str, Any] = {}
     for name, value in map(parse_setting, of_recipe):
         argument, dot, field = name.partition(".")

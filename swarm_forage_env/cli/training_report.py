@@ -2,6 +2,7 @@
 
 import math
 import shlex
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +12,7 @@ from rich.progress import Progress
 from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.cli import EXIT_FAILURE
 from swarm_forage_env.cli.printer import bar, drawn_or_told, note, show
+from swarm_forage_env.runs.progress import duration
 from swarm_forage_env.training.curves import beside_baseline, counted_in, place_of, read_training
 from swarm_forage_env.training.evaluation import EVALUATIONS_FILE, MODEL_FILE, PLAN_FILE, Evaluation
 from swarm_forage_env.training.plan import TrainingPlan
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
     from swarm_forage_env.training.sb3.training import TrainingStatus
 
 PICTURE_FILE = "training.png"
+TIMED_S = 5.0
+"""Of a training, before it is said how long the rest takes; our choice."""
 
 
 def run_training(plan: TrainingPlan, folder: Path, *, resume: bool) -> int:
@@ -85,13 +89,15 @@ def run_seeds(plan: TrainingPlan, seeds: Sequence[int], folder: Path, *, jobs: i
 
 
 class _Report:
-    """Shows how trainings go: one bar for all of them, and a line per evaluation."""
+    """Shows how trainings go: what they will do, one bar for all of them or how long they take, a line per evaluation."""
 
     def __init__(self, plan: TrainingPlan, seeds: Sequence[int], shown: Progress) -> None:
         self._plan, self._seeds, self._shown = plan, seeds, shown
         self._steps: dict[int, int] = {}
-        self._task = shown.add_task("training", total=plan.total_steps * len(seeds))
-        self._has_begun = False
+        self._total = plan.total_steps * len(seeds)
+        self._task = shown.add_task("training", total=self._total)
+        self._first: tuple[float, int] | None = None
+        self._has_begun = self._is_timed = False
 
     def __call__(self, seed: int, news: "TrainingStatus | Evaluation | str") -> None:
         """Show the news of a training."""
@@ -99,11 +105,30 @@ class _Report:
             self._shown.console.out(f"Seed {seed} failed: {news}")
             return
         self._steps[seed] = min(news.steps, self._plan.total_steps)
-        self._shown.update(self._task, completed=sum(self._steps.values()))
+        done = sum(self._steps.values())
+        self._shown.update(self._task, completed=done)
+        self._tell_time(done)
         if isinstance(news, Evaluation):
             self._show(f"{seed:>6} " if len(self._seeds) > 1 else "", news)
         elif not math.isnan(news.episode_return):
             self._shown.update(self._task, description=f"mean return {news.episode_return:.2f}")
+
+    def _tell_time(self, done: int) -> None:
+        """Say at once what will happen, and after some seconds, where no bar shows it, how long the rest takes."""
+        now, say = time.monotonic(), self._shown.console.out
+        if self._first is None:
+            self._first = now, done
+            trainings = f"{len(self._seeds)} trainings of " if len(self._seeds) > 1 else ""
+            plan = self._plan
+            say(
+                f"{plan.algorithm}: {trainings}{plan.total_steps:,} decisions in {counted(len(plan.stages), 'stage')}, "
+                f"evaluated every {plan.evaluation.every_steps:,} and after each stage"
+            )
+            return
+        began, before = self._first
+        if self._shown.disable and not self._is_timed and now - began >= TIMED_S and done > before:
+            self._is_timed = True
+            say(f"About {duration((self._total - done) * (now - began) / (done - before))} to go, and the evaluations")
 
     def _show(self, seed: str, news: Evaluation) -> None:
         what, plan, say = counted_in(self._plan), self._plan.evaluation, self._shown.console.out

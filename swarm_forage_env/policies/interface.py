@@ -7,7 +7,6 @@ use the same translation, so a policy runs exactly as it was trained.
 
 import copy
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property, lru_cache
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias, get_args
@@ -479,9 +478,4 @@ def interface_from_mapping(mapping: Mapping[str, Any]) -> InterfaceConfig:
         ConfigError: an unknown key or value.
     """
     known_keys(mapping, [item.name for item in fields(InterfaceConfig)], "interface option")
-    values = dict(mapping)
-    range_m = values.get("neighbour_range_m")
-    if isinstance(range_m, str):  # a word of the command line; `number` refuses what is none
-        with suppress(ValueError):
-            values["neighbour_range_m"] = float(range_m)
-    return InterfaceConfig(**values)
+    return InterfaceConfig(**mapping)

@@ -1,7 +1,6 @@
 """InterfacePolicy and LearnedPolicy: any trained controller that every robot shares, as a policy."""
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -13,9 +12,6 @@ from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterfac
 
 Choose: TypeAlias = Callable[[ObsArray, np.random.Generator], np.ndarray]
 """A function from observations of a learner, (N, d), to its actions, one row per robot."""
-Remember: TypeAlias = Callable[[ObsArray, Any, np.random.Generator], tuple[np.ndarray, Any]]
-"""The same for a controller with memory: from observations and memory to actions and the memory of the next decision.
-In the first decision of a run the memory is None."""
 
 
 class InterfacePolicy:
@@ -68,17 +64,15 @@ class InterfacePolicy:
 class LearnedPolicy(InterfacePolicy):
     """A trained controller as a policy: it sees and acts through an interface, once per decision.
 
-    An instance drives one run. A controller with memory, such as a recurrent network, begins each run without any. It
-    is asked for all rows in every decision, so a robot in repair goes on remembering, as in training. The memory of a
-    dead robot no longer steers anything.
+    An instance drives one run. The controller is asked for all rows in every decision, so one with a memory goes on
+    remembering while a robot is in repair, as in training. The memory of a dead robot no longer steers anything.
     """
 
     def __init__(
         self,
         interface: InterfaceConfig,
-        choose: Choose | None = None,
+        choose: Choose,
         *,
-        remember: Remember | None = None,
         caches: str | None = "none",
         extra_observation: ExtraFunction | None = None,
     ) -> None:
@@ -86,22 +80,12 @@ class LearnedPolicy(InterfacePolicy):
 
         Args:
             interface: What it saw and did in training.
-            choose: The controller, if it has no memory.
-            remember: The controller, if it has one.
+            choose: The controller.
             caches: Kind of caches that it was trained with; None = unknown, runs then use those of the scenario.
             extra_observation: The function that it was trained with, if there was one; see `policies.extras`.
-
-        Raises:
-            TypeError: both `choose` and `remember`, or neither.
         """
-        if choose is not None and remember is None:
-            self._remember: Remember = partial(_forgetful, choose)
-        elif remember is not None and choose is None:
-            self._remember = remember
-        else:
-            raise TypeError("Expected either choose or remember, the controller without or with memory.")
         super().__init__(interface, caches=caches)
-        self._extra = extra_observation
+        self._choose, self._extra = choose, extra_observation
         if extra_observation is not None:
             self.see_world = self._see_world
 
@@ -119,7 +103,6 @@ class LearnedPolicy(InterfacePolicy):
         self._rng = rng
         self._view = np.empty((spec.n_robots, self.interface.layout.size), np.float32)
         self._ticks_left, self._decision = 0, 0
-        self._memory: Any = None
 
     @property
     def chosen(self) -> np.ndarray:
@@ -131,7 +114,7 @@ class LearnedPolicy(InterfacePolicy):
         if self._ticks_left == 0:
             extra = None if self._extra is None else extra_columns(self._extra, self._arena, self._config.extra_columns)
             view = self.interface.observe(obs, self._view, decision=self._decision, extra=extra)
-            self._chosen, self._memory = self._remember(view, self._memory, self._rng)
+            self._chosen = self._choose(view, self._rng)
             self._checked = self.interface.checked(self._chosen)
             self._ticks_left = self._config.decision_ticks
             self._decision += 1
@@ -146,7 +129,3 @@ def check_extra(interface: InterfaceConfig, extra: ExtraFunction | None) -> None
             f"Expected the extra_observation of {interface.extra_columns} columns that the policy was trained with, "
             "got none; in Python, run LearnedPolicy(network.about.interface, network.choose, extra_observation=...)."
         )
-
-
-def _forgetful(choose: Choose, rows: ObsArray, memory: Any, rng: np.random.Generator) -> tuple[np.ndarray, Any]:
-    return choose(rows, rng), memory

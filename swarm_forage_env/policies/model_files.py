@@ -8,7 +8,7 @@ import hashlib
 import itertools
 import warnings
 from dataclasses import asdict
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,7 @@ from swarm_forage_env.policies.interface import (
     chosen_interface,
     interface_from_mapping,
 )
-from swarm_forage_env.policies.learned import LearnedPolicy, Remember
+from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.scenarios.config import CACHE_KINDS
 
@@ -108,14 +108,24 @@ class ModelPolicy(LearnedPolicy):
                 f"Expected a model from {' to '.join(fitting)}, as {source} says; {name} goes from "
                 f"{' to '.join(found)}."
             )
-        super().__init__(config, remember=model_choice(network, draws=draws), caches=caches)
-        self._name = name
+        super().__init__(config, self._predicted, caches=caches)
+        self._name, self._network, self._draws = name, network, draws
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run; raises ModelError where the model is one of another number of robots together."""
         if self._n_robots not in (None, spec.n_robots):
             raise ModelError(f"Expected the {self._n_robots} robots that {self._name} steers, got {spec.n_robots}.")
+        self._memory: Any = None  # of a recurrent model, a row per robot
         super().reset(spec, rng)
+
+    def _predicted(self, rows: ObsArray, rng: np.random.Generator) -> np.ndarray:
+        """Choose an action for each row; the chance is that of the run."""
+        import torch  # pyright: ignore[reportMissingImports] - an extra
+
+        with torch.random.fork_rng(devices=()):
+            torch.manual_seed(int(rng.integers(2**31)) if self._draws else 0)
+            actions, self._memory = self._network.predict(rows, state=self._memory, deterministic=not self._draws)
+        return actions
 
 
 @lru_cache(maxsize=64)  # every run opens its model anew
@@ -141,26 +151,6 @@ def _told(name: str, config: InterfaceConfig, draws: bool) -> str:
         f"{'draws its actions' if draws else 'takes its best actions'}, and decides in every tick; if it decided less "
         f"often, say so: {name}:decision_ticks=5"
     )
-
-
-def model_choice(model: Any, *, draws: bool) -> Remember:
-    """Return how a model of stable-baselines3, or its policy network, chooses; the chance is that of the run.
-
-    The memory is the state of a recurrent model, a row per robot; other models have none.
-    """
-    return partial(_predicted, model, draws)
-
-
-def _predicted(
-    model: Any, draws: bool, rows: ObsArray, memory: Any, rng: np.random.Generator
-) -> tuple[np.ndarray, Any]:
-    if not draws:
-        return model.predict(rows, state=memory, deterministic=True)
-    import torch  # pyright: ignore[reportMissingImports] - an extra
-
-    with torch.random.fork_rng(devices=()):
-        torch.manual_seed(int(rng.integers(2**31)))
-        return model.predict(rows, state=memory, deterministic=False)
 
 
 def has_probabilities(network: Any) -> bool:

@@ -22,7 +22,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.model_files import checked_digest
-from swarm_forage_env.policies.registry import split_class
+from swarm_forage_env.policies.registry import policy_file
 
 
 class PythonFileError(ConfigError):
@@ -42,7 +42,9 @@ def open_class(place: str, *, digest: str | None = None, **parameters: Any) -> P
         PythonFileError: no class is named, the file has none of that name, its code raises an error, or it would
             import another folder's module instead of the one beside it.
     """
-    file, name = split_class(place)
+    said = policy_file(place)
+    assert said is not None, "its suffix brought it here"
+    file, name = said.path, said.class_name
     if "interface" in parameters:
         raise PythonFileError(
             f"Expected {place} without an interface, got {parameters['interface']!r}; a class in Python reads "

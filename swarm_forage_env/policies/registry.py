@@ -1,12 +1,13 @@
 """How a policy is found and made: by its registered name, from a file, from a function."""
 
 import re
+import tomllib
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
 from pathlib import Path, PurePath
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -38,9 +39,10 @@ _LOCAL_POLICIES: dict[str, Callable[..., Policy]] = {}
 """Names that `local_policy` has given to policies of this process."""
 
 
-_FILE_WITH_WORDS = re.compile(r"(?P<file>.+?):(?P<words>[a-z_]+=[^/\\:]*)")
-_FILE_WITH_CLASS = re.compile(r"(?P<file>.+\.py):(?P<name>[^\W\d]\w*)", re.IGNORECASE)
-_WORDS: dict[str, Any] = {"true": True, "false": False}
+_POLICY_FILE = re.compile(
+    r"(?P<path>.+?\.(?:npz|zip|py))(?:(?<=py):(?P<name>[^\W\d]\w*))?(?::(?P<words>[a-z_]+=[^/\\:]*))?", re.IGNORECASE
+)
+"""A policy file; the class of a Python file may stand behind it, then fields of an interface."""
 
 
 class RandomPolicy:
@@ -96,78 +98,69 @@ def from_callable(function: Callable[[ObsArray], ActionArray], *, name: str | No
     return CallablePolicy(function, name or getattr(function, "__name__", type(function).__name__))
 
 
+class PolicyFile(NamedTuple):
+    """What `my_module.py:MyPolicy` or `model.zip:observation=compact,decision_ticks=5` says."""
+
+    path: str
+    class_name: str | None
+    """Of a Python file."""
+    words: str
+    """Fields of the interface as they were written."""
+
+    @property
+    def whole(self) -> str:
+        """The file with its whole path, and with the class if it has one."""
+        return ":".join(filter(None, (str(Path(self.path).resolve()), self.class_name)))
+
+    def interface(self) -> dict[str, Any]:
+        """Return the fields that are said with the file; raises ConfigError for a word that is no field=value."""
+        fields: dict[str, Any] = {}
+        for word in filter(None, self.words.split(",")):
+            name, equals, value = (part.strip() for part in word.partition("="))
+            if not (name and equals and value):
+                raise ConfigError(f"Expected the interface of {self.path} as field=value, got {word!r}.")
+            try:
+                fields[name] = tomllib.loads(f"value = {value.lower()}")["value"]
+            except tomllib.TOMLDecodeError:
+                fields[name] = value
+        return fields
+
+
+def policy_file(policy: str) -> PolicyFile | None:
+    """Return what the word for a policy file says, None for the name of a policy."""
+    found = _POLICY_FILE.fullmatch(policy)
+    return None if found is None else PolicyFile(found["path"], found["name"], found["words"] or "")
+
+
 def is_policy_file(name: str) -> bool:
-    """Return whether `name` has the suffix of a policy file.
-
-    The interface may be said with it, see `split_interface`, and the class of a Python file, see `split_class`.
-    """
-    return _opener(split_interface(name)[0]) is not None
-
-
-def split_interface(policy: str) -> tuple[str, dict[str, Any]]:
-    """Return a policy without the interface that is said with its file, and the fields of that interface.
-
-    `model.zip:observation=compact,decision_ticks=5` is the file model.zip, trained with compact observations and five
-    ticks per decision. Anything else is returned as it is, with no fields.
-
-    Raises:
-        ConfigError: a word that is no field=value.
-    """
-    found = _FILE_WITH_WORDS.fullmatch(policy)
-    if found is None or _opener(found["file"]) is None:
-        return policy, {}
-    fields: dict[str, Any] = {}
-    for word in found["words"].split(","):
-        name, equals, value = (part.strip() for part in word.partition("="))
-        if not (name and equals and value):
-            raise ConfigError(f"Expected the interface of {found['file']} as field=value, got {word!r} in {policy!r}.")
-        fields[name] = int(value) if value.isdecimal() else _WORDS.get(value.lower(), value)
-    return found["file"], fields
-
-
-def split_class(policy: str) -> tuple[str, str | None]:
-    """Return the Python file and the class of a policy such as `my_module.py:MyPolicy`; else the policy, and None."""
-    found = _FILE_WITH_CLASS.fullmatch(policy)
-    return (policy, None) if found is None else (found["file"], found["name"])
+    """Return whether `name` is that of a policy file."""
+    return policy_file(name) is not None
 
 
 def named_interface(policy: str, parameters: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
     """Return a policy without the interface that is said with its file, and its parameters with that interface.
 
     Raises:
-        ConfigError: see `split_interface`, or the interface is among the parameters, too.
+        ConfigError: a word that is no field=value, or the interface is among the parameters, too.
     """
-    file, interface = split_interface(policy)
-    if not interface:
-        return file, dict(parameters)
+    found = policy_file(policy)
+    if found is None or not found.words:
+        return policy, dict(parameters)
     if "interface" in parameters:
-        raise ConfigError(f"Expected the interface of {file} once, got it with the file and as a parameter.")
-    return file, {**parameters, "interface": interface}
+        raise ConfigError(f"Expected the interface of {found.path} once, got it with the file and as a parameter.")
+    return policy.removesuffix(f":{found.words}"), {**parameters, "interface": found.interface()}
 
 
 def policy_label(policy: str) -> str:
     """Return the name of a policy for people: of a file its name without folder and ending, or its class."""
-    if not is_policy_file(policy):
-        return policy
-    return split_class(policy)[1] or PurePath(policy).stem
+    found = policy_file(policy)
+    return policy if found is None else found.class_name or PurePath(found.path).stem
 
 
 def file_of(policy: str) -> str:
-    """Return a policy without what may stand behind its file: a class, or words of an interface, which are not read."""
-    found = _FILE_WITH_WORDS.fullmatch(policy)
-    return split_class(policy if found is None else found["file"])[0]
-
-
-def whole_path(policy: str) -> str:
-    """Return a policy file with its whole path, and with the class if it has one."""
-    file, name = split_class(policy)
-    path = str(Path(file).resolve())
-    return path if name is None else f"{path}:{name}"
-
-
-def _opener(name: str) -> str | None:
-    """Return where that is what opens the policy file of that name."""
-    return _OPENERS.get(PurePath(split_class(name)[0]).suffix.lower())
+    """Return a policy without what may stand behind its file."""
+    found = policy_file(policy)
+    return policy if found is None else found.path
 
 
 def _imported(place: str) -> Callable[..., Policy]:
@@ -186,11 +179,10 @@ def policy_class(name: str) -> Callable[..., Policy]:
     """
     if name in _LOCAL_POLICIES:
         return _LOCAL_POLICIES[name]
-    file, _ = split_interface(name)
-    opener = _opener(file)
-    if opener is not None:
-        trust.check(file_of(file))
-        return partial(_opened, _imported(opener), name)
+    file = policy_file(name)
+    if file is not None:
+        trust.check(file.path)
+        return partial(_opened, _imported(_OPENERS[PurePath(file.path).suffix.lower()]), name)
     if name in POLICIES:
         return _imported(POLICIES[name])
     raise ConfigError(

@@ -11,14 +11,12 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from swarm_forage_env._internal.fields import ConfigError, instance, known_keys, one_of, read, table, whole
 from swarm_forage_env.policies.registry import (
-    file_of,
     from_callable,
-    is_policy_file,
     load_policy,
     named_interface,
     policy_class,
+    policy_file,
     policy_label,
-    whole_path,
 )
 from swarm_forage_env.scenarios.config import CACHE_KINDS, ScenarioConfig, to_mapping, whole_intervals
 from swarm_forage_env.wrappers.registry import wrapper_config_class, wrapper_configs
@@ -232,15 +230,16 @@ def policy_spec(
     if not isinstance(policy, str | Path):
         return _built_here(policy, label, parameters or {}, caches)
     found, pinned = named_interface(str(policy), parameters or {})
-    if not is_policy_file(found):
+    file = policy_file(found)
+    if file is None:
         stating: object = policy_class(found)
     else:
         from swarm_forage_env.policies.model_files import file_digest  # late: most runs open no model
 
-        found, chosen = whole_path(found), pinned
+        found, chosen = file.whole, pinned
         try:
             if "digest" not in chosen:
-                pinned = {"digest": file_digest(file_of(found)), **chosen}
+                pinned = {"digest": file_digest(file.path), **chosen}
             stating = load_policy(found, chosen)  # without a digest it says what it guesses, which runs do not repeat
         except ConfigError:
             raise

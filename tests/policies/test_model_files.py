@@ -16,7 +16,6 @@ from metrics.scoring import score_question
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import model_files
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, any_swarm
-from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.policies.model_files import (
     MODEL_NOTE,
     InterfaceGuessWarning,
@@ -25,7 +24,7 @@ from swarm_forage_env.policies.model_files import (
     file_digest,
 )
 from swarm_forage_env.policies.network import Network, NetworkAbout
-from swarm_forage_env.policies.registry import is_policy_file, load_policy, local_policy, policy_class, split_interface
+from swarm_forage_env.policies.registry import load_policy, local_policy, policy_class
 from swarm_forage_env.runs.spec import RunSpec, plan_run, policy_spec
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.studies.ladders import Budget
@@ -231,21 +230,6 @@ def test_an_interface_is_said_with_the_file(tmp_path):
             once(f"{path}:decision_ticks=2", given)
 
 
-@pytest.mark.parametrize(
-    ("policy", "expected"),
-    [
-        ("crw:decision_ticks=2", ("crw:decision_ticks=2", {})),
-        ("lr=0.1/a.zip", ("lr=0.1/a.zip", {})),
-        ("b:a=1/a.zip:decision_ticks=2", ("b:a=1/a.zip", {"decision_ticks": 2})),
-        ("a.zip:observation=full, actions=discrete", ("a.zip", {"observation": "full", "actions": "discrete"})),
-    ],
-)
-def test_what_is_an_interface_and_what_is_a_path(policy, expected):
-    assert split_interface(policy) == expected
-    with pytest.raises(ConfigError, match=r"interface of a\.zip as field=value, got 'x'"):
-        split_interface("a.zip:decision_ticks=2,x")
-
-
 class Counting:
     """Stands in for the network of a recurrent model: it turns faster in every decision of a run."""
 
@@ -266,9 +250,6 @@ def test_a_recurrent_model_remembers_within_a_run(monkeypatch, tmp_path):
     np.testing.assert_allclose(wheels, np.repeat([[0.0], [0.0], [0.1], [0.1], [0.2]], 4, axis=1))
     policy.reset(ENV.swarm_spec, np.random.default_rng(0))
     np.testing.assert_array_equal(policy.act(OBS, ACTIVE), 0.0)
-    for wrong in ({}, {"choose": len, "remember": len}):
-        with pytest.raises(TypeError, match="either choose or remember"):
-            LearnedPolicy(InterfaceConfig(), **wrong)
 
 
 def test_files_that_are_missing_changed_or_no_models_are_refused(tmp_path, monkeypatch):
@@ -334,8 +315,7 @@ def test_files_of_equal_names_go_by_their_folders_or_paths(network_file, tmp_pat
     assert [policy.label for policy in plan.policies] == expected[labels]
 
 
-def test_names_and_files_are_told_apart():
-    assert [is_policy_file(name) for name in ("a/b.ZIP", "b.npz", "crw", "crw.pyc")] == [True, True, False, False]
+def test_a_local_policy_has_a_name_of_its_own():
     with local_policy("mine", lambda: "policy"):
         assert policy_class("mine")() == "policy"
         with pytest.raises(ValueError, match="name of its own"), local_policy("mine", list):

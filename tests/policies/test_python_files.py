@@ -10,7 +10,7 @@ import pytest
 
 from swarm_forage_env.policies.model_files import ModelError
 from swarm_forage_env.policies.python_files import PythonFileError, classes_of
-from swarm_forage_env.policies.registry import file_of, is_policy_file, load_policy, policy_label, split_class
+from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.runner import run_all
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import scenario
@@ -68,16 +68,6 @@ def test_a_class_in_a_file_is_a_policy(file):
     assert load_policy(f"{file}:Ahead", {"speed": 0.25}).speed == 0.25
     assert load_policy("mine.py:slow").speed == 0.1, "a function that returns a policy"
     assert classes_of(file) == ("Ahead", "Lame", "Deaf")
-
-
-def test_its_names():
-    assert split_class("a/mine.py:Ahead") == ("a/mine.py", "Ahead")
-    assert split_class("model.zip:decision_ticks=5") == ("model.zip:decision_ticks=5", None)
-    assert policy_label("a/mine.py:Ahead") == "Ahead"
-    assert file_of("a/mine.py:Ahead") == "a/mine.py"
-    assert is_policy_file("a/mine.py:Ahead")
-    assert is_policy_file("a/mine.py")
-    assert not is_policy_file("mine:Ahead")
 
 
 def test_path_and_content_are_the_identity_of_its_runs(file):

@@ -3,7 +3,6 @@
 from dataclasses import asdict
 from typing import Any
 
-import numpy as np
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import FlattenExtractor
@@ -41,7 +40,6 @@ def export_network(
     """
     _check_interface(model, interface)
     layers = _acting_layers(model)
-    linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
     between = {type(layer) for layer in layers if not isinstance(layer, nn.Linear)}
     alternates = all(isinstance(layer, nn.Linear) == (k % 2 == 0) for k, layer in enumerate(layers))
     if not alternates or len(between) > 1 or not between <= _NAMES.keys():
@@ -49,15 +47,13 @@ def export_network(
             "Expected linear layers with one of the activations tanh and ReLU between them, got "
             f"{[type(layer).__name__ for layer in layers]}."
         )
-    weights = tuple(_array(layer.weight.T) for layer in linear)
-    biases = tuple(_array(layer.bias) for layer in linear)
     about = NetworkAbout(
         interface=interface,
         activation=_NAMES[between.pop()] if between else "tanh",
         samples=has_probabilities(model.policy) if samples is None else samples,
         caches=caches,
     )
-    return Network(weights, biases, about)
+    return Network.from_state_dict(nn.Sequential(*layers).state_dict(), about)
 
 
 def note_interface(
@@ -112,7 +108,3 @@ def _acting_layers(model: BaseAlgorithm) -> list[nn.Module]:
         f"Expected a PPO, A2C or DQN model with an MlpPolicy, got {type(model).__name__} with "
         f"{type(policy).__name__}; run it from its zip file instead."
     )
-
-
-def _array(tensor: Any) -> np.ndarray:
-    return np.ascontiguousarray(tensor.detach().cpu().numpy(), np.float32)

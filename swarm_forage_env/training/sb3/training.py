@@ -26,10 +26,10 @@ from stable_baselines3.common.utils import safe_mean
 from swarm_forage_env._internal.fields import ConfigError, known_keys
 from swarm_forage_env._internal.files import alone_in, check_folder, replacing
 from swarm_forage_env.contract.policy import Policy
+from swarm_forage_env.contract.types import ObsArray
 from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.extras import ExtraFunction
 from swarm_forage_env.policies.learned import LearnedPolicy
-from swarm_forage_env.policies.model_files import model_choice
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.training.evaluation import (
     EXPORTABLE,
@@ -128,7 +128,7 @@ def train(
         if resume:
             trust.check(folder / MODEL_FILE)
         torch.set_num_threads(1)  # networks this small gain nothing from more, and arenas want the cores
-        watch = _Watch(plan, folder, report or _keep_quiet, extra_observation, resume=resume)
+        watch = _Watch(plan, folder, report or _keep_quiet, extra_observation)
         return _train(plan, folder, watch, CallbackList([watch, *callbacks]), extras)
 
 
@@ -278,13 +278,11 @@ class _Watch(BaseCallback):
         folder: Path,
         report: Report,
         extra_observation: ExtraFunction | None,
-        *,
-        resume: bool,
     ) -> None:
         super().__init__()
         self.plan, self._folder, self._report, self._extra = plan, folder, report, extra_observation
         made_by = {"versions": {"stable-baselines3": stable_baselines3.__version__, "torch": str(torch.__version__)}}
-        self.evaluator = Evaluator(plan, folder, made_by, resume=resume)
+        self.evaluator = Evaluator(plan, folder, made_by, resume=True)  # the folder was looked at
         self._last_report, self._next_evaluation = -math.inf, 0
 
     def keep(self, model: BaseAlgorithm) -> None:
@@ -304,6 +302,7 @@ class _Watch(BaseCallback):
     def _on_training_start(self) -> None:
         self.plan.write(self._folder / PLAN_FILE)  # not before arenas and model are known to be possible
         if self._next_evaluation == 0:
+            self._report(TrainingStatus(steps=self.num_timesteps, episode_return=math.nan))
             self._next_evaluation = self.num_timesteps + self.plan.evaluation.every_steps
             if self.evaluator.is_due(self.num_timesteps):  # it was killed before it was done
                 self._evaluate()
@@ -340,13 +339,16 @@ class _Watch(BaseCallback):
             network = export_network(self.model, plan.interface, samples=plan.samples, caches=caches)
             policy = None if self._extra is None else partial(self._seeing_more, plan.as_kept(network))
         else:
-            policy = partial(LearnedPolicy, plan.run_interface, remember=model_choice(self.model, draws=False))
+            policy = partial(LearnedPolicy, plan.run_interface, self._best_actions)
         evaluation = self.evaluator.evaluate(network, self.num_timesteps, policy=policy)
         self.logger.record("evaluation/reached", evaluation.reached)
         self.logger.record("evaluation/interference_fraction", evaluation.interference_fraction)
         for world in evaluation.worlds:
             self.logger.record(f"evaluation/ratio/{world.world}", world.ratio)
         self._report(evaluation)
+
+    def _best_actions(self, rows: ObsArray, _: np.random.Generator) -> np.ndarray:
+        return self.model.predict(rows, deterministic=True)[0]
 
     def _seeing_more(self, network: Network) -> Policy:
         """The network with the function of the user that it needs."""
