@@ -89,7 +89,7 @@ def run_seeds(plan: TrainingPlan, seeds: Sequence[int], folder: Path, *, jobs: i
 
 
 class _Report:
-    """Shows how trainings go: what they will do, one bar for all of them or how long they take, a line per evaluation."""
+    """Shows how trainings go: what they will do, a bar for all or how long they take, each evaluation."""
 
     def __init__(self, plan: TrainingPlan, seeds: Sequence[int], shown: Progress) -> None:
         self._plan, self._seeds, self._shown = plan, seeds, shown

@@ -5,7 +5,7 @@ so filming does not change a run.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from swarm_forage_env.rendering.view import arena_view
 from swarm_forage_env.runs.run import LiveRun, build_env
 from swarm_forage_env.runs.spec import plan_run, stated_caches
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.wrappers.world import WorldLike, world_of
+from swarm_forage_env.wrappers.world import World, WorldLike, world_of
 
 
 def record_run(
@@ -68,55 +68,62 @@ def record_run(
         ValueError: unknown policy name, or a policy file that cannot be opened or does not fit the scenario.
     """
     given, path = world_of(world), Path(path)
-    scenario = given.scenario
     number("trail_s", trail_s, at_least=0.0)
     if at_s is None:
-        ticks = _film_ticks(scenario, seconds, speedup, fps)
+        ticks = _film_ticks(given.scenario, seconds, speedup, fps)
         check_film(path, fps, len(ticks))
-        n_samples = round(trail_s * fps / speedup) + 1
+        shown, n_samples = ticks, round(trail_s * fps / speedup) + 1
+    elif path.suffix.lower() == ".png":
+        ticks = _trail_ticks(given.scenario, at_s, trail_s)
+        shown, n_samples = ticks[-1:], len(ticks)
     else:
-        if path.suffix.lower() != ".png":
-            raise ConfigError(
-                f"Expected a picture's path to end in .png, got {str(path)!r}; for a film, leave --at out."
-            )
-        ticks = _trail_ticks(scenario, at_s, trail_s)
-        n_samples = len(ticks)
+        raise ConfigError(f"Expected a picture's path to end in .png, got {str(path)!r}; for a film, leave --at out.")
     check_file(path)
-    arena_view(scenario, size_px, theme)  # refuses a bad size or theme before the run starts
-    if isinstance(policy, str):
-        spec = plan_run(given, policy, parameters=parameters, caches=caches)
-        given, name, policy = spec.world, policy_label(spec.policy), load_policy(spec.policy, spec.parameters)
-    elif parameters:
-        raise ConfigError(f"Expected parameters with a policy's name or file only, got them with {policy!r}.")
+    arena_view(given.scenario, size_px, theme)  # refuses a bad size or theme before the run starts
+    given, name, driver = _driven(given, policy, caches, parameters)
+    arena = given.scenario.arena
+    look = {"title": given.title(name, f"{arena.width_m:g} x {arena.height_m:g} m"), "size_px": size_px, "theme": theme}
+    run = LiveRun(build_env(given.scenario, given.wrappers, reads=getattr(driver, "reads", None)), driver, seed)
+    trails = Trails(given.n_robots, n_samples) if n_samples > 1 else None
+    pictures = _pictures(run, ticks, shown[0], trails, progress, look)
+    if at_s is None:
+        write_film(pictures, path, fps=fps, theme=theme)
     else:
-        name = getattr(policy, "name", type(policy).__name__)
-        given = given.with_caches(caches or stated_caches(policy))
-    scenario = given.scenario
-    title = given.title(name, f"{scenario.arena.width_m:g} x {scenario.arena.height_m:g} m")
-    stack = build_env(scenario, given.wrappers, reads=getattr(policy, "reads", None))
-    trails = Trails(scenario.robots.n_robots, n_samples) if n_samples > 1 else None
+        write_picture(next(pictures), path)
+    return path
 
-    def frames() -> Iterator[Frame]:
-        run = LiveRun(stack, policy, seed)
-        env = run.forage_env
-        for done, tick in enumerate(ticks, start=1):
-            run.advance(to_tick=tick)  # a run that has ended stays as it is
-            if trails is not None:
-                trails.add(env.swarm)
-            if at_s is not None and done < len(ticks):
-                continue
+
+def _driven(
+    world: World, policy: str | Policy, caches: str | None, parameters: Mapping[str, Any] | None
+) -> tuple[World, str, Policy]:
+    """Return the world with the caches that the policy gets, the policy's name, and a fresh one."""
+    if isinstance(policy, str):
+        spec = plan_run(world, policy, parameters=parameters, caches=caches)
+        return spec.world, policy_label(spec.policy), load_policy(spec.policy, spec.parameters)
+    if parameters:
+        raise ConfigError(f"Expected parameters with a policy's name or file only, got them with {policy!r}.")
+    return world.with_caches(caches or stated_caches(policy)), getattr(policy, "name", type(policy).__name__), policy
+
+
+def _pictures(
+    run: LiveRun,
+    ticks: Sequence[int],
+    first: int,
+    trails: Trails | None,
+    progress: Callable[[int, int], None] | None,
+    look: Mapping[str, Any],
+) -> Iterator[Frame]:
+    """Look at a run at these ticks, and draw it from the first picture on."""
+    env = run.forage_env
+    for done, tick in enumerate(ticks, start=1):
+        run.advance(to_tick=tick)  # a run that has ended stays as it is
+        if trails is not None:
+            trails.add(env.swarm)
+        if tick >= first:
             state = (env.swarm, env.objects, env.caches, env.events)
-            yield render_frame(
-                scenario, *state, tick=env.tick, size_px=size_px, trails=trails, title=title, theme=theme
-            )
+            yield render_frame(env.scenario, *state, tick=env.tick, trails=trails, **look)
             if progress is not None:
                 progress(done, len(ticks))
-
-    if at_s is None:
-        write_film(frames(), path, fps=fps, theme=theme)
-    else:
-        write_picture(next(frames()), path)
-    return path
 
 
 def write_picture(frame: Frame, path: Path) -> None:

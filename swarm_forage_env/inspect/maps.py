@@ -117,21 +117,18 @@ def floor_maps(replay: Replay, *, side_m: float = 2 * CELL_M) -> FloorMaps:
     )
 
 
-def maps_of_runs(
-    specs: Sequence[RunSpec], *, jobs: int | None = None, advance: Callable[[float], None] | None = None
-) -> list[FloorMaps]:
+def maps_of_runs(specs: Sequence[RunSpec], *, advance: Callable[[float], None] | None = None) -> list[FloorMaps]:
     """Make runs and return the mean of the maps of each policy, and what is more in each than in the first.
 
     Args:
         specs: The runs; those of a policy differ in their seeds, and all arenas are of one size.
-        jobs: As in `runs.workers.each_run`.
         advance: Called with the robot-ticks that are done when a run ends.
 
     Raises:
         ValueError: a policy that is not installed, or refuses its file.
     """
     found: dict[str, FloorMaps] = {}
-    for spec, maps in each_run(_map_run, specs, jobs=jobs):
+    for spec, maps in each_run(_map_run, specs):
         found[spec.run_id] = maps
         if advance is not None:
             advance(sum(spec.robot_ticks for spec in specs if spec.run_id in found))

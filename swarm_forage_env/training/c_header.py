@@ -4,13 +4,14 @@ The functions do what `policies.kernels.network` does, in the same order, so tha
 are `inline`, because compilers then accept that a program does not call each of them.
 """
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterable, Iterator
 from textwrap import wrap
 
 import numpy as np
 
 from swarm_forage_env.policies.network import Network
-from swarm_forage_env.training.manual import WIDTH, Manual
+from swarm_forage_env.training.manual import WIDTH
 
 _TANH = """\
 /* tanh, at most 4e-7 of its value from the true one: Lambert's fraction at a quarter of x, then tanh 2y twice. */
@@ -90,22 +91,35 @@ static inline int {name}_draw(const float outputs[{upper}_OUTPUTS], double chanc
 """
 
 
-def c_header(network: Network, manual: Manual) -> str:
-    """Return the text of the header: comments, weights, `NAME_forward`, and for numbered actions how one is chosen."""
-    name = manual.identifier
-    names = {"name": name, "upper": name.upper()}
+def c_header(network: Network, name: str, manual: Iterable[str]) -> str:
+    """Return the text of the header: comments, weights, `NAME_forward`, and for numbered actions how one is chosen.
+
+    Args:
+        network: What it computes.
+        name: Of the policy; what C allows of it begins all names.
+        manual: Lines for the comment.
+    """
+    prefix, is_discrete = identifier_of(name), network.about.interface.actions == "discrete"
+    upper = prefix.upper()
+    names = {"name": prefix, "upper": upper}
     parts = [
-        _comment((f"The policy {manual.name} as a network in C, exported by swarm_forage_env.", "", *manual.lines)),
-        f"#ifndef {names['upper']}_H\n#define {names['upper']}_H\n",
-        f"#define {names['upper']}_INPUTS {manual.n_inputs}\n#define {names['upper']}_OUTPUTS {manual.n_outputs}\n",
-        *_arrays(network, name),
+        _comment((f"The policy {name} as a network in C, exported by swarm_forage_env.", "", *manual)),
+        f"#ifndef {upper}_H\n#define {upper}_H\n",
+        f"#define {upper}_INPUTS {network.n_columns}\n#define {upper}_OUTPUTS {len(network.biases[-1])}\n",
+        *_arrays(network, prefix),
         *([_TANH.format(**names)] if _is_tanh(network) else []),
         _LAYER.format(**names),
-        _forward(network, manual, **names),
+        _forward(network, is_discrete, **names),
     ]
-    if manual.is_discrete:
+    if is_discrete:
         parts += [_LIKELIEST.format(**names), *([_DRAW.format(**names)] if network.about.samples else [])]
     return "\n".join([*parts, "#endif\n"])
+
+
+def identifier_of(name: str) -> str:
+    """Return a name with letters, digits and _ only, as C wants it."""
+    found = re.sub(r"\W", "_", name, flags=re.ASCII)
+    return found if found[:1].isalpha() else f"policy_{found}"
 
 
 def _is_tanh(network: Network) -> bool:
@@ -130,7 +144,7 @@ def _array(name: str, values: np.ndarray, shape: str) -> str:
     return f"/* {shape} */\nstatic const float {name}[{values.size}] = {{\n{rows}\n}};\n"
 
 
-def _forward(network: Network, manual: Manual, name: str, upper: str) -> str:
+def _forward(network: Network, is_discrete: bool, name: str, upper: str) -> str:
     widths = [len(bias) for bias in network.biases]
     last = len(widths) - 1
     lines = [
@@ -138,7 +152,7 @@ def _forward(network: Network, manual: Manual, name: str, upper: str) -> str:
         f"static inline void {name}_forward(const float inputs[{upper}_INPUTS], float outputs[{upper}_OUTPUTS])",
         "{",
         *([f"    float values[2][{max(widths[:-1])}];"] if last else []),
-        *(["    int k;"] if last or not manual.is_discrete else []),
+        *(["    int k;"] if last or not is_discrete else []),
     ]
     for k, width in enumerate(widths):
         source = "inputs" if k == 0 else f"values[{(k - 1) % 2}]"
@@ -149,7 +163,7 @@ def _forward(network: Network, manual: Manual, name: str, upper: str) -> str:
             at = f"{target}[k]"
             active = f"{name}_tanh({at})" if _is_tanh(network) else f"{at} > 0.0f ? {at} : 0.0f"
             lines += [f"    for (k = 0; k < {width}; k++)", f"        {at} = {active};"]
-    if not manual.is_discrete:
+    if not is_discrete:
         cut = "outputs[k] < -1.0f ? -1.0f : outputs[k] > 1.0f ? 1.0f : outputs[k]"
         lines += [f"    for (k = 0; k < {upper}_OUTPUTS; k++)", f"        outputs[k] = {cut};"]
     return "\n".join([*lines, "}\n"])

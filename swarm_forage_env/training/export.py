@@ -1,5 +1,6 @@
 """A trained network as a file for robots and other simulators: ONNX, or a C header that needs nothing else."""
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,8 @@ from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.pretrained import network_file, network_names
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.presets import chosen_scenario
-from swarm_forage_env.training.c_header import c_header
-from swarm_forage_env.training.manual import Manual, manual_of
+from swarm_forage_env.training.c_header import c_header, identifier_of
+from swarm_forage_env.training.manual import manual_of
 
 ENDINGS = {".h": "a C header", ".onnx": "ONNX"}
 _OPSET, _IR_VERSION = 13, 8
@@ -47,8 +48,9 @@ def export_policy(policy: str | Path, file: str | Path, scenario: str | Scenario
         expected = " or ".join(f"{ending} ({what})" for ending, what in ENDINGS.items())
         raise ConfigError(f"Expected a file that ends in {expected}, got {target}.")
     network = _network_of(str(policy))
-    manual = manual_of(network, chosen_scenario(scenario, {}), Path(policy).stem)
-    content = c_header(network, manual).encode() if target.suffix == ".h" else _onnx_model(network, manual)
+    name, manual = Path(policy).stem, manual_of(network, chosen_scenario(scenario, {}))
+    is_header = target.suffix == ".h"
+    content = c_header(network, name, manual).encode() if is_header else _onnx_model(network, name, manual)
     with replacing(target) as draft:
         draft.write_bytes(content)
     return target
@@ -67,7 +69,7 @@ def _network_of(policy: str) -> Network:
     return Network.load(file)
 
 
-def _onnx_model(network: Network, manual: Manual) -> bytes:
+def _onnx_model(network: Network, name: str, manual: Iterable[str]) -> bytes:
     """Return a model: inputs (robots, d) to "logits", or to "commands" in [-1, 1], (robots, m), all float32.
 
     Raises:
@@ -77,35 +79,36 @@ def _onnx_model(network: Network, manual: Manual) -> bytes:
         from onnx import TensorProto, checker, helper, numpy_helper
     except ImportError as error:
         raise ImportError(f"An ONNX file needs onnx: {install_command('export')}.") from error
-    output = "logits" if manual.is_discrete else "commands"
+    is_discrete = network.about.interface.actions == "discrete"
+    output = "logits" if is_discrete else "commands"
     nodes: list[Any] = []
     constants: list[Any] = []
     last, value = len(network.weights) - 1, "inputs"
     for k, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
-        for name, array in ((f"weights_{k}", weight), (f"biases_{k}", bias)):
-            constants.append(numpy_helper.from_array(np.ascontiguousarray(array, np.float32), name))
-        summed = output if k == last and manual.is_discrete else f"sums_{k}"
+        for what, array in ((f"weights_{k}", weight), (f"biases_{k}", bias)):
+            constants.append(numpy_helper.from_array(np.ascontiguousarray(array, np.float32), what))
+        summed = output if k == last and is_discrete else f"sums_{k}"
         nodes.append(helper.make_node("Gemm", [value, f"weights_{k}", f"biases_{k}"], [summed]))
         value = summed
         if k < last:
             value = f"layer_{k}"
             nodes.append(helper.make_node(network.about.activation.capitalize(), [summed], [value]))
-    if not manual.is_discrete:
+    if not is_discrete:
         constants += [
-            numpy_helper.from_array(np.array(end, np.float32), name) for end, name in ((-1, "least"), (1, "most"))
+            numpy_helper.from_array(np.array(end, np.float32), what) for end, what in ((-1, "least"), (1, "most"))
         ]
         nodes.append(helper.make_node("Clip", [value, "least", "most"], [output]))
-    shapes = {"inputs": manual.n_inputs, output: manual.n_outputs}
+    shapes = {"inputs": network.n_columns, output: len(network.biases[-1])}
     taken, returned = (
-        helper.make_tensor_value_info(name, TensorProto.FLOAT, ["robots", size]) for name, size in shapes.items()
+        helper.make_tensor_value_info(what, TensorProto.FLOAT, ["robots", size]) for what, size in shapes.items()
     )
-    graph = helper.make_graph(nodes, manual.identifier, [taken], [returned], constants)
+    graph = helper.make_graph(nodes, identifier_of(name), [taken], [returned], constants)
     model = helper.make_model(
         graph,
         producer_name="swarm_forage_env",
         opset_imports=[helper.make_opsetid("", _OPSET)],
         ir_version=_IR_VERSION,
-        doc_string="\n".join(manual.lines),
+        doc_string="\n".join(manual),
     )
     helper.set_model_props(model, {"about": network.about.to_json()})
     checker.check_model(model)

@@ -1,8 +1,6 @@
 """What a network takes and returns, in words: for whoever builds a robot or another simulator around it."""
 
-import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from textwrap import wrap
 
 from swarm_forage_env.contract.policy import COMMANDS, SwarmSpec
@@ -30,36 +28,8 @@ quarter turns. The frame of robot i in its decision n, both counted from 0, is, 
 """
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Manual:
-    """Words about a network, each a line or several."""
-
-    name: str
-    """Of the policy."""
-    n_inputs: int
-    n_outputs: int
-    is_discrete: bool
-    """Whether outputs are logits of numbered actions; else they are commands in [-1, 1]."""
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-    use: tuple[str, ...]
-    """When to ask it, and what to do with the answer."""
-
-    @property
-    def identifier(self) -> str:
-        """The name with letters, digits and _ only, as C wants it."""
-        found = re.sub(r"\W", "_", self.name, flags=re.ASCII)
-        return found if found[:1].isalpha() else f"policy_{found}"
-
-    @property
-    def lines(self) -> tuple[str, ...]:
-        """All of it, one line after the other."""
-        n_inputs, n_outputs = f"Inputs, {self.n_inputs} numbers:", f"Outputs, {self.n_outputs} numbers:"
-        return (n_inputs, *self.inputs, "", n_outputs, *self.outputs, "", *self.use)
-
-
-def manual_of(network: Network, scenario: ScenarioConfig, name: str) -> Manual:
-    """Return the words about a network in a scenario.
+def manual_of(network: Network, scenario: ScenarioConfig) -> tuple[str, ...]:
+    """Return the words about a network in a scenario, line by line.
 
     Raises:
         ConfigError: the scenario lacks what the network sees.
@@ -68,31 +38,28 @@ def manual_of(network: Network, scenario: ScenarioConfig, name: str) -> Manual:
     about, arena = network.about, scenario.arena
     interface = LearnerInterface(about.interface, SwarmSpec.of(scenario))
     network.check_fits(interface)
+    n_inputs, n_outputs = interface.widths
     is_discrete = interface.translation.is_discrete
-    every_s = about.interface.decision_ticks * scenario.dt_s
-    return Manual(
-        name=name,
-        n_inputs=interface.layout.size,
-        n_outputs=len(network.biases[-1]),
-        is_discrete=is_discrete,
-        inputs=(
-            *(f"{line}" for line in interface.layout.describe().splitlines()),
-            f"Arena: X = {arena.width_m:g} m, Y = {arena.height_m:g} m. All inputs lie in [-1, 1].",
-        ),
-        outputs=tuple(_numbered(about.samples, network) if is_discrete else _commands(network)),
-        use=(
-            *_use(about.interface, every_s),
-            *(_frame_lines(interface.translation.frames, is_discrete) if about.interface.frame_decisions else ()),
-        ),
+    frames = interface.translation.frames
+    return (
+        f"Inputs, {n_inputs} numbers:",
+        *interface.layout.describe().splitlines(),
+        f"Arena: X = {arena.width_m:g} m, Y = {arena.height_m:g} m. All inputs lie in [-1, 1].",
+        "",
+        f"Outputs, {n_outputs} numbers:",
+        *(_numbered(about.samples, n_outputs) if is_discrete else _commands(about.interface, n_outputs)),
+        "",
+        *_use(about.interface, about.interface.decision_ticks * scenario.dt_s),
+        *(_frame_lines(frames, is_discrete) if about.interface.frame_decisions else ()),
     )
 
 
-def _numbered(samples: bool, network: Network) -> list[str]:
+def _numbered(samples: bool, n_outputs: int) -> list[str]:
     lines = [
         f"{number:>9}  {motion}: wheels {left * WHEEL_SCALE_MPS:+.2f}, {right * WHEEL_SCALE_MPS:+.2f} m/s (left, right)"
         for number, (motion, (left, right)) in enumerate(MOTION_WHEELS.items())
     ]
-    if len(network.biases[-1]) > len(MOTIONS):
+    if n_outputs > len(MOTIONS):
         lines += [
             f"{len(MOTIONS) + k:>9}  {grip}: wheels stand, gripper command {GRIP_COMMANDS[grip]:+.3f}"
             for k, grip in enumerate(GRIPS)
@@ -105,14 +72,13 @@ def _numbered(samples: bool, network: Network) -> list[str]:
     return [*lines, f"These are logits. {chosen}"]
 
 
-def _commands(network: Network) -> list[str]:
+def _commands(interface: InterfaceConfig, n_outputs: int) -> list[str]:
     names = [
         f"left wheel / {WHEEL_SCALE_MPS:g} m/s",
         f"right wheel / {WHEEL_SCALE_MPS:g} m/s",
         "gripper command",
     ]
-    n_outputs = len(network.biases[-1])
-    driven = 2 if network.about.interface.automatic_gripper else COMMANDS
+    driven = 2 if interface.automatic_gripper else COMMANDS
     names = names[:driven] + [f"number {k} of the message" for k in range(n_outputs - driven)]
     return [*(f"{k:>9}  {name}" for k, name in enumerate(names)), "All outputs are cut to [-1, 1]."]
 

@@ -132,29 +132,23 @@ def recipe(
         given = [name for name, value in refused.items() if value not in (None, ())]
         if given:
             raise ConfigError(f"Expected either a sampler or {', '.join(given)}, which it decides; got both.")
-        scenario = sampler.largest
+        scenario, small_start = sampler.largest, False
     scenario = scenario or DEFAULT_SCENARIO
-    is_preset = not isinstance(scenario, ScenarioConfig)
     measured = MEASURED.get(scenario, {}) if isinstance(scenario, str) else {}
-    fields = {name: value for name, value in overrides.items() if name != "horizon_s"}
-    config = chosen_scenario(scenario, fields)
-    if is_preset and "reward" not in fields:
-        general = REWARDS if config.performance == "collected" else {}
-        config = chosen_scenario(scenario, {**general, **measured.get("rewards", {}), **fields})
+    config = _rewarding(scenario, overrides, measured.get("rewards", {}))
     chosen = chosen_interface(interface, _interface(algorithm, config))
     if n_arenas is None:  # a sampler needs many, so that every batch holds all kinds of worlds
         n_arenas = MOST_ARENAS if sampler else min(MOST_ARENAS, max(1, MOST_ROBOTS // config.robots.n_robots))
     n_rows = n_arenas * config.robots.n_robots
-    episodes: dict[str, Any] = {}
-    if is_preset:
+    episodes = {"horizon_s": overrides["horizon_s"]} if "horizon_s" in overrides else {}
+    if not episodes and isinstance(scenario, str):
         episodes = {"horizon_s": _episode_s(config, steps // 3 / n_rows * chosen.decision_ticks * config.dt_s)}
-    episodes |= {name: value for name, value in overrides.items() if name not in fields}
     with_overrides(config, **episodes)  # refuses an impossible length
     given_options = dict(options or {})
     all_options = _options(algorithm, n_rows, measured.get("options", {}).get(algorithm, {}) | given_options)
     shortest = 1 if small_start else n_rows * (all_options.get("n_steps", 1) if algorithm in SAMPLING else 1)
     if small_start is None:
-        small_start = config.performance == "collected" and sampler is None and bool(measured.get("small_start", True))
+        small_start = config.performance == "collected" and bool(measured.get("small_start", True))
     late = {name: value for name, value in LATE_OPTIONS.get(algorithm, {}).items() if name not in given_options}
     return TrainingPlan(
         world=World(config, wrapper_configs(wrappers)),
@@ -170,6 +164,18 @@ def recipe(
         samples=algorithm in SAMPLING and chosen.actions == "discrete" if samples is None else samples,
         sampler=sampler,
     )
+
+
+def _rewarding(
+    scenario: str | ScenarioConfig, overrides: Mapping[str, Any], measured: Mapping[str, float]
+) -> ScenarioConfig:
+    """Return the scenario with fields by name; a preset has the recipe's rewards and the measured ones beside them."""
+    fields = {name: value for name, value in overrides.items() if name != "horizon_s"}
+    config = chosen_scenario(scenario, fields)
+    if isinstance(scenario, ScenarioConfig) or "reward" in fields:
+        return config
+    general = REWARDS if config.performance == "collected" else {}
+    return chosen_scenario(scenario, {**general, **measured, **fields})
 
 
 def _interface(algorithm: str, config: ScenarioConfig) -> InterfaceConfig:

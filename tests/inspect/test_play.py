@@ -9,8 +9,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.inspect.play import session as playing
 from swarm_forage_env.inspect.play.levels import LEVELS, Levels, with_idle
-from swarm_forage_env.inspect.play.run import SPEEDS, RunByHand
-from swarm_forage_env.inspect.play.session import PlaySession, Setting, wall_of
+from swarm_forage_env.inspect.play.session import SPEEDS, PlaySession, Setting, wall_of
 from swarm_forage_env.inspect.replay.files import read_replays
 from swarm_forage_env.inspect.replay.frames import Status
 from swarm_forage_env.policies.registry import load_policy
@@ -41,7 +40,7 @@ class Clock:
 @pytest.fixture(autouse=True)
 def patient(monkeypatch):
     """Ticks take long while they are compiled."""
-    monkeypatch.setattr("swarm_forage_env.inspect.play.run.LONGEST_S", 1000.0)
+    monkeypatch.setattr("swarm_forage_env.inspect.play.session.LONGEST_S", 1000.0)
 
 
 def session_of(policy="crw", wrappers=(), *, seed=3, world=SMALL):
@@ -81,7 +80,7 @@ def test_a_frame_is_plain_values_and_tells_what_is_where():
     frame = look_after(session, clock, 1.0, run=1)
     assert "about" not in frame, "only for a page that does not have it"
     assert json.loads(json.dumps(frame)) == frame
-    swarm = session.run.world.swarm
+    swarm = session.world.swarm
     np.testing.assert_allclose(np.column_stack((frame["x"], frame["y"])), swarm.position, atol=6e-4)
     assert len(frame["status"]) == about["header"]["n_robots"] == 8
     assert len(frame["objects"]) == 3 * 40
@@ -97,22 +96,22 @@ def state_of(world):
 
 @pytest.mark.parametrize(("policy", "wrappers"), [("dpo", ()), ("stochm", NOISY)])
 def test_looking_changes_nothing(policy, wrappers):
-    looked = RunByHand(plan_run(SMALL, policy, seed=3, wrappers=wrappers))
+    looked, _ = session_of(policy, wrappers)
     for _ in range(150):
-        looked.step()
+        looked.carry_out({"do": "step"})
     plain = load_policy(policy)
-    run = LiveRun(build_env(looked.scenario, wrappers, reads=getattr(plain, "reads", None)), plain, 3)
+    run = LiveRun(build_env(looked.spec.scenario, wrappers, reads=getattr(plain, "reads", None)), plain, 3)
     run.advance(to_tick=150)
     assert state_of(looked.world) == state_of(run.forage_env)
 
 
 @pytest.mark.parametrize("name", ["sensor_noise", "wheel_noise", "throttle", "deaths"])
 def test_a_level_that_was_set_changes_the_run_and_is_told(name):
-    runs = [RunByHand(plan_run(SMALL, "crw", seed=3)) for _ in range(2)]
+    runs = [session_of()[0] for _ in range(2)]
     told = runs[0].levels.set(name, LEVELS[name].most)
     for each in runs:
         for _ in range(400):
-            each.step()
+            each.carry_out({"do": "step"})
     assert state_of(runs[0].world) != state_of(runs[1].world)
     assert runs[0].summary().endswith(f"changed by hand: {told.replace(' is', '')}")
 
@@ -126,11 +125,11 @@ def test_a_level_by_a_table_stays_as_it_is():
 
 
 def test_a_swarm_that_is_dead_ends_the_run():
-    run = RunByHand(plan_run(SMALL, "crw", seed=3))
+    session, _ = session_of()
     for robot in range(8):
-        assert run.levels.treat("kill", robot) == f"robot {robot} was killed"
-    run.step()
-    assert run.run.over
+        session.carry_out({"do": "kill", "robot": robot})
+    session.carry_out({"do": "step"})
+    assert session.run.over
 
 
 def test_pause_step_and_speed():
@@ -250,7 +249,7 @@ def test_a_wrong_command_is_refused_and_changes_nothing(command, expected):
     before, run = session.setting, session.run
     with pytest.raises(ConfigError, match=expected):
         session.carry_out(command)
-    assert (session.setting, session.run, run.levels.changes) == (before, run, [])
+    assert (session.setting, session.run, session.levels.changes) == (before, run, [])
 
 
 def test_a_chosen_robot_is_told_of():
@@ -258,8 +257,7 @@ def test_a_chosen_robot_is_told_of():
     session.carry_out({"do": "speed", "value": 100})
     frame = look_after(session, clock, 2.0, run=1, robot=3)
     assert frame["robot"]["wheels"].endswith("cm/s")
-    objects, caches = session.run.remembered_places(3)
-    assert len(frame["robot"]["places"]) == len(objects) + len(caches)
+    assert len(frame["robot"]["places"]) == sum(map(len, session._policy.describe_memories().of_robot(3)))
     assert frame["words"][frame["activity"][3]]
     plain, clock = session_of("ppo_warehouse_small")
     assert look_after(plain, clock, 0.2, run=1, robot=0)["robot"]["places"] == []

@@ -41,7 +41,7 @@ def session():
 
 
 def opened(browser: Browser, session, *, plays: bool = False) -> None:
-    session.run.paused = not plays
+    session.paused = not plays
     browser.open_address(session.address)
     run_shown(browser, "12 robots")
 
@@ -65,10 +65,10 @@ def test_it_plays_pauses_and_steps(request, kind, session):
     browser.wait_for(f"{SECONDS} > 3")
     browser.click("#play")
     browser.wait_for("document.getElementById('play').ariaLabel === 'Play'")
-    tick = session.run.world.tick
+    tick = session.world.tick
     browser.click("#step")
     browser.wait_for("document.getElementById('note').textContent === 'one tick'")
-    assert session.run.world.tick == tick + 1
+    assert session.world.tick == tick + 1
     assert browser.ask("document.documentElement.scrollWidth") <= browser.width
     keep_picture(browser, f"play_page_{kind}")
     settled(browser)
@@ -82,7 +82,7 @@ def test_a_robot_is_chosen_broken_repaired_and_killed(desktop, session):
     for button, words in (("break", "in repair"), ("repair", "empty"), ("kill", "dead")):
         desktop.click(f"#robot button[data-do={button}]")
         desktop.wait_for(f"document.querySelector('#robot td').textContent === '{words}'")
-    assert session.run.levels.changes == ["robot 4 broken", "robot 4 repaired", "robot 4 killed"]
+    assert session.levels.changes == ["robot 4 broken", "robot 4 repaired", "robot 4 killed"]
     assert desktop.ask("document.querySelectorAll('#robot button:disabled').length") == 3
     desktop.press("Escape")
     desktop.wait_for("document.querySelector('#robot h2') === null")

@@ -74,13 +74,13 @@ def test_another_host_is_refused(server, host):
     for method in ("GET", "POST"):
         status, words = refusal(server, method, body='{"do": "pause"}', Host=host)
         assert (status, words.startswith("Expected the host 127.0.0.1:")) == (403, True)
-    assert not server.session.run.paused
+    assert not server.session.paused
 
 
 def test_another_page_is_refused(server):
     for origin in ("http://evil.example", "null", f"http://127.0.0.1:{server.server_port}0"):
         assert refusal(server, body='{"do": "pause"}', Origin=origin)[0] == 403
-    assert not server.session.run.paused
+    assert not server.session.paused
     answer, text = ask(server, body='{"do": "pause"}', Origin=f"http://127.0.0.1:{server.server_port}")
     assert (answer.status, json.loads(text)) == (200, {"done": ""})
     ask(server, body='{"do": "play"}')
@@ -113,9 +113,9 @@ def test_a_frame_a_command_and_a_replay_come_as_json(server):
     assert answer.status == 200
     assert json.loads(text)["about"]["header"]["n_robots"] == 3
     assert json.loads(ask(server, body='{"do": "kill", "robot": 1}')[1]) == {"done": "robot 1 was killed"}
-    server.session.run.paused = True
+    server.session.paused = True
     assert json.loads(ask(server, place="frame", body="null")[1])["dead"] == [1]
-    while server.session.run.world.tick < 5:
+    while server.session.world.tick < 5:
         ask(server, body='{"do": "step"}')
     told = json.loads(ask(server, place="replay", body="null")[1])
     assert told["name"].endswith("_random.html")

@@ -36,7 +36,7 @@ def pixel_of(browser: Browser, session: PlaySession, x_m: float, y_m: float) -> 
 
 def choose_robot(browser: Browser, session: PlaySession, robot: int) -> None:
     """Click on a robot of a run that stands still."""
-    browser.click_at(*pixel_of(browser, session, *session.run.world.swarm.position[robot].tolist()))
+    browser.click_at(*pixel_of(browser, session, *session.world.swarm.position[robot].tolist()))
     browser.wait_for(f"document.querySelector('#robot h2')?.textContent === 'robot {robot}'")
 
 

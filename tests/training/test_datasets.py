@@ -193,14 +193,9 @@ def test_damaged_files_are_named(tmp_path):
     run = tmp_path / "seed_000003.npz"
     with np.load(run) as stored:
         arrays = dict(stored)
-    damages = {
-        "active as bool": {"active": arrays["active"][1:]},
-        "observations as float32": {"observations": arrays["observations"][:, 1:]},
-        "actions as float32": {"actions": arrays["actions"].astype(np.float64)},
-    }
-    for told, change in damages.items():
-        np.savez(run, **arrays | change)
-        with pytest.raises(DatasetError, match=rf"seed_000003\.npz.*{told}"):
+    for told, change in {"active": arrays["active"][1:], "observations": arrays["observations"][:, 1:]}.items():
+        np.savez(run, **arrays | {told: change})
+        with pytest.raises(DatasetError, match=rf"seed_000003\.npz.*{told} of 100 decisions of 4 robots"):
             first(dataset)
     for content in (b"", b"no archive", run.read_bytes()[:500]):
         run.write_bytes(content)

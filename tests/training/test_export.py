@@ -4,7 +4,6 @@ import re
 import shutil
 import subprocess
 import sys
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -17,7 +16,7 @@ from swarm_forage_env.policies.kernels.frames import take_frames
 from swarm_forage_env.policies.kernels.network import pick
 from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.policies.pretrained import network_file
-from swarm_forage_env.training.c_header import c_header
+from swarm_forage_env.training.c_header import c_header, identifier_of
 from swarm_forage_env.training.manual import manual_of
 
 PROGRAM = """\
@@ -154,7 +153,7 @@ def test_onnx_computes_what_the_policy_does(which, tmp_path):
 
 
 def test_the_words_say_what_goes_in_and_out():
-    text = "\n".join(manual_of(NETWORKS["generalist"], scenario("warehouse_medium"), "generalist").lines)
+    text = "\n".join(manual_of(NETWORKS["generalist"], scenario("warehouse_medium")))
     for words in (
         "Inputs, 31 numbers:",
         "27..30  sighting_site",
@@ -167,10 +166,10 @@ def test_the_words_say_what_goes_in_and_out():
         "If f >= 4, the two wheel speeds of the action change places",
     ):
         assert words in text
-    text = "\n".join(manual_of(NETWORKS["relu and gripper"], scenario("warehouse_small"), "net").lines)
+    text = "\n".join(manual_of(NETWORKS["relu and gripper"], scenario("warehouse_small")))
     assert "6  grasp: wheels stand, gripper command +1.000" in text
     assert "Choose the action with the largest output" in text
-    text = "\n".join(manual_of(NETWORKS["commands"], scenario("warehouse_small"), "net").lines)
+    text = "\n".join(manual_of(NETWORKS["commands"], scenario("warehouse_small")))
     assert "2  gripper command" in text
 
 
@@ -178,8 +177,9 @@ def test_the_words_say_what_goes_in_and_out():
 def test_the_formulas_of_frames_do_what_runs_do(which, tmp_path):
     seen, swarm = rows(NETWORKS[which]), SwarmSpec.of(scenario("warehouse_small", n_robots=LARGE))
     frames = LearnerInterface(NETWORKS[which].about.interface, swarm).translation.frames
-    words = manual_of(NETWORKS[which], scenario("warehouse_small"), which).use
-    formulas = " ".join(line.strip() for line in words if line.startswith("    ")).replace("nothing more", "")
+    words = manual_of(NETWORKS[which], scenario("warehouse_small"))
+    begins = "    m =", "    f =", 12 * " "
+    formulas = " ".join(line.strip() for line in words if line.startswith(begins)).replace("nothing more", "")
     formulas = re.sub(r"f == (\d):(.*?)(?=f ==|$)", r"if (f == \1) {\2}", formulas)
     program = FRAMES.replace("SIZE", str(seen.shape[1])).replace("FORMULAS", formulas)
     taken = set()
@@ -194,9 +194,8 @@ def test_the_formulas_of_frames_do_what_runs_do(which, tmp_path):
 
 
 def test_names_become_identifiers_and_words_do_not_end_the_comment():
-    manual = replace(manual_of(NETWORKS["commands"], scenario("warehouse_small"), "7 nets/a*/"), use=("*/ int x;",))
-    assert manual.identifier == "policy_7_nets_a__"
-    assert c_header(NETWORKS["commands"], manual).split("#ifndef")[0].count("*/") == 1
+    assert identifier_of("7 nets/a*/") == "policy_7_nets_a__"
+    assert c_header(NETWORKS["commands"], "7 nets/a*/", ["*/ int x;"]).split("#ifndef")[0].count("*/") == 1
 
 
 def test_what_is_no_network_or_no_known_file_is_refused(tmp_path):

@@ -18,12 +18,18 @@ from swarm_forage_env._internal.fields import ConfigError, known_keys, known_nam
 from swarm_forage_env._internal.files import as_file_name
 from swarm_forage_env._internal.wording import shown
 from swarm_forage_env.contract.codes import Counter
-from swarm_forage_env.inspect.play.levels import LEVELS
-from swarm_forage_env.inspect.play.run import SPEEDS, RunByHand
-from swarm_forage_env.inspect.replay.capture import caches_now, objects_now, status_now
+from swarm_forage_env.inspect.play.levels import LEVELS, Levels, with_idle
+from swarm_forage_env.inspect.replay.capture import (
+    Capture,
+    caches_now,
+    objects_now,
+    status_now,
+    ticks_between_frames,
+)
 from swarm_forage_env.inspect.replay.files import for_page, page_of
-from swarm_forage_env.policies.registry import POLICIES, policy_label
+from swarm_forage_env.policies.registry import POLICIES, load_policy, policy_label
 from swarm_forage_env.rendering.figures import places_of
+from swarm_forage_env.runs.run import LiveRun, build_env
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.obstacles import MIN_SIDE_M, Rectangle
@@ -31,6 +37,11 @@ from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import PRESETS, scenario
 from swarm_forage_env.wrappers.world import World
 
+SPEEDS = (0.2, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)
+"""Simulated seconds per second; our choice."""
+LONGEST_S = 0.1
+"""Ticks of one frame take at most this long, so that the page gets an answer even if the run is slower than its
+speed."""
 LONGEST_WAIT_S = 0.1
 """A page that asks for its next frame later than this finds the run as if it had asked then: one that sleeps pauses."""
 LONGEST_SUMMARY_S = 1.0
@@ -62,7 +73,12 @@ class PlaySession:
 
     Attributes:
         setting: What the run is made of.
-        run: The run.
+        spec: The run as it was planned.
+        run: The run, which goes on by frames and commands only.
+        world: Its environment; only read it.
+        levels: What can be changed by hand.
+        paused: Whether the clock stands still.
+        speed: Simulated seconds per second.
     """
 
     def __init__(self, setting: Setting, *, clock: Callable[[], float] = time.monotonic) -> None:
@@ -78,16 +94,39 @@ class PlaySession:
         self._lock, self._clock = Lock(), clock
         self._policies = tuple(dict.fromkeys((*POLICIES, setting.policy)))
         self._serial = 0
+        self.speed, self.paused = 10.0, False
         self._begin(setting)
 
     def _begin(self, setting: Setting) -> None:
         """Start a run; if it cannot be, all stays as it is."""
-        run = RunByHand(plan_run(setting.world, setting.policy, caches=setting.caches, seed=setting.seed))
-        if self._serial:
-            run.speed, run.paused = self.run.speed, self.run.paused
-        self.setting, self.run = setting, run
+        spec = plan_run(setting.world, setting.policy, caches=setting.caches, seed=setting.seed)
+        here, end = spec.scenario, spec.scenario.horizon_ticks
+        policy: Any = load_policy(spec.policy, spec.parameters)
+        stack = build_env(here, with_idle(spec.wrappers), reads=getattr(policy, "reads", None))
+        levels, run = Levels(stack), LiveRun(stack, policy, spec.seed)
+        self._capture = Capture(
+            run,
+            policy,
+            end_tick=end,
+            frame_ticks=ticks_between_frames(here, end),
+            disturbances=lambda: levels.all_configs,
+        )
+        self.setting, self.spec, self.run, self.levels, self.world = setting, spec, run, levels, run.forage_env
+        self._policy, self._owed_ticks = policy, 0.0
         self._serial += 1
         self._seen_s = self._clock()
+
+    def _advance(self, seconds: float) -> None:
+        """Let the run go on for what is due after `seconds` of the reader's time; less if it takes too long."""
+        if self.paused:
+            return
+        self._owed_ticks += seconds * self.speed / self.spec.scenario.dt_s
+        until = time.perf_counter() + LONGEST_S
+        while self._owed_ticks >= 1.0 and not self.run.over:
+            self._owed_ticks -= 1.0
+            self._capture.advance()
+            if time.perf_counter() > until:
+                self._owed_ticks %= 1.0
 
     def carry_out(self, command: Any) -> str:
         """Do what a command asks for; returns one line about it. A command that is refused changes nothing.
@@ -100,26 +139,26 @@ class PlaySession:
             ValueError: a run that cannot be.
         """
         with self._lock:
-            run, arena = self.run, self.setting.world.scenario.arena
+            arena = self.setting.world.scenario.arena
             walls = arena.obstacles
             match command:
                 case {"do": "play"}:
-                    run.paused, self._seen_s = False, self._clock()
+                    self.paused, self._seen_s = False, self._clock()
                 case {"do": "pause"}:
-                    run.paused = True
+                    self.paused = True
                 case {"do": "step"}:
-                    run.paused = True
-                    run.step()
+                    self.paused = True
+                    self._capture.advance()
                     return "one tick"
                 case {"do": "speed", "value": value}:
                     number("speed", value, above=0.0, at_most=SPEEDS[-1])
-                    run.speed = float(value)
+                    self.speed = float(value)
                 case {"do": "level", "name": name, "value": value}:
                     known_name("level", name, LEVELS)
-                    return run.levels.set(name, value)
+                    return self.levels.set(name, value)
                 case {"do": "kill" | "break" | "repair" as deed, "robot": robot}:
                     self._check_robot(robot)
-                    return run.levels.treat(deed, robot)
+                    return self.levels.treat(deed, robot)
                 case {"do": "start", **changes}:
                     return self._start_again(changes)
                 case {"do": "wall", "box": [float() | int(), float() | int(), float() | int(), float() | int()] as box}:
@@ -137,7 +176,7 @@ class PlaySession:
         """Start a run, the same or another one, with the levels of now; a chosen scenario begins as its preset."""
         known_keys(changes, ("scenario", "policy", "robots", "seed"))
         now = self.setting
-        world = replace(now.world, wrappers=self.run.levels.configs)
+        world = replace(now.world, wrappers=self.levels.configs)
         policy, seed = changes.get("policy", now.policy), changes.get("seed", now.seed)
         known_name("policy", policy, self._policies)
         if "scenario" in changes:
@@ -156,7 +195,7 @@ class PlaySession:
             here = with_overrides(world.scenario, obstacles=walls)
         except ConfigError as error:
             raise ConfigError(f"A wall cannot stand there. {error}") from error
-        self._begin(replace(self.setting, world=replace(world, scenario=here, wrappers=self.run.levels.configs)))
+        self._begin(replace(self.setting, world=replace(world, scenario=here, wrappers=self.levels.configs)))
         return f"started again with {len(walls)} wall{'' if len(walls) == 1 else 's'}"
 
     def replay_page(self) -> tuple[str, str]:
@@ -165,17 +204,21 @@ class PlaySession:
         Raises:
             ConfigError: the run has not gone on for one frame.
         """
+        changes = f", changed by hand: {self.levels.changes_in_words}" if self.levels.changes else ""
+        name = policy_label(self.spec.policy)
         with self._lock:
-            replay = self.run.replay()
-        name = f"{replay.spec.world.file_name}_{as_file_name(policy_label(self.setting.policy))}.html"
-        return name, page_of([replay])
+            replay = self._capture.replay(self.spec, label=f"{name}{changes}")
+        return f"{self.spec.world.file_name}_{as_file_name(name)}.html", page_of([replay])
 
     def summary(self) -> str:
         """Return one line about the run so far; it waits for `LONGEST_SUMMARY_S` at most."""
         # Who compiles a new run keeps the lock for long; to read the old one without it breaks nothing.
         is_ours = self._lock.acquire(timeout=LONGEST_SUMMARY_S)
         try:
-            return self.run.summary()
+            changes = f"; changed by hand: {self.levels.changes_in_words}" if self.levels.changes else ""
+            delivered = self.world.events.counters[Counter.COLLECTED]
+            time_s = self.world.tick * self.spec.scenario.dt_s
+            return f"{policy_label(self.spec.policy)}: {time_s:,.0f} s, {delivered:,} delivered{changes}"
         finally:
             if is_ours:
                 self._lock.release()
@@ -194,7 +237,7 @@ class PlaySession:
         with self._lock:
             now = self._clock()
             passed, self._seen_s = now - self._seen_s, now
-            self.run.advance(min(max(passed, 0.0), LONGEST_WAIT_S))
+            self._advance(min(max(passed, 0.0), LONGEST_WAIT_S))
             frame = self._swarm() | self._floor() | self._numbers()
             if words.get("run") != self._serial:
                 frame["about"] = self._about()
@@ -203,11 +246,10 @@ class PlaySession:
             return frame
 
     def _check_robot(self, robot: Any) -> None:
-        whole("robot", robot, at_least=0, at_most=self.run.scenario.robots.n_robots - 1)
+        whole("robot", robot, at_least=0, at_most=self.spec.scenario.robots.n_robots - 1)
 
     def _swarm(self) -> dict[str, Any]:
-        world, policy = self.run.world, self.run.policy
-        swarm = world.swarm
+        world, policy, swarm = self.world, self._policy, self.world.swarm
         told: dict[str, Any] = {}
         if hasattr(policy, "describe_robots"):
             states = policy.describe_robots()
@@ -221,9 +263,9 @@ class PlaySession:
         }
 
     def _floor(self) -> dict[str, Any]:
-        world, capture = self.run.world, self.run.capture
-        lasts_s = max(2.0, FLASH_S * self.run.speed)
-        fresh = capture.latest_deliveries(world.tick - math.ceil(lasts_s / world.scenario.dt_s))[-MOST_FLASHES:]
+        world = self.world
+        lasts_s = max(2.0, FLASH_S * self.speed)
+        fresh = self._capture.latest_deliveries(world.tick - math.ceil(lasts_s / world.scenario.dt_s))[-MOST_FLASHES:]
         return {
             "objects": objects_now(world).ravel().tolist(),
             "caches": caches_now(world).ravel().tolist(),
@@ -231,26 +273,26 @@ class PlaySession:
         }
 
     def _numbers(self) -> dict[str, Any]:
-        run, counters = self.run, self.run.world.events.counters
-        time_s = run.world.tick * run.scenario.dt_s
+        counters = self.world.events.counters
+        time_s = self.world.tick * self.spec.scenario.dt_s
         active = int(counters[Counter.ACTIVE])
         return {
             "run": self._serial,
             "time_s": round(time_s, 3),
-            "paused": run.paused,
-            "over": run.run.over,
-            "speed": run.speed,
+            "paused": self.paused,
+            "over": self.run.over,
+            "speed": self.speed,
             "counters": counters.tolist(),
             "per_1000_s": 1000.0 * int(counters[Counter.COLLECTED]) / time_s if time_s else 0.0,
             "interference": int(counters[Counter.INTERFERING]) / active if active else 0.0,
             "curve": self._curve(),
-            "levels": {name: run.levels.level(name) for name in LEVELS},
-            "changes": run.levels.changes_in_words,
+            "levels": {name: self.levels.level(name) for name in LEVELS},
+            "changes": self.levels.changes_in_words,
         }
 
     def _curve(self) -> dict[str, list[float]]:
         """Return deliveries per 1,000 s and the share of time in interference, over equal parts of the run so far."""
-        capture, dt_s = self.run.capture, self.run.scenario.dt_s
+        capture, dt_s = self._capture, self.spec.scenario.dt_s
         last = len(capture.ticks) - 1
         wanted = min(MOST_BINS, max(FEWEST_BINS, round(capture.ticks[-1] * dt_s / SHORTEST_BIN_S)))
         edges = np.round(np.linspace(0, last, min(wanted, last) + 1)).astype(int).tolist()
@@ -264,21 +306,20 @@ class PlaySession:
 
     def _robot(self, robot: int) -> dict[str, Any]:
         self._check_robot(robot)
-        run = self.run
-        left, right = (100.0 * run.world.swarm.wheel_speed[robot]).tolist()
-        remembered = run.remembered_places(robot)
-        places = [] if remembered is None else [*enumerate(remembered, start=1)]
+        left, right = (100.0 * self.world.swarm.wheel_speed[robot]).tolist()
+        tells = hasattr(self._policy, "describe_memories")
+        remembered = self._policy.describe_memories().of_robot(robot) if tells else ()
         return {
             "row": robot,
             "wheels": f"{left:.1f}, {right:.1f} cm/s",
-            "places": [[kind, *place] for kind, places_m in places for place in places_m.tolist()],
+            "places": [[kind, *place] for kind, places_m in enumerate(remembered, 1) for place in places_m.tolist()],
         }
 
     def _about(self) -> dict[str, Any]:
         """Return what stays the same during a run."""
-        run, here = self.run, self.run.scenario
+        here, name = self.spec.scenario, policy_label(self.setting.policy)
         return {
-            "disturbances": [config.in_words(here.dt_s) for config in run.spec.wrappers],
+            "disturbances": [config.in_words(here.dt_s) for config in self.spec.wrappers],
             "place": self.setting.world.place,
             "scenarios": list(dict.fromkeys((*PRESETS, here.name))),
             "policies": list(self._policies),
@@ -289,16 +330,16 @@ class PlaySession:
                 {"name": name, "title": one.title, "most": one.most, "step": one.step} for name, one in LEVELS.items()
             ],
             "header": {
-                "label": policy_label(self.setting.policy),
-                "look": places_of([policy_label(self.setting.policy)])[0],
+                "label": name,
+                "look": places_of([name])[0],
                 "scenario": here.name,
                 "seed": self.setting.seed,
                 "n_robots": here.robots.n_robots,
                 "n_objects": here.objects.n_objects,
-                "n_cache_slots": len(run.world.caches.alive),
+                "n_cache_slots": len(self.world.caches.alive),
                 "dt_s": here.dt_s,
-                "position_step_m": run.capture.step_m,
-                "has_tasks": hasattr(run.policy, "task"),
+                "position_step_m": self._capture.step_m,
+                "has_tasks": hasattr(self._policy, "task"),
                 "signals": [],
                 **for_page(here),
             },

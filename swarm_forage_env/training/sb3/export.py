@@ -1,7 +1,6 @@
 """From a trained stable-baselines3 model to a network file that runs without torch, or a zip file that tells more."""
 
 from dataclasses import asdict
-from typing import Any
 
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.policies import ActorCriticPolicy

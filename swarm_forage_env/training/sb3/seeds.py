@@ -208,3 +208,4 @@ def _stop(processes: Sequence[BaseProcess]) -> None:
     for process in processes:
         process.join(max(0.0, until - time.monotonic()))
         process.kill()
+        process.join()
