@@ -34,13 +34,20 @@ COLUMNS = (
 """Observation slices whose first columns the kernels know by name."""
 
 
+PAPER_SPEED_MPS = 0.1
+"""Top speed of the paper's robots."""
+
+
 class ParameterError(ValueError):
     """A controller parameter that is unknown or makes no sense; the message says what was expected."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class ControllerParameters:
-    """Steering, exploration and homing of a foot-bot, shared by all controllers."""
+    """Steering, exploration and homing of a foot-bot, shared by all controllers.
+
+    Speeds are those of robots with a top speed of `PAPER_SPEED_MPS`; others drive at the same shares of their own.
+    """
 
     wander_speed_mps: float = 0.09
     """Length of the wander force; study: 9 cm/s."""
@@ -156,7 +163,7 @@ def kernel_constants(parameters: ControllerParameters, spec: SwarmSpec, **derive
     """Pack everything that stays constant during a run into one record, readable by name inside kernels.
 
     Args:
-        parameters: All fields are passed on under their own names, as float64.
+        parameters: All fields are passed on under their own names, as float64; speeds as shares of the robots' own.
         spec: Observation columns, scales, drive limits, nest and quirks (0 or 1) of this run.
         derived: Further numbers that a controller computes once; whole ones stay whole.
 
@@ -164,9 +171,11 @@ def kernel_constants(parameters: ControllerParameters, spec: SwarmSpec, **derive
         (1,) record array; `constants[0].name` works compiled and uncompiled.
     """
     half_width_m, half_height_m = spec.layout.part("position").scale
+    share = spec.max_speed_mps / PAPER_SPEED_MPS
     values: dict[str, Any] = {name: spec.layout.part(name).start for name in COLUMNS}
     values |= {name: int(is_on) for name, is_on in dataclasses.asdict(spec.quirks).items()}
-    values |= {field.name: float(getattr(parameters, field.name)) for field in dataclasses.fields(parameters)}
+    own = {field.name: float(getattr(parameters, field.name)) for field in dataclasses.fields(parameters)}
+    values |= {name: value * share if name.endswith("_mps") else value for name, value in own.items()}
     values |= {
         "n_objects": spec.n_objects,
         "has_obstacles": int(spec.has_obstacles),
@@ -183,7 +192,7 @@ def kernel_constants(parameters: ControllerParameters, spec: SwarmSpec, **derive
         "soft_turn_rad": math.radians(parameters.soft_turn_deg),
         "per_soft_turn": 1.0 / math.radians(parameters.soft_turn_deg),
         "per_wheel_scale": 1.0 / spec.wheel_scale_mps,
-        "wander_wheel_share": min(parameters.wander_speed_mps, spec.max_speed_mps) / spec.wheel_scale_mps,
+        "wander_wheel_share": min(values["wander_speed_mps"], spec.max_speed_mps) / spec.wheel_scale_mps,
         **derived,
         **wander_series(parameters),
     }

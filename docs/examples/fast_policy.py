@@ -35,7 +35,8 @@ class SearchNearby(RobotPolicy):
         near_ahead, near_left = ring_sum(see.proximity)
         turn = math.atan2(left - 3.0 * near_left, ahead - 3.0 * near_ahead)
         turn = min(1.0, max(-1.0, turn))
-        return 0.5 - 0.5 * turn, 0.5 + 0.5 * turn, Grip.DELIVER if carrying else Grip.GRASP
+        full = known.max_speed_mps / known.wheel_scale_mps
+        return full * (1.0 - turn), full * (1.0 + turn), Grip.DELIVER if carrying else Grip.GRASP
 
 
 @njit

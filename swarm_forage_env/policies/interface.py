@@ -207,7 +207,7 @@ class LearnerInterface:
             half=(float(half_x), float(half_y)),
             sites=new_site_memory(spec.n_robots),
             frames=frames_of(config.frame_decisions, self.layout, spec.n_robots),
-            wheels=np.array(list(MOTION_WHEELS.values()), np.float32),
+            wheels=_wheels_of(spec),
             grips=np.array(list(GRIP_COMMANDS.values()), np.float32),
         )
         self.observation_space = self.new_observation_space()
@@ -392,6 +392,12 @@ class LearnerInterface:
         mask = np.empty((len(obs), self._n_choices), np.bool_)
         mask_actions(obs, self._mask_starts, self._dynamic_caches, mask)
         return mask
+
+
+def _wheels_of(spec: SwarmSpec) -> ActionArray:
+    """Return the wheel commands of motions, (N_MOTIONS, 2): `MOTION_WHEELS` are those of robots of 0.1 m/s."""
+    share = 2.0 * spec.max_speed_mps / spec.wheel_scale_mps
+    return np.clip(share * np.array([*MOTION_WHEELS.values()]), -1.0, 1.0).astype(np.float32)
 
 
 def any_swarm(config: InterfaceConfig) -> LearnerInterface:

@@ -249,8 +249,11 @@ def legend_below(figure: Figure) -> None:
             shown.setdefault(label, handle)
     order = [*POLICY_NAMES.values()]
     shown = dict(sorted(shown.items(), key=lambda item: order.index(item[0]) if item[0] in order else len(order)))
-    for n_columns in range(len(shown), 0, -1):
-        legend = figure.legend([*shown.values()], [*shown], loc="outside lower center", ncols=n_columns)
+    labels = [*shown]
+    for n_columns in range(len(labels), 0, -1):
+        by_column = [label for column in range(n_columns) for label in labels[column::n_columns]]  # read row by row
+        handles = [shown[label] for label in by_column]
+        legend = figure.legend(handles, by_column, loc="outside lower center", ncols=n_columns)
         if n_columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
             return
         legend.remove()

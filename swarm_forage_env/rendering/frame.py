@@ -14,6 +14,7 @@ from swarm_forage_env.contract.types import BoolArray
 from swarm_forage_env.rendering.view import (
     CACHE_OPACITY,
     DETAIL,
+    LEAST_TEXT_PX,
     NEST_OPACITY,
     SOURCE_OPACITY,
     Box,
@@ -306,12 +307,7 @@ def _write_header(
         f"{np.count_nonzero(events.interfering & swarm.active):,} in interference"
     )
     room = view.width - 2 * margin
-    lines, size = [headline], 1.35 * margin
-    beside = room - text_width(clock, size) - size
-    if text_width(headline, size) > beside:
-        size = 1.1 * margin
-        lines = textwrap.wrap(headline, max(1, int(len(headline) * beside / text_width(headline, size))))
-        size = min(_fitting(max(lines, key=len), size, beside), 0.5 * view.header / len(lines))
+    lines, size = _headline(headline, margin, room - text_width(f"{clock}  ", 1.35 * margin), 0.6 * view.header)
     for k, line in enumerate(lines):
         y = 0.33 * view.header + (k - (len(lines) - 1) / 2) * 1.2 * size
         pen.text(margin, y, line, view.palette.text, size, "lm")
@@ -319,6 +315,22 @@ def _write_header(
     size = _fitting(f"{done}    {now}", margin, room)
     pen.text(margin, 0.75 * view.header, done, view.palette.faint_text, size, "lm")
     pen.text(margin + room, 0.75 * view.header, now, view.palette.faint_text, size, "rm")
+
+
+def _headline(words: str, text_px: float, width: float, height: float) -> tuple[list[str], float]:
+    """Return a headline as lines that fit into a box of pixels, as large as can be, and their height.
+
+    What has no room in letters that can be read is cut off.
+    """
+    lines, size = [words], 1.35 * text_px
+    while text_width(max(lines, key=len), size) > width or 1.2 * size * len(lines) > height:
+        size = max(LEAST_TEXT_PX, 0.93 * size)
+        letters = max(1, int(0.95 * len(words) * width / text_width(words, size)))
+        lines = textwrap.wrap(words, letters)
+        if size == LEAST_TEXT_PX:
+            n_lines = max(1, int(height / (1.2 * size)))
+            return textwrap.wrap(words, letters, max_lines=n_lines, placeholder=" ..."), size
+    return lines, size
 
 
 def _fitting(words: str, text_px: float, room: float) -> float:

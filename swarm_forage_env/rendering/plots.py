@@ -72,7 +72,7 @@ def draw_curves(
                 axes.plot(t_end_s, curve.mean, color=look.colour, linewidth=0.6, alpha=0.6)
                 bold = _running_mean(curve.mean)
             axes.plot(t_end_s, bold, color=look.colour, label=look.name, marker=marker, clip_on=False, zorder=3)
-        axes.set(xlabel=f"time [s] ({band})", ylabel=ylabel, xlim=(0, None), ylim=(0, None))
+        axes.set(xlabel=f"time (s)\n{band}", ylabel=ylabel, xlim=(0, None), ylim=(0, None))
         legend_below(figure)
 
 
@@ -141,7 +141,8 @@ def draw_trainings(
                     axes.axhline(level, color=look.colour, linestyle=dash, label=look.name)
         upper.set(ylabel=ylabel, ylim=(0, None))
         xlabel = "million decisions of single robots" + (" (dotted: a new stage)" if stage_ends[:-1] else "")
-        lower.set(xlabel=xlabel, ylabel="interference", ylim=(0, 1))
+        lower.set(xlabel=xlabel, ylim=(0, 1))
+        lower.set_title("interference", loc="left")  # beside the axis it would have no room
         for axes in (upper, lower):
             axes.set_xlim(0, None)
             for end in stage_ends[:-1]:

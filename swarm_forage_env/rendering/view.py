@@ -28,6 +28,7 @@ DETAIL = 2
 """Pictures are drawn at so many times their size, and made smaller at the end: that smooths all edges."""
 MIN_SIZE_PX = 240
 MAX_SIZE_PX = 4000
+LEAST_TEXT_PX = 9.0
 _REFERENCE_PX = 900.0
 """Picture width for which text and symbol sizes are given; other widths scale them."""
 
@@ -195,7 +196,7 @@ def scale_bar_m(width_m: float) -> int:
 
 def text_height(unit: float) -> float:
     """Height of ordinary text, never too small to read."""
-    return max(9.0, 14.0 * unit)
+    return max(LEAST_TEXT_PX, 14.0 * unit)
 
 
 def text_width(words: str, text_px: float) -> float:

@@ -14,7 +14,7 @@ from swarm_forage_env.policies.kernels.frames import (
     SECOND_FACTOR,
     Frames,
 )
-from swarm_forage_env.policies.kernels.learner import GRIP_COMMANDS, MOTION_WHEELS
+from swarm_forage_env.policies.kernels.learner import GRIP_COMMANDS
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.floor import WHEEL_SCALE_MPS
@@ -47,17 +47,21 @@ def manual_of(network: Network, scenario: ScenarioConfig) -> tuple[str, ...]:
         f"Arena: X = {arena.width_m:g} m, Y = {arena.height_m:g} m. All inputs lie in [-1, 1].",
         "",
         f"Outputs, {n_outputs} numbers:",
-        *(_numbered(about.samples, n_outputs) if is_discrete else _commands(about.interface, n_outputs)),
+        *(
+            _numbered(about.samples, interface.translation.wheels.tolist(), n_outputs)
+            if is_discrete
+            else _commands(about.interface, n_outputs)
+        ),
         "",
         *_use(about.interface, about.interface.decision_ticks * scenario.dt_s),
         *(_frame_lines(frames, is_discrete) if about.interface.frame_decisions else ()),
     )
 
 
-def _numbered(samples: bool, n_outputs: int) -> list[str]:
+def _numbered(samples: bool, wheels: list[list[float]], n_outputs: int) -> list[str]:
     lines = [
         f"{number:>9}  {motion}: wheels {left * WHEEL_SCALE_MPS:+.2f}, {right * WHEEL_SCALE_MPS:+.2f} m/s (left, right)"
-        for number, (motion, (left, right)) in enumerate(MOTION_WHEELS.items())
+        for number, (motion, (left, right)) in enumerate(zip(MOTIONS, wheels, strict=True))
     ]
     if n_outputs > len(MOTIONS):
         lines += [

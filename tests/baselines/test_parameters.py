@@ -77,3 +77,14 @@ def test_numbers_that_the_two_controllers_do_not_share():
     assert STOCHMPolicy().parameters == STOCHM_PARAMETERS
     assert STOCHXPolicy().parameters == STOCHX_PARAMETERS
     assert STOCHXPolicy(estimate_weight=0.25).parameters.estimate_weight == 0.25
+
+
+@pytest.mark.parametrize("policy_class", [CRWPolicy, CPFAPolicy])
+@pytest.mark.parametrize("max_speed_mps", [0.05, 0.1, 0.2])
+def test_speeds_are_shares_of_the_robots_own(policy_class, max_speed_mps):
+    policy = policy_class()
+    policy.reset(dataclasses.replace(make_spec(4), max_speed_mps=max_speed_mps), np.random.default_rng(0))
+    constants = policy._constants[0]
+    assert constants.wander_speed_mps == 0.09 * (max_speed_mps / 0.1)
+    assert constants.wander_wheel_share == constants.wander_speed_mps / 0.2
+    assert constants.slowing_radius_m == 0.2

@@ -138,6 +138,13 @@ def test_motions_drive_and_ask_for_nothing():
     np.testing.assert_allclose(np.rad2deg(turned[4:]), [8.185, -8.185], atol=0.01)
 
 
+@pytest.mark.parametrize(("max_speed_mps", "arc"), [(0.05, (0.2, 0.3)), (0.2, (0.8, 1.0))])
+def test_motions_are_shares_of_the_robots_own_speed(max_speed_mps, arc):
+    env = tidy_world(n_robots=3, max_speed_mps=max_speed_mps)
+    commands = bound(env, actions="discrete").command(np.arange(3), env.arena.observe())
+    np.testing.assert_allclose(commands[1:, :2], [(max_speed_mps / 0.2,) * 2, arc])
+
+
 def test_gripper_actions_by_number():
     env = tidy_world(n_robots=5)
     commands = bound(env, actions="discrete").command(np.array([GRASP, RELEASE, DELIVER, SITE, CREATE_CACHE]),

@@ -49,7 +49,7 @@ def content_of(pdf: Path) -> bytes:
 
 def test_words_in_svg_are_text(tmp_path):
     words = words_in(draw(tmp_path / "it.svg"))
-    assert {"CRW", "DPO", "$a$ mine", "deliveries", "time [s] (bands: two)", "the headline"} <= {*words}
+    assert {"CRW", "DPO", "$a$ mine", "deliveries", "time (s)", "bands: two", "the headline"} <= {*words}
 
 
 def test_fonts_in_pdf_are_truetype(tmp_path):
@@ -133,3 +133,12 @@ def test_a_headline_is_wrapped_in_a_narrow_figure(tmp_path):
     draw(tmp_path / "it.svg", style=style, title="one headline of many words that has no room in one line alone")
     lines = [word for word in words_in(tmp_path / "it.svg") if "headline" in word or "alone" in word]
     assert len(lines) == 2
+
+
+def test_legends_of_several_rows_are_read_row_by_row(tmp_path):
+    names = ("generalist", "crw", "dpo", "stochm", "stochx", "my own policy")
+    words = words_in(draw(tmp_path / "it.svg", names=names, style=FigureStyle(width_in=3.4)))
+    shown = [word for word in words if word.lower() in names]  # as it is drawn, column by column
+    n_rows = shown.index("DPO")
+    assert n_rows > 1
+    assert [*shown[::n_rows], *shown[1::n_rows]] == ["CRW", "DPO", "STOCHM", "STOCHX", "generalist", "my own policy"]

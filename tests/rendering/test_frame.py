@@ -10,7 +10,7 @@ import pytest
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.rendering import view
-from swarm_forage_env.rendering.frame import Trails, render_frame
+from swarm_forage_env.rendering.frame import Trails, _headline, render_frame
 from swarm_forage_env.rendering.view import (
     CACHE_OPACITY,
     NEST_OPACITY,
@@ -18,6 +18,7 @@ from swarm_forage_env.rendering.view import (
     THEMES,
     arena_view,
     legend_rows,
+    text_width,
 )
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M
@@ -203,6 +204,13 @@ def test_a_long_headline_is_wrapped_and_hides_no_figures(world):
     assert ink[:, : world.view.width // 2].any(axis=1).sum() > (short != PALETTE.page).any(axis=2).any(axis=1).sum()
     counts = slice(int(0.66 * world.view.header), world.view.header)
     np.testing.assert_array_equal(short[counts], long[counts])
+
+
+def test_a_headline_without_room_is_cut_off_and_stays_legible():
+    lines, size = _headline("many words of a title " * 9, 9.0, 200.0, 24.0)
+    assert (size, len(lines), lines[-1].endswith(" ...")) == (9.0, 2, True)
+    assert max(text_width(line, size) for line in lines) < 200.0
+    assert _headline("a title", 9.0, 200.0, 24.0) == (["a title"], 1.35 * 9.0)
 
 
 def test_without_pillow_the_message_tells_what_to_install(world, monkeypatch):

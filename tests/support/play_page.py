@@ -29,7 +29,7 @@ def served(session: PlaySession) -> Iterator[PlayServer]:
 def pixel_of(browser: Browser, session: PlaySession, x_m: float, y_m: float) -> tuple[float, float]:
     """Return where a place of the arena is in the window, while the whole arena is shown."""
     left, top, width, height = browser.box(".arena canvas")
-    arena = session.run.scenario.arena
+    arena = session.spec.scenario.arena
     scale = min((width - 2 * _MARGIN_PX) / arena.width_m, (height - 2 * _MARGIN_PX) / arena.height_m)
     return left + width / 2 + scale * (x_m - arena.width_m / 2), top + height / 2 - scale * (y_m - arena.height_m / 2)
 
