@@ -10,6 +10,7 @@ import threading
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager
+from functools import cache
 from multiprocessing import resource_tracker
 from typing import Any
 
@@ -51,10 +52,12 @@ def cluster_executor(where: str, workers: int | None = None) -> Iterator[Executo
         if where == LOCAL:
             options: dict[str, Any] = {"threads_per_worker": 1, "host": "127.0.0.1", "dashboard_address": None}
             with _interrupts_later():
-                cluster = distributed.LocalCluster(n_workers=workers or available_cores(), **options)
+                cluster = distributed.LocalCluster(
+                    n_workers=workers or available_cores(), loop=_event_loop(), **options
+                )
                 target = stack.enter_context(cluster)
         try:
-            client = stack.enter_context(distributed.Client(target, timeout=CONNECT_WITHIN_S))
+            client = stack.enter_context(distributed.Client(target, loop=_event_loop(), timeout=CONNECT_WITHIN_S))
         except (OSError, RuntimeError, TypeError, ValueError) as error:  # Dask raises all of them of addresses
             raise ConfigError(f"Expected local or the address of a Dask scheduler, got {where!r}: {error}") from error
         try:
@@ -67,6 +70,21 @@ def cluster_executor(where: str, workers: int | None = None) -> Iterator[Executo
             raise WorkerError(
                 f"The scheduler of Dask ({where}) does not answer any more: it ended, or its machine cannot be reached."
             ) from error
+
+
+@cache
+def _event_loop() -> Any:
+    """Return an event loop in a thread of its own.
+
+    Dask's own counts as broken when its thread takes more than ten seconds to start, as on a busy machine.
+    """
+    from tornado.ioloop import IOLoop
+
+    loop, started = IOLoop(make_current=False), threading.Event()
+    loop.add_callback(started.set)
+    threading.Thread(target=loop.start, daemon=True).start()
+    started.wait()
+    return loop
 
 
 @contextmanager

@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from concurrent.futures import Executor
 from contextlib import ExitStack, closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -24,7 +24,7 @@ from swarm_forage_env.runs.run import run_one, run_policy
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import RunFailure, read_failure, store, stored_record
 from swarm_forage_env.runs.versions import software_versions
-from swarm_forage_env.runs.workers import each_run, processes_of
+from swarm_forage_env.runs.workers import each_run, prepare, processes_of
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -94,7 +94,8 @@ def run_all(
         ):
             for name, factory in here.items():
                 names.enter_context(local_policy(name, factory))
-            for spec, result in chain(made, each_run(_tried, [spec for spec in todo if spec.policy in here], jobs=1)):
+            made_last = each_run(_tried_here, [spec for spec in todo if spec.policy in here], jobs=1)
+            for spec, result in chain(made, made_last):
                 if folder is not None:
                     store(folder, result)
                 if isinstance(result, RunFailure):
@@ -118,8 +119,14 @@ def longest_first(specs: Iterable[RunSpec]) -> tuple[RunSpec, ...]:
     return tuple(sorted(specs, key=lambda spec: (-spec.robot_ticks, spec.seed)))
 
 
-def _tried(spec: RunSpec) -> Record | RunFailure:
+def _tried_here(spec: RunSpec) -> Record | RunFailure:
+    """Make a run of a policy that only this process has, which acts in its runs and nowhere else."""
+    return _tried(spec, replace(spec, policy="random", parameters={}))
+
+
+def _tried(spec: RunSpec, like: RunSpec | None = None) -> Record | RunFailure:
     """Make a run; one that fails does not end the others."""
+    prepare(like or spec)
     try:
         return run_one(spec)
     except Exception as error:  # noqa: BLE001 - whatever a run raises is its failure

@@ -97,7 +97,7 @@ def each_run(
         if executor is None:
             if not is_kept(observe):
                 tell_of_first_run()  # workers have nobody to tell
-            for _ in _done(workers, _warmed_up, list({_kernels_of(spec): spec for spec in specs}.values()), 1):
+            for _ in _done(workers, prepare, list({_kernels_of(spec): spec for spec in specs}.values()), 1):
                 pass
         yield from _done(workers, do, specs, AT_A_TIME)
 
@@ -132,10 +132,19 @@ def _kernels_of(spec: RunSpec) -> tuple[str, ...]:
     return (spec.policy, world.caches, world.physics, *(config.name for config in spec.wrappers))
 
 
-def _warmed_up(spec: RunSpec) -> None:
-    """Make a run up to its first ticks, for the cache of compiled code; what it raises, the run itself raises, too."""
-    with suppress(Exception):
-        warm_up(spec)
+def prepare(spec: RunSpec) -> None:
+    """Compile what a run needs, or read it from disk, once in a process, so that the run takes as long as any other.
+
+    What its first ticks raise, the run itself raises, too.
+    """
+    kernels = _kernels_of(spec)
+    if kernels not in _prepared:
+        _prepared.add(kernels)
+        with suppress(Exception):
+            warm_up(spec)
+
+
+_prepared: set[tuple[str, ...]] = set()
 
 
 @contextmanager

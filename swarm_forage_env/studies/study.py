@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import msgspec
 
@@ -136,17 +136,9 @@ class StudySpec:
 
     @cached_property
     def policies(self) -> tuple[PolicySpec, ...]:
-        """Policies that run; paths of their files begin at the study file."""
-        tables = [PolicyTable(policy=one) if isinstance(one, str) else one for one in self.file.policies]
-        return tuple(
-            policy_spec(
-                str(Path(self.run.folder, one.policy)) if is_policy_file(one.policy) else one.policy,
-                label=one.label,
-                parameters=one.parameters,
-                caches=one.caches,
-            )
-            for one in tables
-        )
+        """Policies that run; files are as they were when the runs were planned, and are not opened again."""
+        kept = tuple(PolicySpec(**msgspec.structs.asdict(one)) for one in self.run.policies)
+        return kept or tuple(_found(one) for one in self.file.policies)
 
     @property
     def axes(self) -> tuple[Axis, ...]:
@@ -208,11 +200,7 @@ class StudySpec:
 
     def to_toml(self) -> str:
         """Return the file, with what was chosen at its end."""
-        lines = [
-            f"{name} = {json.dumps(value)}"
-            for name, value in msgspec.structs.asdict(self.run).items()
-            if value not in ((), "")
-        ]
+        lines = [f"{name} = {_toml(value)}" for name, value in msgspec.to_builtins(self.run).items() if value]
         return self.text + RUN + "\n".join(lines) + "\n"
 
     @cached_property
@@ -339,7 +327,9 @@ def study_of(
         chosen = budget or next(iter({**content.budget, PAPER: 0}))
         known_name("budget", chosen, {**content.budget, PAPER: 0})
         given = content.budget.get(chosen, BudgetTable()).seeds
-        run = RunTable(budget=chosen, seeds=seeds_of(given), rules=content.rules, folder=folder)
+        run = RunTable(budget=chosen, seeds=seeds_of(given), rules=content.rules)
+        if any(is_policy_file(_as_table(one).policy) for one in content.policies):
+            run = msgspec.structs.replace(run, policies=tuple(_kept(_found(one, folder)) for one in content.policies))
     if seeds is not None:
         run = msgspec.structs.replace(run, seeds=seeds_of(seeds))
     if rules is not None:
@@ -368,6 +358,32 @@ def left_out(spec: StudySpec) -> dict[str, tuple[str, ...]]:
         if absent:
             lacking[axis.name] = absent
     return lacking
+
+
+def _as_table(policy: str | PolicyTable) -> PolicyTable:
+    return PolicyTable(policy=policy) if isinstance(policy, str) else policy
+
+
+def _found(policy: str | PolicyTable, folder: str = "") -> PolicySpec:
+    """Return a policy of a study file as it is run; paths begin at a folder."""
+    asked = _as_table(policy)
+    place = str(Path(folder, asked.policy)) if is_policy_file(asked.policy) else asked.policy
+    return policy_spec(place, label=asked.label, parameters=asked.parameters, caches=asked.caches)
+
+
+def _kept(policy: PolicySpec) -> PolicyTable:
+    """Return a policy with its whole path, digest and caches."""
+    return PolicyTable(policy.policy, policy.label, dict(policy.parameters), policy.caches)
+
+
+def _toml(value: Any) -> str:
+    """Return plain values in a line of TOML."""
+    if isinstance(value, dict):
+        entries = cast("dict[str, Any]", value).items()
+        return f"{{ {', '.join(f'{_toml(name)} = {_toml(one)}' for name, one in entries if one is not None)} }}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_toml, cast('Sequence[Any]', value)))}]"
+    return json.dumps(value, ensure_ascii=False)
 
 
 def _switched(quirks: Quirks, name: str | None) -> Quirks:

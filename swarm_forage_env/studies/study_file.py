@@ -23,8 +23,8 @@
     interval_s = 100.0
     values = { noise = 2 }                 # number of values besides the reference, evenly spread, or a list of values
 
-The folder of a study keeps the file with a table `[run]` at its end: the budget, seeds and rules that were chosen. The
-files of the paper's sets are in the folder `sets`.
+The folder of a study keeps the file with a table `[run]` at its end: the budget, seeds and rules that were chosen, and
+which policy files were run. The files of the paper's sets are in the folder `sets`.
 """
 
 from collections import Counter
@@ -110,8 +110,8 @@ class RunTable(_Strict, frozen=True):
     looks: tuple[int, ...] = ()
     """Numbers of runs of a condition after which claims were judged, and conditions left as they were where all was
     decided; empty: once, at the end. Judgements correct for several looks."""
-    folder: str = ""
-    """Where the study file was, and the paths of its policies begin."""
+    policies: tuple[PolicyTable, ...] = ()
+    """As they are run, where there are files among them: with their whole paths, digests and caches."""
 
 
 class StudyFile(_Strict, frozen=True):

@@ -97,10 +97,12 @@ def test_networks_need_no_trust(tmp_path):
 
 OWNING = """
 from pathlib import Path
+import numpy as np
 
 class Mine:
+    caches = "static"
     def reset(self, spec, rng): ...
-    def act(self, obs, active): ...
+    def act(self, obs, active): return np.zeros((len(obs), 3), np.float32)
 
 Path("owned").touch()
 """
@@ -108,7 +110,10 @@ Path("owned").touch()
 
 def test_a_typed_python_file_is_run_and_one_in_a_study_only_on_trust(command):
     Path("mine.py").write_text(OWNING)
-    Path("study.toml").write_text('name = "s"\nscenario = "warehouse_small"\npolicies = ["mine.py:Mine"]\n')
+    Path("study.toml").write_text(
+        'name = "s"\nscenario = "warehouse_small"\npolicies = ["mine.py:Mine", "random"]\nset = { n_objects = 20 }\n'
+        "budget.s = { seeds = 1, horizon_s = 2.0, interval_s = 1.0 }\n"
+    )
     code, _, err = command("study", "run", "study.toml")
     assert (code, Path("owned").exists()) == (2, False)
     assert "which you did not name yourself" in err
@@ -117,3 +122,10 @@ def test_a_typed_python_file_is_run_and_one_in_a_study_only_on_trust(command):
     assert "classes  Mine" in out
     code, _, err = command("--trust-models", "study", "run", "study.toml", "--dry-run")
     assert (code, Path("owned").exists()) == (0, True), err
+    assert command("--trust-models", "study", "run", "study.toml", "--out", "s", "--jobs", "1")[0] == 0
+    Path("mine.py").unlink()
+    Path("owned").unlink()
+    for place in ("s", "s/s.parquet"):
+        code, out, err = command("study", "status", place)
+        assert (code, Path("owned").exists()) == (0, False), err
+        assert "4 of 4 runs done" in out, "to read a study opens no policy"

@@ -16,7 +16,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.policies.registry import RandomPolicy
 from swarm_forage_env.policies.trust import UntrustedModelError, only_typed
-from swarm_forage_env.runs import runner
+from swarm_forage_env.runs import runner, workers
 from swarm_forage_env.runs.plan import Condition, Plan, planned_line, run_plan
 from swarm_forage_env.runs.record import RecordError
 from swarm_forage_env.runs.run import WARM_UP_TICKS, run_one, run_policy, warm_up
@@ -89,6 +89,17 @@ def test_warm_up_stops_after_a_few_ticks_and_reaches_the_interactions(monkeypatc
     chipmunk = World(replace(WORLD, physics="chipmunk"))  # in Python, tick by tick
     warm_up(replace(SPECS[0], policy="crw", world=chipmunk))
     assert steps[-1] == (WARM_UP_TICKS, [Grip.GRASP] * 3)
+
+
+def test_the_code_that_runs_share_is_compiled_before_the_first_is_timed(monkeypatch):
+    """Also for policies of this process alone, which must not notice."""
+    calls = []
+    monkeypatch.setattr(workers, "_prepared", set())
+    monkeypatch.setattr(workers, "warm_up", lambda spec: calls.append(("warm up", spec.policy)))
+    monkeypatch.setattr(runner, "run_one", lambda spec: calls.append(("run", spec.policy)) or run_one(spec))
+    run_plan(plan_of(policy_spec("crw"), policy_spec(RandomPolicy, label="mine")), jobs=1)
+    first, last = [("warm up", "crw"), *[("run", "crw")] * 2], [("warm up", "random"), *[("run", "mine")] * 2]
+    assert calls == first + last
 
 
 def test_outcomes_come_in_the_order_of_their_specifications(tmp_path):
@@ -173,9 +184,10 @@ from dataclasses import replace
 from swarm_forage_env import plan_run, run_all, scenario
 
 if __name__ == "__main__":
-    specs = [plan_run(scenario("warehouse_small"), "random", seed=seed) for seed in range(200)]
+    world = scenario("warehouse_small", n_robots=5, n_objects=20, horizon_s=200.0)
+    spec = plan_run(world, "random")
     try:
-        run_all([replace(specs[0], seed=999), *specs], out=sys.argv[1], jobs=2)
+        run_all([replace(spec, seed=seed) for seed in range(9999)], out=sys.argv[1], jobs=2)
     except KeyboardInterrupt as interrupt:
         sys.exit(str(interrupt))
 """
