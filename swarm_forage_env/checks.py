@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from pettingzoo import ParallelEnv
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import ConfigError, instance, number, whole
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env._internal.wording import install_command, suggestion
 from swarm_forage_env.contract.codes import Task
@@ -68,6 +68,7 @@ def check_env(env: ParallelEnv[str, Any, Any], *, ticks: int = 60) -> None:
         CheckError: about the first fault that is found.
         ImportError: pytest is not installed, which PettingZoo's test needs.
     """
+    whole("ticks", ticks, at_least=1)
     if not isinstance(env, ParallelEnv):
         raise CheckError(
             f"Expected a parallel environment of PettingZoo, got {env!r}; make one with parallel_env(...), or derive "
@@ -75,8 +76,8 @@ def check_env(env: ParallelEnv[str, Any, Any], *, ticks: int = 60) -> None:
         )
     _check_parallel_api(env, ticks)
     spaces = {agent: copy.deepcopy(env.action_space(agent)) for agent in env.possible_agents}
-    for number, space in enumerate(spaces.values()):
-        space.seed(number)
+    for seed, space in enumerate(spaces.values()):
+        space.seed(seed)
     actions = [{agent: space.sample() for agent, space in spaces.items()} for _ in range(ticks)]
     first, again = _dict_run(env, actions), _dict_run(env, actions)
     advice = "reset(seed) must set back everything that a run changes, and draw from generators made from that seed."
@@ -195,6 +196,7 @@ def check_policy(
         CheckError: about the first fault that is found.
         ValueError: an unknown name or scenario.
     """
+    whole("ticks", ticks, at_least=1)
     subject = _built(_factory_of(policy))
     config = _config_for(subject, scenario)
     world = ForageEnv(config)
@@ -370,8 +372,10 @@ def check_determinism(
         CheckError: two runs with one seed differ; names what differs first.
         ValueError: an unknown name or scenario, or no seeds.
     """
+    instance("seeds", seeds, Sequence)
     if not len(seeds):
         raise ValueError("Expected seeds to run, got none; give at least one.")
+    number("seconds", seconds, above=0.0)
     build = _factory_of(policy)
     config = _config_for(_built(build), scenario)
     interval_s = _INTERVAL_TICKS * config.dt_s
@@ -418,6 +422,7 @@ def _built(build: Callable[[], Any]) -> Policy:
 def _config_for(policy: Policy, scenario: str | ScenarioConfig) -> ScenarioConfig:
     """Return a scenario with the caches that a policy states; raises CheckError for caches that there are not."""
     config = preset(scenario) if isinstance(scenario, str) else scenario
+    instance("scenario", config, ScenarioConfig)
     try:
         return replace(config, caches=stated_caches(policy) or config.caches)
     except ConfigError as error:

@@ -72,7 +72,7 @@ def run(
     from swarm_forage_env.studies.study_file import RULES_NAMES
 
     known_name("rules", rules, (*RULES_NAMES, "both", "file"))
-    chosen = {"both": tuple(RULES_NAMES), "file": None}.get(rules, (rules,))
+    chosen = {"both": tuple(RULES_NAMES), "file": None}.get(rules, rules)
     study = load_study(name, budget, seeds=seeds, rules=chosen)
     folder = out or Path("results", "studies", f"{study.name}_{study.budget}")
     if dry_run:

@@ -1,6 +1,6 @@
 """Plan and table: which runs there are, and what they were. Every question is a function of a table.
 
-    plan = Plan.product(policy_specs(["crw", "dpo"]), [World(scenario("warehouse_small"))], seeds=(0, 1, 2))
+    plan = Plan.product(["crw", "dpo"], "warehouse_small", seeds=(0, 1, 2))
     table = run_plan(plan)
     seeds, curves = table.curves(plan.conditions[0], "performance")     # (R,), name -> (R, T)
 
@@ -8,7 +8,7 @@ A plan is a list of conditions and not only a product: policies may have worlds 
 benchmark and the evaluations of a training each write a plan.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -17,16 +17,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError, whole
+from swarm_forage_env._internal.fields import ConfigError, instance, whole
 from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.policies.registry import policy_label
 from swarm_forage_env.runs.record import Record
 from swarm_forage_env.runs.runner import run_all
-from swarm_forage_env.runs.spec import PolicySpec, RunSpec
+from swarm_forage_env.runs.spec import PolicyLike, PolicySpec, RunSpec, policy_specs
 from swarm_forage_env.runs.store import RunFailure, failure_lines, is_stored, load
 from swarm_forage_env.scenarios.differences import preset_of
-from swarm_forage_env.wrappers.world import UNDISTURBED, World
+from swarm_forage_env.wrappers.world import UNDISTURBED, World, WorldLike, world_of
 
 Curves = tuple[tuple[int, ...], dict[str, FloatArray]]
 """Seeds of the R finished runs, and for each column its values in T intervals, (R, T)."""
@@ -54,6 +54,8 @@ class Plan:
     def __post_init__(self) -> None:
         if not self.conditions or not self.seeds:
             raise ConfigError("Expected a plan with one or more conditions and seeds, got none.")
+        for condition in self.conditions:
+            instance("a condition", condition, Condition, hint="; Plan.product makes them of policies and worlds")
         for seed in self.seeds:
             whole("a seed", seed, at_least=0)
         if len(set(self.seeds)) < len(self.seeds):
@@ -61,10 +63,19 @@ class Plan:
         _ = self.robot_ticks  # refuses what runs refuse
 
     @classmethod
-    def product(cls, policies: Iterable[PolicySpec], worlds: Sequence[World], seeds: Sequence[int]) -> "Plan":
+    def product(
+        cls,
+        policies: Iterable[PolicyLike] | PolicyLike,
+        worlds: Iterable[WorldLike] | WorldLike,
+        seeds: Iterable[int],
+    ) -> "Plan":
         """Return the plan in which every policy runs in every world, policy by policy."""
+        instance("seeds", seeds, Iterable, hint="; range(n) has n of them")
+        several = [worlds] if isinstance(worlds, str) or not isinstance(worlds, Iterable) else worlds
+        found = [world_of(world) for world in several]
         return cls(
-            conditions=tuple(Condition(policy, world) for policy in policies for world in worlds), seeds=tuple(seeds)
+            conditions=tuple(Condition(policy, world) for policy in policy_specs(policies) for world in found),
+            seeds=tuple(seeds),
         )
 
     @property
@@ -151,6 +162,7 @@ def run_plan(
     Raises:
         ValueError: a folder, and a policy without a name by which its runs are found again.
     """
+    instance("plan", plan, Plan, hint="; Plan.product(policies, worlds, seeds) makes one")
     unnamed = [policy.label for policy in plan.policies if not policy.is_named]
     if out is not None and unnamed:
         raise ValueError(f"Expected name= for the policy {unnamed[0]}, by which its runs in {out} are found again.")

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from swarm_forage_env._internal.files import parse_json, replacing
+from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.versions import VERSION_NAMES
 from swarm_forage_env.scenarios.columns import INTERVAL_COLUMNS, KEY_COLUMNS
@@ -61,6 +62,8 @@ class Record:
         object.__setattr__(self, "columns", columns)
 
     def __getitem__(self, column: str) -> np.ndarray:
+        if column not in self.columns:
+            raise KeyError(f"Unknown column {column!r}.{suggestion(str(column), self.columns)}")
         return self.columns[column]
 
     @property

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from swarm_forage_env._internal.fields import ConfigError, instance
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.contract.kernel_policy import CompiledPolicy
@@ -22,6 +23,7 @@ from swarm_forage_env.runs.versions import software_versions
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig, needs_no_python, steps_as_made, wrap_in_order
 from swarm_forage_env.wrappers.recorder import RunRecorder
+from swarm_forage_env.wrappers.registry import wrapper_configs
 
 WARM_UP_TICKS = 5
 """Ticks of a warm-up run under its policy: enough to compile every kernel that each tick calls."""
@@ -45,6 +47,8 @@ class LiveRun:
             by_ticks: Never leave several ticks to one kernel: for those who look after every tick, which is then
                 faster. The run is the same.
         """
+        if isinstance(policy, type) or not all(callable(getattr(policy, name, None)) for name in ("reset", "act")):
+            raise ConfigError(f"Expected a policy object with reset and act, got {policy!r}; load_policy makes one.")
         self.forage_env: ForageEnv = stack.unwrapped
         self.over = False
         self._stack = stack
@@ -91,7 +95,7 @@ class LiveRun:
 
 def build_env(
     scenario: ScenarioConfig,
-    wrappers: Iterable[WrapperConfig] = (),
+    wrappers: Iterable[WrapperConfig | str] = (),
     *,
     reads: tuple[str, ...] | None = None,
 ) -> ForageEnv | SwarmWrapper:
@@ -99,15 +103,15 @@ def build_env(
 
     Args:
         scenario: The scenario.
-        wrappers: Wrapper configurations in any order, each kind at most once.
+        wrappers: Wrapper configurations or words as of `parse_wrapper`, in any order, each kind at most once.
         reads: Observation slices that the policy looks at; default all.
     """
-    return wrap_in_order(ForageEnv(scenario, reads=reads), wrappers)
+    return wrap_in_order(ForageEnv(scenario, reads=reads), wrapper_configs(wrappers))
 
 
 def build_stack(
     scenario: ScenarioConfig,
-    wrappers: Iterable[WrapperConfig] = (),
+    wrappers: Iterable[WrapperConfig | str] = (),
     *,
     reads: tuple[str, ...] | None = None,
 ) -> RunRecorder:
@@ -125,6 +129,7 @@ def run_policy(policy: Policy, spec: RunSpec) -> Record:
         policy: A fresh instance; it drives only this run.
         spec: The run.
     """
+    instance("spec", spec, RunSpec, hint="; plan_run(world, policy) makes one")
     started = Started.now()
     recorder = build_stack(spec.scenario, spec.wrappers, reads=getattr(policy, "reads", None))
     LiveRun(recorder, policy, spec.seed).advance()
@@ -162,6 +167,7 @@ def run_one(spec: RunSpec) -> Record:
     Raises:
         ValueError: no installed policy has the name, or it refuses its parameters.
     """
+    instance("spec", spec, RunSpec, hint="; plan_run(world, policy) makes one")
     return run_policy(load_policy(spec.policy, spec.parameters), spec)
 
 

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 from rich.console import Console
 
+from swarm_forage_env._internal.fields import checked, instance
 from swarm_forage_env._internal.files import check_folder
 from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.policies.registry import load_policy, local_policy
@@ -69,7 +70,10 @@ def run_all(
         KeyboardInterrupt: Ctrl-C; it says how many runs are kept.
         WorkerError: see there; what had finished is kept.
     """
-    wanted = {spec.run_id: spec for spec in specs}
+    instance("specs", specs, Iterable, hint="; plan_run makes one of them, Plan.product(...).specs are many")
+    if executor is not None:
+        instance("executor", executor, Executor, hint="; jobs= sets the number of processes")
+    wanted = {checked("a run", spec, RunSpec).run_id: spec for spec in specs}
     folder, here = None if out is None else Path(out), made_here or {}
     records, failures, done = dict[str, Record](), dict[str, RunFailure](), set[str]()
 
@@ -173,7 +177,7 @@ def rerun(file: str | Path) -> Rerun:
         RecordError: no such file, another content, or a policy that is not here, has changed or is not trusted.
         Exception: whatever a run that had failed raises again.
     """
-    path = Path(file)
+    path = Path(checked("file", file, str | Path))
     stored = read_failure(path) if path.suffix == ".json" else Record.read(path)
     try:
         policy = load_policy(stored.spec.policy, stored.spec.parameters)

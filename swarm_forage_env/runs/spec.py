@@ -3,13 +3,13 @@
 import copy
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from swarm_forage_env._internal.fields import ConfigError, instance, known_keys, one_of, read, table, whole
+from swarm_forage_env._internal.fields import ConfigError, checked, instance, known_keys, one_of, read, table, whole
 from swarm_forage_env.policies.registry import (
     from_callable,
     load_policy,
@@ -32,7 +32,7 @@ _KEYS = ("scenario", "policy", "parameters", "wrappers", "criterion", "criterion
 
 PolicyLike: TypeAlias = Any
 """A registered name; the path of a trained policy (*.zip of stable-baselines3, *.npz); a policy object or class; a
-function of observations (N, D) that returns actions (N, 3)."""
+function of observations (N, D) that returns actions (N, 3); a `PolicySpec`, which is taken as it is."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -225,6 +225,10 @@ def policy_spec(
         TypeError: something that is no policy.
         ValueError: parameters where none can be given.
     """
+    if isinstance(policy, PolicySpec):
+        return policy
+    table("parameters", parameters or {})
+    checked("label", label, str)
     if caches is not None:
         one_of("caches", caches, CACHE_KINDS)
     if not isinstance(policy, str | Path):
@@ -251,7 +255,7 @@ def policy_spec(
 
 
 def policy_specs(
-    policies: Sequence[PolicyLike] | Mapping[str, PolicyLike],
+    policies: Iterable[PolicyLike] | Mapping[str, PolicyLike] | PolicyLike,
     *,
     parameters: Mapping[str, Any] | None = None,
     caches: str | None = None,
@@ -259,14 +263,15 @@ def policy_specs(
     """Return several policies as they are run, each with a name of its own; files of one name go by folder or path.
 
     Args:
-        policies: Policies, or a mapping from names to policies.
+        policies: One policy or several, or a mapping from names to policies.
         parameters: As in `policy_spec`, the same for all.
         caches: As in `policy_spec`.
 
     Raises:
         ConfigError: equal names; for the rest see `policy_spec`.
     """
-    named = policies.items() if isinstance(policies, Mapping) else [("", policy) for policy in policies]
+    several: Any = policies if isinstance(policies, Iterable) and not isinstance(policies, str) else [policies]
+    named = several.items() if isinstance(several, Mapping) else [("", policy) for policy in several]
     specs = [policy_spec(policy, label=name, parameters=parameters, caches=caches) for name, policy in named]
     for parts in (slice(-2, None), slice(None)):
         labels = [spec.label for spec in specs]

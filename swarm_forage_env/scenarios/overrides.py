@@ -11,7 +11,7 @@ from functools import cache
 from types import MappingProxyType
 from typing import Any, get_args, get_origin, get_type_hints
 
-from swarm_forage_env._internal.fields import ConfigError, known_keys, known_name, number, whole
+from swarm_forage_env._internal.fields import ConfigError, instance, known_keys, known_name, number, whole
 from swarm_forage_env.scenarios.config import SECTIONS, ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M, CELLS_PER_M
 from swarm_forage_env.scenarios.obstacles import stretched
@@ -57,6 +57,7 @@ def with_overrides(config: ScenarioConfig, **overrides: Any) -> ScenarioConfig:
     Raises:
         ConfigError: unknown name (with the nearest known one), or values that do not fit together.
     """
+    instance("config", config, ScenarioConfig, hint="; scenario(name) makes one")
     table = field_sections()
     known_keys(overrides, (*table, *SECTIONS), "scenario field")
     if isinstance(rules := overrides.get("quirks"), str):

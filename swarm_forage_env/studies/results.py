@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError, whole
+from swarm_forage_env._internal.fields import ConfigError, checked, instance, whole
 from swarm_forage_env._internal.files import alone_in, parse_json, replacing
 from swarm_forage_env.runs.plan import Curves
 from swarm_forage_env.runs.record import RecordError, read_parquet, write_parquet
@@ -107,7 +107,7 @@ def shard(specs: Sequence[RunSpec], part: str) -> tuple[RunSpec, ...]:
     Raises:
         ConfigError: not two whole numbers, or a part that does not exist.
     """
-    index, _, count = part.partition("/")
+    index, _, count = checked("shard", part, str).partition("/")
     try:
         number, parts = int(index), int(count)
     except ValueError as error:
@@ -145,6 +145,7 @@ def run_study(
         KeyboardInterrupt: Ctrl-C.
         WorkerError: no worker process could be started.
     """
+    instance("spec", spec, StudySpec, hint="; load_study(file) reads one")
     planned = shard(spec.plan.specs, part)
     take(spec, folder)
     runs = Path(folder, "runs")
@@ -256,7 +257,7 @@ def read_study(path: str | Path) -> StudyTable:
     Raises:
         RecordError: the file is missing, is not a study, or is damaged; the message names it.
     """
-    if Path(path).is_dir():
+    if Path(checked("path", path, str | Path)).is_dir():
         return _gathered(Path(path))
     texts, frame = read_parquet(path)
     if not {_STUDY, _VERSIONS} <= texts.keys():

@@ -272,20 +272,21 @@ def load_study(
     name: str | Path,
     budget: str | None = None,
     *,
-    seeds: int | None = None,
-    rules: Sequence[str] | None = None,
+    seeds: int | Sequence[int] | None = None,
+    rules: str | Sequence[str] | None = None,
 ) -> StudySpec:
     """Read a study file and return the study with one of its budgets.
 
     Args:
         name: Name of one of the paper's sets, or path of a file.
         budget: Name of a budget; default the first of the file.
-        seeds: Number of seeds, 0, 1, 2, ..., in place of the seeds of the budget.
+        seeds: Number of seeds, 0, 1, 2, ..., or the seeds, in place of those of the budget.
         rules: Rules in place of those in the file.
 
     Raises:
         ConfigError: the file is missing, is not TOML, or does not describe a study; the message names the file.
     """
+    checked("name", name, str | Path)
     file = SETS / f"{name}.toml" if str(name) in set_names() else Path(name)
     if not file.is_file():
         raise ConfigError(
@@ -305,8 +306,8 @@ def study_of(
     text: str,
     budget: str | None = None,
     *,
-    seeds: int | None = None,
-    rules: Sequence[str] | None = None,
+    seeds: int | Sequence[int] | None = None,
+    rules: str | Sequence[str] | None = None,
     folder: str = "",
 ) -> StudySpec:
     """Return a study from the text of its file; see `load_study`.
@@ -333,7 +334,7 @@ def study_of(
     if seeds is not None:
         run = msgspec.structs.replace(run, seeds=seeds_of(seeds))
     if rules is not None:
-        run = msgspec.structs.replace(run, rules=tuple(rules))
+        run = msgspec.structs.replace(run, rules=(rules,) if isinstance(rules, str) else tuple(rules))
     return StudySpec(text=plain, run=run)
 
 

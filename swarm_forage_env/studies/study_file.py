@@ -175,12 +175,11 @@ def content_of(text: str) -> StudyFile:
         raise ConfigError(f"{told}{' in ' + where.strip('`').removeprefix('$.') if where else ''}.") from error
 
 
-def seeds_of(given: int | tuple[int, ...]) -> tuple[int, ...]:
-    """Return the seeds of a budget, which gives their number or a list."""
-    if isinstance(given, tuple):
-        return given
-    whole("seeds", given, at_least=1, at_most=MOST_SEEDS)
-    return tuple(range(given))
+def seeds_of(given: int | Sequence[int]) -> tuple[int, ...]:
+    """Return seeds that are given by their number or as a list."""
+    if isinstance(given, list | tuple):
+        return tuple(given)
+    return tuple(range(whole("seeds", given, at_least=1, at_most=MOST_SEEDS)))
 
 
 def axes_of(file: StudyFile, asked: Mapping[str, Any]) -> tuple[tuple[Axis, ...], Value | None]:

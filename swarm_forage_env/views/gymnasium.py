@@ -1,5 +1,6 @@
 """The swarm as Gymnasium environments: one agent for all robots, or a vector environment of robots."""
 
+import dataclasses
 import time
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -13,19 +14,13 @@ from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.contract.types import BoolArray, ObsArray
 from swarm_forage_env.env import ForageEnv, checked_seed
 from swarm_forage_env.policies.interface import LearnerInterface
-from swarm_forage_env.views.arenas import ArenaStep, open_arenas
+from swarm_forage_env.views.arenas import ArenaStep, RunOutcome, open_arenas
 from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.plans import constructor_takes, plan_arena
 from swarm_forage_env.wrappers.base import WrapperConfig
 
-_OF_RUN = {
-    "seed": np.int64,
-    "seconds": np.float64,
-    "collected": np.int64,
-    "first_picked": np.int64,
-    "n_robots": np.int64,
-}
-"""What infos of a vector environment tell of a run that ended, see `RunOutcome`."""
+_OF_RUN = [item for item in dataclasses.fields(RunOutcome) if item.type in (int, float) and item.name != "arena"]
+"""What infos of a vector environment tell of a run that ended: its numbers."""
 
 
 class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
@@ -214,7 +209,7 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
         seconds = np.where(is_episode, round(time.perf_counter() - self._started, 6), 0.0)
         told: dict[str, Any] = {"episode": {"r": returns, "l": lengths, "t": seconds}, "_episode": is_episode}
         if step.outcomes:
-            of_run = {name: np.zeros(self.num_envs, kind) for name, kind in _OF_RUN.items()}
+            of_run = {item.name: np.zeros(self.num_envs, item.type) for item in _OF_RUN}
             has_ended = np.zeros(self.num_envs, np.bool_)
             for outcome in step.outcomes:
                 rows = slice(outcome.arena * self.n_robots, (outcome.arena + 1) * self.n_robots)

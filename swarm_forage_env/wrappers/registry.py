@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from swarm_forage_env._internal.fields import ConfigError, known_name, table
+from swarm_forage_env._internal.fields import ConfigError, checked, known_name, table
 
 if TYPE_CHECKING:
     from swarm_forage_env.wrappers.base import WrapperConfig
@@ -42,7 +42,7 @@ def parse_wrapper(text: str) -> "WrapperConfig":
         ConfigError: an unknown name or key, a word that is no key=value, no settings, or values that the
             wrapper refuses; the message has an example.
     """
-    name, _, settings = text.strip().partition(":")
+    name, _, settings = checked("a wrapper", text, str).strip().partition(":")
     config_class = wrapper_config_class(name)
     try:
         return config_class.from_mapping(_settings(settings))
@@ -85,6 +85,8 @@ def wrapper_configs(given: "Iterable[WrapperConfig | str]") -> "tuple[WrapperCon
     Raises:
         ConfigError: `given` is no list, an item is neither a configuration nor a word, or a word names no wrapper.
     """
+    if given == ():
+        return ()
     from swarm_forage_env.wrappers.base import WrapperConfig  # late: this import loads the whole environment
 
     expected = "Expected wrappers as a list of configurations or words such as 'sensor_noise:sigma=0.1', got"

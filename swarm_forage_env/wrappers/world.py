@@ -20,7 +20,7 @@ from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.differences import difference_words, differences, digest_of, is_resized
 from swarm_forage_env.scenarios.overrides import field_sections
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.wrappers.registry import wrappers_from_mapping
+from swarm_forage_env.wrappers.registry import wrapper_configs, wrappers_from_mapping
 
 if TYPE_CHECKING:
     from swarm_forage_env.wrappers.base import WrapperConfig
@@ -70,7 +70,7 @@ class World:
         instance("scenario", self.scenario, ScenarioConfig)
         checked("criterion", self.criterion, Name)
         object.__setattr__(self, "value", checked("criterion_value", self.value, Number))
-        ordered = tuple(sorted(self.wrappers, key=lambda config: config.stack_position))
+        ordered = tuple(sorted(wrapper_configs(self.wrappers), key=lambda config: config.stack_position))
         positions = [config.stack_position for config in ordered]
         if len(set(positions)) < len(positions):
             names = ", ".join(config.name for config in ordered)

@@ -28,6 +28,7 @@ RUN, SCORE = "run crw", "score crw"
         ("list colums", "Did you mean 'columns'?"),
         ("list columns extra", "Unused Tokens: ['extra']"),
         ("record --file x.avi", "to end in .gif or .mp4"),
+        ("record --file x.png", "one picture is made by --at SECONDS"),
         ("info crv", "Did you mean 'crw'?"),
         ("rerun missing.parquet", "Cannot read missing.parquet: No such file or directory"),
         ("rerun file", "Cannot read file: it is no Parquet file or a damaged one"),

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError, number
+from swarm_forage_env._internal.fields import ConfigError, instance, number
 from swarm_forage_env.contract.codes import Counter, Event
 from swarm_forage_env.contract.policy import Memories, Policy
 from swarm_forage_env.env import ForageEnv
@@ -50,6 +50,7 @@ def record_replay(
         ConfigError: `seconds` is longer than the run, or `frame_s` is no whole number of ticks.
         ValueError: no installed policy has the name, or it refuses its parameters.
     """
+    instance("spec", spec, RunSpec, hint="; plan_run(world, policy) makes one")
     scenario, end = spec.scenario, spec.scenario.horizon_ticks
     if seconds is not None:
         number("seconds (of a run of horizon_s)", seconds, above=0.0, at_most=scenario.horizon_s)
