@@ -5,6 +5,7 @@ import logging
 import os
 import signal
 import sys
+import traceback
 import warnings
 from collections.abc import Sequence
 from typing import Any
@@ -115,11 +116,19 @@ def _told(error: Exception) -> int | None:
         return EXIT_FAILURE
     if isinstance(error, OSError) and error.strerror and error.filename:
         complain(f"{error.strerror}: {error.filename}")
+    elif isinstance(error, ImportError) and (package := _raised_in(error)) not in PACKAGES:
+        complain(f"Cannot import {package}: {error}")
     elif isinstance(error, ImportError | OSError) or type(error).__module__.partition(".")[0] in PACKAGES:
         complain(str(error))
     else:
         return None
     return EXIT_USAGE if isinstance(error, ValueError) else EXIT_FAILURE
+
+
+def _raised_in(error: Exception) -> str:
+    """Return the name of the package whose code raised an error."""
+    *_, (frame, _) = traceback.walk_tb(error.__traceback__)
+    return str(frame.f_globals.get("__name__")).partition(".")[0]
 
 
 def _interrupt(number: int, _: object = None) -> None:

@@ -19,7 +19,6 @@ def test_what_nobody_foresaw_is_raised(command, monkeypatch):
     ("error", "code", "told"),
     [
         (OSError(28, "No space left on device", "here"), 1, "No space left on device: here"),
-        (ImportError("No picture without matplotlib"), 1, "No picture without matplotlib"),
         (KeyboardInterrupt("Interrupted: 3 runs are kept."), 130, "Interrupted: 3 runs are kept."),
         (KeyboardInterrupt(), 130, "Interrupted. Unfinished work is not kept; run the same command to start again."),
     ],
@@ -41,6 +40,7 @@ MAIN = f"{sys.executable} -c 'from swarm_forage_env.cli import main; main()'"
         (f"{MAIN} info warehouse_small | head -1", "warehouse_small: ", ""),
         (f"{MAIN} info warehouse_small >&-", "", "swarm-forage: Expected a standard output to write to, got a closed"),
         (f"{MAIN} info nobody 2>&-", "", ""),
+        (f"echo 'raise ImportError(42)' > polars.py; {MAIN} list", "", "swarm-forage: Cannot import polars: 42"),
         (f"mkdir gone; cd gone; rmdir ../gone; {MAIN} info a.toml", "", "swarm-forage: The working folder is gone; "),
     ],
 )
