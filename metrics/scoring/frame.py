@@ -19,15 +19,16 @@ import polars as pl
 from swarm_forage_env.wrappers.world import SIZE
 
 from ..curves import FloatArray, Form, Variant
+from ..distance import noise_floor
 from ..statistics import SIGNIFICANT, Summary, aggregate, holm, paired_p
 from .measures import (
     MEASURES,
     Compared,
-    Level,
     Measure,
     Uncomputable,
     check_measures,
     check_words,
+    conditions_apart,
     levels,
     remark_on,
     unit_of,
@@ -89,12 +90,11 @@ def scores(
     Raises:
         CurveError: an unknown measure, variant or form, or curves that a measure refuses.
     """
-    check_words("variant", variants, get_args(Variant))
-    check_words("form", forms, get_args(Form))
+    names = checked_request(measures, variants, forms)
     parts: list[pl.DataFrame] = []
     missing: dict[tuple[str, str], str] = {}
     for study in studies:
-        for name in check_measures(measures):
+        for name in names:
             measure = MEASURES[name]
             wanted: list[Variant] = [each if each in measure.variants else "corrected" for each in variants]
             compared: Sequence[Form] = forms if measure.compares else ("marginal",)
@@ -107,29 +107,40 @@ def scores(
     return pl.concat([pl.DataFrame(schema=SCHEMA), *parts]), missing
 
 
-def _rows(name: str, study: StudyCurves, form: Form, level: Level) -> pl.DataFrame:
+def checked_request(
+    measures: Sequence[str] | None, variants: Sequence[Variant], forms: Sequence[Form]
+) -> tuple[str, ...]:
+    """Return the measures, see `check_measures`; raises CurveError on an unknown measure, variant or form."""
+    check_words("variant", variants, get_args(Variant))
+    check_words("form", forms, get_args(Form))
+    return check_measures(measures)
+
+
+def _rows(name: str, study: StudyCurves, form: Form, compared: Compared) -> pl.DataFrame:
     """Return the rows of one level."""
-    measure, (one, base, runs, variant) = MEASURES[name], level.compared
+    measure, base, runs = MEASURES[name], compared.base, compared.runs
     told: dict[str, Any] = {
         "policy": study.controller,
         "measure": name,
-        "variant": variant,
+        "variant": compared.variant,
         "form": form,
-        "at": level.at,
+        "at": compared.at,
         "criterion": runs.criterion,
-        "x": float(level.x),
+        "x": float(compared.x),
         "n_robots": runs.n_robots,
-        "floor": level.floor,
-        "distance": level.distance,
-        "misleads": level.misleads,
-        "unit": unit_of(name, study, variant),
-        "remark": remark_on(name, study, variant, misleads=level.misleads),
+        "misleads": compared.misleads,
+        "unit": unit_of(name, study, compared.variant),
+        "remark": remark_on(name, study, compared),
     }
     if name == "availability":
-        return _frame({**told, "value": measure.of(level.compared)})
-    paired = level.paired()
+        return _frame({**told, "value": measure.of(compared)})
+    if measure.is_distance:
+        told["floor"] = float(noise_floor(base.performance).mean()) if len(base.seeds) > 1 else None
+        told["distance"] = conditions_apart(compared)
+    paired = compared.paired()
     seeds = paired.runs.seeds
-    told["lost"] = max(each.n_lost + len(each.seeds) for each in (one, base, runs) if each is not None) - len(seeds)
+    sides = (each for each in (compared.one, base, runs) if each is not None)
+    told["lost"] = max(each.n_lost + len(each.seeds) for each in sides) - len(seeds)
     if not seeds:
         return _frame(told)
     values = measure.of(paired)
@@ -139,7 +150,7 @@ def _rows(name: str, study: StudyCurves, form: Form, level: Level) -> pl.DataFra
         columns |= {"total": total, "relative": _share(values, total)}
     if measure.is_distance and len(seeds) > 1:
         columns |= dict(zip(("mean_curve", "relative_mean_curve"), pseudo_values(measure, paired), strict=True))
-        columns["floor_of_seed"] = _floors(measure, level.compared, seeds)
+        columns["floor_of_seed"] = _floors(measure, compared, seeds)
     return _frame({**told, **columns})
 
 
@@ -201,28 +212,19 @@ def summarized(frame: pl.DataFrame) -> pl.DataFrame:
     misleads, unit, remark. `undefined` and `idle` count runs without a value, and without a share.
     """
     rows: list[dict[str, Any]] = []
-    for (policy, *key), part in frame.group_by("policy", *ROW, maintain_order=True):
-        of = _summary(part["value"])
-        shares = _summary(part["relative"])
-        first = part.row(0, named=True)
-        total = part["total"].mean()
+    for _, part in frame.group_by("policy", *ROW, maintain_order=True):
+        first, total = part.row(0, named=True), part["total"].mean()
+        of, shares = (_summary(part[name]) for name in ("value", "relative"))
         rows.append(
-            {
-                "policy": policy,
-                **dict(zip(ROW, key, strict=True)),
-                "mean": of.mean,
-                "lower": of.lower,
-                "upper": of.upper,
-                "sd": of.std,
-                "runs": of.n_used if first["seed"] is not None else 0,
-                "undefined": of.n_nan,
-                "relative": shares.mean,
-                "relative_lower": shares.lower,
-                "relative_upper": shares.upper,
+            {name: first[name] for name in ("policy", *ROW)}
+            | {"mean": of.mean, "lower": of.lower, "upper": of.upper, "sd": of.std}
+            | {"runs": 0 if first["seed"] is None else of.n_used, "undefined": of.n_nan}
+            | {"relative": shares.mean, "relative_lower": shares.lower, "relative_upper": shares.upper}
+            | {
                 "idle": shares.n_nan,
                 "relative_floor": first["floor"] / total if first["floor"] is not None and total else None,
-                **{name: first[name] for name in ("floor", "distance", "lost", "misleads", "unit", "remark")},
             }
+            | {name: first[name] for name in ("floor", "distance", "lost", "misleads", "unit", "remark")}
         )
     return pl.DataFrame(rows, infer_schema_length=None)
 

@@ -1,4 +1,4 @@
-"""The measures, each one row of one table: symbol, what it varies, how to read it, and its formula over runs.
+"""The measures, each one row of one table: symbol, what it varies, its formula over runs, and how to read it.
 
 A new measure is a formula (`metrics.emergence` and others) and a row of `MEASURES`. What it compares is decided here,
 too: swarm sizes with the next smaller one, levels of an adversity with the undisturbed swarm.
@@ -6,8 +6,8 @@ too: swarm sizes with the next smaller one, levels of an adversity with the undi
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import KW_ONLY, dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from swarm_forage_env.wrappers.world import SIZE
 
 from ..checks import CurveError, PopulationError
 from ..curves import FloatArray, Form, Variant
-from ..distance import noise_floor
 from ..emergence import interference_gain, spatial_emergence, task_emergence, time_emergence, undisturbed_gain
 from ..environment import environment_distance
 from ..flexibility import adaptability, noise_robustness, reactivity
@@ -30,42 +29,72 @@ DISTURBANCES = (THROTTLE, HANDLING)
 """Kinds of disturbance over time, the paper's two, under which reactivity and adaptability can be scored."""
 ENOUGH_SHARE = 0.1
 """Share of the swarm that availability asks for: 5 of 50 and 20 of 200 robots (scenario 1 of the paper)."""
-FALLING = (
-    "performance is lower than that of the next smaller swarm, and it weights the time lost, so that a collapse counts "
-    "as organisation; read time_emergence beside it"
-)
-"""Remark on a value that misleads: see erratum 16 in docs/errata.md."""
 _WORDS = {THROTTLE: "throttle", HANDLING: "handling cost", NOISE: "sigma", POPULATION: "population"}
 """Criterion -> its word in the name of a level."""
-
-
-class Compared(NamedTuple):
-    """Runs that a formula takes, paired by seed."""
-
-    one: RunCurves | None
-    """Those of one robot; None if there are none, or they are not needed."""
-    base: RunCurves
-    """Those of the smaller swarm, or of the undisturbed one; `runs` again where a measure compares nothing."""
-    runs: RunCurves
-    variant: Variant
 
 
 class Uncomputable(Exception):  # noqa: N818 - not an error: it is noted, and other measures go on
     """The curves do not allow this measure; the message says why."""
 
 
-@dataclass(frozen=True, kw_only=True)
+class Compared(NamedTuple):
+    """What a measure compares at one level."""
+
+    one: RunCurves | None
+    """Runs of one robot; None if there are none, or they are not needed."""
+    base: RunCurves
+    """Those of the smaller swarm, or of the undisturbed one; `runs` again where a measure compares nothing."""
+    runs: RunCurves
+    variant: Variant
+    at: str = ""
+    """The level in words: "N = 25 to 50", "throttle 0.4"."""
+    x: float = math.nan
+    """The level as a number: the larger swarm size, or the criterion's value."""
+    misleads: bool = False
+
+    @property
+    def curves(self) -> tuple[FloatArray, FloatArray]:
+        """Performance of the base and of the runs, (R, T) each."""
+        return self.base.performance, self.runs.performance
+
+    @property
+    def achieved(self) -> tuple[FloatArray, int, FloatArray, int]:
+        """Performance and swarm size of both."""
+        return self.base.performance, self.base.n_robots, self.runs.performance, self.runs.n_robots
+
+    @property
+    def lost(self) -> tuple[FloatArray, int, FloatArray, int]:
+        """Share of time lost and swarm size of both."""
+        return self.base.interference, self.base.n_robots, self.runs.interference, self.runs.n_robots
+
+    @property
+    def losses(self) -> tuple[FloatArray, FloatArray, int, FloatArray, FloatArray, int]:
+        """Performance, share of time lost and swarm size of both."""
+        base, runs = self.base, self.runs
+        return base.performance, base.interference, base.n_robots, runs.performance, runs.interference, runs.n_robots
+
+    def paired(self) -> "Compared":
+        """Return the runs with those seeds alone that all of them have."""
+        if self.one is None:
+            base, runs = common_runs(self.base, self.runs)
+            return self._replace(base=base, runs=runs)
+        one, base, runs = common_runs(self.one, self.base, self.runs)
+        return self._replace(one=one, base=base, runs=runs)
+
+
+@dataclass(frozen=True)
 class Measure:
     """One measure."""
 
     symbol: str
     """Symbol in the paper."""
+    of: Callable[[Compared], FloatArray]
+    """The formula, of runs that are paired by seed; returns one value per run, (R,)."""
     varies: str
     """What has to be varied for it."""
-    of: Callable[[Compared], FloatArray]
-    """The formula; returns one value per run, (R,)."""
     unit: str
     """Unit of the value; {amount} stands for what performance counts, {span} for the length of a run."""
+    _: KW_ONLY
     higher_is_better: bool = True
     """Direction of the corrected form."""
     neutral: float | None = 0.0
@@ -80,28 +109,20 @@ class Measure:
     """Whether it compares a swarm size with a smaller one."""
     from_one: bool = False
     """Whether it needs runs of one robot."""
-    is_amount: bool = False
-    """Whether it is an amount of performance, which is also given as a share of that which it is compared with."""
     weights: bool = False
     """Whether it weights the time lost with the performance, which misleads where performance falls with the size."""
-    is_distance: bool = False
-    """Whether it is a distance of two curves, which has a noise floor, and whose normal form changes sign."""
     variants: tuple[Variant, ...] = ("corrected",)
     """Its variants that give different numbers."""
 
+    @property
+    def is_amount(self) -> bool:
+        """Whether it is an amount of performance, which is also given as a share of that which it is compared with."""
+        return "{amount}" in self.unit and self.neutral is not None
 
-def _performance_lost(c: Compared) -> FloatArray:
-    assert c.one is not None
-    return performance_lost(*_losses(c.runs), c.one.performance, c.one.interference).sum(axis=-1)
-
-
-def _spatial_emergence(c: Compared) -> FloatArray:
-    lone = (None, None) if c.one is None else (c.one.performance, c.one.interference)
-    return spatial_emergence(*_losses(c.base), *_losses(c.runs), *lone, variant=c.variant)
-
-
-def _losses(runs: RunCurves) -> tuple[FloatArray, FloatArray, int]:
-    return runs.performance, runs.interference, runs.n_robots
+    @property
+    def is_distance(self) -> bool:
+        """Whether it is a distance of two curves, which has a noise floor."""
+        return self.unit == _DISTANCE
 
 
 def _conditions(runs: RunCurves, disturbance: str, variant: Variant) -> FloatArray:
@@ -112,6 +133,18 @@ def _conditions(runs: RunCurves, disturbance: str, variant: Variant) -> FloatArr
     """
     sampled = runs.curves.get(disturbance)
     return runs.curves["adversity"] if sampled is None or variant == "corrected" else sampled
+
+
+def conditions_apart(compared: Compared) -> float | None:
+    """Return the distance of the conditions from the ideal ones, the paper's x axis; None where it is not known.
+
+    They are sampled at the ends of intervals, mean over runs.
+    """
+    paired = compared.paired()
+    sides, disturbance = (paired.runs, paired.base), paired.runs.criterion
+    if disturbance not in DISTURBANCES or not all("adversity" in each.curves and each.seeds for each in sides):
+        return None
+    return environment_distance(*(_conditions(each, disturbance, "paper").mean(axis=0) for each in sides))
 
 
 def _reactivity(c: Compared) -> FloatArray:
@@ -126,6 +159,16 @@ def _reactivity(c: Compared) -> FloatArray:
     return reactivity(c.base.performance, c.runs.performance, v=given, i_ec=wanted, model=model)
 
 
+def _performance_lost(c: Compared) -> FloatArray:
+    assert c.one is not None
+    return performance_lost(*c.losses[3:], c.one.performance, c.one.interference).sum(axis=-1)
+
+
+def _spatial_emergence(c: Compared) -> FloatArray:
+    lone = (None, None) if c.one is None else (c.one.performance, c.one.interference)
+    return spatial_emergence(*c.losses, *lone, variant=c.variant)
+
+
 def _rates(runs: RunCurves) -> PopulationRates:
     if runs.rates is None:
         raise Uncomputable(f"there are no rates (deaths_per_s, malfunctions_per_s, ...) for {runs.describe()}")
@@ -133,20 +176,13 @@ def _rates(runs: RunCurves) -> PopulationRates:
 
 
 def _population_robustness(c: Compared) -> FloatArray:
-    runs, ideal = c.runs, c.base
-    rates = _rates(runs)
-    if runs.horizon_s is None:
+    rates, horizon_s = _rates(c.runs), c.runs.horizon_s
+    if horizon_s is None:
         raise Uncomputable("there is no column t_end_s, which gives the length of a run")
+    weight = "paper" if c.variant == "paper" else "transient"
+    about: dict[str, Any] = {"n": c.runs.n_robots, "horizon": horizon_s, "ideal_rates": c.base.rates, "weight": weight}
     try:
-        return population_robustness(
-            runs.performance,
-            ideal.performance,
-            rates,
-            horizon=runs.horizon_s,
-            n=runs.n_robots,
-            ideal_rates=ideal.rates,
-            weight="paper" if c.variant == "paper" else "transient",
-        )
+        return population_robustness(c.runs.performance, c.base.performance, rates, **about)
     except PopulationError as error:
         raise Uncomputable(str(error)) from error
 
@@ -158,158 +194,86 @@ def _recorded_population_robustness(c: Compared) -> FloatArray:
     return recorded_population_robustness(c.runs.performance, c.runs.curves["n_active"], c.base.performance, at_work)
 
 
-_LOST = ("interference_fraction",)
+def _availability(c: Compared) -> FloatArray:
+    return np.array([availability(c.runs.n_robots, _enough(c.runs), _ratio_out(c.runs))])
+
+
+def _enough(runs: RunCurves) -> int:
+    return max(1, round(ENOUGH_SHARE * runs.n_robots))
+
+
+def _ratio_out(runs: RunCurves) -> float:
+    """Return lambda / mu of a population: how much oftener robots leave than come."""
+    rates = _rates(runs)
+    return 0.0 if rates.lam == 0.0 else math.inf if rates.mu == 0.0 else round(rates.lam / rates.mu, 6)
+
+
+_TOTAL, _DISTANCE = "{amount} {span}", "{amount} (DTW)"
+_BOTH: tuple[Variant, ...] = ("corrected", "paper")
+_TIME_LOST = ("interference_fraction",)
+_SIZES: dict[str, Any] = {"varies": SIZE, "compares": True}
+_DISTANCES: dict[str, Any] = {"unit": _DISTANCE, "higher_is_better": False, "lowest": 0.0}
 MEASURES: dict[str, Measure] = {
     "raw_performance": Measure(
-        symbol="P(N)",
-        varies=SIZE,
-        of=lambda c: raw_performance(c.runs.performance, reduce="sum"),
-        unit="{amount} {span}",
-        neutral=None,
-        lowest=0.0,
+        "P(N)", lambda c: raw_performance(c.runs.performance, reduce="sum"), SIZE, _TOTAL, neutral=None, lowest=0.0
     ),
     "efficiency": Measure(
-        symbol="P(N) / N",
-        varies=SIZE,
-        of=lambda c: efficiency(c.runs.performance, c.runs.n_robots, reduce="sum"),
-        unit="{amount} per robot {span}",
+        "P(N) / N",
+        lambda c: efficiency(c.runs.performance, c.runs.n_robots, reduce="sum"),
+        SIZE,
+        "{amount} per robot {span}",
         neutral=None,
         lowest=0.0,
     ),
     "t_lost_fraction": Measure(
-        symbol="t_lost(N, t)",
-        varies=SIZE,
-        of=lambda c: c.runs.interference.mean(axis=-1),
-        unit="share of robot time",
+        "t_lost(N, t)",
+        lambda c: c.runs.interference.mean(axis=-1),
+        SIZE,
+        "share of robot time",
         higher_is_better=False,
         lowest=0.0,
         highest=1.0,
-        columns=_LOST,
+        columns=_TIME_LOST,
     ),
     "performance_lost": Measure(
-        symbol="P_lost(N, t)",
-        varies=SIZE,
-        of=_performance_lost,
-        unit="{amount} {span}",
+        "P_lost(N, t)",
+        _performance_lost,
+        SIZE,
+        _TOTAL,
         higher_is_better=False,
-        columns=_LOST,
+        columns=_TIME_LOST,
         from_one=True,
-        is_amount=True,
         weights=True,
     ),
     "spatial_emergence": Measure(
-        symbol="E_S(N1, N2)",
-        varies=SIZE,
-        of=_spatial_emergence,
-        unit="{amount} {span}",
-        columns=_LOST,
-        compares=True,
-        is_amount=True,
-        weights=True,
-        variants=("corrected", "paper"),
+        "E_S(N1, N2)", _spatial_emergence, **_SIZES, unit=_TOTAL, columns=_TIME_LOST, weights=True, variants=_BOTH
     ),
     "time_emergence": Measure(
-        symbol="E_R(N1, N2)",
-        varies=SIZE,
-        of=lambda c: time_emergence(c.base.interference, c.base.n_robots, c.runs.interference, c.runs.n_robots),
-        unit="robots",
-        columns=_LOST,
-        compares=True,
+        "E_R(N1, N2)", lambda c: time_emergence(*c.lost), **_SIZES, unit="robots", columns=_TIME_LOST
     ),
-    "task_emergence": Measure(
-        symbol="E_T(N1, N2)",
-        varies=SIZE,
-        of=lambda c: task_emergence(c.base.performance, c.base.n_robots, c.runs.performance, c.runs.n_robots),
-        unit="{amount} {span}",
-        compares=True,
-        is_amount=True,
-    ),
+    "task_emergence": Measure("E_T(N1, N2)", lambda c: task_emergence(*c.achieved), **_SIZES, unit=_TOTAL),
     "interference_gain": Measure(
-        symbol="E_I(N1, N2)",
-        varies=SIZE,
-        of=lambda c: interference_gain(*_losses(c.base), *_losses(c.runs)),
-        unit="{amount} {span}",
-        columns=_LOST,
-        compares=True,
-        is_amount=True,
+        "E_I(N1, N2)", lambda c: interference_gain(*c.losses), **_SIZES, unit=_TOTAL, columns=_TIME_LOST
     ),
     "undisturbed_gain": Measure(
-        symbol="E_U(N1, N2)",
-        varies=SIZE,
-        of=lambda c: undisturbed_gain(*_losses(c.base), *_losses(c.runs)),
-        unit="{amount} {span}",
-        columns=_LOST,
-        compares=True,
-        is_amount=True,
+        "E_U(N1, N2)", lambda c: undisturbed_gain(*c.losses), **_SIZES, unit=_TOTAL, columns=_TIME_LOST
     ),
     "scalability": Measure(
-        symbol="C(N1, N2)",
-        varies=SIZE,
-        of=lambda c: scalability(
-            c.base.performance, c.base.n_robots, c.runs.performance, c.runs.n_robots, variant=c.variant
-        ),
+        "C(N1, N2)",
+        lambda c: scalability(*c.achieved, variant=c.variant),
+        **_SIZES,
         unit="1 = linear",
         neutral=1.0,
-        compares=True,
-        variants=("corrected", "paper"),
+        variants=_BOTH,
     ),
-    "reactivity": Measure(
-        symbol="R(N)",
-        varies=THROTTLE,
-        of=_reactivity,
-        unit="{amount} (DTW)",
-        higher_is_better=False,
-        lowest=0.0,
-        columns=("adversity",),
-        is_amount=True,
-        is_distance=True,
-        variants=("corrected", "paper"),
-    ),
-    "adaptability": Measure(
-        symbol="A(N)",
-        varies=THROTTLE,
-        of=lambda c: adaptability(c.base.performance, c.runs.performance),
-        unit="{amount} (DTW)",
-        higher_is_better=False,
-        lowest=0.0,
-        is_amount=True,
-        is_distance=True,
-    ),
-    "noise_robustness": Measure(
-        symbol="B_sa",
-        varies=NOISE,
-        of=lambda c: noise_robustness(c.base.performance, c.runs.performance),
-        unit="{amount} (DTW)",
-        higher_is_better=False,
-        lowest=0.0,
-        is_amount=True,
-        is_distance=True,
-    ),
-    "population_robustness": Measure(
-        symbol="B_pd",
-        varies=POPULATION,
-        of=_population_robustness,
-        unit="{amount} {span}",
-        is_amount=True,
-        variants=("corrected", "paper"),
-    ),
+    "reactivity": Measure("R(N)", _reactivity, THROTTLE, **_DISTANCES, columns=("adversity",), variants=_BOTH),
+    "adaptability": Measure("A(N)", lambda c: adaptability(*c.curves), THROTTLE, **_DISTANCES),
+    "noise_robustness": Measure("B_sa", lambda c: noise_robustness(*c.curves), NOISE, **_DISTANCES),
+    "population_robustness": Measure("B_pd", _population_robustness, POPULATION, _TOTAL, variants=_BOTH),
     "recorded_population_robustness": Measure(
-        symbol="B_pd'",
-        varies=POPULATION,
-        of=_recorded_population_robustness,
-        unit="{amount} {span}",
-        columns=("n_active",),
-        is_amount=True,
+        "B_pd'", _recorded_population_robustness, POPULATION, _TOTAL, columns=("n_active",)
     ),
-    "availability": Measure(
-        symbol="p_v",
-        varies=POPULATION,
-        of=lambda c: np.array([availability(c.runs.n_robots, _enough(c.runs), ratio_out(c.runs))]),
-        unit="probability",
-        neutral=1.0,
-        lowest=0.0,
-        highest=1.0,
-    ),
+    "availability": Measure("p_v", _availability, POPULATION, "probability", neutral=1.0, lowest=0.0, highest=1.0),
 }
 """Public function name -> the measure. The order is that of tables."""
 PICTURED = (
@@ -324,34 +288,10 @@ PICTURED = (
     "population_robustness",
 )
 """Measures of the usual table and picture: the paper's, without the parts and variants of ours."""
-_NO_SUM = "this performance is no sum over robots, and the measure compares with growth in proportion to them"
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Level:
-    """What a measure compares at one level, and what is told of it besides the values of runs."""
-
-    at: str
-    """The level in words: "N = 25 to 50", "throttle 0.4"."""
-    x: float
-    """The level as a number: the larger swarm size, or the criterion's value."""
-    compared: Compared
-    """All runs that it compares, not yet paired."""
-    misleads: bool = False
-    floor: float | None = None
-    """Of distances: mean distance between two undisturbed runs, what a perfect swarm scores by chance."""
-    distance: float | None = None
-    """Distance of the conditions from the ideal ones, the paper's x axis; None where it is not known."""
-
-    def paired(self) -> Compared:
-        """Return the runs with those seeds alone that all of them have."""
-        one, base, runs, variant = self.compared
-        paired = common_runs(*(each for each in (one, base, runs) if each is not None))
-        return Compared(None if one is None else paired[0], paired[-2], paired[-1], variant)
-
-
-def levels(name: str, study: StudyCurves, variant: Variant, form: Form) -> Iterator[Level]:
-    """Yield what a measure compares in the runs of a policy.
+def levels(name: str, study: StudyCurves, variant: Variant, form: Form) -> Iterator[Compared]:
+    """Yield what a measure compares in the runs of a policy, level by level.
 
     Args:
         name: Of the measure.
@@ -366,27 +306,31 @@ def levels(name: str, study: StudyCurves, variant: Variant, form: Form) -> Itera
     yield from _sizes(measure, study, variant, form) if measure.varies == SIZE else _disturbed(name, study, variant)
 
 
-def _sizes(measure: Measure, study: StudyCurves, variant: Variant, form: Form) -> Iterator[Level]:
+def _sizes(measure: Measure, study: StudyCurves, variant: Variant, form: Form) -> Iterator[Compared]:
     sizes = study.sizes()
     if not sizes:
         raise Uncomputable(f"there are no runs with criterion {SIZE}")
     _require_columns(measure, sizes)
     smallest = sizes[0]
     one = smallest if smallest.n_robots == 1 else None
+    has_base = measure.from_one or measure.compares
     if one is None and (measure.from_one or (measure.compares and form == "interactive")):
         raise Uncomputable(f"there is no reference run of one robot, the smallest swarm has {smallest.n_robots}")
-    if len(sizes) < 2 and (measure.from_one or measure.compares):
+    if len(sizes) < 2 and has_base:
         raise Uncomputable(f"there is one swarm size only, N = {smallest.n_robots}")
-    for previous, larger in zip((None, *sizes), sizes, strict=False):
-        if previous is None and (measure.from_one or measure.compares):
-            continue  # the first size has nothing to be compared with
-        smaller = one if form == "interactive" else previous
-        base = smaller if measure.compares and smaller is not None else larger
-        yield Level(
-            at=f"N = {base.n_robots} to {larger.n_robots}" if base is not larger else f"N = {larger.n_robots}",
+    for previous, larger in zip((smallest, *sizes), sizes, strict=False):
+        if larger is smallest and has_base:
+            continue  # it has nothing to be compared with
+        smaller = smallest if form == "interactive" else previous
+        base = smaller if measure.compares else larger
+        yield Compared(
+            one=one if measure.weights else None,
+            base=base,
+            runs=larger,
+            variant=variant,
+            at=f"N = {base.n_robots} to {larger.n_robots}" if measure.compares else f"N = {larger.n_robots}",
             x=larger.n_robots,
-            compared=Compared(one if measure.from_one or measure.weights else None, base, larger, variant),
-            misleads=measure.weights and previous is not None and _falls(previous, larger),
+            misleads=measure.weights and _falls(previous, larger),
         )
 
 
@@ -396,56 +340,23 @@ def _falls(previous: RunCurves, larger: RunCurves) -> bool:
     return bool(few.seeds) and float(many.performance.sum()) < float(few.performance.sum())
 
 
-def _disturbed(name: str, study: StudyCurves, variant: Variant) -> Iterator[Level]:
+def _disturbed(name: str, study: StudyCurves, variant: Variant) -> Iterator[Compared]:
     measure = MEASURES[name]
-    criteria = DISTURBANCES if measure.varies in DISTURBANCES else (measure.varies,)
+    criteria = DISTURBANCES if measure.varies == THROTTLE else (measure.varies,)
     pairs = tuple(pair for criterion in criteria for pair in study.levels(criterion))
     if not pairs:
         raise Uncomputable(f"there are no runs with criterion {' or '.join(criteria)} and a value other than 0")
     _require_columns(measure, [each for pair in pairs for each in pair])
-    if name == "availability":
-        yield from _ratios([runs for _, runs in pairs])
+    if name == "availability":  # it follows from the rates alone: one level per ratio of them
+        ratios: dict[tuple[int, float], RunCurves] = {}
+        for _, runs in pairs:
+            ratios.setdefault((runs.n_robots, _ratio_out(runs)), runs)
+        for (_, x), runs in ratios.items():
+            at = f"{_enough(runs)} or more at work, lambda/mu {x:.4g}"
+            yield Compared(None, runs, runs, "corrected", at=at, x=x)
         return
     for ideal, runs in pairs:
-        is_known = measure.is_distance and len(ideal.seeds) > 1
-        yield Level(
-            at=f"{_WORDS[runs.criterion]} {runs.value:.4g}",
-            x=runs.value,
-            compared=Compared(None, ideal, runs, variant),
-            floor=float(noise_floor(ideal.performance).mean()) if is_known else None,
-            distance=_environment_distance(ideal, runs) if measure.is_distance else None,
-        )
-
-
-def _environment_distance(ideal: RunCurves, runs: RunCurves) -> float | None:
-    wanted, applied = common_runs(ideal, runs)
-    is_known = all("adversity" in each.curves for each in (wanted, applied))
-    if not wanted.seeds or runs.criterion not in DISTURBANCES or not is_known:
-        return None
-    # Sampled at interval ends, which gives the paper's x axis.
-    means = [_conditions(each, runs.criterion, "paper").mean(axis=0) for each in (applied, wanted)]
-    return environment_distance(*means)
-
-
-def _ratios(experiments: Sequence[RunCurves]) -> Iterator[Level]:
-    """Yield one level per ratio of rates: availability follows from the rates alone."""
-    seen: set[tuple[int, float]] = set()
-    for runs in experiments:
-        x = ratio_out(runs)
-        if (runs.n_robots, x) not in seen:
-            seen.add((runs.n_robots, x))
-            at = f"{_enough(runs)} or more at work, lambda/mu {x:.4g}"
-            yield Level(at=at, x=x, compared=Compared(None, runs, runs, "corrected"))
-
-
-def ratio_out(runs: RunCurves) -> float:
-    """Return lambda / mu of a population: how much oftener robots leave than come."""
-    rates = _rates(runs)
-    return 0.0 if rates.lam == 0.0 else math.inf if rates.mu == 0.0 else round(rates.lam / rates.mu, 6)
-
-
-def _enough(runs: RunCurves) -> int:
-    return max(1, round(ENOUGH_SHARE * runs.n_robots))
+        yield Compared(None, ideal, runs, variant, at=f"{_WORDS[runs.criterion]} {runs.value:.4g}", x=runs.value)
 
 
 def _require_columns(measure: Measure, experiments: Sequence[RunCurves]) -> None:
@@ -463,18 +374,21 @@ def unit_of(name: str, study: StudyCurves, variant: Variant) -> str:
     return MEASURES[name].unit.format(amount=study.read_as.amount, span=span)
 
 
-def remark_on(name: str, study: StudyCurves, variant: Variant, *, misleads: bool) -> str:
+def remark_on(name: str, study: StudyCurves, compared: Compared) -> str:
     """Return what to know before reading values; empty if nothing."""
     measure = MEASURES[name]
-    compares = measure.compares or measure.from_one or measure.varies == POPULATION
-    in_proportion = name == "efficiency" or (compares and name not in ("time_emergence", "availability"))
+    is_sum = "{amount}" in measure.unit and name != "raw_performance"
+    in_proportion = measure.varies in (SIZE, POPULATION) and (is_sum or name == "scalability")
     remarks = {
-        FALLING: misleads,
-        "minus the speedup times the corrected form, so it reverses the order of swarms": (name, variant)
-        == ("scalability", "paper"),
+        # erratum 16 in docs/errata.md
+        "performance is lower than that of the next smaller swarm, and it weights the time lost, so that a collapse "
+        "counts as organisation; read time_emergence beside it": compared.misleads,
+        "minus the speedup times the corrected form, so it reverses the order of swarms": name == "scalability"
+        and compared.variant == "paper",
         "from the rates alone, the same for every policy, in an equilibrium that runs need not reach": name
         == "availability",
-        _NO_SUM: in_proportion and not study.read_as.adds_up,
+        "this performance is no sum over robots, and the measure compares with growth in proportion to "
+        "them": in_proportion and not study.read_as.adds_up,
     }
     return "; ".join(remark for remark, holds in remarks.items() if holds)
 
@@ -496,12 +410,7 @@ def check_words(what: str, words: Sequence[str], known: Sequence[str]) -> None:
 
 
 def criteria_of(measures: Sequence[str], disturbance: str) -> set[str]:
-    """Return what has to be varied for some measures, with one of `DISTURBANCES` in place of the throttle.
-
-    Raises:
-        CurveError: an unknown kind of disturbance.
-    """
-    if disturbance not in DISTURBANCES:
-        raise CurveError(f"Expected disturbance to be one of {', '.join(DISTURBANCES)}, got {disturbance!r}.")
+    """Return what has to be varied for some measures, with one of `DISTURBANCES` in place of the throttle."""
+    check_words("disturbance", [disturbance], DISTURBANCES)
     criteria = (MEASURES[name].varies for name in measures)
     return {disturbance if criterion == THROTTLE else criterion for criterion in criteria}

@@ -14,12 +14,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast, get_args
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import polars as pl
+import polars.selectors as cs
 
-from swarm_forage_env._internal.wording import counted, limits, number, percent, plain, suggestion
+from swarm_forage_env._internal.wording import counted, limits, number, percent, plain
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 from swarm_forage_env.runs.plan import Plan, Table, run_plan
 from swarm_forage_env.runs.spec import PolicyLike, PolicySpec, policy_specs
@@ -33,8 +34,8 @@ from ..checks import CurveError, chosen_seeds
 from ..curves import Form, Variant
 from ..statistics import ROUNDING
 from .curves_file import read_curves
-from .frame import ROW, differences, label_of, scores, summarized, words_of
-from .measures import MEASURES, PICTURED, check_measures, check_words, criteria_of
+from .frame import ROW, checked_request, differences, label_of, scores, summarized, words_of
+from .measures import MEASURES, PICTURED, check_words, criteria_of
 from .plots import draw_scores, interval_words
 from .question import Question
 from .run_curves import THROTTLE, PerformanceLike, StudyCurves, own_performance, policy_curves
@@ -95,9 +96,9 @@ class Scores(Answer):
         """Return who is best at what, by how much, and whether that is certain; at the last level of each measure."""
         if len(self.policies) < 2 or self.differences.is_empty():
             return []
-        found = [self._sentence(rows) for rows in self._strongest()]
-        open_ones = [words for words, is_certain in found if words and not is_certain]
-        certain = [words for words, is_certain in found if is_certain]
+        found = [sentence for rows in self._strongest() if (sentence := self._sentence(rows))]
+        certain = [words for words in found if words.endswith(".")]
+        open_ones = [words for words in found if words not in certain]
         return [*certain, *([f"No certain difference: {', '.join(open_ones)}."] if open_ones else [])]
 
     def _strongest(self) -> Iterator[pl.DataFrame]:
@@ -108,40 +109,37 @@ class Scores(Answer):
         for _, rows in shown.group_by("measure", "criterion", maintain_order=True):
             yield rows.filter(pl.col("at") == rows.sort("n_robots", "x")["at"][-1])
 
-    def _sentence(self, rows: pl.DataFrame) -> tuple[str, bool]:
-        """Return what is told of the best policy and the next, and whether it is certain; nothing of fewer than two."""
+    def _sentence(self, rows: pl.DataFrame) -> str:
+        """Return what is certain of the best policy and the next; else the measure alone, of fewer than two nothing."""
         first = rows.row(0, named=True)
-        measure = MEASURES[first["measure"]]
+        measure, words = MEASURES[first["measure"]], words_of(first["measure"])
         column = "relative" if measure.is_amount else "mean"
         ranked = rows.filter(pl.col(column).is_finite()).sort(column, descending=measure.higher_is_better)["policy"]
         if len(ranked) < 2:
-            return "", False
+            return ""
         best, other = ranked[0], ranked[1]
-        if self.against is not None and self.against in ranked:
-            other = self.against if best != self.against else other
-        pair = [best, other]
+        if self.against in ranked and best != self.against:
+            other = self.against
         at = self.differences.filter(
             *(pl.col(name) == first[name] for name in ROW),
-            pl.col("is_relative") == (column == "relative"),
-            pl.col("first").is_in(pair),
-            pl.col("second").is_in(pair),
+            pl.col("first").is_in([best, other]),
+            pl.col("second").is_in([best, other]),
+            is_relative=measure.is_amount,
         )
         if at.is_empty():
-            return "", False
+            return ""
         of = at.row(0, named=True)
-        gap = spread(abs(of["difference"]), of["upper"] - of["difference"], is_share=column == "relative")
-        if "{amount}" in measure.unit and column == "mean":
-            gap += f" {first['unit']}"
         if not of["better"]:
-            return words_of(first["measure"]), False
+            return words
+        gap = spread(abs(of["difference"]), of["upper"] - of["difference"], is_share=measure.is_amount)
+        unit = f" {first['unit']}" if "{amount}" in measure.unit and not measure.is_amount else ""
         side = "ahead of" if measure.higher_is_better else "below"
-        return f"{words_of(first['measure'])} at {first['at']}: {best} is best, {gap} {side} {other} (certain).", True
+        return f"{words} at {first['at']}: {best} is best, {gap}{unit} {side} {other} (certain)."
 
     def sheets(self) -> tuple[Sheet, ...]:
         """Return sentences, a table and notes; with `is_full`, all levels and differences."""
-        said = Sheet(title=self._title(), notes=self.sentences())
         tables = tuple(self._long()) if self.is_full else (self._short(),)
-        return said, *tables, Sheet(notes=self._notes())
+        return Sheet(title=self._title(), notes=self.sentences()), *tables, Sheet(notes=self._notes())
 
     def _title(self) -> str:
         told = self.settings
@@ -179,15 +177,20 @@ class Scores(Answer):
         for key, part in self.summary.group_by(*ROW[:3], maintain_order=True):
             first = part.row(0, named=True)
             title = f"{words_of(label_of(*key))}, {first['unit']}, {_better(first['measure'])} is better"
-            columns = {"at": part["at"].to_list(), "policy": part["policy"].to_list()}
-            levels = part.to_dicts()
-            columns["value"] = [number(row["mean"]) + _marks(row) for row in levels]
-            columns["95 % interval"] = [limits(row["lower"], row["upper"]) for row in levels]
-            columns["noise floor"] = ["" if row["floor"] is None else number(row["floor"]) for row in levels]
-            columns["relative"] = ["" if math.isnan(row["relative"]) else percent(row["relative"]) for row in levels]
-            columns["runs"] = [str(row["runs"]) for row in levels]
-            shown = {name: cells for name, cells in columns.items() if set(cells) - {"", "-"}}
-            yield Sheet(title=title, frame=pl.DataFrame(shown))
+            levels = [
+                {
+                    "at": row["at"],
+                    "policy": row["policy"],
+                    "value": number(row["mean"]) + _marks(row),
+                    "95 % interval": limits(row["lower"], row["upper"]),
+                    "noise floor": "" if row["floor"] is None else number(row["floor"]),
+                    "relative": "" if math.isnan(row["relative"]) else percent(row["relative"]),
+                    "runs": str(row["runs"]),
+                }
+                for row in part.iter_rows(named=True)
+            ]
+            frame = pl.DataFrame(levels)
+            yield Sheet(title=title, frame=frame.select(name for name in frame.columns if {*frame[name]} - {"", "-"}))
             if key in by_measure:
                 yield _pairs_of(by_measure[key])
         if len(self.summary):
@@ -217,14 +220,13 @@ class Scores(Answer):
 
     def to_mapping(self) -> dict[str, Any]:
         """Return everything as plain values, ready for JSON; numbers that do not exist are None."""
-        per_seed: dict[tuple[Any, ...], dict[str, float | None]] = {}
-        for row in self.frame.filter(pl.col("seed").is_not_null()).iter_rows(named=True):
-            of_level = per_seed.setdefault(_key(row), {})
-            of_level[str(row["seed"])] = plain(row["value"])
-        rows = [
-            {**_plain(row), **_about(row["measure"]), "per_seed": per_seed.get(_key(row), {})}
-            for row in self.summary.iter_rows(named=True)
-        ]
+        of_runs = self.frame.filter(pl.col("seed").is_not_null()).group_by("policy", *ROW, maintain_order=True)
+        per_seed = {key: dict(zip(map(str, of["seed"]), map(plain, of["value"]), strict=True)) for key, of in of_runs}
+        rows: list[dict[str, Any]] = []
+        for row in _plain_rows(self.summary):
+            of = MEASURES[row["measure"]]
+            row |= {"symbol": of.symbol, "higher_is_better": of.higher_is_better, "neutral": of.neutral}
+            rows.append({**row, "per_seed": per_seed.get(tuple(row[name] for name in ("policy", *ROW)), {})})
         missing: dict[str, dict[str, str]] = {}
         for (policy, label), reason in self.missing.items():
             missing.setdefault(policy, {})[label] = reason
@@ -234,7 +236,7 @@ class Scores(Answer):
             "settings": dict(self.settings),
             "sentences": self.sentences(),
             "scores": rows,
-            "differences": [_plain(row) for row in self.differences.iter_rows(named=True)],
+            "differences": _plain_rows(self.differences),
             "missing": missing,
             "failures": {policy: list(lines) for policy, lines in self.failures.items()},
         }
@@ -249,17 +251,9 @@ class Scores(Answer):
         draw_scores(self.summary, path, title=self.world, style=style)
 
 
-def _key(row: Mapping[str, Any]) -> tuple[Any, ...]:
-    return tuple(row[name] for name in ("policy", *ROW))
-
-
-def _plain(row: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: plain(value) if isinstance(value, float) else value for name, value in row.items()}
-
-
-def _about(name: str) -> dict[str, Any]:
-    measure = MEASURES[name]
-    return {"symbol": measure.symbol, "higher_is_better": measure.higher_is_better, "neutral": measure.neutral}
+def _plain_rows(frame: pl.DataFrame) -> list[dict[str, Any]]:
+    """Return rows without NaN and infinities, which JSON does not have."""
+    return frame.with_columns(pl.when(cs.float().is_finite()).then(cs.float())).to_dicts()
 
 
 def _marks(row: Mapping[str, Any]) -> str:
@@ -269,9 +263,9 @@ def _marks(row: Mapping[str, Any]) -> str:
 
 def _cell(row: Mapping[str, Any]) -> str:
     """Return a value with half of its interval, as a share where there are shares."""
-    if not MEASURES[row["measure"]].is_amount:
-        return spread(row["mean"], row["upper"] - row["mean"]) + _marks(row)
-    return spread(row["relative"], row["relative_upper"] - row["relative"], is_share=True) + _marks(row)
+    is_share = MEASURES[row["measure"]].is_amount
+    mean, upper = (row[name] for name in (("relative", "relative_upper") if is_share else ("mean", "upper")))
+    return spread(mean, upper - mean, is_share=is_share) + _marks(row)
 
 
 def _better(name: str) -> str:
@@ -282,12 +276,11 @@ def _pairs_of(rows: pl.DataFrame) -> Sheet:
     """The differences of a measure, a row per level and pair, values beside shares."""
     cells: dict[tuple[str, str], dict[str, str]] = {}
     for row in rows.iter_rows(named=True):
-        column = "relative" if row["is_relative"] else "value"
-        gap = spread(row["difference"], row["upper"] - row["difference"], is_share=row["is_relative"])
         pair = f"{row['first']} - {row['second']}"
-        cells.setdefault((row["at"], pair), {})[column] = gap + (" *" if row["better"] else "")
-    told = [{"at": at, "difference": pair, **of} for (at, pair), of in cells.items()]
-    return Sheet(frame=pl.DataFrame(told, infer_schema_length=None))
+        gap = spread(row["difference"], row["upper"] - row["difference"], is_share=row["is_relative"])
+        told = cells.setdefault((row["at"], pair), {"at": row["at"], "difference": pair})
+        told["relative" if row["is_relative"] else "value"] = gap + (" *" if row["better"] else "")
+    return Sheet(frame=pl.DataFrame([*cells.values()], infer_schema_length=None))
 
 
 def spread(mean: float, half: float, *, is_share: bool = False) -> str:
@@ -332,7 +325,7 @@ def score(
         KeyboardInterrupt: Ctrl-C; finished runs are in `out`.
     """
     question = score_question(policies, world, **asked)
-    return question.ask(out=out, jobs=jobs, executor=executor, progress=progress)
+    return question.answer(run_plan(question.plan, out=out, jobs=jobs, executor=executor, progress=progress))
 
 
 def score_question(
@@ -344,8 +337,6 @@ def score_question(
     seeds: int | Sequence[int] | None = None,
     horizon_s: float | None = None,
     performance: PerformanceLike | None = None,
-    parameters: Mapping[str, Any] | None = None,
-    caches: str | None = None,
     density: float | None = None,
     disturbance: str = THROTTLE,
     variants: Sequence[Variant] = ("corrected",),
@@ -357,7 +348,8 @@ def score_question(
 
     Args:
         policies: One (see `PolicyLike`), several, or a mapping from names to policies. Objects, classes and functions
-            run in this process, one run at a time, each with its own copy of an object.
+            run in this process, one run at a time, each with its own copy of an object. `policy_specs` gives policies
+            parameters or caches of their own.
         world: Name of a preset, a complete configuration, or a world with wrappers, which then act in all runs. The
             budget sets horizon and interval.
         measures: Names in `MEASURES`; default all.
@@ -369,8 +361,6 @@ def score_question(
             ("1/interference_fraction"), "task_balance", "cache_load", or a function of a record (`Performance`).
             Default: the performance of the scenario. It only changes how runs are read, so stored ones are not
             repeated.
-        parameters: Keyword arguments of a registered policy or a class.
-        caches: "none", "static", "dynamic"; default those that each policy states, else those of the world.
         density: Robots per m^2 at all swarm sizes: the arena grows with the swarm, and one robot is in the smallest
             arena. Default: all sizes are in the scenario's arena (in search and rescue: at its density).
         disturbance: Disturbance for reactivity and adaptability: "throttle" (robots lose speed) or "handling_cost"
@@ -380,53 +370,48 @@ def score_question(
         against: Label of a policy that all others are compared with; default all pairs are compared.
         is_full: Whether the text has all levels, numbers and differences.
     """
-    wanted = check_measures(measures)
-    check_words("variant", variants, get_args(Variant))
-    check_words("form", forms, get_args(Form))
-    allowed = ladders.budget(budget) if isinstance(budget, str) else budget
-    if horizon_s is not None:
-        allowed = replace(allowed, horizon_s=horizon_s)
-    chosen = world_of(world)
+    wanted = checked_request(measures, variants, forms)
+    chosen, own = world_of(world), own_performance(performance)
     if isinstance(performance, str):
         chosen = replace(chosen, scenario=replace(chosen.scenario, performance=performance))
-    if not isinstance(policies, Mapping | list | tuple):
-        policies = [policies]
-    specs = policy_specs(cast("Sequence[PolicyLike]", policies), parameters=parameters, caches=caches)
-    labels = [spec.label for spec in specs]
-    if against is not None and against not in labels:
-        raise CurveError(
-            f"Expected one of {', '.join(labels)} to compare against, got {against!r}.{suggestion(against, labels)}"
-        )
+    specs = policy_specs(cast("Any", policies if isinstance(policies, Mapping | list | tuple) else [policies]))
+    labels = tuple(spec.label for spec in specs)
+    if against is not None:
+        check_words("policy to compare against", [against], labels)
+    allowed = ladders.budget(budget) if isinstance(budget, str) else budget
+    allowed = allowed if horizon_s is None else replace(allowed, horizon_s=horizon_s)
     worlds = ladders.plan_worlds(chosen, criteria_of(wanted, disturbance), allowed, density=density)
     plan = Plan.product(specs, worlds, chosen_seeds(seeds, allowed.n_seeds))
-    own = own_performance(performance)
+    settings = {
+        "budget": budget if isinstance(budget, str) else "custom",
+        "horizon_s": allowed.horizon_s,
+        "interval_s": allowed.interval_s,
+        "seeds": list(plan.seeds),
+        "performance": (own or performance_of(chosen.scenario.performance)).name,
+        "n_robots": chosen.n_robots,
+    }
 
     def answer(table: Table) -> Scores:
-        frame, missing = scores(
-            [policy_curves(table, label, own) for label in labels], wanted, variants=variants, forms=forms
-        )
-        scenario = worlds[0].scenario
+        studies = [policy_curves(table, label, own) for label in labels]
+        frame, missing = scores(studies, wanted, variants=variants, forms=forms)
         return Scores(
             frame=frame,
-            policies=tuple(labels),
+            policies=labels,
             world=chosen.title(),
             missing=missing,
-            failures={label: lines for label in labels if (lines := table.failure_lines(label))},
-            settings={
-                "budget": budget if isinstance(budget, str) else "custom",
-                "horizon_s": scenario.horizon_s,
-                "interval_s": scenario.interval_s,
-                "seeds": list(plan.seeds),
-                "performance": (own or performance_of(chosen.scenario.performance)).name,
-                "n_robots": chosen.n_robots,
-                "out": None if table.folder is None else str(table.folder),
-            },
+            failures=_failures(table),
+            settings={**settings, "out": None if table.folder is None else str(table.folder)},
             notes=tuple(_other_objects(chosen, worlds)),
             against=against,
             is_full=is_full,
         )
 
     return Question(plan=plan, answer=answer)
+
+
+def _failures(table: Table) -> dict[str, Sequence[str]]:
+    """Policy -> why runs failed, for those of which some have."""
+    return {each.label: lines for each in table.plan.policies if (lines := table.failure_lines(each.label))}
 
 
 def _other_objects(world: World, worlds: Sequence[World]) -> Iterator[str]:
@@ -476,9 +461,7 @@ def score_curves(
             that no policy can be run with.
         ValueError: as `score`.
     """
-    check_measures(measures)
-    check_words("variant", variants, get_args(Variant))
-    check_words("form", forms, get_args(Form))
+    checked_request(measures, variants, forms)
     given = read_curves(path, performance, columns=columns, events=events, interval_s=interval_s)
     chosen = world_of(world)
     simulated: list[StudyCurves] = []
@@ -487,7 +470,7 @@ def score_curves(
         plan = _plan_beside(given, policy_specs(policies), chosen)
         table = run_plan(plan, **run)
         simulated = [policy_curves(table, each.label) for each in plan.policies]
-        failures = {each.label: lines for each in plan.policies if (lines := table.failure_lines(each.label))}
+        failures = _failures(table)
     studies = [*simulated, *given]
     frame, missing = scores(studies, measures, variants=variants, forms=forms)
     for study in given:

@@ -119,6 +119,7 @@ def score(
     """
     from metrics.scoring import score_question
     from swarm_forage_env.cli.worlds import default_file, default_folder, described_fields, described_world
+    from swarm_forage_env.runs.spec import policy_specs
 
     asked: dict[str, Any] = {
         "measures": measures or None,
@@ -143,7 +144,7 @@ def score(
     chosen, caches = described_world(replace(world, horizon=None))
     asked |= {"budget": budget, "seeds": seeds, "disturbance": disturbance, "horizon_s": world.horizon}
     density = described_fields(world).fields.get("density")
-    question = score_question(policies, chosen, caches=caches, density=density, **asked)
+    question = score_question(policy_specs(policies, caches=caches), chosen, density=density, **asked)
     folder = options.out or default_folder(chosen)
     file = options.picture or default_file(folder, chosen, policies, "_scores.png")
     return ask_and_show(question, folder, options, file)

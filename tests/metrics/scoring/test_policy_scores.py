@@ -18,6 +18,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import registry as policy_module
 from swarm_forage_env.runs import runner
 from swarm_forage_env.runs.run import run_one
+from swarm_forage_env.runs.spec import policy_specs
 from swarm_forage_env.runs.store import load
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.studies.ladders import Budget
@@ -150,16 +151,14 @@ def test_the_world_of_a_policy_is_kept(tmp_path):
     scored({"mine": Circling}, measures=SIZES, out=tmp_path)
     assert {spec.scenario.caches for spec in planned([Circling]).specs} == {"static"}
     assert {spec.scenario.caches for spec in planned([still]).specs} == {"none"}
-    assert {spec.scenario.caches for spec in planned([Circling], caches="dynamic").specs} == {"dynamic"}
+    assert {spec.scenario.caches for spec in planned(policy_specs([Circling], caches="dynamic")).specs} == {"dynamic"}
     assert {record.spec.policy for record in load(tmp_path)} == {"mine"}
 
 
 def test_parameters_reach_names_and_classes():
-    (spec, *_) = planned("crw", parameters={"wander_speed_mps": 0.05}).specs
+    (spec, *_) = planned(policy_specs(["crw"], parameters={"wander_speed_mps": 0.05})).specs
     assert spec.parameters == {"wander_speed_mps": 0.05}
-    assert scored(Circling, measures=SIZES, parameters={"speed": 0.1}).failures == {}
-    with pytest.raises(ValueError, match="Expected parameters with a name, a file or a class only"):
-        scored(still, parameters={"speed": 0.1})
+    assert scored(policy_specs([Circling], parameters={"speed": 0.1}), measures=SIZES).failures == {}
 
 
 def test_stored_runs_of_functions_need_a_name(tmp_path):
@@ -183,7 +182,7 @@ def test_stored_runs_of_functions_need_a_name(tmp_path):
         (
             {"policies": ["crw", "dpo"], "against": "cwr"},
             CurveError,
-            "one of crw, dpo .* got 'cwr'. Did you mean 'crw'",
+            "Unknown policy to compare against 'cwr'. Did you mean 'crw'",
         ),
     ],
 )
