@@ -1,8 +1,5 @@
 """Films: number of frames, timing, and refusals before anything is run or written."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -12,7 +9,7 @@ from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.inspect import film as film_module
 from swarm_forage_env.inspect.film import record_run
 from swarm_forage_env.policies.registry import RandomPolicy, load_policy
-from swarm_forage_env.rendering.video import check_film, write_film
+from swarm_forage_env.rendering.video import write_film
 from swarm_forage_env.rendering.view import THEMES
 from swarm_forage_env.runs.run import run_policy
 from swarm_forage_env.runs.spec import plan_run
@@ -88,10 +85,7 @@ class Witness(RandomPolicy):
         ({"at_s": 1.0}, r"to end in .png, got"),
         ({"at_s": -1.0, "path": "run.png"}, "at_s"),
         ({"fps": 51.0}, r"fps of a \.gif to be a number from 1 to 50"),
-        ({"fps": 61.0, "path": "run.mp4"}, r"fps of a \.mp4 to be a number from 1 to 60"),
-        ({"fps": 0.0}, "fps"),
         ({"seconds": 2000.0}, "at most 1500 frames for a GIF, got 2001"),
-        ({"seconds": 0.0}, "seconds"),
         ({"seconds": 20_000.0}, "seconds .* <= 10,000"),
         ({"seconds": 0.5}, "seconds .*two pictures.* >= 1"),
         ({"speedup": 1.0}, "speedup .* >= 4"),
@@ -107,33 +101,6 @@ def test_impossible_recordings_are_refused_before_the_run(tmp_path, options, exp
         record_run(world, policy, path, **options)
     assert policy.calls == 0
     assert not list(tmp_path.iterdir())
-
-
-def test_without_ffmpeg_the_message_tells_what_to_install(monkeypatch):
-    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(ImportError, match=r'pip install ".\[render\]"'):
-        check_film(Path("film.mp4"), 20, 10)
-    check_film(Path("film.gif"), 20, 10)
-
-
-def test_one_seed_gives_one_film(tmp_path):
-    calls, world = [], scenario("warehouse_small", n_robots=4, n_objects=10)
-    films = [
-        record_run(
-            world,
-            "random",
-            tmp_path / f"{index}.gif",
-            seed=seed,
-            seconds=6.0,
-            fps=10.0,
-            size_px=300,
-            progress=lambda *done: calls.append(done),
-        ).read_bytes()
-        for index, seed in enumerate((3, 3, 4))
-    ]
-    assert films[0] == films[1] != films[2]
-    assert calls == 3 * [(done, 4) for done in range(1, 5)]
-    assert len(frames_of(tmp_path / "0.gif")) == 4
 
 
 @pytest.fixture
@@ -167,8 +134,8 @@ DISTURBED = (
 )
 
 
-@pytest.mark.parametrize(("policy", "wrappers"), [("crw", ()), ("crw", DISTURBED), ("stochm", DISTURBED)])
-def test_a_film_shows_the_run_that_its_name_promises(filmed, tmp_path, monkeypatch, policy, wrappers):
+def test_a_film_shows_the_run_that_its_name_promises(filmed, tmp_path, monkeypatch):
+    policy, wrappers = "stochm", DISTURBED
     spec = plan_run(CROWDED, policy, wrappers=wrappers, seed=5)
     step, states = ForageEnv.advance, {}
 
@@ -198,10 +165,3 @@ def test_a_run_that_is_over_stays_as_it_ended(filmed, tmp_path):
     ticks = [tick for tick, *_ in filmed]
     assert len(ticks) == 41
     assert ticks[-1] == ticks[-2] < 200
-
-
-def test_parameters_reach_the_policy_of_a_film(filmed, tmp_path):
-    world = scenario("warehouse_small", n_robots=4, n_objects=10)
-    record_run(world, "crw", tmp_path / "run.gif", seconds=10.0, parameters={"wander_speed_mps": 0.05})
-    slow, start = filmed[-1][1], filmed[0][1]
-    assert 0.0 < np.linalg.norm(slow - start, axis=1).max() <= 0.05 * 10.0 + 1e-6

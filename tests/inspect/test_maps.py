@@ -84,14 +84,6 @@ def test_maps_that_do_not_match_are_refused(replay):
         floor_maps(replay, side_m=0.1)
 
 
-def test_arrays_go_to_a_file(replay, tmp_path):
-    maps = floor_maps(replay)
-    maps.write(tmp_path / "maps.npz")
-    with np.load(tmp_path / "maps.npz") as stored:
-        assert {*stored} == {*MEANINGS, "side_m", "size_m"}
-        assert np.array_equal(stored["density"], maps.arrays["density"])
-
-
 def images_of(monkeypatch, tmp_path, *maps: FloorMaps):
     """Draw maps, and return the panels that show them."""
     pytest.importorskip("matplotlib")

@@ -1,8 +1,6 @@
 """The page to play with in a real browser: sliders, buttons, clicks and walls reach the run."""
 
-import os
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
@@ -46,12 +44,6 @@ def opened(browser: Browser, session, *, plays: bool = False) -> None:
     run_shown(browser, "12 robots")
 
 
-def keep_picture(browser: Browser, name: str) -> None:
-    """Write a picture for people to look at, if the environment says where."""
-    if "REPLAY_PICTURES" in os.environ:
-        browser.picture(Path(os.environ["REPLAY_PICTURES"]) / f"{name}.png")
-
-
 def settled(browser: Browser) -> None:
     """All went well, and nothing was asked for elsewhere."""
     assert browser.complaints == []
@@ -70,7 +62,7 @@ def test_it_plays_pauses_and_steps(request, kind, session):
     browser.wait_for("document.getElementById('note').textContent === 'one tick'")
     assert session.world.tick == tick + 1
     assert browser.ask("document.documentElement.scrollWidth") <= browser.width
-    keep_picture(browser, f"play_page_{kind}")
+    browser.keep_picture(f"play_page_{kind}")
     settled(browser)
 
 

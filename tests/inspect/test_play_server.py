@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from swarm_forage_env.inspect.play.server import HOST, MOST_BYTES, PlayServer
+from swarm_forage_env.inspect.play.server import HOST, MOST_BYTES
 from swarm_forage_env.inspect.play.session import PlaySession, Setting
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.world import World
@@ -143,19 +143,6 @@ def test_a_reader_who_leaves_is_no_traceback(server, capsys):
     assert "a fault of ours" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("error", [TimeoutError, BrokenPipeError])
-def test_an_answer_that_breaks_off_is_followed_by_no_other(server, monkeypatch, error):
-    def break_off(handler, *_):
-        handler.wfile.write(b"half")
-        raise error
-
-    monkeypatch.setattr(server.RequestHandlerClass, "_send", break_off)
-    with socket.create_connection((HOST, server.server_port), timeout=60) as connection:
-        connection.sendall(f"GET /{server.token}/ HTTP/1.1\r\nHost: {server.hosts[0]}\r\n\r\n".encode())
-        with connection.makefile("rb") as answer:
-            assert answer.read() == b"half", "and the connection is closed"
-
-
 @pytest.mark.parametrize("told", ["Content-Length: 40", "Transfer-Encoding: chunked"])
 def test_what_comes_with_a_get_is_no_further_request(server, told):
     smuggled = f"POST /{server.token}/command HTTP/1.1\r\n"
@@ -166,8 +153,3 @@ def test_what_comes_with_a_get_is_no_further_request(server, told):
             head = answer.readline(), *iter(answer.readline, b"\r\n")
             assert head[0].startswith(b"HTTP/1.1 200")
             assert b"Connection: close\r\n" in head
-
-
-def test_a_port_that_is_taken_is_no_port(server):
-    with pytest.raises(OSError, match=r"[Aa]ddress already in use"):
-        PlayServer(server.session, server.server_port)

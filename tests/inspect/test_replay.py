@@ -69,12 +69,8 @@ def same(one: Replay, other: Replay) -> bool:
 # What is kept
 
 
-@pytest.mark.parametrize(
-    ("policy", "wrappers", "physics"),
-    [("stochm", DISTURBED, "chipmunk"), ("dpo", (), "chipmunk"), ("stochx", (), "compiled")],
-)
-def test_a_replay_is_the_run_of_the_record(policy, wrappers, physics):
-    spec = spec_of(policy, wrappers, physics=physics)
+def test_a_replay_is_the_run_of_the_record():
+    spec = spec_of()
     kept, record = record_replay(spec, frame_s=0.6), run_one(spec)
     assert kept.ticks.tolist() == [*range(0, 400, 3), 400]
     for name, counter in TOTALS.items():
@@ -148,7 +144,7 @@ def places_at(replay: Replay, frame: int, robot: int) -> set[tuple[int, float, f
     return places
 
 
-@pytest.mark.parametrize("name", ["dpo", "stochm", "generalist"])
+@pytest.mark.parametrize("name", ["stochm", "generalist"])
 def test_places_are_those_that_robots_remember(name, tmp_path):
     spec = spec_of(name, ())
     kept = record_replay(spec, frame_s=10.0)
@@ -185,13 +181,6 @@ def test_tasks_and_activities_are_those_of_the_policy():
     assert kept.has_tasks
     assert (kept.task[-1] != Task.NONE).any()
     assert kept.activities == states.words
-
-
-def test_a_policy_that_tells_nothing_is_shown_all_the_same(tmp_path):
-    kept = record_replay(spec_of("random", ()), seconds=4.0)
-    (again,) = read_replays(write_replays(tmp_path / "run.html", kept))
-    assert (again.activity, again.memory_events, again.activities, again.has_tasks) == (None, None, (), False)
-    assert same(again, kept)
 
 
 @pytest.mark.parametrize(("most", "expected"), [(12 * 81, 5), (12 * 80, 10), (12 * 20, 25), (12 * 2, 500)])
@@ -264,12 +253,9 @@ def flip(text: str) -> str:
         (lambda text: text[: len(text) // 3], "it is no replay page or cut short"),
         (flip, "it does not match its digest"),
         (lambda text: text.replace('class="run">', 'class="run">!'), "damaged"),
-        (lambda text: text.replace('class="run"', 'class="gone"'), "damaged"),
         (lambda text: edited(text, lambda h: h.update(version=99)), "version 99 of the format, .* reads 4; read it"),
         (lambda text: edited(text, lambda h: h.update(format="else")), "no replay page of swarm_forage_env"),
-        (lambda text: edited(text, lambda h: h["runs"][0].update(seed=3)), "digest"),
         (lambda text: edited(text, lambda h: h.pop("runs")), "damaged"),
-        (lambda text: edited(text, lambda h: h.update(runs=7)), "damaged"),
         (lambda text: forged(text, {"arrays": [{}]}), "damaged"),
         (lambda text: forged(text, {"spec": {}}), "Missing key 'scenario'"),
     ],

@@ -1,16 +1,13 @@
 """The replay page in a real browser: it plays, jumps, tells of robots, and asks for nothing."""
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.inspect.replay.capture import record_replay
 from swarm_forage_env.inspect.replay.files import write_replays
-from swarm_forage_env.inspect.replay.frames import Status
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.registry import parse_wrapper
@@ -73,12 +70,6 @@ def browser(request) -> Browser:
     return request.getfixturevalue(request.param)
 
 
-def keep_picture(browser: Browser, name: str) -> None:
-    """Write a picture for people to look at, if the environment says where."""
-    if "REPLAY_PICTURES" in os.environ:
-        browser.picture(Path(os.environ["REPLAY_PICTURES"]) / f"{name}.png")
-
-
 def test_play_moves_robots_and_pause_stops_them(page, browser):
     browser.open(page)
     before = browser.ask(PIXELS)
@@ -90,7 +81,7 @@ def test_play_moves_robots_and_pause_stops_them(page, browser):
     still = browser.ask(PIXELS)
     browser.ask("new Promise((done) => setTimeout(done, 200))")
     assert browser.ask(PIXELS) == still
-    keep_picture(browser, f"play_{browser.width}")
+    browser.keep_picture(f"play_{browser.width}")
     assert (browser.complaints, browser.requests) == ([], [])
 
 
@@ -104,7 +95,7 @@ def test_the_end_shows_the_counts_of_the_record(page, replays, browser):
     assert browser.text("#score td") == str(delivered)
     seek(browser, 200.0)
     assert browser.ask(NUMBER) == replays[0].counters[200, Counter.COLLECTED]
-    keep_picture(browser, f"end_{browser.width}")
+    browser.keep_picture(f"end_{browser.width}")
     assert (browser.complaints, browser.requests) == ([], [])
 
 
@@ -119,7 +110,7 @@ def test_a_click_chooses_a_robot_and_tells_its_state(pair, replays, desktop):
     assert "thing" in words
     desktop.press("f")
     desktop.wait_for("document.querySelector('#robot button').ariaPressed === 'true'")
-    keep_picture(desktop, "robot")
+    desktop.keep_picture("robot")
     desktop.press("Escape")
     desktop.wait_for("document.querySelector('#robot h2') === null")
     assert (desktop.complaints, desktop.requests) == ([], [])
@@ -132,25 +123,3 @@ def test_a_damaged_page_says_so(page, desktop, tmp_path):
     broken.write_text(text[:start] + "AAAA" * 20 + text[start + 80 :])
     desktop.open(broken, "document.getElementById('loading')?.textContent.includes('cannot be shown')")
     assert "may be damaged" in desktop.text("#loading")
-
-
-def test_dead_robots_and_those_in_repair_are_told_and_explained(page, replays, desktop):
-    replay = replays[0]
-    absent, repair = replay.has(Status.ABSENT), replay.has(Status.REPAIR)
-    dead = int(np.flatnonzero(absent[-1])[0])
-    frame, broken = (int(place[0]) for place in np.nonzero(repair))
-    desktop.open(page)
-    for name in ("dead", "in repair"):
-        assert name in desktop.text("#legend")
-    choose(desktop, replay, int(np.argmax(absent[:, dead])) - 1, dead)
-    assert told(desktop) != "dead"
-    seek(desktop, 400.0)
-    assert told(desktop) == "dead"
-    choose(desktop, replay, frame, broken)
-    assert told(desktop) == "in repair"
-    assert desktop.complaints == []
-
-
-def told(browser: Browser) -> str:
-    """Return the state of the chosen robot, as the page calls it."""
-    return browser.text("#robot td")

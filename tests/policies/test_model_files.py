@@ -1,6 +1,5 @@
 """Trained policies in files: found by their suffix, opened with care, applied as they were trained."""
 
-import copy
 import dataclasses
 import sys
 import warnings
@@ -82,8 +81,6 @@ def started(path, seed=0, **parameters) -> ModelPolicy:
         ("PPO", {"use_sde": True, "policy_kwargs": {"net_arch": [16]}}),
         ("A2C", {}),
         ("SAC", {"buffer_size": 10}),
-        ("TD3", {"buffer_size": 10}),
-        ("DDPG", {"buffer_size": 10}),
     ],
 )
 def test_actions_are_the_best_ones_of_the_algorithm_and_of_its_copies(tmp_path, algorithm, options):
@@ -94,10 +91,9 @@ def test_actions_are_the_best_ones_of_the_algorithm_and_of_its_copies(tmp_path, 
     assert (actions.shape, actions.dtype) == ((4, 3), np.float32)
     if "use_sde" in options:  # torch does not copy its noise
         return
-    for twin in (copy.deepcopy(policy), pickled(policy)):
-        original = copy.deepcopy(policy)
-        for obs in (OBS, -OBS, OBS / 2):
-            np.testing.assert_array_equal(twin.act(obs, ACTIVE), original.act(obs, ACTIVE))
+    twin = pickled(policy)
+    for obs in (OBS, -OBS, OBS / 2):
+        np.testing.assert_array_equal(twin.act(obs, ACTIVE), policy.act(obs, ACTIVE))
 
 
 DISCRETE = {"actions": "discrete", "automatic_gripper": True}
@@ -107,10 +103,8 @@ DISCRETE = {"actions": "discrete", "automatic_gripper": True}
     ("algorithm", "fields", "said"),
     [
         ("PPO", {"observation": "compact", **DISCRETE, "site_memory": True}, {}),
-        ("A2C", {"actions": "discrete"}, {"decision_ticks": 5}),
         ("DQN", {"observation": "compact", **DISCRETE}, {}),
         ("PPO", {"observation": "compact", "automatic_gripper": True}, {"decision_ticks": 2}),
-        ("PPO", {"automatic_gripper": True}, {}),
         ("PPO", {}, {"neighbours_seen": 3, "neighbour_range_m": 1.5}),
     ],
 )
@@ -174,13 +168,11 @@ def test_a_model_of_the_whole_swarm_sees_all_rows_at_once(tmp_path):
             r"to Box\(3\), as the parameter interface says; model\.zip goes",
         ),
         ({"interface": NUMBERED, "note": note(InterfaceConfig())}, {}, r"as the note in model\.zip says"),
-        ({"interface": NUMBERED, "note": [1]}, {}, r"Cannot use the note in model\.zip: .*table"),
         (
             {"interface": NUMBERED, "note": note() | {"interface": {"decision_tick": 2}}},
             {},
             "Did you mean 'decision_ticks'",
         ),
-        ({"interface": NUMBERED, "note": note(caches=None)}, {}, "to be one of none, static, dynamic, got None"),
         ({"interface": NUMBERED, "note": note(samples=None)}, {}, "samples to be True or False"),
     ],
 )
@@ -190,13 +182,6 @@ def test_a_model_that_does_not_do_what_an_interface_says_is_refused_when_it_is_o
     _, path = model("A2C", tmp_path, **made_with)
     with pytest.raises(ModelError, match=reason):
         load_policy(str(path), parameters)
-
-
-@pytest.mark.parametrize("wrong", [{"decision_ticks": 0}, {"decision_tick": 2}, 2])
-def test_an_interface_that_is_none_is_refused(tmp_path, wrong):
-    _, path = model("A2C", tmp_path, NUMBERED, note=note())
-    with pytest.raises(ConfigError, match=r"decision_ticks|InterfaceConfig or its fields"):
-        load_policy(str(path), {"interface": wrong})
 
 
 def test_a_model_with_a_note_runs_as_it_was_trained(tmp_path):
@@ -294,14 +279,6 @@ def test_networks_are_policies_by_their_path(network_file):
         load_policy(str(network_file), {"digest": "0"})
     with pytest.raises(ModelError, match="a network file holds its own"):
         load_policy(f"{network_file}:decision_ticks=2")
-
-
-def test_files_are_scored_under_the_name_of_the_file_in_the_world_they_are_made_for(network_file):
-    world = scenario("warehouse_small", n_robots=3, n_objects=20)
-    plan = score_question([network_file], world, budget=TINY, measures=["efficiency"]).plan
-    assert plan.policies[0].label == "straight"
-    assert {spec.scenario.caches for spec in plan.specs} == {"static"}
-    assert all(spec.parameters == {"digest": file_digest(network_file)} for spec in plan.specs)
 
 
 @pytest.mark.parametrize(("folders", "labels"), [(("a", "b"), "short"), (("a/same", "b/same"), "whole")])

@@ -1,6 +1,5 @@
 """Network files and the policy that runs them: exact outputs, draws by probability, files that are whole."""
 
-import copy
 import dataclasses
 import itertools
 import json
@@ -9,10 +8,8 @@ import numpy as np
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.kernels.network import pick, power
-from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkError, NetworkPolicy
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.views.pettingzoo import parallel_env
@@ -142,13 +139,9 @@ ABOUT = json.loads(small_network().about.to_json())
         (b"", "no .npz archive of plain arrays, or a damaged one"),
         ({"numbers": np.zeros(3)}, "Expected the arrays about, got numbers"),
         ({"weight_0": np.zeros((2, 2)), "about": np.array("{}")}, "about, weight_0, bias_0, got weight_0, about"),
-        ({"weight_0": np.array([{}], object), "about": np.array("{}")}, "no .npz archive of plain arrays"),
         ({"about": np.array("{")}, "description of a network, got '{'"),
-        ({"about": np.array("[1]")}, r"a table of values by name, got \[1\]"),
         ({"about": np.array(json.dumps(ABOUT | {"activaton": "red"}))}, "Did you mean 'activation'"),
-        ({"about": np.array(json.dumps({"interface": {}, "samples": True}))}, "activation"),
         ({"about": np.array(json.dumps(ABOUT | {"interface": {"actions": "diskrete"}}))}, "Did you mean 'discrete'"),
-        ({"about": np.array(json.dumps(ABOUT | {"samples": "no"}))}, "samples to be True or False, got 'no'"),
         ({"about": np.array(json.dumps(ABOUT))}, r"layers that follow on each other, got weights \[\]"),
     ],
 )
@@ -168,10 +161,8 @@ def test_layers_that_are_no_network_are_refused():
     first, second = network.weights
     for weights, biases, reason in (
         ((first, np.zeros((3, 2), np.float32)), network.biases, "follow on each other"),
-        ((first, second), network.biases[:1], "follow on each other"),
         ((), (), "follow on each other"),
         ((first, np.full((2, 2), np.nan, np.float32)), network.biases, "finite numbers"),
-        ((first, np.full((2, 2), "a")), network.biases, "finite numbers"),
         ((first.astype(np.float64) * 1e300, second), network.biases, "finite numbers"),
         (
             (np.zeros((1, 20_000), np.float32), np.zeros((20_000, 1), np.float32)),
@@ -232,26 +223,7 @@ def test_layers_of_a_state_dict_make_the_same_network(kind):
         Network.from_state_dict(state, network.about)
 
 
-@pytest.mark.parametrize("actions", ["continuous", "discrete"])
-def test_a_policy_keeps_its_choice_for_the_ticks_of_a_decision(actions):
-    env = parallel_env("warehouse_small", n_robots=4, n_objects=20)
-    interface = dataclasses.replace(DRIVEN, actions=actions, decision_ticks=3)
-    policy = NetworkPolicy(compact_network(interface, 6 if actions == "discrete" else 2))
-    assert isinstance(policy, Policy)
-    policy.reset(env.swarm_spec, np.random.default_rng(0))
-    obs = env.reset_batch(0)
-    wheels = []
-    for _ in range(12):
-        chosen = policy.act(obs, env.active).copy()
-        obs, *_ = env.step_batch(chosen)
-        wheels.append(chosen[:, :2])
-    for tick, chosen in enumerate(wheels):
-        np.testing.assert_array_equal(chosen, wheels[tick - tick % 3])
-    assert any(not np.array_equal(wheels[0], later) for later in wheels)
-
-
-@pytest.mark.parametrize("copied", [copy.deepcopy, pickled])
-def test_a_copy_continues_as_the_original_does(copied):
+def test_a_copy_continues_as_the_original_does():
     """Between two decisions, with actions that are drawn."""
     env = parallel_env("warehouse_small", n_robots=6, n_objects=20)
     interface = InterfaceConfig(observation="compact", actions="discrete", decision_ticks=3)
@@ -260,17 +232,8 @@ def test_a_copy_continues_as_the_original_does(copied):
     obs = env.reset_batch(3)
     for _ in range(4):
         policy.act(obs, env.active)
-    twin = copied(policy)
+    twin = pickled(policy)
     of_twin = [twin.act(obs, env.active).copy() for _ in range(12)]
     of_policy = [policy.act(obs, env.active).copy() for _ in range(12)]
     np.testing.assert_array_equal(of_twin, of_policy)
     assert not np.array_equal(of_policy[0], of_policy[3])
-
-
-def test_any_function_becomes_a_policy_by_naming_its_interface():
-    env = parallel_env("warehouse_small", n_robots=3, n_objects=20)
-    policy = LearnedPolicy(NUMBERED, lambda rows, rng: np.ones(len(rows), np.int64), caches="static")
-    policy.reset(env.swarm_spec, np.random.default_rng(0))
-    assert policy.act(env.reset_batch(0), env.active)[:, :2].tolist() == [[0.5, 0.5]] * 3
-    assert policy.caches == "static"
-    assert "los_object" in policy.reads

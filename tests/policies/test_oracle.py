@@ -75,12 +75,6 @@ def test_robots_beside_the_way_or_ahead_in_a_column_are_not_in_the_way():
     assert turn_of(beside[0]) == turn_of(ahead[0]) == 0
 
 
-def test_it_turns_to_the_nearer_side():
-    left, _ = commands([(10.1, 8.1, EAST, -1)], [(50, 60, FREE)])
-    right, _ = commands([(10.1, 8.1, EAST, -1)], [(50, 20, FREE)])
-    assert (turn_of(left[0]), turn_of(right[0])) == (1, -1)
-
-
 def test_without_a_world_it_says_where_it_works():
     policy = OraclePolicy()
     policy.reset(SwarmSpec.of(scenario("warehouse_small", n_robots=2)), np.random.default_rng(0))

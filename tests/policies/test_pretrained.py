@@ -51,17 +51,6 @@ def test_ppo_warehouse_small_forages_better_than_the_random_walk():
     assert delivered["ppo_warehouse_small"] > 2 * delivered["crw"] > 0
 
 
-def test_a_run_with_it_is_reproducible():
-    world = warehouse_small(n_robots=10, horizon_s=60.0, interval_s=20.0)
-    first, second = (run_one(plan_run(world, "ppo_warehouse_small", seed=3)) for _ in range(2))
-    assert first.equals(second)
-
-
-def test_it_is_made_for_a_world_without_caches():
-    spec = plan_run(warehouse_small(caches="static"), "ppo_warehouse_small")
-    assert spec.scenario.caches == "none"
-
-
 @pytest.mark.parametrize("name", SHIPPED)
 def test_a_robot_keeps_its_cargo_when_it_comes_back_to_work(name):
     """It does so in a step that policies do not foresee: for them the robot is still in repair."""

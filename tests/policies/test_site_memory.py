@@ -153,8 +153,3 @@ def test_a_policy_with_site_memory_tells_its_places_from_the_corner_of_the_arena
         told = asked.describe_memories()
         assert (told.robot.tolist(), told.is_cache.tolist()) == ([1], [False])
         np.testing.assert_allclose(told.place_m, [PLACE], atol=1e-4)
-
-
-def test_a_policy_without_site_memory_tells_no_places():
-    policy = LearnedPolicy(InterfaceConfig(), still)
-    assert not hasattr(policy, "describe_memories")

@@ -107,12 +107,3 @@ def test_robots_do_in_the_world_what_they_chose_in_the_turned_one(turn, config):
     np.testing.assert_allclose(other.swarm.position, expected, atol=5e-4)  # two push each other, in some order
     moved = np.abs(one.swarm.position - np.array([robot[:2] for robot in ROBOTS])).max()
     assert moved > 0.05
-
-
-def test_half_a_turn_changes_the_sign_of_four_columns_of_the_compact_view():
-    seen, interface = rows(world(Turn()), COMPACT)
-    there = turned(seen, Turn(quarters=2), interface)
-    changed = np.flatnonzero((there != seen).any(axis=0))
-    absolute = [column for name in ("position", "heading") for column in range(40)[interface.layout[name]]]
-    assert changed.tolist() == absolute
-    np.testing.assert_array_equal(there[:, absolute], -seen[:, absolute])

@@ -1,7 +1,6 @@
 """Pictures of hand-built states: what is where, in which colour, and that drawing changes no state."""
 
 import copy
-import sys
 from itertools import product
 
 import numpy as np
@@ -9,7 +8,6 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import ObjectStatus
-from swarm_forage_env.rendering import view
 from swarm_forage_env.rendering.frame import Trails, _headline, render_frame
 from swarm_forage_env.rendering.view import (
     CACHE_OPACITY,
@@ -131,9 +129,8 @@ def near(seen, colour, most=25.0) -> bool:
     return bool(np.linalg.norm(np.subtract(seen, colour)) < most)
 
 
-@pytest.mark.parametrize("heading", [0.0, 0.5 * np.pi, np.pi, -0.5 * np.pi])
-def test_the_needle_points_where_the_robot_is_heading(world, heading):
-    world.swarm.heading[0] = heading
+def test_the_needle_points_where_the_robot_is_heading(world):
+    world.swarm.heading[0] = heading = 0.4 * np.pi
     picture, reach = world.draw(), 1.7 * world.view.robot_px
     x, y = world.swarm.position[0]
     right, down = reach * np.cos(heading), -reach * np.sin(heading)
@@ -161,12 +158,6 @@ def test_colours_and_shapes_tell_what_robots_do(world, state, middle, place, see
     x, y = world.swarm.position[0]
     assert near(world.pixel(picture, x, y), getattr(PALETTE, middle))
     assert near(world.pixel(picture, x, y, radius * place[0], radius * place[1]), getattr(PALETTE, seen), 60)
-
-
-@pytest.mark.parametrize("size_px", [239, 4001, 900.5, True, "900", None])
-def test_impossible_sizes_are_refused(world, size_px):
-    with pytest.raises(ConfigError, match="size_px"):
-        world.draw(size_px=size_px)
 
 
 def test_obstacles_are_walls_and_the_legend_names_what_the_world_has():
@@ -211,14 +202,6 @@ def test_a_headline_without_room_is_cut_off_and_stays_legible():
     assert (size, len(lines), lines[-1].endswith(" ...")) == (9.0, 2, True)
     assert max(text_width(line, size) for line in lines) < 200.0
     assert _headline("a title", 9.0, 200.0, 24.0) == (["a title"], 1.35 * 9.0)
-
-
-def test_without_pillow_the_message_tells_what_to_install(world, monkeypatch):
-    monkeypatch.setitem(sys.modules, "PIL", None)
-    view.text_font.cache_clear()
-    arena_view.cache_clear()
-    with pytest.raises(ImportError, match=r'pip install ".\[render\]"'):
-        world.draw()
 
 
 def test_a_light_picture_shows_the_same_in_other_colours(world):

@@ -132,6 +132,11 @@ class Browser:
         self.call("Page.navigate", url=self._address + fragment)
         self.wait_for(ready)
 
+    def keep_picture(self, name: str) -> None:
+        """Write a picture for people to look at, if the environment says where."""
+        if "REPLAY_PICTURES" in os.environ:
+            self.picture(Path(os.environ["REPLAY_PICTURES"]) / f"{name}.png")
+
     def ask(self, expression: str) -> Any:
         """Return the value of an expression in the page."""
         answer = self.call("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)

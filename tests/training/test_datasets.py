@@ -1,6 +1,5 @@
 """Trajectories as files: they hold what the environment gave, and are there whole or not at all."""
 
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +16,6 @@ from swarm_forage_env.training.datasets import Dataset, DatasetError, record_dat
 from swarm_forage_env.views.gymnasium import JointForageEnv
 from swarm_forage_env.wrappers.population import PopulationConfig
 from swarm_forage_env.wrappers.registry import parse_wrapper
-from tests.reference import frames
 
 WORLD = scenario("warehouse_small", n_robots=4, n_objects=400, horizon_s=20.0, interval_s=20.0, physics="compiled")
 DEADLY = (PopulationConfig(death_per_tick=0.03),)
@@ -84,25 +82,6 @@ def test_a_learned_policy_is_recorded_as_it_decides(frame_decisions, tmp_path):
         np.testing.assert_array_equal(info["active"], steps.active[number + 1])
     assert truncated
     np.testing.assert_array_equal(steps.observations[-1], obs)
-
-
-def test_with_frames_rows_and_actions_are_those_that_robots_see_and_choose_in_them(tmp_path):
-    dataset = recorded(tmp_path / "data", generalist(tmp_path, 3))
-    steps = first(dataset)
-    env = build_env(WORLD)
-    plain = LearnerInterface(replace(dataset.interface, frame_decisions=0), env_spec())
-    obs, as_it_is = env.reset_batch(3), []
-    for decision, (actions, rewards) in enumerate(zip(steps.actions, steps.rewards, strict=True)):
-        as_it_is.append(plain.observe(obs))
-        np.testing.assert_array_equal(
-            steps.observations[decision], frames.seen(as_it_is[-1], plain.layout, decision, 3)
-        )
-        earned = np.zeros(4)
-        for _ in range(5):
-            obs, reward, _, _ = env.step_batch(frames.commands(plain.command(actions, obs), decision, 3))
-            earned += reward
-        np.testing.assert_array_equal(earned, rewards)
-    assert (np.array(as_it_is) != steps.observations[:-1]).any(axis=2).mean() > 0.5, "most robots see it as it is"
 
 
 @pytest.mark.parametrize("policy", ["crw", "generalist"])
@@ -259,11 +238,3 @@ def test_minari_recovers_the_environment(tmp_path, monkeypatch):
         np.testing.assert_array_equal(obs, seen)
         assert gained == reward
     assert found.storage.metadata["author"] == {"somebody"}
-
-
-def test_without_minari_the_error_says_what_to_install(tmp_path, monkeypatch):
-    from swarm_forage_env.training.datasets import export_minari
-
-    monkeypatch.setitem(sys.modules, "minari", None)
-    with pytest.raises(ImportError, match=r'pip install "\.\[minari\]"'):
-        export_minari(tmp_path, "x-v0")

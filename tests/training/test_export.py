@@ -3,7 +3,6 @@
 import re
 import shutil
 import subprocess
-import sys
 from itertools import pairwise
 
 import numpy as np
@@ -203,9 +202,3 @@ def test_what_is_no_network_or_no_known_file_is_refused(tmp_path):
         export_policy("generalist", tmp_path / "net.txt")
     with pytest.raises(ConfigError, match="Expected a network"):
         export_policy("crw", tmp_path / "net.h")
-
-
-def test_without_onnx_it_says_what_to_install(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "onnx", None)
-    with pytest.raises(ImportError, match=r'An ONNX file needs onnx: pip install "\.\[export\]"'):
-        export_policy("generalist", tmp_path / "net.onnx")

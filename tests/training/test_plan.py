@@ -6,8 +6,6 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.interface import InterfaceConfig
-from swarm_forage_env.policies.network import Network
-from swarm_forage_env.policies.pretrained import network_file, plan_file
 from swarm_forage_env.scenarios.presets import warehouse_small
 from swarm_forage_env.training.evaluation import EvaluationPlan, EvaluationWorld
 from swarm_forage_env.training.plan import Stage, TrainingPlan, named_plan, read_plan
@@ -74,28 +72,16 @@ def test_a_plan_says_what_its_file_says(plan, tmp_path):
     assert read_plan(tmp_path / "plan.json") == plan
 
 
-@pytest.mark.parametrize("name", ["generalist", "ppo_warehouse_small"])
-def test_shipped_plans_are_those_of_their_networks(name, tmp_path):
-    shipped = named_plan(name)
-    assert TrainingPlan.from_mapping(Network.load(network_file(name)).about.card["plan"]) == shipped
-    shipped.write(tmp_path / "plan.json")
-    assert read_plan(tmp_path / "plan.json") == shipped
-    assert plan_file("crw") is None
-
-
 @pytest.mark.parametrize(
     ("old", "new", "reason"),
     [
         ('algorithm = "dqn"', 'algorithm = "sac"', "actions that sac can choose, got discrete"),
         ("n_arenas = 2", "n_arenas = 0", "n_arenas to be a whole number from 1 to 10,000"),
         ("n_arenas = 2", "arenas = 2", "Did you mean 'n_arenas'"),
-        ("hidden = [16]", "hidden = [0]", r"hidden\[0\] to be a whole number"),
         ("sigma = 0.02", "sigma = -1.0", "sigma"),
-        ("[options]", "[options", "plan.toml"),
         ("width_m = 20.0", "n_robots = 5", "n_robots to stay 6"),
         ("steps = 100", "", r"Missing key 'stages\[0\].steps'"),
         ("horizon_s = 400.0", "horizont_s = 400.0", r"evaluation.horizont_s'. Did you mean 'horizon_s'"),
-        ("horizon_s = 400.0", 'chosen_by = "best"', "mean, worst"),
         ("n_arenas = 2", "n_arenas = 2\ntemperature = 0.0", "temperature to be a number from 0.0001 to 100"),
         ("n_arenas = 2", "n_arenas = 2\ntemperature = 0.5", "only with samples, got 0.5; set samples = true"),
         ("n_arenas = 2", "n_arenas = 2\nsamples = true", "a temperature for samples of dqn"),
@@ -115,13 +101,11 @@ def test_plans_that_cannot_be_are_refused_with_their_file(tmp_path, old, new, re
     ("mapping", "reason"),
     [
         ({}, "Expected scenario to be a table"),
-        ([1], r"the plan to be a table of values by name, got \[1\]"),
         ({**PRESET, "stages": []}, "stages to have at least 1"),
         ({**PRESET, "stages": {"steps": 100}}, r"stages to be a list of tables, \[\[stages\]\]"),
         ({"sampler": TWO_WORLDS}, r"evaluation\.worlds beside a sampler"),
         ({"sampler": TWO_WORLDS, **PRESET}, "either sampler or scenario"),
         ({"sampler": TWO_WORLDS, "evaluation": {"worlds": [PRESET] * 2}}, "different names"),
-        ({"sampler": TWO_WORLDS, "evaluation": {"worlds": {}}}, r"\[\[evaluation\.worlds\]\]"),
         ({**PRESET, "evaluation": {"worlds": [{**PRESET, "nam": "a"}]}}, "Did you mean 'name'"),
         (
             {**PRESET, "wrappers": {"sensor_noise": {"sigma": 0.1}}, "evaluation": {"worlds": [PRESET]}},

@@ -7,7 +7,7 @@ pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-b
 
 import torch
 from gymnasium import spaces
-from stable_baselines3 import DQN, PPO
+from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecFrameStack
 
@@ -96,14 +96,6 @@ def test_a_rollout_of_ppo_with_a_death_a_repair_and_a_time_limit_by_hand(gae_lam
     assert len(next(model.rollout_buffer.get()).returns) == 14
 
 
-def test_training_on_such_a_rollout_moves_the_weights():
-    env = SwarmVecEnv(**lives.WORLD, interface=InterfaceConfig(observation="compact"))
-    model = constant_value_ppo(env, 0.95)
-    before = model.policy.value_net.bias.item()
-    model.learn(lives.N_TICKS * lives.N_ROBOTS, callback=_Story())
-    assert model.policy.value_net.bias.item() != before
-
-
 def test_normalized_observations_are_refused():
     buffer = ActiveRolloutBuffer(1, spaces.Box(-9, 9, (2,)), spaces.Box(-1, 1, (1,)), active_column=1)
     one = torch.ones(1)
@@ -134,24 +126,6 @@ def test_replay_draws_every_present_step_and_no_other():
     np.testing.assert_array_equal(samples.next_observations.numpy(), samples.observations.numpy() + 0.5)
     # Step 1 ends episodes: by time for robot 0, which is bootstrapped, by death for the others.
     np.testing.assert_array_equal(samples.dones.numpy().ravel(), (steps == 1) & (robots != 0))
-
-
-def test_dqn_learns_from_it():
-    env = SwarmVecEnv(**lives.WORLD, interface=InterfaceConfig(observation="compact", actions="discrete"))
-    model = DQN(
-        "MlpPolicy",
-        env,
-        buffer_size=300,
-        learning_starts=30,
-        train_freq=2,
-        replay_buffer_class=PresentReplayBuffer,
-        policy_kwargs={"net_arch": [8]},
-        seed=0,
-        device="cpu",
-    )
-    before = model.q_net.q_net[0].weight.detach().clone()
-    model.learn(90)
-    assert not torch.equal(before, model.q_net.q_net[0].weight)
 
 
 def test_a_wait_is_one_transition_for_lambda_too():

@@ -65,14 +65,6 @@ def test_it_asks_about_robots_at_work_only(monkeypatch):
     assert len(buffer.returns) == len(rows)
 
 
-def test_its_file_is_one_of_ppo(tmp_path):
-    model = made(SwarmPPO).learn(256)
-    model.save(tmp_path / "model.zip")
-    opened = PPO.load(tmp_path / "model.zip", env=model.get_env())
-    np.testing.assert_array_equal(weights(opened), weights(model))
-    opened.learn(256)
-
-
 @pytest.mark.parametrize("interface", [NUMBERED, DRIVEN], ids=["numbers", "values"])
 @pytest.mark.parametrize("n_at_work", [8, 3, 0])
 def test_choices_are_those_of_the_network_for_robots_at_work_and_zeros_for_others(interface, n_at_work):

@@ -1,7 +1,7 @@
 """Replays in files: pages that any browser shows, from which `read_replays` gets the arrays back.
 
 The header of a page says what it holds: format, version, and per run the specification, units, geometry for the page,
-and which array lies where in the run's block of bytes (`coding` says how). `docs/replay.md` has the table.
+and which array lies where in the run's block of bytes (`coding` says how).
 """
 
 import hashlib
