@@ -30,8 +30,6 @@ ACTIVATIONS = ("tanh", "relu")
 TEMPERATURES = (0.0001, 100.0)
 """Least and largest temperature; our choice: further out, actions are drawn as by the likeliest or by chance. Values of
 actions (DQN) lie closer together than logits, and need a lower one."""
-_MOST_NUMBERS = 2**26
-"""Numbers of all layers where each is as wide as the widest, as kernels take them; our choice: 256 MiB."""
 _LAYER_PARTS = ("weight", "bias")
 
 
@@ -100,8 +98,6 @@ class Network:
             raise NetworkError(f"Expected layers that follow on each other, got weights {sizes}.")
         if not all(array.dtype.kind == "f" and _is_finite(array) for array in (*self.weights, *self.biases)):
             raise NetworkError("Expected weights and biases that are finite numbers; did the training diverge?")
-        if self._width() * sum(len(weight) + 1 for weight in self.weights) > _MOST_NUMBERS:
-            raise NetworkError(f"Expected layers of at most {_MOST_NUMBERS:,} numbers side by side, got {sizes}.")
 
     def check_fits(self, interface: LearnerInterface) -> None:
         """Refuse an interface with other columns or actions than the network takes and gives; raises NetworkError."""
@@ -166,7 +162,8 @@ class Network:
 
     def layers(self) -> Layers:
         """Return the layers as kernels take them, with room of their own to work in."""
-        width = -(-self._width() // LANES) * LANES
+        widest = max(size for weight in self.weights for size in weight.shape)
+        width = -(-widest // LANES) * LANES
         numbers = np.zeros((sum(len(weight) + 1 for weight in self.weights), width), np.float32)
         row = 0
         for weight, bias in zip(self.weights, self.biases, strict=True):
@@ -184,10 +181,6 @@ class Network:
             places=np.zeros(ROWS, np.int32),
             powers=np.zeros(len(self.biases[-1])),
         )
-
-    def _width(self) -> int:
-        """Return the largest number of columns that go into a layer or come out of it."""
-        return max(size for weight in self.weights for size in weight.shape)
 
     @classmethod
     def from_state_dict(cls, state: Mapping[str, Any], about: NetworkAbout) -> "Network":

@@ -317,7 +317,6 @@ class Evaluator:
         folder: str | Path,
         made_by: Mapping[str, Any],
         *,
-        baselines: Baselines | None = None,
         resume: bool = False,
     ) -> None:
         """Begin a training, or go on with one.
@@ -327,7 +326,6 @@ class Evaluator:
             folder: Gets `plan.json`, `evaluations.csv` and `policy.npz`. It is made if it is not there.
             made_by: What the card of the network says besides plan, evaluation and versions, as plain values. Its
                 `versions`, if any, are added to ours.
-            baselines: Those of another training with the same evaluation, which saves their runs.
             resume: Go on after the evaluations in the folder.
 
         Raises:
@@ -341,17 +339,15 @@ class Evaluator:
         check_folder(self._folder)
         baseline_runs(plan.evaluation, plan.world)
         self.evaluations = read_evaluations(self._folder / EVALUATIONS_FILE)
-        self._before_s = (0.0, 0.0)
-        if self.evaluations:
-            last = self.evaluations[-1]
-            self._before_s = last.wall_time_s, last.cpu_time_s
-            baselines = {world.world: (world.baseline_policy, world.baseline) for world in last.worlds}
-        self._given = baselines
+        last = self.evaluations[-1] if self.evaluations else None
+        self._before_s = (0.0, 0.0) if last is None else (last.wall_time_s, last.cpu_time_s)
 
     @cached_property
     def baselines(self) -> Baselines:
         """Name of a world -> the policy to compare with, and its performance per 1,000 s."""
-        return baselines_of(self.plan.evaluation, self.plan.world) if self._given is None else self._given
+        if not self.evaluations:
+            return baselines_of(self.plan.evaluation, self.plan.world)
+        return {world.world: (world.baseline_policy, world.baseline) for world in self.evaluations[-1].worlds}
 
     def spent_s(self) -> tuple[float, float]:
         """Return time and processor time of the training so far, s."""

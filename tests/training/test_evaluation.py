@@ -101,7 +101,8 @@ def test_an_evaluation_is_the_runs_of_the_plan_beside_its_baseline(tmp_path):
 
 
 def test_an_evaluation_is_due_when_its_decisions_are_full_and_at_the_end_of_each_stage(tmp_path):
-    evaluator = Evaluator(PLAN, tmp_path, {}, baselines={PLACE.name: ("crw", 1.0)})
+    evaluator = Evaluator(PLAN, tmp_path, {})
+    evaluator.baselines = {PLACE.name: ("crw", 1.0)}
     made = []
     for steps in range(0, 300, 25):
         if evaluator.is_due(steps):

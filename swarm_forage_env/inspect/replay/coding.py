@@ -39,14 +39,12 @@ def unpack(packed: bytes, dtype: str, shape: tuple[int, ...]) -> np.ndarray:
         ConfigError: bytes that are damaged, or of an array of another size.
     """
     size = int(dtype[1])
-    expected = size * math.prod(shape)
-    unpacking = zlib.decompressobj()
     try:
-        raw = unpacking.decompress(packed, expected + 1)  # no more, however much is packed
+        raw = zlib.decompress(packed)
     except zlib.error as error:
         raise ConfigError(f"Expected compressed numbers, got damaged ones ({error}).") from error
-    if len(raw) != expected or not unpacking.eof:
-        raise ConfigError(f"Expected {expected} bytes for an array of shape {shape}, got others.")
+    if len(raw) != size * math.prod(shape):
+        raise ConfigError(f"Expected numbers of an array of shape {shape}, got {len(raw)} bytes.")
     if dtype == "f4":
         return np.frombuffer(raw, "<f4").reshape(shape)
     zigzag = np.frombuffer(raw, np.uint8).reshape(size, -1).T.copy().reshape(-1).view(f"<u{size}")

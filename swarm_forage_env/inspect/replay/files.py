@@ -4,8 +4,6 @@ The header of a page says what it holds: format, version, and per run the specif
 and which array lies where in the run's block of bytes (`coding` says how).
 """
 
-import hashlib
-import json
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -141,8 +139,7 @@ def _packed(replay: Replay, look: int) -> tuple[dict[str, Any], bytes]:
         where = {"name": name, "dtype": _ARRAYS.get(name, "f4"), "shape": list(array.shape)}
         places.append(where | {"offset": len(block), "size": len(packed)})
         block += packed
-    about = _about(replay) | {"look": look, "arrays": places}
-    return about | {"digest": _digest(about, block)}, block
+    return _about(replay) | {"look": look, "arrays": places}, block
 
 
 def _about(replay: Replay) -> dict[str, Any]:
@@ -199,8 +196,6 @@ def for_page(scenario: ScenarioConfig) -> dict[str, Any]:
 
 
 def _replay_of(about: dict[str, Any], block: bytes) -> Replay:
-    if about["digest"] != _digest({name: about[name] for name in about if name != "digest"}, block):
-        raise ConfigError("its content is damaged (it does not match its digest)")
     arrays: dict[str, np.ndarray] = {}
     for place in about["arrays"]:
         packed = block[place["offset"] :][: place["size"]]
@@ -209,9 +204,3 @@ def _replay_of(about: dict[str, Any], block: bytes) -> Replay:
     own: dict[str, Any] = {name: arrays.get(name) for name in _ARRAYS}
     signals = {name.removeprefix(_SIGNAL): array for name, array in arrays.items() if name.startswith(_SIGNAL)}
     return Replay(spec=RunSpec.from_mapping(about["spec"]), signals=signals, **plain, **own)
-
-
-def _digest(about: dict[str, Any], block: bytes) -> str:
-    state = hashlib.blake2b(json.dumps(about, sort_keys=True).encode(), digest_size=16)
-    state.update(block)
-    return state.hexdigest()
