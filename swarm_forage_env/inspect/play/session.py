@@ -307,8 +307,8 @@ class PlaySession:
     def _robot(self, robot: int) -> dict[str, Any]:
         self._check_robot(robot)
         left, right = (100.0 * self.world.swarm.wheel_speed[robot]).tolist()
-        tells = hasattr(self._policy, "describe_memories")
-        remembered = self._policy.describe_memories().of_robot(robot) if tells else ()
+        tell = getattr(self._policy, "describe_memories", None)
+        remembered: tuple[Any, ...] = () if tell is None else tell().of_robot(robot)
         return {
             "row": robot,
             "wheels": f"{left:.1f}, {right:.1f} cm/s",
