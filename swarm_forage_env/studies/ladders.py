@@ -11,11 +11,13 @@ reference world:
     none                  the undisturbed run itself
 """
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, TypeVar
+from typing import Annotated, Any, ClassVar, TypeVar, cast
 
-from swarm_forage_env._internal.fields import ConfigError, known_name, whole
+from msgspec import Meta
+
+from swarm_forage_env._internal.fields import Checked, ConfigError, Positive, Whole, known_name, whole
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import arena_at_density, robots_at_density
 from swarm_forage_env.scenarios.presets import DENSITY, SEARCH_AND_RESCUE_OBJECTS, at_density, search_and_rescue
@@ -27,7 +29,8 @@ from swarm_forage_env.wrappers.population import PopulationConfig, death_levels,
 from swarm_forage_env.wrappers.throttle import ThrottleConfig, sine_throttles, square_throttles
 from swarm_forage_env.wrappers.world import SIZE, World, WorldLike, world_of
 
-CRITERIA = ("population_size", "throttle", "handling_cost", "noise", "population_dynamics")
+ADVERSITIES = ("throttle", "handling_cost", "noise", "population_dynamics")
+CRITERIA = (SIZE, *ADVERSITIES)
 STUDY_HORIZON_S = 10_000.0
 """Length of the study's runs, which its throttle waveforms have their periods for."""
 SIZE_SWEEP_OBJECTS = {
@@ -41,8 +44,8 @@ in the warehouse of that size)."""
 STUDY_LARGEST_SIZE = 2.56
 """Largest swarm of the size sweeps in units of the usual one: 128 of 50 and 512 of 200 (study configuration)."""
 SIGMA_MAX, SIGMA_MAX_SEARCH_AND_RESCUE = 0.03, 0.10
-"""Highest noise of the robustness studies (paper; dual, quad and classroom: our choice, as in the other warehouses; more
-stops most controllers wholly, and all measure alike)."""
+"""Highest noise of the robustness studies (paper; dual, quad and classroom: our choice, as in the other warehouses, as
+more stops most controllers wholly)."""
 STUDY_SIZES_OF_MALFUNCTIONS = (50, 200)
 MALFUNCTION_PER_TICK = 0.001
 AWAY_SHARE = 0.9
@@ -52,26 +55,20 @@ _T = TypeVar("_T")
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Budget:
+class Budget(Checked):
     """How much computing a score may cost."""
 
-    horizon_s: float
+    called: ClassVar[str] = "budget"
+    horizon_s: Positive
     """Length of a run. Waveforms are compressed to it, so that they pass as many cycles as in the study; population
     rates and noise stay as they are."""
-    interval_s: float
+    interval_s: Positive
     """Length of a recording interval."""
-    n_seeds: int
-    n_sizes: int | None
+    n_seeds: Whole
+    n_sizes: Annotated[int, Meta(ge=2)] | None
     """Swarm sizes from one robot up, the largest the scenario's own; None = the sweep of the study."""
-    n_levels: int | None
+    n_levels: Whole | None
     """Levels of each kind of adversity, evenly spread up to the study's strongest; None = all of the study."""
-
-    def __post_init__(self) -> None:
-        whole("n_seeds of a budget", self.n_seeds, at_least=1)
-        if self.n_sizes is not None:
-            whole("n_sizes of a budget", self.n_sizes, at_least=2)
-        if self.n_levels is not None:
-            whole("n_levels of a budget", self.n_levels, at_least=1)
 
 
 BUDGETS: dict[str, Budget] = {
@@ -117,13 +114,12 @@ def plan_worlds(
         ]
     if "noise" in criteria or "population_dynamics" in criteria:
         worlds.append(World(scenario, always))
-    for criterion, adversity in _ADVERSITIES.items():
+    for criterion in ADVERSITIES:
         if criterion in criteria:
-            reference, disturbed = adversity.levels(scenario)
-            chosen = spread(disturbed, budget.n_levels)
+            (_, ideal), *disturbed = _levels(scenario, criterion).items()
             worlds += [
                 World(scenario, _joined(always, wrappers, criterion), criterion=criterion, value=value)
-                for value, wrappers in (*reference, *chosen)
+                for value, wrappers in ([(0.0, ideal)] if ideal else []) + list(spread(disturbed, budget.n_levels))
             ]
     return tuple(worlds)
 
@@ -230,10 +226,9 @@ def study_values(scenario: ScenarioConfig, criterion: str) -> tuple[float, ...]:
         ConfigError: an unknown criterion, or a swarm of one robot when sizes are varied.
     """
     known_name("criterion", criterion, CRITERIA)
-    if criterion == "population_size":
+    if criterion == SIZE:
         return tuple(sized.robots.n_robots for sized in size_ladder(scenario, None))
-    _, disturbed = _ADVERSITIES[criterion].levels(scenario)
-    return tuple(value for value, _ in disturbed)
+    return tuple(_levels(scenario, criterion))[1:]
 
 
 def wrappers_at(scenario: ScenarioConfig, criterion: str, value: float) -> tuple[WrapperConfig, ...]:
@@ -247,14 +242,12 @@ def wrappers_at(scenario: ScenarioConfig, criterion: str, value: float) -> tuple
     Raises:
         ConfigError: an unknown criterion, or a value that its wrapper refuses.
     """
-    known_name("criterion of adversity", criterion, _ADVERSITIES)
-    adversity = _ADVERSITIES[criterion]
-    reference, disturbed = adversity.levels(scenario)
-    known = dict([*reference, *disturbed])
-    if value in known or value == 0.0:
-        return known.get(value, ())
-    level, wrappers = disturbed[0]
-    return tuple(adversity.at(config, level, value) for config in wrappers)
+    known_name("criterion of adversity", criterion, ADVERSITIES)
+    levels = _levels(scenario, criterion)
+    if value in levels:
+        return levels[value]
+    _, (level, wrappers), *_ = levels.items()
+    return tuple(_moved(config, level, value) for config in wrappers)
 
 
 def _growing_arenas(scenario: ScenarioConfig, count: int | None, density: float | None) -> tuple[ScenarioConfig, ...]:
@@ -288,37 +281,44 @@ def _in_arena(scenario: ScenarioConfig, side_m: float, n_robots: int) -> Scenari
     )
 
 
-_Level = tuple[float, tuple[WrapperConfig, ...]]
-"""Criterion value, and the wrappers that make it."""
-_Levels = tuple[list[_Level], list[_Level]]
-"""The reference, if it has wrappers, and the disturbed levels."""
+def _levels(scenario: ScenarioConfig, criterion: str) -> dict[float, tuple[WrapperConfig, ...]]:
+    """Return the wrappers of the reference, value 0, and of each level of the study, in their order."""
+    is_rescue = scenario.name == "search_and_rescue"
+    if criterion == "throttle":
+        return _waved(sine_throttles() if is_rescue else square_throttles(), scenario)
+    if criterion == "handling_cost":
+        return _waved(square_costs(), scenario)
+    if criterion == "noise":
+        sigmas = noise_levels(SIGMA_MAX_SEARCH_AND_RESCUE if is_rescue else SIGMA_MAX)[1:]
+        return {0.0: (), **{cast("float", both[1].sigma): both for both in sigmas}}
+    if is_rescue:
+        return {0.0: (), **{config.death_per_tick: (config,) for config in death_levels()}}
+    configs = enumerate(_malfunctions(scenario.robots.n_robots), 1)
+    return {0.0: (), **{float(factor): (config,) for factor, config in configs}}
 
 
-def _waved(configs: Sequence[ThrottleConfig] | Sequence[HandlingCostConfig], scenario: ScenarioConfig) -> _Levels:
-    """Levels of waveforms compressed to the length of a run; the first is the ideal one."""
-    levels: list[_Level] = []
+def _waved(
+    configs: Sequence[ThrottleConfig] | Sequence[HandlingCostConfig], scenario: ScenarioConfig
+) -> dict[float, tuple[WrapperConfig, ...]]:
+    """Waveforms compressed to the length of a run; the first is the ideal one."""
+    levels: dict[float, tuple[WrapperConfig, ...]] = {}
     for config in configs:
         wave = config.waveform
         if wave.period_s is not None:
             wave = replace(wave, period_s=wave.period_s * (scenario.horizon_s / STUDY_HORIZON_S))
-        levels.append((wave.amplitude, (replace(config, waveform=wave),)))
-    return [(0.0, levels[0][1])], levels[1:]
+        levels[wave.amplitude if levels else 0.0] = (replace(config, waveform=wave),)
+    return levels
 
 
-def _noise_levels(scenario: ScenarioConfig) -> _Levels:
-    levels: list[_Level] = []
-    for sensor, actuator in noise_levels(
-        SIGMA_MAX_SEARCH_AND_RESCUE if scenario.name == "search_and_rescue" else SIGMA_MAX
-    ):
-        assert isinstance(actuator.sigma, float), "levels are constant"
-        levels.append((actuator.sigma, (sensor, actuator)))
-    return [], levels[1:]  # the first is sigma = 0, the undisturbed run
-
-
-def _population_levels(scenario: ScenarioConfig) -> _Levels:
-    if scenario.name == "search_and_rescue":
-        return [], [(config.death_per_tick, (config,)) for config in death_levels()]
-    return [], [(float(factor), (config,)) for factor, config in enumerate(_malfunctions(scenario.robots.n_robots), 1)]
+def _moved(config: Any, level: float, value: float) -> WrapperConfig:
+    """Return the wrapper of a level for another value: amplitude and offset move together, rates are multiples."""
+    if hasattr(config, "waveform"):
+        wave = config.waveform
+        return replace(config, waveform=replace(wave, amplitude=value, offset=wave.offset - level + value))
+    if hasattr(config, "sigma"):
+        return replace(config, sigma=value)
+    rates = ("death_per_tick", "malfunction_per_tick", "repair_per_tick")
+    return replace(config, **{name: getattr(config, name) * (value / level) for name in rates})
 
 
 def repairs_per_tick(malfunction_per_tick: float, n_robots: int) -> float:
@@ -339,37 +339,3 @@ def _malfunctions(n_robots: int) -> tuple[PopulationConfig, ...]:
         PopulationConfig(malfunction_per_tick=factor * MALFUNCTION_PER_TICK, repair_per_tick=factor * repair)
         for factor in range(1, 9)
     )
-
-
-def _waved_at(config: Any, level: float, value: float) -> Any:
-    wave = config.waveform
-    return replace(config, waveform=replace(wave, amplitude=value, offset=wave.offset - level + value))
-
-
-def _noise_at(config: Any, level: float, value: float) -> Any:
-    return replace(config, sigma=config.sigma - level + value)
-
-
-def _population_at(config: Any, level: float, value: float) -> Any:
-    rates = ("death_per_tick", "malfunction_per_tick", "repair_per_tick")
-    return replace(config, **{name: getattr(config, name) * (value / level) for name in rates})
-
-
-class _Adversity(NamedTuple):
-    """One kind of adversity: the levels of the study, and a function that makes another level from one of them."""
-
-    levels: Callable[[ScenarioConfig], _Levels]
-    at: Callable[[Any, float, float], Any]
-    """Wrapper of a level, value of that level, another value -> the wrapper of the other value."""
-
-
-_ADVERSITIES: dict[str, _Adversity] = {
-    "throttle": _Adversity(
-        lambda given: _waved(sine_throttles() if given.name == "search_and_rescue" else square_throttles(), given),
-        _waved_at,
-    ),
-    "handling_cost": _Adversity(lambda given: _waved(square_costs(), given), _waved_at),
-    "noise": _Adversity(_noise_levels, _noise_at),
-    "population_dynamics": _Adversity(_population_levels, _population_at),
-}
-"""Criterion -> its adversity."""
