@@ -133,7 +133,7 @@ def _batch_run(env: ForageEnv | SwarmWrapper, actions: Sequence[dict[str, Any]])
         staying = {name for name, (_, _, terminated, truncated) in run[-1].items() if not (terminated or truncated)}
         if not staying:
             break
-        packed = np.array([chosen[name] if name in staying else np.zeros(3) for name in names], np.float32)
+        packed = np.array([chosen[name] * (name in staying) for name in names], np.float32)
         obs, rewards, ended, cut = env.step_batch(packed)
         rows = [(row, name) for row, name in enumerate(names) if name in staying]
         run.append({name: (obs[row].copy(), rewards[row], ended[row], cut) for row, name in rows})

@@ -1,6 +1,6 @@
 """SwarmLayer: what an environment and each wrapper around it offer alike, the dict API and snapshots of the stack."""
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -26,7 +26,7 @@ _STATE = ("_rewards", "_seeds", "_terminated", "agents", "seed_value")
 """Attributes of a ForageEnv that are state; the arena holds the rest."""
 
 
-class SwarmLayer:
+class SwarmLayer(ABC):
     """A ForageEnv, or a wrapper around one. It works on arrays; only `reset`, `step` and `restore` make dicts."""
 
     @property

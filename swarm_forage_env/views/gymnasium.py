@@ -82,7 +82,7 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
             ActionError: wrong shape, numbers outside of `action_space`, or an active robot's action that is not finite.
         """
         n_robots, n_rows = self._arena.n_robots, self._arena.n_rows
-        rewards = np.zeros(n_robots)  # float64: sums do not depend on the order
+        rewards = np.zeros(n_robots, np.float32)
         chosen = np.asarray(action)
         if n_robots < n_rows:
             if chosen.shape[:1] != (n_rows,):
@@ -91,7 +91,7 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
         self._arena.step(chosen, rewards)
         env = self.forage_env
         terminated, truncated = bool(env.terminated.all()), env.tick >= env.max_cycles
-        return self._arena.observe(), float(rewards.sum()), terminated, truncated, self._info()
+        return self._arena.observe(), float(rewards.sum(dtype=np.float64)), terminated, truncated, self._info()
 
     def render(self) -> np.ndarray | None:
         """Return a picture (height, width, 3) uint8 when created with render_mode="rgb_array", else None."""

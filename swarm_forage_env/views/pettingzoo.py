@@ -114,7 +114,7 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
         if missing:
             raise ValueError(f"Expected an action for each of the {len(self.agents)} agents, missing {missing[:3]}.")
         chosen = self._chosen(actions)
-        rewards = np.zeros(self._arena.n_robots)
+        rewards = np.zeros(self._arena.n_robots, np.float32)
         self._arena.step(chosen, rewards)
         dead, truncated = self.forage_env.terminated, self.forage_env.tick >= self.forage_env.max_cycles
         results = (

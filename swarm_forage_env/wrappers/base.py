@@ -13,12 +13,12 @@ import numpy as np
 from pettingzoo.utils import BaseParallelWrapper
 
 from swarm_forage_env._internal.fields import Checked, ConfigError, known_keys, read
-from swarm_forage_env.contract.policy import ActionError
+from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.env import ForageEnv, checked_gain
 from swarm_forage_env.layer import BatchStep, SwarmLayer
 from swarm_forage_env.scenarios.config import to_mapping
-from swarm_forage_env.world.arena import UNDISTURBED, Stop
+from swarm_forage_env.world.arena import Stop
 from swarm_forage_env.world.kernels.disturbances import Disturbances
 from swarm_forage_env.wrappers.waveform import Waveform
 
@@ -37,13 +37,14 @@ _STEPS = ("step", "step_batch")
 _HOOKS = ("before_step", "gain", "observe", "after_step")
 """Methods that are called on every wrapper in each step."""
 
+_PACKAGE = "swarm_forage_env."
 _WAVE_FIELDS = tuple(item.name for item in dataclasses.fields(Waveform) if item.name != "kind")
 
 
 class SwarmWrapper(SwarmLayer, BaseParallelWrapper):
     """Base of all wrappers of this package; a subclass sets `stack_position` and overrides the hooks it needs.
 
-    Hooks of one step, each called once per tick: `before_step` and `gain` from the outermost wrapper inwards, then
+    Hooks of one step, each called once per tick: `before_step`, then `gain`, from the outermost wrapper inwards, then
     the environment steps, then `observe` and `after_step` from the innermost wrapper outwards. A reset calls
     `on_reset` and `observe` from the innermost wrapper outwards. The wrapper that is stepped calls the hooks of all
     wrappers inside of it; their own `step_batch` is not called, so a wrapper that overrides it cannot be inside of
@@ -95,8 +96,6 @@ class SwarmWrapper(SwarmLayer, BaseParallelWrapper):
         self._inner = env
         self._unwrapped: ForageEnv = env.unwrapped
         self._inside: tuple[SwarmWrapper, ...] = env.stack if isinstance(env, SwarmWrapper) else ()
-        hooks = SwarmWrapper.before_step, SwarmWrapper.gain
-        self._acts_first = any((type(each).before_step, type(each).gain) != hooks for each in self.stack)
 
     @property
     def unwrapped(self) -> ForageEnv:
@@ -165,10 +164,10 @@ class SwarmWrapper(SwarmLayer, BaseParallelWrapper):
     def ahead(self, n_ticks: int) -> tuple[int, dict[str, Any]]:
         """Return for how many of the coming ticks, at most `n_ticks`, the hooks of a tick need not be called.
 
-        And what is done in these ticks instead, as fields of `world.kernels.disturbances.Disturbances`, of its types;
-        compiled code reads them unchecked but for type, order and number of ticks. With 0 the hooks are called in the
-        coming tick. A wrapper without this method, and one whose hooks were replaced, has them
-        called in all ticks.
+        With 0 the hooks are called in the coming tick. A wrapper without this method, and one whose hooks were replaced,
+        has them called in all ticks. Wrappers of this package also return what is done in these ticks instead, as
+        fields of `world.kernels.disturbances.Disturbances`; others return {}, because compiled code reads these arrays
+        unchecked, maybe past their ends.
         """
         return n_ticks, {}
 
@@ -190,27 +189,21 @@ class SwarmWrapper(SwarmLayer, BaseParallelWrapper):
         """Return in how many ticks, at most `n_ticks`, no hook is needed from here inwards, and what happens in them.
 
         Raises:
-            ValueError: a wrapper tells what compiled code cannot read.
+            ValueError: a wrapper from elsewhere wants compiled code to do something.
         """
         fields: dict[str, Any] = {}
         for wrapper in self.stack:
             n_ticks, told = wrapper.ahead(n_ticks)
+            if told and not wrapper.ahead.__module__.startswith(_PACKAGE):
+                raise ValueError(
+                    f"Expected `ahead` of {type(wrapper).__name__} to return {{}} beside the number of ticks, got "
+                    f"{', '.join(told)}; do it in the hooks of these ticks."
+                )
             if fields.keys() & told.keys() - {"gain"}:  # two of a kind: the compiled loop has place for one
                 n_ticks = 0
             fields |= told
         # The last death may have come between two ticks; then the coming one ends the run.
-        n_ticks = 0 if self._unwrapped.terminated.all() else max(0, n_ticks)
-        disturbances = Disturbances(**fields)
-        for name, value in fields.items():
-            n_rows = n_ticks if name in _PER_TICK else self._unwrapped.scenario.robots.n_robots if name == "gain" else 0
-            usual = getattr(UNDISTURBED, name)
-            if isinstance(usual, np.ndarray) and not _is_readable(value, usual, n_rows):
-                raise ValueError(
-                    f"Expected `ahead` to tell {name} as a contiguous array of {usual.dtype} with {usual.ndim} "
-                    f"dimensions and at least {n_rows} rows, got {np.shape(value)} of "
-                    f"{getattr(value, 'dtype', type(value))}."
-                )
-        return n_ticks, disturbances
+        return 0 if self._unwrapped.terminated.all() else max(0, n_ticks), Disturbances(**fields)
 
     def pass_ticks(self, n_ticks: int, stop: Stop, tasks: CodeArray | None = None) -> None:
         """Note, from here inwards, that ticks have passed as `told_ahead` said.
@@ -254,32 +247,38 @@ class SwarmWrapper(SwarmLayer, BaseParallelWrapper):
             tasks: (N,) int8 `contract.codes.Task` codes, None = the policy has no tasks.
 
         Raises:
-            ActionError: as `ForageEnv.step_batch`, before any wrapper has done anything. Only a robot that comes back
-                to work in this very tick is looked at later.
+            ActionError: as `ForageEnv.step_batch`, before any wrapper has done anything.
         """
         env = self._unwrapped
         actions = env.checked_actions(actions)
         wheel_gain = checked_gain(wheel_gain, len(actions))
         self._require_reset()
-        if self._acts_first:
-            env.refuse_bad_step(actions, wheel_gain)  # before any wrapper draws a number or lets a robot die
+        env.refuse_bad_step(actions, wheel_gain)  # before any wrapper draws a number or lets a robot die
         env.break_off()
-        try:
-            _, reward, terminated, truncated = env.advance(actions, self.before(actions, wheel_gain), tasks)
-        except ActionError:
-            if not self._acts_first:
-                env.make_whole()
-            raise
+        _, reward, terminated, truncated = env.advance(*self.before(actions, wheel_gain), tasks)
         obs = self.after(tasks)
         env.make_whole()
         return obs, reward, terminated, truncated
 
-    def before(self, actions: ActionArray, wheel_gain: FloatArray | None = None) -> FloatArray | None:
-        """Call the hooks that come before the arena's step, from here inwards; returns the wheel gain for it."""
+    def before(
+        self, actions: ActionArray, wheel_gain: FloatArray | None = None
+    ) -> tuple[ActionArray, FloatArray | None]:
+        """Call the hooks that come before the arena's step, from here inwards; returns actions and wheel gain for it.
+
+        A robot that comes to work by them stands in this tick and holds what it carries: nobody has chosen its action.
+        """
+        swarm = self._unwrapped.swarm
+        at_work = swarm.active.copy()
         for wrapper in self.stack:
             wrapper.before_step()
+        came = swarm.active & ~at_work
+        if came.any():
+            actions = actions.copy()
+            actions[came] = 0.0
+            actions[came, 2] = np.where(swarm.carried_object[came] >= 0, Grip.GRASP, Grip.RELEASE)
+        for wrapper in self.stack:
             wheel_gain = checked_gain(wrapper.gain(actions, wheel_gain), len(actions))
-        return wheel_gain
+        return actions, wheel_gain
 
     def after(self, tasks: CodeArray | None) -> ObsArray:
         """Call the hooks that come after the arena's step, from the innermost outwards; returns what is seen here."""
@@ -351,22 +350,6 @@ class WrapperConfig(Checked):
             known_keys(values, (*(item.name for item in dataclasses.fields(cls)), *_WAVE_FIELDS), prefix=f"{cls.name}.")
             values[key] = {"kind": kind, **{name: values.pop(name) for name in _WAVE_FIELDS if name in values}}
         return read(cls, values, cls.name)
-
-
-_PER_TICK = ("throttles", "wheel_factors")
-"""What `ahead` tells with one row per tick."""
-
-
-def _is_readable(value: Any, usual: np.ndarray, n_rows: int) -> bool:
-    """Whether compiled code can read an array where it expects one like `usual`, with at least so many rows."""
-    return (
-        isinstance(value, np.ndarray)
-        and (value.dtype, value.ndim) == (usual.dtype, usual.ndim)
-        and value.flags.c_contiguous
-        and value.flags.writeable
-        and value.shape[1:] >= usual.shape[1:]
-        and len(value) >= n_rows
-    )
 
 
 def wrap_in_order(env: ForageEnv, wrappers: Iterable[WrapperConfig]) -> ForageEnv | SwarmWrapper:

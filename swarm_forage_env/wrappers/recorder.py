@@ -111,7 +111,8 @@ class RunRecorder(SwarmWrapper):
                 n_ahead, disturbances = inner.told_ahead(n_ahead)
             if n_ahead == 0:  # one tick as a step of the stack does it
                 arena.run(policy, 0)  # what robots want to do stands before any wrapper acts
-                arena.run(policy, 1, wheel_gain=self.before(policy.actions), acts=False)
+                policy.actions[:], wheel_gain = self.before(policy.actions)
+                arena.run(policy, 1, wheel_gain=wheel_gain, acts=False)
                 self.after(policy.task)
                 kept = False
                 continue
