@@ -80,7 +80,7 @@ class ForageEnv(SwarmLayer, ParallelEnv[str, np.ndarray, np.ndarray]):
         self._terminated = np.zeros(n_robots, np.bool_)
         self.possible_agents = [f"robot_{row}" for row in range(n_robots)]
         self.agents: list[str] = []
-        self._seeds = np.random.default_rng()
+        self._seeds: np.random.Generator | None = None  # not before it is used: copies draw runs of their own
         self.seed_value: int | None = None
         self._is_half_done = False
 
@@ -135,6 +135,8 @@ class ForageEnv(SwarmLayer, ParallelEnv[str, np.ndarray, np.ndarray]):
 
         It is that of the sequence of seeds: what is drawn from it changes the seeds of later resets without one.
         """
+        if self._seeds is None:
+            self._seeds = np.random.default_rng()
         return self._seeds
 
     # True state, for wrappers, recorders and pictures
@@ -250,7 +252,7 @@ class ForageEnv(SwarmLayer, ParallelEnv[str, np.ndarray, np.ndarray]):
         """
         seed = checked_seed(seed)
         if seed is None:
-            seed = int(self._seeds.integers(2**31))
+            seed = int(self.np_random.integers(2**31))
         else:
             self._seeds = np.random.default_rng(seed)
         self.break_off()  # should the reset fail

@@ -9,6 +9,8 @@ import numpy as np
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
+from swarm_forage_env.world.arena import UNDISTURBED, Stop
+from swarm_forage_env.world.kernels.disturbances import Disturbances
 from swarm_forage_env.world.snapshots import Origin, Snapshot, read, take
 
 if TYPE_CHECKING:
@@ -22,6 +24,7 @@ DictStep: TypeAlias = tuple[
 """Observations, rewards, terminations, truncations and infos by agent."""
 OPTION_OF_TESTS = "options"
 """A reset option without a meaning: PettingZoo's own `parallel_api_test` gives it to every environment."""
+_PACKAGE = "swarm_forage_env."
 _STATE = ("_rewards", "_seeds", "_terminated", "agents", "seed_value")
 """Attributes of a ForageEnv that are state; the arena holds the rest."""
 
@@ -53,6 +56,43 @@ class SwarmLayer(ABC):
         self, actions: ActionArray, *, wheel_gain: FloatArray | None = None, tasks: CodeArray | None = None
     ) -> BatchStep:
         """Advance by one tick."""
+
+    # Ticks without Python
+
+    def told_ahead(self, n_ticks: int) -> tuple[int, Disturbances]:
+        """Return in how many ticks, at most `n_ticks`, no hook is needed from here inwards, and what happens in them.
+
+        Raises:
+            ValueError: a wrapper from elsewhere wants compiled code to do something.
+        """
+        if not self.stack:
+            return n_ticks, UNDISTURBED
+        fields: dict[str, Any] = {}
+        for wrapper in self.stack:
+            n_ticks, told = wrapper.ahead(n_ticks)
+            if told and not wrapper.ahead.__module__.startswith(_PACKAGE):
+                raise ValueError(
+                    f"Expected `ahead` of {type(wrapper).__name__} to return {{}} beside the number of ticks, got "
+                    f"{', '.join(told)}; do it in the hooks of these ticks."
+                )
+            if fields.keys() & told.keys() - {"gain"}:  # two of a kind: the compiled loop has place for one
+                n_ticks = 0
+            fields |= told
+        # The last death may have come between two ticks; then the coming one ends the run.
+        return 0 if self.unwrapped.terminated.all() else max(0, n_ticks), Disturbances(**fields)
+
+    def pass_ticks(self, n_ticks: int, stop: Stop, tasks: CodeArray | None = None) -> None:
+        """Note, from here inwards, that ticks have passed as `told_ahead` said.
+
+        Args:
+            n_ticks: How many.
+            stop: Where the arena has stopped after them.
+            tasks: (N,) as in `step_batch`.
+        """
+        for wrapper in self.stack:
+            wrapper.count_ticks(n_ticks)
+        if stop.by_python and self.stack:
+            self.stack[0].after(tasks)
 
     # Dict level
 

@@ -18,6 +18,7 @@ from msgspec import Meta
 from swarm_forage_env._internal.compiling import Calls
 from swarm_forage_env._internal.fields import Checked, ConfigError, Count, Positive, Whole, known_keys
 from swarm_forage_env._internal.held import hold
+from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.contract.kernel_policy import Driver
 from swarm_forage_env.contract.layout import (
     BUILT_IN_SLICES,
@@ -327,6 +328,17 @@ class LearnerInterface:
             return actions
         self._check_numbers(actions)
         return np.ascontiguousarray(actions, np.int32)
+
+    def resting(self, actions: np.ndarray, away: BoolArray, carrying: BoolArray) -> np.ndarray:
+        """Return checked actions in which robots that are away (N,) stand and hold what they carry, should they come.
+
+        So rows of robots that are not at work never act, a decision of many ticks long.
+        """
+        actions = actions.copy()
+        actions[away] = 0  # to stand, if it is a number
+        if not (self.translation.is_discrete or self.translation.grips_itself):
+            actions[away, COMMANDS - 1] = np.where(carrying[away], Grip.GRASP, Grip.RELEASE)
+        return actions
 
     def carry_out(self, actions: np.ndarray, obs: ObsArray) -> ActionArray:
         """Do what `command` does with actions that were checked, which may last for several ticks.

@@ -122,6 +122,9 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
     and seconds since creation "t"; and, for all rows of an arena whose run ended, `run`: seed, simulated seconds,
     collected, first_picked and n_robots. Gymnasium's `RecordEpisodeStatistics` works, and counts absent rows as
     episodes.
+
+    `gymnasium.make_vec(id, vectorization_mode="sync")` makes something else: a sub-environment is then a whole swarm, a
+    `JointForageEnv`.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - declared like this by Gymnasium

@@ -101,9 +101,9 @@ class LearnerArena:
 
     def _begin(self) -> None:
         """Find out, once per run, whether several ticks can be one compiled call."""
-        env, layers = self.forage_env, self.env.stack if isinstance(self.env, SwarmWrapper) else ()
+        env = self.forage_env
         is_paid = env.reward_model.payment is not None
-        self._tells_ahead = is_compiled(keep_on) and is_paid and needs_no_python(env, layers)
+        self._tells_ahead = is_compiled(keep_on) and is_paid and needs_no_python(env, self.env.stack)
 
     def _change(self, overrides: dict[str, Any], world: World | None) -> None:
         """Build another environment, if the one that there is has another world."""
@@ -131,8 +131,10 @@ class LearnerArena:
         env, interface = self.forage_env, self.interface
         env.require_whole()
         arena, chosen = env.arena, interface.checked(actions)
+        if not env.swarm.active.all():
+            chosen = interface.resting(chosen, ~env.swarm.active, env.swarm.carried_object >= 0)
         start = before = arena.tick
-        if isinstance(self.env, SwarmWrapper):  # wrappers may draw numbers before the world looks at actions
+        if self.env.stack:  # wrappers may draw numbers before the world looks at actions
             env.refuse_bad_step(env.checked_actions(interface.carry_out(chosen, self.env.last_obs)), None)
         driver = interface.driver(chosen)
         end = min(start + self._plan.interface.decision_ticks, env.max_cycles)
@@ -143,8 +145,7 @@ class LearnerArena:
                     rewards += self.env.step_batch(interface.carry_out(chosen, self.env.last_obs))[1]
                 else:
                     stop = arena.run(driver, n_ahead, disturbances=disturbances, rewards=env.reward_model, paid=rewards)
-                    if isinstance(self.env, SwarmWrapper):
-                        self.env.pass_ticks(stop.tick - before, stop)
+                    self.env.pass_ticks(stop.tick - before, stop)
                 before = arena.tick
                 if before >= end or env.is_over:
                     break
@@ -156,9 +157,7 @@ class LearnerArena:
 
     def _told_ahead(self, n_ticks: int) -> tuple[int, Disturbances]:
         """Return how many ticks can be one compiled call, and what wrappers do in them; 0 = Python steps one."""
-        if not self._tells_ahead:
-            return 0, UNDISTURBED
-        return self.env.told_ahead(n_ticks) if isinstance(self.env, SwarmWrapper) else (n_ticks, UNDISTURBED)
+        return self.env.told_ahead(n_ticks) if self._tells_ahead else (0, UNDISTURBED)
 
     def _add_extra(self, rewards: np.ndarray) -> None:
         """Add the user's `extra_reward` of a decision to the rewards of the robots (N,)."""

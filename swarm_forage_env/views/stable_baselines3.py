@@ -53,6 +53,8 @@ class SwarmVecEnv(VecEnv):
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Set the seeds of the next reset: arena a runs seed + a, and later runs follow the arena's own sequence.
 
+        As with every vector environment of that library, seeds nearer to each other than `n_arenas` share runs.
+
         Returns:
             One seed per row, that of its arena.
         """

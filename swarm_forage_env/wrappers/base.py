@@ -14,12 +14,11 @@ from pettingzoo.utils import BaseParallelWrapper
 
 from swarm_forage_env._internal.fields import Checked, ConfigError, known_keys, read
 from swarm_forage_env.contract.codes import Grip
+from swarm_forage_env.contract.policy import COMMANDS
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.env import ForageEnv, checked_gain
 from swarm_forage_env.layer import BatchStep, SwarmLayer
 from swarm_forage_env.scenarios.config import to_mapping
-from swarm_forage_env.world.arena import Stop
-from swarm_forage_env.world.kernels.disturbances import Disturbances
 from swarm_forage_env.wrappers.waveform import Waveform
 
 STACK_ORDER = (
@@ -37,7 +36,6 @@ _STEPS = ("step", "step_batch")
 _HOOKS = ("before_step", "gain", "observe", "after_step")
 """Methods that are called on every wrapper in each step."""
 
-_PACKAGE = "swarm_forage_env."
 _WAVE_FIELDS = tuple(item.name for item in dataclasses.fields(Waveform) if item.name != "kind")
 
 
@@ -164,10 +162,10 @@ class SwarmWrapper(SwarmLayer, BaseParallelWrapper):
     def ahead(self, n_ticks: int) -> tuple[int, dict[str, Any]]:
         """Return for how many of the coming ticks, at most `n_ticks`, the hooks of a tick need not be called.
 
-        With 0 the hooks are called in the coming tick. A wrapper without this method, and one whose hooks were replaced,
-        has them called in all ticks. Wrappers of this package also return what is done in these ticks instead, as
-        fields of `world.kernels.disturbances.Disturbances`; others return {}, because compiled code reads these arrays
-        unchecked, maybe past their ends.
+        With 0 the hooks are called in the coming tick. A wrapper without this method, and one whose hooks were
+        replaced, has them called in all ticks. Wrappers of this package also return what is done in these ticks
+        instead, as fields of `world.kernels.disturbances.Disturbances`; others return {}, because compiled code reads
+        these arrays unchecked, maybe past their ends.
         """
         return n_ticks, {}
 
@@ -184,39 +182,6 @@ class SwarmWrapper(SwarmLayer, BaseParallelWrapper):
         return not any(
             name in vars(self) or getattr(type(self), name) is not getattr(teller, name) for name in (*_HOOKS, "ahead")
         )
-
-    def told_ahead(self, n_ticks: int) -> tuple[int, Disturbances]:
-        """Return in how many ticks, at most `n_ticks`, no hook is needed from here inwards, and what happens in them.
-
-        Raises:
-            ValueError: a wrapper from elsewhere wants compiled code to do something.
-        """
-        fields: dict[str, Any] = {}
-        for wrapper in self.stack:
-            n_ticks, told = wrapper.ahead(n_ticks)
-            if told and not wrapper.ahead.__module__.startswith(_PACKAGE):
-                raise ValueError(
-                    f"Expected `ahead` of {type(wrapper).__name__} to return {{}} beside the number of ticks, got "
-                    f"{', '.join(told)}; do it in the hooks of these ticks."
-                )
-            if fields.keys() & told.keys() - {"gain"}:  # two of a kind: the compiled loop has place for one
-                n_ticks = 0
-            fields |= told
-        # The last death may have come between two ticks; then the coming one ends the run.
-        return 0 if self._unwrapped.terminated.all() else max(0, n_ticks), Disturbances(**fields)
-
-    def pass_ticks(self, n_ticks: int, stop: Stop, tasks: CodeArray | None = None) -> None:
-        """Note, from here inwards, that ticks have passed as `told_ahead` said.
-
-        Args:
-            n_ticks: How many.
-            stop: Where the arena has stopped after them.
-            tasks: (N,) as in `step_batch`.
-        """
-        for wrapper in self.stack:
-            wrapper.count_ticks(n_ticks)
-        if stop.by_python:
-            self.after(tasks)
 
     def interval_columns(self) -> dict[str, float]:
         """Return this wrapper's own columns of the run record for the recording interval that ends now.
@@ -275,7 +240,7 @@ class SwarmWrapper(SwarmLayer, BaseParallelWrapper):
         if came.any():
             actions = actions.copy()
             actions[came] = 0.0
-            actions[came, 2] = np.where(swarm.carried_object[came] >= 0, Grip.GRASP, Grip.RELEASE)
+            actions[came, COMMANDS - 1] = np.where(swarm.carried_object[came] >= 0, Grip.GRASP, Grip.RELEASE)
         for wrapper in self.stack:
             wheel_gain = checked_gain(wrapper.gain(actions, wheel_gain), len(actions))
         return actions, wheel_gain
@@ -366,13 +331,12 @@ def steps_as_made(layer: ForageEnv | SwarmWrapper) -> bool:
     return type(layer).step_batch in ours and "step_batch" not in vars(layer)
 
 
-def needs_no_python(env: ForageEnv, layers: Iterable[SwarmWrapper]) -> bool:
+def needs_no_python(env: ForageEnv, layers: "tuple[SwarmWrapper, ...]") -> bool:
     """Whether several ticks can be one compiled call, but for those in which a layer has to act.
 
     They cannot with Chipmunk, an open window, neighbours or messages that the policy reads, a layer that does not tell
     what it does ahead, or a method that was replaced.
     """
-    layers = tuple(layers)
     return (
         type(env) is ForageEnv
         and env.scenario.physics == "compiled"

@@ -12,7 +12,6 @@ from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.columns import INTERVAL_COLUMNS
 from swarm_forage_env.scenarios.config import whole_intervals
 from swarm_forage_env.scenarios.performance import performance_curve
-from swarm_forage_env.world.arena import UNDISTURBED
 from swarm_forage_env.world.kernels.counting import add_task_shares
 from swarm_forage_env.wrappers.base import SwarmWrapper
 
@@ -106,9 +105,7 @@ class RunRecorder(SwarmWrapper):
         env.require_whole()
         env.break_off()  # a run that fails is gone on with by nobody: wrappers are ahead of it, or behind
         while env.tick < end and not self._complete:
-            n_ahead, disturbances = min(end - env.tick, self._ticks_left), UNDISTURBED
-            if isinstance(inner, SwarmWrapper):
-                n_ahead, disturbances = inner.told_ahead(n_ahead)
+            n_ahead, disturbances = inner.told_ahead(min(end - env.tick, self._ticks_left))
             if n_ahead == 0:  # one tick as a step of the stack does it
                 arena.run(policy, 0)  # what robots want to do stands before any wrapper acts
                 policy.actions[:], wheel_gain = self.before(policy.actions)
@@ -120,8 +117,7 @@ class RunRecorder(SwarmWrapper):
             stop = arena.run(policy, n_ahead, disturbances=disturbances, kept=kept, task_shares=self._task_sums)
             kept = len(disturbances.lanes) == 0
             n_done = stop.tick - before
-            if isinstance(inner, SwarmWrapper):
-                inner.pass_ticks(n_done, stop, policy.task)
+            inner.pass_ticks(n_done, stop, policy.task)
             self._ticks_left -= n_done
             self._complete = env.tick >= env.max_cycles
             if self._ticks_left == 0 or self._complete:

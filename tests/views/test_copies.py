@@ -5,7 +5,9 @@ import copy
 import numpy as np
 import pytest
 
+from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.gymnasium import JointForageEnv
 from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv, env, parallel_env
 from tests.support.branches import pickled
@@ -60,10 +62,13 @@ def test_a_copy_of_a_learners_environment_goes_on_as_the_original(make, go_on):
     assert {one.forage_env.seed_value for one in twins} == {learner.forage_env.seed_value}
 
 
-def test_copies_before_the_first_reset_draw_worlds_of_their_own():
-    original = joint()
+@pytest.mark.parametrize("make", [joint, parallel, lambda: ForageEnv(scenario("classroom", n_robots=2))])
+def test_copies_before_the_first_reset_draw_worlds_of_their_own(make):
+    original = make()
     twins = original, copy.deepcopy(original), pickled(original)
-    assert len({twin.reset()[0].tobytes() for twin in twins}) == 3
+    for twin in twins:
+        twin.reset()
+    assert len({getattr(twin, "forage_env", twin).state().tobytes() for twin in twins}) == 3
 
 
 def test_agent_by_agent_is_copied():

@@ -7,6 +7,8 @@ from pettingzoo.test import parallel_api_test, parallel_seed_test
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.views.arenas import ArenaBatch
+from swarm_forage_env.views.gymnasium import JointForageEnv, SwarmVectorEnv
+from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv, parallel_env
 from swarm_forage_env.views.plans import ArenaPlan
 from swarm_forage_env.wrappers.registry import parse_wrapper
@@ -63,6 +65,19 @@ def test_shows_the_same_as_the_rows_of_an_arena(interface):
             n_deaths += terminations[agent]
         assert all(truncations.values()) == bool(step.truncated.any())
     assert n_deaths > 0
+
+
+def test_all_views_are_paid_in_one_type(monkeypatch):
+    """For each type the loop of the world is compiled once."""
+    paid, step = [], LearnerArena.step
+    monkeypatch.setattr(
+        LearnerArena, "step", lambda arena, actions, to: paid.append(to.dtype) or step(arena, actions, to)
+    )
+    for env in (ParallelLearnerEnv(n_robots=2), JointForageEnv(n_robots=2), SwarmVectorEnv(n_robots=2)):
+        env.reset(seed=0)
+        idle = np.zeros((2, 3), np.float32)
+        env.step(dict(zip(env.agents, idle, strict=True)) if isinstance(env, ParallelLearnerEnv) else idle)
+    assert paid == [np.float32] * 3
 
 
 def test_a_reset_can_change_the_scenario():

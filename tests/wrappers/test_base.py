@@ -68,8 +68,8 @@ def test_hooks_run_inwards_before_the_step_and_outwards_after_it(stack):
     stack.step_batch(np.zeros((4, 3), np.float32))
     assert [entry[:2] for entry in Logging.log] == [
         ("outer", "before_step"),
-        ("outer", "gain"),
         ("inner", "before_step"),
+        ("outer", "gain"),
         ("inner", "gain"),
         ("inner", "observe"),
         ("inner", "after_step"),
@@ -196,6 +196,18 @@ def test_whatever_fails_within_a_tick_is_not_gone_on_with(hook, fault):
             refused()
     wrapper.restore(kept)
     wrapper.step_batch(actions)
+
+
+def test_a_hook_of_an_instance_is_a_hook():
+    """What the world would refuse is refused before it acts."""
+    wrapper = wrapper_at(4)(ForageEnv(small_scenario()))
+    wrapper.reset_batch(7)
+    called = []
+    wrapper.before_step = lambda: called.append(True)
+    with pytest.raises(ActionError, match="Expected finite actions"):
+        wrapper.step_batch(np.full((4, 3), np.nan, np.float32))
+    wrapper.step_batch(np.zeros((4, 3), np.float32))
+    assert called == [True]
 
 
 def test_an_interrupted_world_is_not_gone_on_with():

@@ -7,6 +7,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Event, Grip, ObjectStatus
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.views.gymnasium import JointForageEnv
 from swarm_forage_env.wrappers.population import (
     PopulationConfig,
     PopulationDynamics,
@@ -73,9 +74,11 @@ def test_a_robot_in_repair_stops_but_stays(lone_carrier):
         assert obs[0, env.layout["carrying"]] == 1.0
         assert obs[0, env.layout["position"]].any(), "true sensors"
         obs, *_ = lone_carrier.step_batch(hold(env, 0.5, Grip.RELEASE))
-    strike(lone_carrier, "repair", hold(env, 0.5))
+    strike(lone_carrier, "repair", hold(env, 0.5, Grip.RELEASE))
     assert env.active[0]
     assert env.swarm.carried_object[0] == 0
+    np.testing.assert_array_equal(env.swarm.position, where)
+    lone_carrier.step_batch(hold(env, 0.5))
     assert env.swarm.position[0, 0] > where[0, 0]
 
 
@@ -94,6 +97,30 @@ def test_a_robot_in_repair_is_seen_and_in_the_way_but_never_interferes():
     for _ in range(20):
         stack.step_batch(hold(env, 0.5))
     assert np.hypot(*(env.swarm.position[0] - env.swarm.position[1])) > 2 * 0.085036758 - 0.004
+
+
+CONTINUOUS = {"decision_ticks": 5}
+NUMBERED = {"decision_ticks": 5, "actions": "discrete"}
+
+
+@pytest.mark.parametrize(
+    ("interface", "fills"), [(None, (0.0, 1.0, np.nan)), (CONTINUOUS, (0.0, 1.0)), (NUMBERED, (0, 8))]
+)
+def test_rows_of_robots_that_are_away_never_act(interface, fills):
+    """Nor when the robot comes back within the tick, or the decision."""
+    seen = []
+    for fill in fills:
+        words = ["population:malfunction_per_tick=0.5,repair_per_tick=0.5"]
+        env = JointForageEnv("classroom", n_robots=6, wrappers=words, interface=interface)
+        env.reset(seed=3)
+        env.action_space.seed(0)
+        for _ in range(30):
+            actions = env.action_space.sample()
+            actions[~env.forage_env.active] = fill
+            env.step(actions)
+        seen.append(env.forage_env.swarm.position.copy())
+    for other in seen[1:]:
+        np.testing.assert_array_equal(other, seen[0])
 
 
 # Death
