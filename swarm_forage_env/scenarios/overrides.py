@@ -9,9 +9,9 @@ from collections.abc import Mapping
 from dataclasses import fields, replace
 from functools import cache
 from types import MappingProxyType
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import Any, get_type_hints
 
-from swarm_forage_env._internal.fields import ConfigError, instance, known_keys, known_name, number, whole
+from swarm_forage_env._internal.fields import ConfigError, instance, known_keys, known_name, number
 from swarm_forage_env.scenarios.config import SECTIONS, ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M, CELLS_PER_M
 from swarm_forage_env.scenarios.obstacles import stretched
@@ -32,20 +32,6 @@ def field_types() -> dict[str, Any]:
     """Return the type, without its bounds, of every scenario field that can be set by name."""
     hints = {section: get_type_hints(kind) for section, kind in {"": ScenarioConfig, **SECTIONS}.items()}
     return {name: hints[section][name] for name, section in field_sections().items()}
-
-
-def parse_tuple(text: str, kind: Any) -> tuple[Any, ...]:
-    """Return the tuple of numbers that a text stands for, by the type of a field; no text is an empty tuple.
-
-    Example: "1.6,8" for a pair of numbers; "10,4,11,12+20,4,21,12" for any number of boxes.
-
-    Raises:
-        ValueError: an entry that is no number.
-    """
-    inner = get_args(kind)[0]
-    if get_origin(inner) is tuple:
-        return tuple(parse_tuple(part, inner) for part in text.split("+") if part.strip())
-    return tuple(float(word) for word in text.split(",") if word.strip())
 
 
 def with_overrides(config: ScenarioConfig, **overrides: Any) -> ScenarioConfig:
@@ -116,10 +102,9 @@ def arena_at_density(config: ScenarioConfig, density: float, n_robots: int) -> d
         n_robots: Size of the swarm.
 
     Raises:
-        ConfigError: a density or a number of robots that cannot be.
+        ConfigError: a density that cannot be.
     """
     density = checked_density(density)
-    whole("robots.n_robots", n_robots, at_least=1)
     nx, ny = config.arena.n_cells
     common = math.gcd(nx, ny)
     unit_x, unit_y = nx // common, ny // common
@@ -137,18 +122,3 @@ def arena_at_density(config: ScenarioConfig, density: float, n_robots: int) -> d
         "further_nests": stretched(config.arena.further_nests, factors, extents_m),
         "obstacles": stretched(config.arena.obstacles, factors, extents_m),
     }
-
-
-def in_arena(config: ScenarioConfig, arena: dict[str, Any], *, n_robots: int, n_objects: int | None) -> ScenarioConfig:
-    """Return a scenario in another arena, fields as from `arena_at_density`, with another swarm.
-
-    `n_objects` None = as many per m^2 as in `config` (our choice: what a robot meets on a way of a given length then
-    depends on neither the size of the arena nor that of the swarm).
-
-    Raises:
-        ConfigError: an arena that is too small for its robots.
-    """
-    if n_objects is None:
-        share = (arena["width_m"] * arena["height_m"]) / (config.arena.width_m * config.arena.height_m)
-        n_objects = max(1, round(config.objects.n_objects * share))
-    return with_overrides(config, **arena, n_robots=n_robots, n_objects=n_objects)

@@ -17,7 +17,6 @@ from swarm_forage_env.scenarios.overrides import (
     ARENA_FIELDS,
     arena_at_density,
     checked_density,
-    in_arena,
     robots_at_density,
     with_overrides,
 )
@@ -185,16 +184,22 @@ def at_density(
     Raises:
         ConfigError: a density that is no share, or an arena that is too small or too large for the scenario.
     """
-    n_robots = config.robots.n_robots if n_robots is None else n_robots
+    n_robots = whole("robots.n_robots", config.robots.n_robots if n_robots is None else n_robots, at_least=1)
+    width_m, height_m = config.arena.width_m, config.arena.height_m
     if config.objects.placement != "power_law":
-        return in_arena(config, arena_at_density(config, density, n_robots), n_robots=n_robots, n_objects=n_objects)
-    side_m = side_for(n_robots, checked_density(density))
-    arena = {name: getattr(search_and_rescue(side_m=side_m).arena, name) for name in ARENA_FIELDS}
-    factors = side_m / config.arena.width_m, side_m / config.arena.height_m
-    for name in ("further_nests", "obstacles"):
-        arena[name] = stretched(getattr(config.arena, name), factors, (side_m, side_m))
-    objects = SEARCH_AND_RESCUE_OBJECTS[int(side_m)] if n_objects is None else n_objects
-    return in_arena(config, arena, n_robots=n_robots, n_objects=objects)
+        arena = arena_at_density(config, density, n_robots)
+        # Our choice: what a robot meets on a way of a given length depends on neither the arena nor the swarm.
+        share = arena["width_m"] * arena["height_m"] / (width_m * height_m)
+        usual = max(1, round(config.objects.n_objects * share))
+    else:
+        side_m = side_for(n_robots, checked_density(density))
+        arena = {name: getattr(search_and_rescue(side_m=side_m).arena, name) for name in ARENA_FIELDS}
+        for name in ("further_nests", "obstacles"):
+            factors = side_m / width_m, side_m / height_m
+            arena[name] = stretched(getattr(config.arena, name), factors, (side_m, side_m))
+        usual = SEARCH_AND_RESCUE_OBJECTS[int(side_m)]
+    n_objects = usual if n_objects is None else n_objects
+    return with_overrides(config, **arena, n_robots=n_robots, n_objects=n_objects)
 
 
 PRESETS: dict[str, Callable[..., ScenarioConfig]] = {name: globals()[name] for name in SCENARIO_NAMES}

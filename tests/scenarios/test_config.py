@@ -8,7 +8,7 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError, read
 from swarm_forage_env.scenarios.config import SECTIONS, ArenaConfig, ScenarioConfig, to_mapping
-from swarm_forage_env.scenarios.overrides import field_sections, parse_tuple, with_overrides
+from swarm_forage_env.scenarios.overrides import field_sections, with_overrides
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM
 
@@ -46,15 +46,6 @@ def test_a_scenario_is_read_back_from_json(name):
     config = scenario(name, obstacles=((5.0, 2.0, 5.4, 2.6),))
     assert read(ScenarioConfig, json.loads(json.dumps(to_mapping(config)))) == config
     assert hash(config) == hash(scenario(name, obstacles=[[5, 2, 5.4, 2.6]]))
-
-
-def test_texts_stand_for_tuples():
-    assert parse_tuple("1.6, 8", tuple[float, float]) == (1.6, 8.0)
-    boxes = tuple[tuple[float, float, float, float], ...]
-    assert parse_tuple("10,4,11,12+20,4,21,12", boxes) == ((10.0, 4.0, 11.0, 12.0), (20.0, 4.0, 21.0, 12.0))
-    assert parse_tuple("", boxes) == ()
-    with pytest.raises(ValueError, match="wide"):
-        parse_tuple("1,wide", tuple[float, float])
 
 
 @pytest.mark.parametrize(
