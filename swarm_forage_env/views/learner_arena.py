@@ -131,8 +131,9 @@ class LearnerArena:
         env, interface = self.forage_env, self.interface
         env.require_whole()
         arena, chosen = env.arena, interface.checked(actions)
-        if not env.swarm.active.all():
-            chosen = interface.resting(chosen, ~env.swarm.active, env.swarm.carried_object >= 0)
+        swarm = arena.swarm
+        if np.count_nonzero(swarm.active) < len(swarm.active):
+            chosen = interface.resting(chosen, ~swarm.active, swarm.carried_object >= 0)
         start = before = arena.tick
         if self.env.stack:  # wrappers may draw numbers before the world looks at actions
             env.refuse_bad_step(env.checked_actions(interface.carry_out(chosen, self.env.last_obs)), None)
