@@ -86,8 +86,7 @@ def _kept(function: F, compiled: Callable[..., Any]) -> F:
         if place is None:
             _say(
                 "Compiled functions cannot be kept, so every process spends a minute on them. Set NUMBA_CACHE_DIR to a "
-                "folder that can be written to.",
-                logging.WARNING,
+                "folder that can be written to."
             )
 
 
@@ -236,17 +235,17 @@ def _collector_off() -> Iterator[None]:
 
 
 @functools.cache
-def _say(text: str, level: int) -> None:
+def _say(text: str) -> None:
     """Say something once in a process; without settings of the user, loggers print warnings on stderr."""
-    logging.getLogger("swarm_forage_env").log(level, text)
+    logging.getLogger("swarm_forage_env").warning(text)
 
 
 def tell_of_first_run() -> None:
     """Tell, once in a process, that functions are being compiled, here or in a worker.
 
-    It is no warning: the console command shows it, and scripts do if they set up `logging` for level INFO.
+    Loggers without settings print it on stderr, so scripts show it, too.
     """
-    _say("Compiling what is used here for the first time: seconds, or a minute after an installation.", logging.INFO)
+    _say("Compiling what is used here for the first time: seconds, or a minute after an installation.")
 
 
 class _FirstRun(event.Listener):

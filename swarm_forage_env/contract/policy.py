@@ -112,8 +112,6 @@ class SwarmSpec:
     """x low, y low, x high, y high of every nest; the first is the one of `nest_centre_m` and `nest_size_m`."""
     has_obstacles: bool
     """Whether there is anything in the way but the outer walls."""
-    distributable_box_m: tuple[float, float, float, float]
-    """x low, y low, x high, y high of the area where objects may lie."""
     placement: str
     caches: str
     """"none", "static" or "dynamic"."""
@@ -156,7 +154,6 @@ class SwarmSpec:
         """
         arena, robots = scenario.arena, scenario.robots
         nest_left, nest_bottom, nest_right, nest_top = arena.nest_box_m
-        left, bottom, right, top = (edge / CELLS_PER_M for edge in arena.distributable_cells)
         return cls(
             n_robots=robots.n_robots,
             n_objects=scenario.objects.n_objects,
@@ -173,7 +170,6 @@ class SwarmSpec:
             nest_size_m=(nest_right - nest_left, nest_top - nest_bottom),
             nest_boxes_m=arena.nest_boxes_m,
             has_obstacles=bool(arena.obstacles),
-            distributable_box_m=(left, bottom, right, top),
             placement=scenario.objects.placement,
             caches=scenario.caches,
             cache_side_m=scenario.cache_side_cells / CELLS_PER_M,

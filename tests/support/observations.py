@@ -37,7 +37,6 @@ def make_spec(n_robots: int = 1, **changes: Any) -> SwarmSpec:
         nest_size_m=(3.2, 12.8),
         nest_boxes_m=(),
         has_obstacles=False,
-        distributable_box_m=(4.8, 2.4, 27.4, 13.8),
         placement="single_source",
         caches="none",
         cache_side_m=6.2,
