@@ -7,7 +7,7 @@ use the same translation, so a policy runs exactly as it was trained.
 
 import copy
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias, get_args
 
@@ -16,7 +16,7 @@ from gymnasium import spaces
 from msgspec import Meta
 
 from swarm_forage_env._internal.compiling import Calls
-from swarm_forage_env._internal.fields import Checked, ConfigError, Count, Positive, Whole, known_keys
+from swarm_forage_env._internal.fields import Checked, ConfigError, Count, Positive, Whole, read
 from swarm_forage_env._internal.held import hold
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.contract.kernel_policy import Driver
@@ -495,5 +495,4 @@ def interface_from_mapping(mapping: Mapping[str, Any]) -> InterfaceConfig:
     Raises:
         ConfigError: an unknown key or value.
     """
-    known_keys(mapping, [item.name for item in fields(InterfaceConfig)], "interface option")
-    return InterfaceConfig(**mapping)
+    return read(InterfaceConfig, mapping, "interface")

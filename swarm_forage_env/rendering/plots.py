@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import cycle, repeat
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from swarm_forage_env.rendering.figures import (
 
 _SMOOTHED = 5
 """Intervals of a running mean: deliveries come in bursts, which hide who delivers more (our choice)."""
+_MEAN = "mean with its\n95 % interval\n(Student's)"
 _MANY_INTERVALS = 20
 """With fewer, single ones are drawn alone."""
 
@@ -82,23 +83,11 @@ def _running_mean(values: FloatArray) -> FloatArray:
     return np.convolve(values, window, "same") / np.convolve(np.ones_like(values), window, "same")
 
 
-class MeanCurve(NamedTuple):
-    """The mean of several trainings, with an interval."""
-
-    label: str
-    steps: Sequence[int]
-    """(E,) decisions before each evaluation."""
-    performance: FloatArray
-    """(3, E): mean, lower and upper bound of what the scenario counts."""
-    interference: FloatArray
-    """(3, E): the same of the mean fraction of active robots in interference."""
-
-
 def draw_trainings(
     path: str | Path,
     trainings: Mapping[str, tuple[Sequence[int], Sequence[float], Sequence[float]]],
     *,
-    mean: MeanCurve | None = None,
+    mean: tuple[Sequence[int], FloatArray, FloatArray] | None = None,
     beside: Mapping[str, tuple[float, float]],
     stage_ends: Sequence[int],
     title: str,
@@ -111,7 +100,8 @@ def draw_trainings(
         path: File to write; as in `saved_figure`, whose errors this has.
         trainings: Name -> (E,) decisions before each evaluation, (E,) what the scenario counts, and (E,) mean fraction
             of active robots in interference.
-        mean: Of the trainings, with a band for its interval; they themselves are then thin lines of one colour.
+        mean: Of the trainings, which are then thin lines of one colour: (E,) decisions; (3, E) mean, lower and upper
+            bound of what the scenario counts; the same of interference.
         beside: Controllers to compare with -> what they achieve, and their interference, NaN if unknown.
         stage_ends: Decisions at which the stages of the training end.
         title: Headline.
@@ -120,7 +110,7 @@ def draw_trainings(
     """
     with saved_figure(path, (9.0, 5.0), title=title, style=style) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
-        found = looks((*(trainings if mean is None else (mean.label,) * len(trainings)), *beside))
+        found = looks((*(trainings if mean is None else (_MEAN,) * len(trainings)), *beside))
         # Five trainings have a colour twice, so each has a marker of its own.
         lines: Iterator[dict[str, Any]] = ({"marker": marker} for marker in cycle(MARKERS))
         if mean is not None:
@@ -130,9 +120,10 @@ def draw_trainings(
                 shown = look.name if mean is None else f"each of {len(trainings)}"
                 axes.plot(np.asarray(steps) / 1e6, curve, color=look.colour, label=shown, clip_on=False, **line)
         if mean is not None:
-            for axes, (middle, low, high) in ((upper, mean.performance), (lower, mean.interference)):
-                millions = np.asarray(mean.steps) / 1e6
-                axes.plot(millions, middle, color=found[0].colour, marker="o", label=mean.label, clip_on=False)
+            decisions, *curves = mean
+            millions = np.asarray(decisions) / 1e6
+            for axes, (middle, low, high) in zip((upper, lower), curves, strict=True):
+                axes.plot(millions, middle, color=found[0].colour, marker="o", label=_MEAN, clip_on=False)
                 shade(axes, millions, low, high, found[0].colour)
         dashes = ("--", "-.", ":", (0, (6, 1))) * len(beside)
         for look, levels, dash in zip(found[len(trainings) :], beside.values(), dashes, strict=False):

@@ -10,12 +10,13 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.wording import counted
+from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.progress import duration
@@ -36,9 +37,6 @@ from swarm_forage_env.training.evaluation import (
     read_evaluations,
 )
 from swarm_forage_env.training.plan import TrainingPlan, read_plan
-
-if TYPE_CHECKING:
-    from swarm_forage_env.rendering.plots import MeanCurve
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,10 +169,8 @@ class Trainings(Answer):
         planned = np.cumsum([stage.steps for stage in self.plan.stages]).tolist()
         return [next((steps for steps in evaluated if steps >= end), end) for end in planned]
 
-    def _mean(self) -> "MeanCurve | None":
+    def _mean(self) -> tuple[list[int], FloatArray, FloatArray] | None:
         """The mean of those that are averaged, as far as all of them have come; None where there is none."""
-        from swarm_forage_env.rendering.plots import MeanCurve
-
         each = [_curves(one.evaluations) for one in self.averaged]
         first, last = max((one[0][0] for one in each), default=0), min((one[0][-1] for one in each), default=-1)
         common = [step for step in sorted({step for one in each for step in one[0]}) if first <= step <= last]
@@ -186,7 +182,7 @@ class Trainings(Answer):
             )
             for k in (1, 2)
         )
-        return MeanCurve("mean with its\n95 % interval\n(Student's)", common, performance, interference)
+        return common, performance, interference
 
 
 def _curves(evaluations: Sequence[Evaluation]) -> list[list[Any]]:

@@ -86,31 +86,11 @@ def test_what_no_observation_or_reward_can_be_is_refused(role, function, message
         run()
 
 
-def test_after_a_failure_nothing_is_stepped_before_a_reset():
-    def late(arena: Any) -> np.ndarray:
-        return np.full((N, 1), 2.0 * (arena.tick == 2))
-
-    rows = np.zeros((N, 3), np.float32)
-    dicts = {f"robot_{number}": wheels for number, wheels in enumerate(rows)}
-    for make, actions in ((SwarmVectorEnv, rows), (parallel_env, dicts)):
-        env: Any = make("warehouse_small", **FIELDS, extra_observation=late)
-        env.reset(seed=1)
-        env.step(actions)
-        with pytest.raises(ExtraFunctionError):
-            env.step(actions)
-        with pytest.raises(RuntimeError, match="half done"):
-            env.step(actions)
-        env.reset(seed=1)
-        env.step(actions)
-
-
 def test_other_columns_than_the_interface_says_are_refused():
     with pytest.raises(ConfigError, match="3 columns, as the interface says, got 2"):
         parallel_env("warehouse_small", **FIELDS, interface={"extra_columns": 3}, extra_observation=heading_and_cargo)
     with pytest.raises(ConfigError, match=r"extra_observation of the 3 columns .* got none"):
         parallel_env("warehouse_small", **FIELDS, interface={"extra_columns": 3})
-    with pytest.raises(ConfigError, match="extra_reward to be a function"):
-        parallel_env("warehouse_small", **FIELDS, extra_reward="mine")
     with pytest.raises(ConfigError, match=r"frame_decisions of 0 beside extra_observation, .* got 10; give interface"):
         InterfaceConfig(extra_columns=1, frame_decisions=10)
     bound = LearnerInterface(InterfaceConfig(extra_columns=1), SwarmSpec.of(scenario("warehouse_small", **FIELDS)))

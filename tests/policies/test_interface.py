@@ -207,16 +207,14 @@ def test_wrong_choices_are_refused(choices, reason):
 
 
 def test_an_interface_is_given_as_it_is_by_fields_or_not_at_all():
-    numbered = InterfaceConfig(actions="discrete")
-    assert chosen_interface(numbered) is numbered
-    assert chosen_interface({"actions": "discrete"}) == numbered
-    assert chosen_interface(None) == chosen_interface({}) == InterfaceConfig()
-    driven = InterfaceConfig(automatic_gripper=True, decision_ticks=5)
+    numbered, driven = InterfaceConfig(actions="discrete"), InterfaceConfig(automatic_gripper=True, decision_ticks=5)
+    assert chosen_interface(numbered, driven) is numbered
     assert chosen_interface(None, driven) is driven
     assert chosen_interface({"decision_ticks": 2}, driven) == InterfaceConfig(automatic_gripper=True, decision_ticks=2)
-    assert chosen_interface(numbered, driven) is numbered
-    with pytest.raises(ConfigError, match=r"InterfaceConfig or its fields by name, .* got 'discrete'\."):
-        chosen_interface("discrete")
+    assert chosen_interface(None) == chosen_interface({}) == InterfaceConfig()
+    for wrong in ("discrete", {"action": "discrete"}):
+        with pytest.raises(ConfigError, match=r"its fields by name|Did you mean .actions"):
+            chosen_interface(wrong)
 
 
 @pytest.mark.parametrize(

@@ -52,11 +52,6 @@ def test_a_robot_with_an_object_drives_straight_home():
     np.testing.assert_allclose(command, (0.5, 0.5, Grip.DELIVER), atol=1e-6)
 
 
-def test_a_robot_without_an_object_to_fetch_stands():
-    (command,), _ = commands([(10.0, 8.0, EAST, -1)], [(-1, -1, CARRIED)])
-    np.testing.assert_allclose(command[:2], 0.0)
-
-
 def test_whoever_is_nearest_has_an_object_and_the_others_take_the_next():
     robots = [(10.0, 8.1, EAST, -1), (11.0, 8.1, EAST, -1), (12.0, 8.1, EAST, -1)]
     _, policy = commands(robots, [(65, 40, FREE), (80, 40, FREE)])

@@ -85,21 +85,6 @@ def test_a_robot_remembers_where_it_picked_up_until_it_comes_back_and_finds_noth
     assert seen(interface, env, "pickup_site")[2] == 0.0
 
 
-def test_a_robot_remembers_an_object_seen_on_its_way_home():
-    env = tidy_world(n_robots=1)
-    interface = remembering(env, observation="compact")
-    lay(env, 1, (62, 40))
-    put(env, 0, *PLACE)
-    assert seen(interface, env, "sighting_site")[2] == 0.0, "without cargo it takes the object and need not remember it"
-    load(env, 0, 0)
-    np.testing.assert_allclose(seen(interface, env, "sighting_site"), [0.4, 0, 1, 0.02], atol=1e-5)
-    env.swarm.carried_object[0] = -1
-    put(env, 0, *cell_centre((62, 40)))
-    seen(interface, env, "sighting_site")
-    load(env, 0, 1)
-    assert seen(interface, env, "sighting_site")[2] == 0.0, "that was the object"
-
-
 def test_a_new_run_begins_without_memory_and_a_copy_has_it():
     plan = plan_arena("warehouse_small", n_robots=2, physics="compiled", interface=INTERFACE)
     arena = LearnerArena(plan)

@@ -54,7 +54,6 @@ def test_exported_networks_choose_as_the_model_does(algorithm, interface, fields
             r"Expected a model from Box\(\d+\) to Box\(2\) .*, got one from Box\(23\) to Box\(2\)",
         ),
         ({"actions": "discrete"}, r"to Discrete\(6\) .* to Box\(2\)"),
-        ({"automatic_gripper": False}, r"to Box\(3\) .* to Box\(2\)"),
     ],
 )
 def test_the_interface_of_an_export_is_that_of_the_model(wrong, reason):

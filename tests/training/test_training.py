@@ -26,7 +26,6 @@ from swarm_forage_env.training.sb3 import PresentReplayBuffer, training
 from swarm_forage_env.training.sb3.export import export_network
 from swarm_forage_env.training.sb3.training import train
 from swarm_forage_env.views.sampler import ScenarioSampler
-from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.world import World
 from tests.support.sampled import sampler
 
@@ -162,19 +161,6 @@ def test_a_training_that_diverges_leaves_the_checkpoint_before(tmp_path):
     assert (tmp_path / "model.zip").read_bytes() == sound
 
 
-def test_a_rollout_with_nobody_at_work_says_so(tmp_path):
-    plan = tiny_plan(
-        world=World(
-            warehouse_small(n_robots=1, n_objects=20, horizon_s=200.0),
-            (parse_wrapper("population:malfunction_per_tick=0.2,repair_per_tick=0.201"),),
-        ),
-        n_arenas=1,
-        options={"n_steps": 2, "batch_size": 2},
-    )
-    with pytest.raises(ConfigError, match=r"Cannot train in stage 1.*: Expected a robot at work"):
-        train(plan, tmp_path)
-
-
 def test_ctrl_c_before_the_first_evaluation_loses_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(training, "_REPORT_EVERY_S", 0.0)
     plan = tiny_plan(evaluation=EvaluationPlan(every_steps=10_000, horizon_s=200.0, n_runs=1, baseline="random"))
@@ -216,9 +202,7 @@ def test_extra_columns_and_rewards_reach_training_and_evaluations(tmp_path):
     ("changes", "resume", "reason"),
     [
         ({"options": {"learning_rat": 1.0}}, False, "Did you mean 'learning_rate'"),
-        ({"stages": (Stage(steps=128), Stage(steps=1, options={"seed": 3}))}, False, "Unknown option of ppo 'seed'"),
         ({"options": {"n_steps": 1, "batch_size": 1}}, False, "Cannot prepare ppo with its options: `batch_size`"),
-        ({"evaluation": EvaluationPlan(baseline="gone.npz")}, False, r"gone\.npz"),
         # Clusters are drawn by the first reset.
         (
             {"world": World(search_and_rescue(side_m=48.0, n_robots=4, horizon_s=200.0)),
