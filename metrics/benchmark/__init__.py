@@ -1,9 +1,9 @@
 """A benchmark that others can enter: a fixed protocol of worlds and seeds, entry files, and what they are worth."""
 
-from .board import Board, board_of, draw_benchmark
+from .board import Board, board_of
 from .entry import Entry, Training, read_entry, run_benchmark
 from .protocol import BenchmarkError, Protocol, ProtocolWorld, load_protocol
-from .standing import Standing, reference_of, scripted_entries, standing_of
+from .standing import Standing
 from .verification import SAME, verify_entry
 
 __all__ = [
@@ -11,11 +11,7 @@ __all__ = [
     "verify_entry",
     "load_protocol",
     "read_entry",
-    "scripted_entries",
-    "reference_of",
-    "standing_of",
     "board_of",
-    "draw_benchmark",
     "Board",
     "Protocol",
     "ProtocolWorld",

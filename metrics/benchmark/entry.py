@@ -10,18 +10,17 @@ numbers can also write a new digest. To be sure of an entry, verify it.
 """
 
 import json
-import math
 import os
 import shlex
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from msgspec import Meta
 
-from swarm_forage_env._internal.fields import Amount, Count, Name, Share, checked, read
+from swarm_forage_env._internal.fields import Amount, Checked, Count, Name, Share, checked, read
 from swarm_forage_env._internal.files import read_json, replacing
 from swarm_forage_env.contract.policy import sees_world
 from swarm_forage_env.policies.registry import file_of, is_policy_file, policy_class, policy_label
@@ -34,26 +33,18 @@ from ..controllers import PAPER_POLICIES
 from ..curves import FloatArray
 from .protocol import OPEN, BenchmarkError, Protocol, load_protocol
 
-TRAINED_IN = ("given", "other", "nothing", "unknown")
-"""Where a policy was trained: in the training worlds only, also elsewhere, not at all, or the author does not say."""
-
 
 @dataclass(frozen=True, kw_only=True)
-class Training:
+class Training(Checked):
     """How the author says that the policies of an entry were made."""
 
-    worlds: str = "unknown"
-    """One of `TRAINED_IN`."""
+    worlds: Literal["given", "other", "nothing", "unknown"] = "unknown"
+    """Where a policy was trained: in the training worlds only, also elsewhere, not at all, or nobody says."""
     command: str = ""
     track: str = OPEN
     """One of the protocol's tracks, or `OPEN`."""
     decisions: Count | None = None
     """Decisions of its longest training, counted over all robots."""
-
-    def __post_init__(self) -> None:
-        if self.worlds not in TRAINED_IN:
-            raise BenchmarkError(f"Expected training worlds to be one of {', '.join(TRAINED_IN)}, got {self.worlds!r}.")
-        checked("decisions of a training", self.decisions, Count | None)
 
     def check_track(self, protocol: Protocol, n_policies: int) -> None:
         """Refuse a training that does not fit its track.
@@ -66,30 +57,23 @@ class Training:
             BenchmarkError: an unknown track; or one with a budget for policies that trained elsewhere, too long or too
                 seldom, or whose author does not say so.
         """
-        if self.track not in (*protocol.tracks, OPEN):
-            raise BenchmarkError(
-                f"Expected a track of the benchmark ({', '.join((*protocol.tracks, OPEN))}), got {self.track!r}; "
-                "choose one with --track."
-            )
-        budget = protocol.tracks.get(self.track)
-        if budget is None:
+        if self.track == OPEN:
             return
-        if self.worlds != "given":
-            raise BenchmarkError(
-                f"Expected a training in the training worlds only (given) for the track {self.track}, got "
-                f"{self.worlds!r}; say --trained-in given, or choose --track {OPEN}."
-            )
-        if self.decisions is None or self.decisions > budget:
-            told = "none" if self.decisions is None else f"{self.decisions:,}"
-            raise BenchmarkError(
-                f"Expected at most {budget:,} decisions of a training for the track {self.track}, got {told}; say how "
-                f"many with --decisions, or choose --track {OPEN}."
-            )
-        if n_policies < protocol.n_trainings:
-            raise BenchmarkError(
-                f"Expected {protocol.n_trainings} trainings for the track {self.track}, got {n_policies}; give one "
-                f"a file for each, or choose --track {OPEN}."
-            )
+        if self.track not in protocol.tracks:
+            known = ", ".join((*protocol.tracks, OPEN))
+            raise BenchmarkError(f"Expected --track to be one of {known}, got {self.track!r}.")
+        budget, n_trainings = protocol.tracks[self.track], protocol.n_trainings
+        decisions = "none" if self.decisions is None else f"{self.decisions:,}"
+        is_short = self.decisions is not None and self.decisions <= budget
+        for is_kept, wanted, got in (
+            (self.worlds == "given", "a training in the training worlds only (--trained-in given)", repr(self.worlds)),
+            (is_short, f"at most {budget:,} decisions of a training (--decisions)", decisions),
+            (n_policies >= n_trainings, f"{n_trainings} trainings, a file each,", n_policies),
+        ):
+            if not is_kept:
+                raise BenchmarkError(
+                    f"Expected {wanted} for the track {self.track}, got {got}; or choose --track {OPEN}."
+                )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,8 +110,6 @@ class Entry:
     runs: Mapping[str, WorldRuns]
     """World -> its runs."""
     training: Training = field(default_factory=Training)
-    core_hours: Amount | None = None
-    """Core-hours that the runs of the entry took, as far as their records say; None if no record says it."""
     versions: Mapping[str, str] = field(default_factory=dict[str, str])
 
     def performance(self, world: str) -> FloatArray:
@@ -165,11 +147,7 @@ class Entry:
             draft.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
 
     def check(self, protocol: Protocol, where: str) -> None:
-        """Refuse an entry of another protocol, or one that lacks runs.
-
-        Args:
-            protocol: The protocol that it must belong to.
-            where: Name of the entry in messages.
+        """Refuse an entry of another protocol, or one that lacks runs; `where` names it in messages.
 
         Raises:
             BenchmarkError: see above.
@@ -180,19 +158,16 @@ class Entry:
                 "benchmark again."
             )
         digests = [policy.digest for policy in self.policies if policy.digest]
-        if self.training.track in protocol.tracks and len({*digests}) < len(digests):
+        if self.training.track != OPEN and len({*digests}) < len(digests):
             raise BenchmarkError(f"Expected different trainings in {where}, got one file twice.")
-        worlds = {world.name for world in protocol.worlds}
-        if worlds != {*self.runs}:
-            odd = sorted(worlds.symmetric_difference(self.runs))
-            raise BenchmarkError(
-                f"Expected runs of all {len(worlds)} worlds in {where} and of no other; see {odd[0]!r}."
-            )
         self.training.check_track(protocol, len(self.policies))
+        odd = sorted({world.name for world in protocol.worlds}.symmetric_difference(self.runs))
+        if odd:
+            raise BenchmarkError(f"Expected runs of all worlds in {where} and of no other; see {odd[0]!r}.")
         shape = (len(self.policies), len(protocol.seeds))
         for world, runs in self.runs.items():
             for name, rows in vars(runs).items():
-                if {len(row) for row in rows} != {shape[1]} or len(rows) != shape[0]:
+                if [len(row) for row in rows] != [shape[1]] * shape[0]:
                     raise BenchmarkError(
                         f"Expected {name} in the world {world!r} of {where} as lists of numbers, one for each of "
                         f"{shape[0]} policies and {shape[1]} seeds."
@@ -230,8 +205,7 @@ def check_finished(table: Table) -> None:
     Raises:
         BenchmarkError: runs failed.
     """
-    if table.failures:
-        first = next(iter(table.failures.values()))
+    for first in table.failures.values():
         raise BenchmarkError(
             f"Expected all {len(table.plan.specs)} runs to finish, {len(table.failures)} failed; the first, "
             f"{first.spec.describe()}: {first.error}"
@@ -275,14 +249,18 @@ def run_benchmark(
     if not chosen.is_quick:
         told.check_track(chosen, len(policies))
     specs = policy_specs(policies)
-    omniscient = [spec.label for spec in specs if sees_world(policy_class(spec.policy))]
-    if omniscient:
-        raise BenchmarkError(
-            f"Expected policies that decide by what robots observe, got {omniscient[0]}, which reads the world. It is "
-            "a yardstick and no contestant: swarm-forage run puts it beside others."
-        )
-    plan = Plan.product(specs, [each.world for each in chosen.worlds], chosen.seeds)
-    table = run_plan(plan, out=out, jobs=jobs, progress=progress)
+    for spec in specs:
+        if sees_world(policy_class(spec.policy)):
+            raise BenchmarkError(
+                f"Expected policies that decide by what robots observe, got {spec.label}, which reads the world. It is "
+                "a yardstick and no contestant: swarm-forage run puts it beside others."
+            )
+    table = run_plan(
+        Plan.product(specs, [each.world for each in chosen.worlds], chosen.seeds),
+        out=out,
+        jobs=jobs,
+        progress=progress,
+    )
     check_finished(table)
     return Entry(
         protocol=chosen.identity,
@@ -293,11 +271,27 @@ def run_benchmark(
             for spec in specs
             for digest, seed in [policy_origin(spec.policy)]
         ),
-        runs=_runs(chosen, table),
+        runs={
+            world.name: WorldRuns(
+                performance=_of_all(table, world.name, lambda record: record.per_1000_s("performance")),
+                interference=_of_all(table, world.name, lambda record: float(record["interference_fraction"].mean())),
+            )
+            for world in chosen.worlds
+        },
         training=told,
-        core_hours=_core_hours(table.records.values()),
         versions={package: version for package, version in software_versions().items() if version},
     )
+
+
+def _of_all(table: Table, world: str, value: Callable[[Record], float]) -> tuple[tuple[float, ...], ...]:
+    """A number of each run in a world, (policies, seeds)."""
+    conditions = [condition for condition in table.plan.conditions if condition.world.name == world]
+    return tuple(tuple(six_digits(value(record)) for record in table.of(one)) for one in conditions)
+
+
+def six_digits(value: float) -> float:
+    """Return a number as entry files hold it: further digits would only make files longer."""
+    return float(f"{value:.6g}")
 
 
 def entry_command(policies: Sequence[str], name: str, *, training: Training | None = None) -> str:
@@ -305,19 +299,15 @@ def entry_command(policies: Sequence[str], name: str, *, training: Training | No
 
     What a training was is among the words only where its track asks for it.
     """
-    words = map(_from_here, policies)
-    budget: list[str] = []
+    words: list[str] = []
+    for policy in policies:
+        file = file_of(policy)
+        is_whole = is_policy_file(policy) and Path(file).is_absolute()
+        words.append(Path(os.path.relpath(file)).as_posix() + policy.removeprefix(file) if is_whole else policy)
+    words += ["--name", name]
     if training is not None and training.track != OPEN:
-        budget = ["--trained-in", training.worlds, "--track", training.track, "--decisions", str(training.decisions)]
-    return shlex.join(["swarm-forage", "benchmark", *words, "--name", name, *budget])
-
-
-def _from_here(policy: str) -> str:
-    """A policy with the path of its file from the current folder, where the whole path was given."""
-    file = file_of(policy)
-    if not (is_policy_file(policy) and Path(file).is_absolute()):
-        return policy
-    return Path(os.path.relpath(file)).as_posix() + policy.removeprefix(file)
+        words += ["--trained-in", training.worlds, "--track", training.track, "--decisions", str(training.decisions)]
+    return shlex.join(["swarm-forage", "benchmark", *words])
 
 
 def policy_origin(policy: str) -> tuple[str, int | None]:
@@ -333,30 +323,3 @@ def policy_origin(policy: str) -> tuple[str, int | None]:
     plan: Any = card.get("plan")
     seed = dict[str, Any](plan).get("seed") if isinstance(plan, dict) else None  # pyright: ignore[reportUnknownArgumentType] - a card holds anything
     return file_digest(file), seed if isinstance(seed, int) else None
-
-
-def _core_hours(records: Iterable[Record]) -> float | None:
-    """What runs took, of those whose records tell it; three digits, as time is never the same twice."""
-    known = [record.cpu_time_s for record in records if math.isfinite(record.cpu_time_s)]
-    return float(f"{sum(known) / 3600.0:.3g}") if known else None
-
-
-def _runs(protocol: Protocol, table: Table) -> dict[str, WorldRuns]:
-    """World -> performance and interference of all policies and seeds."""
-
-    def of_all(world: str, value: Callable[[Record], float]) -> tuple[tuple[float, ...], ...]:
-        conditions = [condition for condition in table.plan.conditions if condition.world.name == world]
-        return tuple(tuple(six_digits(value(record)) for record in table.of(one)) for one in conditions)
-
-    return {
-        world.name: WorldRuns(
-            performance=of_all(world.name, lambda record: record.per_1000_s("performance")),
-            interference=of_all(world.name, lambda record: float(record["interference_fraction"].mean())),
-        )
-        for world in protocol.worlds
-    }
-
-
-def six_digits(value: float) -> float:
-    """Return a number as entry files hold it: further digits would only make files longer."""
-    return float(f"{value:.6g}")

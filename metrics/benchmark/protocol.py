@@ -21,23 +21,20 @@ FOLDER = Path(__file__).parent
 """Where the protocol is, and in `scripted` the entries of the scripted controllers."""
 OPEN = "open"
 """The track without a budget."""
-_KEYS = ("physics", "horizon_s", "interval_s", "seeds", "trainings", "tracks", "quick", "training", "group")
-_TRAINING_KEYS = ("name", "scenario", "set")
-_GROUP_KEYS = ("name", "scenario", "set", "sizes", "disturbed", "variants")
 
 
 class BenchmarkError(ValueError):
-    """A protocol or an entry that cannot be used; the message says why, and what to do."""
+    """An entry that cannot be made or used; the message says why, and what to do."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class ProtocolWorld:
     """A world where every policy is run once per seed."""
 
     world: World
     """With a unique name: "corridor, long", "late, slow wheels"."""
-    group: str
-    """The group of worlds it belongs to; empty for a world to train in."""
+    group: str = ""
+    """The group of held-out worlds it belongs to; empty for a world to train in."""
     is_scored: bool = True
     """Whether its performance counts; that of a lone robot does not."""
 
@@ -47,19 +44,14 @@ class ProtocolWorld:
         return self.world.name
 
     @property
-    def is_held_out(self) -> bool:
-        """Whether nobody is to train in it."""
-        return bool(self.group)
-
-    @property
     def is_disturbed(self) -> bool:
         """Whether something disturbs the swarm."""
         return bool(self.world.wrappers)
 
     @property
     def counts(self) -> bool:
-        """Whether its performance is part of the score."""
-        return self.is_held_out and self.is_scored
+        """Whether its performance is part of the score: it is held out, and no lone robot is in it."""
+        return bool(self.group) and self.is_scored
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -69,8 +61,6 @@ class Protocol:
     identity: str
     """Short hash of what the file says: two protocols with the same one ask for the same runs."""
     is_quick: bool
-    horizon_s: float
-    interval_s: float
     seeds: tuple[int, ...]
     worlds: tuple[ProtocolWorld, ...]
     """The worlds to train in first."""
@@ -85,59 +75,29 @@ class Protocol:
         return tuple(world for world in self.worlds if world.counts)
 
 
-def scripted_folder() -> Path:
-    """Return where the entries of the scripted controllers are."""
-    return FOLDER / "scripted"
-
-
-def load_protocol(file: str | Path | None = None, *, quick: bool = False) -> Protocol:
+def load_protocol(file: Path | None = None, *, quick: bool = False) -> Protocol:
     """Read a protocol.
 
     Args:
         file: Default that of the package.
         quick: Shorter runs with fewer seeds, as the file says; no entry can be made of them.
-
-    Raises:
-        BenchmarkError: the file cannot be read or describes no protocol; the message names it.
     """
     from swarm_forage_env._internal.files import parse_toml
-
-    path = FOLDER / "benchmark.toml" if file is None else Path(file)
-    try:
-        return _protocol(parse_toml(path.read_text(encoding="utf-8")), quick=quick)
-    except OSError as error:
-        raise BenchmarkError(f"Cannot read the protocol {path}: {error.strerror or error}.") from error
-    except (ValueError, KeyError, TypeError) as error:
-        reason = f"missing key {error}" if isinstance(error, KeyError) else str(error)
-        raise BenchmarkError(f"Cannot use the protocol {path}: {reason}") from error
-
-
-def _protocol(content: Mapping[str, Any], *, quick: bool) -> Protocol:
-    from swarm_forage_env._internal.fields import ConfigError, known_keys
     from swarm_forage_env.runs.spec import identity_of
 
-    known_keys(content, _KEYS, "key of a protocol")
+    content = parse_toml((file or FOLDER / "benchmark.toml").read_text(encoding="utf-8"))
     chosen = {name: content[name] for name in ("physics", "horizon_s", "interval_s", "seeds")}
-    if quick:
-        known_keys(content["quick"], ("horizon_s", "seeds"), prefix="quick.")
-        chosen |= content["quick"]
+    chosen |= content["quick"] if quick else {}
     seeds = tuple(chosen.pop("seeds"))
-    worlds: list[ProtocolWorld] = []
-    for entry in content.get("training", []):
-        known_keys(entry, _TRAINING_KEYS, prefix="training.")
-        world = World(_scenario(entry, chosen), name=f"training: {entry['name']}")
-        worlds.append(ProtocolWorld(world=world, group=""))
+    worlds = [
+        ProtocolWorld(World(_scenario(entry, chosen), name=f"training: {entry['name']}"))
+        for entry in content["training"]
+    ]
     for entry in content["group"]:
-        known_keys(entry, _GROUP_KEYS, prefix="group.")
         worlds += _of_group(entry, chosen)
-    names = [world.name for world in worlds]
-    if len(set(names)) < len(names):
-        raise ConfigError(f"Expected each world once, got {', '.join(names)}.")
     return Protocol(
         identity=identity_of({**content, "is_quick": quick}),
         is_quick=quick,
-        horizon_s=chosen["horizon_s"],
-        interval_s=chosen["interval_s"],
         seeds=seeds,
         worlds=tuple(worlds),
         tracks=content["tracks"],
@@ -169,12 +129,10 @@ def _of_group(entry: Mapping[str, Any], of_all: Mapping[str, Any]) -> Iterator[P
     name, base = entry["name"], _scenario(entry, of_all)
     for what, fields in entry.get("variants", {}).items():
         varied = _scenario({**entry, "set": {**entry.get("set", {}), **fields}}, of_all)
-        yield ProtocolWorld(world=World(varied, name=f"{name}, {what}"), group=name)
+        yield ProtocolWorld(World(varied, name=f"{name}, {what}"), name)
     for size in entry.get("sizes", ()):
-        sized = World(
-            replace(base, robots=replace(base.robots, n_robots=size)),
-            name=f"{name}, {size} robot{'s' if size > 1 else ''}",
-        )
-        yield ProtocolWorld(world=sized, group=name, is_scored=size > 1)
+        sized = replace(base, robots=replace(base.robots, n_robots=size))
+        called = f"{name}, {size} robot{'s' if size > 1 else ''}"
+        yield ProtocolWorld(World(sized, name=called), name, is_scored=size > 1)
     for what, tables in entry.get("disturbed", {}).items():
-        yield ProtocolWorld(world=World(base, wrappers_from_mapping(tables), name=f"{name}, {what}"), group=name)
+        yield ProtocolWorld(World(base, wrappers_from_mapping(tables), name=f"{name}, {what}"), name)

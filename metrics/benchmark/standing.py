@@ -9,33 +9,23 @@ scores of its trainings: a training that failed counts as one of them. Its inter
 entry runs.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
 from ..controllers import PAPER_POLICIES
 from ..curves import FloatArray
 from ..statistics import N_RESAMPLES, Estimate, aggregate, interquartile_mean, probability_of_improvement
+from . import protocol as places
 from .entry import Entry, read_entry
-from .protocol import BenchmarkError, Protocol, ProtocolWorld, scripted_folder
+from .protocol import Protocol, ProtocolWorld
 
 _SEED = 1
 """Seed of the bootstrap; fixed, so that the same entries give the same page."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Reference:
-    """The best scripted controller in each held-out world and each training world."""
-
-    best: dict[str, str]
-    """World -> name of the controller with the highest mean."""
-    runs: dict[str, FloatArray]
-    """World -> performance of its runs, per 1,000 s, (runs,)."""
-
-    def mean(self, world: str) -> float:
-        """Return the mean performance of the best scripted controller in a world, per 1,000 s."""
-        return float(self.runs[world].mean())
+Reference: TypeAlias = Mapping[str, FloatArray]
+"""World -> performance of the runs of the best scripted controller there, per 1,000 s, (runs,)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,8 +38,6 @@ class Standing:
     best scripted controller."""
     improvement: Estimate
     """Probability that one of its runs beats a run of the best scripted controller in the same world, in [0, 1]."""
-    gap: float
-    """Optimality gap: how far runs in held-out worlds fall short of the best scripted controller, mean over runs."""
     n_won: int
     """Number of held-out worlds in which its mean is higher than the means of the paper's four controllers."""
     n_worlds: int
@@ -67,84 +55,63 @@ class Standing:
 
 
 def scripted_entries(protocol: Protocol) -> tuple[Entry, ...]:
-    """Return the entries of the scripted controllers, which come with the package.
-
-    Args:
-        protocol: The full protocol, not the quick one.
-
-    Raises:
-        BenchmarkError: one is missing, or belongs to another protocol.
-    """
-    return tuple(read_entry(scripted_folder() / f"{name}.json", protocol) for name in PAPER_POLICIES)
+    """Return the entries of the scripted controllers, which come with the package; of the full protocol."""
+    return tuple(read_entry(places.FOLDER / "scripted" / f"{name}.json", protocol) for name in PAPER_POLICIES)
 
 
 def reference_of(scripted: Sequence[Entry], protocol: Protocol) -> Reference:
-    """Return the best scripted controller of each world.
-
-    Raises:
-        BenchmarkError: no scripted controller achieves anything in a world that counts, so shares are undefined there.
-    """
-    best: dict[str, str] = {}
-    runs: dict[str, FloatArray] = {}
-    for world in _judged(protocol):
-        winner = max(scripted, key=lambda entry: float(entry.performance(world.name).mean()))
-        best[world.name] = winner.name
-        runs[world.name] = winner.performance(world.name).ravel()
-        if runs[world.name].mean() <= 0.0:
-            raise BenchmarkError(
-                f"Expected a scripted controller that achieves something in the world {world.name!r}, got none; the "
-                "protocol needs a world in its place."
-            )
-    return Reference(best=best, runs=runs)
+    """Return the runs of the best scripted controller in each held-out world and each training world."""
+    return {
+        world.name: max((entry.performance(world.name) for entry in scripted), key=np.mean).ravel()
+        for world in protocol.worlds
+        if world.is_scored
+    }
 
 
 def standing_of(entry: Entry, reference: Reference, protocol: Protocol) -> Standing:
     """Return what an entry is worth; the rates of a quick entry are compared with rates of longer runs."""
-    shares = {world.name: shares_of(entry, world, reference) for world in _judged(protocol)}
+    judged = [world for world in protocol.worlds if world.is_scored]
+    shares = {world.name: shares_of(entry, world, reference) for world in judged}
     policies = [[k] for k in range(len(entry.policies))]
     parts = policies if entry.is_trained else [[k for (k,) in policies]]  # what each has a score of its own
     resampled = 1 if entry.is_trained else N_RESAMPLES  # the interval of trainings needs none
 
     def scores(chosen: Callable[[ProtocolWorld], bool], of: Sequence[list[int]] = parts) -> list[Estimate]:
-        """Return the score of each part in some of the worlds; none where there is no such world."""
-        picked = [shares[world.name] for world in _judged(protocol) if chosen(world)]
+        """Return the score of each part in some of the worlds."""
+        picked = [shares[world.name] for world in judged if chosen(world)]
         return [
             interquartile_mean([runs[part].ravel() for runs in picked], seed=_SEED, n_resamples=resampled)
             for part in of
-            if picked
         ]
 
     def middle(chosen: Callable[[ProtocolWorld], bool]) -> float:
-        found = scores(chosen)
-        return float(np.mean([one.value for one in found])) if found else float("nan")
+        return float(np.mean([one.value for one in scores(chosen)]))
 
-    def counts(world: ProtocolWorld) -> bool:
-        return world in counting
-
+    held_out = scores(lambda world: world.counts)
     counting = protocol.scored
     performances = [entry.performance(world.name) for world in counting]
-    theirs = [reference.runs[world.name] for world in counting]
+    theirs = [reference[world.name] for world in counting]
     chances = [
         probability_of_improvement(
             [runs[part].ravel() for runs in performances], theirs, seed=_SEED, n_resamples=resampled
         )
         for part in parts
     ]
-    by_policy = scores(counts, policies) if len(policies) > 1 else []
-    won = [_n_won([runs[k] for runs in performances], theirs) for (k,) in policies]
+    is_several = len(policies) > 1
+    by_policy = scores(lambda world: world.counts, policies) if is_several else ()
+    won = [_n_won([runs[k] for runs in performances], theirs) for (k,) in policies] if is_several else ()
     return Standing(
         entry=entry,
-        score=over_trainings(scores(counts)) if entry.is_trained else scores(counts)[0],
+        score=over_trainings(held_out) if entry.is_trained else held_out[0],
         improvement=_within_0_and_1(over_trainings(chances)) if entry.is_trained else chances[0],
-        gap=float(np.maximum(0.0, 1.0 - np.concatenate([shares[world.name].ravel() for world in counting])).mean()),
         n_won=_n_won(performances, theirs),
         n_worlds=len(counting),
         calm=middle(lambda world: world.counts and not world.is_disturbed),
         disturbed=middle(lambda world: world.counts and world.is_disturbed),
-        training=middle(lambda world: not world.is_held_out),
+        training=middle(lambda world: not world.group),
         interference=float(np.mean([entry.interference(world.name).mean() for world in counting])),
         by_policy=tuple(each.value for each in by_policy),
-        won_by_policy=tuple(won) if len(won) > 1 else (),
+        won_by_policy=tuple(won),
     )
 
 
@@ -177,8 +144,4 @@ def _within_0_and_1(estimate: Estimate) -> Estimate:
 
 def shares_of(entry: Entry, world: ProtocolWorld, reference: Reference) -> FloatArray:
     """Return the performance of an entry's runs over the best scripted mean in a world, (policies, seeds)."""
-    return entry.performance(world.name) / reference.mean(world.name)
-
-
-def _judged(protocol: Protocol) -> tuple[ProtocolWorld, ...]:
-    return tuple(world for world in protocol.worlds if world.is_scored)
+    return entry.performance(world.name) / reference[world.name].mean()

@@ -1,7 +1,7 @@
 """The commands `benchmark`, `benchmark show` and `benchmark verify`."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from cyclopts import App, Parameter
 from cyclopts.types import NonNegativeInt, PositiveInt
@@ -24,7 +24,7 @@ def run(
     file: Path | None = None,
     out: Path = FOLDER / "records",
     quick: bool = False,
-    trained_in: str = "unknown",
+    trained_in: Literal["given", "other", "nothing", "unknown"] = "unknown",
     training_command: Annotated[str, Parameter(name="--training")] = "",
     track: str = "open",
     decisions: NonNegativeInt | None = None,
@@ -50,8 +50,7 @@ def run(
         raise ConfigError("Expected --name for an entry of several policies.")
     if quick and file is not None:
         raise ConfigError("Expected --file without --quick: a quick look is no entry.")
-    from metrics.benchmark import Training, board_of, load_protocol, run_benchmark, scripted_entries
-    from metrics.controllers import PAPER_POLICIES
+    from metrics.benchmark import Training, board_of, load_protocol, run_benchmark
     from swarm_forage_env._internal.files import as_file_name, check_file
     from swarm_forage_env.policies.registry import policy_label
 
@@ -61,8 +60,6 @@ def run(
     entry_file = None if quick else file or FOLDER / f"{as_file_name(called)}.json"
     if entry_file is not None:
         check_file(entry_file)
-    if called not in PAPER_POLICIES:
-        scripted_entries(load_protocol())  # what it will be shown beside
     entry = run_benchmark([*policies], name=called, protocol=protocol, training=training, out=out, jobs=jobs)
     if entry_file is not None:
         entry.write(entry_file)

@@ -26,7 +26,6 @@ def made_up_entry(
     given: dict[str, Any] = {
         "command": f"swarm-forage benchmark --policy {name}",
         "training": Training(worlds="nothing"),
-        "core_hours": 0.25,
         "versions": {"numpy": "2.0"},
         **fields,
     }

@@ -1,12 +1,13 @@
 """Entry files: what is written is read back, and a file that is no whole entry is refused in a clear line."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from metrics.benchmark import BenchmarkError, Training, load_protocol, read_entry, run_benchmark
-from swarm_forage_env._internal.fields import ConfigError
+from metrics.benchmark import BenchmarkError, Training, load_protocol, read_entry
+from metrics.benchmark.entry import entry_command
 from swarm_forage_env.runs.spec import identity_of
 from tests.support.entries import TINY, made_up_entry
 
@@ -23,23 +24,12 @@ def file(protocol, tmp_path):
     return path
 
 
-def altered(file, change):
-    content = json.loads(file.read_text())
-    change(content)
-    file.write_text(json.dumps(content))
-    return file
-
-
 def test_what_is_written_is_read_back(protocol, file):
     entry = made_up_entry(protocol, "one", lambda k: 10.0 + k, n_policies=2)
     found = read_entry(file, protocol)
     assert found == entry
     np.testing.assert_array_equal(found.performance("training: here"), [[10.0, 12.0], [11.0, 13.0]])
-
-
-def test_a_file_has_one_line_per_world_so_that_changes_can_be_read(protocol, file):
-    lines = file.read_text().splitlines()
-    assert sum(line.startswith('  "room, ') for line in lines) == 6
+    assert sum(line.startswith('  "room, ') for line in file.read_text().splitlines()) == 6, "a line per world"
 
 
 def put(*path_and_value):
@@ -53,25 +43,22 @@ def put(*path_and_value):
     return change
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (put("protocol", "0" * 16), "got one of other worlds or seeds"),
-        (put("name", 5), "Expected name to be a non-empty text"),
-        (put("name", "\x1b[31m"), "Expected name to be a non-empty text without control characters"),
-        (put("core_hours", -1), "Expected core_hours to be a finite number >= 0"),
-        (put("runs", "x"), "Expected runs to be a table"),
-        (put("runs", "room, 2 robots", "performance", 0, 0, -1.0), r"performance\[0\]\[0\] to be a finite number >= 0"),
-        (put("runs", "room, 2 robots", "performance", [[1.0], [1.0]]), "for each of 2 policies and 2 seeds"),
-        (put("runs", "room, 2 robots", "beauty", [[1.0, 1.0]] * 2), "Unknown key .*beauty"),
-        (put("runs", "mars", {"performance": [[1.0, 1.0]] * 2, "interference": [[0.1, 0.1]] * 2}), "see 'mars'"),
-        (put("runs", "room, 2 robots", "interference", 0, 0, 1.5), r"interference.* to be a number from 0 to 1"),
-        (put("policies", []), "Expected policies to have at least 1"),
-        (put("policies", 0, "colour", "red"), "colour"),
-        (put("training", "worlds", "everywhere"), "Expected training worlds to be one of given, other"),
-        (put("versions", {"numpy": 2}), "versions.numpy to be a text"),
-    ],
-)
+ROOM = ("runs", "room, 2 robots")
+ODD = {
+    "protocol": (put("protocol", "0" * 16), "got one of other worlds or seeds"),
+    "name": (put("name", "\x1b[31m"), "Expected name to be a non-empty text without control characters"),
+    "amount": (put(*ROOM, "performance", 0, 0, -1.0), r"performance\[0\]\[0\] to be a finite number >= 0"),
+    "share": (put(*ROOM, "interference", 0, 0, 1.5), r"interference.* to be a number from 0 to 1"),
+    "number of runs": (put(*ROOM, "performance", [[1.0], [1.0]]), "for each of 2 policies and 2 seeds"),
+    "unknown key": (put(*ROOM, "beauty", [[1.0, 1.0]] * 2), "Unknown key .*beauty"),
+    "unknown world": (put("runs", "mars", {"performance": [], "interference": []}), "see 'mars'"),
+    "missing world": (lambda content: content["runs"].pop("room, 2 robots"), "see 'room, 2 robots'"),
+    "no policies": (put("policies", []), "Expected policies to have at least 1"),
+    "training": (put("training", "worlds", "everywhere"), "worlds to be one of"),
+}
+
+
+@pytest.mark.parametrize(("change", "message"), ODD.values(), ids=ODD)
 def test_an_entry_from_a_stranger_is_refused_by_the_name_of_the_field(change, message, protocol, file):
     content = json.loads(file.read_text())
     change(content)
@@ -82,34 +69,37 @@ def test_an_entry_from_a_stranger_is_refused_by_the_name_of_the_field(change, me
     assert str(file) in str(refused.value)
 
 
-def test_a_quick_look_is_no_entry(protocol, tmp_path):
-    quick = load_protocol(TINY, quick=True)
-    made_up_entry(quick, "one", lambda k: 1.0).write(tmp_path / "quick.json")
-    with pytest.raises(BenchmarkError, match="got one of other worlds or seeds"):
-        read_entry(tmp_path / "quick.json", protocol)
-
-
-def test_altered_numbers_and_missing_worlds_are_found(protocol, file):
+def test_altered_numbers_are_found(protocol, file):
+    content = json.loads(file.read_text())
+    put(*ROOM, "performance", 0, 0, 77.0)(content)
+    file.write_text(json.dumps(content))
     with pytest.raises(BenchmarkError, match="the digest does not fit"):
-        read_entry(altered(file, put("runs", "room, 2 robots", "performance", 0, 0, 77.0)), protocol)
-    with pytest.raises(BenchmarkError, match="see 'room, 2 robots'"):
-        read_entry(altered(file, lambda content: content["runs"].pop("room, 2 robots")), protocol)
+        read_entry(file, protocol)
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{", '{"name": 1}'])
-def test_a_file_that_is_no_json_object_of_ours_is_refused(text, protocol, tmp_path):
-    (tmp_path / "entry.json").write_text(text)
+@pytest.mark.parametrize("text", ["", "[]", '{"name": 1}', None])
+def test_a_file_that_is_none_of_ours_is_named(text, protocol, tmp_path):
+    if text is not None:
+        (tmp_path / "entry.json").write_text(text)
     with pytest.raises(BenchmarkError, match=r"entry\.json"):
         read_entry(tmp_path / "entry.json", protocol)
 
 
-def test_a_missing_file_is_named(protocol, tmp_path):
-    with pytest.raises(BenchmarkError, match=r"Cannot read .*none\.json: No such file"):
-        read_entry(tmp_path / "none.json", protocol)
+def test_one_network_in_two_files_is_no_two_trainings(protocol, tmp_path):
+    in_short = Training(worlds="given", track="short", decisions=100)
+    entry = made_up_entry(protocol, "copies", lambda k: 10.0, n_policies=2, training=in_short)
+    for digests in ("ab", "aa"):
+        policies = tuple(replace(one, digest=mark) for one, mark in zip(entry.policies, digests, strict=True))
+        replace(entry, policies=policies).write(tmp_path / f"{digests}.json")
+    assert read_entry(tmp_path / "ab.json", protocol).name == "copies"
+    with pytest.raises(BenchmarkError, match=r"Expected different trainings in .*aa\.json, got one file twice"):
+        read_entry(tmp_path / "aa.json", protocol)
 
 
-def test_what_no_file_may_say_is_refused_before_any_run():
-    with pytest.raises(BenchmarkError, match="got 'mars'"):
-        Training(worlds="mars")
-    with pytest.raises(ConfigError, match="Expected the name of an entry to be a non-empty text"):
-        run_benchmark(["crw"], name="\x1b[31m")
+def test_a_command_names_files_from_here_and_the_track_of_a_training(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    given = [str(tmp_path / "deep" / "a.npz"), "b.npz", str(tmp_path / "a.py") + ":Mine", "crw"]
+    words = "swarm-forage benchmark deep/a.npz b.npz a.py:Mine crw --name x"
+    assert entry_command(given, "x", training=Training(worlds="given", decisions=5)) == words
+    in_short = Training(worlds="given", track="short", decisions=100)
+    assert entry_command(given, "x", training=in_short) == f"{words} --trained-in given --track short --decisions 100"

@@ -8,19 +8,10 @@ import numpy as np
 import pytest
 
 from metrics import PAPER_POLICIES
-from metrics.benchmark import (
-    BenchmarkError,
-    Training,
-    draw_benchmark,
-    load_protocol,
-    read_entry,
-    reference_of,
-    standing_of,
-)
+from metrics.benchmark import Board, Training, load_protocol, read_entry
 from metrics.benchmark.board import bounded
-from metrics.benchmark.standing import over_trainings, scripted_entries
+from metrics.benchmark.standing import over_trainings, reference_of, scripted_entries, standing_of
 from metrics.statistics import interquartile_mean
-from swarm_forage_env._internal.wording import plain_markdown
 from tests.support.entries import TINY, made_up_entry
 from tests.support.pictures import words_in
 
@@ -44,26 +35,19 @@ def reference(protocol, scripted):
 
 
 def test_the_reference_is_the_best_scripted_controller_of_each_world(protocol, reference):
-    for k, world in enumerate(protocol.worlds):
-        if world.is_scored:
-            assert reference.best[world.name] == PAPER_POLICIES[0 if k % 2 else 1]
-            assert reference.mean(world.name) == 20.0
-    assert "room, 1 robot" not in reference.best
+    assert {world: runs.tolist() for world, runs in reference.items()} == {
+        world.name: [19.0, 21.0] for world in protocol.worlds if world.is_scored
+    }
+    assert "room, 1 robot" not in reference
 
 
 def test_no_scripted_controller_wins_against_itself():
     protocol = load_protocol()
     entries = scripted_entries(protocol)
+    assert tuple(entry.name for entry in entries) == PAPER_POLICIES
     reference = reference_of(entries, protocol)
+    assert min(runs.mean() for runs in reference.values()) > 0.0, "shares exist in every world"
     assert [standing_of(entry, reference, protocol).n_won for entry in entries] == [0] * len(entries)
-
-
-def test_a_world_in_which_no_scripted_controller_achieves_anything_is_refused(protocol):
-    nobody = [
-        made_up_entry(protocol, name, lambda k: -1.0) for name in PAPER_POLICIES
-    ]  # -1 and 1 objects: 0 on average
-    with pytest.raises(BenchmarkError, match="training: here"):
-        reference_of(nobody, protocol)
 
 
 def test_the_score_is_the_interquartile_mean_of_shares(protocol, reference):
@@ -126,8 +110,7 @@ def test_policies_without_training_are_judged_by_all_their_runs(protocol, refere
     assert standing.by_policy[1] == 0.0
 
 
-@pytest.mark.parametrize("n_trainings", [2, 3, 5])
-@pytest.mark.parametrize("spread", [0.0, 0.05, 0.3])
+@pytest.mark.parametrize(("n_trainings", "spread"), [(2, 0.3), (5, 0.05)])
 def test_intervals_over_trainings_hold_the_truth(n_trainings, spread):
     """Trainings scatter by `spread`, runs by 0.1: about 95 of 100 intervals hold the score of all trainings."""
     rng = np.random.default_rng(1)
@@ -148,29 +131,11 @@ def test_intervals_over_trainings_hold_the_truth(n_trainings, spread):
     assert 0.92 * 400 <= held <= 0.985 * 400
 
 
-def test_the_gap_counts_only_what_is_missing(protocol, reference):
-    """The best of the four achieves 20: runs of 9 and 11 lack half of it, runs of 39 and 41 nothing."""
-    assert standing_of(made_up_entry(protocol, "half", lambda k: 9.0), reference, protocol).gap == pytest.approx(0.5)
-    assert standing_of(made_up_entry(protocol, "twice", lambda k: 39.0), reference, protocol).gap == 0.0
-
-
-@pytest.mark.parametrize("name", ["https://b.de/c", "www.b.de", "WWW.b.de", "a@b.de"])
-def test_addresses_in_names_are_no_addresses_to_github(name):
-    assert "<!-- -->" in plain_markdown(name)
-
-
 def test_the_figure_shows_every_entry_and_world(protocol, scripted, reference, tmp_path):
     pytest.importorskip("matplotlib")
-    standings = [standing_of(e, reference, protocol) for e in scripted]
-    draw_benchmark(standings, reference, protocol, tmp_path / "it.svg")
+    standings = tuple(standing_of(e, reference, protocol) for e in scripted)
+    Board(standings=standings, reference=reference, protocol=protocol).draw(tmp_path / "it.svg")
     assert {"CRW", "DPO", "STOCHM", "STOCHX", "room, noisy wheels"} <= {*words_in(tmp_path / "it.svg")}
-
-
-def test_the_entries_of_the_scripted_controllers_are_whole_and_achieve_something():
-    protocol = load_protocol()
-    entries = scripted_entries(protocol)
-    assert tuple(entry.name for entry in entries) == PAPER_POLICIES
-    reference_of(entries, protocol)
 
 
 def test_readme_tells_of_the_minute_what_its_entry_says():
