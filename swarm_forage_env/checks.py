@@ -14,13 +14,12 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from pathlib import PurePath
 from typing import Any, NamedTuple
 
 import numpy as np
 from pettingzoo import ParallelEnv
 
-from swarm_forage_env._internal.fields import ConfigError, instance, number, whole
+from swarm_forage_env._internal.fields import instance, number, whole
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env._internal.wording import install_command, suggestion
 from swarm_forage_env.contract.codes import Task
@@ -30,7 +29,7 @@ from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import LiveRun, build_stack
-from swarm_forage_env.runs.spec import stated_caches
+from swarm_forage_env.runs.spec import policy_spec
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import scenario as preset
@@ -185,8 +184,8 @@ def check_policy(
     is overwritten after `act`. Last it gets another number of robots.
 
     Args:
-        policy: A registered name, the path of a policy file, a class that needs no arguments, or an object (which is
-            copied).
+        policy: As in `runs.spec.policy_spec`: a name, the path of a file, a class that needs no arguments, an object
+            (which is copied), or a function of observations.
         scenario: Where it acts, with the caches that the policy states. Choose one in which your policy meets
             everything that it reacts to.
         seed: Seed of the environment and of the policy.
@@ -194,11 +193,11 @@ def check_policy(
 
     Raises:
         CheckError: about the first fault that is found.
-        ValueError: an unknown name or scenario.
+        ValueError: an unknown name or scenario, or caches that there are not.
     """
     whole("ticks", ticks, at_least=1)
-    subject = _built(_factory_of(policy))
-    config = _config_for(subject, scenario)
+    build, config = _subject(policy, scenario)
+    subject = build()
     world = ForageEnv(config)
     if sees_world(subject):
         raise CheckError(
@@ -376,12 +375,11 @@ def check_determinism(
     if not len(seeds):
         raise ValueError("Expected seeds to run, got none; give at least one.")
     number("seconds", seconds, above=0.0)
-    build = _factory_of(policy)
-    config = _config_for(_built(build), scenario)
+    build, config = _subject(policy, scenario)
     interval_s = _INTERVAL_TICKS * config.dt_s
     config = replace(config, interval_s=interval_s, horizon_s=max(1, round(seconds / interval_s)) * interval_s)
     for seed in seeds:
-        run, again = (_results(config, _built(build), seed) for _ in range(2))
+        run, again = (_results(config, build(), seed) for _ in range(2))
         for name, values in run.items():
             if not np.array_equal(values, again.get(name, np.empty(0))):
                 raise CheckError(
@@ -400,30 +398,13 @@ def _results(config: ScenarioConfig, policy: Policy, seed: int) -> dict[str, np.
     return {**poses, **recorder.columns(), **recorder.contributed()}
 
 
-def _factory_of(policy: Any) -> Callable[[], Any]:
-    """Return what builds a fresh policy: by name, by path, from a class, or as a copy of an object."""
-    if isinstance(policy, str | PurePath):
-        return partial(load_policy, policy)
-    return policy if isinstance(policy, type) else partial(copy.deepcopy, policy)
-
-
-def _built(build: Callable[[], Any]) -> Policy:
-    """Return a fresh policy; raises CheckError for something that is none."""
-    policy = build()
-    missing = [name for name in ("reset", "act") if not callable(getattr(policy, name, None))]
-    if missing:
-        raise CheckError(
-            f"Expected a policy with the methods reset and act, got {policy!r} without {' and '.join(missing)}; a "
-            "function from observations to actions becomes a policy by from_callable(function)."
-        )
-    return policy
-
-
-def _config_for(policy: Policy, scenario: str | ScenarioConfig) -> ScenarioConfig:
-    """Return a scenario with the caches that a policy states; raises CheckError for caches that there are not."""
+def _subject(policy: Any, scenario: str | ScenarioConfig) -> tuple[Callable[[], Policy], ScenarioConfig]:
+    """Return what builds a fresh policy, and the scenario with the caches that the policy states."""
     config = preset(scenario) if isinstance(scenario, str) else scenario
     instance("scenario", config, ScenarioConfig)
-    try:
-        return replace(config, caches=stated_caches(policy) or config.caches)
-    except ConfigError as error:
-        raise CheckError(f"{error} Leave the attribute out where it does not matter.") from error
+    found = policy_spec(policy)
+    build = found.factory or partial(load_policy, found.policy, found.parameters)
+    missing = [name for name in ("reset", "act") if not callable(getattr(build(), name, None))]
+    if missing:
+        raise CheckError(f"Expected a policy with the methods reset and act, got one without {' and '.join(missing)}.")
+    return build, replace(config, caches=found.caches or config.caches)

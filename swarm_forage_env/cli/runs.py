@@ -37,6 +37,8 @@ def run(
 ) -> int:
     """Run policies in a scenario and compare how they perform.
 
+    'swarm-forage run crw dpo --robots 10 --seeds 4' makes four runs of each with ten robots.
+
     Makes the runs in parallel, shows a table, stores one record per run and draws performance over time. The command
     does not repeat runs that the folder already holds, so after an interruption, just enter it again.
     """

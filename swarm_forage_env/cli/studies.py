@@ -52,6 +52,8 @@ def run(
 ) -> int:
     """Make the missing runs of a study, and pack it into one file.
 
+    'swarm-forage study run S1a --budget smoke' is a first look, in a minute or two.
+
     Finished runs are kept: after Ctrl-C, or with more seeds, the same command does the rest.
 
     Args:

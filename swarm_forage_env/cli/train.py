@@ -38,6 +38,8 @@ def train(
 ) -> int:
     """Train one policy that every robot shares, and compare it with a scripted controller meanwhile.
 
+    'swarm-forage train --scenario classroom --steps 500000' is a first try.
+
     Episodes last --horizon, by default 4,000 s, or as long as runs of the scenario or a third of the training if these
     are shorter. If deliveries count, they alone are too rare to learn from. The training then sets nest_progress=0.05,
     first_pickup=1 and interference=-0.002, unless --set or the file of --scenario does, and begins in a smaller arena.

@@ -89,8 +89,7 @@ class Plan:
 
     def specs_of(self, condition: Condition) -> tuple[RunSpec, ...]:
         """Return the runs of a condition, one per seed."""
-        policy, world = condition
-        first = RunSpec(world=world.with_caches(policy.caches), policy=policy.policy, parameters=policy.parameters)
+        first = condition.policy.run_in(condition.world)
         return tuple(replace(first, seed=seed) for seed in self.seeds)
 
     @property

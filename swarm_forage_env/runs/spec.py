@@ -192,6 +192,10 @@ class PolicySpec:
     is_named: bool = field(default=True, compare=False)
     """Whether its runs may be stored: a name tells which policy a stored run belongs to."""
 
+    def run_in(self, world: World, seed: int = 0) -> RunSpec:
+        """Return a run of the policy in a world, with the caches of the policy."""
+        return RunSpec(world=world.with_caches(self.caches), policy=self.policy, parameters=self.parameters, seed=seed)
+
 
 def stated_caches(policy: object) -> str | None:
     """Return which caches a policy, or its class, states that it is made for (`caches`); None where it states nothing.
@@ -337,7 +341,4 @@ def plan_run(
     """
     given, more = world_of(world), wrapper_configs(wrappers)
     disturbed = replace(given, wrappers=(*given.wrappers, *more), name="") if more else given
-    found = policy_spec(policy, parameters=parameters, caches=caches)
-    return RunSpec(
-        world=disturbed.with_caches(found.caches), policy=found.policy, parameters=found.parameters, seed=seed
-    )
+    return policy_spec(policy, parameters=parameters, caches=caches).run_in(disturbed, seed)
