@@ -8,7 +8,7 @@ import polars as pl
 
 from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.sheet import Answer, Sheet
-from swarm_forage_env.studies.results import StudyTable
+from swarm_forage_env.studies.results import AXIS, StudyTable
 from swarm_forage_env.studies.study import left_out, load_study, set_names
 from swarm_forage_env.studies.study_file import PAPER
 
@@ -66,15 +66,14 @@ class StudyStatus(Answer):
         lines = [f"{len(places) - len(left):,} of {counted(len(places), 'condition')} complete"]
         if len(self.table.versions) > 1:
             lines.append(f"The runs were made by {len(self.table.versions)} versions or commits of the packages.")
-        words, failed = list(spec.place_words().values()), self._failed()
+        failed = self._failed()
         notes = [f"  {row['policy']}, seed {row['seed']}: {row['error']}" for row in failed[:FAILURES_SHOWN]]
         if len(failed) > FAILURES_SHOWN:
             notes.append(f"  and {len(failed) - FAILURES_SHOWN} more")
-        rows = [(*words[row["condition"]], *(row[name] for name in STATES)) for row in left.to_dicts()]
-        header = ("rules", "policy", *(axis.name for axis in spec.axes), *STATES)
+        axes = (pl.col(AXIS + axis.name).alias(axis.name) for axis in spec.axes)
         return [
             Sheet(title=f"{spec.name}, budget {spec.budget}: {', '.join(told)}", notes=lines),
-            *([Sheet.of(header=header, rows=rows)] if rows else []),
+            *([Sheet(frame=left.select("rules", "policy", *axes, *STATES))] if len(left) else []),
             *([Sheet(title="failed", notes=notes)] if notes else []),
         ]
 

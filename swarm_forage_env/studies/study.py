@@ -165,14 +165,6 @@ class StudySpec:
         values = product(*(axis.values for axis in self.axes))
         return tuple(itertools.starmap(Place, product(self.rules, labels, values)))
 
-    def place_words(self) -> dict[Place, tuple[str, ...]]:
-        """Return conditions as shown to people: rules, policy, values."""
-        words = [value_words(axis.values) for axis in self.axes]
-        return {
-            place: (place.rules, place.policy, *(of[value] for of, value in zip(words, place.values, strict=True)))
-            for place in self.places
-        }
-
     def reference_of(self, place: Place) -> Place | None:
         """Return the reference of a condition, which differs from it on the last axis only; None = no reference."""
         if self.reference is None:

@@ -10,6 +10,7 @@ from swarm_forage_env.policies import pretrained
 from swarm_forage_env.scenarios.quirks import QUIRK_NAMES
 from swarm_forage_env.studies.ladders import BUDGETS
 from swarm_forage_env.studies.study import Place, is_set_of_paper, left_out, load_study, set_names, study_of
+from swarm_forage_env.studies.study_file import word_of
 
 EXPERIMENTS = {"S1a": 8, "S1b": 10, "S1c": 7, "S1d": 7, "S1e": 8, "S1f": 8, "S1g": 8, "S1h": 8,
                "S2a": 32, "S2b": 24, "S2c": 24, "S2d": 24}  # fmt: skip
@@ -215,7 +216,7 @@ def test_an_axis_of_lists(tmp_path):
     )
     spec = load_study(file)
     assert spec.axes[0].values == ((), ((14.0, 1.0, 18.0, 4.0),))
-    assert (spec.reference, spec.place_words()[spec.places[1]][-1]) == ((), "14,1,18,4")
+    assert (spec.reference, word_of(spec.places[1].values[-1])) == ((), "14,1,18,4")
     assert [spec.world(place).scenario.arena.further_nests for place in spec.places] == [(), ((14.0, 1.0, 18.0, 4.0),)]
 
 
