@@ -1,13 +1,6 @@
 """The console command, as a person uses it: words in, text and exit code out."""
 
 import json
-import os
-import re
-import signal
-import subprocess
-import sys
-import time
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -15,7 +8,7 @@ import pytest
 from swarm_forage_env.cli.options import WorldOptions
 from swarm_forage_env.cli.worlds import default_file, described_world
 from swarm_forage_env.inspect.descriptions import _scenario_lines
-from swarm_forage_env.policies.registry import POLICIES, RandomPolicy
+from swarm_forage_env.policies.registry import RandomPolicy
 from swarm_forage_env.runs.record import Record
 from swarm_forage_env.runs.store import load
 from swarm_forage_env.scenarios.overrides import field_sections
@@ -99,71 +92,6 @@ def test_a_failed_run_is_reported_with_the_way_to_run_it_again(command, monkeypa
     code, out, _ = command(*again)
     assert code == 0
     assert "random in warehouse_small, 3 robots" in out
-
-
-def test_rerun_compares_with_the_record(command):
-    command(*RUN)
-    (file,) = Path("results/warehouse_small_3_robots_4_s_33b9a3").glob("*.parquet")
-    code, out, _ = command("rerun", str(file))
-    assert code == 0
-    assert f"bit for bit the same as {file}" in out
-
-
-def test_ctrl_c_in_this_process(command, monkeypatch):
-    def interrupt(self, task, rng):
-        raise KeyboardInterrupt
-
-    command(*RUN)
-    monkeypatch.setattr(RandomPolicy, "reset", interrupt)
-    code, _, err = command(*RUN, "--seeds", "3")
-    assert code == 130
-    expected = (
-        "swarm-forage: Interrupted: 1 of 3 runs are finished. They are in results/warehouse_small_3_robots_4_s_33b9a3; "
-    )
-    assert err.splitlines()[-1] == expected + "the same command does the rest."
-
-
-@pytest.mark.slow
-def test_ctrl_c_with_worker_processes(tmp_path):
-    words = [
-        "run",
-        "random",
-        "--jobs",
-        "2",
-        "--seeds",
-        "6",
-        "--robots",
-        "5",
-        "--set",
-        "n_objects=20",
-        "--horizon",
-        "10000",
-        "--out",
-    ]
-    program = [sys.executable, "-m", "swarm_forage_env.cli", *words, str(tmp_path)]
-    pipe = subprocess.PIPE
-    with subprocess.Popen(program, stdout=pipe, stderr=pipe, text=True, start_new_session=True) as process:
-        try:
-            while not list(tmp_path.glob("*.parquet")) and process.poll() is None:
-                time.sleep(0.1)
-            os.killpg(process.pid, signal.SIGINT)
-            out, err = process.communicate(timeout=10)
-        finally:  # whatever went wrong, nothing stays behind
-            with suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
-    assert process.returncode == -signal.SIGINT
-    assert out == ""
-    assert re.search(r"\d of \d runs are finished\. They are in ", err)
-    assert "Traceback" not in err
-    assert 1 <= len(load(tmp_path)) < 6
-
-
-def test_list_names_everything(command):
-    code, out, _ = command("list")
-    assert code == 0
-    for name in (*SCENARIO_NAMES, *POLICIES):
-        assert name in out
-    assert max(map(len, out.splitlines())) <= 80, "columns of a terminal"
 
 
 @pytest.mark.parametrize("name", SCENARIO_NAMES)

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from swarm_forage_env.runs import runner
 from swarm_forage_env.studies.results import read_study
 
 FILE = """
@@ -36,13 +35,6 @@ def written(command):
     """The command in a folder with a study file."""
     Path("mine.toml").write_text(FILE)
     return command
-
-
-def test_the_sets_are_listed_with_their_runs(command):
-    code, out, _ = command("study", "list")
-    assert code == 0
-    assert len(re.findall(r"^S[12][a-h] ", out, re.MULTILINE)) == 12
-    assert re.search(r"^all +168 +129,024 ", out, re.MULTILINE)
 
 
 def test_a_study_runs_and_is_packed(written):
@@ -90,16 +82,6 @@ def test_failures_are_told_with_the_command_that_makes_them_again(written):
     code, _, err = written(*rerun)
     assert code == 1
     assert "takes no arguments" in err.splitlines()[-2]
-
-
-def test_an_interrupt_keeps_what_is_done(written, monkeypatch):
-    def interrupted(*args, **options):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(runner, "run_one", interrupted)
-    code, _, err = written(*RUN)
-    assert code == 130
-    assert f"in {FOLDER}/runs; the same command does the rest" in err
 
 
 @pytest.mark.parametrize(

@@ -57,16 +57,6 @@ def test_claims_are_held_against_a_study(ran):
     assert ran("study", "verdict", "done/S1a.parquet")[1] == out
 
 
-def test_figures_are_drawn_with_their_numbers(ran):
-    code, out, _ = ran("study", "plot", "done", "--out", "figures", "--band", "--variant", "corrected,paper")
-    assert code == 0
-    assert sorted(out.split()) == sorted(str(path) for path in Path("figures").iterdir())
-    names = {path.name for path in Path("figures").iterdir()}
-    assert {f"S1a_raw_performance_described{suffix}" for suffix in (".svg", ".png", ".csv")} <= names
-    assert any(name.endswith("_described_paper.svg") for name in names)
-    assert Path("figures/S1a_raw_performance_described.csv").read_text().startswith("rules,policy,population_size,")
-
-
 def test_figures_for_a_paper_have_its_width_and_no_headline(ran):
     style = ("--format", "svg", "--width-in", "3.5", "--no-title")
     assert ran("study", "plot", "done", "--out", "paper", *style)[0] == 0

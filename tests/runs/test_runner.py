@@ -274,12 +274,6 @@ def test_long_runs_come_first_and_then_a_run_of_each_policy():
     assert longest_first([*SPECS[:2], UNKNOWN, large]) == (large, SPECS[0], UNKNOWN, SPECS[1])
 
 
-@pytest.mark.parametrize("jobs", [0, -1])
-def test_jobs_must_be_positive(jobs):
-    with pytest.raises(ValueError, match="Expected jobs to be a whole number >= 1"):
-        run_all(SPECS, jobs=jobs)
-
-
 def test_progress_where_stderr_is_no_terminal_is_plain(tmp_path, capsys):
     run_here(SPECS[:1], tmp_path)
     run_here([*SPECS[:2], UNKNOWN], tmp_path, progress=True)

@@ -1,6 +1,5 @@
 """The files in a folder of runs, and how unexpected ones are handled."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,11 +10,9 @@ from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import (
     RunFailure,
-    failure_file,
     failure_lines,
     is_stored,
     load,
-    read_failure,
     record_file,
     store,
 )
@@ -45,16 +42,6 @@ def test_an_empty_or_missing_folder_has_nothing_to_load(tmp_path):
     for empty in (tmp_path, tmp_path / "missing"):
         with pytest.raises(RecordError, match="found none"):
             load(empty)
-
-
-def test_a_failure_is_kept_until_the_run_succeeds(folder):
-    failure = RunFailure(spec=replace(SPEC, seed=1), error="ValueError: no", traceback="line 1\nline 2")
-    store(folder, failure)
-    file = failure_file(folder, failure.run_id)
-    assert read_failure(file) == failure
-    assert json.loads(file.read_text())["rerun"] == f"swarm-forage rerun {file}"
-    store(folder, run_one(failure.spec))
-    assert not file.exists()
 
 
 def test_a_run_is_stored_unless_it_is_missing_failed_or_damaged(folder):
