@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policies.frames import TURNS, Turn, turned_columns
+from swarm_forage_env.policies.frames import TURNS, turned_columns
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
+from swarm_forage_env.policies.kernels.frames import N_FRAMES, N_UPRIGHT
 from swarm_forage_env.scenarios.presets import scenario
 from tests.support.stage import build_cache, clear, lay, load, put
 
-NAMED = {f"{turn.quarters} quarters{', mirrored' * turn.is_mirrored}": turn for turn in TURNS}
 COMPACT = InterfaceConfig(
     observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5, site_memory=True
 )
@@ -25,24 +25,24 @@ OBJECTS = ((47, 23), (46, 24), (50, 25), (48, 21))
 N_OBJECTS = 12
 
 
-def place(turn: Turn, x: float, y: float) -> np.ndarray:
+def place(turn: int, x: float, y: float) -> np.ndarray:
     """Where a place in m comes to lie."""
-    return turn.matrix @ (np.array([x, y]) - SIZE_M / 2) + np.abs(turn.matrix) @ SIZE_M / 2
+    return TURNS[turn] @ (np.array([x, y]) - SIZE_M / 2) + np.abs(TURNS[turn]) @ SIZE_M / 2
 
 
-def cell(turn: Turn, x: int, y: int) -> tuple[int, int]:
+def cell(turn: int, x: int, y: int) -> tuple[int, int]:
     at = np.floor(place(turn, (x + 0.5) / 5, (y + 0.5) / 5) * 5)
     return int(at[0]), int(at[1])
 
 
-def heading(turn: Turn, angle: float) -> float:
-    x, y = turn.matrix @ np.array([np.cos(angle), np.sin(angle)])
+def heading(turn: int, angle: float) -> float:
+    x, y = TURNS[turn] @ np.array([np.cos(angle), np.sin(angle)])
     return float(np.arctan2(y, x))
 
 
-def world(turn: Turn) -> ForageEnv:
+def world(turn: int) -> ForageEnv:
     """A world with nest, robots, objects and a cache where the turn puts them."""
-    swap = np.abs(turn.matrix)
+    swap = np.abs(TURNS[turn])
     width_m, height_m = (swap @ SIZE_M).tolist()
     env = ForageEnv(
         scenario(
@@ -72,16 +72,16 @@ def rows(env: ForageEnv, config: InterfaceConfig) -> tuple[np.ndarray, LearnerIn
     return interface.observe(env.last_obs), interface
 
 
-def turned(seen: np.ndarray, turn: Turn, interface: LearnerInterface) -> np.ndarray:
+def turned(seen: np.ndarray, turn: int, interface: LearnerInterface) -> np.ndarray:
     """What robots see in the turned world, by what they see in the one as it is."""
     source, sign = turned_columns(turn, interface.layout)
     return seen[:, source] * sign
 
 
 @pytest.mark.parametrize("config", [COMPACT, FULL], ids=["compact", "full"])
-@pytest.mark.parametrize("turn", NAMED.values(), ids=NAMED)
+@pytest.mark.parametrize("turn", range(N_FRAMES))
 def test_turned_rows_are_those_of_a_turned_world(turn, config):
-    seen, interface = rows(world(Turn()), config)
+    seen, interface = rows(world(0), config)
     assert (seen != 0).any(axis=0).mean() > 0.4  # of the columns say something
     seen = turned(seen, turn, interface)
     there, _ = rows(world(turn), config)
@@ -91,16 +91,16 @@ def test_turned_rows_are_those_of_a_turned_world(turn, config):
 
 
 @pytest.mark.parametrize("config", [COMPACT, FULL], ids=["compact", "full"])
-@pytest.mark.parametrize("turn", NAMED.values(), ids=NAMED)
+@pytest.mark.parametrize("turn", range(N_FRAMES))
 def test_robots_do_in_the_world_what_they_chose_in_the_turned_one(turn, config):
-    one, other = world(Turn()), world(turn)
+    one, other = world(0), world(turn)
     (_, own), (_, theirs) = rows(one, config), rows(other, config)
     rng = np.random.default_rng(0)
     for _ in range(4):
         chosen = rng.integers(0, 6, len(ROBOTS)) if config is COMPACT else rng.uniform(-1, 1, (len(ROBOTS), 3))
         for _ in range(5):
             commands = own.command(chosen, one.last_obs).copy()
-            commands[:, :2] = commands[:, 1::-1] if turn.is_mirrored else commands[:, :2]
+            commands[:, :2] = commands[:, 1::-1] if turn >= N_UPRIGHT else commands[:, :2]
             one.step_batch(commands)
             other.step_batch(theirs.command(chosen, other.last_obs).copy())
     expected = np.array([place(turn, *at) for at in one.swarm.position])

@@ -3,7 +3,7 @@
 import numpy as np
 
 from swarm_forage_env.contract.layout import ObservationLayout
-from swarm_forage_env.policies.frames import TURNS, turned_columns
+from swarm_forage_env.policies.frames import turned_columns
 
 _BITS = 2**64
 
@@ -21,7 +21,7 @@ def seen(rows: np.ndarray, layout: ObservationLayout, decision: int, length: int
     """What robots see in their frames, (N, d), from what they would see in the world as it is."""
     turned = []
     for robot, row in enumerate(rows):
-        source, sign = turned_columns(TURNS[frame(robot, decision, length)], layout)
+        source, sign = turned_columns(frame(robot, decision, length), layout)
         turned.append(row[source] * sign)
     return np.array(turned)
 
@@ -30,6 +30,6 @@ def commands(wanted: np.ndarray, decision: int, length: int) -> np.ndarray:
     """What robots do, (N, A), who want this in what they see."""
     done = wanted.copy()
     for robot, row in enumerate(done):
-        if TURNS[frame(robot, decision, length)].is_mirrored:
+        if frame(robot, decision, length) >= 4:  # mirrored
             row[:2] = row[1::-1]
     return done
