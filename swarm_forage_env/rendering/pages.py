@@ -31,6 +31,10 @@ SHARED_SCRIPTS = (
 """Parts of both scripts in the order in which they are put together; later ones use earlier ones."""
 REPLAY_SCRIPTS = ("decode.js", "player.js", "controls.js", "main.js")
 PLAY_SCRIPTS = ("link.js", "swarm.js", "walls.js", "cards.js", "buttons.js", "play.js")
+_POLICY = (
+    '<meta http-equiv="Content-Security-Policy" '
+    "content=\"default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:\">"
+)
 _HEADER = re.compile(r'<script type="application/json" id="header">(.*?)</script>', re.DOTALL)
 _DATA = re.compile(r'<script type="text/plain" class="run">(.*?)</script>', re.DOTALL)
 
@@ -43,12 +47,13 @@ def build_replay_page(title: str, header: dict[str, Any], blocks: list[bytes]) -
         header: Plain values for JSON.
         blocks: One block of bytes per run.
     """
-    data = "\n".join(
-        f'<script type="text/plain" class="run">{base64.b64encode(block).decode("ascii")}</script>' for block in blocks
-    )
     # "<" within JSON would end the script element early if "/script>" followed.
     written = json.dumps(header, allow_nan=False).replace("<", "\\u003c")
-    return _page("replay_page", ("replay.css",), REPLAY_SCRIPTS, title=html.escape(title), header=written, data=data)
+    data = [f'<script type="application/json" id="header">{written}</script>']
+    data += [
+        f'<script type="text/plain" class="run">{base64.b64encode(one).decode("ascii")}</script>' for one in blocks
+    ]
+    return _page(html.escape(title), "replay_page", REPLAY_SCRIPTS, policy=_POLICY, data="\n".join(data))
 
 
 def take_replay_page_apart(text: str) -> tuple[dict[str, Any], list[bytes]]:
@@ -66,16 +71,23 @@ def take_replay_page_apart(text: str) -> tuple[dict[str, Any], list[bytes]]:
 
 def build_play_page() -> str:
     """Return the page to play with as text; it gets all else from the server that sends it."""
-    return _page("play_page", ("replay.css", "play.css"), PLAY_SCRIPTS)
+    style = _part("play_page/play.css")
+    return _page("swarm-forage play", "play_page", PLAY_SCRIPTS, style=style)
 
 
-def _page(folder: str, styles: tuple[str, ...], scripts: tuple[str, ...], **parts: str) -> str:
-    return Template(_part(f"{folder}/index.html")).substitute(
-        style="".join(_part(f"{name.removesuffix('.css')}_page/{name}") for name in styles),
+def _page(
+    title: str, folder: str, scripts: tuple[str, ...], *, policy: str = "", data: str = "", style: str = ""
+) -> str:
+    return Template(_part("page.html")).substitute(
+        title=title,
+        policy=policy,
+        style=_part("replay_page/replay.css") + style,
+        main=_part(f"{folder}/main.html"),
+        keys=_part(f"{folder}/keys.html"),
+        data=data,
         script="\n".join(
             [_part(f"replay_page/{name}") for name in SHARED_SCRIPTS] + [_part(f"{folder}/{name}") for name in scripts]
         ),
-        **parts,
     )
 
 
