@@ -21,6 +21,7 @@ from numba import config as numba_config
 from numba.core import event
 
 F = TypeVar("F", bound=Callable[..., Any])
+T = TypeVar("T")
 
 # Without numba's memory runtime an allocation is a compile error, and arrays that are handed around, alone, in rows or
 # as fields of a named tuple, are not reference-counted. That halves the time of functions that call others often.
@@ -156,7 +157,7 @@ class Calls:
 
     def __init__(self) -> None:
         """Begin without any."""
-        self._found: dict[Callable[..., Any], Callable[..., Any]] = {}
+        self._found: dict[Callable[..., Any], Any] = {}
 
     def __call__(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """Call a kernel."""
@@ -164,6 +165,12 @@ class Calls:
         if found is None:
             found = self._found[function] = direct(function, *arguments)
         return found(*arguments)
+
+    def once(self, make: Callable[..., T], *arguments: Any) -> T:
+        """Return what a function makes for these calls; it is asked once, and anew for copies."""
+        if make not in self._found:
+            self._found[make] = make(*arguments)
+        return cast(T, self._found[make])
 
     def __reduce__(self) -> Any:
         return Calls, ()
@@ -195,15 +202,15 @@ def _callable_by_address(function: Any, signature: Any) -> Any:
 class Callback:
     """A kernel that another one takes as an argument: which one it is may change without compiling anything anew."""
 
-    def __init__(self, function: Callable[..., Any], *example: Any) -> None:
-        """Take `function`, which returns nothing, for arguments of the types of `example`; it is compiled when used."""
+    def __init__(self, function: Callable[..., Any], *example: Any, gives: Any = None) -> None:
+        """Take `function`, for arguments of the types of `example`, and what it returns; it is compiled when used."""
         self.function = function
         if is_compiled(function):
-            self._numba_type_ = types.FunctionType(types.none(*map(typeof, example)))  # where numba looks
+            self._numba_type_ = types.FunctionType(typeof(gives)(*map(typeof, example)))  # where numba looks
 
-    def __call__(self, *arguments: Any) -> None:
+    def __call__(self, *arguments: Any) -> Any:
         """Call the function itself, for kernels that are not compiled."""
-        self.function(*arguments)
+        return self.function(*arguments)
 
     def __reduce__(self) -> Any:
         """Refuse copies for another process: the address is one of this process."""

@@ -121,7 +121,7 @@ class ForagingArena:
 
     def observe(self) -> ObsArray:
         """Return the observation (N, D) of the world as it is now; only needed after a change between two steps."""
-        self._call(kernels.observe, self._held)
+        self._call(kernels.observe, self._held, self._phases)
         self._sense_further()
         return self.obs
 
@@ -166,16 +166,16 @@ class ForagingArena:
         """
         tick = self.tick + 1
         gain = self._unit_gain if wheel_gain is None else np.ascontiguousarray(wheel_gain, np.float64)
-        call, arrays, physics = self._call, self._held, self._physics
+        call, arrays, phases, physics = self._call, self._held, self._phases, self._physics
         picks, walks = self.draws(tick)
         draws = picks[0], walks[0]
         if isinstance(physics, Bodies):
-            outcome = call(kernels.whole, arrays, physics.held, actions, gain, tick, self.has_changed, *draws)
+            outcome = call(kernels.whole, arrays, physics.held, phases, actions, gain, tick, self.has_changed, *draws)
         else:
-            outcome = call(kernels.set_out, arrays, actions, gain, tick, self.has_changed)
+            outcome = call(kernels.set_out, arrays, phases, actions, gain, tick, self.has_changed)
             if outcome == DONE:
                 physics.advance(self.swarm)
-                outcome = call(kernels.meet_and_close, arrays, actions, tick, *draws)
+                outcome = call(kernels.meet_and_close, arrays, phases, actions, tick, *draws)
         self.conclude(outcome, actions, gain, tasks)
         return self.obs
 
@@ -217,13 +217,15 @@ class ForagingArena:
         picks, walks = self.draws(self.tick)
         if outcome == NO_ROOM:
             self._physics.advance(self.swarm)
-            outcome = self._call(kernels.meet_and_close, self._held, actions, self.tick, picks[0], walks[0])
+            outcome = self._call(
+                kernels.meet_and_close, self._held, self._phases, actions, self.tick, picks[0], walks[0]
+            )
         if outcome == TO_PLACE:
             self._create_dynamic_caches()
             self._replace_displaced()
             self._restore_caches(tasks)
             self._arrays.sensors.kept[0] = False  # nobody has listed which squares of the floor have changed
-            self._call(kernels.close, self._held, walks[0])
+            self._call(kernels.close, self._held, self._phases, walks[0])
 
     def run(
         self,
@@ -275,6 +277,7 @@ class ForagingArena:
                 kernels.run,
                 self._held,
                 self._bodies.held,
+                self._phases,
                 disturbances,
                 driver.held,
                 None if rewards is None else rewards.payment,
@@ -306,6 +309,12 @@ class ForagingArena:
         if not tasks_counted:
             raise refused_tasks(tasks, len(self.swarm.active))
         return Stop(self.tick, by_python=outcome != DONE)
+
+    @property
+    def _phases(self) -> kernels.Phases:
+        """The phases of a tick, compiled for this arena."""
+        bodies = self._physics.held if isinstance(self._physics, Bodies) else None
+        return self._call.once(kernels.phases_of, self._held, bodies)
 
     @property
     def needs_python(self) -> bool:

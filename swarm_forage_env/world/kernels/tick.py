@@ -16,10 +16,12 @@ sense           the rest of the observation
 """
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
-from swarm_forage_env._internal.compiling import inline_kernel, kernel, part
-from swarm_forage_env._internal.held import opened
+import numpy as np
+
+from swarm_forage_env._internal.compiling import Callback, inline_kernel, kernel, kind_of, part
+from swarm_forage_env._internal.held import hold, opened
 from swarm_forage_env._internal.prefetching import LARGE
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.types import ActionArray, CodeArray, FloatArray, ObsArray
@@ -47,8 +49,50 @@ _OBJECTS_MOVED = int(Counter.OBJECTS_MOVED)
 
 
 @kernel
+def start(a: ArenaArrays, actions: ActionArray, wheel_gain: FloatArray) -> int:
+    """From actions to velocities of the bodies.
+
+    Returns `DONE`, or the first active row whose action or gain is not finite; then nothing has happened.
+    """
+    a = opened(a)
+    swarm, m = a.state.swarm, a.motion
+    return drive(
+        actions,
+        wheel_gain,
+        swarm.active,
+        swarm.pending_kind,
+        swarm.facing,
+        m.drive_limits,
+        m.dt_s,
+        swarm.wheel_speed,
+        m.twist,
+    )
+
+
+@kernel
+def push(a: ArenaArrays, tick: int) -> None:
+    """Let robots in touch press against each other, in tick number `tick`."""
+    a = opened(a)
+    swarm, m, s = a.state.swarm, a.motion, a.sensors
+    before, now = (m.touching[0], m.touching[1]) if tick % 2 == 0 else (m.touching[1], m.touching[0])
+    press(swarm.position, swarm.present, s.near, s.bins, m.touch_m, before, now, m.command, m.twist)
+
+
+@kernel
+def move(a: ArenaArrays, b: BodyState) -> bool:
+    """Move compiled bodies; returns whether there was room for all pairs that might touch, else nobody was moved."""
+    a, b = opened(a), opened(b)
+    swarm = a.state.swarm
+    if not move_bodies(b, a.motion.twist, swarm.present, a.motion.dt_s):
+        return False
+    tell_poses(b.poses, swarm.present, swarm.position, swarm.heading, swarm.facing)
+    return True
+
+
+@kernel
 def look(a: ArenaArrays) -> None:
     """Find out who is near whom, and write the proximity readings: a ring of beams, 1 at contact, 0 without a hit."""
+    a = opened(a)
     swarm, s = a.state.swarm, a.sensors
     bin_robots(swarm.position, swarm.present, s.bins[0], s.bins[1], s.bins[2])
     mark_cells(swarm.position, swarm.present, s.bins[0], s.occupied)
@@ -69,9 +113,35 @@ def look(a: ArenaArrays) -> None:
     )
 
 
-@inline_kernel
+@kernel
+def meet(a: ArenaArrays, actions: ActionArray, tick: int, chance: FloatArray) -> bool:
+    """After a look: who is in interference, who picks up and drops; objects come back on the floor.
+
+    `chance` (N,) uniform in [0, 1) decides which object leaves a cache. Returns whether anything is to be placed.
+    """
+    a = opened(a)
+    state, s = a.state, a.sensors
+    mark(s.obs, s.columns.proximity, s.near, s.behind_counts, state.swarm, state.caches, state.events)
+    serve(state, a.rules, actions, tick, chance)
+    displaced, creators = state.requests.displaced, state.requests.creators
+    if creators[-1] == 0:  # new caches come first
+        place_displaced(state.requests, state.objects, a.source, a.wandering.area, a.placement_draws)
+    is_to_place = displaced[-1] > 0 or creators[-1] > 0
+    return is_to_place or (a.n_static_caches > 0 and _alive(state.caches) < a.n_static_caches)
+
+
+@part
+def _alive(caches: CacheState) -> int:
+    n_alive = 0
+    for slot in range(caches.alive.shape[0]):
+        n_alive += caches.alive[slot]
+    return n_alive
+
+
+@kernel
 def sense(a: ArenaArrays) -> None:
     """Complete the observation after `look`; slices that are not read may stay zero."""
+    a = opened(a)
     swarm, objects, events, s = a.state.swarm, a.state.objects, a.state.events, a.sensors
     position, facing, present, c = swarm.position, swarm.facing, swarm.present, s.columns
     if s.reads_light and s.light_is_due[0]:
@@ -123,95 +193,93 @@ def sense(a: ArenaArrays) -> None:
         )
 
 
-@kernel
-def observe(a: ArenaArrays) -> None:
-    """Write the observation of the world as it is now."""
-    a = opened(a)
-    look(a)
-    sense(a)
+class Phases(NamedTuple):
+    """Phases that are called by address: each is compiled once, alone, and not anew with all that calls it."""
+
+    start: Callable[..., int]
+    push: Callable[..., None]
+    move: Callable[..., bool] | None
+    """None where Chipmunk has the bodies."""
+    look: Callable[..., None]
+    meet: Callable[..., bool]
+    sense: Callable[..., None]
+
+
+def phases_of(a: ArenaArrays, b: BodyState | None) -> Phases:
+    """Return the phases for an arena and its bodies, both held; held, too."""
+    kinds = kind_of((a, b))
+    if kinds not in _phases:
+        actions, chance = np.empty((1, 1), np.float32), np.empty(1)
+        phases = Phases(
+            start=Callback(start, a, actions, np.empty((1, 1)), gives=1),
+            push=Callback(push, a, 1),
+            move=None if b is None else Callback(move, a, b, gives=True),
+            look=Callback(look, a),
+            meet=Callback(meet, a, actions, 1, chance, gives=True),
+            sense=Callback(sense, a),
+        )
+        _phases[kinds] = hold(phases)
+    return _phases[kinds]
+
+
+_phases: dict[Any, Phases] = {}
+"""Kinds of arenas and bodies -> what `phases_of` returns."""
 
 
 @inline_kernel
-def set_out(a: ArenaArrays, actions: ActionArray, wheel_gain: FloatArray, tick: int, look_first: bool) -> int:
-    """From actions to velocities of the bodies, in tick number `tick`.
+def observe(a: ArenaArrays, p: Phases) -> None:
+    """Write the observation of the world as it is now."""
+    p = opened(p)
+    p.look(a)
+    p.sense(a)
 
-    `look_first`: robots came or went since the last `look`. Returns `DONE`, or the first active row whose action or
-    gain is not finite; then nothing has happened.
-    """
-    a = opened(a)
-    swarm, m, s = a.state.swarm, a.motion, a.sensors
-    bad = drive(
-        actions,
-        wheel_gain,
-        swarm.active,
-        swarm.pending_kind,
-        swarm.facing,
-        m.drive_limits,
-        m.dt_s,
-        swarm.wheel_speed,
-        m.twist,
-    )
-    if bad >= 0:
-        return bad
+
+@inline_kernel
+def set_out(
+    a: ArenaArrays, p: Phases, actions: ActionArray, wheel_gain: FloatArray, tick: int, look_first: bool
+) -> int:
+    """What comes before the bodies move; `look_first`: robots came or went. Returns as `start`."""
+    p = opened(p)
+    refused = p.start(a, actions, wheel_gain)
+    if refused != DONE:
+        return refused
     if look_first:
-        look(a)
-    before, now = (m.touching[0], m.touching[1]) if tick % 2 == 0 else (m.touching[1], m.touching[0])
-    press(swarm.position, swarm.present, s.near, s.bins, m.touch_m, before, now, m.command, m.twist)
+        p.look(a)
+    p.push(a, tick)
     return DONE
 
 
 @inline_kernel
-def meet(a: ArenaArrays, actions: ActionArray, tick: int, chance: FloatArray) -> bool:
-    """After the bodies have moved: who is near, who is in interference, who picks up and drops.
-
-    `chance` (N,) uniform in [0, 1) decides which object leaves a cache. Returns whether anything is to be placed.
-    """
-    state, s = a.state, a.sensors
-    look(a)
-    mark(s.obs, s.columns.proximity, s.near, s.behind_counts, state.swarm, state.caches, state.events)
-    serve(state, a.rules, actions, tick, chance)
-    displaced, creators = state.requests.displaced, state.requests.creators
-    if creators[-1] == 0:  # new caches come first
-        place_displaced(state.requests, state.objects, a.source, a.wandering.area, a.placement_draws)
-    is_to_place = displaced[-1] > 0 or creators[-1] > 0
-    return is_to_place or (a.n_static_caches > 0 and _alive(state.caches) < a.n_static_caches)
-
-
-@part
-def _alive(caches: CacheState) -> int:
-    n_alive = 0
-    for slot in range(caches.alive.shape[0]):
-        n_alive += caches.alive[slot]
-    return n_alive
-
-
-@inline_kernel
-def close(a: ArenaArrays, walk_chance: FloatArray) -> None:
+def close(a: ArenaArrays, p: Phases, walk_chance: FloatArray) -> None:
     """After everything is placed: objects walk, caches are counted, robots sense.
 
     `walk_chance` (M,) uniform in [0, 1); not read where objects lie still.
     """
-    a = opened(a)
-    objects, caches, counters, w = a.state.objects, a.state.caches, a.state.events.counters, a.wandering
+    world, p = opened(a), opened(p)
+    objects, caches = world.state.objects, world.state.caches
+    counters, w = world.state.events.counters, world.wandering
     if w.probability > 0.0:
         counters[_OBJECTS_MOVED] += walk(
             objects.floor, objects.status, objects.cell, walk_chance, w.probability, w.area, w.self_conflict
         )
-        a.state.requests.changed[-1, 0] = CHANGES + 1
-    if a.has_caches:
+        world.state.requests.changed[-1, 0] = CHANGES + 1
+    if world.has_caches:
         counters[_CACHES_ALIVE] += _alive(caches)
         for slot in range(caches.count.shape[0]):
             counters[_OBJECTS_CACHED] += caches.count[slot]
-    sense(a)
+    p.sense(a)
 
 
 @inline_kernel
-def meet_and_close(a: ArenaArrays, actions: ActionArray, tick: int, chance: FloatArray, walk_chance: FloatArray) -> int:
-    """`meet`, then `close` unless anything is to be placed; returns `DONE` or `TO_PLACE`."""
-    a = opened(a)
-    if meet(a, actions, tick, chance):
+def meet_and_close(
+    a: ArenaArrays, p: Phases, actions: ActionArray, tick: int, chance: FloatArray, walk_chance: FloatArray
+) -> int:
+    """After the bodies have moved; returns `DONE`, or `TO_PLACE` if `close` is still to come."""
+    p = opened(p)
+    p.look(a)
+    if p.meet(a, actions, tick, chance):
         return TO_PLACE
-    close(a, walk_chance)
+    close(a, p, walk_chance)
     return DONE
 
 
@@ -219,6 +287,7 @@ def meet_and_close(a: ArenaArrays, actions: ActionArray, tick: int, chance: Floa
 def whole(
     a: ArenaArrays,
     b: BodyState,
+    p: Phases,
     actions: ActionArray,
     wheel_gain: FloatArray,
     tick: int,
@@ -227,15 +296,13 @@ def whole(
     walk_chance: FloatArray,
 ) -> int:
     """The whole tick, with compiled bodies; returns `DONE`, `TO_PLACE`, `NO_ROOM` or the row of a refused action."""
-    a, b = opened(a), opened(b)
-    swarm = a.state.swarm
-    refused = set_out(a, actions, wheel_gain, tick, look_first)
+    p = opened(p)
+    refused = set_out(a, p, actions, wheel_gain, tick, look_first)
     if refused != DONE:
         return refused
-    if not move_bodies(b, a.motion.twist, swarm.present, a.motion.dt_s):
+    if not p.move(a, b):
         return NO_ROOM
-    tell_poses(b.poses, swarm.present, swarm.position, swarm.heading, swarm.facing)
-    return meet_and_close(a, actions, tick, chance, walk_chance)
+    return meet_and_close(a, p, actions, tick, chance, walk_chance)
 
 
 @inline_kernel
@@ -263,6 +330,7 @@ def disturb_senses(d: Disturbances, k: int, a: ArenaArrays) -> None:
 def run(
     a: ArenaArrays,
     b: BodyState,
+    p: Phases,
     d: Disturbances,
     driver: tuple[tuple[Any, ...], Callable[..., None]],
     payment: Payment | None,
@@ -287,6 +355,7 @@ def run(
     Args:
         a: The arena.
         b: Its bodies.
+        p: Its phases.
         d: What disturbs the robots. The observation after a tick that is not `DONE` is left as it is.
         driver: Its state, of which the last are the actions, and a function (obs, active, draws, state, tick) that
             writes them.
@@ -309,9 +378,9 @@ def run(
         How many ticks have begun, the outcome of the last of them, and whether its tasks were codes of `Task`, one per
         robot. Tasks of a tick with a refused action are not looked at.
     """
-    a, b, driver = opened(a), opened(b), opened(driver)
+    world, p, driver = opened(a), opened(p), opened(driver)
     state, act = driver
-    obs, swarm, s, actions = a.sensors.obs, a.state.swarm, a.sensors, state[-1]
+    obs, swarm, s, actions = world.sensors.obs, world.state.swarm, world.sensors, state[-1]
     light_is_due = s.light_is_due
     gain = d.gain if d.gain.shape[0] > 0 else wheel_gain
     if n_ticks == 0:
@@ -321,15 +390,15 @@ def run(
             remember(opened(payment))
         if acts:
             act(obs, swarm.active, driver_draws[k % driver_draws.shape[0]], state, driver_first + k)
-        disturb_wheels(d, k, actions, swarm.carried_object, a.motion.drive_limits, wheel_gain)
+        disturb_wheels(d, k, actions, swarm.carried_object, world.motion.drive_limits, wheel_gain)
         chance, walk_chance = chances[k % chances.shape[0]], walk_chances[k % walk_chances.shape[0]]
         now_then = driver_first + k + 1  # the tick in which the driver sees what is sensed here
         is_due = (now_then - 1) % decision_ticks == 0 or k == n_ticks - 1
         light_is_due[0] = is_due
-        outcome = whole(a, b, actions, gain, first + k, look_first and k == 0, chance, walk_chance)
+        outcome = whole(a, b, p, actions, gain, first + k, look_first and k == 0, chance, walk_chance)
         light_is_due[0] = True  # for what Python may have to finish
         if outcome == DONE:
-            disturb_senses(d, k, a)
+            disturb_senses(d, k, world)
             s.kept[0] = d.draws.shape[0] == 0 and (is_due or s.kept[0])
             if payment is not None:
                 pay(opened(payment), paid)
