@@ -141,7 +141,7 @@ def _see_what_stands(
                     _see(_beam_to_box, sides, facing, i, radius, reach, row)
 
 
-@kernel
+@inline_kernel
 def proximity(
     position: FloatArray,
     facing: FloatArray,

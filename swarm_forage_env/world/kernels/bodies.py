@@ -30,7 +30,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import kernel, part
+from swarm_forage_env._internal.compiling import inline_kernel, kernel, part
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray
 from swarm_forage_env.world.kernels.bins import bin_of, cell_of
 from swarm_forage_env.world.kernels.drive import SMALL_RAD, hold_inside, sinc_and_cosine, small_sinc_and_cosine
@@ -425,7 +425,7 @@ def _turn_to(wrapped: float, heading: float) -> float:
     return turn - math.copysign(2.0 * math.pi, turn) if abs(turn) > math.pi else turn
 
 
-@kernel
+@inline_kernel
 def move_bodies(b: BodyState, twist: FloatArray, present: BoolArray, dt_s: float) -> bool:
     """Move present robots by one tick along `twist` (>= N, 3), with contacts; nobody ends in a wall or a box.
 

@@ -2,7 +2,7 @@
 
 import math
 
-from swarm_forage_env._internal.compiling import kernel, part
+from swarm_forage_env._internal.compiling import inline_kernel, part
 from swarm_forage_env.contract.types import BoolArray, FloatArray
 from swarm_forage_env.world.kernels.bins import bin_of, cell_of
 from swarm_forage_env.world.state import Bins, Touching
@@ -43,7 +43,7 @@ def remembered(memory: Touching, i: int, j: int) -> float:
     return math.nan
 
 
-@kernel
+@inline_kernel
 def press(
     position: FloatArray,
     present: BoolArray,

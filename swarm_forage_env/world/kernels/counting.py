@@ -1,6 +1,6 @@
 """What is counted in every tick: who is in interference, who does what, and how the swarm divides over tasks."""
 
-from swarm_forage_env._internal.compiling import kernel, part
+from swarm_forage_env._internal.compiling import inline_kernel, kernel, part
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.detection import sees_obstacle
 from swarm_forage_env.contract.layout import RING_SENSORS
@@ -16,7 +16,7 @@ _HANDLING, _AT_CACHES = int(Counter.HANDLING), int(Counter.AT_CACHES)
 _NEAR_CACHES = int(Counter.INTERFERING_NEAR_CACHES)
 
 
-@part
+@inline_kernel
 def mark(
     obs: ObsArray,
     proximity: int,

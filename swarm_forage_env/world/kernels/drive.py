@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import kernel, part
+from swarm_forage_env._internal.compiling import inline_kernel, kernel, part
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray
 
 _MORE = 1.0 + 1e-12
@@ -61,7 +61,7 @@ def limit_command(
     return limit_wheels(wanted_left, wanted_right, max_speed, max_difference)
 
 
-@part
+@inline_kernel
 def drive(
     actions: ActionArray,
     wheel_gain: FloatArray,

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import kernel, part
+from swarm_forage_env._internal.compiling import inline_kernel, kernel, part
 from swarm_forage_env._internal.prefetching import AHEAD, LARGE, prefetch
 from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_OBJECT
 from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
@@ -188,7 +188,7 @@ def _is_near_change(changed: IntArray, cell_x: int, cell_y: int) -> bool:
     return False
 
 
-@part
+@inline_kernel
 def line_of_sight(
     position: FloatArray,
     present: BoolArray,

@@ -5,7 +5,7 @@ If it holds, an interaction starts. It takes effect some ticks later (usually on
 possible in every tick until then. A RELEASE onto open floor acts at once.
 """
 
-from swarm_forage_env._internal.compiling import kernel, part
+from swarm_forage_env._internal.compiling import inline_kernel, kernel, part
 from swarm_forage_env.contract.codes import (
     CELL_CACHE,
     CELL_EMPTY,
@@ -411,7 +411,7 @@ def _band_now(swarm: SwarmState, gripper: ActionArray, i: int) -> int:
     return swarm.pending_band[i]
 
 
-@part
+@inline_kernel
 def interact(state: WorldState, rules: Rules, gripper: ActionArray, tick: int, chance: FloatArray) -> None:
     """Serve all requests of one tick, phase by phase; within a phase, robots by (row - tick) mod N, lowest first.
 
@@ -439,7 +439,7 @@ def interact(state: WorldState, rules: Rules, gripper: ActionArray, tick: int, c
                 _serve(state, rules, _band_now(swarm, gripper, i), i, tick, chance[i])
 
 
-@kernel
+@inline_kernel
 def serve(state: WorldState, rules: Rules, gripper: ActionArray, tick: int, chance: FloatArray) -> None:
     """Rewrite the events and lists of a tick: clear them, and `interact` if any robot has a request."""
     state.requests.displaced[-1] = 0
