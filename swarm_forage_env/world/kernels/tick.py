@@ -198,8 +198,8 @@ class Phases(NamedTuple):
 
     start: Callable[..., int]
     push: Callable[..., None]
-    move: Callable[..., bool] | None
-    """None where Chipmunk has the bodies."""
+    move: Callable[..., bool]
+    """Not called where Chipmunk has the bodies."""
     look: Callable[..., None]
     meet: Callable[..., bool]
     sense: Callable[..., None]
@@ -213,7 +213,7 @@ def phases_of(a: ArenaArrays, b: BodyState | None) -> Phases:
         phases = Phases(
             start=Callback(start, a, actions, np.empty((1, 1)), gives=1),
             push=Callback(push, a, 1),
-            move=None if b is None else Callback(move, a, b, gives=True),
+            move=Callback(move, a, b, gives=True) if b is not None else Callback(push, a, 1),
             look=Callback(look, a),
             meet=Callback(meet, a, actions, 1, chance, gives=True),
             sense=Callback(sense, a),
