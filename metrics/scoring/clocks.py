@@ -1,7 +1,7 @@
 """Runs of other simulators and of real robots on one clock: deliveries binned, curves cut or resampled."""
 
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple, TypeAlias
+from collections.abc import Mapping
+from typing import TypeAlias
 
 import numpy as np
 
@@ -11,8 +11,8 @@ from ..checks import CurveError
 from ..curves import FloatArray
 from .run_curves import HANDLING, THROTTLE
 
-TIME = "time_s"
-"""Column of event logs: when a delivery was."""
+TIME, END = "time_s", "t_end_s"
+"""Columns: when a delivery was, and where an interval ends."""
 MOST_INTERVALS = 1_000_000
 """Most intervals of a run of deliveries; our choice: some measures need a table of so many by so many."""
 _AT_THE_END = (THROTTLE, HANDLING)
@@ -20,22 +20,13 @@ _AT_THE_END = (THROTTLE, HANDLING)
 _NEAR = 1e-9
 """Relative difference of times that are the same."""
 
-Experiment: TypeAlias = tuple[str, str, float, int]
-"""Policy, criterion, its value, number of robots."""
+RunKey: TypeAlias = tuple[str, str, float, int, int]
+"""Policy, criterion, its value, number of robots, seed."""
+Runs: TypeAlias = Mapping[RunKey, Mapping[str, FloatArray]]
+"""Run -> column -> its values, (T,) each: in intervals that end at `END`, where that is known, or of deliveries."""
 
 
-class Run(NamedTuple):
-    """One run as it was given."""
-
-    experiment: Experiment
-    seed: int
-    times_s: FloatArray | None
-    """Ends of the intervals, or times of the deliveries, (T,)."""
-    curves: Mapping[str, FloatArray]
-    """Column -> (T,)."""
-
-
-def binned(runs: Sequence[Run], interval_s: float, where: str) -> tuple[list[Run], FloatArray, str]:
+def binned(runs: Runs, interval_s: float, where: str) -> tuple[Runs, FloatArray, str]:
     """Add up the deliveries in each interval.
 
     Returns:
@@ -44,7 +35,7 @@ def binned(runs: Sequence[Run], interval_s: float, where: str) -> tuple[list[Run
     Raises:
         CurveError: there would be too many intervals.
     """
-    latest = max(float(run.times_s.max()) for run in runs if run.times_s is not None)
+    latest = max(float(run[TIME].max()) for run in runs.values())
     n_intervals = max(1, int(np.ceil(latest / interval_s * (1.0 - _NEAR))))
     if n_intervals > MOST_INTERVALS:
         raise CurveError(
@@ -52,12 +43,11 @@ def binned(runs: Sequence[Run], interval_s: float, where: str) -> tuple[list[Run
             f"intervals of {interval_s:g} s."
         )
     clock = interval_s * np.arange(1.0, n_intervals + 1.0)
-    found: list[Run] = []
-    for run in runs:
-        assert run.times_s is not None
-        places = np.minimum((run.times_s / interval_s).astype(np.intp), n_intervals - 1)
-        counts = np.bincount(places, run.curves["performance"], n_intervals)
-        found.append(run._replace(times_s=clock, curves={"performance": counts, "t_end_s": clock}))
+    found: dict[RunKey, dict[str, FloatArray]] = {}
+    for key, run in runs.items():
+        places = np.minimum((run[TIME] / interval_s).astype(np.intp), n_intervals - 1)
+        delivered = np.bincount(places, run["performance"], n_intervals).astype(np.float64)
+        found[key] = {"performance": delivered, END: clock}
     note = (
         f"deliveries are counted in {counted(n_intervals, 'interval')} of {interval_s:g} s; all runs are taken to last "
         f"{clock[-1]:g} s, as the latest delivery tells"
@@ -66,12 +56,12 @@ def binned(runs: Sequence[Run], interval_s: float, where: str) -> tuple[list[Run
 
 
 def on_one_clock(
-    runs: Sequence[Run], interval_s: float | None, *, is_total: bool, where: str
-) -> tuple[list[Run], FloatArray | None, str]:
+    runs: Runs, interval_s: float | None, *, is_total: bool, where: str
+) -> tuple[Runs, FloatArray | None, str]:
     """Cut runs to the shortest, and resample them where their intervals differ.
 
     Args:
-        runs: As they were given; all with times, or none.
+        runs: As they were given; all with ends of intervals, or none.
         interval_s: Length of the intervals that all get; None = those of the shortest run if all have the same, else
             the longest that a run has.
         is_total: Whether performance is a total over its interval; totals are kept in sum, others in mean over time.
@@ -83,16 +73,16 @@ def on_one_clock(
     Raises:
         CurveError: the shortest run has no whole interval.
     """
-    lengths = [len(run.curves["performance"]) for run in runs]
-    is_cut = min(lengths) < max(lengths)
-    cut = f"runs have from {min(lengths)} to {max(lengths)} intervals and are cut to the first {min(lengths)}"
-    ends = [run.times_s for run in runs if run.times_s is not None]
+    lengths = [len(run["performance"]) for run in runs.values()]
+    least, most = min(lengths), max(lengths)
+    note = f"runs have from {least} to {most} intervals and are cut to the first {least}" if least < most else ""
+    ends = [run[END] for run in runs.values() if END in run]
     if not ends:
-        clock = None if interval_s is None else interval_s * np.arange(1.0, min(lengths) + 1.0)
-        return [_cut(run, min(lengths), clock) for run in runs], clock, cut if is_cut else ""
+        clock = None if interval_s is None else interval_s * np.arange(1.0, least + 1.0)
+        return _cut(runs, least, clock), clock, note
     clock = min(ends, key=len)
     steps = [float(np.median(np.diff(each, prepend=0.0))) for each in ends]
-    if interval_s is not None or not all(_same(each, clock) for each in ends):
+    if interval_s is not None or not all(_begins_with(each, clock) for each in ends):
         step = max(steps) if interval_s is None else interval_s
         shortest = min(float(each[-1]) for each in ends)
         clock = step * np.arange(1.0, np.floor(shortest / step * (1.0 + _NEAR)) + 1.0)
@@ -100,39 +90,36 @@ def on_one_clock(
             raise CurveError(
                 f"Expected an interval of at most {shortest:g} s, the shortest run of {where}, got {step:g} s."
             )
-    if all(_same(each, clock) for each in ends):
-        return [_cut(run, len(clock), clock) for run in runs], clock, cut if is_cut else ""
+    if all(_begins_with(each, clock) for each in ends):
+        return _cut(runs, len(clock), clock), clock, note
     kept = "totals of performance are kept" if is_total else "performance is a mean over time"
     note = (
         f"runs with intervals of {min(steps):g} to {max(steps):g} s are resampled to {counted(len(clock), 'interval')} "
         f"of {clock[0]:g} s: {kept}"
     )
-    return [_resampled(run, clock, is_total=is_total) for run in runs], clock, note
+    return {key: _resampled(run, clock, is_total=is_total) for key, run in runs.items()}, clock, note
 
 
-def _same(ends_s: FloatArray, clock: FloatArray) -> bool:
-    """Whether a run has the intervals of a clock, and perhaps more."""
+def _begins_with(ends_s: FloatArray, clock: FloatArray) -> bool:
     return len(ends_s) >= len(clock) and np.allclose(ends_s[: len(clock)], clock, rtol=_NEAR, atol=0.0)
 
 
-def _cut(run: Run, n_intervals: int, clock: FloatArray | None) -> Run:
-    curves = {name: curve[:n_intervals] for name, curve in run.curves.items()}
-    return run._replace(times_s=clock, curves=curves if clock is None else {**curves, "t_end_s": clock})
+def _cut(runs: Runs, n_intervals: int, clock: FloatArray | None) -> Runs:
+    ends = {} if clock is None else {END: clock}
+    return {key: {name: curve[:n_intervals] for name, curve in run.items()} | ends for key, run in runs.items()}
 
 
-def _resampled(run: Run, clock: FloatArray, *, is_total: bool) -> Run:
+def _resampled(run: Mapping[str, FloatArray], clock: FloatArray, *, is_total: bool) -> dict[str, FloatArray]:
     """Return a run on another clock, which ends no later than the run."""
-    assert run.times_s is not None
-    ends, edges = np.concatenate(([0.0], run.times_s)), np.concatenate(([0.0], clock))
+    ends, edges = np.concatenate(([0.0], run[END])), np.concatenate(([0.0], clock))
     curves: dict[str, FloatArray] = {}
-    for name, curve in run.curves.items():
+    for name, curve in run.items():
         if name in _AT_THE_END:
-            places = np.searchsorted(run.times_s, clock * (1.0 - _NEAR))
-            curves[name] = curve[places]
+            curves[name] = curve[np.searchsorted(run[END], clock * (1.0 - _NEAR))]
             continue
         is_sum = is_total and name == "performance"
         sums = np.concatenate(([0.0], np.cumsum(curve if is_sum else curve * np.diff(ends))))
         parts = np.diff(np.interp(edges, ends, sums))
         # A difference of sums can be off by a rounding error, and no mean lies outside of its values.
         curves[name] = np.maximum(parts, 0.0) if is_sum else np.clip(parts / np.diff(edges), curve.min(), curve.max())
-    return run._replace(times_s=clock, curves={**curves, "t_end_s": clock})
+    return {**curves, END: clock}

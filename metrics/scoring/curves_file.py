@@ -7,7 +7,7 @@ Whatever is wrong with a table is one line: its place in the file, what was expe
 """
 
 import csv
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
@@ -23,7 +23,7 @@ from swarm_forage_env.wrappers.world import SIZE, UNDISTURBED
 from ..checks import CurveError
 from ..curves import FRACTION_TOLERANCE, FloatArray
 from ..queues import PopulationRates
-from .clocks import TIME, Experiment, Run, binned, on_one_clock
+from .clocks import END, TIME, Runs, binned, on_one_clock
 from .run_curves import (
     CRITERIA,
     CURVE_COLUMNS,
@@ -77,20 +77,21 @@ def read_curves(path: str | Path, performance: str | None = None, **how: Any) ->
     """
     file = Path(path)
     try:
-        frame = _read_parquet(file) if file.suffix.lower() == ".parquet" else _read_text(file)
+        frame = pl.read_parquet(file) if file.suffix.lower() == ".parquet" else _read_text(file)
     except OSError as error:
         raise CurveError(f"Cannot read {file}: {error.strerror or error}.") from error
-    studies = study_curves(frame, performance, where=str(file), controller=file.stem, **how)
-    for study in studies:
-        _check_comparable(study)
-    return studies
-
-
-def _read_parquet(file: Path) -> pl.DataFrame:
-    try:
-        return pl.read_parquet(file)
     except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
         raise CurveError(f"Cannot read {file} as Parquet: {str(error).splitlines()[0]}.") from error
+    studies = study_curves(frame, performance, where=str(file), controller=file.stem, **how)
+    for study in studies:
+        for criterion in (THROTTLE, HANDLING, NOISE, POPULATION):
+            study.levels(criterion)  # each has a reference
+        if not shared_seeds(study.experiments):
+            raise CurveError(
+                f"Expected runs with numbers in common over all experiments of {study.controller} in {file}, got none; "
+                "number the runs of each experiment alike (column seed)."
+            )
+    return studies
 
 
 def _read_text(file: Path) -> pl.DataFrame:
@@ -138,7 +139,7 @@ def study_curves(
 
     Args:
         frame: Rows in any order, one per interval of a run with columns as in `CURVE_COLUMNS`, or one per delivery with
-            those of `EVENT_COLUMNS`. Runs of unequal lengths and steps are resampled; `StudyCurves.notes` say so.
+            those of `EVENT_COLUMNS`. Runs of unequal lengths and steps are resampled; `StudyCurves.note` says so.
         performance: Column that is read as performance, or "1/" and a column in which less is better; default
             "performance".
         columns: Our name of a column -> its name in the table, or a number, which then stands in each row.
@@ -159,39 +160,31 @@ def study_curves(
         names["performance"] = performance.removeprefix(INVERTED)
     known = EVENT_COLUMNS if events else CURVE_COLUMNS
     given = _Given.named(frame, names, known, where)
-    if events:
-        given.require("n_robots", "seed", TIME)
-    else:
-        clock = "t_end_s" if "t_end_s" in given.frame.columns else "interval"
-        given.require("n_robots", "seed", clock, "performance")
+    clock = TIME if events else END if END in given.frame.columns else "interval"
+    given.require("n_robots", "seed", clock, *([] if events else ["performance"]))
     table = _with_experiments(given.typed(known), given, controller)
     if performance is not None and performance.startswith(INVERTED):  # 1/0 is 0: distances need finite curves
         inverse = pl.when(pl.col("performance") != 0.0).then(1.0 / pl.col("performance")).otherwise(0.0)
         table = table.with_columns(performance=inverse)
     read_as, is_total = _performance(performance)
     experiments = table.partition_by(*_EXPERIMENT, as_dict=True, maintain_order=True)
-    if events and interval_s is not None:
-        logs = [run for key, part in experiments.items() for run in _events(key, part)]
-        runs, clock, note = binned(logs, interval_s, where)
+    found: dict[Any, dict[str, FloatArray]] = {}
+    for key, part in experiments.items():
+        held = [name for name in (*INTERVAL_COLUMNS, "interval") if name in part.columns and part[name].count()]
+        for name in held if not events else ():
+            wanted = f"a value, as in other intervals with N = {key[-1]}"
+            _refuse_rows(part, pl.col(name).is_null(), given, name, wanted)
+        for (seed,), run in part.sort(clock).partition_by("seed", as_dict=True, maintain_order=True).items():
+            found[*key, seed] = _delivered(run) if events else _curve(run, seed, held, given)
+    if events:
+        runs, ends, note = binned(found, interval_s or MOST, where)
     else:
-        curves = [run for key, part in experiments.items() for run in _curves(key, part, given)]
-        runs, clock, note = on_one_clock(curves, interval_s, is_total=is_total, where=where)
-    rates = {key: _rates(part, given) for key, part in experiments.items()}
-    return tuple(
-        StudyCurves(
-            controller=name,
-            experiments=tuple(
-                _experiment([run for run in runs if run.experiment == key], rates[key], clock)
-                for key in experiments
-                if key[0] == name
-            ),
-            t_end_s=clock,
-            read_as=read_as,
-            where=where,
-            note=note,
-        )
-        for name in table["controller"].unique(maintain_order=True)
-    )
+        runs, ends, note = on_one_clock(found, interval_s, is_total=is_total, where=where)
+    of_policy: dict[Any, list[RunCurves]] = {}
+    for key, part in experiments.items():
+        of_policy.setdefault(key[0], []).append(_experiment(key, runs, _rates(part, given), ends))
+    told: dict[str, Any] = {"t_end_s": ends, "read_as": read_as, "where": where, "note": note}
+    return tuple(StudyCurves(controller=name, experiments=tuple(of), **told) for name, of in of_policy.items())
 
 
 def _performance(name: str | None) -> tuple[Performance, bool]:
@@ -201,19 +194,7 @@ def _performance(name: str | None) -> tuple[Performance, bool]:
     # Nobody knows what a column of one's own is; it is taken for a total. An inverse is none, and does not add up.
     known = PERFORMANCE_COLUMNS.get(name, Performance(name, is_total=True, adds_up=True))
     is_inverse = name.startswith(INVERTED)
-    unit = known.unit if name in PERFORMANCE_COLUMNS else "1"
-    return Performance(name, unit, adds_up=known.adds_up and not is_inverse), known.is_total and not is_inverse
-
-
-def _check_comparable(study: StudyCurves) -> None:
-    """Check that there is a reference for everything that is varied, and that runs can be paired."""
-    for criterion in (THROTTLE, HANDLING, NOISE, POPULATION):
-        study.levels(criterion)
-    if not shared_seeds(study.experiments):
-        raise CurveError(
-            f"Expected runs with numbers in common over all experiments of {study.controller} in {study.where}, "
-            "got none; number the runs of each experiment alike (column seed)."
-        )
+    return Performance(name, known.unit, adds_up=known.adds_up and not is_inverse), known.is_total and not is_inverse
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -269,19 +250,16 @@ class _Given:
             return texts
         values = texts.cast(pl.Float64, strict=False)
         if name == TIME and values.null_count() == len(values):
-            return self._dates(texts)
+            try:
+                dates = texts.str.to_datetime(strict=False)
+            except pl.exceptions.ComputeError:  # no form of dates fits the first ones
+                dates = values
+            self.refuse(dates.is_null(), TIME, "a number of seconds, or a date and time")
+            return dates
         wanted, is_right = _KINDS[kind]
         is_known = (values.is_finite() & (values.abs() <= MOST) & is_right(values)).fill_null(False)
         self.refuse(~is_known & (texts.is_not_null() | (name in _IN_EACH_ROW)), name, wanted)
         return values.cast(pl.Int64) if kind == "whole" else values
-
-    def _dates(self, texts: pl.Series) -> pl.Series:
-        try:
-            dates = texts.str.to_datetime(strict=False)
-        except pl.exceptions.ComputeError:  # no form of dates fits the first ones
-            dates = texts.cast(pl.Null, strict=False)
-        self.refuse(dates.is_null(), TIME, "a number of seconds, or a date and time")
-        return dates
 
     def refuse(self, is_bad: pl.Series, name: str, wanted: str) -> None:
         """Raise an error about the first row that is bad, if there is one."""
@@ -323,37 +301,24 @@ def _with_experiments(table: pl.DataFrame, given: _Given, controller: str) -> pl
     return table
 
 
-def _experiment(runs: Sequence[Run], rates: PopulationRates | None, clock: FloatArray | None) -> RunCurves:
-    """Return the runs of one experiment, in the order of their numbers."""
-    runs = sorted(runs, key=lambda run: run.seed)
-    _, criterion, value, n_robots = runs[0].experiment
-    return RunCurves(
-        criterion=criterion,
-        value=value,
-        n_robots=n_robots,
-        seeds=tuple(run.seed for run in runs),
-        curves={name: np.stack([run.curves[name] for run in runs]) for name in runs[0].curves},
-        rates=rates,
-        horizon_s=None if clock is None else float(clock[-1]),
-    )
+def _curve(run: pl.DataFrame, seed: object, names: list[str], given: _Given) -> dict[str, FloatArray]:
+    """Return the columns of a run, whose intervals follow each other."""
+    if "interval" in names:
+        wrong = pl.col("interval") != pl.int_range(pl.len()) + min(run["interval"][0], 1)
+        _refuse_rows(run, wrong, given, "interval", f"the next interval of run {seed}, each once")
+    if END in names:
+        wrong = pl.col(END).diff().fill_null(pl.col(END).first()) <= 0.0
+        _refuse_rows(run, wrong, given, END, f"a later end of an interval of run {seed}")
+    return {name: run[name].to_numpy() for name in names if name != "interval"}
 
 
-def _curves(key: Experiment, part: pl.DataFrame, given: _Given) -> Iterator[Run]:
-    """Yield the runs of an experiment, with those columns that it has."""
-    names = [name for name in (*INTERVAL_COLUMNS, "interval") if name in part.columns and part[name].count()]
-    for name in names:
-        _refuse_rows(part, pl.col(name).is_null(), given, name, f"a value, as in other intervals with N = {key[-1]}")
-    for (seed,), run in part.sort("t_end_s" if "t_end_s" in names else "interval").group_by(
-        "seed", maintain_order=True
-    ):
-        if "interval" in names:
-            wrong = pl.col("interval") != pl.int_range(pl.len()) + min(run["interval"][0], 1)
-            _refuse_rows(run, wrong, given, "interval", f"the next interval of run {seed}, each once")
-        if "t_end_s" in names:
-            wrong = pl.col("t_end_s").diff().fill_null(pl.col("t_end_s").first()) <= 0.0
-            _refuse_rows(run, wrong, given, "t_end_s", f"a later end of an interval of run {seed}")
-        curves = {name: run[name].to_numpy() for name in names if name != "interval"}
-        yield Run(key, int(str(seed)), curves.get("t_end_s"), curves)
+def _delivered(run: pl.DataFrame) -> dict[str, FloatArray]:
+    """Return the times of deliveries, and how much each brought."""
+    times = run[TIME]
+    if times.dtype.is_temporal():  # from the first one on
+        times = (times - times.min()).dt.total_microseconds() / 1e6
+    delivered = run["performance"].to_numpy() if "performance" in run.columns else np.ones(len(run))
+    return {TIME: times.to_numpy(), "performance": delivered}
 
 
 def _refuse_rows(part: pl.DataFrame, is_bad: pl.Expr, given: _Given, name: str, wanted: str) -> None:
@@ -362,14 +327,19 @@ def _refuse_rows(part: pl.DataFrame, is_bad: pl.Expr, given: _Given, name: str, 
         given.refuse_row(row, name, wanted)
 
 
-def _events(key: Experiment, part: pl.DataFrame) -> Iterator[Run]:
-    """Yield the deliveries of the runs of an experiment."""
-    for (seed,), run in part.group_by("seed", maintain_order=True):
-        times = run[TIME]
-        if times.dtype.is_temporal():  # from the first one on
-            times = (times - times.min()).dt.total_microseconds() / 1e6
-        delivered = run["performance"].to_numpy() if "performance" in run.columns else np.ones(len(run))
-        yield Run(key, int(str(seed)), times.to_numpy(), {"performance": delivered})
+def _experiment(key: tuple[Any, ...], runs: Runs, rates: PopulationRates | None, ends: FloatArray | None) -> RunCurves:
+    """Return the runs of one experiment, in the order of their numbers."""
+    _, criterion, value, n_robots = key
+    mine = sorted((run_key[-1], run) for run_key, run in runs.items() if run_key[:-1] == key)
+    return RunCurves(
+        criterion=criterion,
+        value=value,
+        n_robots=n_robots,
+        seeds=tuple(seed for seed, _ in mine),
+        curves={name: np.stack([run[name] for _, run in mine]) for name in mine[0][1]},
+        rates=rates,
+        horizon_s=None if ends is None else float(ends[-1]),
+    )
 
 
 def _rates(part: pl.DataFrame, given: _Given) -> PopulationRates | None:

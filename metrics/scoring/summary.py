@@ -5,7 +5,7 @@ print(summarize_runs(table))
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,19 +26,16 @@ from ..statistics import Summary, aggregate
 from .limits import ABOUT_LIMIT, share_of_limit
 from .plots import FEWEST_RUNS, interval_words
 
-LEVEL = 0.95
-"""Confidence level of all intervals."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ConditionSummary:
-    """What the runs of a policy in a world achieved."""
+    """What the finished runs of a policy in a world achieved."""
 
     condition: Condition
+    records: tuple[Record, ...]
     caches: str
-    n_runs: int
     of: Mapping[str, Summary]
-    """Quantity of `_quantities` -> mean and interval over runs."""
+    """Quantity of `_quantities` -> mean and 95 % interval over runs."""
     share_of_limit: float | None
     """Mean performance over the estimated limit of the world; None where there is no estimate, see `limit_of`."""
     simulated_s_per_wall_s: float
@@ -63,57 +60,78 @@ class RunSummary(Answer):
         """What performance is in the first world."""
         return performance_of(self.world.scenario.performance)
 
+    @property
+    def n_worlds(self) -> int:
+        """Number of worlds."""
+        return len({condition.world for condition in self.table.plan.conditions})
+
     def sheets(self) -> tuple[Sheet, ...]:
         """Return one row per condition, and why runs failed."""
         failures = Sheet(notes=[f"failed: {line}" for line in failure_lines(self.table.failures.values())])
         if not self.rows:
             return (failures,)
-        n_worlds = len({condition.world for condition in self.table.plan.conditions})
-        # Deliveries are always there; what else the scenario calls performance stands before them.
-        other = [] if self.read_as.name == "collected" else [f"{self.read_as.title} {span(self.read_as)}"]
-        header = ["policy", *(["world"] if n_worlds > 1 else []), "caches", "runs", *other, "deliveries per 1,000 s"]
-        has_limit = any(row.share_of_limit is not None for row in self.rows)
-        header += [*(["of the limit"] if has_limit else []), "interference", "simulated s per wall s"]
-        lines: list[list[str]] = []
+        # What the scenario calls performance stands before deliveries, where it is something else.
+        first = f"{self.read_as.title} {'per 1,000 s' if self.read_as.is_total else 'mean'}"
+        lines: list[dict[str, str]] = []
         for row in self.rows:
-            about = [row.condition.policy.label, *([row.condition.world.name] if n_worlds > 1 else [])]
-            numbers = [spread_text(row.of["performance"])] if other else []
-            numbers += [spread_text(row.of["deliveries_per_1000_s"])]
-            numbers += ["-" if row.share_of_limit is None else percent(row.share_of_limit)] if has_limit else []
-            tail = [f"{row.of['interference_fraction'].mean:.3f}", f"{row.simulated_s_per_wall_s:,.0f}"]
-            lines.append([*about, row.caches, str(row.n_runs), *numbers, *tail])
-        notes = [f"{interval_words([row.n_runs for row in self.rows])}; interference: share of active robot time"]
+            share = row.share_of_limit
+            line = {
+                "policy": row.condition.policy.label,
+                "world": row.condition.world.name,
+                "caches": row.caches,
+                "runs": str(len(row.records)),
+                first: _with_half(row.of["performance"]),
+                "deliveries per 1,000 s": _with_half(row.of["deliveries_per_1000_s"]),
+                "of the limit": "-" if share is None else percent(share),
+                "interference": f"{row.of['interference_fraction'].mean:.3f}",
+                "simulated s per wall s": f"{row.simulated_s_per_wall_s:,.0f}",
+            }
+            lines.append(line)
+        has_limit = any(row.share_of_limit is not None for row in self.rows)
+        is_hidden = {"world": self.n_worlds == 1, "of the limit": not has_limit}
+        header = [name for name in lines[0] if not is_hidden.get(name)]
+        notes = [f"{interval_words([len(row.records) for row in self.rows])}; interference: share of active robot time"]
         notes += [ABOUT_LIMIT] if has_limit else []
-        return Sheet.of(title=self._title(n_worlds), header=header, rows=lines, notes=notes), failures
+        cells = [[line[name] for name in header] for line in lines]
+        return Sheet.of(title=self._title(), header=header, rows=cells, notes=notes), failures
 
-    def _title(self, n_worlds: int) -> str:
+    def _title(self) -> str:
         scenario = self.world.scenario
-        if n_worlds > 1:
-            return f"{scenario.name} and others: {counted(n_worlds, 'world')}"
+        if self.n_worlds > 1:
+            return f"{scenario.name} and others: {counted(self.n_worlds, 'world')}"
         sizes = counted(self.world.n_robots, "robot"), counted(scenario.objects.n_objects, "object")
         return self.world.title(*sizes, f"{scenario.horizon_s:g} s")
 
     def to_mapping(self) -> dict[str, Any]:
         """Return policies, runs and failures as plain values."""
-        folder = self.table.folder
+        folder, read_as = self.table.folder, self.read_as
         return {
             "scenario": self.world.scenario.name,
-            "performance": {
-                "name": self.read_as.name,
-                "unit": self.read_as.unit,
-                "is_per_1000_s": self.read_as.is_total,
-            },
+            "performance": {"name": read_as.name, "unit": read_as.unit, "is_per_1000_s": read_as.is_total},
             "out": None if folder is None else str(folder),
-            "controllers": [_condition_mapping(row) for row in self.rows],
+            "controllers": [
+                {
+                    "controller": row.condition.policy.label,
+                    "caches": row.caches,
+                    "n_runs": len(row.records),
+                    **{
+                        name: {"mean": plain(of.mean), "low": plain(of.lower), "high": plain(of.upper)}
+                        for name, of in row.of.items()
+                    },
+                    "share_of_limit": row.share_of_limit,
+                    "simulated_s_per_wall_s": plain(row.simulated_s_per_wall_s),
+                }
+                for row in self.rows
+            ],
             "runs": [
                 {
                     **record.keys,
-                    **_quantities(record, self.read_as),
+                    **_quantities(record, read_as),
                     "wall_time_s": plain(record.wall_time_s),
                     "file": None if folder is None else str(record_file(folder, record.run_id)),
                 }
                 for row in self.rows
-                for record in self.table.of(row.condition)
+                for record in row.records
             ],
             "failures": [
                 {
@@ -135,56 +153,56 @@ class RunSummary(Answer):
         """Draw performance over time, one curve per condition with the t interval over seeds."""
         if not self.has_picture:
             raise ValueError("Expected finished runs with the same intervals, got nothing to draw.")
-        scenario, read_as = self.world.scenario, self.read_as
-        n_worlds = len({row.condition.world for row in self.rows})
+        interval_s, read_as = self.world.scenario.interval_s, self.read_as
         curves: list[Curve] = []
         for row in self.rows:
-            runs = np.array([record["performance"] for record in self.table.of(row.condition)])
-            per_interval = [aggregate(column, level=LEVEL) for column in runs.T]
-            mean, low, high = np.array([(point.mean, point.lower, point.upper) for point in per_interval]).T
+            runs = np.array([record["performance"] for record in row.records])
+            points = [aggregate(column) for column in runs.T]
+            mean, low, high = np.array([(point.mean, point.lower, point.upper) for point in points]).T
             if len(runs) < FEWEST_RUNS:
                 low = high = np.full_like(mean, np.nan)
             policy, world = row.condition
-            label = policy.label if n_worlds == 1 else f"{policy.label} in {world.name}"
+            label = policy.label if self.n_worlds == 1 else f"{policy.label} in {world.name}"
             curves.append(Curve(label, mean, low, high))
         draw_curves(
             path,
-            self.table.of(self.rows[0].condition)[0]["t_end_s"],
+            self.rows[0].records[0]["t_end_s"],
             curves,
-            title=self._title(n_worlds),
-            ylabel=f"{read_as.title} per {scenario.interval_s:g} s" if read_as.is_total else read_as.title,
-            band=_about_bands(curves),
+            title=self._title(),
+            ylabel=f"{read_as.title} per {interval_s:g} s" if read_as.is_total else read_as.title,
+            band=_about_bands([len(row.records) for row in self.rows]),
             style=style,
         )
 
 
 def summarize_runs(table: Table) -> RunSummary:
     """Return what the runs of a table achieved, one row per condition that has finished runs."""
-    return RunSummary(table=table, rows=tuple(_condition_summaries(table)))
+    found = ((condition, table.of(condition)) for condition in table.plan.conditions)
+    rows = (_summary(table, condition, records) for condition, records in found if records)
+    return RunSummary(table=table, rows=tuple(rows))
 
 
-def performance_number(record: Record, read_as: Performance) -> float:
-    """Return the performance of a run as one number: per 1,000 s for totals, else the mean over intervals."""
-    return record.per_1000_s("performance") if read_as.is_total else float(record["performance"].mean())
-
-
-def span(read_as: Performance) -> str:
-    """Return what `performance_number` counts, in words."""
-    return "per 1,000 s" if read_as.is_total else "mean"
-
-
-def spread_text(summary: Summary) -> str:
-    """Return a mean with half of its interval, with two digits behind the point."""
-    half = summary.upper - summary.mean
-    return f"{summary.mean:.2f}" + ("" if math.isnan(half) else f" ± {half:.2f}")
+def _summary(table: Table, condition: Condition, records: tuple[Record, ...]) -> ConditionSummary:
+    wall_s = sum(record.wall_time_s for record in records)
+    planned = table.plan.specs_of(condition)[0].world
+    runs = [_quantities(record, performance_of(condition.world.scenario.performance)) for record in records]
+    return ConditionSummary(
+        condition=condition,
+        records=records,
+        caches=planned.scenario.caches,
+        of={name: aggregate([run[name] for run in runs]) for name in runs[0]},
+        share_of_limit=share_of_limit(planned, float(np.mean([record["performance"].sum() for record in records]))),
+        simulated_s_per_wall_s=sum(record.horizon_s for record in records) / wall_s if wall_s else math.nan,
+    )
 
 
 def _quantities(record: Record, read_as: Performance) -> dict[str, float]:
-    """Return what is told of a run, each as one number."""
+    """Return what is told of a run, each as one number; performance is per 1,000 s if it is a total, else a mean."""
     delivered, present = record["collected"], record["n_present"]
     per_robot = np.divide(delivered, present, out=np.zeros(len(present)), where=present > 0.0)
+    performance = record.per_1000_s("performance") if read_as.is_total else float(record["performance"].mean())
     return {
-        "performance": performance_number(record, read_as),
+        "performance": performance,
         "deliveries_per_1000_s": record.per_1000_s("collected"),
         "deliveries_per_robot_per_1000_s": float(per_robot.sum()) * 1000.0 / record.horizon_s,  # that is present
         "first_pickups_per_1000_s": record.per_1000_s("first_picked"),
@@ -192,43 +210,15 @@ def _quantities(record: Record, read_as: Performance) -> dict[str, float]:
     }
 
 
-def _condition_summaries(table: Table) -> Iterator[ConditionSummary]:
-    for condition in table.plan.conditions:
-        records = table.of(condition)
-        if not records:
-            continue
-        wall_s = sum(record.wall_time_s for record in records)
-        read_as = performance_of(condition.world.scenario.performance)
-        planned = table.plan.specs_of(condition)[0].world
-        runs = [_quantities(record, read_as) for record in records]
-        yield ConditionSummary(
-            condition=condition,
-            caches=planned.scenario.caches,
-            n_runs=len(records),
-            of={name: aggregate([run[name] for run in runs], level=LEVEL) for name in runs[0]},
-            share_of_limit=share_of_limit(planned, float(np.mean([record["performance"].sum() for record in records]))),
-            simulated_s_per_wall_s=sum(record.horizon_s for record in records) / wall_s if wall_s else math.nan,
-        )
+def _with_half(summary: Summary) -> str:
+    """Return a mean with half of its interval, with two digits behind the point."""
+    half = summary.upper - summary.mean
+    return f"{summary.mean:.2f}" + ("" if math.isnan(half) else f" ± {half:.2f}")
 
 
-def _condition_mapping(row: ConditionSummary) -> dict[str, Any]:
-    return {
-        "controller": row.condition.policy.label,
-        "caches": row.caches,
-        "n_runs": row.n_runs,
-        **{
-            name: {"mean": plain(of.mean), "low": plain(of.lower), "high": plain(of.upper)}
-            for name, of in row.of.items()
-        },
-        "share_of_limit": row.share_of_limit,
-        "simulated_s_per_wall_s": plain(row.simulated_s_per_wall_s),
-    }
-
-
-def _about_bands(curves: Sequence[Curve]) -> str:
+def _about_bands(n_runs: Sequence[int]) -> str:
     """Return what the bands are; of curves without them, why."""
     few = f"fewer than {FEWEST_RUNS} runs, too few for a band"
-    with_band = [bool(np.isfinite(curve.low).any()) for curve in curves]
-    if not any(with_band):
+    if max(n_runs) < FEWEST_RUNS:
         return few
-    return f"bands: {LEVEL:.0%} t interval over seeds" + ("" if all(with_band) else f"; elsewhere {few}")
+    return "bands: 95% t interval over seeds" + (f"; elsewhere {few}" if min(n_runs) < FEWEST_RUNS else "")

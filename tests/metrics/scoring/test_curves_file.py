@@ -189,6 +189,7 @@ BAD_TABLES = {
         CROWDING.rename({"performance": "performence"}),
         "--columns performance=NAME names another one. Did you mean 'performence'",
     ),
+    "capitals": (CROWDING.rename(str.upper), "the columns n_robots, seed, .* Did you mean 'N_ROBOTS'"),
     "no rows": (CROWDING.clear(), "column names without a row"),
     "gap in a run": (
         table(rows(2, [[1.0, 1.0, 1.0]])).filter(pl.col("interval") != 1),
