@@ -39,6 +39,9 @@ def test_the_story_by_hand(arena):
     np.testing.assert_array_equal([step.rewards[rows] for step in steps], lives.REWARDS)
     np.testing.assert_array_equal([step.terminated[rows] for step in steps], lives.TERMINATED)
     np.testing.assert_array_equal([step.truncated[rows] for step in steps], lives.TRUNCATED)
+    np.testing.assert_array_equal([step.active[rows] for step in steps[:-1]], lives.ACTIVE_BEFORE[1:])
+    seen = [step.obs[rows, batch.interface.active_column] == 1.0 for step in steps[:-1]]
+    np.testing.assert_array_equal(seen, lives.ACTIVE_BEFORE[1:])
     episodes = {
         (tick, row - rows.start): (step.returns[k], step.lengths[k])
         for tick, step in enumerate(steps)
@@ -46,14 +49,6 @@ def test_the_story_by_hand(arena):
         if step.is_episode[k] and rows.start <= row < rows.stop
     }
     assert episodes == lives.EPISODES
-
-
-def test_active_rows_follow_the_story():
-    batch = ArenaBatch(plan(), 1)
-    steps = told_story(batch, 0)
-    column = batch.interface.active_column
-    np.testing.assert_array_equal([step.active for step in steps[:-1]], lives.ACTIVE_BEFORE[1:])
-    np.testing.assert_array_equal([step.obs[:, column] == 1.0 for step in steps[:-1]], lives.ACTIVE_BEFORE[1:])
 
 
 def test_final_observations_are_the_last_of_the_old_run_and_the_returned_ones_the_first_of_the_new():
@@ -171,16 +166,7 @@ def test_a_refused_scenario_leaves_the_arena_as_it_was(options, reason):
     assert batch.step(np.zeros((3, 3), np.float32)).rewards.tolist() == [1.0, 1.0, 1.0]
 
 
-def test_closed_arenas_take_no_reset_and_no_step():
-    batch = ArenaBatch(plan(), 1)
-    batch.reset([0], [None])
-    batch.close()
-    for call in (lambda: batch.step(np.zeros((3, 3))), batch.action_masks, lambda: batch.reset([0], [None])):
-        with pytest.raises(RuntimeError, match="were closed"):
-            call()
-
-
-def test_refuses_too_few_rows_and_steps_before_a_reset():
+def test_refuses_too_few_rows_and_steps_before_a_reset_or_after_the_end():
     batch = ArenaBatch(plan(), 2)
     with pytest.raises(RuntimeError, match="reset"):
         batch.step(np.zeros((6, 3), np.float32))
@@ -193,6 +179,10 @@ def test_refuses_too_few_rows_and_steps_before_a_reset():
         batch.step(np.zeros((3, 3), np.float32))
     with pytest.raises(ValueError, match="n_arenas to be a whole number >= 1"):
         ArenaBatch(plan(), 0)
+    batch.close()
+    for call in (lambda: batch.step(np.zeros((6, 3))), batch.action_masks, lambda: batch.reset([0, 1], [None] * 2)):
+        with pytest.raises(RuntimeError, match="were closed"):
+            call()
 
 
 @pytest.mark.parametrize("interface", [InterfaceConfig(), InterfaceConfig(automatic_gripper=True)])

@@ -77,22 +77,6 @@ def test_seeds_count_up_by_arena_and_hold_for_one_reset():
     assert drawn[3] == drawn[0] + 1
 
 
-def test_attributes_and_methods_reach_the_arenas():
-    env = SwarmVecEnv(**lives.WORLD, n_arenas=2)
-    env.seed(0)
-    env.reset()
-    assert env.get_attr("tick") == [0] * 6
-    assert env.get_attr("tick", indices=[0, 5]) == [0, 0]
-    assert env.get_attr("seed_value", indices=4) == [1]
-    env.set_attr("max_cycles", 3, indices=[3])
-    assert env.get_attr("max_cycles") == [5, 5, 5, 3, 3, 3]
-    names = env.env_method("observation_space", "robot_0", indices=[5, 0])
-    assert [space.shape for space in names] == [env.observation_space.shape] * 2
-    assert env.env_is_wrapped(Wrapper) == [False] * 6
-    assert env.has_attr("layout")
-    assert not env.has_attr("no_such_thing")
-
-
 def test_evaluations_of_the_library_count_episodes_and_no_absences():
     wrappers = [parse_wrapper("population:death_per_tick=0.05")]
     env = SwarmVecEnv("warehouse_small", n_robots=4, max_cycles=20, delivery=0.0, first_pickup=0.0, tick=1.0,
@@ -103,15 +87,6 @@ def test_evaluations_of_the_library_count_episodes_and_no_absences():
         returns, lengths = evaluate_policy(model, env, n_eval_episodes=40, return_episode_rewards=True)
     lost = np.array(lengths) - np.array(returns)
     assert set(lost) == {0.0, 1.0}, "whoever dies earns nothing in the last step of its episode, and in no other"
-
-
-def test_options_change_the_scenario_of_the_next_resets():
-    env = SwarmVecEnv(**lives.WORLD, n_arenas=2)
-    env.set_options({"scenario": {"n_objects": 9}})
-    env.reset()
-    assert env.get_attr("swarm_spec", indices=[0])[0].n_objects == 9
-    env.reset()
-    assert env.get_attr("swarm_spec", indices=[5])[0].n_objects == 9
 
 
 def test_masks_are_found_where_masking_algorithms_look():
@@ -144,6 +119,10 @@ def test_attributes_and_methods_reach_the_arenas_of_rows():
     env.seed(3)
     env.reset()
     assert env.get_attr("tick", indices=[8, 0]) == [0, 0]
+    assert env.get_attr("seed_value", indices=4) == [4]
+    assert env.env_is_wrapped(Wrapper) == [False] * 9
+    assert env.has_attr("layout")
+    assert not env.has_attr("no_such_thing")
     assert env.env_method("observation_space", "robot_0", indices=[4])[0].shape == env.observation_space.shape
     env.set_attr("max_cycles", 9, indices=[3])
     assert env.get_attr("max_cycles", indices=[0, 3, 8]) == [5, 9, 5]

@@ -3,7 +3,6 @@
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from gymnasium.wrappers.vector import RecordEpisodeStatistics
@@ -14,6 +13,7 @@ from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.views.gymnasium import JointForageEnv, SwarmVectorEnv
 from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv
+from swarm_forage_env.views.plans import plan_arena
 from swarm_forage_env.wrappers.noise import SensorNoise
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.support import lives
@@ -61,15 +61,6 @@ def test_the_number_of_sub_environments_is_a_whole_number_of_swarms():
         gymnasium.make_vec(env_id, n_robots=4, n_arenas=0)
 
 
-def test_make_vec_takes_what_disturbs_the_swarm_under_a_name_of_its_own():
-    noise, slip = parse_wrapper("sensor_noise:sigma=0.1"), parse_wrapper("actuator_noise:sigma=0.1")
-    envs = gymnasium.make_vec("swarm_forage/warehouse_small-v0", n_robots=4, swarm_wrappers=[noise])
-    clean = SwarmVectorEnv(n_robots=4)
-    assert not np.array_equal(envs.reset(seed=0)[0], clean.reset(seed=0)[0])
-    both = SwarmVectorEnv(n_robots=4, wrappers=[slip, noise])
-    np.testing.assert_array_equal(both.reset(seed=0)[0], envs.reset(seed=0)[0])
-
-
 def test_words_of_the_command_line_and_plain_values_are_taken_everywhere():
     words, fields = ["sensor_noise:sigma=0.1"], {"actions": "discrete"}
     seen = []
@@ -102,10 +93,9 @@ def test_words_of_the_command_line_and_plain_values_are_taken_everywhere():
         ({"interface": {"action": "discrete"}}, "Did you mean 'actions'"),
     ],
 )
-@pytest.mark.parametrize("view", [JointForageEnv, SwarmVectorEnv, ParallelLearnerEnv])
-def test_other_wrappers_and_interfaces_are_refused(view, given, reason):
+def test_other_wrappers_and_interfaces_are_refused(given, reason):
     with pytest.raises(ConfigError, match=reason):
-        view(n_robots=3, **given)
+        plan_arena(n_robots=3, **given)
 
 
 def told_story() -> list[tuple]:
@@ -114,16 +104,11 @@ def told_story() -> list[tuple]:
     return lives.live(lambda **change: envs.call("set_population", **change), lambda: envs.step(IDLE))
 
 
-def test_rewards_and_endings_by_hand():
+def test_infos_by_hand():
     steps = told_story()
     np.testing.assert_array_equal([rewards for _, rewards, *_ in steps], lives.REWARDS)
-    np.testing.assert_array_equal([terminated for _, _, terminated, *_ in steps], lives.TERMINATED)
-    np.testing.assert_array_equal([truncated for _, _, _, truncated, _ in steps], lives.TRUNCATED)
     np.testing.assert_array_equal([infos["active"] for *_, infos in steps[:-1]], lives.ACTIVE_BEFORE[1:])
-
-
-def test_infos_by_hand():
-    for tick, (obs, _, terminated, truncated, infos) in enumerate(told_story()):
+    for tick, (obs, _, terminated, truncated, infos) in enumerate(steps):
         done = terminated | truncated
         assert ("final_obs" in infos) == done.any()
         if not done.any():
@@ -138,46 +123,6 @@ def test_infos_by_hand():
         assert episodes == {key: value for key, value in lives.EPISODES.items() if key[0] == tick}
         for robot in np.flatnonzero(truncated).tolist():
             assert not np.array_equal(infos["final_obs"][robot], obs[robot])
-
-
-def test_rows_are_those_of_the_joint_view():
-    envs = SwarmVectorEnv("warehouse_small", num_envs=8, n_robots=4, max_cycles=20)
-    joint = [JointForageEnv("warehouse_small", n_robots=4, max_cycles=20) for _ in range(2)]
-    obs, _ = envs.reset(seed=3)
-    rows = [env.reset(seed=3 + arena)[0] for arena, env in enumerate(joint)]
-    rng = np.random.default_rng(0)
-    for tick in range(30):
-        np.testing.assert_array_equal(obs, np.concatenate(rows))
-        actions = rng.uniform(-1, 1, (8, 3)).astype(np.float32)
-        obs, rewards, _, truncated, _ = envs.step(actions)
-        rows = []
-        for arena, env in enumerate(joint):
-            mine = slice(4 * arena, 4 * arena + 4)
-            row, reward, _, is_over, _ = env.step(actions[mine])
-            assert reward == pytest.approx(rewards[mine].sum())
-            assert truncated[mine].tolist() == [is_over] * 4
-            rows.append(env.reset()[0] if is_over else row)
-        assert truncated.all() == (tick == 19)
-
-
-def test_the_same_seed_gives_the_same_data_twice_and_nothing_is_reused():
-    def played() -> list:
-        envs = SwarmVectorEnv("warehouse_small", num_envs=6, n_robots=3, max_cycles=8, interface=INTERFACES[2])
-        envs.action_space.seed(5)
-        envs.reset(seed=2)
-        data = [envs.step(envs.action_space.sample()) for _ in range(10)]
-        for *_, infos in data:
-            infos.get("final_info", {}).pop("episode", None)  # the clock on the wall
-        return data
-
-    first, second = played(), played()
-    for one, other in zip(first, second, strict=True):
-        for k in range(4):
-            assert data_equivalence(one[k], other[k], exact=True)
-        np.testing.assert_array_equal(one[4]["active"], other[4]["active"])
-        for mine, theirs in zip(one[4].get("final_obs", ()), other[4].get("final_obs", ()), strict=True):
-            np.testing.assert_array_equal(mine, theirs)
-    assert not np.array_equal(first[0][0], first[1][0])
 
 
 def test_the_end_of_a_run_tells_what_it_brought():
@@ -210,28 +155,6 @@ def test_seeds_per_arena_and_their_number():
     assert not np.array_equal(other, again)
     with pytest.raises(ValueError, match="one seed per arena"):
         envs.reset(seed=[1])
-
-
-@pytest.mark.parametrize("view", ["joint", "vector"])
-def test_a_reset_can_change_the_scenario(view):
-    if view == "joint":
-        env = JointForageEnv("warehouse_small", n_robots=3)
-        forage_envs = lambda: [env.forage_env]  # noqa: E731 - a name for both views
-    else:
-        env = SwarmVectorEnv("warehouse_small", num_envs=6, n_robots=3)
-        forage_envs = lambda: [env._arenas.arenas[k].forage_env for k in range(2)]  # noqa: E731 - as above
-    space = env.observation_space
-    env.reset(seed=0, options={"scenario": {"n_objects": 77, "delivery": 5.0}})
-    assert {each.scenario.objects.n_objects for each in forage_envs()} == {77}
-    env.reset()
-    assert {each.scenario.reward.delivery for each in forage_envs()} == {5.0}
-    env.reset(options={"scenario": {}})
-    assert {each.scenario.objects.n_objects for each in forage_envs()} == {200}
-    assert env.observation_space == space
-    with pytest.raises(ConfigError, match="n_robots to stay 3"):
-        env.reset(options={"scenario": {"n_robots": 4}})
-    with pytest.raises(ConfigError, match=r"the reset option 'scenario' only, .* got 'width_m'"):
-        env.reset(options={"width_m": 24.0})
 
 
 def test_attributes_and_methods_reach_the_arenas():
