@@ -81,14 +81,6 @@ def test_obstacle_thresholds(length, angle, described, program):
     assert [is_obstacle_vector(*vector, behind_counts) for behind_counts in (False, True)] == [described, program]
 
 
-def test_one_reading_at_full_range_is_an_obstacle():
-    readings = np.zeros(24, np.float32)
-    readings[3] = 0.1004
-    assert sees_obstacle(readings, False)
-    readings[3] = 0.0996
-    assert not sees_obstacle(readings, False)
-
-
 @pytest.mark.parametrize(
     ("greys", "seen"),
     [
@@ -184,7 +176,7 @@ def test_walls_are_seen_from_a_reach_beyond_the_body(stage, gap, obstacle):
 
 
 @pytest.mark.parametrize("apart", [0.18, 0.2, 0.22, 0.25])
-@pytest.mark.parametrize("heading", np.linspace(0.0, 3.0, 13))
+@pytest.mark.parametrize("heading", np.linspace(0.0, 3.0, 5))
 def test_equal_obstacles_on_opposite_sides_cancel(stage, heading, apart):
     put(stage, 0, 16.0, 8.0, heading)
     put(stage, 1, 16.0 + apart, 8.0, math.pi)

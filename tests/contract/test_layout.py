@@ -48,10 +48,6 @@ def test_indexing_gives_the_columns_of_a_slice(layout):
     assert row[layout["los_cache"]].tolist() == list(range(layout.size - 16, layout.size))
 
 
-def test_noise_groups_name_the_sensors_that_noise_may_reach(layout):
-    assert {part.name: part.noise_group for part in layout if part.noise_group} == {name: name for name in NOISY}
-
-
 def test_scales_are_natural_units(layout):
     for part in layout:
         assert len(part.scale) == part.size
@@ -65,18 +61,6 @@ def test_scales_are_natural_units(layout):
 def test_unknown_slice_lists_the_known_ones(layout):
     with pytest.raises(KeyError, match=r"'lidar'.*proximity, light"):
         layout["lidar"]
-
-
-def test_description_has_one_line_per_slice(layout):
-    lines = layout.describe().splitlines()[1:]
-    assert [line.split()[1] for line in lines] == list(SIZES)
-    assert lines[0].split()[0] == "0..23"
-    assert lines[6].split()[0] == "58"
-
-
-def test_layouts_of_equal_worlds_are_one_object():
-    assert observation_layout(48.0, 48.0, 10) is observation_layout(48.0, 48.0, 10)
-    assert observation_layout(48.0, 48.0, 10) != observation_layout(48.0, 48.0, 11)
 
 
 def test_serial_numbers_survive_float32():

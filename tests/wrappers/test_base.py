@@ -134,19 +134,6 @@ def test_only_the_documented_order_can_be_stacked(outer, inner):
             wrapper_at(outer)(base)
 
 
-def test_dict_api_packs_once_steps_the_stack_and_unpacks_once(stack):
-    observations, infos = stack.reset(seed=3)
-    assert list(observations) == list(infos) == ["robot_0", "robot_1", "robot_2", "robot_3"]
-    Logging.log.clear()
-    actions = {agent: np.zeros(3, np.float32) for agent in stack.agents}
-    observations, rewards, terminations, truncations, infos = stack.step(actions)
-    assert len([entry for entry in Logging.log if entry[1] == "after_step"]) == 2
-    assert len(stack.unwrapped.calls) == 1
-    np.testing.assert_allclose(observations["robot_2"], 0.01 + 0.5 + 0.25)
-    for table in (observations, rewards, terminations, truncations, infos):
-        assert list(table) == ["robot_0", "robot_1", "robot_2", "robot_3"]
-
-
 def test_dict_and_array_level_give_the_same_run():
     config = small_scenario(horizon_s=4.0)
     rng = np.random.default_rng(0)

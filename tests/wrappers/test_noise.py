@@ -110,16 +110,6 @@ def test_exact_columns_stay_exact(world):
         assert same == exact, part.name
 
 
-@pytest.mark.parametrize("group", NOISE_GROUPS)
-def test_only_chosen_groups_are_noisy(world, group):
-    obs = middling_obs(world)
-    for fields in ({"sigma": 0.1, "groups": (group,)}, {"sigmas": {group: 0.1}}):
-        seen = noisy(world, obs, 1, **fields)[0]
-        changed = np.flatnonzero((seen != obs).any(axis=0))
-        columns = world.layout[group]
-        assert changed.tolist() == list(range(columns.start, columns.stop))
-
-
 def test_a_group_may_have_a_sigma_of_its_own(world):
     obs = middling_obs(world)
     seen = noisy(world, obs, 20, sigma=0.02, groups=("proximity", "ground"), sigmas={"ground": 0.1, "light": 0.04})
@@ -189,17 +179,6 @@ def test_the_loss_of_a_robot_does_not_shift_the_noise_of_others(world):
     np.testing.assert_array_equal(fewer[0][5], obs[5])
 
 
-def test_a_run_has_noise_of_its_own(world):
-    obs = middling_obs(world)
-    stack = SensorNoise(world, SensorNoiseConfig(sigma=0.1))
-    seen = []
-    for seed in (1, 2, 1):
-        stack.on_reset(seed)
-        seen.append(stack.observe(obs.copy()))
-    np.testing.assert_array_equal(seen[0], seen[2])
-    assert not np.array_equal(seen[0], seen[1])
-
-
 # Time
 
 
@@ -225,13 +204,9 @@ def test_sigma_may_follow_a_waveform():
 STUDY_TABLE = [
     # sigma, false obstacle per tick, all four sensors show the object, three of four show the nest or a cache
     (0.0043, 0.168, 1.00, 1.00),
-    (0.0129, 0.170, 1.00, 1.00),
     (0.0171, 0.184, 0.99, 1.00),
-    (0.021, 0.22, 0.96, 1.00),
     (0.030, 0.379, 0.82, 1.00),
     (0.043, 0.57, 0.60, 1.00),
-    (0.050, 0.66, 0.50, 0.99),
-    (0.071, 0.81, 0.33, 0.88),
     (0.100, 0.90, 0.23, 0.62),
 ]
 
@@ -307,6 +282,24 @@ def test_random_bits_are_those_of_the_twin(n_draws):
         np.testing.assert_array_equal(room, next(twin)[0])
 
 
+@pytest.mark.parametrize("n_robots", [1, 7, 200])
+def test_draws_of_all_ticks_robots_and_columns_are_standard_and_independent(n_robots):
+    """Also where robots' draws do not fill the lanes of the generator."""
+    lanes, room, columns = new_lanes(stream_rng(7, Stream.SENSOR_NOISE)), room_for_draws(n_robots * 57), 57
+    ticks = max(20, 4_000 // n_robots)
+    drawn = np.empty((ticks, n_robots, columns))
+    for tick in range(ticks):
+        draw_bits(lanes, room)
+        drawn[tick] = normal_of_bits(room[: n_robots * columns]).reshape(n_robots, columns)
+    sure = 4.0 / np.sqrt(drawn.size)
+    assert abs(drawn.mean()) < sure
+    assert abs((drawn**2).mean() - 1.0) < sure * np.sqrt(2.0)
+    for axis, size in enumerate(drawn.shape):
+        for apart in {1, size // 2} if size > 1 else ():
+            pairs = drawn * np.roll(drawn, apart, axis)
+            assert abs(pairs.mean()) < sure * np.sqrt(2.0), f"axis {axis}, {apart} apart"
+
+
 # Actuators
 
 
@@ -320,14 +313,6 @@ def actuator_gains(n_steps: int, *, wheel_gain=None, seed: int = 0, **fields) ->
         stack.step_batch(np.zeros((ROBOTS, 3), np.float32), wheel_gain=wheel_gain)
         gains.append(np.array(env.calls[-1]["wheel_gain"]))
     return np.stack(gains)
-
-
-def test_each_wheel_has_a_factor_of_its_own_in_every_tick():
-    gains = actuator_gains(50, sigma=0.05)
-    assert gains.mean() == pytest.approx(1.0, abs=4 * 0.05 / np.sqrt(gains.size))
-    assert gains.std() == pytest.approx(0.05, rel=0.03)
-    assert np.corrcoef(gains[..., 0].ravel(), gains[..., 1].ravel())[0, 1] == pytest.approx(0.0, abs=0.04)
-    assert np.corrcoef(gains[0].ravel(), gains[1].ravel())[0, 1] == pytest.approx(0.0, abs=0.2)
 
 
 def test_gains_from_outside_are_multiplied_and_left_alone():
@@ -350,6 +335,3 @@ def test_wheel_noise_acts_after_the_limit_and_only_on_wheels_that_turn():
     assert not speeds[:, 1].any()
     assert not speeds[:, 2, 0].any()
     assert speeds[:, 2, 1].std() > 0.01
-
-
-# Configuration

@@ -155,24 +155,6 @@ def test_the_dead_lose_their_cargo_and_their_body(place, status, event, deaths):
     assert np.all(env.arena._physics.poses()[0, :2] < 0.0), "parked outside"
 
 
-def kill_all(deaths: str) -> list[tuple[list[str], dict[str, bool]]]:
-    """Agents and terminations of each step while three robots die, one per step."""
-    env = ForageEnv(scenario("warehouse_small", n_robots=3, n_objects=20, physics=engines.CHOSEN))
-    stack = at_hand(env, deaths=deaths)
-    stack.reset(seed=0)
-    seen = []
-    for _ in range(3):
-        make_due(stack, "death")
-        actions = {agent: np.zeros(3, np.float32) for agent in stack.agents}
-        _, _, terminations, truncations, infos = stack.step(actions)
-        assert not any(truncations.values())
-        assert {agent: info["active"] for agent, info in infos.items()} == {
-            agent: bool(env.active[env.possible_agents.index(agent)]) for agent in infos
-        }
-        seen.append((list(stack.agents), terminations))
-    return seen
-
-
 @in_each_engine
 @pytest.mark.parametrize("lives_on", [False, True])
 def test_both_ways_of_death_are_the_same_world_and_record(lives_on):
@@ -248,6 +230,17 @@ def test_births_bring_working_robots_at_free_places():
     make_due(stack, "birth")
     stack.step_batch(hold(env))
     assert env.active.all(), "nobody is left to be born"
+
+
+def test_births_come_as_near_to_the_border_as_starts_where_that_is_less():
+    """The classroom starts robots 0.8 m from its border; the study's births keep 2 m."""
+    stack = at_hand(ForageEnv(scenario("classroom", n_robots=60)), initial_robots=1, birth_per_tick=1e-12)
+    stack.reset_batch(1)
+    for _ in range(59):
+        strike(stack, "birth")
+    places = stack.unwrapped.swarm.position
+    nearest = np.minimum(places, (8.0, 6.0) - places).min(axis=1)[1:]
+    assert 0.8 <= nearest.min() < 1.0
 
 
 # Events and record

@@ -154,17 +154,6 @@ def test_deaths_per_run_of_search_and_rescue():
 PROCESSES = ("death", "birth", "malfunction", "repair")
 
 
-def test_clocks_that_start_at_another_tick_have_other_waits_and_lots_of_the_same_mean():
-    rate, ticks = 0.01, np.arange(2_000)
-    started = [EventClocks(EventRates(death=rate, malfunction=rate), 5, tick=int(tick)) for tick in ticks]
-    waits = np.array([[one.death.next_tick, one.malfunction.next_tick] for one in started]) - ticks[:, None]
-    # An exponential has a deviation like its mean; the floor takes half a tick.
-    assert waits.mean(axis=0) == pytest.approx(1.0 / rate - 0.5, abs=3.3 / rate / np.sqrt(len(ticks)))
-    for column in (*waits.T, np.array([one.death.choices.random() for one in started])):
-        assert abs(np.corrcoef(column[1:], column[:-1])[0, 1]) < 3.3 / np.sqrt(len(ticks))
-    assert all(one.birth.next_tick == np.inf for one in started)
-
-
 @pytest.mark.parametrize("changed", PROCESSES)
 def test_a_process_that_keeps_its_rate_keeps_its_clock(changed):
     rates = dict.fromkeys(PROCESSES, 0.01)

@@ -36,17 +36,6 @@ def test_a_stack_goes_on_from_a_snapshot_to_the_same_record(name, caches):
         assert branch.columns() == columns
 
 
-CHILD = """
-import hashlib, pickle, sys
-from pathlib import Path
-from tests.support.branches import whole_stack
-snapshot, run, stack = pickle.loads(Path(sys.argv[1]).read_bytes())
-fresh = whole_stack("warehouse_small", "compiled", "dynamic")
-for branch in (run.beside(fresh, fresh.restore_batch(snapshot)), run.beside(stack, run.obs)):
-    print(hashlib.sha256(b"".join(branch.go_on(200).seen)).hexdigest(), branch.columns())
-"""
-
-
 @pytest.mark.parametrize(
     "words",
     [["sensor_noise:sigma=0.2"], [], ["throttle:waveform=constant,amplitude=0.1"]],
