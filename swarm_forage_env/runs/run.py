@@ -5,6 +5,7 @@
 
 import time
 from collections.abc import Iterable
+from dataclasses import replace
 from datetime import UTC, datetime
 from typing import NamedTuple
 
@@ -172,17 +173,21 @@ def run_one(spec: RunSpec) -> Record:
 
 
 def warm_up(spec: RunSpec) -> None:
-    """Step a run a few ticks, so that its kernels are compiled and cached before many processes need them.
+    """Make a run of a few ticks and one interval, so that its kernels are compiled and cached before many need them.
 
-    So early in a run a policy may not use the gripper. In one more tick every robot therefore grasps, because the
+    So early in a run a policy may not use the gripper. In the last tick every robot therefore grasps, because the
     kernel of interactions takes longest to compile. Where the whole run is one kernel, it is compiled already.
     """
+    length_s = (WARM_UP_TICKS + 1) * spec.scenario.dt_s
+    scenario = replace(spec.scenario, horizon_s=length_s, interval_s=length_s)
     policy = load_policy(spec.policy, spec.parameters)
-    recorder = build_stack(spec.scenario, spec.wrappers, reads=getattr(policy, "reads", None))
+    recorder = build_stack(scenario, spec.wrappers, reads=getattr(policy, "reads", None))
     run = LiveRun(recorder, policy, spec.seed)
     run.advance(to_tick=WARM_UP_TICKS)
     if run.compiled_policy is None:
-        grasping = np.zeros((spec.scenario.robots.n_robots, 3), np.float32)
+        grasping = np.zeros((scenario.robots.n_robots, 3), np.float32)
         grasping[:, 2] = Grip.GRASP
         recorder.step_batch(grasping)
+    else:
+        run.advance()
     recorder.close()

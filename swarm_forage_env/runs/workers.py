@@ -3,6 +3,7 @@
 Workers need no shared disk, because results are sent back.
 """
 
+import logging
 import os
 import signal
 import threading
@@ -96,7 +97,7 @@ def each_run(
     with _process_pool(n_workers) if executor is None else nullcontext(executor) as workers:
         if executor is None:
             if not is_kept(observe):
-                tell_of_first_run()  # workers have nobody to tell
+                tell_of_first_run()
             for _ in _done(workers, prepare, list({_kernels_of(spec): spec for spec in specs}.values()), 1):
                 pass
         yield from _done(workers, do, specs, AT_A_TIME)
@@ -177,7 +178,11 @@ def deaf_children() -> Iterator[None]:
 
 
 def live_with_driver() -> None:
-    """Prepare a process that a driver has started: it ignores Ctrl-C, and exits when the driver is gone."""
+    """Prepare a process that a driver has started: it ignores Ctrl-C, and exits when the driver is gone.
+
+    That functions are compiled the driver tells, once for all.
+    """
+    logging.getLogger("swarm_forage_env").setLevel(logging.ERROR)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     driver = parent_process()
     if driver is not None:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from baselines.crw import CRWPolicy
-from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import LiveRun, build_env, build_stack
@@ -20,6 +19,7 @@ from swarm_forage_env.wrappers.recorder import RunRecorder
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.throttle import Throttle, ThrottleConfig
 from swarm_forage_env.wrappers.waveform import Waveform
+from tests.support.drivers import LAST_TICK, UntilNaN
 from tests.support.foraging import quick_world
 
 POOLS = (
@@ -291,21 +291,6 @@ def test_two_wrappers_that_do_the_same_thing_both_do_it():
 
 
 # Faults
-
-LAST_TICK = 5
-
-
-@kernel
-def drive_until_nan(_obs, active, _draws, state, now):
-    actions = state[-1]
-    for i in range(active.size):
-        actions[i, 0], actions[i, 1], actions[i, 2] = 0.5, 0.4, -1.0
-    if now == LAST_TICK:
-        actions[2, 1] = np.nan
-
-
-class UntilNaN(CRWPolicy):
-    _kernel = staticmethod(drive_until_nan)
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.recorder import RunRecorder
 from swarm_forage_env.wrappers.throttle import ThrottleConfig
 from swarm_forage_env.wrappers.waveform import Waveform
-from tests.support.drivers import tick_by_tick
+from tests.support.drivers import LAST_TICK, UntilNaN, tick_by_tick
 from tests.support.foraging import quick_world
 from tests.support.stage import assert_same_world, snapshot
 
@@ -159,18 +159,7 @@ def test_tasks_that_no_kernel_keeps_up_to_date_are_asked_for_in_every_tick():
     assert not is_compiled(scenario("warehouse_small", n_robots=2), TellsAnew())
 
 
-LAST_TICK = 5
-"""Of the faulty policies."""
 NO_TASK = max(Task) + 1
-
-
-@kernel
-def drive_until_nan(_obs, active, _draws, state, now):
-    actions = state[-1]
-    for i in range(active.size):
-        actions[i, 0], actions[i, 1], actions[i, 2] = 0.5, 0.4, -1.0
-    if now == LAST_TICK:
-        actions[2, 1] = np.nan
 
 
 @kernel
@@ -180,10 +169,6 @@ def drive_until_no_task(_obs, active, _draws, state, now):
         actions[i, 0], actions[i, 1], actions[i, 2] = 0.5, 0.4, -1.0
     if now == LAST_TICK:
         allocation.task[1] = NO_TASK
-
-
-class UntilNaN(CRWPolicy):
-    _kernel = staticmethod(drive_until_nan)
 
 
 class UntilNoTask(STOCHMPolicy):
