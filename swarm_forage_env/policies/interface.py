@@ -275,18 +275,17 @@ class LearnerInterface:
         _check_rows("observations", obs, (len(obs), self._n_columns))
         if out is not None:
             _check_rows("out", out, (len(obs), self.layout.size))
-            if not (out.flags.c_contiguous and out.flags.writeable):
-                raise ValueError("Expected out as an array in one piece that can be written to; give a copy.")
+            if not out.flags.writeable:
+                raise ValueError("Expected out as an array that can be written to; give a copy.")
         n_extra = 0 if extra is None else extra.shape[1]
         if n_extra != self.config.extra_columns:
             raise ValueError(
                 f"Expected {self.config.extra_columns} columns of extra_observation, which the learner sees, got "
                 f"{n_extra}."
             )
-        if self.translation.has_memory or self.config.frame_decisions:
-            n_robots = len(self._commands)
-            if len(obs) != n_robots:
-                raise ValueError(f"Expected observations of {n_robots} robots, each with its row, got {len(obs)} rows.")
+        n_robots = len(self._commands)
+        if (self.translation.has_memory or self.config.frame_decisions) and len(obs) != n_robots:
+            raise ValueError(f"Expected observations of {n_robots} robots, each with its row, got {len(obs)} rows.")
         if decision is None and self.config.frame_decisions:
             raise ValueError(
                 "Expected the number of decisions before this one, which says what frames robots have, got none; call "
@@ -294,7 +293,7 @@ class LearnerInterface:
             )
         if out is None:
             out = np.empty((len(obs), self.layout.size), np.float32)
-        self.show(np.ascontiguousarray(obs), out, decision or 0, extra)
+        self.show(obs, out, decision or 0, extra)
         return out
 
     def show(self, obs: ObsArray, out: ObsArray, decision: int, extra: FloatArray | None) -> None:
@@ -326,7 +325,12 @@ class LearnerInterface:
             )
         if not self.translation.is_discrete:
             return actions
-        self._check_numbers(actions)
+        most = self._n_choices - 1
+        expected = f"Expected actions as whole numbers from 0 to {most}, got"
+        if actions.dtype.kind not in "iu":
+            raise ActionError(f"{expected} {actions.dtype}.")
+        if actions.min() < 0 or actions.max() > most:
+            raise ActionError(f"{expected} {actions.min()} to {actions.max()}.")
         return np.ascontiguousarray(actions, np.int32)
 
     def resting(self, actions: np.ndarray, away: BoolArray, carrying: BoolArray) -> np.ndarray:
@@ -377,14 +381,6 @@ class LearnerInterface:
     def __getstate__(self) -> dict[str, Any]:
         """Return what copies and pickles have; addresses of compiled code are no others' than this one's."""
         return {name: value for name, value in vars(self).items() if name not in ("_held", "_driver")}
-
-    def _check_numbers(self, actions: np.ndarray) -> None:
-        most = self._n_choices - 1
-        expected = f"Expected actions as whole numbers from 0 to {most}, got"
-        if actions.dtype.kind not in "iu":
-            raise ActionError(f"{expected} {actions.dtype}.")
-        if actions.min() < 0 or actions.max() > most:
-            raise ActionError(f"{expected} {actions.min()} to {actions.max()}.")
 
     def mask(self, obs: ObsArray) -> BoolArray:
         """Return which discrete actions make sense, (N, number of actions) bool; at least one per row.
