@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 import polars as pl
 
 from swarm_forage_env.rendering.figures import (
@@ -16,6 +17,7 @@ from swarm_forage_env.rendering.figures import (
 from swarm_forage_env.wrappers.world import SIZE
 
 from ..claims.panel import MIN_RUNS
+from ..curves import FloatArray
 from .frame import label_of, words_of
 from .measures import MEASURES, PICTURED
 from .run_curves import NOISE, POPULATION, THROTTLE
@@ -24,18 +26,20 @@ FEWEST_RUNS = MIN_RUNS
 """Fewer runs are drawn without an interval: they decide nothing, and that of two runs reaches nine standard deviations
 to either side, which would leave nothing else to be seen."""
 X_LABELS = {
-    SIZE: "robots N (the larger swarm)",
-    THROTTLE: "distance from ideal conditions, DTW(I_ec, V) (amplitude)",
-    NOISE: "noise \N{GREEK SMALL LETTER SIGMA}, in the unit of each sensor",
-    POPULATION: "level of population dynamics (rates λ, μ)",
+    SIZE: "robots N",
+    THROTTLE: "distance from ideal conditions (amplitude)",
+    NOISE: "standard deviation of the noise",
+    POPULATION: "level of population dynamics",
 }
+_ASIDE, _MOST_ASIDE = 0.04, 0.1
+"""Distance between policies at one level, and of the outer ones from the level at most; levels are 1 apart."""
 
 
 def draw_scores(summary: pl.DataFrame, path: str | Path, *, title: str = "", style: FigureStyle = SCREEN) -> None:
     """Draw scores into a picture file: one panel per measure, one line per policy.
 
     Amounts and distances are drawn relative to performance, where they have such values: a swarm that does little has
-    little to lose. Error bars are the intervals of the tables; below a dotted line, the noise floor, a distance says
+    little to lose. Error bars are the intervals of the tables; below its dotted line, the noise floor, a distance says
     nothing; hollow marks are values that mislead. The measures are those of `PICTURED`, or all where only some were
     scored. Measures that are computed without runs (availability) and values that are not finite are left out.
 
@@ -59,12 +63,14 @@ def draw_scores(summary: pl.DataFrame, path: str | Path, *, title: str = "", sty
         drawn = drawn.filter(pl.col("measure").is_in(PICTURED))
     if drawn.is_empty():
         raise ValueError("Expected a score to draw, got none with a finite value from runs.")
-    policies = summary["policy"].unique(maintain_order=True).to_list()
-    of_look = list(zip(policies, looks(policies), strict=True))
+    policies = drawn["policy"].unique(maintain_order=True).to_list()
+    step = min(_ASIDE, 2.0 * _MOST_ASIDE / max(len(policies) - 1, 1))
+    steps = step * (np.arange(len(policies)) - 0.5 * (len(policies) - 1))
+    of_look = [*zip(policies, looks(policies), steps.tolist(), strict=True)]
     groups = drawn.partition_by("measure", "variant", "form", maintain_order=True)
-    about = (
-        f"{title + ': ' if title else ''}{_about_bars(drawn['runs'].to_list())}; dotted: noise floor; hollow: misleads"
-    )
+    bars, floors = _about_bars(drawn["runs"].to_list()), "; dotted: noise floor" if drawn["ground"].count() else ""
+    hollow = "; hollow: misleads" if drawn["misleads"].any() else ""
+    about = f"{title + ': ' if title else ''}{bars}{floors}{hollow}"
     with saved_panels(path, len(groups), (3.4, 2.8), title=about, style=style) as panels:
         for rows, panel in zip(groups, panels, strict=True):
             _draw_panel(panel, rows, of_look)
@@ -88,22 +94,21 @@ def _about_bars(n_runs: Sequence[int]) -> str:
     return "mean and 95 % interval over seeds" + (f"; none of fewer than {FEWEST_RUNS}" if False in with_bar else "")
 
 
-def _draw_panel(panel: Panel, rows: pl.DataFrame, of_look: Sequence[tuple[str, Look]]) -> None:
+def _draw_panel(panel: Panel, rows: pl.DataFrame, of_look: Sequence[tuple[str, Look, float]]) -> None:
     first = rows.row(0, named=True)
     measure = MEASURES[first["measure"]]
     places = sorted(set(rows["x"]))
-    for index, (policy, look) in enumerate(of_look):
+    for policy, look, aside in of_look:
         mine = rows.filter(policy=policy)
-        # Levels are categories, side by side, so that error bars of different policies do not cover each other.
-        shift = 0.08 * (index - 0.5 * (len(of_look) - 1))
-        x = [places.index(place) + shift for place in mine["x"]]
-        _draw_policy(panel, mine.with_columns(place=pl.Series(x, dtype=pl.Float64)), look)
+        x = np.array([places.index(place) for place in mine["x"]]) + aside  # levels are categories
+        if len(mine):
+            _draw_policy(panel, mine, x, look)
     if measure.neutral is not None and not measure.is_distance and first["variant"] == "corrected":
         panel.axhline(measure.neutral, color="0.6", linewidth=0.8, zorder=0)
     arrow = "higher" if measure.higher_is_better else "lower"
     name = words_of(label_of(first["measure"], first["variant"], first["form"]))
     panel.set_title(f"{name} ({arrow} is better)")
-    panel.set_ylabel(f"{measure.symbol}, {'share of performance' if first['is_relative'] else first['unit']}")
+    panel.set_ylabel("share of performance" if first["is_relative"] else first["unit"])
     panel.set_xlabel(X_LABELS[measure.varies])
     distance = dict(rows.select("x", "distance").drop_nulls().iter_rows())
     texts = [f"{distance[place]:.3g} ({place:.3g})" if place in distance else f"{place:.3g}" for place in places]
@@ -111,18 +116,13 @@ def _draw_panel(panel: Panel, rows: pl.DataFrame, of_look: Sequence[tuple[str, L
     panel.set_xlim(-0.5, len(places) - 0.5)
 
 
-def _draw_policy(panel: Panel, rows: pl.DataFrame, look: Look) -> None:
+def _draw_policy(panel: Panel, rows: pl.DataFrame, x: FloatArray, look: Look) -> None:
     has_bar = pl.col("top").is_finite() & (pl.col("runs") >= FEWEST_RUNS)
     half = rows.select(pl.when(has_bar).then(pl.col("top") - pl.col("y")).otherwise(0.0)).to_series()
-    panel.errorbar(
-        rows["place"], rows["y"], yerr=half.to_list(), color=look.colour, marker=look.marker, label=look.name
-    )
-    hollow = rows.filter("misleads")
-    if len(hollow):
-        panel.plot(
-            hollow["place"], hollow["y"], color=look.colour, marker=look.marker, markerfacecolor="w", linestyle=""
-        )
-    floors = rows.filter(pl.col("ground") > 0.0)
-    if len(floors):
-        panel.plot(floors["place"], floors["ground"], color=look.colour, linestyle=":", marker="_")
-        panel.fill_between(floors["place"], 0.0, floors["ground"], color=look.colour, alpha=0.06, linewidth=0.0)
+    style = {"color": look.colour, "marker": look.marker}
+    panel.errorbar(x, rows["y"], yerr=half.to_list(), label=look.name, **style)
+    hollow = rows["misleads"].to_numpy()
+    if hollow.any():
+        panel.plot(x[hollow], rows["y"].to_numpy()[hollow], markerfacecolor="w", linestyle="", **style)
+    if rows["ground"].count():
+        panel.plot(x, rows["ground"], color=look.colour, linestyle=":", linewidth=1.0, zorder=1)

@@ -50,8 +50,8 @@ _FEW_DECADES = 100.0
 """Over less than two decades, powers of ten alone are too few numbers along an axis."""
 _FLATTEST = 0.8
 """Height of a figure that is made narrower, as a share of its width: words need as much height as before."""
-_LETTER = 0.55
-"""Width of a letter as a share of the height of the font, roughly."""
+_LETTER, _LINE = 0.55, 1.3
+"""Width of a letter and height of a line as shares of the height of the font, roughly."""
 _NARROWEST_FIGURE_IN = 5.2
 """Unless a style says otherwise: room for a headline."""
 
@@ -144,13 +144,22 @@ def saved_figure(
         figure = Drawing(figsize=(width, height))
         if title and style.title:
             most = int(width * 72.0 / (_LETTER * style.font_size))
-            figure.suptitle(textwrap.fill(title, max(20, most), break_long_words=False))
+            lines = textwrap.wrap(title, max(20, most), break_long_words=False)
+            figure.suptitle("\n".join(lines))
+            if style.width_in is not None:  # the height was made for one line and a wider page
+                _grow(figure, len(lines) * _LINE * style.font_size)
         yield figure
         _fit_words(figure, style)
         _spread_numbers(figure)
         for file, ending in zip(files, endings, strict=True):
             with replacing(file, ending=ending) as draft:
                 figure.savefig(draft, metadata=_UNDATED[ending])
+
+
+def _grow(figure: Figure, points: float) -> None:
+    """Make a figure higher by the room that words need, so that panels keep theirs."""
+    width, height = figure.get_size_inches()
+    figure.set_size_inches(width, height + points / 72.0)
 
 
 def _fit_words(figure: Figure, style: FigureStyle) -> None:
@@ -235,11 +244,13 @@ def saved_panels(
         for panel in panels[n_panels:]:
             panel.set_axis_off()
         yield panels[:n_panels]
-        legend_below(figure)
+        n_lines = legend_below(figure)
+        if style.width_in is not None:
+            _grow(figure, n_lines * _LINE * style.font_size)
 
 
-def legend_below(figure: Figure) -> None:
-    """Explain everything with a label once, below all panels, in as few rows as the width has room for.
+def legend_below(figure: Figure) -> int:
+    """Explain everything with a label once, below all panels, in as few rows as the width has room for; return these.
 
     The paper's policies stand first, in its order.
     """
@@ -255,8 +266,9 @@ def legend_below(figure: Figure) -> None:
         handles = [shown[label] for label in by_column]
         legend = figure.legend(handles, by_column, loc="outside lower center", ncols=n_columns)
         if n_columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
-            return
+            return math.ceil(len(shown) / n_columns)
         legend.remove()
+    return 0
 
 
 def size_axis(panel: Panel, sizes: Iterable[float]) -> None:
@@ -276,7 +288,7 @@ def log_height(panel: Panel) -> None:
         digit = value / 10.0 ** math.floor(math.log10(value))
         return f"{value:g}" if high / low < _FEW_DECADES and round(digit) in (2, 5) else ""
 
-    panel.set_yscale("log", nonpositive="mask")
+    panel.set_yscale("log", nonpositive="clip")
     panel.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     panel.yaxis.set_minor_formatter(between)
 

@@ -20,6 +20,7 @@ from swarm_forage_env.rendering.figures import (
     FORMATS,
     FigureStyle,
     check_picture,
+    log_height,
     looks,
     saved_figure,
 )
@@ -122,3 +123,17 @@ def test_legends_of_several_rows_are_read_row_by_row(tmp_path):
     n_rows = shown.index("DPO")
     assert n_rows > 1
     assert [*shown[::n_rows], *shown[1::n_rows]] == ["CRW", "DPO", "STOCHM", "STOCHX", "generalist", "my own policy"]
+
+
+def test_a_bar_that_reaches_below_zero_is_drawn_to_the_edge_of_a_logarithmic_axis(tmp_path):
+    with saved_figure(tmp_path / "bars.png", (3.0, 3.0)) as figure:
+        panel = figure.subplots()
+        log_height(panel)
+        panel.errorbar([1.0, 2.0], [5.0, 50.0], yerr=[[8.0, 5.0], [8.0, 5.0]])
+        (bars,) = panel.containers[0][2]
+        low, high = panel.get_ylim()
+        bottom, top = panel.transData.transform(bars.get_segments()[0])[:, 1]
+        edge = panel.transData.transform((1.0, low))[1]
+    assert bottom < edge < top
+    assert low > 1.0
+    assert high < 100.0

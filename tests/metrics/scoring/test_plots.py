@@ -8,8 +8,9 @@ from metrics import MEASURES, waveform
 from metrics.scoring.frame import summarized, words_of
 from metrics.scoring.measures import PICTURED
 from metrics.scoring.plots import draw_scores
+from swarm_forage_env.rendering.figures import FigureStyle
 from tests.support.curve_tables import rows, scored
-from tests.support.pictures import PNG, keep_figures
+from tests.support.pictures import keep_figures
 
 
 def summary(*names, runs=((1.0, 2.0), (2.0, 2.0))):
@@ -39,27 +40,47 @@ def panel_of(figure, title):
 
 
 def test_one_panel_per_measure_and_one_line_per_policy(tmp_path, monkeypatch):
-    given = summary("mine", "theirs")
-    draw_scores(given, tmp_path / "scores.png")
-    assert (tmp_path / "scores.png").read_bytes().startswith(PNG)
+    given = summary("mine", "theirs", "absent").filter((pl.col("policy") != "absent") | (pl.col("measure") == "none"))
+    draw_scores(given, tmp_path / "scores.svg")
+    assert "<svg" in (tmp_path / "scores.svg").read_text()
     figure = drawn(monkeypatch, tmp_path / "scores.png", given)
     titles = [axes.get_title().partition(" (")[0] for axes in figure.axes if axes.axison]
     assert titles == [words_of(name) for name in given["measure"].unique(maintain_order=True)]
-    assert panel_of(figure, "time lost").get_ylabel() == "t_lost(N, t), share of robot time"
+    assert panel_of(figure, "time lost").get_ylabel() == "share of robot time"
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["mine", "theirs"]
     panel = panel_of(figure, "noise robustness")
-    assert len(panel.containers) == 2
-    assert panel.get_ylabel() == "B_sa, share of performance"
+    assert panel.get_ylabel() == "share of performance"
     row = given.filter(measure="noise_robustness").row(0, named=True)
     (bar,) = panel.containers[0][2][0].get_segments()
     assert bar[:, 1].tolist() == pytest.approx([row["relative"]] * 2)  # of two runs there is no interval
     dotted = [line for line in panel.get_lines() if line.get_linestyle() == ":"]
     assert [line.get_ydata()[0] for line in dotted] == [row["relative_floor"]] * 2
+    assert not any("Poly" in type(part).__name__ for part in panel.collections), "floors are lines"
+    assert not [
+        each for each in panel.collections if each not in {part for bars in panel.containers for part in bars[2]}
+    ]
 
 
-def test_single_runs_have_no_error_bars_and_other_formats_work(tmp_path):
-    draw_scores(summary("mine", runs=((1.0, 2.0),)), tmp_path / "scores.svg")
-    assert "<svg" in (tmp_path / "scores.svg").read_text()
+@pytest.mark.parametrize("n_policies", [1, 2, 9])
+def test_marks_stand_at_their_level_or_a_tenth_beside_it(n_policies, tmp_path, monkeypatch):
+    given = summary(*(f"p{k}" for k in range(n_policies))).filter(measure="raw_performance")
+    (panel,) = drawn(monkeypatch, tmp_path / "scores.png", given).axes
+    x = np.array([bars[0].get_xdata() for bars in panel.containers])
+    assert x.shape == (n_policies, 2)
+    assert np.abs(x - [0.0, 1.0]).max() <= 0.1 + 1e-9
+    assert x.mean(axis=0) == pytest.approx([0.0, 1.0], abs=1e-12)
+
+
+def test_panels_of_a_narrow_figure_keep_their_room_under_a_long_title(tmp_path, monkeypatch):
+    given = summary("mine", "theirs").filter(pl.col("measure").is_in(["raw_performance", "scalability"]))
+
+    def heights(title):
+        monkeypatch.undo()
+        figure = drawn(monkeypatch, tmp_path / "scores.png", given, title=title, style=FigureStyle(width_in=3.4))
+        figure.draw_without_rendering()
+        return [axes.get_window_extent().height for axes in figure.axes]
+
+    assert heights("a long title " * 12) == pytest.approx(heights("short"), rel=0.1)
 
 
 def test_values_that_are_not_finite_are_left_out(tmp_path, monkeypatch):
@@ -126,4 +147,4 @@ def test_the_x_axis_of_flexibility_is_the_distance_of_the_conditions(tmp_path, m
     figure = drawn(monkeypatch, tmp_path / "scores.png", given)
     panel = panel_of(figure, "reactivity")
     assert [text.get_text() for text in panel.get_xticklabels()] == ["7.4 (0.15)", "19.4 (0.4)"]
-    assert " ".join(panel.get_xlabel().split()) == "distance from ideal conditions, DTW(I_ec, V) (amplitude)"
+    assert " ".join(panel.get_xlabel().split()) == "distance from ideal conditions (amplitude)"
