@@ -11,7 +11,7 @@ from swarm_forage_env import ConfigError, ForageEnv, load_policy, parallel_env, 
 from swarm_forage_env.checks import check_policy
 from swarm_forage_env.contract.policy import ActionError, SwarmSpec
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
-from swarm_forage_env.policies.registry import from_callable
+from swarm_forage_env.policies.registry import from_callable, policy_file
 from swarm_forage_env.training.datasets import Dataset, record_dataset
 from tests.reference import neighbourhood
 from tests.support.branches import pickled
@@ -199,7 +199,7 @@ def test_a_policy_says_what_it_needs():
 
 
 def test_an_interface_can_be_said_in_words():
-    said = {"neighbours_seen": 3, "neighbour_range_m": "1.3", "message_size": 2}
+    said = policy_file("model.zip:neighbours_seen=3,neighbour_range_m=1.3,message_size=2").interface()
     assert interface_from_mapping(said) == InterfaceConfig(neighbours_seen=3, neighbour_range_m=1.3, message_size=2)
     with pytest.raises(ConfigError, match=r"interface\.neighbour_range_m.*'far'"):
         interface_from_mapping({"neighbour_range_m": "far"})
