@@ -1,11 +1,6 @@
-"""Files that are there complete or not at all, whether they can be written, and what JSON and TOML of anybody's say.
-
-Texts that anybody may have written are read with a bound on how deep they are nested: both parsers, and all that walks
-over what they return, call themselves for each level, and a file of brackets alone would end the process's stack.
-"""
+"""Files that are there complete or not at all, whether they can be written, and what JSON and TOML of anybody's say."""
 
 import errno
-import json
 import os
 import re
 import tomllib
@@ -15,14 +10,12 @@ from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
+import msgspec
+
 _PROBE = bytes(1 << 16)
 """What a folder must have room for, as large as a small record (our choice)."""
 _NO_LOCKS = (errno.EBADF, errno.EINVAL, errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP)
 """How disks answer that keep no locks, or none of folders, as some network disks do."""
-_LONE = re.compile(r"\\u[dD][89a-fA-F]")
-"""Half of a pair of UTF-16 in JSON, which alone stands for no character."""
-MOST_LEVELS = 50
-"""Levels of nested tables and lists that a file may have; our choice: our own files have fewer than ten."""
 
 
 @contextmanager
@@ -148,20 +141,8 @@ def as_file_name(text: str) -> str:
 
 
 def parse_json(text: str) -> Any:
-    """Return what a JSON text holds.
-
-    Raises:
-        ValueError: no JSON, nested deeper than `MOST_LEVELS`, or with a text that cannot be written as UTF-8.
-    """
-    content = _bounded(json.loads, text, "JSON")
-    if _LONE.search(text):
-        try:
-            json.dumps(content, ensure_ascii=False).encode()
-        except UnicodeEncodeError as error:
-            raise ValueError(
-                f"Expected texts that can be written as UTF-8, got one with {error.object[error.start]!r}."
-            ) from error
-    return content
+    """Return what a JSON text holds; ValueError for no JSON, or one that is nested too deep."""
+    return _parsed(msgspec.json.decode, text)
 
 
 def read_json(path: Path, refusal: type[ValueError]) -> Any:
@@ -183,29 +164,12 @@ def read_json(path: Path, refusal: type[ValueError]) -> Any:
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """Return the tables of a TOML text.
-
-    Raises:
-        ValueError: no TOML, or nested deeper than `MOST_LEVELS`.
-    """
-    return _bounded(tomllib.loads, text, "TOML")
+    """Return the tables of a TOML text; ValueError for no TOML, or one that is nested too deep."""
+    return _parsed(tomllib.loads, text)
 
 
-def _bounded(parse: Callable[[str], Any], text: str, language: str) -> Any:
-    message = f"Expected {language} of at most {MOST_LEVELS} nested levels, got more."
+def _parsed(parse: Callable[[str], Any], text: str) -> Any:
     try:
-        content = parse(text)
+        return parse(text)
     except RecursionError as error:
-        raise ValueError(message) from error
-    level = [content]
-    for _ in range(MOST_LEVELS):
-        level = [item for value in level for item in _members(value)]
-        if not level:
-            return content
-    raise ValueError(message)
-
-
-def _members(value: Any) -> list[Any]:
-    if isinstance(value, dict):
-        return list(value.values())
-    return value if isinstance(value, list) else []
+        raise ValueError("Expected fewer nested levels, got more than can be read.") from error

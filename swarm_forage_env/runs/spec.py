@@ -61,7 +61,7 @@ class RunSpec:
         whole_intervals(self.scenario)
         try:
             plain = json.loads(json.dumps(dict(self.parameters), allow_nan=False))
-        except (TypeError, ValueError) as error:
+        except (RecursionError, TypeError, ValueError) as error:
             raise ConfigError(f"Expected policy parameters to be plain JSON values: {error}.") from error
         object.__setattr__(self, "parameters", plain)
 
