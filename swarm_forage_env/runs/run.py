@@ -7,7 +7,6 @@ import time
 from collections.abc import Iterable
 from dataclasses import replace
 from datetime import UTC, datetime
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.contract.kernel_policy import CompiledPolicy
 from swarm_forage_env.contract.policy import Policy, sees_world
+from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.env import ForageEnv, read_only
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.record import Record
@@ -131,11 +131,11 @@ def run_policy(policy: Policy, spec: RunSpec) -> Record:
         spec: The run.
     """
     instance("spec", spec, RunSpec, hint="; plan_run(world, policy) makes one")
-    started = Started.now()
+    started_s = clocks_s()
     recorder = build_stack(spec.scenario, spec.wrappers, reads=getattr(policy, "reads", None))
     LiveRun(recorder, policy, spec.seed).advance()
     recorder.close()
-    wall_time_s, cpu_time_s = started.spent_s()
+    wall_time_s, cpu_time_s = clocks_s() - started_s
     origin = {
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "wall_time_s": f"{wall_time_s:.3f}",
@@ -145,21 +145,9 @@ def run_policy(policy: Policy, spec: RunSpec) -> Record:
     return Record(spec=spec, columns={**contributed, **recorder.columns()}, made_with=software_versions() | origin)
 
 
-class Started(NamedTuple):
-    """When a run began, by the clocks of this process, s."""
-
-    wall_s: float
-    cpu_s: float
-    """Of all threads: another run in the same process counts, too."""
-
-    @classmethod
-    def now(cls) -> "Started":
-        """Read both clocks."""
-        return cls(time.perf_counter(), time.process_time())
-
-    def spent_s(self) -> tuple[float, float]:
-        """Return the time since then and its processor time, s."""
-        return time.perf_counter() - self.wall_s, time.process_time() - self.cpu_s
+def clocks_s() -> FloatArray:
+    """Return the time and the processor time of this process, s, other runs in it included; differences count."""
+    return np.array([time.perf_counter(), time.process_time()])
 
 
 def run_one(spec: RunSpec) -> Record:

@@ -88,12 +88,12 @@ def each_run(
         Exception: whatever the function raises.
     """
     n_workers = processes_of(len(specs), jobs)
+    for file in {file_of(spec.policy) for spec in specs if is_policy_file(spec.policy)}:
+        trust.check(file)  # workers know nothing of what the user of a command allows
     if executor is None and n_workers == 1:
         for spec in specs:
             yield spec, do(spec)
         return
-    for file in {file_of(spec.policy) for spec in specs if is_policy_file(spec.policy)}:
-        trust.check(file)  # workers know nothing of what the user of a command allows
     with _process_pool(n_workers) if executor is None else nullcontext(executor) as workers:
         if executor is None:
             if not is_kept(observe):

@@ -36,7 +36,7 @@ from swarm_forage_env._internal.files import check_folder, replacing
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.runs.plan import Condition, Plan, Table, run_plan
-from swarm_forage_env.runs.run import Started
+from swarm_forage_env.runs.run import clocks_s
 from swarm_forage_env.runs.spec import PolicySpec, policy_spec
 from swarm_forage_env.runs.versions import software_versions
 from swarm_forage_env.scenarios.overrides import with_overrides
@@ -332,7 +332,7 @@ class Evaluator:
             ConfigError: the folder holds a training and `resume` is False, or a baseline is no policy.
             OSError: the folder cannot be made or written to.
         """
-        self.plan, self._folder, self._started = plan, Path(folder), Started.now()
+        self.plan, self._folder, self._started_s = plan, Path(folder), clocks_s()
         self._made_by = {**made_by, "versions": {**software_versions(), **made_by.get("versions", {})}}
         if not resume:
             check_unused(self._folder, "choose another folder, or remove it")
@@ -351,7 +351,7 @@ class Evaluator:
 
     def spent_s(self) -> tuple[float, float]:
         """Return time and processor time of the training so far, s."""
-        wall_s, cpu_s = self._started.spent_s()
+        wall_s, cpu_s = (clocks_s() - self._started_s).tolist()
         return self._before_s[0] + wall_s, self._before_s[1] + cpu_s
 
     def is_due(self, steps: int) -> bool:

@@ -129,3 +129,5 @@ def test_a_typed_python_file_is_run_and_one_in_a_study_only_on_trust(command):
         code, out, err = command("study", "status", place)
         assert (code, Path("owned").exists()) == (0, False), err
         assert "4 of 4 runs done" in out, "to read a study opens no policy"
+    code, _, err = command("study", "run", "s/study.toml", "--out", "again", "--jobs", "1")
+    assert (code, "which you did not name yourself" in err) == (2, True)
