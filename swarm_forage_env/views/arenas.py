@@ -75,11 +75,11 @@ class ArenaStep:
     """Runs that ended."""
 
 
-def _owner(env: ForageEnv | SwarmWrapper, name: str) -> ForageEnv | SwarmWrapper:
-    """Return the wrapper or environment of a stack that has the attribute itself and does not only pass it on."""
+def set_on_stack(env: ForageEnv | SwarmWrapper, name: str, value: Any) -> None:
+    """Set an attribute of a stack, in the wrapper or environment that has it itself and does not only pass it on."""
     while isinstance(env, SwarmWrapper) and name not in vars(env) and not hasattr(type(env), name):
         env = cast("ForageEnv | SwarmWrapper", env.env)  # checked by its constructor
-    return env
+    setattr(env, name, value)
 
 
 class ArenaBatch:
@@ -262,26 +262,14 @@ class ArenaBatch:
         if not self._is_reset:
             raise RuntimeError(f"Call reset before {what}; after a step that failed half done, too.")
 
+    @property
+    def envs(self) -> list[ForageEnv | SwarmWrapper]:
+        """The environments of the arenas with their wrappers; others after a reset that drew other worlds."""
+        return [arena.env for arena in self.arenas]
+
     def render(self) -> list[np.ndarray | None]:
         """Return one picture per arena."""
         return [arena.forage_env.render() for arena in self.arenas]
-
-    def get_attribute(self, name: str, arenas: Sequence[int]) -> list[Any]:
-        """Return an attribute of the environments of some arenas; raises AttributeError for unknown names."""
-        return [getattr(self.arenas[number].env, name) for number in arenas]
-
-    def set_attribute(self, name: str, value: Any, arenas: Sequence[int]) -> None:
-        """Set an attribute of the environments of some arenas, in the wrapper or environment that has it."""
-        for number in arenas:
-            setattr(_owner(self.arenas[number].env, name), name, value)
-
-    def call_method(self, name: str, arenas: Sequence[int], *args: Any, **kwargs: Any) -> list[Any]:
-        """Call a method of the environments of some arenas, once each; returns what they return.
-
-        An attribute that cannot be called is returned as it is.
-        """
-        found = self.get_attribute(name, arenas)
-        return [member(*args, **kwargs) if callable(member) else member for member in found]
 
     def close(self) -> None:
         """Close all environments; afterwards `reset` and `step` raise errors."""

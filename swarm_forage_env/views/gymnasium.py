@@ -14,7 +14,7 @@ from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.contract.types import BoolArray, ObsArray
 from swarm_forage_env.env import ForageEnv, checked_seed
 from swarm_forage_env.policies.interface import LearnerInterface
-from swarm_forage_env.views.arenas import ArenaStep, RunOutcome, open_arenas
+from swarm_forage_env.views.arenas import ArenaStep, RunOutcome, open_arenas, set_on_stack
 from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.plans import constructor_takes, plan_arena
 from swarm_forage_env.wrappers.base import WrapperConfig
@@ -244,19 +244,20 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
         """Call a method of every arena's environment, or read an attribute; returns one result per arena."""
-        return tuple(self._arenas.call_method(name, range(self.n_arenas), *args, **kwargs))
+        found = self.get_attr(name)
+        return tuple(member(*args, **kwargs) if callable(member) else member for member in found)
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
         """Return an attribute of every arena's environment."""
-        return tuple(self._arenas.get_attribute(name, range(self.n_arenas)))
+        return tuple(getattr(env, name) for env in self._arenas.envs)
 
     def set_attr(self, name: str, values: Any) -> None:
         """Set an attribute of every arena's environment: one value for all, or a list or tuple of one per arena."""
         per_arena = list(values) if isinstance(values, list | tuple) else [values] * self.n_arenas
         if len(per_arena) != self.n_arenas:
             raise ValueError(f"Expected one value per arena ({self.n_arenas}), got {len(per_arena)}.")
-        for arena, value in enumerate(per_arena):
-            self._arenas.set_attribute(name, value, [arena])
+        for env, value in zip(self._arenas.envs, per_arena, strict=True):
+            set_on_stack(env, name, value)
 
     def close_extras(self, **kwargs: Any) -> None:
         """Close all arenas."""

@@ -12,7 +12,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
 from swarm_forage_env.contract.types import BoolArray
-from swarm_forage_env.views.arenas import ArenaStep, open_arenas
+from swarm_forage_env.views.arenas import ArenaStep, open_arenas, set_on_stack
 from swarm_forage_env.views.plans import constructor_takes
 
 
@@ -128,11 +128,13 @@ class SwarmVecEnv(VecEnv):
             if self.interface.config.actions != "discrete":
                 raise AttributeError("Continuous actions have no masks.")
             return [self.action_masks] * len(rows)
-        return self._per_row(rows, lambda arenas: self._arenas.get_attribute(attr_name, arenas))
+        envs = self._arenas.envs
+        return [getattr(envs[row // self.n_robots], attr_name) for row in rows]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
         """Set an attribute of the environments that the rows are parts of."""
-        self._arenas.set_attribute(attr_name, value, self._arenas_of(self._rows(indices)))
+        for arena in self._arenas_of(self._rows(indices)):
+            set_on_stack(self._arenas.envs[arena], attr_name, value)
 
     def env_method(
         self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
@@ -144,9 +146,11 @@ class SwarmVecEnv(VecEnv):
         rows = self._rows(indices)
         if method_name == "action_masks":
             return list(self.action_masks()[rows])
-        return self._per_row(
-            rows, lambda arenas: self._arenas.call_method(method_name, arenas, *method_args, **method_kwargs)
-        )
+        told = {
+            arena: getattr(self._arenas.envs[arena], method_name)(*method_args, **method_kwargs)
+            for arena in self._arenas_of(rows)
+        }
+        return [told[row // self.n_robots] for row in rows]
 
     def env_is_wrapped(self, wrapper_class: type[gymnasium.Wrapper], indices: VecEnvIndices = None) -> list[bool]:
         """Return False for each row, but True for `Monitor`, because rows report their episodes in the same way.
@@ -165,8 +169,3 @@ class SwarmVecEnv(VecEnv):
 
     def _arenas_of(self, rows: Sequence[int]) -> list[int]:
         return sorted({row // self.n_robots for row in rows})
-
-    def _per_row(self, rows: Sequence[int], ask: Any) -> list[Any]:
-        arenas = self._arenas_of(rows)
-        values = dict(zip(arenas, ask(arenas), strict=True))
-        return [values[row // self.n_robots] for row in rows]

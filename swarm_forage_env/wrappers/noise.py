@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -22,15 +21,7 @@ from swarm_forage_env.world.kernels.disturbances import (
     room_for_draws,
 )
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
-from swarm_forage_env.wrappers.waveform import (
-    Sigma,
-    Signal,
-    Waveform,
-    WaveformAhead,
-    is_noisy,
-    sigma_in_words,
-    wave_of,
-)
+from swarm_forage_env.wrappers.waveform import Sigma, Signal, Waveform, is_noisy, sigma_in_words, wave_of
 
 NOISE_GROUPS = ("proximity", "light", "ground", "wheel_speed", "position", "heading")
 """Groups of sensors that can be noisy, in the order of their columns."""
@@ -84,14 +75,14 @@ class SensorNoise(SwarmWrapper):
         units: list[float] = []
         lows: list[float] = []
         spans: list[tuple[int, int, int, int]] = []
-        self._varying: list[tuple[slice, WaveformAhead]] = []
+        self._varying: list[tuple[slice, Signal]] = []
         heading = 0, NOT_NOISY
         for name in (name for name in NOISE_GROUPS if name in sigmas):
             part, first = parts[name], len(units)
             units += [1.0] if name == "heading" else [_NATURAL_UNITS.get(name, 1.0) / scale for scale in part.scale]
             columns = slice(first, len(units))
             lows += [0.0 if name in _READINGS else -1.0] * (len(units) - first)
-            self._varying.append((columns, WaveformAhead(wave_of(sigmas[name]).signal(env.scenario.dt_s))))
+            self._varying.append((columns, wave_of(sigmas[name]).signal(env.scenario.dt_s, least=0.0)))
             # Other slices are not read, and the environment does not rewrite them: noise would add up there.
             if part.name not in env.arena.reads:
                 continue
@@ -115,8 +106,8 @@ class SensorNoise(SwarmWrapper):
         if self._constant is not None:
             return self._constant
         factors = np.empty((n_ticks, len(self._units)), np.float32)
-        for columns, waveform in self._varying:
-            sigmas = np.maximum(0.0, waveform.of(tick)[:n_ticks]).astype(np.float32)
+        for columns, signal in self._varying:
+            sigmas = signal.ahead(tick)[:n_ticks].astype(np.float32)
             factors[:, columns] = sigmas[:, None] * self._units[columns]
         return factors
 
@@ -150,7 +141,7 @@ class SensorNoise(SwarmWrapper):
     def ahead(self, n_ticks: int) -> tuple[int, dict[str, Any]]:
         """Return what disturbs the observations after the coming ticks."""
         tick = self.unwrapped.tick + 1
-        n_ticks = min([n_ticks, *(len(waveform.of(tick)) for _, waveform in self._varying)])
+        n_ticks = min([n_ticks, *(len(signal.ahead(tick)) for _, signal in self._varying)])
         return n_ticks, {
             "lanes": self._lanes,
             "draws": self._draws,
@@ -183,9 +174,8 @@ class ActuatorNoise(SwarmWrapper):
     def reconfigure(self, config: "ActuatorNoiseConfig") -> None:
         """Go on under another configuration from the next tick on."""
         self.made_from = config
-        sigma = config.sigma
-        self._is_noisy = is_noisy(sigma)
-        self._factors = WaveformAhead(partial(_factor, wave_of(sigma).signal(self.unwrapped.scenario.dt_s)))
+        self._is_noisy = is_noisy(config.sigma)
+        self._factors = wave_of(config.sigma).signal(self.unwrapped.scenario.dt_s, least=0.0)
 
     def on_reset(self, seed: int) -> None:
         """Start the random stream."""
@@ -197,7 +187,7 @@ class ActuatorNoise(SwarmWrapper):
             return wheel_gain
         outer_gain = self._unit_gain if wheel_gain is None else wheel_gain
         draw_bits(self._lanes, self._draws)
-        factor = self._factors.of(self.unwrapped.tick + 1)[0]
+        factor = self._factors(self.unwrapped.tick + 1)
         noisy_gain(self._draws, factor, outer_gain, self._gain)
         return self._gain
 
@@ -205,18 +195,13 @@ class ActuatorNoise(SwarmWrapper):
         """Return the noise on wheels in the coming ticks."""
         if not self._is_noisy:
             return n_ticks, {}
-        factors = self._factors.of(self.unwrapped.tick + 1)
+        factors = self._factors.ahead(self.unwrapped.tick + 1)
         return min(n_ticks, len(factors)), {
             "wheel_lanes": self._lanes,
             "wheel_draws": self._draws,
             "wheel_factors": factors,
             "gain": self._gain,
         }
-
-
-def _factor(signal: Signal, tick: int) -> float:
-    """Return the standard deviation at a tick; negative values count as 0."""
-    return max(0.0, signal(tick))
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

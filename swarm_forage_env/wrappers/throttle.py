@@ -11,7 +11,7 @@ from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.world.kernels.disturbances import throttle
 from swarm_forage_env.world.motion import drive_limits
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
-from swarm_forage_env.wrappers.waveform import Waveform, WaveformAhead
+from swarm_forage_env.wrappers.waveform import Waveform
 
 IDEAL_THROTTLE = 0.10
 """Constant throttle that the paper's flexibility studies take as ideal conditions."""
@@ -43,7 +43,6 @@ class Throttle(SwarmWrapper):
         self.made_from = config
         self._only_carriers = config.carriers
         self._signal = config.waveform.signal(self.unwrapped.scenario.dt_s)
-        self._values = WaveformAhead(self._signal)
 
     def on_reset(self, seed: int) -> None:
         """Start the waveform."""
@@ -64,7 +63,7 @@ class Throttle(SwarmWrapper):
 
     def ahead(self, n_ticks: int) -> tuple[int, dict[str, Any]]:
         """Return the throttle of the coming ticks."""
-        values = self._values.of(self.unwrapped.tick + 1)
+        values = self._signal.ahead(self.unwrapped.tick + 1)
         return min(n_ticks, len(values)), {
             "throttles": values,
             "only_carriers": self._only_carriers,
@@ -73,7 +72,7 @@ class Throttle(SwarmWrapper):
 
     def count_ticks(self, n_ticks: int) -> None:
         """Add up the throttle of these ticks."""
-        for value in self._values.of(self.unwrapped.tick + 1 - n_ticks)[:n_ticks].tolist():
+        for value in self._signal.ahead(self.unwrapped.tick + 1 - n_ticks)[:n_ticks].tolist():
             self._value = value
             self._sum += value
         self._ticks += n_ticks

@@ -14,18 +14,13 @@ The last two are ours: the study's program makes a step from a square wave whose
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, fields
-from functools import partial
 from typing import ClassVar, Literal, TypeAlias
 
 import numpy as np
 
 from swarm_forage_env._internal.fields import Amount, Checked, ConfigError, Number, Positive
 from swarm_forage_env.contract.types import FloatArray
-
-Signal: TypeAlias = Callable[[int], float]
-"""Value at a tick; the first tick of a run is 1."""
 
 _CYCLE = ("amplitude", "offset", "period_s", "phase")
 _USED = {
@@ -111,11 +106,12 @@ class Waveform(Checked):
         manner = f"{self.kind}, period {self.period_s:,g} s" if self.period_s else f"table of {len(self.values)} values"
         return f"{low} to {high}{unit} ({manner})"
 
-    def signal(self, dt_s: float) -> Signal:
-        """Return V as a function of the tick, for ticks of `dt_s` seconds; it can be pickled."""
-        return partial(self._at, dt_s)
+    def signal(self, dt_s: float, *, least: float = -math.inf) -> "Signal":
+        """Return V, no value below `least`, as a function of the tick, for ticks of `dt_s` seconds."""
+        return Signal(self, dt_s, least)
 
-    def _at(self, dt_s: float, tick: int) -> float:
+    def value_at(self, tick: int, dt_s: float) -> float:
+        """Return V at a tick of a run with ticks of `dt_s` seconds."""
         if self.kind == "constant":
             return self.amplitude
         if self.kind == "table":
@@ -132,21 +128,26 @@ class Waveform(Checked):
         return self.offset + (self.amplitude if sine >= 0.0 else -self.amplitude)
 
 
-class WaveformAhead:
-    """Values of a signal, worked out for many ticks at a time."""
+class Signal:
+    """Values of a waveform by tick, none below `least`; the first tick of a run is 1."""
 
     _TICKS = 256
+    """Values that `ahead` works out at a time."""
 
-    def __init__(self, signal: Signal) -> None:
-        """Take the signal."""
-        self._signal = signal
+    def __init__(self, waveform: Waveform, dt_s: float, least: float) -> None:
+        """Take the waveform, for ticks of `dt_s` seconds."""
+        self._waveform, self._dt_s, self._least = waveform, dt_s, least
         self._first, self._values = 0, np.zeros(0)
 
-    def of(self, tick: int) -> FloatArray:
+    def __call__(self, tick: int) -> float:
+        """Return the value at a tick."""
+        return max(self._least, self._waveform.value_at(tick, self._dt_s))
+
+    def ahead(self, tick: int) -> FloatArray:
         """Return the values (ticks,) of a tick and of those after it that are worked out already, at least one."""
         if not 0 <= tick - self._first < len(self._values):
             self._first = tick
-            self._values = np.array([self._signal(later) for later in range(tick, tick + self._TICKS)], float)
+            self._values = np.array([self(later) for later in range(tick, tick + self._TICKS)], float)
         return self._values[tick - self._first :]
 
 

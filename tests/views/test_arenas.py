@@ -8,7 +8,7 @@ import pytest
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.views.arenas import ArenaBatch, ArenaStep
+from swarm_forage_env.views.arenas import ArenaBatch, ArenaStep, set_on_stack
 from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.plans import ArenaPlan, plan_arena
 from swarm_forage_env.world.arena import UNDISTURBED
@@ -27,7 +27,7 @@ def told_story(batch: ArenaBatch, arena: int) -> list[ArenaStep]:
     batch.reset([7 + a for a in range(batch.n_arenas)], [None] * batch.n_arenas)
     actions = np.zeros((batch.n_rows, 3), np.float32)
     return lives.live(
-        lambda **change: batch.call_method("set_population", [arena], **change), lambda: batch.step(actions)
+        lambda **change: batch.envs[arena].unwrapped.set_population(**change), lambda: batch.step(actions)
     )
 
 
@@ -71,12 +71,12 @@ def test_the_arena_ends_with_its_last_robot():
     batch = ArenaBatch(plan(), 1)
     batch.reset([0], [None])
     actions, nobody = np.zeros((3, 3), np.float32), np.zeros(3, bool)
-    batch.call_method("set_population", [0], active=~nobody, present=~nobody)
+    batch.envs[0].unwrapped.set_population(active=~nobody, present=~nobody)
     one = np.array([True, False, False])
-    batch.call_method("set_population", [0], active=one, present=one, terminated=~one)
+    batch.envs[0].unwrapped.set_population(active=one, present=one, terminated=~one)
     first = batch.step(actions)
     assert first.terminated.tolist() == [False, True, True]
-    batch.call_method("set_population", [0], active=nobody, present=nobody, terminated=~nobody)
+    batch.envs[0].unwrapped.set_population(active=nobody, present=nobody, terminated=~nobody)
     last = batch.step(actions)
     assert last.terminated.tolist() == [True, True, True]
     assert not last.truncated.any()
@@ -212,7 +212,7 @@ def test_attributes_are_set_where_they_are_also_below_wrappers():
     )
     batch = ArenaBatch(wrapped, 1)
     batch.reset([0], [None])
-    batch.set_attribute("max_cycles", 1, [0])
+    set_on_stack(batch.envs[0], "max_cycles", 1)
     assert batch.arenas[0].forage_env.max_cycles == 1
     assert batch.step(np.zeros((3, 3), np.float32)).truncated.all()
 

@@ -100,9 +100,9 @@ def test_rows_to_spare_are_absent_from_the_first_step_to_the_last():
 def test_fields_of_a_reset_hold_in_every_world():
     batch = ArenaBatch(PLAN, 2)
     batch.reset([3, 5], [{"scenario": {"delivery": 7.0}}] * 2)
-    assert batch.get_attribute("scenario", [0])[0].reward.delivery == 7.0
+    assert batch.envs[0].unwrapped.scenario.reward.delivery == 7.0
     batch.reset([8, 9], [None] * 2)
-    assert {config.reward.delivery for config in batch.get_attribute("scenario", [0, 1])} == {7.0}
+    assert {env.unwrapped.scenario.reward.delivery for env in batch.envs} == {7.0}
 
 
 # PettingZoo's test wonders about possible agents that a run does not have; that is what a drawn size means.
