@@ -12,7 +12,6 @@ Source: ours. It is an estimate and no bound: as many objects appear at each gap
 waiting and passing cost nothing.
 """
 
-import math
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -27,8 +26,6 @@ from ..curves import FloatArray
 
 ABOUT_LIMIT = "of the limit: performance over the estimate for a swarm that sees everything and loses no time"
 """What the share is, for readers of tables."""
-_MOST_PLACES = 250_000
-"""Places of a source that are looked at; of a larger one every k-th along both axes."""
 
 
 class ForagingLimit(NamedTuple):
@@ -100,8 +97,7 @@ def _places(scenario: ScenarioConfig) -> tuple[FloatArray, FloatArray]:
     """
     gaps: list[FloatArray] = []
     for x_low, y_low, x_high, y_high in scenario.source_cells:
-        step = max(1, math.ceil(math.sqrt((x_high - x_low) * (y_high - y_low) / _MOST_PLACES)))
-        x, y = (axis.ravel() for axis in np.mgrid[x_low:x_high:step, y_low:y_high:step])
+        x, y = (axis.ravel() for axis in np.mgrid[x_low:x_high, y_low:y_high])
         for left, low, right, high in (*scenario.arena.all_nest_cells, *scenario.obstacle_cells):
             is_free = (x < left) | (x >= right) | (y < low) | (y >= high)
             x, y = x[is_free], y[is_free]

@@ -115,6 +115,11 @@ class Measure:
     """Its variants that give different numbers."""
 
     @property
+    def better(self) -> str:
+        """Which values are better, "higher" or "lower"."""
+        return "higher" if self.higher_is_better else "lower"
+
+    @property
     def is_amount(self) -> bool:
         """Whether it is an amount of performance, which is also given as a share of that which it is compared with."""
         return "{amount}" in self.unit and self.neutral is not None

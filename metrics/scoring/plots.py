@@ -105,9 +105,8 @@ def _draw_panel(panel: Panel, rows: pl.DataFrame, of_look: Sequence[tuple[str, L
             _draw_policy(panel, mine, x, look)
     if measure.neutral is not None and not measure.is_distance and first["variant"] == "corrected":
         panel.axhline(measure.neutral, color="0.6", linewidth=0.8, zorder=0)
-    arrow = "higher" if measure.higher_is_better else "lower"
     name = words_of(label_of(first["measure"], first["variant"], first["form"]))
-    panel.set_title(f"{name} ({arrow} is better)")
+    panel.set_title(f"{name} ({measure.better} is better)")
     panel.set_ylabel("share of performance" if first["is_relative"] else first["unit"])
     panel.set_xlabel(X_LABELS[measure.varies])
     distance = dict(rows.select("x", "distance").drop_nulls().iter_rows())

@@ -11,10 +11,11 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 import polars as pl
@@ -40,9 +41,6 @@ from .plots import draw_scores, interval_words
 from .question import Question
 from .run_curves import THROTTLE, PerformanceLike, StudyCurves, own_performance, policy_curves
 
-if TYPE_CHECKING:
-    from concurrent.futures import Executor
-
 TEST = (
     "Differences: first policy minus second, runs paired by seed, mean with half of Student's 95 % interval; * = "
     "certain: two-sided paired t test, p at most 0.05 after Holm's correction over all levels and pairs of a measure."
@@ -55,7 +53,7 @@ SIGNS = {
 }
 """Sign in a cell -> what it says."""
 _NO_AMOUNT = 1e-12
-"""Smaller amounts are rounding errors and are shown as zero."""
+"""Smaller amounts are rounding errors."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,7 +70,7 @@ class Scores(Answer):
     failures: Mapping[str, Sequence[str]] = field(default_factory=dict[str, Sequence[str]])
     """Policy -> why runs failed, a line per reason."""
     settings: Mapping[str, Any] = field(default_factory=dict[str, Any])
-    """How the runs were made: budget, length, seeds, folder."""
+    """How the runs were made."""
     notes: tuple[str, ...] = ()
     """What else is to be known."""
     against: str | None = None
@@ -160,7 +158,7 @@ class Scores(Answer):
             first = part.row(0, named=True)
             of = {row["policy"]: _cell(row) for row in part.iter_rows(named=True)}
             cells = [of.get(name, "-") for name in self.policies]
-            rows.append([words_of(first["measure"]), first["at"], _better(first["measure"]), *cells])
+            rows.append([words_of(first["measure"]), first["at"], MEASURES[first["measure"]].better, *cells])
         notes = self._legend("".join(cell for row in rows for cell in row)) if rows else ()
         return Sheet.of(["measure", "at", "better", *self.policies], rows, notes=notes)
 
@@ -176,7 +174,7 @@ class Scores(Answer):
         by_measure = self.differences.partition_by(*ROW[:3], as_dict=True) if len(self.differences) else {}
         for key, part in self.summary.group_by(*ROW[:3], maintain_order=True):
             first = part.row(0, named=True)
-            title = f"{words_of(label_of(*key))}, {first['unit']}, {_better(first['measure'])} is better"
+            title = f"{words_of(label_of(*key))}, {first['unit']}, {MEASURES[first['measure']].better} is better"
             levels = [
                 {
                     "at": row["at"],
@@ -268,10 +266,6 @@ def _cell(row: Mapping[str, Any]) -> str:
     return spread(mean, upper - mean, is_share=is_share) + _marks(row)
 
 
-def _better(name: str) -> str:
-    return "higher" if MEASURES[name].higher_is_better else "lower"
-
-
 def _pairs_of(rows: pl.DataFrame) -> Sheet:
     """The differences of a measure, a row per level and pair, values beside shares."""
     cells: dict[tuple[str, str], dict[str, str]] = {}
@@ -302,7 +296,7 @@ def score(
     *,
     out: str | Path | None = None,
     jobs: int | None = None,
-    executor: "Executor | None" = None,
+    executor: Executor | None = None,
     progress: bool = True,
     **asked: Any,
 ) -> Scores:
@@ -311,8 +305,7 @@ def score(
     Args:
         policies: As in `score_question`. With `out` objects, classes and functions need a name.
         world: As in `score_question`.
-        out: Folder for run records. Runs that it already holds are not made again, so you can repeat an interrupted
-            call.
+        out: Folder for run records. Runs that it already holds are not made again, so a call can be repeated.
         jobs: Processes; default one per core.
         executor: Makes the runs in place of the processes, for example Dask's `client.get_executor()`.
         progress: Show progress and an estimate on stderr.
@@ -354,13 +347,11 @@ def score_question(
             budget sets horizon and interval.
         measures: Names in `MEASURES`; default all.
         budget: "quick", "standard", "paper" (`swarm_forage_env.studies.ladders.BUDGETS`), or one of your own.
-        seeds: Their number, or a list; default those of the budget. All experiments use the same seeds, so runs are
-            paired.
+        seeds: Their number, or a list; default those of the budget. All experiments use them, so runs are paired.
         horizon_s: Length of a run in seconds, whole intervals; default that of the budget.
         performance: What P(N, t) is: a recorded column ("n_carrying"), "1/" and a column in which less is better
             ("1/interference_fraction"), "task_balance", "cache_load", or a function of a record (`Performance`).
-            Default: the performance of the scenario. It only changes how runs are read, so stored ones are not
-            repeated.
+            Default that of the scenario. It changes how runs are read; stored ones are not repeated.
         density: Robots per m^2 at all swarm sizes: the arena grows with the swarm, and one robot is in the smallest
             arena. Default: all sizes are in the scenario's arena (in search and rescue: at its density).
         disturbance: Disturbance for reactivity and adaptability: "throttle" (robots lose speed) or "handling_cost"
@@ -464,13 +455,8 @@ def score_curves(
     checked_request(measures, variants, forms)
     given = read_curves(path, performance, columns=columns, events=events, interval_s=interval_s)
     chosen = world_of(world)
-    simulated: list[StudyCurves] = []
-    failures: dict[str, Sequence[str]] = {}
-    if policies:
-        plan = _plan_beside(given, policy_specs(policies), chosen)
-        table = run_plan(plan, **run)
-        simulated = [policy_curves(table, each.label) for each in plan.policies]
-        failures = _failures(table)
+    table = run_plan(_plan_beside(given, policy_specs(policies), chosen), **run) if policies else None
+    simulated = [] if table is None else [policy_curves(table, each.label) for each in table.plan.policies]
     studies = [*simulated, *given]
     frame, missing = scores(studies, measures, variants=variants, forms=forms)
     for study in given:
@@ -485,7 +471,7 @@ def score_curves(
         policies=tuple(study.controller for study in studies),
         world=chosen.title() if simulated else "",
         missing=missing,
-        failures=failures,
+        failures={} if table is None else _failures(table),
         settings={"curves": str(path), "seeds": seeds, "horizon_s": given[0].horizon_s, **told},
         notes=(f"{path}: {given[0].note}",) if given[0].note else (),
         against=against,

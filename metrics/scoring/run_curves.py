@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swarm_forage_env.runs.plan import Condition, Curves, Table
+from swarm_forage_env.runs.record import Record
 from swarm_forage_env.scenarios.columns import ALL_COLUMNS, Column
 from swarm_forage_env.scenarios.performance import (
     PERFORMANCE_COLUMNS,
@@ -44,7 +45,6 @@ RATE_COLUMNS = {
     "mu_bd": "repairs_per_s",
 }
 """Field of `PopulationRates` -> column; one value per run. They are no part of records: specifications tell them."""
-REQUIRED_COLUMNS = ("n_robots", "seed", "interval", "performance")
 CURVE_COLUMNS: Mapping[str, Column] = {
     **{
         name: ALL_COLUMNS[name]
@@ -52,7 +52,10 @@ CURVE_COLUMNS: Mapping[str, Column] = {
             "controller",
             "criterion",
             "criterion_value",
-            *REQUIRED_COLUMNS,
+            "n_robots",
+            "seed",
+            "interval",
+            "performance",
             "t_end_s",
             "interference_fraction",
             "n_active",
@@ -78,15 +81,9 @@ PerformanceLike: TypeAlias = str | Performance | Callable[[Any], ArrayLike]
 
 
 def own_performance(given: PerformanceLike | None) -> Performance | None:
-    """Return what was given as a `Performance` if it is a function; None if it is a name or nothing.
-
-    Raises:
-        CurveError: it is none of these.
-    """
-    if given is None or isinstance(given, str):
-        return None
-    if isinstance(given, Performance):
-        return given
+    """Return what was given as a `Performance` if it is a function; None if it is a name or nothing."""
+    if given is None or isinstance(given, str | Performance):
+        return given if isinstance(given, Performance) else None
     if not callable(given):
         raise CurveError(
             f"Expected performance to be the name of a recorded column, or a function of a record, got {given!r}."
@@ -94,32 +91,24 @@ def own_performance(given: PerformanceLike | None) -> Performance | None:
     return Performance(getattr(given, "__name__", type(given).__name__), function=given)
 
 
-def checked_performance(values: ArrayLike, name: str, n_intervals: int, where: str) -> FloatArray:
-    """Return a performance as numbers, (T,) float64.
-
-    Args:
-        values: What was computed or recorded.
-        name: Name of the performance.
-        n_intervals: How many intervals T the run has.
-        where: Name of the run in error messages.
+def checked_performance(values: ArrayLike, name: str, record: Record) -> FloatArray:
+    """Return a performance of a run as numbers, (T,) float64.
 
     Raises:
-        CurveError: no numbers, not T of them, or NaN, infinite or negative ones; the message has the first interval.
+        CurveError: no numbers, not one per interval, or NaN, infinite or negative ones; the message has the first.
     """
+    what = f"Expected performance {name} of run {record.run_id}"
     try:
         curve = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise CurveError(f"Expected performance {name} of {where} as numbers, got {values!r:.80}; {error}.") from error
-    if curve.shape != (n_intervals,):
+        raise CurveError(f"{what} as numbers, got {values!r:.80}; {error}.") from error
+    shape = record["interval"].shape
+    if curve.shape != shape:
+        raise CurveError(f"{what} with one number per interval, shape {shape}, got shape {curve.shape}.")
+    for interval in np.flatnonzero(~(np.isfinite(curve) & (curve >= 0.0))):
         raise CurveError(
-            f"Expected performance {name} of {where} with one number per interval, shape ({n_intervals},), got shape "
-            f"{curve.shape}."
-        )
-    wrong = np.flatnonzero(~(np.isfinite(curve) & (curve >= 0.0)))
-    if len(wrong):
-        raise CurveError(
-            f"Expected performance {name} of {where} as finite numbers >= 0, got {curve[wrong[0]]} in interval "
-            f"{wrong[0]}; let 1/0 be 0, and shift or turn round what can be negative."
+            f"{what} as finite numbers >= 0, got {curve[interval]} in interval {interval}; let 1/0 be 0, and shift or "
+            "turn round what can be negative."
         )
     return curve
 
@@ -286,26 +275,19 @@ def policy_curves(table: Table, policy: str, performance: Performance | None = N
     """
     conditions = table.plan.of_policy(policy)
     read_as = performance or performance_of(conditions[0].world.scenario.performance)
-    runs = [(condition.world, _curves(table, condition, performance)) for condition in conditions]
+    runs = [(condition.world, _curves(table, condition, read_as)) for condition in conditions]
     return curves_in_worlds(runs, len(table.plan.seeds), controller=policy, read_as=read_as)
 
 
-def _curves(table: Table, condition: Condition, performance: Performance | None) -> Curves:
+def _curves(table: Table, condition: Condition, read_as: Performance) -> Curves:
     """The runs of a condition, with the performance that is asked for."""
     seeds, columns = table.curves(condition, *INTERVAL_COLUMNS)
-    read_as = performance or performance_of(condition.world.scenario.performance)
+    own = read_as.function
     checked = [
-        checked_performance(
-            record["performance"] if read_as.function is None else read_as.function(record.frame),
-            read_as.name,
-            len(record["interval"]),
-            f"run {record.run_id}",
-        )
+        checked_performance(record["performance"] if own is None else own(record.frame), read_as.name, record)
         for record in table.of(condition)
     ]
-    if checked:
-        columns["performance"] = np.stack(checked)
-    return seeds, columns
+    return seeds, {**columns, "performance": np.stack(checked)} if checked else columns
 
 
 def rates_of(world: World) -> PopulationRates | None:

@@ -22,24 +22,9 @@ from swarm_forage_env.scenarios.performance import Performance, performance_of
 from swarm_forage_env.sheet import Answer, Sheet
 from swarm_forage_env.wrappers.world import World
 
-from ..statistics import Summary, aggregate
+from ..statistics import aggregate
 from .limits import ABOUT_LIMIT, share_of_limit
 from .plots import FEWEST_RUNS, interval_words
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ConditionSummary:
-    """What the finished runs of a policy in a world achieved."""
-
-    condition: Condition
-    records: tuple[Record, ...]
-    caches: str
-    of: Mapping[str, Summary]
-    """Quantity of `_quantities` -> mean and 95 % interval over runs."""
-    share_of_limit: float | None
-    """Mean performance over the estimated limit of the world; None where there is no estimate, see `limit_of`."""
-    simulated_s_per_wall_s: float
-    """Simulated seconds per second and process, policy and recording included."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -47,8 +32,10 @@ class RunSummary(Answer):
     """What the runs of a table achieved."""
 
     table: Table
-    rows: tuple[ConditionSummary, ...]
-    """One per condition with finished runs."""
+    rows: tuple[dict[str, Any], ...]
+    """One per condition with finished runs: controller, world, caches, n_runs; of each quantity of a run mean, low and
+    high, its 95 % interval; share_of_limit, None where there is no estimate (see `limit_of`); simulated seconds per
+    second and process, policy and recording included."""
 
     @property
     def world(self) -> World:
@@ -72,25 +59,24 @@ class RunSummary(Answer):
             return (failures,)
         # What the scenario calls performance stands before deliveries, where it is something else.
         first = f"{self.read_as.title} {'per 1,000 s' if self.read_as.is_total else 'mean'}"
-        lines: list[dict[str, str]] = []
-        for row in self.rows:
-            share = row.share_of_limit
-            line = {
-                "policy": row.condition.policy.label,
-                "world": row.condition.world.name,
-                "caches": row.caches,
-                "runs": str(len(row.records)),
-                first: _with_half(row.of["performance"]),
-                "deliveries per 1,000 s": _with_half(row.of["deliveries_per_1000_s"]),
-                "of the limit": "-" if share is None else percent(share),
-                "interference": f"{row.of['interference_fraction'].mean:.3f}",
-                "simulated s per wall s": f"{row.simulated_s_per_wall_s:,.0f}",
+        lines = [
+            {
+                "policy": row["controller"],
+                "world": row["world"],
+                "caches": row["caches"],
+                "runs": str(row["n_runs"]),
+                first: _with_half(row["performance"]),
+                "deliveries per 1,000 s": _with_half(row["deliveries_per_1000_s"]),
+                "of the limit": "-" if row["share_of_limit"] is None else percent(row["share_of_limit"]),
+                "interference": f"{row['interference_fraction']['mean']:.3f}",
+                "simulated s per wall s": f"{row['simulated_s_per_wall_s'] or math.nan:,.0f}",
             }
-            lines.append(line)
-        has_limit = any(row.share_of_limit is not None for row in self.rows)
+            for row in self.rows
+        ]
+        has_limit = any(row["share_of_limit"] is not None for row in self.rows)
         is_hidden = {"world": self.n_worlds == 1, "of the limit": not has_limit}
         header = [name for name in lines[0] if not is_hidden.get(name)]
-        notes = [f"{interval_words([len(row.records) for row in self.rows])}; interference: share of active robot time"]
+        notes = [f"{interval_words([row['n_runs'] for row in self.rows])}; interference: share of active robot time"]
         notes += [ABOUT_LIMIT] if has_limit else []
         cells = [[line[name] for name in header] for line in lines]
         return Sheet.of(title=self._title(), header=header, rows=cells, notes=notes), failures
@@ -109,20 +95,7 @@ class RunSummary(Answer):
             "scenario": self.world.scenario.name,
             "performance": {"name": read_as.name, "unit": read_as.unit, "is_per_1000_s": read_as.is_total},
             "out": None if folder is None else str(folder),
-            "controllers": [
-                {
-                    "controller": row.condition.policy.label,
-                    "caches": row.caches,
-                    "n_runs": len(row.records),
-                    **{
-                        name: {"mean": plain(of.mean), "low": plain(of.lower), "high": plain(of.upper)}
-                        for name, of in row.of.items()
-                    },
-                    "share_of_limit": row.share_of_limit,
-                    "simulated_s_per_wall_s": plain(row.simulated_s_per_wall_s),
-                }
-                for row in self.rows
-            ],
+            "controllers": list(self.rows),
             "runs": [
                 {
                     **record.keys,
@@ -130,8 +103,8 @@ class RunSummary(Answer):
                     "wall_time_s": plain(record.wall_time_s),
                     "file": None if folder is None else str(record_file(folder, record.run_id)),
                 }
-                for row in self.rows
-                for record in row.records
+                for condition in self._finished()
+                for record in self.table.of(condition)
             ],
             "failures": [
                 {
@@ -143,10 +116,14 @@ class RunSummary(Answer):
             ],
         }
 
+    def _finished(self) -> list[Condition]:
+        """The conditions with finished runs."""
+        return [condition for condition in self.table.plan.conditions if self.table.of(condition)]
+
     @property
     def has_picture(self) -> bool:
         """Whether runs have finished, and all have the same intervals."""
-        scenarios = [row.condition.world.scenario for row in self.rows]
+        scenarios = [condition.world.scenario for condition in self._finished()]
         return len({(scenario.horizon_s, scenario.interval_s) for scenario in scenarios}) == 1
 
     def draw(self, path: str | Path, *, style: FigureStyle = SCREEN) -> None:
@@ -155,22 +132,21 @@ class RunSummary(Answer):
             raise ValueError("Expected finished runs with the same intervals, got nothing to draw.")
         interval_s, read_as = self.world.scenario.interval_s, self.read_as
         curves: list[Curve] = []
-        for row in self.rows:
-            runs = np.array([record["performance"] for record in row.records])
+        for policy, world in self._finished():
+            runs = np.array([record["performance"] for record in self.table.of(Condition(policy, world))])
             points = [aggregate(column) for column in runs.T]
             mean, low, high = np.array([(point.mean, point.lower, point.upper) for point in points]).T
             if len(runs) < FEWEST_RUNS:
                 low = high = np.full_like(mean, np.nan)
-            policy, world = row.condition
             label = policy.label if self.n_worlds == 1 else f"{policy.label} in {world.name}"
             curves.append(Curve(label, mean, low, high))
         draw_curves(
             path,
-            self.rows[0].records[0]["t_end_s"],
+            self.table.of(self._finished()[0])[0]["t_end_s"],
             curves,
             title=self._title(),
             ylabel=f"{read_as.title} per {interval_s:g} s" if read_as.is_total else read_as.title,
-            band=_about_bands([len(row.records) for row in self.rows]),
+            band=_about_bands([row["n_runs"] for row in self.rows]),
             style=style,
         )
 
@@ -178,22 +154,25 @@ class RunSummary(Answer):
 def summarize_runs(table: Table) -> RunSummary:
     """Return what the runs of a table achieved, one row per condition that has finished runs."""
     found = ((condition, table.of(condition)) for condition in table.plan.conditions)
-    rows = (_summary(table, condition, records) for condition, records in found if records)
-    return RunSummary(table=table, rows=tuple(rows))
+    return RunSummary(
+        table=table, rows=tuple(_row(table, condition, records) for condition, records in found if records)
+    )
 
 
-def _summary(table: Table, condition: Condition, records: tuple[Record, ...]) -> ConditionSummary:
-    wall_s = sum(record.wall_time_s for record in records)
+def _row(table: Table, condition: Condition, records: Sequence[Record]) -> dict[str, Any]:
     planned = table.plan.specs_of(condition)[0].world
     runs = [_quantities(record, performance_of(condition.world.scenario.performance)) for record in records]
-    return ConditionSummary(
-        condition=condition,
-        records=records,
-        caches=planned.scenario.caches,
-        of={name: aggregate([run[name] for run in runs]) for name in runs[0]},
-        share_of_limit=share_of_limit(planned, float(np.mean([record["performance"].sum() for record in records]))),
-        simulated_s_per_wall_s=sum(record.horizon_s for record in records) / wall_s if wall_s else math.nan,
-    )
+    quantities = {name: aggregate([run[name] for run in runs]) for name in runs[0]}
+    simulated_s, wall_s = (sum(getattr(each, name) for each in records) for name in ("horizon_s", "wall_time_s"))
+    return {
+        "controller": condition.policy.label,
+        "world": condition.world.name,
+        "caches": planned.scenario.caches,
+        "n_runs": len(records),
+        **{name: {"mean": of.mean, "low": plain(of.lower), "high": plain(of.upper)} for name, of in quantities.items()},
+        "share_of_limit": share_of_limit(planned, float(np.mean([each["performance"].sum() for each in records]))),
+        "simulated_s_per_wall_s": plain(simulated_s / wall_s) if wall_s else None,
+    }
 
 
 def _quantities(record: Record, read_as: Performance) -> dict[str, float]:
@@ -210,10 +189,10 @@ def _quantities(record: Record, read_as: Performance) -> dict[str, float]:
     }
 
 
-def _with_half(summary: Summary) -> str:
+def _with_half(of: Mapping[str, float | None]) -> str:
     """Return a mean with half of its interval, with two digits behind the point."""
-    half = summary.upper - summary.mean
-    return f"{summary.mean:.2f}" + ("" if math.isnan(half) else f" ± {half:.2f}")
+    mean, high = of["mean"] or 0.0, of["high"]
+    return f"{mean:.2f}" + ("" if high is None else f" ± {high - mean:.2f}")
 
 
 def _about_bands(n_runs: Sequence[int]) -> str:

@@ -3,13 +3,12 @@
 import re
 from pathlib import Path
 
-import numpy as np
 import polars as pl
 import pytest
 
 from metrics import CurveError, PopulationRates
 from metrics.scoring.curves_file import EVENT_COLUMNS, read_curves, study_curves
-from metrics.scoring.run_curves import CURVE_COLUMNS, common_runs
+from metrics.scoring.run_curves import CURVE_COLUMNS
 from tests.support.curve_tables import CROWDING, rows, table
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "scoring.md"
@@ -101,13 +100,6 @@ def test_columns_of_some_experiments_are_there_for_those_only():
     assert (undisturbed.curves.keys(), undisturbed.rates) == ({"performance"}, None)
     assert throttled.curves["adversity"].tolist() == [[0.0, 0.4]]
     assert throttled.rates == PopulationRates(lambda_d=0.01)
-
-
-def test_runs_are_paired_by_their_number():
-    frame = table(rows(1, [[1.0], [2.0], [3.0]], first_seed=0), rows(2, [[20.0], [30.0], [40.0]], first_seed=1))
-    few, many = common_runs(*only(frame).experiments)
-    assert few.seeds == many.seeds == (1, 2)
-    np.testing.assert_array_equal(many.performance / few.performance, [[10.0], [10.0]])
 
 
 def test_longer_runs_are_cut_and_it_is_said():

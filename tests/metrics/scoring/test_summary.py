@@ -16,7 +16,9 @@ def test_conditions_in_several_worlds_have_a_row_each(tmp_path, monkeypatch):
     noisy = World(WORLD, (parse_wrapper("sensor_noise:sigma=0.03"),))
     plan = Plan.product(policy_specs(["random", "crw"]), [World(WORLD), noisy], seeds=(0, 1))
     summary = summarize_runs(run_plan(plan, jobs=1))
-    assert [row.condition for row in summary.rows] == list(plan.conditions)
+    assert [(row["controller"], row["world"]) for row in summary.rows] == [
+        (policy.label, world.name) for policy, world in plan.conditions
+    ]
     lines = str(summary).splitlines()
     assert lines[0] == "warehouse_small and others: 2 worlds"
     assert "warehouse_small, 3 robots, 20 objects, sensor noise: sigma 0.03 (all sensors)" in lines[3]
