@@ -37,6 +37,8 @@ from swarm_forage_env.wrappers.base import SwarmWrapper
 
 _INTERVAL_TICKS = 10
 """Length of a recording interval in compared records. Our choice: short, so that small differences are seen."""
+_SEED = 0
+"""Of environment and policy in `check_policy`."""
 _MOMENT = ("observation", "reward", "termination", "truncation")
 """What an agent gets in a tick."""
 
@@ -173,9 +175,7 @@ def _summary(values: Any) -> str:
     return f"{values.dtype} of shape {values.shape}{ends}"
 
 
-def check_policy(
-    policy: Any, scenario: str | ScenarioConfig = "warehouse_small", *, seed: int = 0, ticks: int = 150
-) -> None:
+def check_policy(policy: Any, scenario: str | ScenarioConfig = "warehouse_small", *, ticks: int = 150) -> None:
     """Check a policy against `contract.policy.Policy`.
 
     The policy acts for a while, with some robots away and then with all robots away. Its actions must have the right
@@ -188,7 +188,6 @@ def check_policy(
             (which is copied), or a function of observations.
         scenario: Where it acts, with the caches that the policy states. Choose one in which your policy meets
             everything that it reacts to.
-        seed: Seed of the environment and of the policy.
         ticks: How long it acts.
 
     Raises:
@@ -205,9 +204,9 @@ def check_policy(
             "it is a yardstick and no contestant, and check_determinism alone says something about it."
         )
     reads = _checked_reads(subject, world.layout)
-    scenes = list(_act_in(subject, world, seed, ticks, away=True))
+    scenes = list(_act_in(subject, world, ticks, away=True))
     seen = [scene.obs for scene in scenes]
-    act_again = partial(_check_same_actions, subject, world.swarm_spec, seed, scenes)
+    act_again = partial(_check_same_actions, subject, world.swarm_spec, scenes)
     advice = "make all memory in reset, and draw random numbers from the generator that reset is given only."
     act_again((obs.copy() for obs in seen), "Expected reset to begin a new run", advice)
     expected = "Expected a policy that keeps no reference to the observation array"
@@ -218,7 +217,7 @@ def check_policy(
         act_again((_without_unread(world.layout, reads, obs) for obs in seen), expected, advice)
     n_robots = config.robots.n_robots
     other = ForageEnv(with_overrides(config, n_robots=n_robots // 2 if n_robots > 1 else 2))
-    for _ in _act_in(subject, other, seed, min(ticks, _INTERVAL_TICKS), away=False):
+    for _ in _act_in(subject, other, min(ticks, _INTERVAL_TICKS), away=False):
         pass
 
 
@@ -230,10 +229,10 @@ class _Scene(NamedTuple):
     actions: ActionArray
 
 
-def _act_in(policy: Policy, world: ForageEnv, seed: int, ticks: int, *, away: bool) -> Iterator[_Scene]:
+def _act_in(policy: Policy, world: ForageEnv, ticks: int, *, away: bool) -> Iterator[_Scene]:
     """Let a policy act in an environment; with `away`, robots leave for repair and come back."""
-    obs = world.reset_batch(seed)
-    _reset(policy, world.swarm_spec, seed)
+    obs = world.reset_batch(_SEED)
+    _reset(policy, world.swarm_spec)
     rows = np.arange(world.num_agents)
     everybody = np.ones(len(rows), np.bool_)
     populations = {ticks // 4: rows % 2 == 0, ticks // 2: ~everybody, 3 * ticks // 4: everybody} if away else {}
@@ -274,9 +273,9 @@ def _asked(policy: Policy, obs: ObsArray, active: BoolArray, tick: int, spec: Sw
     return _Scene(shown, at_work, np.where(at_work[:, None], actions, np.float32(0.0)))
 
 
-def _reset(policy: Policy, spec: SwarmSpec, seed: int) -> None:
+def _reset(policy: Policy, spec: SwarmSpec) -> None:
     try:
-        policy.reset(spec, stream_rng(seed, Stream.POLICY))
+        policy.reset(spec, stream_rng(_SEED, Stream.POLICY))
     except Exception as error:
         raise CheckError(
             f"Expected reset to prepare for a swarm of {spec.n_robots} robots, got {type(error).__name__}: {error}"
@@ -301,11 +300,11 @@ def _checked_tasks(policy: Policy, n_robots: int, tick: int) -> Any:
 
 
 def _check_same_actions(
-    policy: Policy, spec: SwarmSpec, seed: int, scenes: list[_Scene], shown: Iterable[ObsArray], expected: str,
+    policy: Policy, spec: SwarmSpec, scenes: list[_Scene], shown: Iterable[ObsArray], expected: str,
     advice: str,
 ) -> None:  # fmt: skip
     """Give a policy the observations of `scenes` again, as `shown` has them, and compare its actions."""
-    _reset(policy, spec, seed)
+    _reset(policy, spec)
     for tick, (scene, obs) in enumerate(zip(scenes, shown, strict=True)):
         again = _asked(policy, obs, scene.active.copy(), tick, spec).actions
         for row in np.flatnonzero((again != scene.actions).any(axis=1)):

@@ -38,15 +38,13 @@ class LiveRun:
         over: Whether the run has ended: horizon reached, or every robot dead.
     """
 
-    def __init__(self, stack: ForageEnv | SwarmWrapper, policy: Policy, seed: int, *, by_ticks: bool = False) -> None:
+    def __init__(self, stack: ForageEnv | SwarmWrapper, policy: Policy, seed: int) -> None:
         """Start a run.
 
         Args:
             stack: The environment, with or without wrappers and recorder.
             policy: A policy that drives no other run.
             seed: Seed of the environment, of its wrappers and of the policy.
-            by_ticks: Never leave several ticks to one kernel: for those who look after every tick, which is then
-                faster. The run is the same.
         """
         if isinstance(policy, type) or not all(callable(getattr(policy, name, None)) for name in ("reset", "act")):
             raise ConfigError(f"Expected a policy object with reset and act, got {policy!r}; load_policy makes one.")
@@ -54,7 +52,6 @@ class LiveRun:
         self.over = False
         self._stack = stack
         self._policy = policy
-        self._by_ticks = by_ticks
         policy.reset(self.forage_env.swarm_spec, stream_rng(seed, Stream.POLICY))
         self._obs = stack.reset_batch(seed)
         if sees_world(policy):
@@ -68,7 +65,7 @@ class LiveRun:
         That is where `needs_no_python` says so, or a recorder that is a subclass or was changed.
         """
         stack = self._stack
-        if self._by_ticks or type(stack) is not RunRecorder or "after_step" in vars(stack) or not steps_as_made(stack):
+        if type(stack) is not RunRecorder or "after_step" in vars(stack) or not steps_as_made(stack):
             return None
         if not hasattr(type(self._policy), "compiled") or not needs_no_python(self.forage_env, stack.stack[1:]):
             return None

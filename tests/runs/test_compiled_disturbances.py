@@ -19,7 +19,7 @@ from swarm_forage_env.wrappers.recorder import RunRecorder
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.throttle import Throttle, ThrottleConfig
 from swarm_forage_env.wrappers.waveform import Waveform
-from tests.support.drivers import LAST_TICK, UntilNaN
+from tests.support.drivers import LAST_TICK, UntilNaN, tick_by_tick
 from tests.support.foraging import quick_world
 
 POOLS = (
@@ -67,14 +67,17 @@ def started(policy: str, wrappers, seed: int = 4, *, by_ticks: bool = False, n_r
     world = quick_world(
         "warehouse_small", caches=getattr(chosen, "caches", "none"), n_robots=n_robots, **far, **lasting
     )
-    return LiveRun(build_stack(world, wrappers, reads=getattr(chosen, "reads", None)), chosen, seed, by_ticks=by_ticks)
+    stack = build_stack(world, wrappers, reads=getattr(chosen, "reads", None))
+    return LiveRun(stack, tick_by_tick(chosen) if by_ticks else chosen, seed)
 
 
 def outcome(run: LiveRun) -> dict[str, np.ndarray]:
     """Everything that a run shows and records."""
     recorder, swarm = run._stack, run.forage_env.swarm
     assert isinstance(recorder, RunRecorder)
-    shown = {"obs": recorder.last_obs.copy(), "actions": run._policy.compiled().actions.copy()}
+    policy = copy.copy(run._policy)
+    vars(policy).pop("act", None)
+    shown = {"obs": recorder.last_obs.copy(), "actions": policy.compiled().actions.copy()}
     shown |= {name: np.array(getattr(swarm, name)) for name in swarm._fields}
     shown |= {"tick": np.array(run.forage_env.tick)}
     return shown | (recorder.columns() | recorder.contributed() if recorder.complete else {})
@@ -97,7 +100,9 @@ def test_a_run_of_any_stack_is_the_run_tick_by_tick(seed):
         pieces.advance(to_tick=tick)
         slow.advance(to_tick=tick)
         assert_same(pieces, slow)
-        pieces._by_ticks = bool(chance.random() < 0.3)  # now and then some ticks with Python in between
+        vars(pieces._policy).pop("act", None)
+        if chance.random() < 0.3:  # now and then some ticks with Python in between
+            tick_by_tick(pieces._policy)
     pieces.advance()
     slow.advance()
     assert pieces.over
@@ -242,7 +247,7 @@ def test_gains_of_every_type_and_order_are_taken(given):
     for by_ticks in (False, True):
         stack = Gain(build_env(scenario("warehouse_small", n_robots=N_ROBOTS)))
         stack.given = given
-        run = LiveRun(RunRecorder(stack), CRWPolicy(), seed=1, by_ticks=by_ticks)
+        run = LiveRun(RunRecorder(stack), tick_by_tick(CRWPolicy()) if by_ticks else CRWPolicy(), seed=1)
         assert by_ticks or run.compiled_policy is not None
         run.advance(to_tick=3)
         speeds.append(run.forage_env.swarm.wheel_speed.copy())
@@ -285,7 +290,7 @@ def test_two_wrappers_that_do_the_same_thing_both_do_it():
     for by_ticks in (False, True):
         inner, outer = (ThrottleConfig(waveform=Waveform(kind="constant", amplitude=share)) for share in (0.2, 0.5))
         stack = Throttle(Second(build_env(scenario("warehouse_small", n_robots=2)), inner), outer)
-        runs.append(LiveRun(RunRecorder(stack), CRWPolicy(), seed=1, by_ticks=by_ticks))
+        runs.append(LiveRun(RunRecorder(stack), tick_by_tick(CRWPolicy()) if by_ticks else CRWPolicy(), seed=1))
         runs[-1].advance(to_tick=20)
     assert_same(*runs)
 
@@ -300,9 +305,10 @@ def test_a_fault_ends_a_run_where_it_ends_with_python(population):
     """Also in a tick in which robots break down: none does, because what robots want to do is looked at before."""
     ended = []
     for by_ticks in (False, True):
-        world, policy = scenario("warehouse_small", n_robots=4, n_objects=20), UntilNaN()
+        world = scenario("warehouse_small", n_robots=4, n_objects=20)
+        policy: Any = tick_by_tick(UntilNaN()) if by_ticks else UntilNaN()
         wrappers = [parse_wrapper(word) for word in (population, "throttle:waveform=constant,amplitude=0.5")]
-        run = LiveRun(build_stack(world, wrappers, reads=policy.reads), policy, seed=4, by_ticks=by_ticks)
+        run = LiveRun(build_stack(world, wrappers, reads=policy.reads), policy, seed=4)
         with pytest.raises(ActionError, match=r"nan.* for robot_2"):
             run.advance()
         assert policy.n_ticks == LAST_TICK

@@ -14,6 +14,7 @@ from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import LiveRun, build_stack
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from tests.runs.test_compiled_disturbances import outcome, random_stack
+from tests.support.drivers import tick_by_tick
 from tests.support.foraging import quick_world
 
 WORLDS: dict[str, dict[str, Any]] = {
@@ -56,7 +57,7 @@ def assert_same_in_pieces(policy: Callable[[], Policy], world: ScenarioConfig, s
     for by_ticks in (False, True):
         chosen: Any = policy()
         stack = build_stack(world, wrappers, reads=getattr(chosen, "reads", None))
-        runs.append(LiveRun(stack, chosen, seed, by_ticks=by_ticks))
+        runs.append(LiveRun(stack, tick_by_tick(chosen) if by_ticks else chosen, seed))
     assert runs[0].compiled_policy is not None
     for tick in [*sorted(chance.integers(1, 300, 3).tolist()), 300]:
         for run in runs:
