@@ -103,21 +103,19 @@ class ForageEnv(SwarmLayer, ParallelEnv[str, np.ndarray, np.ndarray]):
 
     def observation_space(self, agent: str) -> spaces.Box:
         """(D,) float32 in [-1, 1]; one space object per agent."""
-        return self._observation_spaces[agent]
+        return self._spaces[agent][0]
 
     def action_space(self, agent: str) -> spaces.Box:
         """(A,) float32 in [-1, 1]: left wheel, right wheel, gripper, message; one space object per agent."""
-        return self._action_spaces[agent]
+        return self._spaces[agent][1]
 
     @cached_property  # made when asked for: runs of a policy never look, and there may be a million robots
-    def _observation_spaces(self) -> dict[str, spaces.Box]:
-        columns = self.layout.size
-        return {agent: spaces.Box(-1.0, 1.0, (columns,), np.float32) for agent in self.possible_agents}
-
-    @cached_property
-    def _action_spaces(self) -> dict[str, spaces.Box]:
-        columns = self.swarm_spec.action_size
-        return {agent: spaces.Box(-1.0, 1.0, (columns,), np.float32) for agent in self.possible_agents}
+    def _spaces(self) -> dict[str, tuple[spaces.Box, spaces.Box]]:
+        seen, done = (self.layout.size,), (self.swarm_spec.action_size,)
+        return {
+            agent: (spaces.Box(-1.0, 1.0, seen, np.float32), spaces.Box(-1.0, 1.0, done, np.float32))
+            for agent in self.possible_agents
+        }
 
     @cached_property
     def state_space(self) -> spaces.Box:

@@ -9,40 +9,29 @@ from swarm_forage_env.contract.kernel_policy import CompiledPolicy
 from swarm_forage_env.contract.policy import refused_tasks
 from swarm_forage_env.contract.types import BoolArray, CodeArray
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.scenarios.columns import INTERVAL_COLUMNS
+from swarm_forage_env.scenarios.columns import ALL_COLUMNS, INTERVAL_COLUMNS
 from swarm_forage_env.scenarios.config import whole_intervals
 from swarm_forage_env.scenarios.performance import performance_curve
 from swarm_forage_env.world.kernels.counting import add_task_shares
 from swarm_forage_env.wrappers.base import SwarmWrapper
 
-TOTALS: dict[str, Counter] = {
-    "collected": Counter.COLLECTED,
-    "first_picked": Counter.FIRST_PICKED,
-    "free_pickups": Counter.FREE_PICKUPS,
-    "cache_pickups": Counter.CACHE_PICKUPS,
-    "cache_drops": Counter.CACHE_DROPS,
-    "floor_drops": Counter.FLOOR_DROPS,
-    "displaced_drops": Counter.DISPLACED_DROPS,
-    "objects_moved": Counter.OBJECTS_MOVED,
-    "caches_created": Counter.CACHES_CREATED,
-    "caches_depleted": Counter.CACHES_DEPLETED,
-    "interference_ticks": Counter.INTERFERING,
-    "avoidances": Counter.AVOIDANCES,
-    "interference_ticks_near_caches": Counter.INTERFERING_NEAR_CACHES,
+_OTHER_NAMES = {
+    Counter.INTERFERING: "interference_ticks",
+    Counter.INTERFERING_NEAR_CACHES: "interference_ticks_near_caches",
+    Counter.CACHES_ALIVE: "n_caches",
 }
-"""Columns that are totals per interval."""
-TICK_MEANS: dict[str, Counter] = {
-    "n_active": Counter.ACTIVE,
-    "n_present": Counter.PRESENT,
-    "n_carrying": Counter.CARRYING,
-    "n_caches": Counter.CACHES_ALIVE,
-    "n_objects_cached": Counter.OBJECTS_CACHED,
-    "n_searching": Counter.SEARCHING,
-    "n_homing": Counter.HOMING,
-    "n_handling": Counter.HANDLING,
-    "n_at_caches": Counter.AT_CACHES,
-}
-"""Columns that are means over the ticks of an interval."""
+
+
+def _column_of(counter: Counter) -> str:
+    """Return the column that a counter becomes: most have its name, or that after "n_"."""
+    name = counter.name.lower()
+    return _OTHER_NAMES.get(counter, name if name in ALL_COLUMNS else f"n_{name}")
+
+
+COUNTED = {_column_of(counter): counter for counter in Counter}
+"""Columns that the arena counts; see `Column.is_total`."""
+TOTALS = {name: counter for name, counter in COUNTED.items() if ALL_COLUMNS[name].is_total}
+"""Those of them that are totals per interval; the others are means over its ticks."""
 
 
 class RunRecorder(SwarmWrapper):
@@ -145,8 +134,10 @@ class RunRecorder(SwarmWrapper):
 
     def _counted(self) -> dict[str, np.ndarray]:
         """What the arena counts, as columns."""
-        totals = {name: self._counts[:, counter] for name, counter in TOTALS.items()}
-        return totals | {name: self._counts[:, counter] / self._interval_ticks for name, counter in TICK_MEANS.items()}
+        return {
+            name: self._counts[:, counter] if name in TOTALS else self._counts[:, counter] / self._interval_ticks
+            for name, counter in COUNTED.items()
+        }
 
     def _adversity(self) -> np.ndarray:
         """Conditions, (T,): the throttle if there is one, else what handling takes under its cost, else zero."""

@@ -10,7 +10,7 @@ from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.floor import WHEEL_SCALE_MPS
 from swarm_forage_env.scenarios.obstacles import distances_m
 from swarm_forage_env.world.state import listed
-from swarm_forage_env.wrappers.recorder import TICK_MEANS, TOTALS, RunRecorder
+from swarm_forage_env.wrappers.recorder import COUNTED, TOTALS, RunRecorder
 from tests.support.stage import assert_conserved
 
 IN_A_CROWD = 0.12
@@ -97,7 +97,8 @@ def look_at_record(recorder: RunRecorder, first_counters: np.ndarray) -> None:
     for name, counter in TOTALS.items():
         assert columns[name].sum() == counters[counter], f"{name} is the total of its intervals"
         assert columns[name].min() >= 0, f"{name} never falls"
-    for name, counter in TICK_MEANS.items():
+    for name in COUNTED.keys() - TOTALS.keys():
+        counter = COUNTED[name]
         ticks = columns[name].sum() * env.scenario.interval_ticks
         assert abs(ticks - counters[counter]) < 1e-6 * max(1, counters[counter]), f"{name} is the mean of its ticks"
     totals = {name: int(columns[name].sum()) for name in TOTALS}

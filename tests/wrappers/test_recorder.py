@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm_forage_env.contract.codes import Counter, Task
+from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.world.kernels.counting import add_task_shares
 from swarm_forage_env.wrappers.base import SwarmWrapper
-from swarm_forage_env.wrappers.recorder import TICK_MEANS, TOTALS, RunRecorder
+from swarm_forage_env.wrappers.recorder import COUNTED, RunRecorder
 from tests.reference.task_shares import task_shares
 from tests.support.fake_arena import FakeArena, small_scenario
 
@@ -24,7 +24,7 @@ def drive(recorder: RunRecorder, ticks: int = 15, tasks=None) -> RunRecorder:
 
 def told(recorder: RunRecorder) -> dict[str, np.ndarray]:
     """What not every record has, without counters of the world."""
-    return {name: values for name, values in recorder.contributed().items() if name not in TOTALS | TICK_MEANS}
+    return {name: values for name, values in recorder.contributed().items() if name not in COUNTED}
 
 
 class Contributor(SwarmWrapper):
@@ -47,10 +47,6 @@ def test_totals_are_differences_and_means_are_over_ticks():
     assert columns["interval"].tolist() == [0, 1, 2]
     np.testing.assert_allclose(columns["t_end_s"], [1.0, 2.0, 3.0])
     assert columns["adversity"].tolist() == [0.0, 0.0, 0.0]
-
-
-def test_every_counter_of_the_world_is_recorded():
-    assert {*TOTALS.values(), *TICK_MEANS.values()} == set(Counter)
 
 
 def test_performance_may_be_any_column_and_what_is_computed_from_them():
