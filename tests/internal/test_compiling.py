@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from swarm_forage_env._internal import compiling
-from swarm_forage_env._internal.compiling import Callback, Calls, direct, kernel
+from swarm_forage_env._internal.compiling import Callback, direct, kernel
 
 INNER = """
 from swarm_forage_env._internal.compiling import kernel
@@ -32,20 +32,6 @@ from .inner import inner
 @kernel
 def outer(x: float) -> float:
     return inner(x)
-"""
-
-
-PAIR = """
-from typing import NamedTuple
-from swarm_forage_env._internal.compiling import kernel
-
-class {name}(NamedTuple):
-    left: float
-    right: float
-
-@kernel
-def total(pair: {name}) -> float:
-    return pair.left + pair.right
 """
 
 
@@ -83,13 +69,6 @@ def test_an_edit_of_one_module_reaches_what_another_has_compiled_in(package):
     assert call(package, program) == "3.0 0"
     (of_folder,) = (package.parent / "cache").glob("controllers-*")
     assert len(list(of_folder.iterdir())) == 1, "what was made of former sources is gone"
-
-
-def test_a_type_that_the_sources_no_longer_have_does_no_harm(package):
-    program = "from controllers import pairs; print(pairs.total(pairs.{name}(1.0, 2.0)))"
-    for name in ("Pair", "Couple"):
-        (package / "pairs.py").write_text(PAIR.format(name=name))
-        assert call(package, program.format(name=name)) == "3.0"
 
 
 ROOT = Path(compiling.__file__).parents[2]
@@ -194,19 +173,6 @@ def test_a_kernel_takes_any_function_of_a_type_as_an_argument():
     for function, expected in ((double, [8.0, 24.0]), (negate, [-8.0, -24.0])):
         call(Callback(function, numbers), numbers)
         assert numbers.tolist() == expected
-
-
-def test_copies_of_calls_find_what_they_call_anew():
-    calls, numbers = Calls(), np.array([1.0, 3.0])
-    for each in (calls, copy.deepcopy(calls), pickle.loads(pickle.dumps(calls))):  # noqa: S301 - our own
-        each(double, numbers)
-    assert numbers.tolist() == [8.0, 24.0]
-
-
-def test_a_callback_can_be_called_from_python():
-    numbers = np.array([1.0, 3.0])
-    Callback(double, numbers)(numbers)
-    assert numbers.tolist() == [2.0, 6.0]
 
 
 @pytest.mark.parametrize("copied", [pickle.dumps, copy.deepcopy, copy.copy])

@@ -4,12 +4,10 @@ import pytest
 
 from swarm_forage_env.scenarios.floor import (
     PLACEMENTS,
-    cache_centre_box,
     capacity,
     distributable_box,
     overlap_cells,
     source_boxes,
-    square_box,
 )
 
 
@@ -49,16 +47,3 @@ def test_capacity_is_the_number_of_source_cells_off_the_nest(placement):
     assert capacity(boxes, 70, 50, [nest]) == len([1 for x, y in cells if not (20 <= x < 60 and 4 <= y < 40)])
     assert capacity(boxes, 70, 50, []) == len(cells)
     assert all(overlap_cells(box, area) == overlap_cells(box, box) > 0 for box in boxes)
-
-
-@pytest.mark.parametrize(
-    ("b", "cells"), [((0, 0, 4, 3), 12), ((3, 2, 9, 9), 1), ((4, 0, 8, 3), 0), ((10, 10, 12, 12), 0)]
-)
-def test_overlap_cells(b, cells):
-    assert overlap_cells((0, 0, 4, 3), b) == overlap_cells(b, (0, 0, 4, 3)) == cells
-
-
-def test_squares_of_caches():
-    assert square_box((10, 20), 3) == (9, 19, 12, 22)
-    assert cache_centre_box(160, 80, 32) == (32, 32, 128, 48)
-    assert cache_centre_box(160, 80, 5) == (24, 12, 137, 69)

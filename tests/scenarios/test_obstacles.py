@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.cli.worlds import parse_setting
 from swarm_forage_env.scenarios.obstacles import blocked_cells, covered_area_m2, distances_m, stretched
 from swarm_forage_env.scenarios.presets import at_density, scenario
 
@@ -46,12 +45,6 @@ def test_nonsense_is_refused(overrides, words):
     with pytest.raises(ConfigError) as caught:
         scenario("warehouse_small", **overrides)
     assert words in str(caught.value)
-
-
-def test_obstacles_come_from_the_command_line():
-    expected = scenario("warehouse_small", obstacles=(WALL, PILLAR))
-    assert scenario("warehouse_small", **dict([parse_setting("obstacles=14,4,14.4,12 + 18,7.5,19,8.5")])) == expected
-    assert scenario("warehouse_small", **dict([parse_setting("obstacles=")])) == scenario("warehouse_small")
 
 
 def test_boxes_keep_their_share_of_an_arena_at_another_density():

@@ -6,7 +6,7 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.scenarios.floor import source_boxes
-from swarm_forage_env.scenarios.overrides import robots_at_density, with_overrides
+from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, chosen_scenario, scenario
 from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.world.placement import static_cache_centres
@@ -95,11 +95,6 @@ def test_what_is_no_scenario_is_refused():
 
 
 # Density
-
-
-@pytest.mark.parametrize(("area_m2", "n_robots"), [(256, 12), (1024, 51), (2304, 115), (16384, 819), (3.0, 1)])
-def test_robots_are_whole_and_at_least_one(area_m2, n_robots):
-    assert robots_at_density(area_m2, 0.05) == n_robots
 
 
 @pytest.mark.parametrize(

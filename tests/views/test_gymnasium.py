@@ -7,7 +7,6 @@ from gymnasium import spaces
 from gymnasium.utils.env_checker import check_env
 
 from swarm_forage_env import SCENARIO_NAMES
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.views.gymnasium import JointForageEnv, SwarmVectorEnv
@@ -100,8 +99,3 @@ def test_an_interface_shows_the_rows_of_the_vector_view_and_sums_their_rewards(i
         total += reward
     assert joint.forage_env.tick == 20
     assert total >= 20 * 4 * 0.01 * (1 - 1e-6), "0.01 per robot and tick, also of the decision cut short"
-
-
-def test_unknown_scenario_names_the_nearest():
-    with pytest.raises(ConfigError, match="warehouse_small"):
-        JointForageEnv("warehouse_smal")

@@ -69,8 +69,6 @@ def test_units_of_sigma(world):
     for name, deviation in expected.items():
         change = seen[:, :, layout[name]] - obs[:, layout[name]]
         assert change.std() == pytest.approx(deviation, rel=0.04), name
-        assert abs(change.mean()) < 4 * deviation / np.sqrt(change.size), name
-        assert np.corrcoef(change.reshape(-1, change.shape[-1]).T)[0, 1] == pytest.approx(0.0, abs=0.06), name
     angle = np.arctan2(seen[:, :, layout["heading"]][..., 1], seen[:, :, layout["heading"]][..., 0])
     assert angle.std() == pytest.approx(sigma, rel=0.04)  # 1 rad
 

@@ -78,25 +78,7 @@ def test_robots_at_work_are_those_of_the_chain_with_few_seeds_too(at_work):
     assert abs(few.mean()) < 3.3 / np.sqrt(len(LEVELS))
 
 
-# Choices
-
-
 # The four processes
-
-
-def test_a_malfunction_without_a_victim_waits_for_one():
-    state, clocks = PopulationState.start(1), due({"malfunction": 2})
-    assert advance_population(state, clocks, 2)
-    clocks.malfunction.next_tick, clocks.repair.next_tick = 3, 7
-    for tick in (3, 4, 5, 6):
-        assert not advance_population(state, clocks, tick)
-        assert clocks.malfunction.next_tick == 3
-    # Malfunctions come before repairs: the robot works for this one tick.
-    assert advance_population(state, clocks, 7)
-    assert state.active[0]
-    assert advance_population(state, clocks, 8)
-    assert not state.active[0]
-    assert clocks.malfunction.next_tick > 8
 
 
 def test_stays_and_absences_are_measured_in_ticks():
