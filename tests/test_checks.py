@@ -38,6 +38,8 @@ def test_our_environments_pass(name):
 def test_wrapped_stacks_and_views_for_learners_pass():
     check_env(build_stack(scenario("warehouse_small", n_robots=5, n_objects=80), map(parse_wrapper, ADVERSE)))
     check_env(ParallelLearnerEnv(SMALL, interface={"observation": "compact", "actions": "discrete"}), ticks=20)
+    dying = [parse_wrapper("population:death_per_tick=0.2")]
+    check_env(build_stack(scenario("classroom", n_robots=5, message_size=2), dying), ticks=20)
 
 
 def test_short_episodes_pass_and_keep_their_horizon():

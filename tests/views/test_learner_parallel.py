@@ -79,6 +79,13 @@ def test_all_views_are_paid_in_one_type(monkeypatch):
     assert paid == [np.float32] * 3
 
 
+def test_with_an_interface_an_environment_has_the_attributes_that_it_has_without():
+    plain, learner = (parallel_env(n_robots=3, interface=interface) for interface in (None, INTERFACES["driven"]))
+    assert learner.swarm_spec == plain.swarm_spec
+    for env in (plain, learner):
+        assert env.observation_space("robot_0").shape == (env.layout.size,)
+
+
 def test_without_agents_and_actions_a_step_does_nothing():
     env = ParallelLearnerEnv("warehouse_small", n_robots=3, interface=INTERFACES["numbered"], max_cycles=1)
     with pytest.raises(RuntimeError, match="Call reset before step"):

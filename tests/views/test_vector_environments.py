@@ -61,6 +61,12 @@ def test_the_number_of_sub_environments_is_a_whole_number_of_swarms():
         gymnasium.make_vec(env_id, n_robots=4, n_arenas=0)
 
 
+def test_vectorized_one_by_one_a_sub_environment_is_a_whole_swarm():
+    envs = gymnasium.make_vec("swarm_forage/classroom-v0", num_envs=2, vectorization_mode="sync", n_robots=3)
+    assert envs.reset(seed=1)[0].shape[:2] == (2, 3)
+    envs.close()
+
+
 def test_words_of_the_command_line_and_plain_values_are_taken_everywhere():
     words, fields = ["sensor_noise:sigma=0.1"], {"actions": "discrete"}
     seen = []

@@ -9,6 +9,7 @@ from pettingzoo.test import parallel_api_test
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.layer import SwarmLayer
 from swarm_forage_env.views.gymnasium import JointForageEnv, SwarmVectorEnv
 from swarm_forage_env.views.pettingzoo import parallel_env
 from swarm_forage_env.wrappers.base import STACK_ORDER, SwarmWrapper
@@ -183,6 +184,11 @@ def test_whatever_fails_within_a_tick_is_not_gone_on_with(hook, fault):
             refused()
     wrapper.restore(kept)
     wrapper.step_batch(actions)
+
+
+def test_a_layer_without_its_methods_is_none():
+    with pytest.raises(TypeError, match="abstract methods last_obs, reset_batch, stack, step_batch, unwrapped"):
+        SwarmLayer()
 
 
 def test_a_hook_of_an_instance_is_a_hook():
