@@ -2,11 +2,12 @@
 
 from swarm_forage_env.scenarios.performance import Performance
 
+from .answer import Scores
 from .frame import differences, scores, summarized
 from .limits import ForagingLimit, limit_of
 from .measures import MEASURES, Measure
 from .plots import draw_scores
-from .policy_scores import Scores, score, score_curves, score_question
+from .policy_scores import score, score_curves, score_question
 from .question import Question
 from .run_curves import StudyLine, study_lines
 from .study_numbers import StudyPanel, study_panels

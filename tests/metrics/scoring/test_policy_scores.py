@@ -10,10 +10,10 @@ import pytest
 
 import metrics
 from metrics import MEASURES, CurveError, score
-from metrics.scoring import score_question
+from metrics.scoring import Scores, score_question
+from metrics.scoring.answer import spread
 from metrics.scoring.frame import SCHEMA
 from metrics.scoring.measures import PICTURED
-from metrics.scoring.policy_scores import Scores, spread
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import registry as policy_module
 from swarm_forage_env.runs import runner
