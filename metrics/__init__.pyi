@@ -80,7 +80,7 @@ from .statistics import paired_tests as paired_tests
 # claims of the paper
 from .controllers import PAPER_POLICIES as PAPER_POLICIES
 from .claims import CLAIMS as CLAIMS
-from .claims import check_claim as check_claim
+from .claims import check_claims as check_claims
 from .claims import Claim as Claim
 from .claims import Panel as Panel
 from .claims import Verdict as Verdict

@@ -67,8 +67,8 @@ def aligned_l1(x: ArrayLike, y: ArrayLike) -> FloatArray:
     return np.abs(x - y).sum(axis=-1)
 
 
-def noise_floor(perf_ideal: ArrayLike) -> FloatArray:
-    """Distances between all pairs of ideal runs: what a perfect swarm would score by chance alone.
+def noise_floor(perf_ideal: ArrayLike, maps: ArrayLike | None = None) -> FloatArray:
+    """Distances between all pairs of ideal runs of the same map: what a perfect swarm would score by chance alone.
 
     Reactivity, adaptability and noise robustness compare single runs, which scatter independently, so they are above 0
     even for a perfect swarm. Without warping, the floor is about 1.13 sigma T, where sigma is the standard deviation of
@@ -76,9 +76,11 @@ def noise_floor(perf_ideal: ArrayLike) -> FloatArray:
 
     Args:
         perf_ideal: P_ideal of all R >= 2 runs, shape (R, T).
+        maps: Number of the map of each run, (R,); runs of different maps differ by more than chance, and are not
+            paired. None: all runs have the same map.
 
     Returns:
-        Distances, shape (R (R - 1) / 2,).
+        Distances, shape (pairs,); R (R - 1) / 2 of one map, none where each run has its own.
 
     Raises:
         CurveError: Fewer than two runs, or no valid curves.
@@ -87,7 +89,10 @@ def noise_floor(perf_ideal: ArrayLike) -> FloatArray:
     if runs.ndim != 2 or runs.shape[0] < 2:
         raise CurveError(f"Expected perf_ideal of at least two runs, shape (R, T), got {runs.shape}.")
     first, second = np.triu_indices(runs.shape[0], k=1)
-    return dtw(runs[first], runs[second])
+    if maps is not None:
+        same = np.equal(*np.asarray(maps)[np.array([first, second])])
+        first, second = first[same], second[same]
+    return dtw(runs[first], runs[second]) if first.size else np.empty(0)
 
 
 def _njit(**options: bool) -> Callable[[Callable[..., Any]], Callable[..., Any]]:

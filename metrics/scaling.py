@@ -41,9 +41,9 @@ def scalability(
             take S in each interval.
 
     Returns:
-        C, shape (...,). Corrected: 1 for a linear gain, 0 for no gain, above 1 for a superlinear gain (at most r / (r -
-        1), also if only P(N1) is 0), negative if the larger swarm delivers less (-inf if only P(N2) is 0), NaN if both
-        are 0.
+        C, shape (...,). Corrected: 1 for a linear gain, 0 for no gain, above 1 for a superlinear gain (below r / (r -
+        1)), negative if the larger swarm delivers less (-inf if it delivers nothing), and NaN if the smaller swarm
+        delivers nothing: no gain is a multiple of that, and the limit r / (r - 1) would make the best score of it.
 
     Raises:
         CurveError: Curves are missing, negative, infinite or of different length; n1 >= n2.
@@ -59,6 +59,8 @@ def scalability(
         curves = tuple(curve.sum(axis=-1, keepdims=True) for curve in curves)
     with np.errstate(divide="ignore", invalid="ignore"):
         speedup = curves[1] / curves[0]
+        if variant == "corrected":
+            speedup = np.where(curves[0] > 0.0, speedup, np.nan)
         fraction = (speedup if variant == "paper" else 1.0 / speedup) - 1.0 / r
         return reduce_intervals(1.0 - fraction / (1.0 - 1.0 / r), reduce, *curves)
 

@@ -1,55 +1,53 @@
 """Numbers and answers of docs/results as fields of blocks in pages, which scripts/update_docs writes.
 
     results.C3                                      the answers to a claim under the rules described and program
-    results.R2_relative                             the same relative to performance
-    results.A5_ties_program                         how many of the comparisons of a claim tie, such as "19 of 42"
-    results.N2_ties_described_relative              the same relative to performance
+    results.X1_amounts                              the same in another reading than the main one
+    results.X1_shares_program                       how many statements hold and what comparisons show, in words
+    results.X1_5_shares_program                     the contrast of the fifth statement, with its interval
     results.S1a_raw_performance_described_crw_128   a mean of measures.csv: set, measure, rules, policy, value,
                                                     and values on other axes, such as _walk_probability_0
     results.runs, .sets, .hours, .version           what was run, and by what
     results.answers                                 how many claims have which answer, as a table
-    results.contradicted, .supported, .split        claims with these answers under both rules, as tables
+    results.contradicted, .supported, .equivalent   claims with these answers under both rules, as tables
+    results.split                                   claims supported under one of the rules and contradicted by the other
+    results.readings                                claims whose readings part, as a table
 
-Answers are ours, by intervals, with the corrected measures; `write_results` writes the files.
+`write_results` writes the files.
 """
 
 import csv
-import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from metrics.claims import CLAIMS
 from swarm_forage_env._internal.wording import number
 
-DESCRIBED, PROGRAM = RULES = ("described", "program")
-SENSES = {"": "", "relative to performance": "_relative"}
-"""Sense of a claim in verdicts.csv -> end of the name of a field."""
-TIES = (
-    re.compile(r"(?P<tie>\d+) of (?P<all>\d+) comparisons of .* tie,"),
-    re.compile(r"\d+ of (?P<all>\d+) comparisons differ, (?P<tie>\d+) tie,"),
-)
-"""How the column "why" tells it, of claims that things tie and of claims that nothing differs."""
-ANSWERS = ("supported", "contradicted", "tie", "undecided", "too vague")
+RULES = ("described", "program")
+READINGS = ("amounts", "shares", "bands")
+ANSWERS = ("supported", "contradicted", "equivalent", "open", "untestable")
 """Columns of the table, in this order; further ones follow."""
+
+Given = tuple[str, str]
+"""The answers under both rules."""
 
 
 def results_fields(folder: Path) -> dict[str, str]:
     """Return the fields of the files in a folder such as docs/results."""
-    answers = dict(_answers(folder / "verdicts.csv"))
+    lines = _lines(folder / "verdicts.csv")
+    main = _answers([line for line in lines if line["is_main"] == "true"])
+    readings = {one: _answers([line for line in lines if line["reading"] == one]) for one in READINGS}
     return {
-        **{name: ", ".join(given) for name, given in answers.items()},
-        **{
-            f"{name}_relative": ", ".join(given)
-            for name, given in _answers(folder / "verdicts.csv", "relative to performance")
-        },
-        **dict(_ties(folder / "verdicts.csv")),
+        **{name: ", ".join(given) for name, given in main.items()},
+        **{f"{name}_{one}": ", ".join(given) for one, found in readings.items() for name, given in found.items()},
+        **{f"{line['claim']}_{line['reading']}_{line['rules']}": _counted(line) for line in lines},
+        **dict(_contrasts(folder / "contrasts.csv")),
         **dict(_means(folder / "measures.csv")),
         **_runs(folder / "runs.csv"),
-        "answers": _counts(list(answers.values())),
-        "contradicted": _claims(answers, ("contradicted", "contradicted")),
-        "supported": _claims(answers, ("supported", "supported")),
-        "split": _claims(answers, ("contradicted", "supported"), ("supported", "contradicted")),
+        "answers": _counts([*main.values()]),
+        **{word: _claims(main, lambda given, word=word: given == (word, word)) for word in ANSWERS},
+        "split": _claims(main, lambda given: {*given} == {"supported", "contradicted"}),
+        "readings": _parted(readings),
     }
 
 
@@ -58,25 +56,26 @@ def _lines(file: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(lines))
 
 
-def _answers(file: Path, sense: str = "") -> Iterator[tuple[str, tuple[str, str]]]:
-    """Yield each claim of the paper and its answers; one about a formula has the same under both rules."""
-    given = {
-        (line["claim"], line["rules"]): line["answer"]
-        for line in _lines(file)
-        if line["measures"] in ("", "corrected") and line["sense"] == sense
-    }
-    for name in CLAIMS:
-        of_formula = given.get((name, ""), "waiting")
-        yield name, (given.get((name, DESCRIBED), of_formula), given.get((name, PROGRAM), of_formula))
+def _answers(lines: Sequence[dict[str, str]]) -> dict[str, Given]:
+    """Return each claim of the paper that has answers, with them."""
+    given = {(line["claim"], line["rules"]): line["answer"] for line in lines}
+    named = [name for name in CLAIMS if any((name, rules) in given for rules in RULES)]
+    return {name: (given.get((name, RULES[0]), "no runs"), given.get((name, RULES[1]), "no runs")) for name in named}
 
 
-def _ties(file: Path) -> Iterator[tuple[str, str]]:
-    """Yield how many comparisons tie, for each claim and rules; of several conditions of a claim, in the first."""
+def _counted(line: dict[str, str]) -> str:
+    return f"{line['n_held']} of {line['n_statements']}"
+
+
+def _contrasts(file: Path) -> Iterator[tuple[str, str]]:
+    """Yield the contrast of each statement of each claim, in percent of the unit of its measure."""
+    seen: Counter[tuple[str, str, str]] = Counter()
     for line in _lines(file):
-        if line["measures"] == "corrected" and line["sense"] in SENSES:
-            name = f"{line['claim']}_ties_{line['rules']}{SENSES[line['sense']]}"
-            first = line["why"].partition("\n")[0]
-            yield from ((name, f"{found['tie']} of {found['all']}") for one in TIES if (found := one.search(first)))
+        key = (line["claim"], line["reading"], line["rules"])
+        seen[key] += 1
+        if line["mean"]:
+            mean, lower, upper = (f"{100.0 * float(line[name]):.1f}" for name in ("mean", "lower", "upper"))
+            yield f"{key[0]}_{seen[key]}_{key[1]}_{key[2]}", f"{mean} % ({lower} to {upper})"
 
 
 def _means(file: Path) -> Iterator[tuple[str, str]]:
@@ -102,7 +101,7 @@ def _table(header: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in (header, ["---"] * len(header), *lines))
 
 
-def _counts(answers: Sequence[tuple[str, str]]) -> str:
+def _counts(answers: Sequence[Given]) -> str:
     counts = [Counter(given[place] for given in answers) for place in range(len(RULES))]
     known = [*ANSWERS, *sorted(set().union(*counts) - set(ANSWERS))]
     return _table(
@@ -111,6 +110,16 @@ def _counts(answers: Sequence[tuple[str, str]]) -> str:
     )
 
 
-def _claims(answers: dict[str, tuple[str, str]], *wanted: tuple[str, str]) -> str:
-    found = [(name, CLAIMS[name].text, *given) for name, given in answers.items() if given in wanted]
+def _claims(answers: dict[str, Given], is_wanted: Callable[[Given], bool]) -> str:
+    found = [(name, CLAIMS[name].text, *given) for name, given in answers.items() if is_wanted(given)]
     return _table(["claim", "the paper", *RULES], found) if found else "None."
+
+
+def _parted(readings: dict[str, dict[str, Given]]) -> str:
+    """Return the claims of flexibility and robustness whose amounts and shares have other answers, with the bands."""
+    found = [
+        (name, *(readings[one][name][place] for place in range(len(RULES)) for one in READINGS))
+        for name in readings["shares"]
+        if readings["shares"][name] != readings["amounts"][name]
+    ]
+    return _table(["claim", *(f"{rules}: {one}" for rules in RULES for one in READINGS)], found) if found else "None."

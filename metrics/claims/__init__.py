@@ -1,8 +1,19 @@
-"""The claims of the paper and its intuitions, each with a verdict by its rule and by ours: arrays in, answers out."""
+"""The claims of the paper and its intuitions, each a few contrasts of runs: arrays in, answers out."""
 
-from .claim import Claim, PanelName, Statement, Verdict, check_claim
-from .panel import Panel
-from .paper import CLAIMS, INTUITIONS
-from .words import EXPERIMENTS
+from .panel import MARGINS, Panel, PanelName
+from .paper import CLAIMS, EXPERIMENTS, INTUITIONS
+from .statements import Statement
+from .verdict import Claim, Verdict, check_claims
 
-__all__ = ["CLAIMS", "EXPERIMENTS", "INTUITIONS", "Claim", "Panel", "PanelName", "Statement", "Verdict", "check_claim"]
+__all__ = [
+    "CLAIMS",
+    "EXPERIMENTS",
+    "INTUITIONS",
+    "MARGINS",
+    "Claim",
+    "Panel",
+    "PanelName",
+    "Statement",
+    "Verdict",
+    "check_claims",
+]

@@ -24,7 +24,6 @@ from ..statistics import SIGNIFICANT, Summary, aggregate, holm, paired_p
 from .measures import (
     MEASURES,
     Compared,
-    Measure,
     Uncomputable,
     check_measures,
     check_words,
@@ -49,8 +48,7 @@ SCHEMA: dict[str, Any] = {
     "relative": pl.Float64,
     "floor": pl.Float64,
     "floor_of_seed": pl.Float64,
-    "mean_curve": pl.Float64,
-    "relative_mean_curve": pl.Float64,
+    "excess": pl.Float64,
     "total": pl.Float64,
     "distance": pl.Float64,
     "lost": pl.Int64,
@@ -61,9 +59,11 @@ SCHEMA: dict[str, Any] = {
 """Columns of the frame. `seed` is null where no run tells the value: availability, and levels whose runs all failed.
 
 `relative` is the value as a share of the performance that it is compared with, `total`; null for measures without
-shares. `floor` is the noise floor of a distance, `floor_of_seed` a sample of it: the distance of the undisturbed run of
-this seed to that of the next. `mean_curve` is the pseudo-value of the distance of mean curves, `relative_mean_curve`
-that of its share. `distance` is that of the conditions from the ideal ones. `lost` counts runs that are missing.
+shares. `floor` is the noise floor of a distance, null where the map depends on the seed, because two undisturbed runs
+then differ in it, too. `floor_of_seed` is the distance of the undisturbed run of this seed to that of the next, and
+`excess` what a disturbed run adds to it; where the map depends on the seed, that is the disturbed run of the next seed,
+so that both distances are of two maps. `distance` is that of the conditions from the ideal ones. `lost` counts missing
+runs.
 """
 ROW = ("measure", "variant", "form", "at", "criterion", "x", "n_robots")
 """Columns that tell the levels of a policy apart."""
@@ -135,7 +135,9 @@ def _rows(name: str, study: StudyCurves, form: Form, compared: Compared) -> pl.D
     if name == "availability":
         return _frame({**told, "value": measure.of(compared)})
     if measure.is_distance:
-        told["floor"] = float(noise_floor(base.performance).mean()) if len(base.seeds) > 1 else None
+        told["floor"] = (
+            float(noise_floor(base.performance).mean()) if len(base.seeds) > 1 and not base.maps_differ else None
+        )
         told["distance"] = conditions_apart(compared)
     paired = compared.paired()
     seeds = paired.runs.seeds
@@ -149,8 +151,9 @@ def _rows(name: str, study: StudyCurves, form: Form, compared: Compared) -> pl.D
         total = (paired.runs if measure.varies == SIZE else paired.base).performance.sum(axis=-1)
         columns |= {"total": total, "relative": _share(values, total)}
     if measure.is_distance and len(seeds) > 1:
-        columns |= dict(zip(("mean_curve", "relative_mean_curve"), pseudo_values(measure, paired), strict=True))
-        columns["floor_of_seed"] = _floors(measure, compared, seeds)
+        beside_next = measure.of(paired._replace(runs=_next(paired.runs, runs.criterion)))
+        floors = measure.of(paired._replace(runs=_next(paired.base, runs.criterion)))
+        columns |= {"floor_of_seed": floors, "excess": (beside_next if runs.maps_differ else values) - floors}
     return _frame({**told, **columns})
 
 
@@ -169,39 +172,10 @@ def _share(values: FloatArray, total: FloatArray) -> FloatArray:
     return np.divide(values, total, out=np.full(values.shape, math.nan), where=total > 0.0)
 
 
-def _floors(measure: Measure, compared: Compared, seeds: Sequence[int]) -> FloatArray:
-    """Return the distance of each undisturbed run to the next, the last one's to the first, (R,)."""
-    ideal = compared.base
-    # What is held beside the undisturbed runs is of the level's criterion.
-    curves = {name: np.roll(curve, -1, axis=0) for name, curve in ideal.curves.items()}
-    moved = replace(ideal, criterion=compared.runs.criterion, curves=curves)
-    found = measure.of(compared._replace(runs=moved))
-    return found[[ideal.seeds.index(seed) for seed in seeds]]
-
-
-def pseudo_values(measure: Measure, paired: Compared) -> tuple[FloatArray, FloatArray]:
-    """Return the pseudo-values of the distance of mean curves, (R,), and of its share of the base's performance.
-
-    With R runs, v of all and v_i without run i they are v + (R - 1) (m - v_i), where m is the mean of all v_i. Their
-    mean is v, and they scatter like R independent values of which v is the mean (Miller 1974), on average no less than
-    v does (Efron and Stein 1981). The usual ones, R v - (R - 1) v_i, have a mean with less bias. But a distance has
-    bends, where curves cross and where its path through time turns, and at these that mean varies several times as much
-    as the pseudo-values tell.
-    """
-    whole = paired._replace(base=_mean_run(paired.base), runs=_mean_run(paired.runs))
-    parts = paired._replace(base=paired.base.without_each(), runs=paired.runs.without_each())
-    of_all, without = measure.of(whole), measure.of(parts)
-    totals = [each.base.performance.sum(axis=-1) for each in (whole, parts)]
-    return _pseudo(of_all, without), _pseudo(_share(of_all, totals[0]), _share(without, totals[1]))
-
-
-def _mean_run(runs: RunCurves) -> RunCurves:
-    return replace(runs, curves={name: curve.mean(axis=0, keepdims=True) for name, curve in runs.curves.items()})
-
-
-def _pseudo(of_all: FloatArray, without: FloatArray) -> FloatArray:
-    with np.errstate(invalid="ignore"):  # infinite without each run
-        return of_all + (without.size - 1) * (without.mean() - without)
+def _next(runs: RunCurves, criterion: str) -> RunCurves:
+    """Return the runs with each in the place of the one before, and the first in that of the last."""
+    curves = {name: np.roll(curve, -1, axis=0) for name, curve in runs.curves.items()}
+    return replace(runs, criterion=criterion, curves=curves)
 
 
 def summarized(frame: pl.DataFrame) -> pl.DataFrame:

@@ -390,6 +390,9 @@ def remark_on(name: str, study: StudyCurves, compared: Compared) -> str:
         "counts as organisation; read time_emergence beside it": compared.misleads,
         "minus the speedup times the corrected form, so it reverses the order of swarms": name == "scalability"
         and compared.variant == "paper",
+        "the smaller swarm delivers nothing in some runs, which have no value": name == "scalability"
+        and compared.variant == "corrected"
+        and bool((compared.base.performance.sum(axis=-1) == 0.0).any()),
         "from the rates alone, the same for every policy, in an equilibrium that runs need not reach": name
         == "availability",
         "this performance is no sum over robots, and the measure compares with growth in proportion to "

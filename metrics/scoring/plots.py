@@ -16,7 +16,7 @@ from swarm_forage_env.rendering.figures import (
 )
 from swarm_forage_env.wrappers.world import SIZE
 
-from ..claims.panel import MIN_RUNS
+from ..claims.contrast import MIN_RUNS
 from ..curves import FloatArray
 from .frame import label_of, words_of
 from .measures import MEASURES, PICTURED

@@ -3,9 +3,8 @@
 Run records of `swarm_forage_env` and curves from other sources share the names of columns.
 """
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import takewhile
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -29,7 +28,7 @@ from ..queues import PopulationRates
 
 if TYPE_CHECKING:
     from swarm_forage_env.studies.results import StudyTable
-    from swarm_forage_env.studies.study import Place, StudySpec
+    from swarm_forage_env.studies.study import Place
     from swarm_forage_env.studies.study_file import Value
 
 DELIVERIES = performance_of("collected")
@@ -131,6 +130,8 @@ class RunCurves:
     """How many runs were planned; None = as many as there are."""
     horizon_s: float | None = None
     """Length of a run, s, where known."""
+    maps_differ: bool = False
+    """Whether each seed draws clusters, a map of its own, so that two undisturbed runs differ by more than chance."""
 
     @property
     def performance(self) -> FloatArray:
@@ -253,6 +254,7 @@ def curves_in_worlds(
                 rates=rates_of(world),
                 n_planned=n_planned,
                 horizon_s=scenario.horizon_s,
+                maps_differ=world.scenario.objects.placement == "power_law",
             )
             for world, (seeds, columns) in runs
         ),
@@ -326,8 +328,7 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
     """Return the lines of a study, in the order of its conditions.
 
     Args:
-        table: From `swarm_forage_env.read_study`. Failed and missing runs count as planned and lost. Of a study that
-            was judged several times, lines have the first runs that all of their conditions have.
+        table: From `swarm_forage_env.read_study`. Failed and missing runs count as planned and lost.
         performance: What P(N, t) is, by a name as in `score`; default that of the scenario.
 
     Raises:
@@ -344,10 +345,6 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
         first = places[0]
         read_as = performance_of(performance or spec.world(first).scenario.performance)
         runs = [(spec.world(place), _place_curves(table, place, performance)) for place in places]
-        n_planned = len(spec.seeds)
-        if spec.run.looks:
-            n_planned = _n_first_runs(spec, [seeds for _, (seeds, _) in runs])
-            runs = [(world, _first(curves, n_planned)) for world, curves in runs]
         lines.append(
             StudyLine(
                 rules=first.rules,
@@ -357,7 +354,7 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
                 places=tuple(places),
                 curves=curves_in_worlds(
                     runs,
-                    n_planned,
+                    len(spec.seeds),
                     controller=first.policy,
                     read_as=read_as,
                     reference_value=_reference_value(table, places),
@@ -366,17 +363,6 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
             )
         )
     return tuple(lines)
-
-
-def _n_first_runs(spec: "StudySpec", done: "Iterable[Collection[int]]") -> int:
-    """Return how many first seeds all conditions of a line have done, given the seeds that each has done."""
-    everywhere = set(spec.seeds).intersection(*done)
-    return len(list(takewhile(everywhere.__contains__, sorted(spec.seeds))))
-
-
-def _first(curves: Curves, n_runs: int) -> Curves:
-    seeds, columns = curves
-    return seeds[:n_runs], {name: values[:n_runs] for name, values in columns.items()}
 
 
 def _place_curves(table: "StudyTable", place: "Place", performance: str | None) -> Curves:

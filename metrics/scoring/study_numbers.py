@@ -4,22 +4,22 @@ A panel has the scores of every run. It is drawn as it is, and the claims of the
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 from typing import TYPE_CHECKING, Any, TypeAlias, cast, get_args
 
 import numpy as np
 import polars as pl
+from numpy.typing import NDArray
 
 from ..checks import CurveError
-from ..claims import EXPERIMENTS, Panel, PanelName
-from ..claims.panel import TIE
+from ..claims import EXPERIMENTS, MARGINS, Panel, PanelName
+from ..claims.panel import mean_of
 from ..curves import FloatArray, Form, Variant
-from ..statistics import CONFIDENCE
 from .frame import SCHEMA, scores
 from .measures import DISTURBANCES, MEASURES, PICTURED, check_words
-from .run_curves import THROTTLE, StudyLine, study_lines
+from .run_curves import THROTTLE, RunCurves, StudyLine, study_lines
 
 if TYPE_CHECKING:
     from swarm_forage_env.studies.results import StudyTable
@@ -38,10 +38,10 @@ FIGURES: tuple[tuple[str, Form], ...] = (
 Spatial emergence has two forms: in the warehouses a swarm is held beside as many robots that work alone, in search and
 rescue, where no robot works alone, beside the next smaller swarm.
 """
+INTERACTING = 8
+"""Robots from which a swarm counts where a claim is about interaction (our choice)."""
 _PACES = {0.0: "still", 0.001: "slow", 0.051: "fast"}
 """Value on the first axis of S2a -> its word in the name of an experiment."""
-TIE_OF_FRACTIONS = 0.02
-"""Largest difference of fractions that is a tie (our choice)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -111,50 +111,51 @@ class StudyPanel:
         return self.of("value")
 
     @property
-    def floors(self) -> dict[str, FloatArray]:
-        """For distances, policy -> distances between undisturbed runs, (R,); empty unless all policies have some."""
-        floors = {policy: values[0] for policy, values in self.of("floor_of_seed").items()}
-        return floors if all(np.isfinite(floor).any() for floor in floors.values()) else {}
+    def floors(self) -> dict[str, float]:
+        """For distances, policy -> mean distance of two undisturbed runs of one map; empty where there are none."""
+        known = self.frame.drop_nulls("floor").group_by("policy", maintain_order=True).agg(pl.col("floor").first())
+        return dict(known.iter_rows())
+
+    def for_claims(self) -> Panel:
+        """Return the scores that claims are held against, in the unit of their measure (`claims.MARGINS`)."""
+        is_large = self.x >= INTERACTING if MEASURES[self.measure].compares else np.ones_like(self.x, dtype=np.bool_)
+        kept = is_large if is_large.any() else ~is_large
+        found = {name: values[kept] for name, values in self.scores.items()}
+        margin = MARGINS[self.measure].share if self.measure in MARGINS else 0.05
+        return Panel(
+            levels=self.levels[kept], scores=found, unit=self._unit[kept], shares=self._shares(kept), margin=margin
+        )
+
+    def _shares(self, kept: NDArray[np.bool_]) -> dict[str, FloatArray] | None:
+        """Return amounts as shares of performance, above the noise floor; of time lost as shares of the mean one."""
+        about = MEASURES[self.measure]
+        if not about.is_amount:
+            return None
+        totals = {name: values[kept] for name, values in self.of("total").items()}
+        found = {name: values[kept] for name, values in self.of("excess" if about.is_distance else "value").items()}
+        with np.errstate(divide="ignore", invalid="ignore"):  # where nothing was delivered there are no shares
+            shares = {name: values / totals[name] for name, values in found.items()}
+        if self.measure != "spatial_emergence":
+            return shares
+        one = np.mean(self._unit[kept] / mean_of([*totals.values()]))
+        return {name: values / one for name, values in shares.items()}
 
     @property
-    def compared_with(self) -> FloatArray | None:
-        """Performance that amounts are compared with, mean of policies, (L,); performance with the mean of all runs."""
-        column, by = ("value", ["x"]) if self.measure == "raw_performance" else ("total", ["policy", "x"])
-        means = self.frame.group_by(by).agg(pl.col(column).mean())
-        total = means.group_by("x").agg(pl.col(column).mean()).sort("x")[column]
-        return total.to_numpy() if total.count() else None
+    def _unit(self) -> FloatArray:
+        """What scores are shares of at each level, mean of the policies, (L,)."""
+        if self.measure == "spatial_emergence":
+            return np.mean([[_lost(runs) for runs in line.curves.experiments if runs.value in self.x]
+                            for line in self.lines], axis=0)  # fmt: skip
+        if not MEASURES[self.measure].is_amount and self.measure != "raw_performance":
+            return np.ones_like(self.x)
+        column = "value" if self.measure == "raw_performance" else "total"
+        means = self.frame.group_by("policy", "x").agg(pl.col(column).mean()).group_by("x").agg(pl.col(column).mean())
+        return means.sort("x")[column].to_numpy()
 
-    def for_claims(self, name: PanelName) -> Panel | None:
-        """Return the scores that a panel of claims shows: shares of performance, of mean curves; None if it has none.
 
-        Margins of ties are in the measure's own unit (our choice): a tenth of the performance that an amount is
-        compared with, a tenth of 1 for scalability, 0.02 for fractions. Else, and at levels where nothing was
-        delivered, they are shares of the scores.
-        """
-        columns = ("mean_curve", "relative_mean_curve") if name.of_mean_curves else ("value", "relative")
-        column = columns[name.is_relative]
-        if not self.frame[column].count():
-            return None
-        panel = Panel(levels=self.levels, scores=self.of(column))
-        looks = self.spec.run.looks
-        if looks:  # each look is wrong in its share of 5 % (Bonferroni)
-            n_runs_of = {line.policy: len(line.curves.experiments[0].seeds) for line in self.lines}
-            panel = replace(panel, n_runs_of=n_runs_of, confidence=1.0 - (1.0 - CONFIDENCE) / len(looks))
-        measure, same = MEASURES[self.measure], np.ones_like(self.levels)
-        if self.measure == "scalability":
-            return replace(panel, margins=TIE * same, unit=1.0)
-        if np.isfinite((measure.lowest, measure.highest)).all():
-            return replace(panel, margins=TIE_OF_FRACTIONS * same, unit=1.0)
-        floors = {} if name.of_mean_curves else self.floors  # undisturbed runs have no second mean curve
-        total = self.compared_with
-        if total is None:
-            return replace(panel, undisturbed=floors or None)
-        margins = np.where(total > 0.0, TIE * total, panel.tie_margins)
-        if name.is_relative:
-            margins = TIE * same
-            with np.errstate(divide="ignore", invalid="ignore"):  # where nothing was delivered there are no shares
-                floors = {policy: floor / total[0] for policy, floor in floors.items()}
-        return replace(panel, margins=margins, undisturbed=floors or None)
+def _lost(runs: RunCurves) -> float:
+    """Performance lost to interference, mean over runs."""
+    return float((runs.performance * runs.interference).sum(axis=-1).mean()) if runs.seeds else np.nan
 
 
 def study_panels(

@@ -1,4 +1,4 @@
-"""Figures of a study, drawn and as files: measures with every run a dot. They need the extra "plots"."""
+"""Figures of a study, drawn and as files: measures with every run a dot, and claims. They need the extra "plots"."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass
@@ -10,11 +10,23 @@ import polars as pl
 
 from swarm_forage_env._internal.fields import known_name
 from swarm_forage_env._internal.files import replacing
-from swarm_forage_env.rendering.figures import SCREEN, FigureStyle, Panel, log_height, looks, saved_panels, size_axis
+from swarm_forage_env.rendering.figures import (
+    COLOURS,
+    MARKERS,
+    SCREEN,
+    FigureStyle,
+    Panel,
+    legend_below,
+    log_height,
+    looks,
+    policy_words,
+    saved_figure,
+    saved_panels,
+    size_axis,
+)
 from swarm_forage_env.wrappers.world import SIZE
 
 from ..checks import CurveError
-from ..claims.panel import mean_over_runs
 from ..curves import FloatArray, Variant
 from ..statistics import Summary, aggregate
 from .frame import label_of, words_of
@@ -33,6 +45,8 @@ _APART, _OF_GAP = 0.022, 0.17
 """Distance between policies at one level: a share of the axis, at most this one of the least gap between levels."""
 _DOTS_ASIDE = 0.35
 """Distance of dots from the bar of their policy, in the same unit as those of policies."""
+LIMIT_MARGIN, _ROW_STEP = 0.05, 0.3
+"""What stands for a margin where a number is compared with a limit, and distance between rules in a row."""
 MANY_DOTS = 500
 """More dots in a panel are put into vector pictures as an image: as single marks they take a megabyte and more."""
 
@@ -62,16 +76,15 @@ class StudyFigure:
         """Return the numbers behind the picture: one row per panel, policy and level, and a column per run."""
         rows: list[dict[str, Any]] = []
         for panel in self.panels:
-            floors, of_means = panel.floors, panel.of("mean_curve")
+            floors = panel.floors
             for policy, scores in panel.scores.items():
                 levels = zip(panel.x.tolist(), panel.levels.tolist(), scores, _summaries(scores), strict=True)
-                for place, (x, level, runs, of) in enumerate(levels):
+                for x, level, runs, of in levels:
                     row = {"rules": panel.rules, **panel.lines[0].others, "policy": policy}
                     row |= {panel.criterion: x, "level": level}
                     row |= {"mean": of.mean, "lower": of.lower, "upper": of.upper, "sd": of.std}
                     if floors:
-                        row["of_mean_curves"] = float(mean_over_runs(of_means[policy][place]))
-                        row["noise_floor"] = float(mean_over_runs(floors[policy]))
+                        row["noise_floor"] = floors.get(policy, np.nan)
                     seeds = (f"seed_{seed}" for seed in sorted(panel.spec.seeds))
                     rows.append({**row, "n_runs": of.n_used, **dict(zip(seeds, runs.tolist(), strict=True))})
         return pl.DataFrame(rows, infer_schema_length=None).fill_nan(None)
@@ -112,7 +125,7 @@ def caption(figure: StudyFigure, band: Band) -> str:
     """Return what dots, bars and others are, and why bars are missing."""
     n_runs = [of.n_used for panel in figure.panels for scores in panel.scores.values() for of in _summaries(scores)]
     has_floors = any(panel.floors for panel in figure.panels)
-    floor = "\ndotted: two undisturbed runs; hollow: mean curves" if has_floors else ""
+    floor = "\ndotted: two undisturbed runs" if has_floors else ""
     lacking = f"\nno bar: fewer than {FEWEST_RUNS} runs of a condition, which tell too little"
     return f"bars: {_BANDS[band]}; dots: runs{floor}" + (lacking if any(0 < n < FEWEST_RUNS for n in n_runs) else "")
 
@@ -121,7 +134,7 @@ def _draw_panel(place: Panel, panel: StudyPanel, band: Band) -> None:
     about = MEASURES[panel.measure]
     if panel.criterion == SIZE:
         size_axis(place, panel.x)
-    of_means, floors = panel.of("mean_curve"), panel.floors
+    floors = panel.floors
     for policy, look, (x, aside) in zip(panel.scores, looks(panel.scores), _beside(panel), strict=True):
         scores = panel.scores[policy]
         dots = {"color": look.colour, "alpha": 0.4, "markersize": 3.0, "zorder": 2.5}
@@ -129,10 +142,8 @@ def _draw_panel(place: Panel, panel: StudyPanel, band: Band) -> None:
         marks.set_rasterized(panel.frame["value"].count() > MANY_DOTS)
         mean, reach = _bars(panel, scores, band)
         place.errorbar(x, mean, yerr=reach, color=look.colour, marker=look.marker, label=look.name, zorder=3)
-        if floors:
-            place.axhline(mean_over_runs(floors[policy]), color=look.colour, linestyle=":", linewidth=1.0, zorder=1)
-            hollow = {"color": look.colour, "marker": look.marker, "markerfacecolor": "w", "zorder": 4}
-            place.plot(x, mean_over_runs(of_means[policy]), linestyle="", **hollow)
+        if policy in floors:
+            place.axhline(floors[policy], color=look.colour, linestyle=":", linewidth=1.0, zorder=1)
     if about.neutral is not None and panel.variant == "corrected":
         place.axhline(about.neutral, color="0.5", linewidth=0.8, zorder=0)
     words = [f"{name.replace('_', ' ')} {word}" for name, word in panel.lines[0].words.items()]
@@ -173,6 +184,46 @@ def _summaries(scores: FloatArray) -> list[Summary]:
     """Return the mean of the runs at each level, with its interval; runs without a finite score are left out."""
     found = (runs[np.isfinite(runs)] for runs in scores)
     return [aggregate(known) if known.size else Summary() for known in found]
+
+
+def draw_forest(parts: pl.DataFrame, paths: Sequence[Path], title: str, *, style: FigureStyle = SCREEN) -> None:
+    """Draw the contrasts of claims into picture files: a row per statement, in margins, right of 0 as claimed.
+
+    Args:
+        parts: Rows of `StudyVerdict.parts`, one per statement, rules and reading; the reading "amounts" is hollow where
+            there is another one.
+        paths: Files to write; as in `saved_figure`, whose errors this has.
+        title: Headline.
+        style: Of the figure.
+    """
+    names = parts.select("claim", "statement", "where").unique(maintain_order=True)
+    rows = {key: place for place, key in enumerate(names.iter_rows())}
+    every = parts["rules"].unique(maintain_order=True).to_list()
+    with saved_figure(paths, (7.5, 1.4 + 0.17 * len(rows)), title=title, style=style) as figure:
+        place = figure.subplots()
+        place.axvspan(-1.0, 1.0, color="0.9", zorder=0)
+        place.axvline(0.0, color="0.5", linewidth=0.8, zorder=1)
+        for k, rules in enumerate(every):
+            for reading in ("amounts", "shares"):
+                mine = parts.filter(pl.col("mean").is_finite(), rules=rules, reading=reading)
+                unit = mine["margin"].to_numpy()
+                unit = np.where(unit > 0.0, unit, LIMIT_MARGIN)
+                mean, lower, upper = (mine[name].to_numpy() / unit for name in ("mean", "lower", "upper"))
+                y = [rows[key] + _ROW_STEP * (k - 0.5 * (len(every) - 1)) for key in mine.select(names.columns).rows()]
+                is_faint = reading == "amounts" and "shares" in parts["reading"]
+                look = {"color": COLOURS[k], "markerfacecolor": "w" if is_faint else COLOURS[k], "markersize": 3.5}
+                label = f"{rules}, {reading}" if len(mine) else None
+                place.errorbar(
+                    mean, y, xerr=[mean - lower, upper - mean], fmt=MARKERS[k], linewidth=0.9, label=label, **look
+                )
+        place.set_xscale("symlog", linthresh=1.0)
+        place.set_xticks([-100, -10, -1, 0, 1, 10, 100], ["-100", "-10", "-1", "0", "1", "10", "100"])
+        place.set_yticks(
+            [*rows.values()], [f"{claim}  {policy_words(words)}  [{where}]" for claim, words, where in rows], fontsize=6
+        )
+        place.set_ylim(len(rows) - 0.4, -0.6)
+        place.set_xlabel("effect in margins: right of 0 as claimed, within the grey band a tie")
+        legend_below(figure)
 
 
 def plot(

@@ -1,9 +1,8 @@
-"""What runs of the paper's sets say of its claims and of its intuitions, under all rules and in all variants."""
+"""What runs of the paper's sets say of its claims and of its intuitions, under all rules and in all readings."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import product
 from typing import TYPE_CHECKING, Any, get_args
 
 import polars as pl
@@ -14,23 +13,20 @@ from swarm_forage_env.studies.study import is_set_of_paper, left_out, load_study
 from swarm_forage_env.studies.study_file import PAPER
 
 from ..checks import CurveError
-from ..claims import CLAIMS, INTUITIONS, Claim, PanelName, check_claim
-from ..claims.claim import RELATIVE, read_otherwise
-from ..claims.rules import Answer as ClaimAnswer
-from ..curves import Variant
-from .measures import MEASURES
-from .study_numbers import Key, StudyPanel, study_panels
+from ..claims import CLAIMS, INTUITIONS, MARGINS, Claim, Panel, PanelName, Verdict, check_claims
+from ..claims.contrast import Answer as ClaimAnswer
+from ..claims.panel import TRIED
+from ..claims.verdict import Reading
+from .study_numbers import StudyPanel, study_panels
 
 if TYPE_CHECKING:
     from swarm_forage_env.studies.results import StudyTable
     from swarm_forage_env.studies.study import StudySpec
 
-VARIANTS: tuple[Variant, ...] = ("corrected", "paper")
-WAITS = "waits"
-"""What stands in place of an answer for which runs are missing."""
-ANSWERS: tuple[str, ...] = (*get_args(ClaimAnswer), WAITS)
-COLUMNS = ("the paper's bands", "ours", "ours, relative")
-"""Columns of the table that says it all, under each of the rules."""
+EVERY: dict[str, Claim] = {**CLAIMS, **INTUITIONS}
+ANSWERS: tuple[str, ...] = get_args(ClaimAnswer)
+WAITS = "no runs"
+"""The answer of claims about runs that are missing."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,34 +35,31 @@ class StudyVerdict(Answer):
 
     tables: "tuple[StudyTable, ...]"
     panels: tuple[StudyPanel, ...] = ()
-    """Those of all studies, in all variants."""
+    """Those of all studies."""
     frame: pl.DataFrame = field(default_factory=pl.DataFrame)
-    """One row per claim, rules, variant of the measures and sense of the words, first those that need no runs, which
-    have no rules; then the same of the intuitions, by corrected measures only. The sense is empty for what the paper
-    says. `answer` is by intervals, our rule; `why` has one line per statement, or the runs that an answer waits for."""
+    """One row per claim, rules and reading (`metrics.claims.verdict.Reading`): the answer, how many statements hold,
+    how many comparisons are as claimed, reversed, tied and open, and the answers by other margins. `is_main` marks the
+    reading that answers a claim: shares for flexibility and robustness, else amounts."""
+    parts: pl.DataFrame = field(default_factory=pl.DataFrame)
+    """One row per statement of each of them: the mean of its contrast over runs, in the unit of the measure, interval,
+    Cohen's d, p value after Holm's correction within the family, margin, and number of runs."""
 
     @property
     def rules(self) -> tuple[str, ...]:
         """Those that some study has."""
         return tuple(dict.fromkeys(rules for table in self.tables for rules in table.spec.rules))
 
-    def counts(self, rules: str, variant: str) -> dict[str, int]:
-        """Return answer -> how many claims have it by these rules; those that no run answers are in the corrected."""
-        mine = self.frame.filter(pl.col("claim").is_in([*CLAIMS]), pl.col("rules").is_in([rules, ""]))
-        answers = Counter(mine.filter(sense="", measures=variant)["answer"])
+    def counts(self, rules: str) -> dict[str, int]:
+        """Return answer -> how many claims of the paper have it in their main reading."""
+        mine = self.frame.filter(pl.col("claim").is_in([*CLAIMS]), pl.col("is_main"), rules=rules)
+        answers = Counter(mine["answer"])
         return {word: answers[word] for word in ANSWERS}
 
     def at_a_glance(self, claims: Mapping[str, Claim]) -> list[tuple[str, ...]]:
-        """Return a row per claim: its name, its text, and `COLUMNS` under each of the rules, measures corrected."""
-        rows = self.frame.filter(measures="corrected").select("claim", "rules", "sense", "by_bands", "answer").rows()
-        found = {(name, rules, sense): answers for name, rules, sense, *answers in rows}
-
-        def cells(claim: Claim) -> Iterator[str]:
-            for rules in self.rules:
-                key = (claim.name, rules if claim.panels else "")
-                yield from (*found[*key, ""], found.get((*key, RELATIVE), ("", ""))[1])
-
-        return [(name, claim.text, *cells(claim)) for name, claim in claims.items()]
+        """Return a row per claim: its name, its text, and its answer in each reading under each of the rules."""
+        found = {tuple(key): answer for *key, answer in self.frame.select("claim", "rules", "reading", "answer").rows()}
+        readings = [(rules, reading) for rules in self.rules for reading in get_args(Reading)]
+        return [(name, claim.text, *(found.get((name, *of), "") for of in readings)) for name, claim in claims.items()]
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -79,56 +72,59 @@ class StudyVerdict(Answer):
 
     def sheets(self) -> Sequence[Sheet]:
         """Return how many have which answer, all claims at a glance, what is behind each answer, and what waits."""
-        counts = [{"rules": rules, **self.counts(rules, "corrected")} for rules in self.rules]
-        sheets = [Sheet(title="how many claims, measures corrected", frame=pl.DataFrame(counts))]
-        header = ("claim", "the paper", *(f"{rules}: {word}" for rules in self.rules for word in COLUMNS))
+        counts = [{"rules": rules, **self.counts(rules)} for rules in self.rules]
+        sheets = [Sheet(title="how many claims", frame=pl.DataFrame(counts))]
+        header = (
+            "claim",
+            "the paper",
+            *(f"{rules}: {reading}" for rules in self.rules for reading in get_args(Reading)),
+        )
         for title, claims in (("all claims at a glance", CLAIMS), ("what the paper expected", INTUITIONS)):
             rows = self.at_a_glance(claims)
             shown = [row for row in rows if {*row[2:]} - {WAITS, ""}]
             notes = [f"{len(rows) - len(shown)} of {len(rows)} wait for runs."] if len(shown) < len(rows) else []
             sheets.append(Sheet.of(title=title, header=header, rows=shown, notes=notes))
-        behind = self.frame.filter(pl.col("answer") != WAITS).drop("text", "figure")
+        main = self.frame.filter("is_main")
+        behind = main.filter(pl.col("answer") != WAITS).select("claim", "rules", "reading", "answer", "n_runs", "why")
         waiting: dict[str, dict[str, None]] = {}
-        for name, why in self.frame.filter(answer=WAITS).select("claim", "why").iter_rows():
+        for name, why in main.filter(answer=WAITS).select("claim", "why").iter_rows():
             waiting.setdefault(why, {})[name] = None
-        lines = [f"  {', '.join(names)}: for {why}" for why, names in waiting.items()]
+        lines = [f"  {', '.join(names)}: {why}" for why, names in waiting.items()]
         title = "These claims and intuitions (H) wait:" if lines else "No claim waits for runs."
         return [*sheets, Sheet(title="what is behind the answers", frame=behind), Sheet(title=title, notes=lines)]
 
     def to_mapping(self) -> dict[str, Any]:
         """Return everything as plain values; numbers that do not exist are None."""
+        claims, parts = (
+            each.with_columns(pl.when(cs.float().is_finite()).then(cs.float())).to_dicts()
+            for each in (self.frame, self.parts)
+        )
         return {
             "studies": [{"name": table.spec.name, "versions": [*map(dict, table.versions)]} for table in self.tables],
-            "counts": {rules: self.counts(rules, "corrected") for rules in self.rules},
-            "claims": self.frame.with_columns(pl.when(cs.float().is_finite()).then(cs.float())).to_dicts(),
+            "counts": {rules: self.counts(rules) for rules in self.rules},
+            "claims": claims,
+            "statements": parts,
         }
 
 
 def _remarks_on(spec: "StudySpec") -> Iterator[str]:
-    """Yield how a study differs from the paper's, and whether it was judged several times."""
-    if is_set_of_paper(spec):
-        seconds, whole = spec.length.horizon_s, load_study(spec.name, PAPER).length.horizon_s
-        less = [f"runs of {seconds:,g} s instead of {whole:,g} s"] if seconds != whole else []
-        less += [f"without {axis} {', '.join(values)}" for axis, values in left_out(spec).items()]
-        if less:
-            yield f"budget {spec.budget}, {', '.join(less)}"
-    else:
+    """Yield how a study differs from the paper's."""
+    if not is_set_of_paper(spec):
         yield "other settings than those of the paper's set with this name"
-    if spec.run.looks:
-        yield (
-            f"judged after {', '.join(map(str, spec.run.looks))} runs, and stopped where claims were decided; "
-            "intervals are wider, so that all looks together are wrong once in twenty"
-        )
+        return
+    seconds, whole = spec.length.horizon_s, load_study(spec.name, PAPER).length.horizon_s
+    less = [f"runs of {seconds:,g} s instead of {whole:,g} s"] if seconds != whole else []
+    less += [f"without {axis} {', '.join(values)}" for axis, values in left_out(spec).items()]
+    if less:
+        yield f"budget {spec.budget}, {', '.join(less)}"
 
 
 def verdict(*tables: "StudyTable", tell: Callable[[str], None] | None = None) -> StudyVerdict:
     """Hold the claims of the paper, and its intuitions, against runs of its sets.
 
-    A claim is left out in a variant that none of its measures has.
-
     Args:
         tables: From `swarm_forage_env.read_study`. Runs of a set under different rules may be in different studies.
-        tell: Called with words about what is under way: with many runs it takes minutes.
+        tell: Called with words about what is under way: with many runs it takes a while.
 
     Raises:
         CurveError: a study twice under the same rules, one of none of the paper's sets, or without its policies.
@@ -144,59 +140,68 @@ def verdict(*tables: "StudyTable", tell: Callable[[str], None] | None = None) ->
                 f"study {spec.name!r}. 'swarm-forage study plot' takes any study."
             )
     panels: list[StudyPanel] = []
-    reasons: dict[tuple[str, Key], str] = {}
     for table in tables:
         if tell is not None:
             tell(f"scoring {table.spec.name}")
-        found, missing = study_panels(table, VARIANTS)
-        panels += found
-        reasons |= {(table.spec.name, key): why for key, why in missing.items()}
-    by_name = {(panel.rules, panel.variant, panel.name): panel for panel in panels}
-    every = dict.fromkeys(rules for table in tables for rules in table.spec.rules)
+        panels += study_panels(table)[0]
     rows: list[dict[str, Any]] = []
-    for claims, variants in ((CLAIMS.values(), VARIANTS), (INTUITIONS.values(), VARIANTS[:1])):
-        for claim in (one for one in claims if not one.panels):
-            rows += _rows(claim, "", "corrected", {}, {})
-        for rules, variant, claim in product(every, variants, claims):
-            if any(_variant_of(name, variant) == variant for name in claim.panels):
-                rows += _rows(claim, rules, variant, by_name, reasons)
-    frame = pl.DataFrame(rows, infer_schema_length=None)
-    return StudyVerdict(tables=tables, panels=tuple(panels), frame=frame)
+    parts: list[dict[str, Any]] = []
+    for rules in dict.fromkeys(rules for table in tables for rules in table.spec.rules):
+        shown = {
+            panel.name: panel.for_claims()
+            for panel in panels
+            if panel.rules == rules and panel.name.experiment and panel.measure in MARGINS
+        }
+        for reading in get_args(Reading):
+            found = check_claims(EVERY, shown, reading=reading)
+            others = _by_margins(shown, reading)
+            for claim in (one for one in EVERY.values() if reading != "shares" or one.has_shares):
+                about = {"claim": claim.name, "rules": rules, "reading": reading}
+                rows.append({**about, **_row(claim, reading, found[claim.name]), **others.get(claim.name, {})})
+                parts += [{**about, **row} for row in _rows(found[claim.name])]
+    return StudyVerdict(
+        tables=tables,
+        panels=tuple(panels),
+        frame=pl.DataFrame(rows, infer_schema_length=None),
+        parts=pl.DataFrame(parts, infer_schema_length=None),
+    )
 
 
-def _variant_of(name: PanelName, variant: Variant) -> Variant:
-    """Return the variant of a measure that is used: this one if it has it, else the corrected one."""
-    return variant if variant in MEASURES[name.measure].variants else "corrected"
+def _by_margins(panels: Mapping[PanelName, Panel], reading: Reading) -> dict[str, dict[str, str]]:
+    """Return claim -> its answers by the margins that are tried; bands have none."""
+    tried = TRIED if reading != "bands" else ()
+    found = {f"at_{margin:g}": check_claims(EVERY, panels, reading=reading, margin=margin) for margin in tried}
+    return {name: {column: given[name].answer for column, given in found.items()} for name in EVERY}
 
 
-def _rows(
-    claim: Claim,
-    rules: str,
-    variant: Variant,
-    panels: Mapping[tuple[str, str, PanelName], StudyPanel],
-    reasons: Mapping[tuple[str, Key], str],
-) -> Iterator[dict[str, Any]]:
-    """Yield the rows of a claim, answered with panels by rules, variant and name; or one with what it waits for."""
-    about = {"claim": claim.name, "text": claim.text, "figure": claim.figure, "rules": rules, "measures": variant}
-    names = [*claim.panels, *claim.other_panels]
-    for one in read_otherwise(claim).values():
-        names += one.panels
-    shown = {
-        name: panels.get((rules, _variant_of(name, variant), name._replace(is_relative=False, of_mean_curves=False)))
-        for name in names
+def _row(claim: Claim, reading: Reading, of: Verdict) -> dict[str, Any]:
+    claimed, turned, tied, still_open = of.counts
+    return {
+        "family": claim.family,
+        "is_main": reading == ("shares" if claim.has_shares else "amounts"),
+        "answer": of.answer,
+        "n_held": of.n_held,
+        "n_statements": len(of.parts),
+        "claimed": claimed,
+        "reversed": turned,
+        "tied": tied,
+        "open": still_open,
+        "n_runs": min((part.n_runs for part in of.parts), default=0),
+        "why": of.why,
     }
-    lacks = [name for name in claim.panels if shown[name] is None]
-    if lacks:
-        keys: list[tuple[str, Key]] = [
-            (name.experiment.split()[0], (name.measure, _variant_of(name, variant), name.form)) for name in lacks
-        ]
-        why = "; ".join(dict.fromkeys(reasons[key] for key in keys if key in reasons))
-        runs = ", ".join(dict.fromkeys(name.experiment for name in lacks))
-        runs += f" ({rules}, {variant}: {why})" if why else ""
-        yield {**about, "sense": "", "answer": WAITS, "by_bands": WAITS, "why": runs}
-        return
-    found = {name: panel.for_claims(name) for name, panel in shown.items() if panel is not None}
-    verdict = check_claim(claim, {name: panel for name, panel in found.items() if panel is not None})
-    for sense, one in {"": verdict, **verdict.otherwise}.items():
-        told = ("answer", "by_bands", "statistic", "effect", "n_runs", "why")
-        yield {**about, "sense": sense, **{name: getattr(one, name) for name in told}}
+
+
+def _rows(of: Verdict) -> Iterator[dict[str, Any]]:
+    for part in of.parts:
+        told = ("answer", "mean", "lower", "upper", "d", "p", "margin", "n_runs", "why")
+        claimed, turned, tied, still_open = part.counts
+        yield {
+            "statement": part.statement.words,
+            "kind": part.statement.kind,
+            "where": part.statement.where,
+            **{name: getattr(part, name) for name in told},
+            "claimed": claimed,
+            "reversed": turned,
+            "tied": tied,
+            "open": still_open,
+        }

@@ -67,3 +67,5 @@ def test_a_nan_spoils_its_own_pair_only():
 
 def test_noise_floor_pairs_different_runs():
     assert noise_floor([[0.0, 0.0], [1.0, 1.0], [4.0, 4.0]]).tolist() == [2.0, 8.0, 6.0]
+    assert noise_floor([[0.0, 0.0], [1.0, 1.0], [4.0, 4.0]], maps=[1, 2, 1]).tolist() == [8.0]
+    assert noise_floor([[0.0], [1.0]], maps=[1, 2]).tolist() == []

@@ -125,35 +125,29 @@ def test_answers_and_means_are_those_beside_the_results(tmp_path):
         "S1a,spatial_emergence,interactive,described,,crw,4.0,1\n"
     )
     (tmp_path / "verdicts.csv").write_text(
-        "claim,rules,measures,sense,answer,why\nV1,,,,supported,\n"
-        'E1,described,corrected,,contradicted,"S1e: 1 of 3 comparisons of a and b tie, 2 do not\n'
-        'S1f: 2 of 3 comparisons of a and b tie, 1 do not"\n'
-        'E1,described,corrected,of mean curves,tie,"9 of 9 comparisons of a and b tie, 0 do not"\n'
-        'E1,described,corrected,relative to performance,undecided,"0 of 3 comparisons of a and b tie, 3 do not"\n'
-        'E1,program,corrected,,supported,"S1e: 1 of 5 comparisons differ, 4 tie, 0 open"\nE1,program,paper,,tie,\n'
+        "claim,rules,reading,is_main,answer,n_held,n_statements\n"
+        "R1,described,amounts,false,supported,2,2\nR1,described,shares,true,contradicted,0,2\n"
+        "R1,described,bands,false,open,1,2\nR1,program,amounts,false,supported,2,2\n"
+        "R1,program,shares,true,supported,2,2\nR1,program,bands,false,open,1,2\n"
+        "V1,described,amounts,true,supported,0,0\nV1,program,amounts,true,supported,0,0\n"
+    )
+    (tmp_path / "contrasts.csv").write_text(
+        "claim,rules,reading,mean,lower,upper\nR1,described,shares,,,\nR1,described,shares,0.0512,0.021,0.0833\n"
     )
     found = results_fields(tmp_path)
-    assert (found["V1"], found["E1"], found["C3"]) == (
-        "supported, supported",
-        "contradicted, supported",
-        "waiting, waiting",
-    )
+    assert (found["V1"], found["R1"]) == ("supported, supported", "contradicted, supported")
+    assert (found["R1_amounts"], found["R1_shares_described"]) == ("supported, supported", "0 of 2")
+    assert found["R1_2_shares_described"] == "5.1 % (2.1 to 8.3)"
     assert [name for name in found if name.startswith(("S1", "S2"))] == [
         "S1a_raw_performance_described_crw_128",
         "S2a_raw_performance_described_crw_128_walk_probability_0",
     ]
-    assert found["E1_relative"] == "undecided, waiting"
-    ties = {name: text for name, text in found.items() if "_ties_" in name}
-    assert ties == {
-        "E1_ties_described": "1 of 3",
-        "E1_ties_described_relative": "0 of 3",
-        "E1_ties_program": "4 of 5",
-    }
     assert found["S1a_raw_performance_described_crw_128"] == "456.4"
     assert (found["runs"], found["sets"], found["hours"], found["version"]) == ("1,240", "2", "0.3", "0.1.0")
     assert found["contradicted"] == "None."
     assert found["split"].splitlines()[2].endswith("| contradicted | supported |")
     assert found["answers"].splitlines()[2].startswith("| described | 1 | 1 | 0 | 0 | 0 |")
+    assert found["readings"].splitlines()[2] == "| R1 | supported | contradicted | open | supported | supported | open |"
     block = "<!-- generated: results.split by scripts/update_docs -->"
     assert f"{block}\n\n| claim |" in update_docs.written(f"{block}<!-- end -->", {"results": found})
 

@@ -11,7 +11,7 @@ import sys
 import tomllib
 from collections.abc import Iterator
 from functools import cache
-from itertools import pairwise, takewhile
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -27,17 +27,6 @@ Line = dict[float, pl.DataFrame]
 """Value of the last axis -> rows of its runs by seed and interval: a policy in one panel of a figure."""
 Measured = Iterator[tuple[str, str, float, np.ndarray]]
 """Measure, its form, value of the last axis, and values of runs."""
-
-
-def looked_at(line: Line, study: dict) -> Line:
-    """Of a study that is looked at several times, the first runs of each condition, as many as the last look has."""
-    if not study["run"].get("looks"):
-        return line
-    everywhere = set.intersection(*(set(rows["seed"]) for rows in line.values()))
-    leading = list(takewhile(everywhere.__contains__, sorted(study["run"]["seeds"])))
-    is_whole = len(line) == study["n_values"]
-    n_runs = max((look for look in study["run"]["looks"] if is_whole and look <= len(leading)), default=0)
-    return {value: rows.filter(pl.col("seed").is_in(leading[:n_runs])) for value, rows in line.items() if n_runs}
 
 
 def paired(*conditions: pl.DataFrame) -> list[pl.DataFrame]:
@@ -68,7 +57,8 @@ def over_sizes(line: Line, study: dict) -> Measured:
     for smaller, size in pairwise(line):
         (few, many), ratio = paired(line[smaller], line[size]), size / smaller
         yield "task_emergence", "marginal", size, performance(many) - ratio * performance(few)  # Eq. (3)
-        serial = (performance(few) / performance(many) - 1.0 / ratio) / (1.0 - 1.0 / ratio)  # Karp and Flatt
+        before = np.where(performance(few) > 0.0, performance(few), np.nan)  # of nothing there is no gain
+        serial = (before / performance(many) - 1.0 / ratio) / (1.0 - 1.0 / ratio)  # Karp and Flatt
         yield "scalability", "marginal", size, 1.0 - serial  # Eq. (4)
         _, few, many = paired(line.get(1.0, few), few, many)  # Eq. (2) has one robot in both terms, where it cancels
         yield "spatial_emergence", "marginal", size, spatial_emergence(few, many, ratio)
@@ -127,13 +117,11 @@ def measured(file: Path) -> Iterator[tuple[tuple, np.ndarray]]:
     study = tomllib.loads(pl.read_parquet_metadata(file)["swarm_forage_env.study"])
     *others, last = (axis.get("criterion") or axis["field"] for axis in study["axis"])
     rows = pl.read_parquet(file).filter(pl.col("error").is_null()).sort(f"axis_{last}", "seed", "interval")
-    study["n_values"] = rows[f"axis_{last}"].n_unique()
     lines: dict[tuple, Line] = {}
     axes = [f"axis_{name}" for name in (*others, last)]
     for place, condition in rows.group_by("rules", "policy", *axes, maintain_order=True):
         lines.setdefault(place[:-1], {})[float(place[-1])] = condition
-    for (rules, policy, *values), whole in lines.items():
-        line = looked_at(whole, study)
+    for (rules, policy, *values), line in lines.items():
         where = " ".join(f"{name} {value:g}" for name, value in zip(others, values, strict=True))
         measures = over_sizes if last == "population_size" else over_levels
         for measure, form, value, of_runs in measures(line, study):

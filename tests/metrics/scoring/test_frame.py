@@ -1,6 +1,7 @@
 """The frame of scores: pairs of runs, shares, summaries, and which differences are certain."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,8 +9,7 @@ import polars as pl
 import pytest
 
 import metrics
-from metrics.scoring.frame import SCHEMA, differences, pseudo_values, scores, summarized
-from metrics.scoring.measures import MEASURES, Compared
+from metrics.scoring.frame import SCHEMA, differences, scores, summarized
 from metrics.scoring.run_curves import RunCurves, StudyCurves
 from metrics.statistics import holm
 from tests.support.curve_tables import IDEAL, SLOWED, rows, scored, throttled
@@ -42,22 +42,21 @@ def test_amounts_are_shares_of_the_performance_that_they_are_compared_with():
     np.testing.assert_allclose(gains["relative"], metrics.task_emergence(SLOWED, 2, IDEAL, 4, relative=True))
 
 
-def test_pseudo_values_by_hand():
-    ideal, runs = (
-        RunCurves(criterion="noise", value=1.0, n_robots=1, seeds=(0, 1), curves={"performance": np.array(values)})
-        for values in ([[4.0], [4.0]], [[1.0], [3.0]])
+def test_the_excess_is_over_two_undisturbed_runs_and_beside_the_next_map_where_maps_differ():
+    ideal, noisy = (
+        RunCurves(criterion="noise", value=value, n_robots=1, seeds=(0, 1, 2), curves={"performance": np.array(values)})
+        for value, values in ((0.0, [[4.0], [6.0], [5.0]]), (1.0, [[1.0], [3.0], [9.0]]))
     )
-    # Of means 4 and 2 the distance is 2; without the first run 4 - 3 = 1, without the second 4 - 1 = 3, 2 on average.
-    distances, shares = pseudo_values(MEASURES["adaptability"], Compared(None, ideal, runs, "corrected"))
-    assert distances.tolist() == [2.0 + (2.0 - 1.0), 2.0 + (2.0 - 3.0)]
-    assert shares.tolist() == [0.75, 0.25]
 
+    def found(*runs):
+        return scores([StudyCurves(controller="p", experiments=runs, t_end_s=None)], ["noise_robustness"])[0]
 
-def test_distances_of_mean_curves_have_that_of_the_means_as_their_mean():
-    found = scored(*throttled(), measures=["adaptability"])
-    expected = metrics.adaptability(np.mean(IDEAL, axis=0), np.mean(SLOWED, axis=0))
-    assert found["mean_curve"].mean() == pytest.approx(float(expected))
-    np.testing.assert_allclose(found["floor_of_seed"], metrics.adaptability(IDEAL, np.roll(IDEAL, -1, axis=0)))
+    same = found(ideal, noisy)  # distances 3, 3, 4; between undisturbed runs 2, 1, 1
+    assert same.select("value", "floor_of_seed", "excess").rows() == [(3.0, 2.0, 1.0), (3.0, 1.0, 2.0), (4.0, 1.0, 3.0)]
+    assert same["floor"][0] == pytest.approx(4.0 / 3.0)
+    own = found(*(replace(runs, maps_differ=True) for runs in (ideal, noisy)))  # 4 to 3, 6 to 9, 5 to 1
+    assert own["excess"].to_list() == [1.0 - 2.0, 3.0 - 1.0, 4.0 - 1.0]
+    assert own["floor"].null_count() == 3
 
 
 def test_doing_nothing_is_not_praised():

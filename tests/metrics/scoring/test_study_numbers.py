@@ -32,18 +32,15 @@ def test_a_panel_has_a_row_per_level_and_a_column_per_seed():
     assert tuple(panel.scores) == FOUR
     _, curves = table.curves(table.spec.places[1], "performance")
     np.testing.assert_allclose(panel.scores["crw"][1], curves["performance"].sum(axis=1))
-    claimed = panel.for_claims(panel.name)
+    claimed = panel.for_claims()
     np.testing.assert_array_equal(claimed.scores["dpo"], panel.scores["dpo"])
-    np.testing.assert_allclose(claimed.margins, 0.1 * np.mean([*panel.scores.values()], axis=(0, 2)))
-    assert panel.for_claims(panel.name._replace(is_relative=True)) is None
+    np.testing.assert_allclose(claimed.unit, np.mean([*panel.scores.values()], axis=(0, 2)))
+    assert (claimed.margin, claimed.shares) == (0.05, None)
 
 
-def test_a_level_without_deliveries_leaves_the_margins_of_others():
+def test_a_level_without_deliveries_is_left_out_of_claims():
     (panel,) = panels_of(made_study(), lambda place: 0.0 if place.values[-1] == 1 else by_policy(place))
-    margins = panel.for_claims(panel.name).margins
-    assert panel.compared_with[0] == 0.0
-    np.testing.assert_allclose(margins[1:], 0.1 * panel.compared_with[1:])
-    assert margins[0] > 0.0
+    assert panel.for_claims().curves(["crw"], shares=False).levels.tolist() == [2.0, 4.0]
 
 
 def test_a_missing_run_is_no_score():
@@ -82,36 +79,41 @@ def test_throttles_are_placed_by_the_distance_of_conditions():
     assert panel.levels.tolist() == pytest.approx([0.4, 0.8]), "two intervals, 0.2 and 0.4 from the ideal"
 
 
-def test_distances_are_shown_to_claims_relative_and_of_mean_curves():
+def test_distances_are_shown_to_claims_as_amounts_and_as_shares_above_the_floor():
     spec = made_study("S1e", Axis(name="noise", values=(0.0, 0.01, 0.02)), reference=0.0)
     (panel,) = panels_of(spec, lambda place: 10.0 * (1.0 - 10.0 * place.values[-1]), "noise_robustness")
-    plain, relative, means = (
-        panel.for_claims(panel.name._replace(**told)) for told in ({}, {"is_relative": True}, {"of_mean_curves": True})
-    )
-    np.testing.assert_allclose(plain.margins, 0.1 * panel.compared_with)
-    np.testing.assert_allclose(relative.margins, 0.1)
-    np.testing.assert_allclose(relative.undisturbed["crw"], plain.undisturbed["crw"] / panel.compared_with[0])
-    np.testing.assert_array_equal(means.scores["crw"], panel.of("mean_curve")["crw"])
-    assert means.undisturbed is None
+    claimed, totals = panel.for_claims(), panel.of("total")
+    np.testing.assert_allclose(claimed.unit, np.mean([*totals.values()], axis=(0, 2)))
+    np.testing.assert_allclose(claimed.shares["crw"], panel.of("excess")["crw"] / totals["crw"])
+    assert panel.floors["crw"] == pytest.approx(panel.frame["floor"][0])
 
 
-def test_margins_of_scalability_and_of_fractions_have_their_own_unit():
-    found = {
-        panel.measure: panel.for_claims(panel.name) for panel in study_panels(made_table(made_study(), by_policy))[0]
-    }
-    assert [found["scalability"].margins[0], found["scalability"].unit] == [0.1, 1.0]
+def test_units_are_those_of_the_measures_and_small_swarms_do_not_interact():
+    sizes = Axis(name="population_size", values=(1, 4, 8, 16))
+    panels, _ = study_panels(made_table(made_study("S1a", sizes), by_policy))
+    found = {(panel.measure, panel.form): panel.for_claims() for panel in panels}
+    assert found["raw_performance", "marginal"].levels.tolist() == [1.0, 4.0, 8.0, 16.0]
+    scaled, spatial = found["scalability", "marginal"], found["spatial_emergence", "interactive"]
+    assert scaled.levels.tolist() == spatial.levels.tolist() == [8.0, 16.0]
+    assert (scaled.unit.tolist(), scaled.margin) == ([1.0, 1.0], 0.1)
+    lost = 0.1 * found["raw_performance", "marginal"].unit[2:]  # a tenth of the time
+    np.testing.assert_allclose(spatial.unit, lost)
+    np.testing.assert_allclose(found["task_emergence", "marginal"].unit, 10.0 * lost)
+    shares = {name: values / panel_total(panels, name) / 0.1 for name, values in spatial.scores.items()}
+    np.testing.assert_allclose(spatial.shares["dpo"], shares["dpo"])
+
+
+def panel_total(panels, policy):
+    """What a policy delivers in each run with 8 and 16 robots."""
+    (panel,) = (one for one in panels if one.measure == "raw_performance")
+    return panel.scores[policy][2:]
+
+
+def test_rates_of_a_population_are_told_in_events():
     spec = made_study("S1g", Axis(name="population_dynamics", values=(0.0, 1.0, 2.0)), reference=0.0)
     (panel,) = panels_of(spec, lambda place: 10.0, "population_robustness")
     assert panel.levels.tolist() == [1.0, 2.0], "of which claims speak"
     assert panel.departures.tolist() == pytest.approx([5.0, 10.0])
-
-
-def test_each_look_at_runs_gets_its_share_of_the_errors():
-    spec = made_study().with_run(looks=(3, 6))
-    (panel,) = panels_of(spec, lost={(spec.places[2], 3)})
-    claimed = panel.for_claims(panel.name)
-    assert claimed.confidence == pytest.approx(0.975)
-    assert dict(claimed.n_runs_of) == {"crw": 3, "dpo": 6, "stochm": 6, "stochx": 6}
 
 
 def test_a_measure_has_a_panel_in_each_variant_that_it_has():

@@ -9,7 +9,7 @@ import pytest
 
 from metrics import CurveError, plot
 from metrics.scoring import study_panels
-from metrics.scoring.study_plots import caption, draw_figure, study_figures
+from metrics.scoring.study_plots import caption, draw_figure, draw_forest, study_figures
 from metrics.statistics import aggregate
 from swarm_forage_env.studies.study_file import Axis
 from tests.support.made_tables import FOUR, made_study, made_table
@@ -130,16 +130,15 @@ def test_performance_over_sizes_has_two_logarithmic_axes(tmp_path):
     draw_figure(with_scores(figure, 0.0 * grown), [tmp_path / "nothing.svg"])
 
 
-def test_distances_have_their_noise_floor_and_those_of_mean_curves_beside_them(tmp_path):
+def test_distances_have_their_noise_floor_beside_them(tmp_path):
     noise = Axis(name="noise", values=(0.0, 0.01, 0.02))
     (figure,) = figures(noise, name="S1e", reference=0.0, performance=lambda place: 10.0 + place.values[0])
-    assert caption(figure, "ci").endswith("\ndotted: two undisturbed runs; hollow: mean curves")
+    assert caption(figure, "ci").endswith("\ndotted: two undisturbed runs")
     draw_figure(figure, [tmp_path / "floors.svg"])
     assert len(re.findall(r"stroke-dasharray: 1,1\.65", (tmp_path / "floors.svg").read_text())) == len(FOUR)
     (panel,) = figure.panels
     for row in figure.to_frame().filter(noise=0.02).rows(named=True):
-        assert row["noise_floor"] == pytest.approx(panel.floors[row["policy"]].mean())
-        assert row["of_mean_curves"] == pytest.approx(panel.of("mean_curve")[row["policy"]][-1].mean())
+        assert row["noise_floor"] == pytest.approx(panel.floors[row["policy"]])
     assert "noise_floor" not in figures()[0].to_frame().columns
 
 
@@ -169,3 +168,18 @@ def test_what_cannot_be_drawn_is_told(tmp_path):
         plot(words, tmp_path, band="sigma")
     spec = made_study()
     assert figures(lost={(place, seed) for place in spec.places for seed in spec.seeds}) == ()
+
+
+def test_claims_are_drawn_a_row_per_statement(tmp_path):
+    about = {"statement": "crw - dpo", "mean": 0.1, "lower": 0.05, "upper": 0.2, "margin": 0.05}
+    rows = [
+        {"claim": claim, "where": "S1c", "rules": rules, "reading": reading, **about}
+        for claim in ("R1", "R2")
+        for rules in ("described", "program")
+        for reading in ("amounts", "shares")
+    ]
+    rows.append({**rows[-1], "claim": "R3", "mean": float("nan")})
+    draw_forest(pl.DataFrame(rows), [tmp_path / "forest.svg"], "flexibility")
+    words = words_in(tmp_path / "forest.svg")
+    for word in ("R1  CRW - DPO  [S1c]", "described, amounts", "program, shares", "R3  CRW - DPO  [S1c]"):
+        assert any(word in one for one in words), (word, words)

@@ -22,7 +22,8 @@ def by_policy(place):
 
 
 def answers(found, **where):
-    return {row["claim"]: row["answer"] for row in found.frame.filter(sense="", **where).iter_rows(named=True)}
+    mine = found.frame.filter("is_main", **where)
+    return dict(mine.select("claim", "answer").iter_rows())
 
 
 @pytest.fixture(scope="module")
@@ -35,16 +36,23 @@ def both():
     return found
 
 
-def test_claims_are_answered_under_all_rules_and_in_all_variants(both):
-    corrected = answers(both, rules="program", measures="corrected")
-    assert corrected["P2"] == "supported"
-    assert corrected["R1"] == "waits"
-    paper = answers(both, rules="described", measures="paper")
-    assert "P2" not in paper, "performance has one variant"
-    assert paper.keys() >= {"E1", "E2", "E3"}
-    assert answers(both, rules="")["V1"] == "supported"
-    lacking = both.frame.filter(claim="D2", rules="program", measures="corrected")["why"].to_list()
-    assert lacking == ["S1h, S1b"]
+def test_claims_are_answered_under_all_rules_and_in_all_readings(both):
+    found = answers(both, rules="program")
+    assert (found["P2"], found["R1"], found["V1"], found["D5"]) == ("supported", "no runs", "supported", "untestable")
+    assert both.frame.filter(claim="P2", rules="described")["reading"].to_list() == ["amounts", "bands"]
+    assert both.frame.filter(claim="R1", rules="described")["reading"].to_list() == ["amounts", "shares", "bands"]
+    lacking = both.frame.filter("is_main", claim="D2", rules="program")["why"].to_list()
+    assert lacking == [
+        "0 of 4 statements hold; no runs of S1h population robustness; "
+        "no runs of S1b task emergence, S1h population robustness"
+    ]
+    row = both.frame.filter(claim="P2", rules="described", reading="amounts").row(0, named=True)
+    assert [row[name] for name in ("claimed", "reversed", "tied", "open", "n_runs")] == [12, 0, 0, 0, 6]
+    assert [row[f"at_{margin}"] for margin in ("0.025", "0.05", "0.1", "0.2")] == ["supported"] * 4
+    (part,) = both.parts.filter(claim="P2", rules="described", reading="amounts").iter_rows(named=True)
+    assert (part["statement"], part["where"]) == ("crw, dpo - stochm, stochx", "S1a raw performance")
+    assert part["mean"] == pytest.approx((10.5 - 4.5) / 7.5, rel=0.02)
+    assert part["p"] < 0.001
 
 
 def test_claims_are_counted_and_at_a_glance(both):
@@ -52,55 +60,45 @@ def test_claims_are_counted_and_at_a_glance(both):
     assert counts.frame["rules"].to_list() == ["described", "program"]
     assert {sum(row[1:]) for row in counts.frame.rows()} == {len(CLAIMS)}
     shown = {row[0]: row[2:] for row in claims.frame.rows()}
-    assert shown["P2"] == ("supported", "supported", "") * 2
-    assert shown["D5"] == ("too vague", "too vague", "") * 2
+    assert shown["P2"] == ("supported", "", "supported") * 2
+    assert shown["D5"] == ("untestable", "", "untestable") * 2
     assert "R1" not in shown
     assert claims.notes == [f"{len(CLAIMS) - len(shown)} of {len(CLAIMS)} wait for runs."]
     assert intuitions.notes == [f"{len(INTUITIONS)} of {len(INTUITIONS)} wait for runs."]
     assert {"P2", "V1"} <= {*behind.frame["claim"]}
-    assert any(line.endswith(": for S1e, S1f") for line in waiting.notes)
+    assert any("no runs of S1e noise robustness" in line for line in waiting.notes)
     told = both.to_mapping()
-    assert told["counts"]["program"]["waits"] == counts.frame["waits"][1]
-    assert [row["effect"] for row in told["claims"] if row["claim"] == "V1"] == [None]
+    assert told["counts"]["program"]["no runs"] == counts.frame["no runs"][1]
+    assert [row["n_runs"] for row in told["claims"] if row["claim"] == "V1"] == [0] * 4
 
 
-def test_claims_about_distances_are_read_relative_and_of_mean_curves():
+def test_claims_about_distances_are_read_as_shares_too():
     spec = made_study("S1e", Axis(name="noise", values=(0.0, 0.01, 0.02, 0.03)), reference=0.0)
     found = verdict(made_table(spec, lambda place: 10.0 * (1.0 - 10.0 * place.values[-1])))
-    senses = found.frame.filter(claim="N1", measures="corrected")
-    assert senses["sense"].to_list() == [
-        "",
-        "relative to performance",
-        "of mean curves",
-        "of mean curves, relative to performance",
-    ]
-    assert {*senses["answer"]} == {"supported"}
-    assert found.at_a_glance({"N1": CLAIMS["N1"]})[0][2:] == ("supported",) * 3
+    mine = found.frame.filter(claim="N1")
+    assert mine.select("reading", "tied").rows() == [("amounts", 3), ("shares", 3), ("bands", 3)]
+    assert mine.filter("is_main")["reading"].to_list() == ["shares"]
 
 
 def test_the_opposite_order_contradicts_and_no_run_decides_nothing():
     heights = dict(zip(SIMPLE_FIRST, reversed(SIMPLE_FIRST.values()), strict=True))
     table = made_table(made_study(), lambda place: heights[place.policy])
-    assert answers(verdict(table), measures="corrected")["P2"] == "contradicted"
+    assert answers(verdict(table))["P2"] == "contradicted"
     nothing = StudyTable(spec=table.spec, frame=table.frame.clear(), versions=())
-    assert answers(verdict(nothing), measures="corrected")["P2"] == "no scores"
+    assert answers(verdict(nothing))["P2"] == "no runs"
 
 
 def test_a_claim_may_need_two_studies():
     found = verdict(*(made_table(made_study(name), by_policy) for name in ("S1a", "S1b")))
-    answered = found.frame.filter(pl.col("answer") != "waits")["claim"]
+    answered = found.frame.filter(pl.col("answer") != "no runs")["claim"]
     assert {"H1", "H3", "H12"} <= {*answered}
 
 
-def test_search_and_rescue_needs_no_lone_robot_and_what_cannot_be_computed_is_told():
-    def of_sizes(*sizes):
-        axes = (Axis(name="walk_probability", values=(0.001,)), Axis(name="population_size", values=sizes))
-        return verdict(made_table(made_study("S2a", *axes), by_policy)).frame.filter(claim="E9", sense="")
-
-    found = of_sizes(12, 51)
-    assert found["measures"].to_list() == ["corrected", "paper"]
-    assert "waits" not in found["answer"]
-    assert "(described, corrected: there is one swarm size only" in of_sizes(2)["why"][0]
+def test_search_and_rescue_needs_no_lone_robot():
+    axes = (Axis(name="walk_probability", values=(0.051,)), Axis(name="population_size", values=(12, 51, 115)))
+    found = answers(verdict(made_table(made_study("S2a", *axes), by_policy)))
+    assert found["E9"] != "no runs"
+    assert found["E7"] == "no runs"
 
 
 @pytest.mark.parametrize(
@@ -130,8 +128,6 @@ def test_what_sets_have_less_of_than_the_paper_is_told_in_a_line():
     assert told("paper", "S1a", "S1c") == ()
     (smoke,) = told("smoke", "S1a")
     assert smoke.startswith("S1a: budget smoke, runs of 1,000 s instead of 10,000 s, without population_size ")
-    *_, looks = StudyVerdict(tables=(SimpleNamespace(spec=load_study("S1a").with_run(looks=(2, 4))),)).remarks
-    assert looks.startswith("S1a: judged after 2, 4 runs")
 
 
 def test_a_status_tells_what_is_missing():

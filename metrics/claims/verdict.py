@@ -1,0 +1,290 @@
+"""Claims held against panels: each statement is judged, corrected within its family, and joined with the others."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import nan
+from typing import Literal, NamedTuple, TypeAlias, cast
+
+import numpy as np
+
+from ..curves import FloatArray
+from ..statistics import SIGNIFICANT, holm
+from .contrast import Answer, Contrast, PValues, all_of, corrected, decide, most_of, p_values
+from .panel import HAVE_SHARES, Panel, PanelName
+from .statements import Statement, Untestable
+
+Reading: TypeAlias = Literal["amounts", "shares", "bands"]
+"""`amounts`: measures as their equations have them. `shares`: of flexibility and robustness, what is above the noise
+floor, as a share of what the policy delivers. `bands`: amounts by the mean and two standard deviations of runs."""
+Family: TypeAlias = Literal[
+    "self-organization", "scalability", "performance", "flexibility", "robustness", "together", "expected"
+]
+"""Claims whose contrasts are corrected together."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Claim:
+    """One claim: the statements that it consists of."""
+
+    name: str
+    text: str
+    """What is claimed, in our words."""
+    figure: str
+    """Figure of the paper that shows it."""
+    family: Family
+    statements: tuple[Statement, ...] = ()
+    needs: Literal["all", "most"] = "all"
+    """How many of the statements must hold."""
+    formula: Callable[[], tuple[bool, str]] | None = None
+    """Whether a claim that needs no runs holds, and what was found."""
+    untestable: str = ""
+    """Why no run can answer; empty for a claim with statements."""
+
+    @property
+    def panels(self) -> tuple[PanelName, ...]:
+        """Panels that its statements need, each once."""
+        return tuple(dict.fromkeys(name for statement in self.statements for name in statement.panels))
+
+    @property
+    def has_shares(self) -> bool:
+        """Whether it is about a measure that is read as shares, too, which is then its main reading."""
+        return any(name.measure in HAVE_SHARES for name in self.panels)
+
+
+class Counts(NamedTuple):
+    """Comparisons of two policies at one level, by what they show."""
+
+    claimed: int = 0
+    reversed: int = 0
+    tied: int = 0
+    open: int = 0
+
+    @property
+    def words(self) -> str:
+        """The counts for people."""
+        told = f"{self.claimed} of {sum(self)} comparisons as claimed, {self.reversed} reversed, {self.tied} tie"
+        return f"{told}, {self.open} open" if self.open else told
+
+
+NOTHING = Counts()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Part:
+    """What runs say of one statement."""
+
+    statement: Statement
+    answer: Answer = "open"
+    mean: float = nan
+    """Mean over runs, in the unit of the measure."""
+    lower: float = nan
+    """Lower end of its interval, of 95 %; by bands, of two standard deviations of runs."""
+    upper: float = nan
+    d: float = nan
+    """Cohen's d."""
+    p: float = nan
+    """P value of the test that the answer needs, after Holm's correction; NaN by bands."""
+    margin: float = nan
+    n_runs: int = 0
+    counts: Counts = NOTHING
+    """Of comparisons level by level, without correction."""
+    why: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """What runs say of a claim."""
+
+    claim: str
+    answer: Answer
+    parts: tuple[Part, ...] = ()
+    why: str = ""
+
+    @property
+    def n_held(self) -> int:
+        """Number of statements that hold."""
+        return sum(part.answer == "supported" for part in self.parts)
+
+    @property
+    def counts(self) -> Counts:
+        """Comparisons of all statements."""
+        return Counts(*map(sum, zip(*(part.counts for part in self.parts), strict=True))) if self.parts else Counts()
+
+
+def check_claims(
+    claims: Mapping[str, Claim],
+    panels: Mapping[PanelName, Panel],
+    *,
+    reading: Reading = "amounts",
+    margin: float | None = None,
+) -> dict[str, Verdict]:
+    """Hold claims against scores.
+
+    Args:
+        claims: `CLAIMS`, or claims of your own. Those of a family are corrected together for their number.
+        panels: Scores of all policies.
+        reading: How scores are read.
+        margin: Share that is a tie in all panels; None: that of each.
+
+    Returns:
+        Name of a claim -> verdict.
+
+    Raises:
+        CurveError: A panel lacks a policy that a claim names.
+    """
+    seen = {name: [_seen(one, panels, reading, margin) for one in claim.statements] for name, claim in claims.items()}
+    found: dict[str, Verdict] = {}
+    for family in dict.fromkeys(claim.family for claim in claims.values()):
+        mine = {name: claim for name, claim in claims.items() if claim.family == family}
+        parts = iter([_part(one, reading) for one in _corrected([one for name in mine for one in seen[name]])])
+        found |= {name: _verdict(claim, [next(parts) for _ in claim.statements]) for name, claim in mine.items()}
+    return {name: found[name] for name in claims}
+
+
+class _Seen(NamedTuple):
+    """A statement with its contrast, and p values where it is tested."""
+
+    statement: Statement
+    contrast: Contrast | None = None
+    margin: float = nan
+    counts: Counts = Counts()
+    p: PValues | None = None
+    reverses: FloatArray = np.empty(0)
+    """Of a group, one-sided p values that a pair of its members has the claimed order or ties, (pairs,)."""
+    answer: Answer = "open"
+    why: str = ""
+
+
+def _seen(statement: Statement, panels: Mapping[PanelName, Panel], reading: Reading, margin: float | None) -> _Seen:
+    absent = [name.words for name in statement.panels if name not in panels]
+    if absent:
+        return _Seen(statement, answer="no runs", why=f"no runs of {', '.join(absent)}")
+    shown = [panels[name] for name in statement.panels]
+    curves = [
+        one.curves(
+            statement.policies,
+            shares=statement.is_share or (reading == "shares" and name.measure in HAVE_SHARES),
+            one_unit=statement.keeps_shape,
+            unit=shown[0].unit if statement.has_one_unit else None,
+        )
+        for name, one in zip(statement.panels, shown, strict=True)
+    ]
+    if any(0 in one.values.shape for one in curves):
+        return _Seen(statement, answer="no runs", why="no level has enough runs with a score")
+    limit = (shown[-1].margin if margin is None else margin) if statement.has_margin else 0.0
+    try:
+        found = Contrast(statement.number(curves))
+    except Untestable as reason:
+        return _Seen(statement, answer="untestable", why=str(reason))
+    if reading == "bands" or statement.is_counted:
+        p = None
+    else:
+        p = p_values(statement.kind, found, limit)
+    if not statement.pairs:
+        return _Seen(statement, found, limit, p=p)
+    sides = statement.sides(curves[0])
+    seen = _Seen(statement, found, limit, _counts(sides, limit, reading), p)
+    if p is None or statement.kind != "more" or len(statement.pairs) == 1:
+        return seen
+    pairs = Contrast((sides[0] - sides[1]).mean(axis=1))
+    return seen._replace(reverses=np.where(pairs.mean < 0.0, pairs.p_beyond(limit), 1.0))
+
+
+def _corrected(family: Sequence["_Seen"]) -> list["_Seen"]:
+    """Return statements with p values after Holm's correction."""
+    tested = iter(corrected([one.p for one in family if one.p is not None]))
+    reverses = holm(np.concatenate([np.empty(0), *(one.reverses for one in family)]))
+    ends = np.cumsum([one.reverses.size for one in family])
+    return [
+        one if one.p is None else one._replace(p=next(tested), reverses=reverses[end - one.reverses.size : end])
+        for one, end in zip(family, ends, strict=True)
+    ]
+
+
+def _counts(sides: FloatArray, margin: float, reading: Reading) -> Counts:
+    """Count comparisons of the first and the second of pairs, (2, pairs, L, R)."""
+    gaps = Contrast(sides[0] - sides[1])
+    if reading == "bands":
+        is_apart = np.abs(gaps.mean) > 2.0 * Contrast(sides).sd.sum(axis=0)
+        n_claimed, n_apart = int((is_apart & (gaps.mean > 0.0)).sum()), int(is_apart.sum())
+        return Counts(n_claimed, n_apart - n_claimed, is_apart.size - n_apart)
+    answers = decide("more", gaps.mean, p_values("more", gaps, margin))
+    return Counts(*(int((answers == word).sum()) for word in ("supported", "contradicted", "equivalent", "open")))
+
+
+_DECIDING = {
+    **{(kind, answer): 0 for kind in ("more", "differ") for answer in ("supported", "contradicted", "open")},
+    **{(kind, "equivalent"): 1 for kind in ("more", "differ")},
+    ("tie", "supported"): 1,
+    ("tie", "open"): 1,
+    ("tie", "contradicted"): 2,
+}
+"""Kind of a statement and answer -> place of the p value in `PValues`."""
+
+
+def _part(seen: _Seen, reading: Reading) -> Part:
+    statement, found = seen.statement, seen.contrast
+    if found is None:
+        return Part(statement=statement, answer=seen.answer, why=seen.why)
+    lower, upper = (float(end) for end in (found.band if reading == "bands" else found.interval))
+    mean, p, why = float(found.mean), nan, ""
+    if statement.pairs and (statement.is_counted or reading == "bands"):
+        answer = _of_counts(statement, seen.counts)
+    elif seen.p is None:
+        answer = _of_band(statement, lower, upper)
+    else:
+        answer = str(decide(statement.kind, found.mean, seen.p))
+        p = float(seen.p[_DECIDING[statement.kind, answer]])
+        if (seen.reverses <= SIGNIFICANT).any():
+            turned = [
+                f"{b} above {a}"
+                for (a, b), one in zip(statement.pairs, seen.reverses, strict=True)
+                if one <= SIGNIFICANT
+            ]
+            answer, why = "contradicted", f"{', '.join(turned)} in {statement.where}"
+    return Part(
+        statement=statement,
+        answer=cast(Answer, answer),
+        mean=mean,
+        lower=lower,
+        upper=upper,
+        d=float(found.d),
+        p=p,
+        margin=seen.margin,
+        n_runs=found.n_runs,
+        counts=seen.counts,
+        why=why,
+    )
+
+
+def _of_counts(statement: Statement, counts: Counts) -> Answer:
+    """The answer of more than half of the comparisons."""
+    many, n_apart = sum(counts) / 2.0, counts.claimed + counts.reversed
+    if counts.tied > many:
+        return "supported" if statement.kind == "tie" else "equivalent"
+    if statement.kind != "more":
+        return "open" if n_apart <= many else "contradicted" if statement.kind == "tie" else "supported"
+    return "supported" if counts.claimed > many else "contradicted" if counts.reversed > many else "open"
+
+
+def _of_band(statement: Statement, lower: float, upper: float) -> Answer:
+    """The answer by the band of a number: bands that hold 0 look like a tie."""
+    if lower <= 0.0 <= upper:
+        return "supported" if statement.kind == "tie" else "equivalent"
+    if statement.kind == "tie":
+        return "contradicted"
+    return "supported" if statement.kind == "differ" or lower > 0.0 else "contradicted"
+
+
+def _verdict(claim: Claim, parts: Sequence[Part]) -> Verdict:
+    if claim.untestable:
+        return Verdict(claim=claim.name, answer="untestable", why=claim.untestable)
+    if claim.formula is not None:
+        holds, why = claim.formula()
+        return Verdict(claim=claim.name, answer="supported" if holds else "contradicted", why=why)
+    join = all_of if claim.needs == "all" else most_of
+    found = Verdict(claim=claim.name, answer=join([part.answer for part in parts]), parts=tuple(parts))
+    told = [f"{found.n_held} of {len(parts)} statements hold"] if len(parts) > 1 else []
+    told += [found.counts.words] if sum(found.counts) else []
+    told += dict.fromkeys(part.why for part in parts if part.why)
+    return replace(found, why="; ".join(told))
