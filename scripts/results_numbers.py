@@ -9,7 +9,7 @@
     results.runs, .sets, .hours, .version           what was run, and by what
     results.answers                                 how many claims have which answer, as a table
     results.contradicted, .supported, .equivalent   claims with these answers under both rules, as tables
-    results.split                                   claims supported under one of the rules and contradicted by the other
+    results.split                                   claims supported under one of the rules alone, else contradicted
     results.readings                                claims whose readings part, as a table
 
 `write_results` writes the files.
@@ -27,6 +27,9 @@ RULES = ("described", "program")
 READINGS = ("amounts", "shares", "bands")
 ANSWERS = ("supported", "contradicted", "equivalent", "open", "untestable")
 """Columns of the table, in this order; further ones follow."""
+
+SIGNS = {"supported": "+", "contradicted": "-", "equivalent": "=", "open": "?", "untestable": "x", "no runs": "0"}
+"""Answer -> its sign, as on the results page."""
 
 Given = tuple[str, str]
 """The answers under both rules."""
@@ -73,7 +76,7 @@ def _contrasts(file: Path) -> Iterator[tuple[str, str]]:
     for line in _lines(file):
         key = (line["claim"], line["reading"], line["rules"])
         seen[key] += 1
-        if line["mean"]:
+        if line["lower"]:
             mean, lower, upper = (f"{100.0 * float(line[name]):.1f}" for name in ("mean", "lower", "upper"))
             yield f"{key[0]}_{seen[key]}_{key[1]}_{key[2]}", f"{mean} % ({lower} to {upper})"
 
@@ -118,8 +121,8 @@ def _claims(answers: dict[str, Given], is_wanted: Callable[[Given], bool]) -> st
 def _parted(readings: dict[str, dict[str, Given]]) -> str:
     """Return the claims of flexibility and robustness whose amounts and shares have other answers, with the bands."""
     found = [
-        (name, *(readings[one][name][place] for place in range(len(RULES)) for one in READINGS))
+        (name, *("/".join(SIGNS[readings[one][name][place]] for one in READINGS) for place in range(len(RULES))))
         for name in readings["shares"]
         if readings["shares"][name] != readings["amounts"][name]
     ]
-    return _table(["claim", *(f"{rules}: {one}" for rules in RULES for one in READINGS)], found) if found else "None."
+    return _table(["claim", *RULES], found) if found else "None."

@@ -134,5 +134,5 @@ def most_of(answers: Sequence[Answer]) -> Answer:
     """Return the answer that more than half of some statements have; open without one."""
     if "no runs" in answers:
         return "no runs"
-    many = [answer for answer in answers if 2 * answers.count(answer) > len(answers)]
+    many: list[Answer] = [answer for answer in answers if 2 * answers.count(answer) > len(answers)]
     return many[0] if many else "open"

@@ -284,7 +284,9 @@ def _verdict(claim: Claim, parts: Sequence[Part]) -> Verdict:
         return Verdict(claim=claim.name, answer="supported" if holds else "contradicted", why=why)
     join = all_of if claim.needs == "all" else most_of
     found = Verdict(claim=claim.name, answer=join([part.answer for part in parts]), parts=tuple(parts))
-    told = [f"{found.n_held} of {len(parts)} statements hold"] if len(parts) > 1 else []
-    told += [found.counts.words] if sum(found.counts) else []
+    told: list[str] = []
+    if found.answer != "no runs":
+        told += [f"{found.n_held} of {len(parts)} statements hold"] if len(parts) > 1 else []
+        told += [found.counts.words] if sum(found.counts) else []
     told += dict.fromkeys(part.why for part in parts if part.why)
     return replace(found, why="; ".join(told))

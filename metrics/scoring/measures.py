@@ -392,6 +392,7 @@ def remark_on(name: str, study: StudyCurves, compared: Compared) -> str:
         and compared.variant == "paper",
         "the smaller swarm delivers nothing in some runs, which have no value": name == "scalability"
         and compared.variant == "corrected"
+        and bool(compared.base.seeds)
         and bool((compared.base.performance.sum(axis=-1) == 0.0).any()),
         "from the rates alone, the same for every policy, in an equilibrium that runs need not reach": name
         == "availability",

@@ -153,12 +153,6 @@ class RunCurves:
         size = f"N = {self.n_robots}"
         return size if self.criterion == SIZE else f"{self.criterion} {self.value:g}, {size}"
 
-    def without_each(self) -> "RunCurves":
-        """Return means over all runs but one, (R, T): row i leaves out run i."""
-        n_others = len(self.seeds) - 1
-        means = {name: (curve.sum(axis=0) - curve) / n_others for name, curve in self.curves.items()}
-        return replace(self, curves=means)
-
     def at_seeds(self, seeds: Sequence[int]) -> "RunCurves":
         """Return the same experiment with some of its runs only."""
         places = [self.seeds.index(seed) for seed in seeds]

@@ -147,7 +147,7 @@ def test_answers_and_means_are_those_beside_the_results(tmp_path):
     assert found["contradicted"] == "None."
     assert found["split"].splitlines()[2].endswith("| contradicted | supported |")
     assert found["answers"].splitlines()[2].startswith("| described | 1 | 1 | 0 | 0 | 0 |")
-    assert found["readings"].splitlines()[2] == "| R1 | supported | contradicted | open | supported | supported | open |"
+    assert found["readings"].splitlines()[2] == "| R1 | +/-/? | +/+/? |"
     block = "<!-- generated: results.split by scripts/update_docs -->"
     assert f"{block}\n\n| claim |" in update_docs.written(f"{block}<!-- end -->", {"results": found})
 
