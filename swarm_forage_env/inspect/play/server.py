@@ -88,19 +88,14 @@ class _Handler(BaseHTTPRequestHandler):
     server_version = "swarm-forage"
     sys_version = ""
 
-    def do_GET(self) -> None:
-        """Send the page."""
-        self._answer()
-
     def do_POST(self) -> None:
-        """Send a frame or a replay, or carry out a command."""
-        self._answer()
-
-    def _answer(self) -> None:
+        """Send the page, a frame or a replay, or carry out a command."""
         try:
             self._send(*self._outcome())
         except (ConnectionError, TimeoutError):  # the reader has gone, maybe in the middle of the answer
             self.close_connection = True
+
+    do_GET = do_POST  # noqa: N815 - the name that http.server has
 
     def _outcome(self) -> tuple[int, Any]:
         """Return the status, and the page as text or the answer as a table."""

@@ -37,28 +37,21 @@ class ActiveRolloutBuffer(RolloutBuffer):
         self,
         buffer_size: int,
         observation_space: spaces.Space,
-        action_space: spaces.Space,
-        device: torch.device | str = "auto",
-        gae_lambda: float = 1.0,
-        gamma: float = 0.99,
-        n_envs: int = 1,
-        *,
+        *args: Any,
         active_column: int,
         n_columns: int | None = None,
+        **kwargs: Any,
     ) -> None:
-        """Create the buffer.
+        """Create the buffer; arguments as `RolloutBuffer`, and two more.
 
         Args:
-            buffer_size: As in `RolloutBuffer`, like everything else up to `n_envs`.
+            buffer_size: Steps of a rollout.
             observation_space: Observations of one row.
-            action_space: Actions of one row.
-            device: Where minibatches go.
-            gae_lambda: lambda of the advantages.
-            gamma: Discount.
-            n_envs: Rows.
+            args: See above.
             active_column: Column of what the environment gives that is 1 for robots at work, else 0.
             n_columns: Columns of what the environment gives; observations may be several such frames, the newest last.
                 None: observations are single frames.
+            kwargs: See above.
 
         Raises:
             ValueError: the columns of an observation are not a whole number of frames, or a frame has no such column.
@@ -72,7 +65,7 @@ class ActiveRolloutBuffer(RolloutBuffer):
             )
         self._active_column = width - frame + active_column
         self._newest = slice(width - frame, width)
-        super().__init__(buffer_size, observation_space, action_space, device, gae_lambda, gamma, n_envs)
+        super().__init__(buffer_size, observation_space, *args, **kwargs)
 
     def at_work(self, observations: np.ndarray) -> np.ndarray:
         """Return which rows of observations (.., columns) are of robots at work, (..) bool."""
@@ -159,18 +152,10 @@ class PresentReplayBuffer(ReplayBuffer):
         super().__init__(*args, **kwargs)
         self._is_present = np.zeros((self.buffer_size, self.n_envs), np.bool_)
 
-    def add(
-        self,
-        obs: np.ndarray,
-        next_obs: np.ndarray,
-        action: np.ndarray,
-        reward: np.ndarray,
-        done: np.ndarray,
-        infos: list[dict[str, Any]],
-    ) -> None:
+    def add(self, obs: np.ndarray, *args: Any, **kwargs: Any) -> None:
         """Store one step of all rows; see `ReplayBuffer.add`."""
         self._is_present[self.pos] = np.any(obs, axis=-1)
-        super().add(obs, next_obs, action, reward, done, infos)
+        super().add(obs, *args, **kwargs)
 
     def sample(self, batch_size: int, env: VecNormalize | None = None) -> ReplayBufferSamples:
         """Draw steps uniformly from those of present robots.
