@@ -114,6 +114,7 @@ def test_a_dead_robot_stays_where_it_was_last():
     absent = kept.has(Status.ABSENT)
     assert not absent[0].any()
     assert absent[-1].all()
+    assert not kept.has(Status.REPAIR).any(), "the dead are not in repair"
     assert kept.end_tick < 400, "the run ends with the last robot"
     for robot in range(12):
         gone = kept.position[absent[:, robot], robot]

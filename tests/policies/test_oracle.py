@@ -58,6 +58,14 @@ def test_whoever_is_nearest_has_an_object_and_the_others_take_the_next():
     np.testing.assert_array_equal(policy._chosen, [-1, 1, 0])
 
 
+def test_what_another_robot_has_chosen_is_left_to_it():
+    robots = [(10.0, 8.1, EAST, -1), (12.0, 8.1, EAST, 1)]
+    _, policy = commands(robots, [(65, 40, FREE), (-1, -1, CARRIED), (80, 40, FREE)])
+    policy._world.swarm.carried_object[1] = -1
+    policy.act(np.zeros((2, 1), np.float32), np.ones(2, np.bool_))
+    np.testing.assert_array_equal(policy._chosen, [0, 2])
+
+
 def test_robots_that_meet_pass_each_other_on_the_right():
     found, _ = commands([(10.0, 8.1, EAST, -1), (10.6, 8.1, WEST, 1)], [(80, 40, FREE), (-1, -1, CARRIED)])
     assert [turn_of(command) for command in found] == [-1, -1]

@@ -105,5 +105,8 @@ def test_robots_do_in_the_world_what_they_chose_in_the_turned_one(turn, config):
             other.step_batch(theirs.command(chosen, other.last_obs).copy())
     expected = np.array([place(turn, *at) for at in one.swarm.position])
     np.testing.assert_allclose(other.swarm.position, expected, atol=5e-4)  # two push each other, in some order
+    (seen, interface), (there, _) = rows(one, config), rows(other, config)
+    wheels = interface.layout["wheel_speed"]
+    np.testing.assert_allclose(turned(seen, turn, interface)[:, wheels], there[:, wheels], atol=1e-6)
     moved = np.abs(one.swarm.position - np.array([robot[:2] for robot in ROBOTS])).max()
     assert moved > 0.05

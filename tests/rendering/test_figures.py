@@ -116,6 +116,11 @@ def test_a_headline_is_wrapped_in_a_narrow_figure(tmp_path):
     assert len(lines) == 2
 
 
+def test_panels_stand_in_rows_that_can_be_read():
+    assert [FigureStyle().columns(n) for n in (1, 4, 6, 9, 12)] == [1, 2, 2, 3, 4]
+    assert [FigureStyle(width_in=width).columns(4) for width in (3.4, 7.16)] == [1, 2]
+
+
 def test_legends_of_several_rows_are_read_row_by_row(tmp_path):
     names = ("generalist", "crw", "dpo", "stochm", "stochx", "my own policy")
     words = words_in(draw(tmp_path / "it.svg", names=names, style=FigureStyle(width_in=3.4)))

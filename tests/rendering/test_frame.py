@@ -171,6 +171,9 @@ def test_obstacles_are_walls_and_the_legend_names_what_the_world_has():
         for one in (config, scenario("search_and_rescue"))
     )
     assert {"obstacle", "source", "nest"} <= there
+    narrow = legend_rows(config, 300, 7.0)
+    assert len(narrow) > 1
+    assert max(x + text_width(name, 9.0) + 1.45 * 9.0 for row in narrow for name, x, _ in row) < 300
     assert not {"obstacle", "source", "cache"} & elsewhere
 
 
@@ -179,6 +182,9 @@ def test_trails_fade_towards_the_past(world):
     for step in range(30):
         world.swarm.position[0] = (10.0 + 0.1 * step, 10.0)
         trails.add(world.swarm)
+    world.swarm.present[1] = False
+    trails.add(world.swarm)
+    assert np.isnan(trails.position[-1]).all(axis=1).tolist() == [False, True, False, False], "nobody drives there"
     picture = world.draw(trails=trails)
     blue = [world.pixel(picture, x, 10.0)[2] for x in (10.5, 11.2, 12.0, 12.6)]
     assert blue == sorted(blue)
