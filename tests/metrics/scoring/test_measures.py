@@ -163,20 +163,6 @@ def test_a_handling_cost_is_sampled_as_a_throttle_is():
     assert found["distance"].to_list() == [3.0, 3.0]
 
 
-@pytest.mark.parametrize(("ideal", "ticks"), [(0.0, 2.0), (1.0, [1.0, 0.0, 2.0, 2.0])])
-def test_handling_that_takes_no_tick_has_no_reactivity(ideal, ticks):
-    assert "the ticks that handling takes, and 0 or less" in missing(
-        *handled(ideal, ticks, [4.0] * 4), measures=["reactivity"]
-    )
-
-
-def test_the_printed_reactivity_does_not_exist_under_perfect_conditions():
-    ideal, level = throttled()
-    perfect = [{**row, "adversity": 0.0} for row in ideal]
-    reason = missing(perfect, level, measures=["reactivity"], variants=["paper"])
-    assert reason == "the printed form divides by the ideal conditions, which are 0 here"
-
-
 WAVES = [
     ("square", 4e-5, [0.15, 0.20, 0.25, 0.30, 0.35, 0.40], [7.4, 9.8, 12.2, 14.6, 17.0, 19.4]),
     ("sine", 2e-5, [0.15, 0.20, 0.25, 0.30, 0.35, 0.40, 0.45], [5.04, 7.18, 9.44, 11.76, 14.13, 16.52, 18.92]),
@@ -243,20 +229,6 @@ def test_population_is_weighted_with_the_robots_recorded_at_work():
     assert found["unit"][0] == "objects in 400 s"
 
 
-def test_measures_of_a_population_say_what_they_lack():
-    ideal, level, _ = failing()
-    without = [{**row, "n_active": None} for row in level]
-    assert "no column n_active" in missing(ideal, without, measures=["recorded_population_robustness"])
-    nobody = [{**row, "n_active": 0.0} for row in ideal]
-    assert "no robot of the reference" in missing(nobody, level, measures=["recorded_population_robustness"])
-    leaving = [{**row, "repairs_per_s": 0.01} for row in level]
-    reason = missing(ideal, leaving, measures=["population_robustness"], variants=["paper"])
-    assert "more returns than departures" in reason
-    unrated = [{**row, "malfunctions_per_s": None, "repairs_per_s": None} for row in level]
-    for measure in ("population_robustness", "availability"):
-        assert "there are no rates" in missing(ideal, unrated, measures=[measure])
-
-
 def test_availability_is_told_once_per_ratio_of_rates():
     levels = [
         rows(9, IDEAL, criterion="population_dynamics", criterion_value=x, deaths_per_s=rate, **birth)
@@ -268,18 +240,30 @@ def test_availability_is_told_once_per_ratio_of_rates():
     assert found["seed"].null_count() == 2, "it follows from rates, not from runs"
 
 
-@pytest.mark.parametrize(
-    ("parts", "measure", "words"),
-    [
-        ((rows(2, IDEAL),), "scalability", "there is one swarm size only, N = 2"),
-        ((rows(2, IDEAL), rows(4, IDEAL)), "performance_lost", "there is no column interference_fraction"),
-        (
-            (rows(2, IDEAL),),
-            "adaptability",
-            "no runs with criterion throttle or handling_cost and a value other than 0",
-        ),
-        (throttled(), "raw_performance", "there are no runs with criterion population_size"),
-    ],
-)
-def test_what_is_lacking_is_told(parts, measure, words):
-    assert words in missing(*parts, measures=[measure])
+def changed(rows, **columns):
+    return [{**row, **columns} for row in rows]
+
+
+IDEAL_SWARM, LEVEL, _ = failing()
+UNRATED = {"malfunctions_per_s": None, "repairs_per_s": None}
+LACKING = [
+    ((rows(2, IDEAL),), "scalability", "there is one swarm size only, N = 2"),
+    (COLLAPSE[1:], "performance_lost", "no reference run of one robot, the smallest swarm has 2"),
+    ((rows(2, IDEAL), rows(4, IDEAL)), "time_emergence", "there is no column interference_fraction"),
+    ((rows(2, IDEAL),), "adaptability", "no runs with criterion throttle or handling_cost and a value other than 0"),
+    (throttled(), "raw_performance", "there are no runs with criterion population_size"),
+    (handled(0.0, 2.0, [4.0] * 4), "reactivity", "the ticks that handling takes, and 0 or less"),
+    (handled(1.0, [1.0, 0.0, 2.0, 2.0], [4.0] * 4), "reactivity", "the ticks that handling takes, and 0 or less"),
+    ((changed(throttled()[0], adversity=0.0), throttled()[1]), "reactivity, paper", "divides by the ideal conditions"),
+    ((IDEAL_SWARM, changed(LEVEL, n_active=None)), "recorded_population_robustness", "no column n_active"),
+    ((changed(IDEAL_SWARM, n_active=0.0), LEVEL), "recorded_population_robustness", "no robot of the reference"),
+    ((IDEAL_SWARM, changed(LEVEL, repairs_per_s=0.01)), "population_robustness, paper", "more returns than departures"),
+    ((IDEAL_SWARM, changed(LEVEL, **UNRATED)), "population_robustness", "there are no rates"),
+    ((IDEAL_SWARM, changed(LEVEL, **UNRATED)), "availability", "there are no rates"),
+]
+
+
+@pytest.mark.parametrize(("parts", "label", "words"), LACKING)
+def test_what_is_lacking_is_told(parts, label, words):
+    measure, _, variant = label.partition(", ")
+    assert words in missing(*parts, measures=[measure], variants=[variant or "corrected"])
