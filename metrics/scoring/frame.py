@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -25,8 +25,7 @@ from .measures import (
     MEASURES,
     Compared,
     Uncomputable,
-    check_measures,
-    check_words,
+    checked_request,
     conditions_apart,
     levels,
     remark_on,
@@ -105,15 +104,6 @@ def scores(
                     except Uncomputable as reason:
                         missing[study.controller, label_of(name, variant, form)] = str(reason)
     return pl.concat([pl.DataFrame(schema=SCHEMA), *parts]), missing
-
-
-def checked_request(
-    measures: Sequence[str] | None, variants: Sequence[Variant], forms: Sequence[Form]
-) -> tuple[str, ...]:
-    """Return the measures, see `check_measures`; raises CurveError on an unknown measure, variant or form."""
-    check_words("variant", variants, get_args(Variant))
-    check_words("form", forms, get_args(Form))
-    return check_measures(measures)
 
 
 def _rows(name: str, study: StudyCurves, form: Form, compared: Compared) -> pl.DataFrame:

@@ -7,7 +7,7 @@ too: swarm sizes with the next smaller one, levels of an adversity with the undi
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import KW_ONLY, dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
@@ -402,8 +402,16 @@ def remark_on(name: str, study: StudyCurves, compared: Compared) -> str:
     return "; ".join(remark for remark, holds in remarks.items() if holds)
 
 
-def check_measures(measures: Sequence[str] | None) -> tuple[str, ...]:
-    """Return measures in the order of tables, each once; None = all. Raises CurveError on unknown ones, or none."""
+def checked_request(
+    measures: Sequence[str] | None, variants: Sequence[Variant], forms: Sequence[Form]
+) -> tuple[str, ...]:
+    """Return the measures in the order of tables, each once; None = all.
+
+    Raises:
+        CurveError: an unknown measure, variant or form, or none.
+    """
+    check_words("variant", variants, get_args(Variant))
+    check_words("form", forms, get_args(Form))
     if measures is not None:
         check_words("measure", measures, tuple(MEASURES))
     return tuple(name for name in MEASURES if measures is None or name in measures)
@@ -416,10 +424,3 @@ def check_words(what: str, words: Sequence[str], known: Sequence[str]) -> None:
             raise CurveError(f"Unknown {what} {word!r}.{suggestion(word, known)} Known: {', '.join(known)}.")
     if not words:
         raise CurveError(f"Expected one or more {what}s of {', '.join(known)}, got none.")
-
-
-def criteria_of(measures: Sequence[str], disturbance: str) -> set[str]:
-    """Return what has to be varied for some measures, with one of `DISTURBANCES` in place of the throttle."""
-    check_words("disturbance", [disturbance], DISTURBANCES)
-    criteria = (MEASURES[name].varies for name in measures)
-    return {disturbance if criterion == THROTTLE else criterion for criterion in criteria}

@@ -68,9 +68,9 @@ def draw_scores(summary: pl.DataFrame, path: str | Path, *, title: str = "", sty
     steps = step * (np.arange(len(policies)) - 0.5 * (len(policies) - 1))
     of_look = [*zip(policies, looks(policies), steps.tolist(), strict=True)]
     groups = drawn.partition_by("measure", "variant", "form", maintain_order=True)
-    bars, floors = _about_bars(drawn["runs"].to_list()), "; dotted: noise floor" if drawn["ground"].count() else ""
+    floors = "; dotted: noise floor" if drawn["ground"].count() else ""
     hollow = "; hollow: misleads" if drawn["misleads"].any() else ""
-    about = f"{title + ': ' if title else ''}{bars}{floors}{hollow}"
+    about = f"{title + ': ' if title else ''}means; {about_intervals(drawn['runs'].to_list(), 'bars')}{floors}{hollow}"
     with saved_panels(path, len(groups), (3.4, 2.8), title=about, style=style) as panels:
         for rows, panel in zip(groups, panels, strict=True):
             _draw_panel(panel, rows, of_look)
@@ -86,12 +86,12 @@ def interval_words(n_runs: Sequence[int]) -> str:
     return "± 95% t interval over seeds"
 
 
-def _about_bars(n_runs: Sequence[int]) -> str:
-    """Return what is drawn of scores of so many runs."""
-    with_bar = {n >= FEWEST_RUNS for n in n_runs}
-    if True not in with_bar:
-        return f"mean over seeds; no intervals, of fewer than {FEWEST_RUNS} runs"
-    return "mean and 95 % interval over seeds" + (f"; none of fewer than {FEWEST_RUNS}" if False in with_bar else "")
+def about_intervals(n_runs: Sequence[int], called: str) -> str:
+    """Return what the bars or bands around means over so many runs are, and where there are none."""
+    few = f"fewer than {FEWEST_RUNS} runs"
+    if max(n_runs) < FEWEST_RUNS:
+        return f"no {called}: {few}"
+    return f"{called}: 95 % interval over seeds" + (f", none of {few}" if min(n_runs) < FEWEST_RUNS else "")
 
 
 def _draw_panel(panel: Panel, rows: pl.DataFrame, of_look: Sequence[tuple[str, Look, float]]) -> None:

@@ -23,8 +23,8 @@ from ..checks import CurveError, chosen_seeds
 from ..curves import Form, Variant
 from .answer import Scores
 from .curves_file import read_curves
-from .frame import checked_request, scores
-from .measures import check_words, criteria_of
+from .frame import scores
+from .measures import DISTURBANCES, MEASURES, check_words, checked_request
 from .question import Question
 from .run_curves import THROTTLE, PerformanceLike, StudyCurves, own_performance, policy_curves
 
@@ -110,7 +110,10 @@ def score_question(
         check_words("policy to compare against", [against], labels)
     allowed = ladders.budget(budget) if isinstance(budget, str) else budget
     allowed = allowed if horizon_s is None else replace(allowed, horizon_s=horizon_s)
-    worlds = ladders.plan_worlds(chosen, criteria_of(wanted, disturbance), allowed, density=density)
+    check_words("disturbance", [disturbance], DISTURBANCES)
+    varied = {MEASURES[name].varies for name in wanted}
+    criteria = {disturbance if criterion == THROTTLE else criterion for criterion in varied}
+    worlds = ladders.plan_worlds(chosen, criteria, allowed, density=density)
     plan = Plan.product(specs, worlds, chosen_seeds(seeds, allowed.n_seeds))
     settings = {
         "budget": budget if isinstance(budget, str) else "custom",

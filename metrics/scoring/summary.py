@@ -24,7 +24,7 @@ from swarm_forage_env.wrappers.world import World
 
 from ..statistics import aggregate
 from .limits import ABOUT_LIMIT, share_of_limit
-from .plots import FEWEST_RUNS, interval_words
+from .plots import FEWEST_RUNS, about_intervals, interval_words
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -146,7 +146,7 @@ class RunSummary(Answer):
             curves,
             title=self._title(),
             ylabel=f"{read_as.title} per {interval_s:g} s" if read_as.is_total else read_as.title,
-            band=_about_bands([row["n_runs"] for row in self.rows]),
+            band=about_intervals([row["n_runs"] for row in self.rows], "bands"),
             style=style,
         )
 
@@ -193,11 +193,3 @@ def _with_half(of: Mapping[str, float | None]) -> str:
     """Return a mean with half of its interval, with two digits behind the point."""
     mean, high = of["mean"] or 0.0, of["high"]
     return f"{mean:.2f}" + ("" if high is None else f" ± {high - mean:.2f}")
-
-
-def _about_bands(n_runs: Sequence[int]) -> str:
-    """Return what the bands are; of curves without them, why."""
-    few = f"fewer than {FEWEST_RUNS} runs, too few for a band"
-    if max(n_runs) < FEWEST_RUNS:
-        return few
-    return "bands: 95% t interval over seeds" + (f"; elsewhere {few}" if min(n_runs) < FEWEST_RUNS else "")

@@ -10,7 +10,7 @@ import pytest
 
 import metrics
 from metrics import MEASURES, CurveError, PopulationRates
-from metrics.scoring.measures import check_measures, criteria_of
+from metrics.scoring.measures import checked_request
 from tests.support.curve_tables import CLOCK, IDEAL, SIGNAL, SLOWED, missing, rows, scored, throttled
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
@@ -36,9 +36,12 @@ def test_the_page_of_scores_says_what_is_varied_for_which_measure(criterion):
 @pytest.mark.parametrize(("names", "message"), [(["scalabilty"], "Did you mean 'scalability'"), ([], "got none")])
 def test_unknown_measures_are_refused(names, message):
     with pytest.raises(CurveError, match=message):
-        check_measures(names)
-    assert check_measures(["scalability", "efficiency", "scalability"]) == ("efficiency", "scalability")
-    assert criteria_of(["reactivity", "noise_robustness"], "handling_cost") == {"handling_cost", "noise"}
+        checked_request(names, ["corrected"], ["marginal"])
+    twice = ["scalability", "efficiency", "scalability"]
+    assert checked_request(twice, ["paper"], ["marginal"]) == ("efficiency", "scalability")
+    for variants, forms in ((["papr"], ["marginal"]), (["paper"], [])):
+        with pytest.raises(CurveError, match=r"variant 'papr'\. Did you mean 'paper'|one or more forms"):
+            checked_request(twice, variants, forms)
 
 
 ONE, TWO = np.array([[1.0, 2.0], [2.0, 1.0]]), np.array([[3.0, 5.0], [2.0, 6.0]])

@@ -93,6 +93,7 @@ def test_failed_runs_are_those_of_their_policy(tmp_path, monkeypatch):
     [
         ({"policies": "crww"}, ValueError, "Unknown policy 'crww'. Did you mean 'crw'"),
         ({"measures": ["speed"]}, CurveError, "Unknown measure 'speed'"),
+        ({"disturbance": "noise"}, CurveError, "Unknown disturbance 'noise'. Known: throttle, handling_cost"),
         ({"budget": "quik"}, ConfigError, "Unknown budget 'quik'. Did you mean 'quick'"),
         ({"seeds": 0}, ValueError, "Expected one or more seeds, at most 100,000, got 0"),
         ({"horizon_s": 3.0}, ConfigError, "whole number of intervals"),
@@ -113,6 +114,10 @@ def test_seeds_and_length_of_runs_can_be_chosen():
     plan = planned("random", seeds=[5, 9], horizon_s=8.0, measures=SIZES)
     assert {spec.seed for spec in plan.specs} == {5, 9}
     assert {spec.scenario.horizon_s for spec in plan.specs} == {8.0}
+    criteria = {
+        spec.world.criterion for spec in planned("random", measures=["reactivity"], disturbance="handling_cost").specs
+    }
+    assert criteria == {"handling_cost"}
     found = scored([Path("random")], seeds=1, measures=SIZES)
     assert (found.settings["budget"], found.settings["seeds"]) == ("custom", [0])
 
