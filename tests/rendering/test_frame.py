@@ -171,9 +171,10 @@ def test_obstacles_are_walls_and_the_legend_names_what_the_world_has():
         for one in (config, scenario("search_and_rescue"))
     )
     assert {"obstacle", "source", "nest"} <= there
-    narrow = legend_rows(config, 300, 7.0)
-    assert len(narrow) > 1
-    assert max(x + text_width(name, 9.0) + 1.45 * 9.0 for row in narrow for name, x, _ in row) < 300
+    for width in range(240, 400, 10):
+        narrow = legend_rows(config, width, 7.0)
+        assert len(narrow) > 1
+        assert max(x + text_width(name, 9.0) + 1.45 * 9.0 for row in narrow for name, x, _ in row) < width
     assert not {"obstacle", "source", "cache"} & elsewhere
 
 
