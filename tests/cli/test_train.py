@@ -11,6 +11,7 @@ import pytest
 
 from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.cli import training_report
+from swarm_forage_env.cli.printer import bar
 from swarm_forage_env.training.evaluation import Evaluation, EvaluationPlan, WorldEvaluation, write_evaluations
 from swarm_forage_env.training.plan import named_plan, read_plan
 from swarm_forage_env.training.recipe import recipe
@@ -32,6 +33,7 @@ def test_trains_shows_evaluations_and_goes_on(command, painted):
     words = ("train", *TINY, "--set", "nest_progress=0.07")
     code, _, err = command(*words)
     assert code == 0, err
+    assert err.startswith("ppo: 128 decisions in 3 stages, evaluated every 128 and after each stage\n")
     assert "Evaluated in 1 run in warehouse_small, 4 robots" in err
     folder = Path("results/training/warehouse_small_ppo")
     assert "decisions  deliveries per 1,000 s" in err
@@ -56,6 +58,27 @@ def test_trains_shows_evaluations_and_goes_on(command, painted):
                            "interval_s=2", "--jobs", "1", "--json")  # fmt: skip
     assert code == 0
     assert len(json.loads(out)["runs"]) == 2
+
+
+def test_without_a_terminal_it_says_once_how_long_the_rest_takes(capsys, monkeypatch):
+    training = pytest.importorskip("swarm_forage_env.training.sb3.training")
+    times = iter([0.0, 2.0, 6.0, 60.0])
+    monkeypatch.setattr(training_report.time, "monotonic", lambda: next(times))
+    with bar() as shown:
+        report = training_report._Report(recipe(steps=300), [0, 1], shown)
+        for seed, steps in ((0, 0), (0, 30), (1, 60), (1, 90)):
+            report(seed, training.TrainingStatus(steps=steps, episode_return=0.0))
+    first, second = capsys.readouterr().err.splitlines()
+    assert first == "ppo: 2 trainings of 300 decisions in 1 stage, evaluated every 1,000,000 and after each stage"
+    assert second == "About 34 s to go, and the evaluations"  # 90 of 600 decisions took 6 s
+
+
+def test_an_unknown_setting_is_told_with_the_nearest_one(command):
+    code, _, err = command("train", "--set", "hiden=3")
+    assert (code, err) == (
+        2,
+        "swarm-forage: Unknown field of the scenario or the training 'hiden'. Did you mean 'hidden'?\n",
+    )
 
 
 @needs_training

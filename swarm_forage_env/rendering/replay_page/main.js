@@ -26,8 +26,9 @@ class Page {
   describe() {
     const { header } = this.runs[0];
     const { world } = header;
-    const facts = [header.scenario.replaceAll("_", " "), `${header.n_robots} robots`, `${header.n_objects} objects`,
-      `${world.width_m} × ${world.height_m} m`, `seed ${header.seed}`];
+    const facts = [`${header.n_robots} robots`, `${header.n_objects} objects`, `${world.width_m} × ${world.height_m} m`,
+      `seed ${header.seed}`];
+    if (this.runs.length > 1) facts.unshift(header.scenario.replaceAll("_", " ")); // else the headline has it
     showFacts([...facts, ...this.disturbances()]);
   }
 
