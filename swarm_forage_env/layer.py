@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.contract.policy import ActionError
+from swarm_forage_env.contract.codes import Grip
+from swarm_forage_env.contract.policy import COMMANDS, ActionError
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.world.arena import UNDISTURBED, Stop
 from swarm_forage_env.world.kernels.disturbances import Disturbances
@@ -137,7 +138,7 @@ class SwarmLayer(ABC):
         return {agent: {"active": active} for agent, active in self._by_agent(self.unwrapped.active.tolist()).items()}
 
     def _packed(self, actions: dict[str, np.ndarray]) -> ActionArray:
-        """Return actions by agent as an array (N, A)."""
+        """Return actions by agent as an array (N, A); robots that are away stand and hold, should they come back."""
         env, agents = self.unwrapped, self.unwrapped.agents
         if not isinstance(actions, Mapping):
             raise ActionError(f"Expected actions as a dict by agent, got {type(actions).__name__}.")
@@ -161,10 +162,12 @@ class SwarmLayer(ABC):
             raise ActionError(
                 f"Expected each action as {size} numbers, shape ({size},), got shapes {sorted(shapes)}: {error}."
             ) from error
-        if len(agents) == len(env.possible_agents):
-            return rows
-        packed = np.zeros((len(env.possible_agents), size), np.float32)
-        packed[[int(agent.removeprefix("robot_")) for agent in agents]] = rows
+        packed = rows
+        if len(agents) < len(env.possible_agents):
+            packed = np.zeros((len(env.possible_agents), size), np.float32)
+            packed[[int(agent.removeprefix("robot_")) for agent in agents]] = rows
+        if not env.active.all():
+            packed = at_rest(packed, ~env.active, env.swarm.carried_object >= 0)
         return packed
 
     # Snapshots
@@ -219,6 +222,14 @@ class SwarmLayer(ABC):
         env = self.unwrapped
         configs = (wrapper.made_from for wrapper in self.stack if wrapper.made_from is not None)
         return [env, env.arena, env.scenario, env.layout, *self.stack, *configs]
+
+
+def at_rest(actions: np.ndarray, away: BoolArray, carrying: BoolArray) -> np.ndarray:
+    """Return actions (N, A) in which robots that are away (N,) stand and hold their cargo, should they come back."""
+    actions = actions.copy()
+    actions[away] = 0.0
+    actions[away, COMMANDS - 1] = np.where(carrying[away], Grip.GRASP, Grip.RELEASE)
+    return actions
 
 
 def is_over(agents_left: Collection[str], actions: Any, *, is_reset: bool) -> bool:

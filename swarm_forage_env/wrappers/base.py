@@ -9,12 +9,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
 from pettingzoo.utils import BaseParallelWrapper
 
 from swarm_forage_env._internal.fields import Checked, ConfigError, known_keys, read
-from swarm_forage_env.contract.codes import Grip
-from swarm_forage_env.contract.policy import COMMANDS
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.env import ForageEnv, checked_gain
 from swarm_forage_env.layer import BatchStep, SwarmLayer
@@ -42,7 +39,7 @@ _WAVE_FIELDS = tuple(item.name for item in dataclasses.fields(Waveform) if item.
 class SwarmWrapper(SwarmLayer, BaseParallelWrapper):
     """Base of all wrappers of this package; a subclass sets `stack_position` and overrides the hooks it needs.
 
-    Hooks of one step, each called once per tick: `before_step`, then `gain`, from the outermost wrapper inwards, then
+    Hooks of one step, each called once per tick: `before_step` and `gain` from the outermost wrapper inwards, then
     the environment steps, then `observe` and `after_step` from the innermost wrapper outwards. A reset calls
     `on_reset` and `observe` from the innermost wrapper outwards. The wrapper that is stepped calls the hooks of all
     wrappers inside of it; their own `step_batch` is not called, so a wrapper that overrides it cannot be inside of
@@ -212,7 +209,8 @@ class SwarmWrapper(SwarmLayer, BaseParallelWrapper):
             tasks: (N,) int8 `contract.codes.Task` codes, None = the policy has no tasks.
 
         Raises:
-            ActionError: as `ForageEnv.step_batch`, before any wrapper has done anything.
+            ActionError: as `ForageEnv.step_batch`, before any wrapper has done anything. Only a robot that comes back
+                to work in this very tick is looked at later.
         """
         env = self._unwrapped
         actions = env.checked_actions(actions)
@@ -220,30 +218,17 @@ class SwarmWrapper(SwarmLayer, BaseParallelWrapper):
         self._require_reset()
         env.refuse_bad_step(actions, wheel_gain)  # before any wrapper draws a number or lets a robot die
         env.break_off()
-        _, reward, terminated, truncated = env.advance(*self.before(actions, wheel_gain), tasks)
+        _, reward, terminated, truncated = env.advance(actions, self.before(actions, wheel_gain), tasks)
         obs = self.after(tasks)
         env.make_whole()
         return obs, reward, terminated, truncated
 
-    def before(
-        self, actions: ActionArray, wheel_gain: FloatArray | None = None
-    ) -> tuple[ActionArray, FloatArray | None]:
-        """Call the hooks that come before the arena's step, from here inwards; returns actions and wheel gain for it.
-
-        A robot that comes to work by them stands in this tick and holds what it carries: nobody has chosen its action.
-        """
-        swarm = self._unwrapped.swarm
-        at_work = swarm.active.copy()
+    def before(self, actions: ActionArray, wheel_gain: FloatArray | None = None) -> FloatArray | None:
+        """Call the hooks that come before the arena's step, from here inwards; returns the wheel gain for it."""
         for wrapper in self.stack:
             wrapper.before_step()
-        came = swarm.active & ~at_work
-        if came.any():
-            actions = actions.copy()
-            actions[came] = 0.0
-            actions[came, COMMANDS - 1] = np.where(swarm.carried_object[came] >= 0, Grip.GRASP, Grip.RELEASE)
-        for wrapper in self.stack:
             wheel_gain = checked_gain(wrapper.gain(actions, wheel_gain), len(actions))
-        return actions, wheel_gain
+        return wheel_gain
 
     def after(self, tasks: CodeArray | None) -> ObsArray:
         """Call the hooks that come after the arena's step, from the innermost outwards; returns what is seen here."""

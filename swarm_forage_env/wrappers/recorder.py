@@ -97,8 +97,7 @@ class RunRecorder(SwarmWrapper):
             n_ahead, disturbances = inner.told_ahead(min(end - env.tick, self._ticks_left))
             if n_ahead == 0:  # one tick as a step of the stack does it
                 arena.run(policy, 0)  # what robots want to do stands before any wrapper acts
-                policy.actions[:], wheel_gain = self.before(policy.actions)
-                arena.run(policy, 1, wheel_gain=wheel_gain, acts=False)
+                arena.run(policy, 1, wheel_gain=self.before(policy.actions), acts=False)
                 self.after(policy.task)
                 kept = False
                 continue

@@ -69,8 +69,8 @@ def test_hooks_run_inwards_before_the_step_and_outwards_after_it(stack):
     stack.step_batch(np.zeros((4, 3), np.float32))
     assert [entry[:2] for entry in Logging.log] == [
         ("outer", "before_step"),
-        ("inner", "before_step"),
         ("outer", "gain"),
+        ("inner", "before_step"),
         ("inner", "gain"),
         ("inner", "observe"),
         ("inner", "after_step"),

@@ -8,6 +8,7 @@ from swarm_forage_env.contract.codes import Event, Grip, ObjectStatus
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.gymnasium import JointForageEnv
+from swarm_forage_env.views.pettingzoo import parallel_env
 from swarm_forage_env.wrappers.population import (
     PopulationConfig,
     PopulationDynamics,
@@ -74,11 +75,9 @@ def test_a_robot_in_repair_stops_but_stays(lone_carrier):
         assert obs[0, env.layout["carrying"]] == 1.0
         assert obs[0, env.layout["position"]].any(), "true sensors"
         obs, *_ = lone_carrier.step_batch(hold(env, 0.5, Grip.RELEASE))
-    strike(lone_carrier, "repair", hold(env, 0.5, Grip.RELEASE))
+    strike(lone_carrier, "repair", hold(env, 0.5))
     assert env.active[0]
     assert env.swarm.carried_object[0] == 0
-    np.testing.assert_array_equal(env.swarm.position, where)
-    lone_carrier.step_batch(hold(env, 0.5))
     assert env.swarm.position[0, 0] > where[0, 0]
 
 
@@ -121,6 +120,22 @@ def test_rows_of_robots_that_are_away_never_act(interface, fills):
         seen.append(env.forage_env.swarm.position.copy())
     for other in seen[1:]:
         np.testing.assert_array_equal(other, seen[0])
+
+
+def test_actions_by_name_of_robots_that_are_away_never_act():
+    seen = []
+    for fill in (0.0, 1.0, np.nan):
+        env = parallel_env(
+            "classroom", n_robots=6, wrappers=["population:malfunction_per_tick=0.5,repair_per_tick=0.5"]
+        )
+        env.reset(seed=3)
+        chance = np.random.default_rng(0)
+        for _ in range(30):
+            rows = chance.uniform(-1.0, 1.0, (6, 3))
+            rows[~env.unwrapped.active] = fill
+            env.step(dict(zip(env.agents, rows, strict=True)))
+        seen.append(env.unwrapped.swarm.position.tobytes())
+    assert len(set(seen)) == 1
 
 
 # Death
