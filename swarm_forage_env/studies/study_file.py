@@ -107,9 +107,6 @@ class RunTable(_Strict, frozen=True):
     budget: str
     seeds: tuple[int, ...]
     rules: tuple[str, ...]
-    looks: tuple[int, ...] = ()
-    """Numbers of runs of a condition after which claims were judged, and conditions left as they were where all was
-    decided; empty: once, at the end. Judgements correct for several looks."""
     policies: tuple[PolicyTable, ...] = ()
     """As they are run, where there are files among them: with their whole paths, digests and caches."""
 
