@@ -110,7 +110,10 @@ def test_longer_runs_are_cut_and_it_is_said():
 
 def test_unequal_steps_are_resampled_with_the_same_totals_and_means():
     fine = rows(
-        1, [[1.0, 3.0, 2.0, 2.0, 9.0]], t_end_s=[5.0, 10.0, 15.0, 20.0, 25.0], n_active=[1.0, 0.0, 1.0, 1.0, 1.0]
+        1,
+        [[1.0, 3.0, 2.0, 2.0, 9.0, 9.0]],
+        t_end_s=[5.0, 10.0, 15.0, 20.0, 25.0, 30.0],
+        n_active=[1.0, 0.0, 1.0, 1.0, 1.0, 1.0],
     )
     coarse = rows(2, [[4.0, 6.0]], t_end_s=[10.0, 20.0], n_active=[2.0, 1.0])
     study = only(table(fine, coarse))

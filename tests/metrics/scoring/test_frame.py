@@ -158,6 +158,12 @@ def test_the_correction_is_over_levels_and_pairs_of_a_measure_and_nothing_else()
     np.testing.assert_allclose(against["p_holm"], holm(against["p"].to_numpy()))
 
 
+def test_nobody_is_better_by_a_p_value_above_5_percent():
+    (p,) = differences(frame(a=[1.0, 1.5, 2.6], b=[0.0, 0.0, 0.0])).select("p").to_series()
+    assert 0.05 < p < 0.1
+    assert differences(frame(a=[1.0, 1.5, 2.6], b=[0.0, 0.0, 0.0]))["better"].to_list() == [""]
+
+
 def test_nobody_is_better_by_a_difference_that_the_correction_takes_away():
     clear, nothing, zero = [1.0, 1.6, 0.4, 1.2], [0.1, -0.1, 0.2, -0.2], [0.0] * 4
     levels = [("raw_performance", f"N = {n}") for n in range(4, 9)]
@@ -177,6 +183,7 @@ def test_shares_are_tested_on_their_own():
         )
     )
     assert found.select("is_relative", "better").rows() == [(False, "b"), (True, "")]
+    assert found["p_holm"].to_list() == found["p"].to_list(), "each is the only test of its family"
 
 
 def test_undefined_runs_do_not_count_and_infinite_ones_forbid_the_test():
