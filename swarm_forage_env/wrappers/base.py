@@ -275,11 +275,7 @@ class WrapperConfig(Checked):
         Args:
             dt_s: Length of a tick, for what is set per tick.
         """
-        settings = ", ".join(
-            f"{key} {'+'.join(map(str, value)) if isinstance(value, list | tuple) else value}"
-            for key, value in self.to_mapping().items()
-        )
-        return f"{self.name.replace('_', ' ')}: {settings}"
+        raise NotImplementedError
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the fields as plain values, ready for JSON."""

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 import pytest
@@ -36,7 +36,6 @@ Place = tuple[Positive, Positive]
     [
         (Number, -2, -2.0),
         (Number, np.float32(0.5), 0.5),
-        (Positive, 1e-15, 1e-15),
         (Amount, 0, 0.0),
         (Share, 1, 1.0),
         (Count, np.uint8(3), 3),
@@ -45,12 +44,9 @@ Place = tuple[Positive, Positive]
         (Name, "a \u200c b", "a \u200c b"),
         (FileName, "n" * 60, "n" * 60),
         (Place, [1, 2.5], (1.0, 2.5)),
-        (tuple[Place, ...], [[1, 2]], ((1.0, 2.0),)),
-        (Mapping[str, Count], {"a": 1}, {"a": 1}),
         (Whole | None, None, None),
         (bool | int | float | str, 1, 1),
         (Literal["left", "right"], "left", "left"),
-        (Any, [None], [None]),
     ],
 )
 def test_values_become_what_is_declared(kind, value, kept):
@@ -68,7 +64,6 @@ def test_values_become_what_is_declared(kind, value, kept):
         (Share, (1.1, -0.1, math.nan), "to be a number from 0 to 1"),
         (Count, (-1, 1.0, True, "1", None), "to be a whole number >= 0"),
         (Whole, (0, 10**15 + 1, 10**30), "to be a whole number >= 1"),
-        (Annotated[int, Meta(ge=1, le=1000)], (0, 1001), "to be a whole number from 1 to 1,000"),
         (bool, (1, None, "yes"), "to be True or False"),
         (Name, ("", 3, "a\nb", "\x1b[0m", "\u202eb", "\ud800"), "to be a non-empty text without control characters"),
         (FileName, ("../x", "a/b", "a\\b", "C:x", ".a", "", "a\x00", "n" * 61, 7), "to be at most 60 characters"),
@@ -77,7 +72,6 @@ def test_values_become_what_is_declared(kind, value, kept):
         (Annotated[tuple[int, ...], Meta(min_length=1, max_length=2)], ((),), "to have at least 1"),
         (Annotated[tuple[int, ...], Meta(min_length=1, max_length=2)], ((1, 2, 3),), "to have at most 2"),
         (Mapping[str, int], ([], "a", None), "to be a table of values by name"),
-        (Whole | None, (0, "a"), "to be a whole number >= 1"),
         (float | bool, ("a", None, []), "to be a number or True or False"),
         (Literal["left", "right"], ("Lefd", ["left"], None), "to be one of left, right"),
     ],

@@ -15,6 +15,9 @@ class OuterConfig(WrapperConfig):
     def wrap(self, env):
         return type("Outer", (SwarmWrapper,), {"stack_position": 1})(env)
 
+    def in_words(self, dt_s):
+        return f"test outer: groups {'+'.join(self.groups)}"
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class InnerConfig(WrapperConfig):
@@ -24,3 +27,6 @@ class InnerConfig(WrapperConfig):
 
     def wrap(self, env):
         return type("Inner", (SwarmWrapper,), {"stack_position": 4})(env)
+
+    def in_words(self, dt_s):
+        return f"test inner: sigma {self.sigma}"

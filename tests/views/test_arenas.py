@@ -84,31 +84,6 @@ def test_the_arena_ends_with_its_last_robot():
     assert last.active.all()
 
 
-def test_deaths_of_the_population_wrapper_end_rows_once_per_run():
-    wrapped = ArenaPlan(
-        world=World(
-            scenario("warehouse_small", n_robots=6, n_objects=4), (parse_wrapper("population:death_per_tick=0.05"),)
-        ),
-        max_cycles=60,
-        interface=InterfaceConfig(observation="compact"),
-    )
-    batch = ArenaBatch(wrapped, 1)
-    batch.reset([3], [None])
-    actions = np.zeros((6, 3), np.float32)
-    episodes = np.zeros(6, int)
-    n_deaths = 0
-    for tick in range(60):
-        step = batch.step(actions)
-        episodes[step.ended[step.is_episode]] += 1
-        if tick < 59:
-            n_deaths += int(step.terminated.sum())
-            dead = episodes > 0
-            assert not step.obs[dead].any()
-            assert not step.active[dead].any()
-    assert 0 < n_deaths < 6
-    assert episodes.tolist() == [1] * 6
-
-
 def test_an_action_is_kept_for_the_ticks_of_a_decision_and_rewards_add_up():
     batch = ArenaBatch(plan(InterfaceConfig(decision_ticks=3)), 1)
     batch.reset([0], [None])

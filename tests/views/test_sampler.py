@@ -31,12 +31,6 @@ def test_a_seed_is_a_whole_number(seed):
         sampler().world_of(seed)
 
 
-@pytest.mark.parametrize("share", [-0.1, 1.0, float("nan"), "all"])
-def test_a_share_is_a_place_among_the_weights(share):
-    with pytest.raises(ConfigError, match=r"Expected share to be .* got"):
-        sampler().world_of(1, share)
-
-
 def test_worlds_come_as_often_as_their_weights_say_and_wrappers_as_their_probability():
     found = drawn(sampler())
     names = Counter(world.scenario.name for world in found)
