@@ -139,36 +139,10 @@ class SwarmLayer(ABC):
 
     def _packed(self, actions: dict[str, np.ndarray]) -> ActionArray:
         """Return actions by agent as an array (N, A); robots that are away stand and hold, should they come back."""
-        env, agents = self.unwrapped, self.unwrapped.agents
-        if not isinstance(actions, Mapping):
-            raise ActionError(f"Expected actions as a dict by agent, got {type(actions).__name__}.")
-        if actions.keys() != set(agents) and actions.keys() != set(
-            env.possible_agents
-        ):  # those of the dead may be there
-            missing = [agent for agent in agents if agent not in actions]
-            foreign = [agent for agent in actions if agent not in agents]
-            raise ActionError(
-                f"Expected one action for each of the {len(agents)} agents in env.agents, "
-                f"missing {missing[:3] or 'none'}, not in env.agents {foreign[:3] or 'none'}."
-            )
-        size = env.swarm_spec.action_size
-        try:
-            given = np.array([actions[agent] for agent in agents])  # a third of the time of numpy.stack
-            if given.shape != (len(agents), size):
-                raise ValueError("another shape")
-            rows = given.astype(np.float32, casting="same_kind")
-        except (TypeError, ValueError) as error:
-            shapes = {np.shape(actions[agent]) for agent in agents}
-            raise ActionError(
-                f"Expected each action as {size} numbers, shape ({size},), got shapes {sorted(shapes)}: {error}."
-            ) from error
-        packed = rows
-        if len(agents) < len(env.possible_agents):
-            packed = np.zeros((len(env.possible_agents), size), np.float32)
-            packed[[int(agent.removeprefix("robot_")) for agent in agents]] = rows
-        if not env.active.all():
-            packed = at_rest(packed, ~env.active, env.swarm.carried_object >= 0)
-        return packed
+        env = self.unwrapped
+        n_robots, size = len(env.possible_agents), env.swarm_spec.action_size
+        packed = packed_actions(actions, env.agents, env.possible_agents, np.zeros((n_robots, size), np.float32))
+        return packed if env.active.all() else at_rest(packed, ~env.active, env.swarm.carried_object >= 0)
 
     # Snapshots
 
@@ -222,6 +196,45 @@ class SwarmLayer(ABC):
         env = self.unwrapped
         configs = (wrapper.made_from for wrapper in self.stack if wrapper.made_from is not None)
         return [env, env.arena, env.scenario, env.layout, *self.stack, *configs]
+
+
+def packed_actions(
+    actions: Mapping[str, Any], agents: Collection[str], possible_agents: Collection[str], out: np.ndarray
+) -> np.ndarray:
+    """Write actions by agent into the rows of the agents, and return these.
+
+    Args:
+        actions: One for each agent that is left, or for each possible one: those of the dead are ignored.
+        agents: Those that are left.
+        possible_agents: All.
+        out: (N, ...) zeros.
+
+    Raises:
+        ActionError: no such actions, or one of another shape or type.
+    """
+    if not isinstance(actions, Mapping):
+        raise ActionError(f"Expected actions as a dict by agent, got {type(actions).__name__}.")
+    if actions.keys() != set(agents) and actions.keys() != set(possible_agents):
+        missing = [agent for agent in agents if agent not in actions]
+        foreign = [agent for agent in actions if agent not in agents]
+        raise ActionError(
+            f"Expected one action for each of the {len(agents)} agents in env.agents, "
+            f"missing {missing[:3] or 'none'}, not in env.agents {foreign[:3] or 'none'}."
+        )
+    try:
+        given = np.array([actions[agent] for agent in agents])  # a third of the time of numpy.stack
+        if given.shape != (len(agents), *out.shape[1:]):
+            raise ValueError("another shape")
+        given = given.astype(out.dtype, casting="same_kind")
+    except (TypeError, ValueError) as error:
+        shapes = sorted({np.shape(actions[agent]) for agent in agents})
+        raise ActionError(
+            f"Expected each action as {out.dtype} of shape {out.shape[1:]}, got shapes {shapes}: {error}."
+        ) from error
+    if len(agents) == len(out):
+        return given
+    out[[int(agent.removeprefix("robot_")) for agent in agents]] = given
+    return out
 
 
 def at_rest(actions: np.ndarray, away: BoolArray, carrying: BoolArray) -> np.ndarray:

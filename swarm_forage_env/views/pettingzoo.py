@@ -10,7 +10,7 @@ from pettingzoo.utils.conversions import parallel_to_aec
 from swarm_forage_env.contract.layout import ObservationLayout
 from swarm_forage_env.contract.policy import SwarmSpec, state_size
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.layer import is_over
+from swarm_forage_env.layer import is_over, packed_actions
 from swarm_forage_env.policies.interface import LearnerInterface
 from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.plans import constructor_takes, plan_arena, takes
@@ -117,15 +117,14 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
 
         Raises:
             RuntimeError: not reset, or actions although all agents are done.
-            ValueError: an agent without an action, or actions outside of its action space.
+            ActionError: an agent without an action, or actions outside of its action space.
         """
         if is_over(self.agents, actions, is_reset=self.forage_env.seed_value is not None):
             return {}, {}, {}, {}, {}
-        missing = [agent for agent in self.agents if agent not in actions]
-        if missing:
-            raise ValueError(f"Expected an action for each of the {len(self.agents)} agents, missing {missing[:3]}.")
-        chosen = self._chosen(actions)
-        rewards = np.zeros(self._arena.n_robots, np.float32)
+        space, n_robots = self.interface.action_space, self._arena.n_robots
+        rows = np.zeros((n_robots, *(space.shape or ())), space.dtype)
+        chosen = packed_actions(actions, self.agents, self.possible_agents, rows)
+        rewards = np.zeros(n_robots, np.float32)
         self._arena.step(chosen, rewards)
         dead, truncated = self.forage_env.terminated, self.forage_env.tick >= self.forage_env.max_cycles
         results = (
@@ -137,21 +136,6 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
         )
         self.agents = [] if truncated else [agent for agent in self.agents if not dead[self._row_of[agent]]]
         return results
-
-    def _chosen(self, actions: dict[str, Any]) -> np.ndarray:
-        """Return one row per robot; zeros for robots that have left."""
-        space = self.interface.action_space
-        given = {agent: np.asarray(actions[agent]) for agent in self.agents}
-        # Assigning to an array would broadcast arrays that are too small and truncate fractions.
-        for agent, action in given.items():
-            if action.shape != space.shape or not np.can_cast(action.dtype, space.dtype, casting="same_kind"):
-                raise ValueError(
-                    f"Expected an action of {space} for {agent}, got {action.dtype} with shape {action.shape}."
-                )
-        chosen = np.zeros((self._arena.n_robots, *(space.shape or ())), space.dtype)
-        for agent, action in given.items():
-            chosen[self._row_of[agent]] = action
-        return chosen
 
     def _per_agent(self, rows: Any) -> dict[str, Any]:
         return {agent: rows[self._row_of[agent]] for agent in self.agents}

@@ -120,5 +120,5 @@ def test_wrappers_of_others_find_a_generator_that_follows_the_seed(interface):
 def test_actions_that_would_have_to_be_stretched_or_cut_are_refused(interface, action):
     env = ParallelLearnerEnv("warehouse_small", n_robots=2, interface=INTERFACES[interface])
     env.reset(seed=0)
-    with pytest.raises(ValueError, match=r"Expected an action of .* for robot_0"):
+    with pytest.raises(ValueError, match=r"Expected each action as .* of shape"):
         env.step(dict.fromkeys(env.agents, action))
