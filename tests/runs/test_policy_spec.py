@@ -8,7 +8,7 @@ from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.model_files import file_digest
 from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.policies.registry import RandomPolicy
-from swarm_forage_env.runs.spec import PolicySpec, policy_spec, policy_specs
+from swarm_forage_env.runs.spec import PolicySpec, plan_run, policy_spec, policy_specs
 
 
 class ForStatic(RandomPolicy):
@@ -25,7 +25,7 @@ def network_in(tmp_path):
 
     def write(folder, seed=0):
         path = tmp_path / folder / "net.npz"
-        path.parent.mkdir(parents=True)
+        path.parent.mkdir(exist_ok=True)
         weights = np.random.default_rng(seed).normal(size=(23, 6)).astype(np.float32)
         interface = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True)
         about = NetworkAbout(interface=interface, activation="tanh", samples=False, caches="static")
@@ -51,6 +51,19 @@ def test_a_file_is_pinned_by_its_digest(network_in):
     assert found == policy_spec(str(path))
     assert (found.label, found.policy, found.caches) == ("net", str(path), "static")
     assert found.parameters == {"digest": file_digest(path)}
+
+
+def test_the_content_of_a_file_is_part_of_the_identity_of_its_runs(network_in, monkeypatch):
+    path = network_in("a")
+    monkeypatch.chdir(path.parent)
+    first = plan_run("warehouse_small", "net.npz")
+    assert first == plan_run("warehouse_small", str(path))
+    assert first == plan_run("warehouse_small", path, parameters=first.parameters)
+    assert first.scenario.caches == "static"
+    network_in("a", seed=1)
+    assert plan_run("warehouse_small", path).run_id != first.run_id
+    with pytest.raises(ValueError, match="a file that has changed since"):
+        plan_run("warehouse_small", path, parameters=first.parameters)
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,9 @@
 import json
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.policies.interface import InterfaceConfig
-from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.policies.registry import POLICIES, policy_class
 from swarm_forage_env.runs.spec import RunSpec, plan_run
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
@@ -144,35 +141,3 @@ def test_wrappers_are_added_to_those_of_the_world():
     assert (spec.scenario.caches, spec.world.criterion, spec.world.value) == ("static", "noise", 0.1)
     with pytest.raises(ConfigError, match="each wrapper at most once"):
         plan_run(world, "crw", wrappers=[InnerConfig()])
-
-
-def network_file(path, *, caches="none", seed=0):
-    """A network from compact observations to motions, with random weights."""
-    weights = np.random.default_rng(seed).normal(size=(23, 6)).astype(np.float32)
-    interface = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True)
-    network = Network(
-        (weights,),
-        (np.zeros(6, np.float32),),
-        NetworkAbout(interface=interface, activation="tanh", samples=False, caches=caches),
-    )
-    network.save(path)
-    return path
-
-
-def test_the_content_of_a_policy_file_is_part_of_the_runs_identity(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    world = scenario("warehouse_small")
-    network_file(tmp_path / "net.npz")
-    first = plan_run(world, "net.npz")
-    assert first == plan_run(world, str(tmp_path / "net.npz"))
-    network_file(tmp_path / "net.npz", seed=1)
-    assert plan_run(world, "net.npz").run_id != first.run_id
-
-
-def test_a_pinned_file_is_opened_to_learn_what_caches_it_is_made_for(tmp_path):
-    path = str(network_file(tmp_path / "net.npz", caches="static"))
-    pinned = plan_run(scenario("warehouse_small"), path).parameters
-    assert plan_run(scenario("warehouse_small"), path, parameters=pinned).scenario.caches == "static"
-    network_file(tmp_path / "net.npz", seed=1)
-    with pytest.raises(ValueError, match="a file that has changed since"):
-        plan_run(scenario("warehouse_small"), path, parameters=pinned)
