@@ -137,7 +137,8 @@ class StudyPanel:
             shares = {name: values / totals[name] for name, values in found.items()}
         if self.measure != "spatial_emergence":
             return shares
-        one = np.mean(self._unit[kept] / mean_of([*totals.values()]))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            one = np.mean(self._unit[kept] / mean_of([*totals.values()]))
         return {name: values / one for name, values in shares.items()}
 
     @property

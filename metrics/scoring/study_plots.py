@@ -3,12 +3,12 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import polars as pl
 
-from swarm_forage_env._internal.fields import known_name
+from swarm_forage_env._internal.fields import instance, known_name
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env.rendering.figures import (
     COLOURS,
@@ -24,6 +24,7 @@ from swarm_forage_env.rendering.figures import (
     saved_panels,
     size_axis,
 )
+from swarm_forage_env.studies.results import StudyTable
 from swarm_forage_env.wrappers.world import SIZE
 
 from ..checks import CurveError
@@ -33,9 +34,6 @@ from .frame import label_of, words_of
 from .measures import MEASURES
 from .plots import FEWEST_RUNS, X_LABELS
 from .study_numbers import StudyPanel, study_panels
-
-if TYPE_CHECKING:
-    from swarm_forage_env.studies.results import StudyTable
 
 Band: TypeAlias = Literal["ci", "sd"]
 """What bars are: the 95 % confidence interval of the mean, or the mean plus and minus two standard deviations."""
@@ -252,6 +250,7 @@ def plot(
         ValueError: the study gives nothing to draw, or an unknown band, format or variant.
         ImportError: matplotlib is not installed.
     """
+    instance("table", table, StudyTable, hint="; read_study(path) reads one")
     known_name("band", band, _BANDS)
     panels, missing = study_panels(table, variants)
     figures = study_figures(panels)

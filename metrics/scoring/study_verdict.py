@@ -3,13 +3,15 @@
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 import polars as pl
 import polars.selectors as cs
 
+from swarm_forage_env._internal.fields import instance
 from swarm_forage_env.sheet import Answer, Sheet
-from swarm_forage_env.studies.study import is_set_of_paper, left_out, load_study
+from swarm_forage_env.studies.results import StudyTable
+from swarm_forage_env.studies.study import StudySpec, is_set_of_paper, left_out, load_study
 from swarm_forage_env.studies.study_file import PAPER
 
 from ..checks import CurveError
@@ -18,10 +20,6 @@ from ..claims.contrast import Answer as ClaimAnswer
 from ..claims.panel import TRIED
 from ..claims.verdict import Reading
 from .study_numbers import StudyPanel, study_panels
-
-if TYPE_CHECKING:
-    from swarm_forage_env.studies.results import StudyTable
-    from swarm_forage_env.studies.study import StudySpec
 
 EVERY: dict[str, Claim] = {**CLAIMS, **INTUITIONS}
 ANSWERS: tuple[str, ...] = get_args(ClaimAnswer)
@@ -129,6 +127,8 @@ def verdict(*tables: "StudyTable", tell: Callable[[str], None] | None = None) ->
     Raises:
         CurveError: a study twice under the same rules, one of none of the paper's sets, or without its policies.
     """
+    for table in tables:
+        instance("a study", table, StudyTable, hint="; read_study(path) reads one")
     under = [f"{table.spec.name} ({rules})" for table in tables for rules in table.spec.rules]
     if len(set(under)) < len(under):
         raise CurveError(f"Expected each study once under the same rules, got {', '.join(under)}.")

@@ -95,6 +95,8 @@ def from_callable(function: Callable[[ObsArray], ActionArray], *, name: str | No
         function: Takes (N, D) observations, returns (N, 3) actions; with messages, (N, 3 + message_size).
         name: Name under which results are stored; default the function's own name.
     """
+    if not callable(function):
+        raise ConfigError(f"Expected function to be callable, got {function!r}.")
     return CallablePolicy(function, name or getattr(function, "__name__", type(function).__name__))
 
 

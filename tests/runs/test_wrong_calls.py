@@ -2,6 +2,7 @@
 
 import pytest
 
+from metrics import plot, verdict
 from swarm_forage_env import (
     ConfigError,
     Plan,
@@ -11,12 +12,14 @@ from swarm_forage_env import (
     build_stack,
     check_determinism,
     check_policy,
+    from_callable,
     load_study,
     parse_wrapper,
     plan_run,
     policy_specs,
     read_study,
     record_replay,
+    record_run,
     rerun,
     run_all,
     run_one,
@@ -69,6 +72,10 @@ def test_one_or_several_names_or_objects_are_taken_by_all_alike():
         (lambda: check_determinism("random", TINY, seconds=-4), "seconds to be a number > 0, got -4"),
         (lambda: with_overrides("classroom", n_robots=3), r"config to be a ScenarioConfig.* scenario\(name\)"),
         (lambda: parse_wrapper(parse_wrapper(NOISE)), "a wrapper to be a text"),
+        (lambda: verdict("results"), r"a study to be a StudyTable, got 'results'; read_study\(path\) reads one"),
+        (lambda: plot("results", "figures"), r"table to be a StudyTable, got 'results'; read_study\(path\)"),
+        (lambda: from_callable(3), "function to be callable, got 3"),
+        (lambda: record_run(TINY, RandomPolicy, "x.gif", seconds=2.0), "a policy object with reset and act"),
     ],
 )
 def test_a_wrong_call_is_told_in_a_line(call, told):

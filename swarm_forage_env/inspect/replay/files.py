@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import ConfigError, checked
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.wording import shown
 from swarm_forage_env.contract.codes import Counter, Task
@@ -67,7 +67,7 @@ def write_replays(path: str | Path, replays: Replay | Sequence[Replay], *, title
     replays = (replays,) if isinstance(replays, Replay) else tuple(replays)
     if not replays:
         raise ConfigError("Expected at least one replay to write, got none.")
-    path = Path(path)
+    path = Path(checked("path", path, str | Path))
     page = page_of(replays, title=title)
     with replacing(path) as draft:
         draft.write_text(page, encoding="utf-8")
