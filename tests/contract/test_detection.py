@@ -19,7 +19,7 @@ from swarm_forage_env.contract.detection import (
     sees_object,
     sees_obstacle,
 )
-from tests.support.stage import build_cache, cell_centre, lay, put, tidy_world
+from tests.support.stage import cell_centre, lay, put, tidy_world
 
 FAR_BEHIND_RAD = 2.61
 OBSTACLE_LENGTH = 0.1
@@ -145,18 +145,6 @@ def test_an_object_is_seen_within_3_7_cm_along_the_heading(stage, ahead, left, s
     cos, sin = math.cos(heading), math.sin(heading)
     put(stage, 0, x + cos * ahead - sin * left, y + sin * ahead + cos * left, heading)
     assert sees_object(sensed(stage, "ground")) == seen
-
-
-def test_nest_and_cache_are_seen_from_inside():
-    env = tidy_world(n_robots=3, caches="static")
-    build_cache(env, [0, 1], (60, 40))
-    put(env, 0, *cell_centre((60, 40)))
-    put(env, 1, *cell_centre((16, 40)))
-    put(env, 2, *cell_centre((100, 60)))
-    grounds = [sensed(env, "ground", robot) for robot in range(3)]
-    assert [sees_cache(row) for row in grounds] == [True, False, False]
-    assert [sees_nest(row) for row in grounds] == [False, True, False]
-    assert [sees_object(row) for row in grounds] == [False, False, False]
 
 
 @pytest.mark.parametrize(("apart", "obstacle"), [(0.28, False), (0.26, True)])

@@ -98,16 +98,6 @@ def test_equals_the_slow_twin(world):
 # What stays exact
 
 
-def test_exact_columns_stay_exact(world):
-    obs = middling_obs(world)
-    seen = noisy(world, obs, 5, sigma=10.0)
-    for part in world.layout:
-        exact = part.noise_group == ""
-        columns = world.layout[part.name]
-        same = np.array_equal(seen[:, :, columns], np.broadcast_to(obs[:, columns], seen[:, :, columns].shape))
-        assert same == exact, part.name
-
-
 def test_a_group_may_have_a_sigma_of_its_own(world):
     obs = middling_obs(world)
     seen = noisy(world, obs, 20, sigma=0.02, groups=("proximity", "ground"), sigmas={"ground": 0.1, "light": 0.04})
