@@ -84,7 +84,6 @@ class EntryPolicy:
     """Name for people, see `swarm_forage_env.policies.registry.policy_label`; for a file without folder and ending."""
     digest: str = ""
     """Hash of the content of its file; empty without a file."""
-    training_seed: Count | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -266,11 +265,7 @@ def run_benchmark(
         protocol=chosen.identity,
         name=name,
         command=entry_command([spec.policy for spec in specs], name, training=told),
-        policies=tuple(
-            EntryPolicy(name=policy_label(spec.policy), digest=digest, training_seed=seed)
-            for spec in specs
-            for digest, seed in [policy_origin(spec.policy)]
-        ),
+        policies=tuple(EntryPolicy(name=policy_label(each.policy), digest=digest_of(each.policy)) for each in specs),
         runs={
             world.name: WorldRuns(
                 performance=_of_all(table, world.name, lambda record: record.per_1000_s("performance")),
@@ -310,16 +305,10 @@ def entry_command(policies: Sequence[str], name: str, *, training: Training | No
     return shlex.join(["swarm-forage", "benchmark", *words])
 
 
-def policy_origin(policy: str) -> tuple[str, int | None]:
-    """Return the digest of a policy's file, and the seed of its training as far as the file tells it."""
+def digest_of(policy: str) -> str:
+    """Return the hash of the content of a policy's file; empty without a file."""
     from swarm_forage_env.policies.model_files import file_digest
-    from swarm_forage_env.policies.network import Network
     from swarm_forage_env.policies.pretrained import network_file
 
     file = Path(file_of(policy)) if is_policy_file(policy) else network_file(policy)
-    if file is None:
-        return "", None
-    card: dict[str, Any] = Network.load(file).about.card if file.suffix == ".npz" else {}
-    plan: Any = card.get("plan")
-    seed = dict[str, Any](plan).get("seed") if isinstance(plan, dict) else None  # pyright: ignore[reportUnknownArgumentType] - a card holds anything
-    return file_digest(file), seed if isinstance(seed, int) else None
+    return "" if file is None else file_digest(file)

@@ -10,7 +10,7 @@ from swarm_forage_env.runs.plan import Condition, Plan, run_plan
 from swarm_forage_env.runs.spec import policy_specs
 from swarm_forage_env.sheet import Sheet
 
-from .entry import check_finished, policy_origin, read_entry, six_digits
+from .entry import check_finished, digest_of, read_entry, six_digits
 from .protocol import BenchmarkError, load_protocol
 
 SAME = "same"
@@ -43,7 +43,7 @@ def verify_entry(
     if not policies and not set(names) <= set(POLICIES):
         raise BenchmarkError(f"Expected --policy FILE,... for each of {', '.join(names)}, in this order, got none.")
     specs = policy_specs(policies or names)
-    if [policy_origin(spec.policy)[0] for spec in specs] != [policy.digest for policy in entry.policies]:
+    if [digest_of(spec.policy) for spec in specs] != [policy.digest for policy in entry.policies]:
         raise BenchmarkError(f"Expected the policies of {file} in their order ({', '.join(names)}), got others.")
     pairs = [(k, world) for k in range(len(specs)) for world in protocol.worlds]
     drawn: list[int] = sorted(np.random.default_rng(seed).permutation(len(pairs))[:n_worlds].tolist())

@@ -10,7 +10,7 @@ import csv
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -173,7 +173,7 @@ def study_curves(
         held = [name for name in (*INTERVAL_COLUMNS, "interval") if name in part.columns and part[name].count()]
         for name in held if not events else ():
             wanted = f"a value, as in other intervals with N = {key[-1]}"
-            _refuse_rows(part, pl.col(name).is_null(), given, name, wanted)
+            given.refuse(part.filter(pl.col(name).is_null())["row"], name, wanted)
         for (seed,), run in part.sort(clock).partition_by("seed", as_dict=True, maintain_order=True).items():
             found[*key, seed] = _delivered(run) if events else _curve(run, seed, held, given)
     if events:
@@ -246,7 +246,7 @@ class _Given:
             raise CurveError(f"Expected texts or numbers in column {name} of {self.where}, got {given.dtype}.")
         texts = given.cast(pl.String).replace("", None)
         if kind == "text":
-            self.refuse(texts.is_null(), name, "a text")
+            self.refuse(texts.is_null().arg_true(), name, "a text")
             return texts
         values = texts.cast(pl.Float64, strict=False)
         if name == TIME and values.null_count() == len(values):
@@ -254,27 +254,22 @@ class _Given:
                 dates = texts.str.to_datetime(strict=False)
             except pl.exceptions.ComputeError:  # no form of dates fits the first ones
                 dates = values
-            self.refuse(dates.is_null(), TIME, "a number of seconds, or a date and time")
+            self.refuse(dates.is_null().arg_true(), TIME, "a number of seconds, or a date and time")
             return dates
         wanted, is_right = _KINDS[kind]
         is_known = (values.is_finite() & (values.abs() <= MOST) & is_right(values)).fill_null(False)
-        self.refuse(~is_known & (texts.is_not_null() | (name in _IN_EACH_ROW)), name, wanted)
+        is_bad = ~is_known & (texts.is_not_null() | (name in _IN_EACH_ROW))
+        self.refuse(is_bad.arg_true(), name, wanted)
         return values.cast(pl.Int64) if kind == "whole" else values
 
-    def refuse(self, is_bad: pl.Series, name: str, wanted: str) -> None:
-        """Raise an error about the first row that is bad, if there is one."""
-        row = is_bad.arg_max()
-        if row is not None and is_bad[row]:
-            self.refuse_row(row, name, wanted)
-
-    def refuse_row(self, row: int, name: str, wanted: str) -> NoReturn:
-        """Raise an error about one cell."""
-        theirs = self.theirs.get(name, name)
-        got = self.frame[name][row]
-        raise CurveError(
-            f"Expected {wanted} in line {self.frame[_LINE][row]} of {self.where}, column {theirs}"
-            f"{'' if theirs == name else f' ({name})'}, got {'nothing' if got in (None, '') else shown(got)}."
-        )
+    def refuse(self, rows: pl.Series, name: str, wanted: str) -> None:
+        """Raise an error about the first of some rows, if there is one."""
+        for row in rows:
+            theirs, got = self.theirs.get(name, name), self.frame[name][row]
+            raise CurveError(
+                f"Expected {wanted} in line {self.frame[_LINE][row]} of {self.where}, column {theirs}"
+                f"{'' if theirs == name else f' ({name})'}, got {'nothing' if got in (None, '') else shown(got)}."
+            )
 
 
 def _is_number(text: str) -> bool:
@@ -290,14 +285,15 @@ def _with_experiments(table: pl.DataFrame, given: _Given, controller: str) -> pl
         table = table.with_columns(criterion=pl.lit(SIZE))
     if "controller" not in table.columns:
         table = table.with_columns(controller=pl.lit(controller))
-    given.refuse(~table["criterion"].is_in(CRITERIA), "criterion", f"one of {', '.join(CRITERIA)}")
-    given.refuse(~table["n_robots"].is_between(1, MOST_ROBOTS), "n_robots", f"1 to {MOST_ROBOTS:,} robots")
+    given.refuse((~table["criterion"].is_in(CRITERIA)).arg_true(), "criterion", f"one of {', '.join(CRITERIA)}")
+    is_swarm = table["n_robots"].is_between(1, MOST_ROBOTS)
+    given.refuse((~is_swarm).arg_true(), "n_robots", f"1 to {MOST_ROBOTS:,} robots")
     value = pl.when(criterion=SIZE).then(pl.col("n_robots").cast(pl.Float64)).when(criterion=UNDISTURBED).then(0.0)
     if not table["criterion"].is_in((SIZE, UNDISTURBED)).all():
         given.require("criterion_value")
         value = value.otherwise("criterion_value")
     table = table.with_columns(value.alias("criterion_value"))
-    given.refuse(table["criterion_value"].is_null(), "criterion_value", "a number")
+    given.refuse(table["criterion_value"].is_null().arg_true(), "criterion_value", "a number")
     return table
 
 
@@ -305,10 +301,10 @@ def _curve(run: pl.DataFrame, seed: object, names: list[str], given: _Given) -> 
     """Return the columns of a run, whose intervals follow each other."""
     if "interval" in names:
         wrong = pl.col("interval") != pl.int_range(pl.len()) + min(run["interval"][0], 1)
-        _refuse_rows(run, wrong, given, "interval", f"the next interval of run {seed}, each once")
+        given.refuse(run.filter(wrong)["row"], "interval", f"the next interval of run {seed}, each once")
     if END in names:
         wrong = pl.col(END).diff().fill_null(pl.col(END).first()) <= 0.0
-        _refuse_rows(run, wrong, given, END, f"a later end of an interval of run {seed}")
+        given.refuse(run.filter(wrong)["row"], END, f"a later end of an interval of run {seed}")
     return {name: run[name].to_numpy() for name in names if name != "interval"}
 
 
@@ -319,12 +315,6 @@ def _delivered(run: pl.DataFrame) -> dict[str, FloatArray]:
         times = (times - times.min()).dt.total_microseconds() / 1e6
     delivered = run["performance"].to_numpy() if "performance" in run.columns else np.ones(len(run))
     return {TIME: times.to_numpy(), "performance": delivered}
-
-
-def _refuse_rows(part: pl.DataFrame, is_bad: pl.Expr, given: _Given, name: str, wanted: str) -> None:
-    """Raise an error about the first bad row of a part of the table, if there is one."""
-    for row in part.filter(is_bad)["row"]:
-        given.refuse_row(row, name, wanted)
 
 
 def _experiment(key: tuple[Any, ...], runs: Runs, rates: PopulationRates | None, ends: FloatArray | None) -> RunCurves:
@@ -348,6 +338,6 @@ def _rates(part: pl.DataFrame, given: _Given) -> PopulationRates | None:
         if name in part.columns and part[name].count():
             first = part[name][0]
             wanted = f"the same rate in each row of {part['criterion'][0]} {part['criterion_value'][0]:g}"
-            _refuse_rows(part, pl.col(name).ne_missing(first), given, name, wanted)
+            given.refuse(part.filter(pl.col(name).ne_missing(first))["row"], name, wanted)
             rates[rate] = first
     return PopulationRates(**rates) if rates else None

@@ -23,7 +23,7 @@ from ..interference import performance_lost
 from ..population import availability, population_robustness, recorded_population_robustness
 from ..queues import PopulationRates
 from ..scaling import efficiency, raw_performance, scalability
-from .run_curves import HANDLING, NOISE, POPULATION, THROTTLE, RunCurves, StudyCurves, common_runs
+from .run_curves import HANDLING, NOISE, POPULATION, THROTTLE, RunCurves, StudyCurves, shared_seeds
 
 DISTURBANCES = (THROTTLE, HANDLING)
 """Kinds of disturbance over time, the paper's two, under which reactivity and adaptability can be scored."""
@@ -75,11 +75,9 @@ class Compared(NamedTuple):
 
     def paired(self) -> "Compared":
         """Return the runs with those seeds alone that all of them have."""
-        if self.one is None:
-            base, runs = common_runs(self.base, self.runs)
-            return self._replace(base=base, runs=runs)
-        one, base, runs = common_runs(self.one, self.base, self.runs)
-        return self._replace(one=one, base=base, runs=runs)
+        seeds = shared_seeds([each for each in (self.one, self.base, self.runs) if each is not None])
+        one = None if self.one is None else self.one.at_seeds(seeds)
+        return self._replace(one=one, base=self.base.at_seeds(seeds), runs=self.runs.at_seeds(seeds))
 
 
 @dataclass(frozen=True)
@@ -341,8 +339,9 @@ def _sizes(measure: Measure, study: StudyCurves, variant: Variant, form: Form) -
 
 def _falls(previous: RunCurves, larger: RunCurves) -> bool:
     """Whether the mean performance is lower than that of the next smaller swarm."""
-    few, many = common_runs(previous, larger)
-    return bool(few.seeds) and float(many.performance.sum()) < float(few.performance.sum())
+    seeds = shared_seeds((previous, larger))
+    few, many = (float(each.at_seeds(seeds).performance.sum()) if seeds else 0.0 for each in (previous, larger))
+    return many < few
 
 
 def _disturbed(name: str, study: StudyCurves, variant: Variant) -> Iterator[Compared]:

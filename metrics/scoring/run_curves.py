@@ -209,12 +209,6 @@ class StudyCurves:
         )
 
 
-def common_runs(*experiments: RunCurves) -> tuple[RunCurves, ...]:
-    """Return the experiments with only those runs whose number all of them have, paired by it."""
-    shared = shared_seeds(experiments)
-    return tuple(experiment.at_seeds(shared) for experiment in experiments)
-
-
 def shared_seeds(experiments: Sequence[RunCurves]) -> list[int]:
     """Return the numbers of the runs that all experiments have."""
     first, *others = (experiment.seeds for experiment in experiments)

@@ -32,7 +32,7 @@ def made_up_entry(
     return Entry(
         protocol=protocol.identity,
         name=name,
-        policies=tuple(EntryPolicy(name=f"{name}_{k}.npz", training_seed=k) for k in range(n_policies)),
+        policies=tuple(EntryPolicy(name=f"{name}_{k}.npz") for k in range(n_policies)),
         runs=runs,
         **given,
     )

@@ -9,7 +9,7 @@ from typing import Any
 
 VARIES = "<varies>"
 _VARYING_FIELDS = {
-    "commit", "core_hours", "cpu_time_s", "created", "digest", "simulated_s_per_wall_s",
+    "commit", "cpu_time_s", "created", "digest", "simulated_s_per_wall_s",
     "traceback", "versions", "wall_time_s",
 }  # fmt: skip
 """Fields of JSON documents; the digest of an entry is also of its versions and hours."""

@@ -46,8 +46,8 @@ def test_an_entry_has_the_runs_of_all_policies(entry, protocol):
 
 def test_an_entry_tells_how_it_was_made(entry):
     crw, ppo = entry.policies
-    assert (crw.name, crw.digest, crw.training_seed) == ("crw", "", None)
-    assert (ppo.name, len(ppo.digest), ppo.training_seed) == ("ppo_warehouse_small", 16, 0)
+    assert (crw.name, crw.digest) == ("crw", "")
+    assert (ppo.name, len(ppo.digest)) == ("ppo_warehouse_small", 16)
     assert (entry.training.command, entry.training.track) == ("a command", "open")
     assert entry.versions["swarm-forage-env"]
 
