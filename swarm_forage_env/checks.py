@@ -27,6 +27,7 @@ from swarm_forage_env.contract.layout import LIGHT_IF_CARRYING, ObservationLayou
 from swarm_forage_env.contract.policy import Policy, SwarmSpec, sees_world
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.layer import at_rest
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import LiveRun, build_stack
 from swarm_forage_env.runs.spec import policy_spec
@@ -135,7 +136,8 @@ def _batch_run(env: ForageEnv | SwarmWrapper, actions: Sequence[dict[str, Any]])
         if not staying:
             break
         packed = np.array([chosen[name] * (name in staying) for name in names], np.float32)
-        obs, rewards, ended, cut = env.step_batch(packed)
+        away, carrying = ~env.unwrapped.active, env.unwrapped.swarm.carried_object >= 0
+        obs, rewards, ended, cut = env.step_batch(at_rest(packed, away, carrying))
         rows = [(row, name) for row, name in enumerate(names) if name in staying]
         run.append({name: (obs[row].copy(), rewards[row], ended[row], cut) for row, name in rows})
     return run

@@ -204,7 +204,8 @@ class SwarmWrapper(SwarmLayer, BaseParallelWrapper):
         """Advance the stack by one tick; see `ForageEnv.step_batch`.
 
         Args:
-            actions: (N, A) float32 in [-1, 1].
+            actions: (N, A) float32 in [-1, 1]. Rows of robots that are away are ignored; one that comes back to work in
+                this tick acts by its row.
             wheel_gain: (N, 2) factors on the wheel speeds, None = all 1.
             tasks: (N,) int8 `contract.codes.Task` codes, None = the policy has no tasks.
 
