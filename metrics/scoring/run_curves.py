@@ -14,9 +14,7 @@ from swarm_forage_env.runs.plan import Condition, Curves, Table
 from swarm_forage_env.runs.record import Record
 from swarm_forage_env.scenarios.columns import ALL_COLUMNS, Column
 from swarm_forage_env.scenarios.performance import (
-    PERFORMANCE_COLUMNS,
     Performance,
-    performance_curve,
     performance_of,
 )
 from swarm_forage_env.studies.study_file import value_words
@@ -312,15 +310,10 @@ class StudyLine:
     """One experiment per condition, in the same order; `scores` takes it."""
 
 
-def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[StudyLine, ...]:
-    """Return the lines of a study, in the order of its conditions.
+def study_lines(table: "StudyTable") -> tuple[StudyLine, ...]:
+    """Return the lines of a study from `read_study`, in the order of its conditions.
 
-    Args:
-        table: From `swarm_forage_env.read_study`. Failed and missing runs count as planned and lost.
-        performance: What P(N, t) is, by a name as in `score`; default that of the scenario.
-
-    Raises:
-        ValueError: no such performance.
+    Failed and missing runs count as planned and lost.
     """
     spec = table.spec
     names = [axis.name for axis in spec.axes[:-1]]
@@ -331,8 +324,7 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
     lines: list[StudyLine] = []
     for places in places_of.values():
         first = places[0]
-        read_as = performance_of(performance or spec.world(first).scenario.performance)
-        runs = [(spec.world(place), _place_curves(table, place, performance)) for place in places]
+        runs = [(spec.world(place), table.curves(place, *INTERVAL_COLUMNS)) for place in places]
         lines.append(
             StudyLine(
                 rules=first.rules,
@@ -344,21 +336,13 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
                     runs,
                     len(spec.seeds),
                     controller=first.policy,
-                    read_as=read_as,
+                    read_as=performance_of(runs[0][0].scenario.performance),
                     reference_value=_reference_value(table, places),
                     where=f"study {spec.name}",
                 ),
             )
         )
     return tuple(lines)
-
-
-def _place_curves(table: "StudyTable", place: "Place", performance: str | None) -> Curves:
-    """The finished runs of a condition of a study, with the performance that is asked for."""
-    seeds, columns = table.curves(place, *{*INTERVAL_COLUMNS, *PERFORMANCE_COLUMNS})
-    if performance is not None and seeds:
-        columns["performance"] = performance_curve(performance, columns)
-    return seeds, columns
 
 
 def _reference_value(table: "StudyTable", places: "list[Place]") -> float:

@@ -1,6 +1,5 @@
 """Curves of a study's table: lines of figures, references found by the axes, scores."""
 
-import numpy as np
 import pytest
 
 from metrics.scoring.frame import scores
@@ -57,13 +56,10 @@ def test_the_lowest_rates_may_be_the_reference(made):
     assert found["x"].unique(maintain_order=True).to_list() == [2.0, 4.0]
 
 
-def test_lost_runs_are_counted_and_another_performance_is_read(made, tmp_path):
+def test_lost_runs_are_counted(made, tmp_path):
     table = made(Axis(name="noise", values=(0.0, 0.02)))
     noisy = table.spec.places[-1]
     record_file(tmp_path / "runs", table.spec.specs_of(noisy)[1].run_id).unlink()
-    (line,) = study_lines(read_study(tmp_path), "n_active")
+    (line,) = study_lines(read_study(tmp_path))
     reference, level = line.curves.experiments
     assert (reference.n_lost, level.n_lost, level.seeds) == (0, 1, (0,))
-    np.testing.assert_array_equal(level.performance, level.curves["n_active"])
-    assert line.curves.read_as.amount == "robots"
-    assert not line.curves.read_as.is_total
