@@ -57,6 +57,10 @@ def test_it_plays_pauses_and_steps(request, kind, session):
     browser.wait_for(f"{SECONDS} > 3")
     browser.click("#play")
     browser.wait_for("document.getElementById('play').ariaLabel === 'Play'")
+    browser.click("#theme")  # a space is for the page, and not for what was clicked last
+    for word in ("Pause", "Play"):
+        browser.press(" ")
+        browser.wait_for(f"document.getElementById('play').ariaLabel === '{word}'")
     tick = session.world.tick
     browser.click("#step")
     browser.wait_for("document.getElementById('note').textContent === 'one tick'")

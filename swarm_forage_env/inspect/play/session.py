@@ -194,7 +194,9 @@ class PlaySession:
         try:
             here = with_overrides(world.scenario, obstacles=walls)
         except ConfigError as error:
-            raise ConfigError(f"A wall cannot stand there. {error}") from error
+            raise ConfigError(
+                "A wall cannot stand there: it must be clear of the nest and of caches, and leave room for all objects."
+            ) from error
         self._begin(replace(self.setting, world=replace(world, scenario=here, wrappers=self.levels.configs)))
         return f"started again with {len(walls)} wall{'' if len(walls) == 1 else 's'}"
 

@@ -197,7 +197,7 @@ class PlayPage {
   drawWalls(wanted) {
     this.drawsWalls = wanted;
     document.getElementById("wall").setAttribute("aria-pressed", String(wanted));
-    this.repaint();
+    this.hideTip(); // it would cover a wall that is drawn
   }
 
   async save() {

@@ -8,6 +8,7 @@ const theme = {
   start() {
     const system = matchMedia("(prefers-color-scheme: dark)");
     this.set(system.matches ? "dark" : "light");
+    returnKeys();
     system.addEventListener("change", () => {
       if (!this.isChosen) this.set(system.matches ? "dark" : "light");
     });
@@ -45,8 +46,17 @@ function showFacts(facts) {
 /** Whether a key is for the element that has it, and not for the page. */
 function isTyping(event) {
   if (event.ctrlKey || event.metaKey || event.altKey || document.getElementById("keys").open) return true;
-  if (event.key === " " && event.target.matches("button:focus-visible")) return true; // chosen by keys, not clicked
+  if (event.key === " " && event.target.matches("button")) return true; // chosen by keys, see `returnKeys`
   return event.target.matches("select, input[type=number]");
+}
+
+/** A button or a choice that a pointer has used does not keep the keys, which are the page's again. */
+function returnKeys() {
+  let byPointer = false;
+  addEventListener("pointerdown", () => { byPointer = true; }, true);
+  addEventListener("keydown", () => { byPointer = false; }, true);
+  addEventListener("click", ({ target }) => byPointer && target.closest("button")?.blur());
+  addEventListener("change", ({ target }) => byPointer && target.closest("select")?.blur());
 }
 
 /** A canvas of this many CSS pixels, sharp on dense screens; returns its context. */
