@@ -14,7 +14,7 @@ from ..population import availability, ratio_for_team
 from .contrast import Kind
 from .panel import Levels, Number, PanelName, bend, best, rise, scatter, slope, steeper_from, variation
 from .statements import Statement, alike, follows, further_apart, group, larger_lead, mostly_tie
-from .verdict import Claim, Family
+from .verdict import Claim
 
 SIMPLE, COMPLEX = "crw dpo", "stochm stochx"
 STEADY, UNSTEADY = "crw stochx", "dpo stochm"
@@ -114,12 +114,9 @@ def of_each(where: Iterable[str], *said: Says) -> tuple[Statement, ...]:
     return tuple(statement for say in said for one in listed for statement in say(one))
 
 
-def about(family: Family, figure: str, where: str, **claims: tuple[str, *tuple[Says, ...]]) -> list[Claim]:
-    """Return claims about the places of a figure, by name: text, and what each says."""
-    return [
-        Claim(name=name, text=text, figure=figure, family=family, statements=of_each(places(where), *said))
-        for name, (text, *said) in claims.items()
-    ]
+def about(where: str, **claims: tuple[str, *tuple[Says, ...]]) -> list[Claim]:
+    """Return claims about some places, by name: text, and what each says."""
+    return [Claim(name, text, of_each(places(where), *said)) for name, (text, *said) in claims.items()]
 
 
 def follow(first: str, others: str, *, turned: bool = False) -> tuple[Statement, ...]:
@@ -130,16 +127,12 @@ def follow(first: str, others: str, *, turned: bool = False) -> tuple[Statement,
 _STEADY_AND_NOT = more(UNSTEADY, STEADY, variation)
 _SELF_ORGANIZATION = (
     *about(
-        "self-organization",
-        "scenario 1, spatial self-organization beside robots alone, small warehouse",
         "S1a E_S",
         E1=("Every algorithm stays roughly constant over the swarm size.", each(ALL, rise, kind="tie", is_share=True)),
         E2=("CRW differs from the other three; it is higher (implied).", best_is("crw")),
         E3=("STOCHM and STOCHX tie.", tie(COMPLEX)),
     ),
     *about(
-        "self-organization",
-        "scenario 1, task self-organization, medium warehouse",
         "S1b E_T",
         E4=("CRW, DPO and STOCHM mostly tie.", mostly("crw dpo stochm")),
         E5=("STOCHX is highest.", best_is("stochx")),
@@ -150,8 +143,6 @@ _SELF_ORGANIZATION = (
         ),
     ),
     *about(
-        "self-organization",
-        "scenario 2, task self-organization, objects at rest",
         "S2a still E_T",
         E7=("STOCHX and CRW are steady over the swarm size, DPO and STOCHM vary strongly.", _STEADY_AND_NOT),
         E8=(
@@ -160,24 +151,12 @@ _SELF_ORGANIZATION = (
             lambda where: (group(place(where), "stochx", "crw dpo stochm", levels="low", less=LITTLE, sign=-1.0),),
         ),
     ),
-    *about(
-        "self-organization",
-        "scenario 2, spatial self-organization, moving objects",
-        "S2a fast E_S",
-        E9=("As E7, for spatial self-organization with moving objects.", _STEADY_AND_NOT),
-    ),
-    *about(
-        "self-organization",
-        "scenario 1, spatial self-organization (no figure), medium warehouse",
-        "S1b E_S",
-        E10=("Spatial self-organization does not differ between the four.", tie(ALL)),
-    ),
+    *about("S2a fast E_S", E9=("As E7, for spatial self-organization with moving objects.", _STEADY_AND_NOT)),
+    *about("S1b E_S", E10=("Spatial self-organization does not differ between the four.", tie(ALL))),
     Claim(
-        name="E11",
-        text="Trends over the swarm size are equal, however fast objects move.",
-        figure="scenario 2, task self-organization",
-        family="self-organization",
-        statements=tuple(
+        "E11",
+        "Trends over the swarm size are equal, however fast objects move.",
+        tuple(
             alike(place("S2a still E_T"), place(f"S2a {pace} E_T"), policy, of=rise)
             for pace in ("slow", "fast")
             for policy in ALL.split()
@@ -191,8 +170,6 @@ _HIGHER_AND_WIDER = (more(COMPLEX, SIMPLE, best), more(COMPLEX, SIMPLE, scatter)
 _SIMPLE_BETTER = better(f"{SIMPLE} > {COMPLEX}")
 _SCALING = (
     *about(
-        "scalability",
-        "scenario 1, scalability, medium warehouse",
         "S1b C",
         C1=("CRW and DPO have narrow bands.", _NARROW),
         C2=("STOCHM and STOCHX have wide bands.", _WIDE),
@@ -201,66 +178,34 @@ _SCALING = (
             *_HIGHER_AND_WIDER,
         ),
     ),
+    *about("S2a still C, S2a slow C, S2a fast C", C4=("There are no significant differences at all.", tie(ALL))),
     *about(
-        "scalability",
-        "scenario 2, scalability (no figure), objects at rest and moving",
-        "S2a still C, S2a slow C, S2a fast C",
-        C4=("There are no significant differences at all.", tie(ALL)),
-    ),
-    *about(
-        "scalability",
-        "scenario 1, scalability (no figure), small warehouse",
         "S1a C",
         C5=(
             "The small warehouse shows the same picture: C1, C2 and C3 hold there, too.",
             *(_NARROW, _WIDE, *_HIGHER_AND_WIDER),
         ),
     ),
-    *about(
-        "scalability",
-        "scenario 1, scalability, medium warehouse",
-        "S1b C",
-        C6=("The complex algorithms scale less well than the simple ones.", _SIMPLE_BETTER),
-    ),
-    *about(
-        "performance",
-        "scenario 1, raw performance, medium warehouse",
-        "S1b P",
-        P1=("CRW and DPO deliver more than STOCHM and STOCHX.", _SIMPLE_BETTER),
-    ),
-    *about(
-        "performance",
-        "scenario 1, raw performance (no figure)",
-        "S1a P",
-        P2=("The small warehouse shows the same picture.", _SIMPLE_BETTER),
-    ),
+    *about("S1b C", C6=("The complex algorithms scale less well than the simple ones.", _SIMPLE_BETTER)),
+    *about("S1b P", P1=("CRW and DPO deliver more than STOCHM and STOCHX.", _SIMPLE_BETTER)),
+    *about("S1a P", P2=("The small warehouse shows the same picture.", _SIMPLE_BETTER)),
     Claim(
-        name="P3",
-        text="Performance and self-organization are negatively related.",
-        figure="scenario 2, raw performance and self-organization, objects at rest and at their fastest",
-        family="performance",
-        statements=(
-            *follow("S2a still E_T", "S2a still P", turned=True),
-            *follow("S2a fast E_S", "S2a fast P", turned=True),
-        ),
+        "P3",
+        "Performance and self-organization are negatively related.",
+        (*follow("S2a still E_T", "S2a still P", turned=True), *follow("S2a fast E_S", "S2a fast P", turned=True)),
     ),
     *about(
-        "performance",
-        "scenario 2, raw performance, objects at rest and at their fastest",
         "S2a still P, S2a fast P",
         P4=("Simpler algorithms perform better: CRW and DPO above STOCHM and STOCHX (implied).", _SIMPLE_BETTER),
     ),
 )
 
 
-def _flexibility(letter: str, measure: str) -> list[Claim]:
+def _flexibility(letter: str) -> list[Claim]:
     """Return the four claims that the paper makes in the same words about reactivity and about adaptability."""
     small, medium, others = f"S1c {letter}", f"S1d {letter}", "crw dpo stochm"
-    both = f"scenario 1, {measure}, both warehouses"
     return [
         *about(
-            "flexibility",
-            both,
             f"{small}, {medium}",
             **{
                 f"{letter}1": (
@@ -271,15 +216,11 @@ def _flexibility(letter: str, measure: str) -> list[Claim]:
             },
         ),
         Claim(
-            name=f"{letter}3",
-            text="More differences are significant in the medium warehouse than in the small one.",
-            figure=both,
-            family="flexibility",
-            statements=(further_apart(place(medium), place(small)),),
+            f"{letter}3",
+            "More differences are significant in the medium warehouse than in the small one.",
+            (further_apart(place(medium), place(small)),),
         ),
         *about(
-            "flexibility",
-            f"scenario 1, {measure}, medium warehouse",
             medium,
             **{
                 f"{letter}4": (
@@ -293,11 +234,9 @@ def _flexibility(letter: str, measure: str) -> list[Claim]:
 
 _STRONG = better(f"{STEADY} > {UNSTEADY}", "high")
 _FLEXIBILITY = (
-    *_flexibility("R", "reactivity"),
-    *_flexibility("A", "adaptability"),
+    *_flexibility("R"),
+    *_flexibility("A"),
     *about(
-        "flexibility",
-        "scenario 2, reactivity, 115 robots",
         "S2b 115 R",
         R5=(
             "CRW and STOCHX are best, DPO and STOCHM worst; only under strong disturbance, else they tie.",
@@ -305,25 +244,19 @@ _FLEXIBILITY = (
         ),
     ),
     *about(
-        "flexibility",
-        "scenario 2, adaptability, 320 robots",
         "S2b 320 A",
         A5=("The algorithms mostly tie.", mostly(ALL)),
         A6=("Under strong disturbance CRW is better than DPO and STOCHM.", better(f"crw > {UNSTEADY}", "high")),
     ),
     Claim(
-        name="A7",
-        text="The swarm sizes that are not shown look the same: they have the same order of algorithms.",
-        figure="scenario 2, reactivity shown of 115 robots and adaptability of 320, of 12, 115 and 320",
-        family="flexibility",
-        statements=(*follow("S2b 115 R", "S2b 12 R, S2b 320 R"), *follow("S2b 320 A", "S2b 12 A, S2b 115 A")),
+        "A7",
+        "The swarm sizes that are not shown look the same: they have the same order of algorithms.",
+        (*follow("S2b 115 R", "S2b 12 R, S2b 320 R"), *follow("S2b 320 A", "S2b 12 A, S2b 115 A")),
     ),
     Claim(
-        name="A8",
-        text="There are fewer differences in adaptability than in reactivity.",
-        figure="scenario 2, reactivity of 115 robots and adaptability of 320",
-        family="flexibility",
-        statements=tuple(further_apart(place(f"S2b {n} R"), place(f"S2b {n} A")) for n in (115, 320)),
+        "A8",
+        "There are fewer differences in adaptability than in reactivity.",
+        tuple(further_apart(place(f"S2b {n} R"), place(f"S2b {n} A")) for n in (115, 320)),
     ),
 )
 
@@ -331,8 +264,6 @@ _THREE = "dpo stochm stochx"
 _CHANGE_AND_MOST = (each(ALL, steeper_from(ONSET)), more(UNSTEADY, STEADY, rise))
 _NOISE = (
     *about(
-        "robustness",
-        "scenario 1, noise, small warehouse",
         "S1e N",
         N1=("CRW and STOCHX tie.", tie(STEADY)),
         N2=(
@@ -344,15 +275,11 @@ _NOISE = (
         N4=("The change is strongest for DPO and STOCHM.", _CHANGE_AND_MOST[1]),
     ),
     Claim(
-        name="N5",
-        text="The algorithms are further apart than in the small warehouse; N3 and N4 hold again.",
-        figure="scenario 1, noise, medium warehouse",
-        family="robustness",
-        statements=(further_apart(place("S1f N"), place("S1e N")), *of_each(["S1f N"], *_CHANGE_AND_MOST)),
+        "N5",
+        "The algorithms are further apart than in the small warehouse; N3 and N4 hold again.",
+        (further_apart(place("S1f N"), place("S1e N")), *of_each(["S1f N"], *_CHANGE_AND_MOST)),
     ),
     *about(
-        "robustness",
-        "scenario 2, noise, 320 robots",
         "S2c 320 N",
         N6=("CRW and STOCHX tie in most cases.", mostly(STEADY)),
         N7=("DPO, STOCHM and STOCHX get clearly worse with stronger noise.", each(_THREE, rise)),
@@ -363,11 +290,7 @@ _NOISE = (
         N10=("CRW shows no change of phase: it grows evenly.", each("crw", bend, kind="tie")),
     ),
     Claim(
-        name="N9",
-        text="115 robots show the same picture as 320: the same order of algorithms.",
-        figure="scenario 2, noise (no figure), 115 robots",
-        family="robustness",
-        statements=follow("S2c 320 N", "S2c 115 N"),
+        "N9", "115 robots show the same picture as 320: the same order of algorithms.", follow("S2c 320 N", "S2c 115 N")
     ),
 )
 
@@ -389,32 +312,19 @@ def _is_less_available(needed: Iterable[tuple[int, int]]) -> tuple[bool, str]:
     return n_less == 3 * len(few), f"200 robots are less available in {n_less} of {3 * len(few)} cases"
 
 
-_FORMULA = "scenario 1, availability (formula)"
 _POPULATION = (
+    Claim("V1", "With 50 robots, 5 needed and a mean team of 5, availability is about 0.40.", formula=_v1),
     Claim(
-        name="V1",
-        text="With 50 robots, 5 needed and a mean team of 5, availability is about 0.40.",
-        figure=_FORMULA,
-        family="robustness",
-        formula=_v1,
-    ),
-    Claim(
-        name="V2",
-        text="With 200 robots and 20 needed, larger teams are needed for the same availability.",
-        figure=_FORMULA,
-        family="robustness",
+        "V2",
+        "With 200 robots and 20 needed, larger teams are needed for the same availability.",
         formula=lambda: _is_less_available([(5, 20)]),
     ),
     Claim(
-        name="V3",
-        text="Availability drops more steeply with 200 robots than with 50, the more robots are needed.",
-        figure=_FORMULA,
-        family="robustness",
+        "V3",
+        "Availability drops more steeply with 200 robots than with 50, the more robots are needed.",
         formula=lambda: _is_less_available([(n, n) for n in (1, 5, 10, 20, 40)]),
     ),
     *about(
-        "robustness",
-        "scenario 1, population robustness, small warehouse",
         "S1g D",
         D1=(
             "Under larger population variance STOCHX is most robust, and STOCHX and CRW are above DPO and STOCHM.",
@@ -422,29 +332,15 @@ _POPULATION = (
         ),
     ),
     Claim(
-        name="D2",
-        text="The order is that of task self-organization, STOCHX first.",
-        figure="scenario 1, population robustness, medium warehouse",
-        family="robustness",
-        statements=(*best_is("stochx")("S1h D"), *follow("S1b E_T", "S1h D")),
+        "D2",
+        "The order is that of task self-organization, STOCHX first.",
+        (*best_is("stochx")("S1h D"), *follow("S1b E_T", "S1h D")),
     ),
-    *about(
-        "robustness",
-        "scenario 2, population robustness, 115 robots",
-        "S2d 115 D",
-        D3=("CRW and STOCHX are high, DPO and STOCHM much lower.", better(f"{STEADY} > {UNSTEADY}")),
-    ),
-    *about(
-        "robustness",
-        "scenario 2, population robustness (no figure)",
-        "S2d 320 D",
-        D4=("With 320 robots all tie.", tie(ALL)),
-    ),
+    *about("S2d 115 D", D3=("CRW and STOCHX are high, DPO and STOCHM much lower.", better(f"{STEADY} > {UNSTEADY}"))),
+    *about("S2d 320 D", D4=("With 320 robots all tie.", tie(ALL))),
     Claim(
-        name="D5",
-        text="STOCHM and CRW may tie.",
-        figure="scenario 1, population robustness, medium warehouse",
-        family="robustness",
+        "D5",
+        "STOCHM and CRW may tie.",
         untestable='"may" leaves room for a tie and claims none: no outcome speaks against it',
     ),
 )
@@ -455,21 +351,19 @@ _EVERYWHERE = places(f"{_FLEXIBLE_1}, {_ROBUST_1}, {_FLEXIBLE_2}, {_ROBUST_2}")
 _SELF_2 = "S2a still E_T, S2a fast E_S"
 
 
-def _together(name: str, text: str, figure: str, statements: tuple[Statement, ...]) -> Claim:
-    return Claim(name=name, text=text, figure=figure, family="together", statements=statements, needs="most")
+def _together(name: str, text: str, statements: tuple[Statement, ...]) -> Claim:
+    return Claim(name, text, statements, needs="most")
 
 
 _TOGETHER = (
     _together(
         "X1",
         "In flexibility and robustness CRW and STOCHX stand together, better than DPO and STOCHM.",
-        "scenarios 1 and 2, flexibility and robustness",
         of_each(_EVERYWHERE, better(f"{STEADY} > {UNSTEADY}")),
     ),
     _together(
         "X2",
         "Higher self-organization goes with better flexibility and robustness.",
-        "scenarios 1 and 2, self-organization beside flexibility and robustness",
         (
             *follow("S1a E_S", "S1c R, S1c A, S1e N, S1g D"),
             *follow("S1b E_T", "S1d R, S1d A, S1f N, S1h D"),
@@ -477,29 +371,24 @@ _TOGETHER = (
         ),
     ),
     Claim(
-        name="X3",
-        text="Self-organization is not tied to scalability or raw performance.",
-        figure="scenarios 1 and 2, self-organization beside scalability and raw performance",
-        family="together",
+        "X3",
+        "Self-organization is not tied to scalability or raw performance.",
         untestable="two unrelated orders of four policies agree, or disagree, in five pairs of six or more in 8 of 24 "
         "cases: no number of runs tells unrelated orders from related ones",
     ),
     _together(
         "X4",
         "For scenario 2 STOCHX is the best choice overall.",
-        "scenario 2, all figures",
         of_each(places(f"{_SELF_2}, {_FLEXIBLE_2}, {_ROBUST_2}"), better("stochx > crw dpo stochm")),
     ),
     _together(
         "X5",
         'More "intelligent" algorithms are more flexible and robust: STOCHM and STOCHX more than CRW and DPO.',
-        "scenarios 1 and 2, flexibility and robustness",
         of_each(_EVERYWHERE, better(f"{COMPLEX} > {SIMPLE}")),
     ),
     _together(
         "X6",
         "Flexibility and robustness go together.",
-        "scenarios 1 and 2, flexibility and robustness",
         (
             *follow("S1c R", "S1e N, S1g D"),
             *follow("S1d R", "S1f N, S1h D"),
@@ -510,7 +399,6 @@ _TOGETHER = (
     _together(
         "X7",
         "In scenario 1 STOCHM is more flexible and robust than DPO.",
-        "scenario 1, flexibility and robustness",
         of_each(places(f"{_FLEXIBLE_1}, {_ROBUST_1}"), better("stochm > dpo")),
     ),
 )
@@ -522,56 +410,51 @@ CLAIMS: dict[str, Claim] = {
 
 _SPATIAL = "S1a E_S, S1b E_S"
 _BOTH = "S1a C, S1b C"
-_EXPECTED: tuple[tuple[int, str, str, str], ...] = (
-    (1, "CRW: Modest spatial self-organization: above DPO, below STOCHX.", _SPATIAL, "stochx > crw > dpo"),
+_EXPECTED: tuple[tuple[str, str, str], ...] = (
+    ("CRW: Modest spatial self-organization: above DPO, below STOCHX.", _SPATIAL, "stochx > crw > dpo"),
     (
-        1,
         "CRW: Moderate reactivity and adaptability: better than DPO, worse than STOCHX.",
         _FLEXIBLE_1,
         "stochx > crw > dpo",
     ),
-    (1, "DPO: Less spatial self-organization than CRW.", _SPATIAL, "crw > dpo"),
-    (1, "DPO: Low reactivity and adaptability: worse than the three others.", _FLEXIBLE_1, "crw stochm stochx > dpo"),
-    (1, "STOCHM: Low self-organization: below CRW and STOCHX.", f"{_SPATIAL}, S1b E_T", "crw stochx > stochm"),
-    (1, "STOCHM: More reactive and adaptable than DPO.", _FLEXIBLE_1, "stochm > dpo"),
-    (1, "STOCHM: Less scalable than CRW and DPO.", _BOTH, "crw dpo > stochm"),
-    (1, "STOCHX: High spatial self-organization.", _SPATIAL, "stochx > crw dpo stochm"),
-    (1, "STOCHX: High reactivity and adaptability.", _FLEXIBLE_1, "stochx > crw dpo stochm"),
-    (1, "STOCHX: High robustness to malfunctions and repairs.", "S1g D, S1h D", "stochx > crw dpo stochm"),
+    ("DPO: Less spatial self-organization than CRW.", _SPATIAL, "crw > dpo"),
+    ("DPO: Low reactivity and adaptability: worse than the three others.", _FLEXIBLE_1, "crw stochm stochx > dpo"),
+    ("STOCHM: Low self-organization: below CRW and STOCHX.", f"{_SPATIAL}, S1b E_T", "crw stochx > stochm"),
+    ("STOCHM: More reactive and adaptable than DPO.", _FLEXIBLE_1, "stochm > dpo"),
+    ("STOCHM: Less scalable than CRW and DPO.", _BOTH, "crw dpo > stochm"),
+    ("STOCHX: High spatial self-organization.", _SPATIAL, "stochx > crw dpo stochm"),
+    ("STOCHX: High reactivity and adaptability.", _FLEXIBLE_1, "stochx > crw dpo stochm"),
+    ("STOCHX: High robustness to malfunctions and repairs.", "S1g D, S1h D", "stochx > crw dpo stochm"),
     (
-        1,
         "STOCHX: Task self-organization in the medium warehouse, where objects lie everywhere, more than in the small.",
         "S1b E_T",
         "stochx > crw dpo stochm",
     ),
-    (1, "STOCHX: Delivers less than CRW, DPO and STOCHM.", "S1a P, S1b P", "crw dpo stochm > stochx"),
-    (1, "STOCHX: Less scalable than STOCHM.", _BOTH, "stochm > stochx"),
-    (2, "CRW: Moving objects do not affect it: it performs alike with objects at rest and at their fastest.", "", ""),
-    (2, "CRW: Robust to deaths and to noise: better than DPO and STOCHM.", _ROBUST_2, "crw > dpo stochm"),
-    (2, "CRW: Reactive and adaptable: better than DPO and STOCHM.", _FLEXIBLE_2, "crw > dpo stochm"),
-    (2, "DPO: Less self-organized than CRW.", _SELF_2, "crw > dpo"),
+    ("STOCHX: Delivers less than CRW, DPO and STOCHM.", "S1a P, S1b P", "crw dpo stochm > stochx"),
+    ("STOCHX: Less scalable than STOCHM.", _BOTH, "stochm > stochx"),
+    ("CRW: Moving objects do not affect it: it performs alike with objects at rest and at their fastest.", "", ""),
+    ("CRW: Robust to deaths and to noise: better than DPO and STOCHM.", _ROBUST_2, "crw > dpo stochm"),
+    ("CRW: Reactive and adaptable: better than DPO and STOCHM.", _FLEXIBLE_2, "crw > dpo stochm"),
+    ("DPO: Less self-organized than CRW.", _SELF_2, "crw > dpo"),
     (
-        2,
         "DPO: Low robustness and flexibility: worse than CRW and STOCHX.",
         f"{_ROBUST_2}, {_FLEXIBLE_2}",
         "crw stochx > dpo",
     ),
-    (2, "STOCHM: Poor self-organization: below CRW and STOCHX.", _SELF_2, "crw stochx > stochm"),
+    ("STOCHM: Poor self-organization: below CRW and STOCHX.", _SELF_2, "crw stochx > stochm"),
     (
-        2,
         "STOCHM: Low robustness to deaths, but above DPO: below CRW and STOCHX.",
         "S2d 115 D",
         "crw stochx > stochm > dpo",
     ),
-    (2, "STOCHX: Modest self-organization: above STOCHM.", _SELF_2, "stochx > stochm"),
+    ("STOCHX: Modest self-organization: above STOCHM.", _SELF_2, "stochx > stochm"),
     (
-        2,
         "STOCHX: Modest robustness to deaths and modest flexibility: worse than CRW, better than DPO.",
         f"S2d 115 D, {_FLEXIBLE_2}",
         "crw > stochx > dpo",
     ),
-)  # fmt: skip
-"""Scenario, algorithm and words, panels, and who is better than whom. The paper has a table of intuitions per scenario.
+)
+"""Algorithm and words, panels, and who is better than whom. The paper has a table of intuitions per scenario.
 Its words are vague; here "high" means better than the three others, "low" worse than CRW and STOCHX, and for one of
 these two worse than both others; "modest" lies between (our choice)."""
 _FURTHER = {
@@ -582,15 +465,13 @@ _FURTHER = {
 
 INTUITIONS: dict[str, Claim] = {
     f"H{number}": Claim(
-        name=f"H{number}",
-        text=text,
-        figure=f"scenario {scenario}, intuitions",
-        family="expected",
-        statements=(
+        f"H{number}",
+        text,
+        (
             *of_each(places(where), *(better(f"{a} > {b}") for a, b in pairwise(chain.split(" > ")))),
             *_FURTHER.get(number, ()),
         ),
     )
-    for number, (scenario, text, where, chain) in enumerate(_EXPECTED, 1)
+    for number, (text, where, chain) in enumerate(_EXPECTED, 1)
 }
 """Name -> intuition; H as in hypothesis."""

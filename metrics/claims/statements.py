@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -126,44 +126,43 @@ def mostly_tie(panel: PanelName, policies: str) -> Statement:
 
 def alike(first: PanelName, second: PanelName, policy: str, *, of: Number = height) -> Statement:
     """A policy ties with itself in two panels."""
-
-    def number(curves: Sequence[Curves]) -> FloatArray:
-        a, b = _paired(*(of(one) for one in curves), curves=curves)
-        return a[0] - b[0]
-
     words = f"{policy} in both" if of is height else f"{of.__name__}: {policy} in both"
-    return Statement(
-        words=words,
-        panels=(first, second),
-        number=number,
-        policies=(policy,),
-        kind="tie",
-        has_one_unit=True,
-        keeps_shape=of is not height,
-    )
+    told: dict[str, Any] = {"kind": "tie", "has_one_unit": True, "keeps_shape": of is not height}
+    return _of_two(words, first, second, lambda a, b: a[0] - b[0], (policy,), of, **told)
 
 
 def further_apart(first: PanelName, second: PanelName) -> Statement:
     """The policies scatter more about their common mean in the first panel than in the second."""
-
-    def number(curves: Sequence[Curves]) -> FloatArray:
-        a, b = _paired(*(height(one) for one in curves), curves=curves)
-        return a.std(axis=0) - b.std(axis=0)
-
-    return Statement(words="apart: all",
-                     panels=(first, second), number=number)  # fmt: skip
+    return _of_two("apart: all", first, second, lambda a, b: a.std(axis=0) - b.std(axis=0))
 
 
 def larger_lead(first: PanelName, second: PanelName, leader: str, others: str) -> Statement:
     """A policy leads others by more in the first panel than in the second."""
     names = (leader, *others.split())
 
-    def number(curves: Sequence[Curves]) -> FloatArray:
-        a, b = _paired(*(height(one) for one in curves), curves=curves)
-        return (a[0] - a[1:].mean(axis=0)) - (b[0] - b[1:].mean(axis=0))
+    def lead(numbers: FloatArray) -> FloatArray:
+        return numbers[0] - numbers[1:].mean(axis=0)
 
-    words = f"lead of {leader} in the first"
-    return Statement(words=words, panels=(first, second), number=number, policies=names)
+    return _of_two(f"lead of {leader} in the first", first, second, lambda a, b: lead(a) - lead(b), names)
+
+
+def _of_two(
+    words: str,
+    first: PanelName,
+    second: PanelName,
+    compare: Callable[[FloatArray, FloatArray], FloatArray],
+    policies: tuple[str, ...] = PAPER_POLICIES,
+    of: Number = height,
+    **told: Any,
+) -> Statement:
+    """Return a statement about numbers of policies in two panels, (P, R) each, in the runs that both have."""
+
+    def number(curves: Sequence[Curves]) -> FloatArray:
+        n_runs = min(one.runs.size for one in curves)
+        both = np.logical_and(*(one.runs[:n_runs] for one in curves))
+        return compare(*(of(one)[:, (np.cumsum(one.runs) - 1)[:n_runs][both]] for one in curves))
+
+    return Statement(words=words, panels=(first, second), number=number, policies=policies, **told)
 
 
 def follows(first: PanelName, second: PanelName, *, turned: bool = False) -> Statement:
@@ -186,11 +185,3 @@ def follows(first: PanelName, second: PanelName, *, turned: bool = False) -> Sta
 
     words = "who is worse leads" if turned else "who is better leads"
     return Statement(words=words, panels=(first, second), number=number)
-
-
-def _paired(*numbers: FloatArray, curves: Sequence[Curves]) -> list[FloatArray]:
-    """Return numbers of two panels, (P, R), in the runs that both have."""
-    n_runs = min(one.runs.size for one in curves)
-    both = np.logical_and(*(one.runs[:n_runs] for one in curves))
-    places = [(np.cumsum(one.runs) - 1)[:n_runs][both] for one in curves]
-    return [of[:, kept] for of, kept in zip(numbers, places, strict=True)]

@@ -1,7 +1,7 @@
 """Claims held against panels: each statement is judged, corrected within its family, and joined with the others."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import nan
 from typing import Literal, NamedTuple, TypeAlias, cast
 
@@ -9,29 +9,32 @@ import numpy as np
 
 from ..curves import FloatArray
 from ..statistics import SIGNIFICANT, holm
-from .contrast import Answer, Contrast, PValues, all_of, corrected, decide, most_of, p_values
+from .contrast import Answer, Contrast, Kind, PValues, all_of, corrected, decide, most_of, p_values
 from .panel import HAVE_SHARES, Panel, PanelName
 from .statements import Statement, Untestable
 
 Reading: TypeAlias = Literal["amounts", "shares", "bands"]
 """`amounts`: measures as their equations have them. `shares`: of flexibility and robustness, what is above the noise
 floor, as a share of what the policy delivers. `bands`: amounts by the mean and two standard deviations of runs."""
-Family: TypeAlias = Literal[
-    "self-organization", "scalability", "performance", "flexibility", "robustness", "together", "expected"
-]
-"""Claims whose contrasts are corrected together."""
+_FAMILIES = {
+    **dict.fromkeys("E", "self-organization"),
+    **dict.fromkeys("C", "scalability"),
+    **dict.fromkeys("P", "performance"),
+    **dict.fromkeys("RA", "flexibility"),
+    **dict.fromkeys("NVD", "robustness"),
+    **dict.fromkeys("X", "together"),
+    **dict.fromkeys("H", "expected"),
+}
+"""First letter of the name of a claim -> its family."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Claim:
     """One claim: the statements that it consists of."""
 
     name: str
     text: str
     """What is claimed, in our words."""
-    figure: str
-    """Figure of the paper that shows it."""
-    family: Family
     statements: tuple[Statement, ...] = ()
     needs: Literal["all", "most"] = "all"
     """How many of the statements must hold."""
@@ -39,6 +42,11 @@ class Claim:
     """Whether a claim that needs no runs holds, and what was found."""
     untestable: str = ""
     """Why no run can answer; empty for a claim with statements."""
+
+    @property
+    def family(self) -> str:
+        """Claims whose contrasts are corrected together."""
+        return _FAMILIES[self.name[0]]
 
     @property
     def panels(self) -> tuple[PanelName, ...]:
@@ -69,26 +77,41 @@ class Counts(NamedTuple):
 NOTHING = Counts()
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Part:
     """What runs say of one statement."""
 
     statement: Statement
     answer: Answer = "open"
-    mean: float = nan
-    """Mean over runs, in the unit of the measure."""
-    lower: float = nan
-    """Lower end of its interval, of 95 %; by bands, of two standard deviations of runs."""
-    upper: float = nan
-    d: float = nan
-    """Cohen's d."""
-    p: float = nan
-    """P value of the test that the answer needs, after Holm's correction; NaN by bands."""
+    contrast: Contrast | None = None
+    """Its number per run, in the unit of the measure; None where there is none."""
+    is_band: bool = False
+    """Whether it is read by bands of two standard deviations of runs, not by intervals."""
     margin: float = nan
-    n_runs: int = 0
     counts: Counts = NOTHING
     """Of comparisons level by level, without correction."""
+    p: PValues | None = None
+    """P values, corrected for those of the family; None where comparisons are counted, and by bands."""
+    reverses: FloatArray = field(default_factory=lambda: np.empty(0))
+    """Of a group, p values that a pair of its members has the claimed order or ties, (pairs,)."""
     why: str = ""
+
+    def numbers(self) -> dict[str, float]:
+        """Return mean, lower and upper end, Cohen's d, the p value that decides, margin and number of runs."""
+        found = self.contrast
+        if found is None:
+            return {**dict.fromkeys(("mean", "lower", "upper", "d", "p", "margin"), nan), "n_runs": 0}
+        lower, upper = found.band if self.is_band else found.interval
+        p = nan if self.p is None else float(self.p[_decides(self.statement.kind, self.answer)])
+        told = {"mean": float(found.mean), "lower": float(lower), "upper": float(upper), "d": float(found.d)}
+        return {**told, "p": p, "margin": self.margin, "n_runs": found.n_runs}
+
+
+def _decides(kind: Kind, answer: Answer) -> int:
+    """Return the place of the p value that decides."""
+    if kind == "tie":
+        return 2 if answer == "contradicted" else 1
+    return 1 if answer == "equivalent" else 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,29 +159,16 @@ def check_claims(
     found: dict[str, Verdict] = {}
     for family in dict.fromkeys(claim.family for claim in claims.values()):
         mine = {name: claim for name, claim in claims.items() if claim.family == family}
-        parts = iter([_part(one, reading) for one in _corrected([one for name in mine for one in seen[name]])])
+        parts = iter([_answered(one) for one in _corrected([one for name in mine for one in seen[name]])])
         found |= {name: _verdict(claim, [next(parts) for _ in claim.statements]) for name, claim in mine.items()}
     return {name: found[name] for name in claims}
 
 
-class _Seen(NamedTuple):
-    """A statement with its contrast, and p values where it is tested."""
-
-    statement: Statement
-    contrast: Contrast | None = None
-    margin: float = nan
-    counts: Counts = Counts()
-    p: PValues | None = None
-    reverses: FloatArray = np.empty(0)
-    """Of a group, one-sided p values that a pair of its members has the claimed order or ties, (pairs,)."""
-    answer: Answer = "open"
-    why: str = ""
-
-
-def _seen(statement: Statement, panels: Mapping[PanelName, Panel], reading: Reading, margin: float | None) -> _Seen:
+def _seen(statement: Statement, panels: Mapping[PanelName, Panel], reading: Reading, margin: float | None) -> Part:
+    """Return a statement with its contrast, without an answer unless there is no contrast."""
     absent = [name.words for name in statement.panels if name not in panels]
     if absent:
-        return _Seen(statement, answer="no runs", why=f"no runs of {', '.join(absent)}")
+        return Part(statement=statement, answer="no runs", why=f"no runs of {', '.join(absent)}")
     shown = [panels[name] for name in statement.panels]
     curves = [
         one.curves(
@@ -170,41 +180,40 @@ def _seen(statement: Statement, panels: Mapping[PanelName, Panel], reading: Read
         for name, one in zip(statement.panels, shown, strict=True)
     ]
     if any(0 in one.values.shape for one in curves):
-        return _Seen(statement, answer="no runs", why="no level has enough runs with a score")
+        return Part(statement=statement, answer="no runs", why="no level has enough runs with a score")
     limit = (shown[-1].margin if margin is None else margin) if statement.has_margin else 0.0
     try:
         found = Contrast(statement.number(curves))
     except Untestable as reason:
-        return _Seen(statement, answer="untestable", why=str(reason))
-    if reading == "bands" or statement.is_counted:
-        p = None
-    else:
-        p = p_values(statement.kind, found, limit)
+        return Part(statement=statement, answer="untestable", why=str(reason))
+    is_band = reading == "bands"
+    p = None if is_band or statement.is_counted else p_values(statement.kind, found, limit)
+    part = Part(statement=statement, contrast=found, is_band=is_band, margin=limit, p=p)
     if not statement.pairs:
-        return _Seen(statement, found, limit, p=p)
+        return part
     sides = statement.sides(curves[0])
-    seen = _Seen(statement, found, limit, _counts(sides, limit, reading), p)
+    part = replace(part, counts=_counts(sides, limit, is_band))
     if p is None or statement.kind != "more" or len(statement.pairs) == 1:
-        return seen
+        return part
     pairs = Contrast((sides[0] - sides[1]).mean(axis=1))
-    return seen._replace(reverses=np.where(pairs.mean < 0.0, pairs.p_beyond(limit), 1.0))
+    return replace(part, reverses=np.where(pairs.mean < 0.0, pairs.p_beyond(limit), 1.0))
 
 
-def _corrected(family: Sequence["_Seen"]) -> list["_Seen"]:
-    """Return statements with p values after Holm's correction."""
+def _corrected(family: Sequence[Part]) -> list[Part]:
+    """Return parts with p values after Holm's correction."""
     tested = iter(corrected([one.p for one in family if one.p is not None]))
     reverses = holm(np.concatenate([np.empty(0), *(one.reverses for one in family)]))
     ends = np.cumsum([one.reverses.size for one in family])
     return [
-        one if one.p is None else one._replace(p=next(tested), reverses=reverses[end - one.reverses.size : end])
+        one if one.p is None else replace(one, p=next(tested), reverses=reverses[end - one.reverses.size : end])
         for one, end in zip(family, ends, strict=True)
     ]
 
 
-def _counts(sides: FloatArray, margin: float, reading: Reading) -> Counts:
+def _counts(sides: FloatArray, margin: float, is_band: bool) -> Counts:
     """Count comparisons of the first and the second of pairs, (2, pairs, L, R)."""
     gaps = Contrast(sides[0] - sides[1])
-    if reading == "bands":
+    if is_band:
         is_apart = np.abs(gaps.mean) > 2.0 * Contrast(sides).sd.sum(axis=0)
         n_claimed, n_apart = int((is_apart & (gaps.mean > 0.0)).sum()), int(is_apart.sum())
         return Counts(n_claimed, n_apart - n_claimed, is_apart.size - n_apart)
@@ -212,49 +221,19 @@ def _counts(sides: FloatArray, margin: float, reading: Reading) -> Counts:
     return Counts(*(int((answers == word).sum()) for word in ("supported", "contradicted", "equivalent", "open")))
 
 
-_DECIDING = {
-    **{(kind, answer): 0 for kind in ("more", "differ") for answer in ("supported", "contradicted", "open")},
-    **{(kind, "equivalent"): 1 for kind in ("more", "differ")},
-    ("tie", "supported"): 1,
-    ("tie", "open"): 1,
-    ("tie", "contradicted"): 2,
-}
-"""Kind of a statement and answer -> place of the p value in `PValues`."""
-
-
-def _part(seen: _Seen, reading: Reading) -> Part:
-    statement, found = seen.statement, seen.contrast
+def _answered(part: Part) -> Part:
+    statement, found = part.statement, part.contrast
     if found is None:
-        return Part(statement=statement, answer=seen.answer, why=seen.why)
-    lower, upper = (float(end) for end in (found.band if reading == "bands" else found.interval))
-    mean, p, why = float(found.mean), nan, ""
-    if statement.pairs and (statement.is_counted or reading == "bands"):
-        answer = _of_counts(statement, seen.counts)
-    elif seen.p is None:
-        answer = _of_band(statement, lower, upper)
-    else:
-        answer = str(decide(statement.kind, found.mean, seen.p))
-        p = float(seen.p[_DECIDING[statement.kind, answer]])
-        if (seen.reverses <= SIGNIFICANT).any():
-            turned = [
-                f"{b} above {a}"
-                for (a, b), one in zip(statement.pairs, seen.reverses, strict=True)
-                if one <= SIGNIFICANT
-            ]
-            answer, why = "contradicted", f"{', '.join(turned)} in {statement.where}"
-    return Part(
-        statement=statement,
-        answer=cast(Answer, answer),
-        mean=mean,
-        lower=lower,
-        upper=upper,
-        d=float(found.d),
-        p=p,
-        margin=seen.margin,
-        n_runs=found.n_runs,
-        counts=seen.counts,
-        why=why,
-    )
+        return part
+    if statement.pairs and part.p is None:
+        return replace(part, answer=_of_counts(statement, part.counts))
+    if part.p is None:
+        return replace(part, answer=_of_band(statement, *found.band))
+    turned = [pair for pair, p in zip(statement.pairs, part.reverses, strict=False) if p <= SIGNIFICANT]
+    if turned:
+        told = ", ".join(f"{worse} above {better}" for better, worse in turned)
+        return replace(part, answer="contradicted", why=f"{told} in {statement.where}")
+    return replace(part, answer=cast(Answer, str(decide(statement.kind, found.mean, part.p))))
 
 
 def _of_counts(statement: Statement, counts: Counts) -> Answer:
@@ -267,7 +246,7 @@ def _of_counts(statement: Statement, counts: Counts) -> Answer:
     return "supported" if counts.claimed > many else "contradicted" if counts.reversed > many else "open"
 
 
-def _of_band(statement: Statement, lower: float, upper: float) -> Answer:
+def _of_band(statement: Statement, lower: FloatArray, upper: FloatArray) -> Answer:
     """The answer by the band of a number: bands that hold 0 look like a tie."""
     if lower <= 0.0 <= upper:
         return "supported" if statement.kind == "tie" else "equivalent"

@@ -186,20 +186,21 @@ def _row(claim: Claim, reading: Reading, of: Verdict) -> dict[str, Any]:
         "reversed": turned,
         "tied": tied,
         "open": still_open,
-        "n_runs": min((part.n_runs for part in of.parts), default=0),
+        "n_runs": min((part.contrast.n_runs if part.contrast else 0 for part in of.parts), default=0),
         "why": of.why,
     }
 
 
 def _rows(of: Verdict) -> Iterator[dict[str, Any]]:
     for part in of.parts:
-        told = ("answer", "mean", "lower", "upper", "d", "p", "margin", "n_runs", "why")
         claimed, turned, tied, still_open = part.counts
         yield {
             "statement": part.statement.words,
             "kind": part.statement.kind,
             "where": part.statement.where,
-            **{name: getattr(part, name) for name in told},
+            "answer": part.answer,
+            **part.numbers(),
+            "why": part.why,
             "claimed": claimed,
             "reversed": turned,
             "tied": tied,
