@@ -103,6 +103,7 @@ class Part:
             return {**dict.fromkeys(("mean", "lower", "upper", "d", "p", "margin"), nan), "n_runs": 0}
         lower, upper = found.band if self.is_band else found.interval
         p = nan if self.p is None else float(self.p[_decides(self.statement.kind, self.answer)])
+        p = float(self.reverses.min()) if (self.reverses <= SIGNIFICANT).any() else p
         told = {"mean": float(found.mean), "lower": float(lower), "upper": float(upper), "d": float(found.d)}
         return {**told, "p": p, "margin": self.margin, "n_runs": found.n_runs}
 

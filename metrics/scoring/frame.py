@@ -46,7 +46,6 @@ SCHEMA: dict[str, Any] = {
     "value": pl.Float64,
     "relative": pl.Float64,
     "floor": pl.Float64,
-    "floor_of_seed": pl.Float64,
     "excess": pl.Float64,
     "total": pl.Float64,
     "distance": pl.Float64,
@@ -59,9 +58,9 @@ SCHEMA: dict[str, Any] = {
 
 `relative` is the value as a share of the performance that it is compared with, `total`; null for measures without
 shares. `floor` is the noise floor of a distance, null where the map depends on the seed, because two undisturbed runs
-then differ in it, too. `floor_of_seed` is the distance of the undisturbed run of this seed to that of the next, and
-`excess` what a disturbed run adds to it; where the map depends on the seed, that is the disturbed run of the next seed,
-so that both distances are of two maps. `distance` is that of the conditions from the ideal ones. `lost` counts missing
+then differ in it, too. `excess` is what a disturbed run adds to the distance of the undisturbed run of this seed to that
+of the next; where the map depends on the seed, that is the disturbed run of the next seed, so that both distances are of
+two maps. `distance` is that of the conditions from the ideal ones. `lost` counts missing
 runs.
 """
 ROW = ("measure", "variant", "form", "at", "criterion", "x", "n_robots")
@@ -143,7 +142,7 @@ def _rows(name: str, study: StudyCurves, form: Form, compared: Compared) -> pl.D
     if measure.is_distance and len(seeds) > 1:
         beside_next = measure.of(paired._replace(runs=_next(paired.runs, runs.criterion)))
         floors = measure.of(paired._replace(runs=_next(paired.base, runs.criterion)))
-        columns |= {"floor_of_seed": floors, "excess": (beside_next if runs.maps_differ else values) - floors}
+        columns["excess"] = (beside_next if runs.maps_differ else values) - floors
     return _frame({**told, **columns})
 
 

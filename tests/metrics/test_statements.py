@@ -83,6 +83,7 @@ def test_a_group_is_compared_by_its_mean_and_fails_if_a_pair_of_its_members_is_t
     turned = judged(two, first=panel({"crw": 2.0, "dpo": 1.0, "stochm": 0.9, "stochx": 0.8}))
     assert (turned.answer, turned.parts[0].numbers()["mean"] > 0) == ("contradicted", True)
     assert turned.why.endswith("; dpo above stochx, stochm above stochx in S1a raw performance")
+    assert turned.parts[0].numbers()["p"] < 0.001
     almost = judged(two, first=panel({"crw": 2.0, "dpo": 1.0, "stochm": 0.9, "stochx": 0.98}))
     assert almost.answer == "supported", "2 % less is a tie"
     far = judged(group(FAR, "crw", "dpo"), far=panel({"crw": 1.0, "dpo": 2.0}))
@@ -125,6 +126,7 @@ def test_mostly_counts_levels(heights, answer):
         ("differ", [1, 1, 1, 1, 2, 2], "equivalent"),
         ("more", [2, 2, 2, 2, 1, 0.4], "supported"),
         ("more", [1, 1, 1, 0.4, 0.4, 2], "open"),
+        ("more", [1, 1, 1, 2, 2, 2], "open"),
     ],
 )
 def test_bands_ask_most_levels(kind, heights, answer):
@@ -149,6 +151,10 @@ def test_an_order_goes_from_one_panel_to_another_unless_policies_tie():
     assert judged(follows(PLACE, FAR), first=first, far=turned).answer == "supported", "shorter distances are better"
     tied = judged(said, first=panel({**dict.fromkeys(HIGH, 1.0), "crw": 2.0}, n_runs=4), second=first)
     assert tied.answer == "supported", "three of six pairs differ, and crw leads the others"
+    assert tied.parts[0].numbers()["mean"] == pytest.approx((1.0 + 2.0 + 3.0) / 3.0 / 2.5, abs=0.01)
+    wild = panel({"crw": 1.0, "dpo": 1.1, "stochm": 1.05, "stochx": 1.05},
+                 sd={"crw": 0.001, "dpo": 0.001, "stochm": 1.0, "stochx": 1.0})  # fmt: skip
+    assert judged(said, first=wild, second=first).why.startswith("2 of 6 pairs")
     none = judged(said, first=panel(dict.fromkeys(HIGH, 1.0), n_runs=4), second=first)
     assert none.answer == "untestable"
     assert none.why == "0 of 6 pairs of policies have an order in S1a raw performance, and policies that tie have none"

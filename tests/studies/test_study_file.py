@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from swarm_forage_env import load_policy
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import pretrained
 from swarm_forage_env.scenarios.quirks import QUIRK_NAMES
@@ -135,6 +136,13 @@ def test_an_axis_of_quirks_has_all_of_them_and_the_rules_as_reference():
     assert (axis.name, axis.values, spec.reference) == ("quirk", ("none", *QUIRK_NAMES), "none")
     place = Place("program", "stochx", ("scattered_sites",))
     assert spec.reference_of(place) == Place("program", "stochx", ("none",))
+
+
+def test_rules_that_the_text_lacks_are_parameters_of_policies_in_a_study():
+    spec = load_study(Path(__file__).parents[2] / "docs/silent.toml")
+    given = {policy.label: policy.parameters for policy in spec.policies if policy.parameters}
+    assert given["dpo_sees_obstacles_at_goals"] == {"approach_ignores_obstacles": False}
+    assert all(load_policy(one.policy, one.parameters) for one in spec.policies)
 
 
 def test_a_policy_file_lies_beside_the_study(written, tmp_path):
