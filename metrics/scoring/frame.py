@@ -58,10 +58,9 @@ SCHEMA: dict[str, Any] = {
 
 `relative` is the value as a share of the performance that it is compared with, `total`; null for measures without
 shares. `floor` is the noise floor of a distance, null where the map depends on the seed, because two undisturbed runs
-then differ in it, too. `excess` is what a disturbed run adds to the distance of the undisturbed run of this seed to that
-of the next; where the map depends on the seed, that is the disturbed run of the next seed, so that both distances are of
-two maps. `distance` is that of the conditions from the ideal ones. `lost` counts missing
-runs.
+then differ in it, too. `excess` is what a disturbed run adds to the distance of the undisturbed run of this seed to
+that of the next; where the map depends on the seed, it is the disturbed run of the next seed, so that both are of two
+maps. `distance` is that of the conditions from the ideal ones. `lost` counts missing runs.
 """
 ROW = ("measure", "variant", "form", "at", "criterion", "x", "n_robots")
 """Columns that tell the levels of a policy apart."""
