@@ -61,6 +61,14 @@ def test_one_panel_per_measure_and_one_line_per_policy(tmp_path, monkeypatch):
     ]
 
 
+def test_bars_of_shares_reach_to_the_ends_of_their_intervals(tmp_path, monkeypatch):
+    runs = ((1.0, 2.0), (2.0, 2.0), (2.0, 3.0), (1.0, 4.0))
+    given = summary("mine", runs=runs).filter(measure="noise_robustness")
+    (panel,) = drawn(monkeypatch, tmp_path / "scores.png", given).axes
+    (bar,) = panel.containers[0][2][0].get_segments()
+    assert bar[:, 1].tolist() == pytest.approx([*given.select("relative_lower", "relative_upper").row(0)])
+
+
 @pytest.mark.parametrize("n_policies", [1, 2, 9])
 def test_marks_stand_at_their_level_or_a_tenth_beside_it(n_policies, tmp_path, monkeypatch):
     given = summary(*(f"p{k}" for k in range(n_policies))).filter(measure="raw_performance")
