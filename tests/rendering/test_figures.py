@@ -23,6 +23,7 @@ from swarm_forage_env.rendering.figures import (
     log_height,
     looks,
     saved_figure,
+    size_axis,
 )
 from swarm_forage_env.rendering.plots import Curve, draw_curves
 from tests.support.pictures import words_in
@@ -119,6 +120,15 @@ def test_a_headline_is_wrapped_in_a_narrow_figure(tmp_path):
 def test_panels_stand_in_rows_that_can_be_read():
     assert [FigureStyle().columns(n) for n in (1, 4, 6, 9, 12)] == [1, 2, 2, 3, 4]
     assert [FigureStyle(width_in=width).columns(4) for width in (3.4, 7.16)] == [1, 2]
+
+
+def test_numbers_that_would_run_into_each_other_stand_on_two_lines(tmp_path):
+    with saved_figure(tmp_path / "it.svg", (2.5, 2.0)) as figure:
+        panel = figure.subplots()
+        size_axis(panel, [2**k for k in range(11)])
+    words = [label.get_text() for label in panel.get_xticklabels()]
+    assert words[-1] == "1024", "the largest swarm has its number"
+    assert {word[:1] == "\n" for word in words if word} == {False, True}
 
 
 def test_legends_of_several_rows_are_read_row_by_row(tmp_path):
