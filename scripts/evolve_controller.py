@@ -167,7 +167,7 @@ def main() -> None:
     worlds = [
         replace(one.world, scenario=replace(one.world.scenario, horizon_s=words.horizon))
         for one in load_protocol().worlds
-        if not one.is_held_out
+        if not one.group
     ]
     found = evolved(words.policy, words.ranges, before, worlds, words)
     print(comparison(words.policy, before, found, worlds, words).text())

@@ -40,7 +40,8 @@ _LOCAL_POLICIES: dict[str, Callable[..., Policy]] = {}
 
 
 _POLICY_FILE = re.compile(
-    r"(?P<path>.+?\.(?:npz|zip|py))(?:(?<=py):(?P<name>[^\W\d]\w*))?(?::(?P<words>[a-z_]+=[^/\\:]*))?", re.IGNORECASE
+    r"(?P<path>.*?[^/\\]\.(?:npz|zip|py))(?:(?<=py):(?P<name>[^\W\d]\w*))?(?::(?P<words>[a-z_]+=[^/\\:]*))?",
+    re.IGNORECASE,
 )
 """A policy file; the class of a Python file may stand behind it, then fields of an interface."""
 

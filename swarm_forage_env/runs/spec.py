@@ -32,7 +32,7 @@ _KEYS = ("scenario", "policy", "parameters", "wrappers", "criterion", "criterion
 
 PolicyLike: TypeAlias = Any
 """A registered name; the path of a trained policy (*.zip of stable-baselines3, *.npz); a policy object or class; a
-function of observations (N, D) that returns actions (N, 3); a `PolicySpec`, which is taken as it is."""
+function of observations (N, D) that returns actions (N, 3); a `PolicySpec`, of which only the label can be another."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -230,7 +230,7 @@ def policy_spec(
         ValueError: parameters where none can be given.
     """
     if isinstance(policy, PolicySpec):
-        return policy
+        return replace(policy, label=label or policy.label)
     table("parameters", parameters or {})
     checked("label", label, str)
     if caches is not None:

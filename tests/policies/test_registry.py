@@ -11,7 +11,7 @@ from swarm_forage_env.scenarios.presets import scenario
 SPEC = SwarmSpec.of(scenario("warehouse_small", n_robots=4))
 
 
-@pytest.mark.parametrize("word", ["crw", "crw.pyc", "mine:Ahead", "crw:decision_ticks=2", "model.zip:Ahead"])
+@pytest.mark.parametrize("word", ["crw", "crw.pyc", "mine:Ahead", "crw:decision_ticks=2", "a.zip:Ahead", "a/.zip"])
 def test_what_is_no_file(word):
     assert policy_file(word) is None
     assert policy_label(word) == file_of(word) == word

@@ -106,6 +106,7 @@ def test_what_is_no_policy_is_refused(given, options, error, message):
 
 def test_several_have_names_of_their_own():
     assert [spec.label for spec in policy_specs(["crw", "dpo"])] == ["crw", "dpo"]
+    assert [spec.label for spec in policy_specs({"one": policy_spec("crw")})] == ["one"]
     named = policy_specs({"slow": "crw", "mine": forward}, caches="dynamic")
     assert [(spec.label, spec.policy) for spec in named] == [("slow", "crw"), ("mine", "mine")]
     assert {spec.caches for spec in named} == {"dynamic"}
