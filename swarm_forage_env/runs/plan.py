@@ -60,7 +60,7 @@ class Plan:
             whole("a seed", seed, at_least=0)
         if len(set(self.seeds)) < len(self.seeds):
             raise ConfigError(f"Expected different seeds, got {', '.join(map(str, self.seeds))}.")
-        _ = self.robot_ticks  # refuses what runs refuse
+        _ = self.specs_of(self.conditions[0]), self.robot_ticks  # refuse what runs refuse: seeds, and conditions
 
     @classmethod
     def product(
@@ -100,7 +100,7 @@ class Plan:
     @cached_property
     def robot_ticks(self) -> int:
         """Robots times ticks of all runs."""
-        return sum(spec.robot_ticks for spec in self.specs)
+        return len(self.seeds) * sum(policy.run_in(world).robot_ticks for policy, world in self.conditions)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

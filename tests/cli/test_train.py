@@ -4,6 +4,7 @@ import builtins
 import json
 import sys
 from dataclasses import replace
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -61,7 +62,8 @@ def test_trains_shows_evaluations_and_goes_on(command, painted):
 
 
 def test_without_a_terminal_it_says_once_how_long_the_rest_takes(capsys, monkeypatch):
-    training = pytest.importorskip("swarm_forage_env.training.sb3.training")
+    pytest.importorskip("torch", reason="needs the train extra")
+    training = import_module("swarm_forage_env.training.sb3.training")
     times = iter([0.0, 2.0, 6.0, 60.0])
     monkeypatch.setattr(training_report.time, "monotonic", lambda: next(times))
     with bar() as shown:

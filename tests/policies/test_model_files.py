@@ -227,6 +227,7 @@ class Counting:
 
 
 def test_a_recurrent_model_remembers_within_a_run(monkeypatch, tmp_path):
+    pytest.importorskip("torch")
     path = tmp_path / "model.zip"
     path.write_bytes(b"recurrent")
     monkeypatch.setattr(model_files, "_open_model", lambda path, digest: (Counting(), None))
