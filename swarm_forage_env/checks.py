@@ -44,8 +44,8 @@ _MOMENT = ("observation", "reward", "termination", "truncation")
 """What an agent gets in a tick."""
 
 CHECKED = (
-    "Looked at: actions and tasks with robots away, resets, memory of observations, what reads names, and another "
-    "number of robots."
+    "Looked at: actions and tasks with robots away, resets, memory of observations, what reads names, rows of robots "
+    "that are away, and another number of robots."
 )
 """What `check_policy` looks at, in a sentence."""
 
@@ -183,7 +183,9 @@ def check_policy(policy: Any, scenario: str | ScenarioConfig = "warehouse_small"
     The policy acts for a while, with some robots away and then with all robots away. Its actions must have the right
     shape, type and range, and `task` must hold codes of `Task`. Then it gets the same observations again: after a reset
     it must act in the same way, also if the slices that it does not read hold other values, and if an observation array
-    is overwritten after `act`. Last it gets another number of robots.
+    is overwritten after `act`. Robots at work must act in the same way whatever the rows of robots that are away hold.
+    The actions of these must be actions, too: a robot that comes back to work in the tick acts by its row, and only
+    then. Last it gets another number of robots.
 
     Args:
         policy: As in `runs.spec.policy_spec`: a name, the path of a file, a class that needs no arguments, an object
@@ -217,6 +219,10 @@ def check_policy(policy: Any, scenario: str | ScenarioConfig = "warehouse_small"
         expected = f"Expected equal actions when the slices that are not in reads = {reads!r} hold other numbers"
         advice = "name every slice that act looks at in reads; the others are not computed in runs."
         act_again((_without_unread(world.layout, reads, obs) for obs in seen), expected, advice)
+    expected = "Expected equal actions of robots at work when the observations of robots that are away are others"
+    advice = "look at the rows of act that active names only; others can hold anything."
+    early = scenes[: ticks // 2]  # later those at work have been away, and remember it
+    _check_same_actions(subject, world.swarm_spec, early, map(_without_away, early), expected, advice)
     n_robots = config.robots.n_robots
     other = ForageEnv(with_overrides(config, n_robots=n_robots // 2 if n_robots > 1 else 2))
     for _ in _act_in(subject, other, min(ticks, _INTERVAL_TICKS), away=False):
@@ -269,9 +275,9 @@ def _asked(policy: Policy, obs: ObsArray, active: BoolArray, tick: int, spec: Sw
         raise CheckError(
             f"{expected}, got {_summary(actions)} at tick {tick}; return one row per robot, inactive ones included."
         )
-    for row in np.flatnonzero(at_work):
-        if not (np.abs(actions[row]) <= 1.0).all():  # NaN included
-            raise CheckError(f"{expected}, got {actions[row].tolist()} for robot {row} at tick {tick}; np.clip them.")
+    for row in np.flatnonzero(~(np.abs(actions) <= 1.0).all(axis=1)):  # NaN included
+        is_away = "" if at_work[row] else ", which is away, but may come back in this tick and then act so"
+        raise CheckError(f"{expected}, got {actions[row].tolist()} for robot {row} at tick {tick}{is_away}; clip them.")
     return _Scene(shown, at_work, np.where(at_work[:, None], actions, np.float32(0.0)))
 
 
@@ -337,6 +343,12 @@ def _without_unread(layout: ObservationLayout, reads: Sequence[str], observed: O
                 where=obs[:, layout["carrying"]] < 0.5 if is_read else True,
             )
     return obs
+
+
+def _without_away(scene: _Scene) -> ObsArray:
+    """Return observations in which the rows of robots that are away hold random numbers."""
+    others = np.random.default_rng(0).uniform(-1.0, 1.0, scene.obs.shape)
+    return np.where(scene.active[:, None], scene.obs, others).astype(np.float32)
 
 
 def _checked_reads(policy: Policy, layout: ObservationLayout) -> tuple[str, ...] | None:
