@@ -36,6 +36,7 @@ def main() -> None:
     """Run the command line and exit, in a process that does nothing else."""
     # Or processes that start would look for Python's own modules in the current folder first (SECURITY.md).
     os.environ["PYTHONSAFEPATH"] = "1"
+    os.environ["MPLBACKEND"] = "agg"  # pictures go to files; one that is not installed would end every command
     try:
         atexit.register(_die_of_signal)  # registered first, so done last
         hear()

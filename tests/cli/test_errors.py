@@ -32,6 +32,7 @@ def test_what_happens_to_a_user_is_one_line(command, monkeypatch, error, code, t
 
 
 MAIN = f"{sys.executable} -c 'from swarm_forage_env.cli import main; main()'"
+DRAWS_AT_LAST = MAIN.replace("-c '", '-c \'import atexit; atexit.register(__import__, "matplotlib"); ')
 
 
 @pytest.mark.parametrize(
@@ -41,6 +42,7 @@ MAIN = f"{sys.executable} -c 'from swarm_forage_env.cli import main; main()'"
         (f"{MAIN} info warehouse_small >&-", "", "swarm-forage: Expected a standard output to write to, got a closed"),
         (f"{MAIN} info nobody 2>&-", "", ""),
         (f"echo 'raise ImportError(42)' > polars.py; {MAIN} list", "", "swarm-forage: Cannot import polars: 42"),
+        (f"MPLBACKEND=nonsense {DRAWS_AT_LAST} --version", "swarm-forage ", ""),
         (f"mkdir gone; cd gone; rmdir ../gone; {MAIN} info a.toml", "", "swarm-forage: The working folder is gone; "),
     ],
 )
