@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 CARD_FILE = "dataset.json"
 ARRAYS = ("observations", "actions", "rewards", "terminated", "truncated", "active")
 _LONGER_BY_ONE = ("observations", "active")
-_MINARI_ID = re.compile(r"(?:[\w-]+/)*[\w-]+-v\d+")
+_MINARI_ID = re.compile(r"(?:[\w-][\w/-]*[\w-]/)?[\w-]+-v\d+")
 
 
 class DatasetError(ValueError):
@@ -325,7 +325,7 @@ def export_minari(folder: str | Path, dataset_id: str, **about: Any) -> "MinariD
         episodes.append(EpisodeBuffer(id=number, seed=steps.seed, infos={"active": steps.active}, **arrays))
     told: dict[str, Any] = {
         "env": EnvSpec(
-            f"swarm_forage/{spec.scenario.name}-v0",
+            f"swarm_forage/{re.sub('[^-_a-zA-Z0-9]', '_', spec.scenario.name)}-v0",
             entry_point=f"{__name__}:{recorded_env.__name__}",
             kwargs={"spec": spec.to_mapping(), "interface": asdict(dataset.interface)},
         ),
