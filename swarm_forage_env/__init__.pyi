@@ -2,6 +2,7 @@
 
 # environments and scenarios
 from .views.pettingzoo import parallel_env as parallel_env
+from .views.pettingzoo import aec_env as aec_env
 from .scenarios.presets import scenario as scenario
 from .scenarios.presets import SCENARIO_NAMES as SCENARIO_NAMES
 from .scenarios.config import ScenarioConfig as ScenarioConfig

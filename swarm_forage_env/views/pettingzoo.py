@@ -175,3 +175,7 @@ def env(*args: Any, **options: Any) -> Any:
     """Create the agent-by-agent (AEC) form of `parallel_env` by PettingZoo's own conversion."""
     parallel = parallel_env(*args, **options)
     return parallel_to_aec(parallel)  # pyright: ignore[reportArgumentType] - its type asks for actions that may be None
+
+
+aec_env = env
+"""Another name for `env`, by which the package offers it; modules of PettingZoo have `env` and `parallel_env`."""

@@ -104,7 +104,8 @@ def plan_arena(
             and continuous actions.
         wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
             ("population:death_per_tick=0.01").
-        max_cycles: Ticks until truncation; default the scenario's horizon.
+        max_cycles: Ticks, not steps, until truncation; a step takes `decision_ticks` of the interface. Default the
+            scenario's horizon.
         render_mode: None, "rgb_array" or "human"; see `ForageEnv`.
         extra_reward: Function of the world, called after each decision; returns (N,) in [-1, 1], what is added to the
             reward of each robot at work.

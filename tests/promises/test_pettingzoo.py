@@ -5,11 +5,13 @@ import pettingzoo
 import pytest
 from gymnasium import spaces
 from pettingzoo.test import api_test, parallel_api_test, parallel_seed_test, seed_test, state_test
+from pettingzoo.test.max_cycles_test import max_cycles_test
 from pettingzoo.utils.env import AECEnv
 
-from swarm_forage_env import SCENARIO_NAMES
+from swarm_forage_env import SCENARIO_NAMES, aec_env
 from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.views import pettingzoo as module
 from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv, env, parallel_env
 from swarm_forage_env.wrappers.throttle import Throttle
 
@@ -45,6 +47,11 @@ def test_agent_by_agent_seeds(name):
 @pytest.mark.parametrize("name", SCENARIO_NAMES)
 def test_state(name):
     state_test(env(name, **SMALL), parallel_env(name, **SMALL), num_cycles=5)
+
+
+def test_max_cycles_end_both_forms():
+    max_cycles_test(module)
+    assert aec_env is module.env
 
 
 with_ids = pytest.mark.skipif(not hasattr(pettingzoo, "make"), reason="needs PettingZoo 1.27, which has ids")
