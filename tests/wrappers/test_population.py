@@ -5,7 +5,10 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Event, Grip, ObjectStatus
+from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.layer import at_rest
+from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.gymnasium import JointForageEnv
 from swarm_forage_env.views.pettingzoo import parallel_env
@@ -136,6 +139,14 @@ def test_actions_by_name_of_robots_that_are_away_never_act():
             env.step(dict(zip(env.agents, rows, strict=True)))
         seen.append(env.unwrapped.swarm.position.tobytes())
     assert len(set(seen)) == 1
+
+
+def test_robots_that_are_away_hold_what_they_carry():
+    away, carrying = np.array([True, True, False]), np.array([True, False, True])
+    interface = LearnerInterface(InterfaceConfig(), SwarmSpec.of(scenario("classroom", n_robots=3)))
+    for rest in (at_rest, interface.resting):
+        rested = rest(np.full((3, 3), 0.5, np.float32), away, carrying)
+        np.testing.assert_array_equal(rested, [[0, 0, Grip.GRASP], [0, 0, Grip.RELEASE], [0.5, 0.5, 0.5]])
 
 
 # Death
