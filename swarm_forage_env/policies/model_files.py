@@ -149,7 +149,7 @@ def _told(name: str, config: InterfaceConfig, draws: bool) -> str:
     return (
         f"{name} has no note of its training. By its spaces it runs with {shown or 'full observations and commands'}, "
         f"{'draws its actions' if draws else 'takes its best actions'}, and decides in every tick; if it decided less "
-        f"often, say so: {name}:decision_ticks=5. A file that training.sb3.export.export_network makes runs faster."
+        f"often, say so: {name}:decision_ticks=5. export_network (training.sb3) makes faster files of most."
     )
 
 

@@ -120,7 +120,7 @@ def test_what_is_deduced_is_said_once_on_one_line_before_any_run(tmp_path):
     world = scenario("warehouse_small", n_robots=4)
     words = (
         r"model\.zip has no note.*observation=compact,actions=discrete,automatic_gripper=true, draws its actions, "
-        r".*model\.zip:decision_ticks=5\. A file .* runs faster\.$"
+        r".*model\.zip:decision_ticks=5\. export_network .* of most\.$"
     )
     with pytest.warns(InterfaceGuessWarning, match=words) as told:
         spec = plan_run(world, str(path))
