@@ -270,10 +270,12 @@ class Policy(Protocol):
 
         Args:
             obs: (N, D) float32, read only. The array is reused by the environment: copy what must be kept.
-            active: (N,) bool, read only, robots of the tasked swarm; rows of others are ignored.
+            active: (N,) bool, read only, robots at work. Others are away: robots in repair still observe, those that
+                are not in the world have rows of zeros, and no action of a robot at work depends on either.
 
         Returns:
             (N, 3) float32 in [-1, 1]: left wheel, right wheel, gripper. Where robots can send messages,
-            (N, 3 + message_size); a policy that returns (N, 3) sends zeros.
+            (N, 3 + message_size); a policy that returns (N, 3) sends zeros. Rows of robots that are away are ignored,
+            unless one comes back to work in this very tick: it acts by its row.
         """
         ...

@@ -5,6 +5,7 @@ What robots remember is handed over as bytes, so that the world's tick is compil
 
 import dis
 import inspect
+import re
 import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import fields
@@ -24,7 +25,9 @@ from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
 # isort: split
 from numba import njit, typeof, types
 
-_OF_THE_COMPILER = "Failed in ", "During: ", "Enable logging ", "File "  # lines of numba's messages
+_OF_THE_COMPILER = "Failed in ", "Enable logging "  # lines of numba's messages, which end with what led to the error
+_LED_TO_IT = re.compile(r"^During: |^File \"|Raised from ", re.MULTILINE)
+_PLACE = re.compile(r"(?:at|from) (?!.*[/\\]numba[/\\])(.+) \((\d+)\)\s*$", re.MULTILINE)  # the innermost comes first
 _ACTION = "(left wheel, right wheel, gripper), three finite numbers"
 
 
@@ -158,22 +161,24 @@ def _compiled(step: Any, see: Any, robot: Any, known: Any) -> Any:
     function, kinds, code = njit(boundscheck=True)(step), (see, robot, types.float64[::1], known), step.__code__
     if function is step:  # the compiler is switched off
         return step
-    expected, line = f"Expected {step.__qualname__} ", code.co_firstlineno
+    expected, file, line = f"Expected {step.__qualname__} ", code.co_filename, code.co_firstlineno
     try:
         function.compile(kinds)
     except Exception as error:  # numba has errors of many kinds; of an unknown field of a record it raises KeyError
         line = getattr(getattr(error, "loc", None), "line", line)
-        said = [text for text in map(str.strip, str(error).splitlines()) if text]
-        told = " ".join([text for text in said if not text.startswith(_OF_THE_COMPILER)][:2])
+        if place := _PLACE.search(str(error)):
+            file, line = place.groups()
+        said = [text for text in map(str.strip, _LED_TO_IT.split(str(error))[0].splitlines()) if text]
+        told = " ".join([text for text in said if not text.startswith(_OF_THE_COMPILER)][:2]).rstrip(".")
         if isinstance(error, KeyError):
             places = [i.positions for i in dis.get_instructions(code) if i.argval == error.args[0]]
             told, line = f"no field {error}", getattr(places[0], "lineno", line) if places else line
         expected += "and what it calls under numba.njit to be Python that numba compiles"
-        raise StepError(f"{expected}, got {told} ({code.co_filename}:{line}).") from error
+        raise StepError(f"{expected}, got {told} ({file}:{line}).") from error
     result: Any = function.overloads[kinds].signature.return_type
     parts: Any = result if isinstance(result, types.BaseTuple) else ()
     if len(parts) != COMMANDS or not all(isinstance(part, types.Number | types.Boolean) for part in parts):
-        raise StepError(f"{expected}({code.co_filename}:{line}) to return {_ACTION}, got {types.unliteral(result)}.")
+        raise StepError(f"{expected}({file}:{line}) to return {_ACTION}, got {types.unliteral(result)!s:.80}.")
     return function
 
 

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+from numba import njit
 
 from swarm_forage_env import (
     ConfigError,
@@ -228,21 +229,31 @@ def two_kinds(see, robot, chance, known):
     return (0.0, 0.0, 0.0) if robot.ticks else 0.0
 
 
+@njit
+def adds_words(number):
+    return number + "words"
+
+
+def calls_it(see, robot, chance, known):
+    return adds_words(see.proximity[0]), 0.0, 0.0
+
+
 def reset_by(step):
     """Reset a policy with this step."""
     acts(type("Wrong", (RobotPolicy,), {"step": step, "reads": ("proximity",), "memory": {"ticks": 0}})())
 
 
 @pytest.mark.parametrize(
-    ("step", "told"),
+    ("step", "told", "line"),
     [
-        (unread, "no field 'light'"),
-        (two_kinds, "Cannot unify .*float64.*"),
+        (unread, "no field 'light'", unread.__code__.co_firstlineno + 1),
+        (two_kinds, "Cannot unify .*float64.*", two_kinds.__code__.co_firstlineno + 1),
+        (calls_it, "No implementation of function .*add.*", adds_words.py_func.__code__.co_firstlineno + 2),
     ],
     ids=lambda value: getattr(value, "__name__", ""),
 )
-def test_code_that_is_not_compiled_is_told_in_one_line_with_its_place(step, told):
-    place = re.escape(f"({__file__}:{step.__code__.co_firstlineno + 1})")
+def test_code_that_is_not_compiled_is_told_in_one_line_with_its_place(step, told, line):
+    place = re.escape(f"({__file__}:{line})")
     expected = rf"^Expected {step.__name__} and what it calls under numba.njit to be Python .*, got {told} {place}\.$"
     with pytest.raises(StepError, match=expected):
         reset_by(step)
