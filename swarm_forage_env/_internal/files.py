@@ -1,6 +1,7 @@
 """Files that are there complete or not at all, whether they can be written, and what JSON and TOML of anybody's say."""
 
 import errno
+import json
 import os
 import re
 import tomllib
@@ -143,6 +144,14 @@ def as_file_name(text: str) -> str:
 def parse_json(text: str) -> Any:
     """Return what a JSON text holds; ValueError for no JSON, or one that is nested too deep."""
     return _parsed(msgspec.json.decode, text)
+
+
+def json_text(what: str, value: Any, **options: Any) -> str:
+    """Return a value as JSON; ValueError for what JSON cannot hold, such as infinity."""
+    try:
+        return json.dumps(value, allow_nan=False, **options)
+    except (RecursionError, TypeError, ValueError) as error:
+        raise ValueError(f"Expected {what} to be plain JSON values: {error}.") from error
 
 
 def read_json(path: Path, refusal: type[ValueError]) -> Any:

@@ -6,7 +6,6 @@ A file is an `.npz` of plain arrays: the layers of the network ("weight_0", "bia
 
 import dataclasses
 import itertools
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,7 +15,7 @@ import numpy as np
 
 from swarm_forage_env._internal.archives import ArchiveError, read_arrays
 from swarm_forage_env._internal.fields import ConfigError, checked, known_keys, number, one_of, table
-from swarm_forage_env._internal.files import parse_json, replacing
+from swarm_forage_env._internal.files import json_text, parse_json, replacing
 from swarm_forage_env.contract.kernel_policy import KernelPolicy
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ObsArray
@@ -64,7 +63,7 @@ class NetworkAbout:
 
     def to_json(self) -> str:
         """Return the text that files hold."""
-        return json.dumps(dataclasses.asdict(self), sort_keys=True)
+        return json_text("what a network says of itself", dataclasses.asdict(self), sort_keys=True)
 
     @classmethod
     def from_json(cls, text: str) -> "NetworkAbout":

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from swarm_forage_env._internal.fields import ConfigError, checked, instance, known_keys, one_of, read, table, whole
+from swarm_forage_env._internal.files import json_text
 from swarm_forage_env.policies.registry import (
     from_callable,
     load_policy,
@@ -60,9 +61,9 @@ class RunSpec:
         table("parameters", self.parameters)
         whole_intervals(self.scenario)
         try:
-            plain = json.loads(json.dumps(dict(self.parameters), allow_nan=False))
-        except (RecursionError, TypeError, ValueError) as error:
-            raise ConfigError(f"Expected policy parameters to be plain JSON values: {error}.") from error
+            plain = json.loads(json_text("policy parameters", dict(self.parameters)))
+        except ValueError as error:
+            raise ConfigError(str(error)) from error
         object.__setattr__(self, "parameters", plain)
 
     @property
@@ -230,6 +231,11 @@ def policy_spec(
         ValueError: parameters where none can be given.
     """
     if isinstance(policy, PolicySpec):
+        if parameters or caches is not None:
+            raise ConfigError(
+                f"Expected a name, a file or an object for parameters or caches, got the policy {policy.label!r} that "
+                "was looked up before; give them to that policy_spec."
+            )
         return replace(policy, label=label or policy.label)
     table("parameters", parameters or {})
     checked("label", label, str)

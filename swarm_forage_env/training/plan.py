@@ -1,7 +1,6 @@
 """TrainingPlan: a training as frozen data, read from TOML and written beside its results."""
 
 import dataclasses
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Annotated, Any, Literal
 from msgspec import Meta
 
 from swarm_forage_env._internal.fields import Checked, ConfigError, Count, Whole, known_keys, read, table, whole
-from swarm_forage_env._internal.files import parse_json, parse_toml, replacing
+from swarm_forage_env._internal.files import json_text, parse_json, parse_toml, replacing
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.policy import layout_for
 from swarm_forage_env.policies.interface import InterfaceConfig, any_swarm, interface_from_mapping, learner_layout
@@ -275,7 +274,7 @@ class TrainingPlan(Checked):
     def write(self, path: str | Path) -> None:
         """Write the plan as JSON."""
         with replacing(Path(path)) as draft:
-            draft.write_text(json.dumps(self.to_mapping(), indent=2) + "\n", encoding="utf-8")
+            draft.write_text(json_text("the plan", self.to_mapping(), indent=2) + "\n", encoding="utf-8")
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "TrainingPlan":

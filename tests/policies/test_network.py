@@ -124,7 +124,7 @@ def test_files_give_back_what_was_written_and_are_replaced_whole_or_not_at_all(t
     for one, other in zip(layers_of(network), layers_of(again), strict=True):
         np.testing.assert_array_equal(one, other, strict=True)
     assert all(isinstance(load_policy(one), NetworkPolicy) for one in (path, str(path)))
-    with pytest.raises(TypeError):
+    with pytest.raises(ValueError, match="plain JSON values"):
         compact_network(card={"not": {"plain"}}).save(path)
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]

@@ -74,6 +74,8 @@ def test_one_or_several_names_or_objects_are_taken_by_all_alike():
         (lambda: parse_wrapper(parse_wrapper(NOISE)), "a wrapper to be a text"),
         (lambda: verdict("results"), r"a study to be a StudyTable, got 'results'; read_study\(path\) reads one"),
         (lambda: plot("results", "figures"), r"table to be a StudyTable, got 'results'; read_study\(path\)"),
+        (lambda: policy_specs(policy_specs("crw"), caches="static"), "a name, a file or an object for parameters"),
+        (lambda: plan_run(TINY, "crw", parameters={"x": float("inf")}), "policy parameters to be plain JSON values"),
         (lambda: from_callable(3), "function to be callable, got 3"),
         (lambda: record_run(TINY, RandomPolicy, "x.gif", seconds=2.0), "a policy object with reset and act"),
     ],

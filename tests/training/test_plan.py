@@ -9,6 +9,7 @@ from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.presets import warehouse_small
 from swarm_forage_env.training.evaluation import EvaluationPlan, EvaluationWorld
 from swarm_forage_env.training.plan import Stage, TrainingPlan, named_plan, read_plan
+from swarm_forage_env.training.recipe import recipe
 from swarm_forage_env.wrappers.world import World
 from tests.support.sampled import TWO_WORLDS
 
@@ -163,3 +164,10 @@ def test_plans_that_go_on_with_a_training_differ_in_steps_to_come_alone(plan):
         ({"stages": (first,)}, "stages[1].steps: 200 before, nothing now"),
     ):
         assert difference in replace(plan, **changes).differences(plan)
+
+
+def test_numbers_that_no_file_holds_are_refused_before_a_training(tmp_path):
+    plan = recipe("warehouse_small", steps=1000, options={"max_grad_norm": float("inf")})
+    with pytest.raises(ValueError, match="the plan to be plain JSON values"):
+        plan.write(tmp_path / "plan.json")
+    assert not [*tmp_path.iterdir()]
