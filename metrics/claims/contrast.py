@@ -118,8 +118,8 @@ def p_values(kind: Kind, found: Contrast, margin: float) -> PValues:
 def corrected(family: Sequence[PValues]) -> list[PValues]:
     """Return the p values of a family of contrasts after Holm's correction, each sort of test on its own.
 
-    A mean cannot be 0 and beyond a margin at once, so at most one sort errs about it. But means of a family differ, so the
-    whole family may err once in twenty times in each sort.
+    A mean cannot be 0 and beyond a margin at once, so at most one sort errs about it. But means of a family differ, so
+    the whole family may err once in twenty times in each sort.
     """
     adjusted = [holm(np.array([float(p[sort]) for p in family])) for sort in range(3)]
     return list(zip(*adjusted, strict=True))
