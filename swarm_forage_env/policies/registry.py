@@ -124,7 +124,7 @@ class PolicyFile(NamedTuple):
                 raise ConfigError(f"Expected the interface of {self.path} as field=value, got {word!r}.")
             try:
                 fields[name] = tomllib.loads(f"value = {value.lower()}")["value"]
-            except tomllib.TOMLDecodeError:
+            except (tomllib.TOMLDecodeError, RecursionError):
                 fields[name] = value
         return fields
 

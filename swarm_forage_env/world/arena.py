@@ -300,8 +300,7 @@ class ForagingArena:
             if not n_begun:
                 return Stop(self.tick, by_python=False)
             self.tick, self.has_changed = first + n_begun - 2, self.has_changed and n_begun == 1
-            own_gain = disturbances.gain if len(disturbances.gain) else gain
-            self.conclude(outcome, driver.actions, own_gain, driver.task)
+            self.conclude(outcome, driver.actions, disturbances.gain if len(disturbances.gain) else gain, driver.task)
         finally:
             is_kept[0] = False
         if rewards is not None and outcome != DONE:
