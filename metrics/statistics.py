@@ -140,11 +140,12 @@ def paired_p(differences: FloatArray) -> float:
     return 2.0 * float(stdtr(n_pairs - 1, -abs(mean) * math.sqrt(n_pairs) / std))
 
 
-def holm(p_values: FloatArray) -> FloatArray:
+def holm(p_values: FloatArray, most_true: int | None = None) -> FloatArray:
     """Adjust p values of one family for testing many at once (Holm 1979); NaN values do not count and stay NaN.
 
     Args:
         p_values: (K,).
+        most_true: How many of the hypotheses can be true at once, if some exclude others (Shaffer 1986); None: all.
 
     Returns:
         Adjusted values (K,), at most 1: rejecting where they are at most alpha keeps the probability of any false
@@ -152,7 +153,7 @@ def holm(p_values: FloatArray) -> FloatArray:
     """
     adjusted = np.full(p_values.shape, math.nan)
     order = np.argsort(p_values, kind="stable")[: np.isfinite(p_values).sum()]  # NaN comes last
-    factors = np.arange(order.size, 0, -1)
+    factors = np.minimum(np.arange(order.size, 0, -1), order.size if most_true is None else most_true)
     adjusted[order] = np.minimum(1.0, np.maximum.accumulate(factors * p_values[order]))
     return adjusted
 

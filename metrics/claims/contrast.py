@@ -115,14 +115,19 @@ def p_values(kind: Kind, found: Contrast, margin: float) -> PValues:
     return (nothing, within, found.p_beyond(margin)) if kind == "tie" else (found.p_differs, within, nothing)
 
 
-def corrected(family: Sequence[PValues]) -> list[PValues]:
-    """Return the p values of a family of contrasts after Holm's correction, each sort of test on its own.
+def corrected(family: Sequence[PValues], pairs: FloatArray | None = None) -> tuple[list[PValues], FloatArray]:
+    """Return the p values of a family after one correction, so that the whole family errs once in twenty times.
 
-    A mean cannot be 0 and beyond a margin at once, so at most one sort errs about it. But means of a family differ, so
-    the whole family may err once in twenty times in each sort.
+    It is Holm's with Shaffer's bound: a mean cannot be 0 and outside of a margin at once, so of the tests of a contrast
+    at most one can err, and there are as many errors to guard against as contrasts and pairs.
+
+    Args:
+        family: P values of its contrasts.
+        pairs: Further p values, each of a test of its own, (K,).
     """
-    adjusted = [holm(np.array([float(p[sort]) for p in family])) for sort in range(3)]
-    return list(zip(*adjusted, strict=True))
+    tests, others = np.array(family, dtype=np.float64).reshape(-1, 3), np.empty(0) if pairs is None else pairs
+    adjusted = holm(np.concatenate([tests.ravel(), others]), most_true=len(tests) + others.size)
+    return [(p[0], p[1], p[2]) for p in adjusted[: tests.size].reshape(-1, 3)], adjusted[tests.size :]
 
 
 def all_of(answers: Sequence[Answer]) -> Answer:

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple, TypeAlias, cast
 import numpy as np
 
 from ..curves import FloatArray
-from ..statistics import SIGNIFICANT, holm
+from ..statistics import SIGNIFICANT
 from .contrast import Answer, Contrast, Kind, PValues, all_of, corrected, decide, most_of, p_values
 from .panel import HAVE_SHARES, Panel, PanelName
 from .statements import Statement, Untestable
@@ -201,9 +201,10 @@ def _seen(statement: Statement, panels: Mapping[PanelName, Panel], reading: Read
 
 
 def _corrected(family: Sequence[Part]) -> list[Part]:
-    """Return parts with p values after Holm's correction."""
-    tested = iter(corrected([one.p for one in family if one.p is not None]))
-    reverses = holm(np.concatenate([np.empty(0), *(one.reverses for one in family)]))
+    """Return parts with p values after correction."""
+    pairs = np.concatenate([np.empty(0), *(one.reverses for one in family)])
+    found, reverses = corrected([one.p for one in family if one.p is not None], pairs)
+    tested = iter(found)
     ends = np.cumsum([one.reverses.size for one in family])
     return [
         one if one.p is None else replace(one, p=next(tested), reverses=reverses[end - one.reverses.size : end])

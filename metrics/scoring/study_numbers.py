@@ -145,8 +145,8 @@ class StudyPanel:
     def _unit(self) -> FloatArray:
         """What scores are shares of at each level, mean of the policies, (L,)."""
         if self.measure == "spatial_emergence":
-            return np.mean([[_lost(runs) for runs in line.curves.experiments if runs.value in self.x]
-                            for line in self.lines], axis=0)  # fmt: skip
+            lost = [{runs.value: _lost(runs) for runs in line.curves.experiments} for line in self.lines]
+            return np.mean([[of[x] for x in self.x] for of in lost], axis=0)
         if not MEASURES[self.measure].is_amount and self.measure != "raw_performance":
             return np.ones_like(self.x)
         column = "value" if self.measure == "raw_performance" else "total"
