@@ -90,6 +90,19 @@ def checked_density(density: Any) -> float:
     return number("density (robots per m^2; 0.05 is 5 %)", density, above=0.0, at_most=1.0)
 
 
+def with_object_density(config: ScenarioConfig, per_m2: float) -> ScenarioConfig:
+    """Return `config` with so many objects per m^2 of its arena, rounded to whole objects, at least 1.
+
+        with_object_density(scenario("search_and_rescue", side_m=16), 0.085)  # 22 objects
+
+    Raises:
+        ConfigError: a density that cannot be, or more objects than the arena has room for.
+    """
+    number("object_density (objects per m^2)", per_m2, above=0.0, at_most=1.0 / CELL_M**2)
+    n_objects = max(1, round(per_m2 * config.arena.width_m * config.arena.height_m))
+    return with_overrides(config, n_objects=n_objects)
+
+
 def arena_at_density(config: ScenarioConfig, density: float, n_robots: int) -> dict[str, Any]:
     """Return the fields of the smallest arena in the proportions of `config` that holds a swarm at a density.
 

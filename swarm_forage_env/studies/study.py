@@ -21,11 +21,13 @@ from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.policies.registry import is_policy_file
 from swarm_forage_env.runs.plan import Condition, Plan
 from swarm_forage_env.runs.spec import PolicySpec, RunSpec, policy_spec, wrappers_from_list
+from swarm_forage_env.scenarios.overrides import with_object_density
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.quirks import QUIRK_NAMES, RULES, Quirks
 from swarm_forage_env.studies.ladders import CRITERIA, swarms_of_sizes, wrappers_at
 from swarm_forage_env.studies.study_file import (
     NOTHING,
+    OBJECT_DENSITY,
     OF_THE_STUDY,
     PAPER,
     QUIRK,
@@ -220,15 +222,18 @@ class StudySpec:
             overrides: dict[str, Any] = {**length, **self.file.set} | {
                 name: value for name, value in here.items() if name in SCENARIO_FIELDS
             }
+            per_m2 = overrides.pop(OBJECT_DENSITY, None)
             density = None if at is None else overrides.pop("density", None)
             quirks = _switched(RULES[RULES_NAMES[rules]], here.get(QUIRK))
             world = scenario(self.file.scenario, quirks=quirks, **overrides)
-            if at is None:
-                found[values] = world
-                continue
-            sizes: Any = self.axes[at].values
-            for size, sized in swarms_of_sizes(world, sizes, density).items():
-                found[*values[:at], size, *values[at:]] = sized
+            sized: dict[tuple[Value, ...], ScenarioConfig] = {values: world}
+            if at is not None:
+                sizes: Any = self.axes[at].values
+                swarms = swarms_of_sizes(world, sizes, density)
+                sized = {(*values[:at], size, *values[at:]): swarm for size, swarm in swarms.items()}
+            if per_m2 is not None:
+                sized = {place: with_object_density(one, per_m2) for place, one in sized.items()}
+            found |= sized
         return found
 
     def _world(self, values: tuple[Value, ...], sized: "ScenarioConfig") -> World:
@@ -272,7 +277,7 @@ def load_study(
     Args:
         name: Name of one of the paper's sets, or path of a file.
         budget: Name of a budget; default the first of the file.
-        seeds: Number of seeds, 0, 1, 2, ..., or the seeds, in place of those of the budget.
+        seeds: Number of seeds, from the first of the budget on, or the seeds, in place of those of the budget.
         rules: Rules in place of those in the file.
 
     Raises:
@@ -319,12 +324,13 @@ def study_of(
     if run is None or budget is not None:
         chosen = budget or next(iter({**content.budget, PAPER: 0}))
         known_name("budget", chosen, {**content.budget, PAPER: 0})
-        given = content.budget.get(chosen, BudgetTable()).seeds
-        run = RunTable(budget=chosen, seeds=seeds_of(given), rules=content.rules)
+        given = content.budget.get(chosen, BudgetTable())
+        run = RunTable(budget=chosen, seeds=seeds_of(given.seeds, given.first_seed), rules=content.rules)
         if any(is_policy_file(_as_table(one).policy) for one in content.policies):
             run = msgspec.structs.replace(run, policies=tuple(_kept(_found(one, folder)) for one in content.policies))
     if seeds is not None:
-        run = msgspec.structs.replace(run, seeds=seeds_of(seeds))
+        first = content.budget.get(run.budget, BudgetTable()).first_seed
+        run = msgspec.structs.replace(run, seeds=seeds_of(seeds, first))
     if rules is not None:
         run = msgspec.structs.replace(run, rules=(rules,) if isinstance(rules, str) else tuple(rules))
     return StudySpec(text=plain, run=run)
@@ -332,7 +338,12 @@ def study_of(
 
 def is_set_of_paper(spec: StudySpec) -> bool:
     """Return whether a study is a set of the paper, with any choices, not only by its name."""
-    return spec.name in set_names() and spec.file == load_study(spec.name).file
+    return spec.name in set_names() and _question(spec.file) == _question(load_study(spec.name).file)
+
+
+def _question(file: StudyFile) -> StudyFile:
+    """Return a file without what says how much of it to run."""
+    return msgspec.structs.replace(file, budget={}, run=None)
 
 
 def left_out(spec: StudySpec) -> dict[str, tuple[str, ...]]:

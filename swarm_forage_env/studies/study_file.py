@@ -18,7 +18,7 @@
     reference = 0.0                        # only on the last axis; default see `StudySpec.reference`
 
     [budget.smoke]                         # all keys are optional; default: as in the paper
-    seeds = 2
+    seeds = 2                              # 0 and 1; from `first_seed` on, or a list
     horizon_s = 1000.0
     interval_s = 100.0
     values = { noise = 2 }                 # number of values besides the reference, evenly spread, or a list of values
@@ -53,8 +53,11 @@ PAPER = "paper"
 """Name of the budget that every study has: runs as long, and as many, as in the paper."""
 RULES_NAMES = {"described": "DESCRIBED", "program": "AUTHORS_PROGRAM"}
 """Word of studies -> name of the rules in `scenarios.quirks.RULES`."""
-SCENARIO_FIELDS = (*field_sections(), "density", "side_m")
-"""Scenario fields that a study may set and vary: all arguments that `scenarios.presets.scenario` takes by name."""
+OBJECT_DENSITY = "object_density"
+"""Objects per m^2 of floor, in place of n_objects: their number follows the arena, however the swarm grows."""
+SCENARIO_FIELDS = (*field_sections(), "density", "side_m", OBJECT_DENSITY)
+"""Scenario fields that a study may set and vary: all arguments that `scenarios.presets.scenario` takes by name, and the
+density of objects."""
 OF_THE_STUDY = {
     "horizon_s": "the budget of a study sets it",
     "interval_s": "the budget of a study sets it",
@@ -96,6 +99,8 @@ class BudgetTable(_Strict, frozen=True):
 
     seeds: int | tuple[int, ...] = BUDGETS[PAPER].n_seeds
     """Their number, or a list."""
+    first_seed: int = 0
+    """The first of a number of seeds."""
     horizon_s: float = BUDGETS[PAPER].horizon_s
     interval_s: float = BUDGETS[PAPER].interval_s
     values: dict[str, int | tuple[int | float | str | bool | list[Any], ...]] = {}
@@ -172,11 +177,11 @@ def content_of(text: str) -> StudyFile:
         raise ConfigError(f"{told}{' in ' + where.strip('`').removeprefix('$.') if where else ''}.") from error
 
 
-def seeds_of(given: int | Sequence[int]) -> tuple[int, ...]:
-    """Return seeds that are given by their number or as a list."""
+def seeds_of(given: int | Sequence[int], first: int) -> tuple[int, ...]:
+    """Return seeds that are given by their number, with the first of them, or as a list."""
     if isinstance(given, list | tuple):
         return tuple(given)
-    return tuple(range(whole("seeds", given, at_least=1, at_most=MOST_SEEDS)))
+    return tuple(range(first, first + whole("seeds", given, at_least=1, at_most=MOST_SEEDS)))
 
 
 def axes_of(file: StudyFile, asked: Mapping[str, Any]) -> tuple[tuple[Axis, ...], Value | None]:
@@ -221,7 +226,8 @@ def _usual_values(file: StudyFile, name: str) -> tuple[Value, ...]:
         return (NOTHING, *QUIRK_NAMES)
     if name not in CRITERIA:
         raise ConfigError(f"Missing key 'values' of axis {name}; only criteria have values of their own.")
-    return tuple(study_values(scenario(file.scenario, **file.set), name))
+    overrides = {field: value for field, value in file.set.items() if field != OBJECT_DENSITY}
+    return tuple(study_values(scenario(file.scenario, **overrides), name))
 
 
 def _usual_reference(name: str, values: Sequence[Any]) -> Value | None:
