@@ -7,7 +7,7 @@ from .frame import differences, scores, summarized
 from .limits import ForagingLimit, limit_of
 from .measures import MEASURES, Measure
 from .plots import draw_scores
-from .policy_scores import score, score_curves, score_question
+from .policy_scores import curves_question, score, score_curves, score_question
 from .question import Question
 from .run_curves import StudyLine, study_lines
 from .study_numbers import StudyPanel, study_panels
@@ -27,6 +27,7 @@ __all__ = [
     "ForagingLimit",
     "summarize_runs",
     "score_question",
+    "curves_question",
     "study_lines",
     "study_panels",
     "study_figures",

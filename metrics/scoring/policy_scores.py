@@ -161,6 +161,38 @@ def score_curves(
     policies: Sequence[PolicyLike] | Mapping[str, PolicyLike] = (),
     world: WorldLike = "warehouse_small",
     *,
+    out: str | Path | None = None,
+    jobs: int | None = None,
+    executor: Executor | None = None,
+    progress: bool = True,
+    **asked: Any,
+) -> Scores:
+    """Score curves of any simulator or of real robots, beside those of policies that are run here.
+
+    Args:
+        path: A file as `read_curves` reads it.
+        policies: As in `score`, like all that follow. They run with swarm sizes, numbers of runs and clock of the file.
+        world: Where policies run.
+        out: Folder for run records.
+        jobs: Processes.
+        executor: In place of the processes.
+        progress: Whether to show progress.
+        asked: All further arguments of `curves_question`: columns, events, interval_s, measures and others.
+
+    Raises:
+        CurveError: a file with an error, a measure that you name and that cannot be computed, or a clock or swarm sizes
+            that no policy can be run with.
+        ValueError: as `score`.
+    """
+    question = curves_question(path, policies, world, **asked)
+    return question.answer(run_plan(question.plan, out=out, jobs=jobs, executor=executor, progress=progress))
+
+
+def curves_question(
+    path: str | Path,
+    policies: Sequence[PolicyLike] | Mapping[str, PolicyLike] = (),
+    world: WorldLike = "warehouse_small",
+    *,
     columns: Mapping[str, str] | None = None,
     events: bool = False,
     interval_s: float | None = None,
@@ -170,14 +202,13 @@ def score_curves(
     forms: Sequence[Form] = ("marginal",),
     against: str | None = None,
     is_full: bool = False,
-    **run: Any,
-) -> Scores:
-    """Score curves of any simulator or of real robots, beside those of policies that are run here.
+) -> Question[Scores]:
+    """Return the question of `score_curves`; without policies its plan has no runs. Errors as there.
 
     Args:
-        path: A file as `read_curves` reads it.
-        policies: As in `score`. They run in `world` with swarm sizes, numbers of runs and clock of the file.
-        world: Where policies run, as in `score`.
+        path: See `score_curves`, as for the next two.
+        policies: See there.
+        world: See there.
         columns: Our name of a column -> its name in the file, or a number for all rows.
         events: Whether a row is a delivery with a time, and not an interval.
         interval_s: Length of an interval, s; needed for events.
@@ -187,38 +218,35 @@ def score_curves(
         forms: See there.
         against: See there.
         is_full: See there.
-        run: How runs are made: out, jobs, executor, progress, as in `score`.
-
-    Raises:
-        CurveError: a file with an error, a measure that you name and that cannot be computed, or a clock or swarm sizes
-            that no policy can be run with.
-        ValueError: as `score`.
     """
     checked_request(measures, variants, forms)
     given = read_curves(path, performance, columns=columns, events=events, interval_s=interval_s)
     chosen = world_of(world)
-    table = run_plan(_plan_beside(given, policy_specs(policies), chosen), **run) if policies else None
-    simulated = [] if table is None else [policy_curves(table, each.label) for each in table.plan.policies]
-    studies = [*simulated, *given]
-    frame, missing = scores(studies, measures, variants=variants, forms=forms)
-    for study in given:
-        reasons = {label: why for (policy, label), why in missing.items() if policy == study.controller}
-        if reasons and (measures is not None or frame.filter(policy=study.controller).is_empty()):
-            label, reason = next(iter(reasons.items()))
-            raise CurveError(f"Cannot compute {label} for {study.controller} from {path}: {reason}.")
-    seeds = sorted({seed for study in studies for runs in study.experiments for seed in runs.seeds})
-    told = {} if performance is None else {"performance": performance}
-    return Scores(
-        frame=frame,
-        policies=tuple(study.controller for study in studies),
-        world=chosen.title() if simulated else "",
-        missing=missing,
-        failures={} if table is None else _failures(table),
-        settings={"curves": str(path), "seeds": seeds, "horizon_s": given[0].horizon_s, **told},
-        notes=(f"{path}: {given[0].note}",) if given[0].note else (),
-        against=against,
-        is_full=is_full,
-    )
+    plan = _plan_beside(given, policy_specs(policies), chosen) if policies else Plan(conditions=(), seeds=(0,))
+
+    def answer(table: Table) -> Scores:
+        studies = [*(policy_curves(table, each.label) for each in table.plan.policies), *given]
+        frame, missing = scores(studies, measures, variants=variants, forms=forms)
+        for study in given:
+            reasons = {label: why for (policy, label), why in missing.items() if policy == study.controller}
+            if reasons and (measures is not None or frame.filter(policy=study.controller).is_empty()):
+                label, reason = next(iter(reasons.items()))
+                raise CurveError(f"Cannot compute {label} for {study.controller} from {path}: {reason}.")
+        seeds = sorted({seed for study in studies for runs in study.experiments for seed in runs.seeds})
+        told = {} if performance is None else {"performance": performance}
+        return Scores(
+            frame=frame,
+            policies=tuple(study.controller for study in studies),
+            world=chosen.title() if policies else "",
+            missing=missing,
+            failures=_failures(table),
+            settings={"curves": str(path), "seeds": seeds, "horizon_s": given[0].horizon_s, **told},
+            notes=(f"{path}: {given[0].note}",) if given[0].note else (),
+            against=against,
+            is_full=is_full,
+        )
+
+    return Question(plan=plan, answer=answer)
 
 
 def _plan_beside(given: Sequence[StudyCurves], policies: Sequence[PolicySpec], world: World) -> Plan:

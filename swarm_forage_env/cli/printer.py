@@ -6,7 +6,7 @@ Names of policies, files and scenarios are shown as they are: no console reads m
 import json
 import shutil
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from swarm_forage_env.cli.options import RunOptions
     from swarm_forage_env.runs.plan import Table
     from swarm_forage_env.sheet import Answer
+    from swarm_forage_env.wrappers.world import World
 
 
 def say(text: object) -> None:
@@ -51,8 +52,18 @@ def progress_bar(text: str, total: float | None = None) -> "Iterator[Callable[..
         yield lambda done, total=None: shown.update(task, completed=done, total=total)
 
 
-def ask_and_show(question: "Question[Any]", folder: Path, options: "RunOptions", picture: Path) -> int:
+def ask_and_show(
+    question: "Question[Any]",
+    options: "RunOptions",
+    world: "World",
+    policies: Sequence[str],
+    *,
+    ending: str = ".png",
+    seed: int = 0,
+) -> int:
     """Make the runs of a question and show its answer, or only its plan; returns 1 if runs have failed.
+
+    Folder and picture are named by `options`, else by the other arguments: see `cli.worlds.default_file`.
 
     Raises:
         ConfigError: a picture whose ending is none of figures.
@@ -60,9 +71,12 @@ def ask_and_show(question: "Question[Any]", folder: Path, options: "RunOptions",
         CommandError: too many runs have failed for an answer.
     """
     from metrics.checks import CurveError
+    from swarm_forage_env.cli.worlds import default_file, default_folder
     from swarm_forage_env.rendering.figures import picture_ending
     from swarm_forage_env.runs.plan import planned_line, run_plan
 
+    folder = options.out or default_folder(world)
+    picture = options.picture or default_file(folder, world, policies, ending, seed=seed)
     picture_ending(picture)  # before the work; a place that cannot be written to is told of beside the answer
     if options.dry_run:
         specs = question.plan.specs
@@ -72,7 +86,9 @@ def ask_and_show(question: "Question[Any]", folder: Path, options: "RunOptions",
     table = run_plan(question.plan, out=folder, jobs=options.jobs, progress=True)
     try:
         answer: Answer = question.answer(table)
-    except CurveError as error:  # what is left is too little
+    except CurveError as error:
+        if not table.failures:
+            raise
         raise CommandError(str(error)) from None
     show(answer, picture, as_json=options.as_json)
     _tell_of_records(table, folder)

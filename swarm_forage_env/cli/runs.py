@@ -23,7 +23,7 @@ from swarm_forage_env.cli.options import (
     StyleOptions,
     WorldOptions,
 )
-from swarm_forage_env.cli.printer import ask_and_show, note, say, show
+from swarm_forage_env.cli.printer import ask_and_show, note, say
 
 
 def run(
@@ -43,16 +43,12 @@ def run(
     does not repeat runs that the folder already holds, so after an interruption, just enter it again.
     """
     from metrics.scoring import Question, summarize_runs
-    from swarm_forage_env.cli.worlds import default_file, default_folder, described_world
+    from swarm_forage_env.cli.worlds import described_runs
     from swarm_forage_env.runs.plan import Plan
-    from swarm_forage_env.runs.spec import policy_specs
 
-    chosen, caches = described_world(world)
-    plan = Plan.product(policy_specs(policies, caches=caches), [chosen], range(seed, seed + seeds))
-    question = Question(plan=plan, answer=summarize_runs)
-    folder = options.out or default_folder(chosen)
-    picture = options.picture or default_file(folder, chosen, policies, ".png", seed=seed)
-    return ask_and_show(question, folder, options, picture)
+    chosen, specs = described_runs(world, policies)
+    question = Question(plan=Plan.product(specs, chosen, range(seed, seed + seeds)), answer=summarize_runs)
+    return ask_and_show(question, options, chosen, policies, seed=seed)
 
 
 def plot(
@@ -120,8 +116,7 @@ def score(
         disturbance: Disturbance for reactivity and adaptability: throttle or handling_cost.
     """
     from metrics.scoring import score_question
-    from swarm_forage_env.cli.worlds import default_file, default_folder, described_fields, described_world
-    from swarm_forage_env.runs.spec import policy_specs
+    from swarm_forage_env.cli.worlds import described_fields, described_runs
 
     asked: dict[str, Any] = {
         "measures": measures or None,
@@ -143,43 +138,30 @@ def score(
     for word in world.settings:
         if word.partition("=")[0] in ("horizon_s", "interval_s"):
             raise ConfigError(f"Expected no --set {word}, which the budget sets; --horizon changes the length of runs.")
-    chosen, caches = described_world(replace(world, horizon=None))
+    chosen, specs = described_runs(replace(world, horizon=None), policies)
     asked |= {"budget": budget, "seeds": seeds, "disturbance": disturbance, "horizon_s": world.horizon}
     density = described_fields(world).fields.get("density")
-    question = score_question(policy_specs(policies, caches=caches), chosen, density=density, **asked)
-    folder = options.out or default_folder(chosen)
-    file = options.picture or default_file(folder, chosen, policies, "_scores.png")
-    return ask_and_show(question, folder, options, file)
+    question = score_question(specs, chosen, density=density, **asked)
+    return ask_and_show(question, options, chosen, policies, ending="_scores.png")
 
 
 def _score_curves(
     policies: Sequence[str], world: WorldOptions, options: RunOptions, curves: CurveOptions, **how: Any
 ) -> int:
     """Score curves of a file beside those of policies, and draw a picture beside the file."""
-    from metrics.scoring import score_curves
-    from swarm_forage_env.cli.worlds import default_folder, described_world
+    from metrics.scoring import curves_question
+    from swarm_forage_env.cli.worlds import described_runs
 
     file = curves.curves
     if file is None:
         raise ConfigError("Expected a file with --curves for --columns, --events and --interval, got none.")
     if not policies and world != WorldOptions():
         raise ConfigError("Expected policies to run in a world beside --curves, got a world alone.")
-    chosen, _ = described_world(replace(world, horizon=None))
-    folder = options.out or default_folder(chosen)
-    columns, events, interval_s = curves.named_columns(), curves.events, curves.interval
-    found = score_curves(
-        file,
-        policies,
-        chosen,
-        columns=columns,
-        events=events,
-        interval_s=interval_s,
-        out=folder,
-        jobs=options.jobs,
-        **how,
-    )
-    show(found, options.picture or file.with_name(f"{file.stem}_scores.png"), as_json=options.as_json)
-    return int(bool(found.failures))
+    chosen, specs = described_runs(replace(world, horizon=None), policies)
+    given = {"columns": curves.named_columns(), "events": curves.events, "interval_s": curves.interval}
+    question = curves_question(file, specs, chosen, **given, **how)
+    picture = options.picture or file.with_name(f"{file.stem}_scores.png")
+    return ask_and_show(question, replace(options, picture=picture), chosen, policies)
 
 
 def check(policies: Policies, /, *, world: WorldOptions = WorldOptions()) -> None:

@@ -1,6 +1,5 @@
 """From command-line words to run specifications. Every wrong input raises a ConfigError here."""
 
-import dataclasses
 import re
 import tomllib
 from collections.abc import Sequence
@@ -11,7 +10,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import as_file_name
 from swarm_forage_env.cli.options import WorldOptions
 from swarm_forage_env.policies.registry import policy_label
-from swarm_forage_env.runs.spec import RunSpec, plan_run
+from swarm_forage_env.runs.spec import PolicySpec, RunSpec, policy_specs
 from swarm_forage_env.scenarios.differences import digest_of, preset_of
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.world import FILE, World, WorldDescription, describe_file
@@ -48,6 +47,16 @@ def described_world(options: WorldOptions) -> tuple[World, str | None]:
     """
     described = described_fields(options)
     return described.world(), described.fields.get("caches")
+
+
+def described_runs(options: WorldOptions, policies: Sequence[str]) -> tuple[World, tuple[PolicySpec, ...]]:
+    """Return the world that options describe, and policies with the caches that were asked for.
+
+    Raises:
+        ConfigError: as `described_world`, or of a policy.
+    """
+    world, caches = described_world(options)
+    return world, policy_specs(policies, caches=caches)
 
 
 def described_fields(options: WorldOptions) -> WorldDescription:
@@ -96,10 +105,9 @@ def _value(text: str) -> Any:
 
 
 def plan_runs(options: WorldOptions, policies: Sequence[str], seeds: Sequence[int]) -> tuple[RunSpec, ...]:
-    """Return one specification per policy and seed; raises ConfigError as `described_world`, or of a policy."""
-    world, caches = described_world(options)
-    planned = [plan_run(world, name, caches=caches) for name in policies]
-    return tuple(dataclasses.replace(spec, seed=seed) for spec in planned for seed in seeds)
+    """Return one specification per policy and seed; errors as `described_runs`."""
+    world, specs = described_runs(options, policies)
+    return tuple(spec.run_in(world, seed) for spec in specs for seed in seeds)
 
 
 def default_folder(world: World) -> Path:

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import product, starmap
 from pathlib import Path
 from typing import NamedTuple
 
@@ -44,7 +45,7 @@ class Plan:
     """Runs that belong together.
 
     Raises:
-        ConfigError: no conditions or seeds, equal seeds, or conditions that describe no run.
+        ConfigError: no seeds, equal seeds, or conditions that describe no run.
     """
 
     conditions: tuple[Condition, ...]
@@ -52,15 +53,15 @@ class Plan:
     """All conditions share them, so their runs are paired."""
 
     def __post_init__(self) -> None:
-        if not self.conditions or not self.seeds:
-            raise ConfigError("Expected a plan with one or more conditions and seeds, got none.")
+        if not self.seeds:
+            raise ConfigError("Expected a plan with one or more seeds, got none.")
         for condition in self.conditions:
             instance("a condition", condition, Condition, hint="; Plan.product makes them of policies and worlds")
         for seed in self.seeds:
             whole("a seed", seed, at_least=0)
         if len(set(self.seeds)) < len(self.seeds):
             raise ConfigError(f"Expected different seeds, got {', '.join(map(str, self.seeds))}.")
-        _ = self.specs_of(self.conditions[0]), self.robot_ticks  # refuse what runs refuse: seeds, and conditions
+        _ = [self.specs_of(one) for one in self.conditions[:1]], self.robot_ticks  # refuse what runs refuse
 
     @classmethod
     def product(
@@ -72,11 +73,10 @@ class Plan:
         """Return the plan in which every policy runs in every world, policy by policy."""
         instance("seeds", seeds, Iterable, hint="; range(n) has n of them")
         several = [worlds] if isinstance(worlds, str) or not isinstance(worlds, Iterable) else worlds
-        found = [world_of(world) for world in several]
-        return cls(
-            conditions=tuple(Condition(policy, world) for policy in policy_specs(policies) for world in found),
-            seeds=tuple(seeds),
-        )
+        specs, found = policy_specs(policies), [world_of(world) for world in several]
+        if not specs or not found:
+            raise ConfigError("Expected one or more policies and worlds, got none.")
+        return cls(conditions=tuple(starmap(Condition, product(specs, found))), seeds=tuple(seeds))
 
     @property
     def policies(self) -> tuple[PolicySpec, ...]:

@@ -109,9 +109,10 @@ def test_real_robots_stand_beside_policies_in_one_table_and_picture(command, pai
         "robots;run;stamp\n" + "".join(f"{n};{run};{t:g}\n".replace(".", ",") for n, run, t in times)
     )
     words = ("--columns", "n_robots=robots,seed=run,time_s=stamp", "--events", "--interval", "2", "--jobs", "1")
-    code, out, err = command(
-        "score", "random", "--curves", "real.csv", *words, "--set", "n_objects=20", "--out", "here"
-    )
+    asked = ("score", "random", "--curves", "real.csv", *words, "--set", "n_objects=20", "--out", "here")
+    code, out, _ = command(*asked, "--dry-run")
+    assert (code, out[:27], Path("here").exists()) == (0, "4 runs, 0 stored, 4 to do w", False)
+    code, out, err = command(*asked)
     assert code == 0
     assert out.splitlines()[0] == "random, real in warehouse_small with 20 objects and from real.csv, 2 seeds, 4 s"
     header, first = [line.split() for line in out.splitlines() if line.startswith(("measure ", "raw performance  "))]

@@ -55,8 +55,7 @@ def test_its_runs_are_those_that_are_planned_one_by_one(policy, world):
 @pytest.mark.parametrize(
     ("conditions", "seeds", "message"),
     [
-        ((), (0,), "one or more conditions and seeds"),
-        ((Condition(CRW, QUIET),), (), "one or more conditions and seeds"),
+        ((), (), "one or more seeds"),
         ((Condition(CRW, QUIET),), (1, 1), "Expected different seeds, got 1, 1"),
         ((Condition(CRW, QUIET),), (-1,), "a seed to be a whole number >= 0, got -1"),
     ],
@@ -64,6 +63,12 @@ def test_its_runs_are_those_that_are_planned_one_by_one(policy, world):
 def test_impossible_plans_are_refused(conditions, seeds, message):
     with pytest.raises(ConfigError, match=message):
         Plan(conditions=conditions, seeds=seeds)
+
+
+@pytest.mark.parametrize(("policies", "worlds"), [([], [QUIET]), ([CRW], [])])
+def test_a_product_without_factors_is_refused(policies, worlds):
+    with pytest.raises(ConfigError, match="one or more policies and worlds"):
+        Plan.product(policies, worlds, seeds=(0,))
 
 
 def test_a_condition_that_describes_no_run_is_refused_at_once():
