@@ -233,17 +233,15 @@ def page() -> str:
     lines = [
         "# Gallery",
         "",
-        "[Replays](replay.md) of every scenario, every controller and every kind of adversity, most of them 1,000 s",
-        "long. Download a file and open it in a browser. Runs side by side have the same seed.",
-        "`scripts/make_gallery.py` makes them all. A click on a film leads to its replay.",
+        "[Replays](look.md#replays) of every scenario, controller and kind of adversity. A click on a picture opens",
+        "one. Runs side by side have the same seed; most last 1,000 s. `scripts/make_gallery.py` makes them.",
         "",
         *table_of_films(),
     ]
     for exhibit in EXHIBITS:
         title = exhibit.name.replace("_", " ")
-        lines += ["", f"## {title[0].upper()}{title[1:]}", "", exhibit.text, ""]
-        lines += [f"[![{title}](gallery/{exhibit.name}.png)](gallery/{exhibit.name}.html)", ""]
-        lines += [f"[Open the replay](gallery/{exhibit.name}.html): {', '.join(exhibit.policies)}."]
+        lines += ["", f"## {title[0].upper()}{title[1:]}", "", f"{exhibit.text} ({', '.join(exhibit.policies)})", ""]
+        lines += [f"[![{title}](gallery/{exhibit.name}.png)](gallery/{exhibit.name}.html)"]
     return "\n".join(lines) + "\n"
 
 

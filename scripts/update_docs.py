@@ -48,12 +48,6 @@ FIVE = ("crw", "dpo", "stochm", "stochx", "ppo_warehouse_small")
 WITH_ALL = ("crw", "dpo", "stochm", "stochx", "generalist")
 SCENARIOS = {"small": "warehouse_small", "medium": "warehouse_medium", "rescue": "search_and_rescue"}
 """Short name in blocks -> scenario."""
-LIKELIEST = (
-    "from dataclasses import replace as change; from swarm_forage_env.policies.network import Network; "
-    "from swarm_forage_env.policies.pretrained import network_file as file; net = Network.load(file('generalist')); "
-    "change(net, about=change(net.about, samples=False)).save('likeliest.npz')"
-)
-"""The same weights, with the likeliest action in the place of one that is drawn."""
 SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "run": ((f"swarm-forage run {','.join(FIVE)} --scenario warehouse_small --robots 50 --seeds 4",), FIVE),
     "medium": (
@@ -90,13 +84,6 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         if (short, seed) != ("small", 0)  # that is "trained"
     },
     "five": (("swarm-forage train --seeds 5 --jobs 2 --out results/training/five",), ()),
-    "drawn": (
-        (
-            f'python -c "{LIKELIEST}"',
-            "swarm-forage run generalist,likeliest.npz --scenario search_and_rescue --robots 64 --seeds 4",
-        ),
-        ("generalist", "likeliest"),
-    ),
     "cpfa_evolved": (
         (
             f"python {ROOT}/scripts/evolve_controller.py cpfa search_per_tick=0.001:0.5:log@0.05 "

@@ -153,7 +153,7 @@ def test_answers_and_means_are_those_beside_the_results(tmp_path):
 
 
 def test_commands_of_the_store_are_those_that_the_pages_show():
-    shown = {"run": "README.md", "trained": "docs/learning.md"}
+    shown = {"run": "README.md", "trained": "docs/training.md"}
     assert [
         command
         for name, page in shown.items()
