@@ -14,12 +14,12 @@ from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.world import World
 
 pytest.importorskip("distributed")
+pytestmark = pytest.mark.slow
 
 WORLD = World(scenario("warehouse_small", n_robots=2, n_objects=20, horizon_s=4.0, interval_s=2.0))
 SPECS = [RunSpec(world=WORLD, policy="random", seed=seed) for seed in range(3)]
 
 
-@pytest.mark.slow
 def test_a_cluster_of_this_machine_is_one_word(tmp_path):
     """It makes the same runs, and a run that always kills its worker ends the call."""
     expected = run_all(SPECS, jobs=1, progress=False)
@@ -36,6 +36,7 @@ def no_executor(where, *workers):
         pytest.fail("there should be no executor")
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # Dask leaves coroutines behind
 def test_a_scheduler_that_does_not_answer_is_told(monkeypatch):
     """Dask would wait ten seconds for a thread of its own to start, which is too short on a busy machine."""
     monkeypatch.setattr("distributed.utils._CollectErrorThread", None)

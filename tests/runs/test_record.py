@@ -9,10 +9,13 @@ import polars as pl
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.runs import versions
 from swarm_forage_env.runs.record import Record, RecordError
+from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.runs.store import RunFailure, failure_lines, is_stored, load, record_file, store
+from swarm_forage_env.runs.versions import PACKAGES, VERSION_NAMES, software_versions
 from swarm_forage_env.scenarios.columns import INTERVAL_COLUMNS
-from swarm_forage_env.scenarios.config import whole_intervals
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.world import World
 
@@ -55,15 +58,10 @@ def test_the_file_is_a_plain_table_with_keys_on_each_row(record, file):
     assert json.loads(pl.read_parquet_metadata(file)["swarm_forage_env.spec"])["policy"] == "crw"
 
 
-@pytest.mark.parametrize("share", [0.0, 0.01, 0.5, 0.99])
-def test_a_cut_off_file_is_damaged(file, share):
-    sound = file.read_bytes()
-    file.write_bytes(sound[: int(share * len(sound))])
+def test_what_is_no_record_is_refused(file, tmp_path):
+    file.write_bytes(file.read_bytes()[:-9])
     with pytest.raises(RecordError, match=r"record\.parquet: it is no Parquet file or a damaged one"):
         Record.read(file)
-
-
-def test_what_is_no_record_is_refused(tmp_path):
     path = tmp_path / "other.parquet"
     pl.DataFrame({"a": [1]}).write_parquet(path)
     with pytest.raises(RecordError, match=r"other\.parquet: it is a Parquet file, but no run record"):
@@ -104,13 +102,10 @@ def test_a_failed_write_leaves_the_old_file_and_no_litter(record, file, monkeypa
     assert Record.read(file).equals(record)
 
 
-@pytest.mark.parametrize("values", [[1.0, 2.0], [1.0, 2.0, np.nan], [1.0, 2.0, np.inf]], ids=["short", "nan", "inf"])
-def test_impossible_columns_are_refused(record, values):
-    with pytest.raises(RecordError, match="column performance"):
-        replace(record, columns={**record.columns, "performance": np.array(values)})
-
-
-def test_columns_cannot_be_changed(record):
+def test_columns_are_finite_of_one_length_and_cannot_be_changed(record):
+    for values in ([1.0, 2.0], [1.0, 2.0, np.inf]):
+        with pytest.raises(RecordError, match="column performance"):
+            replace(record, columns={**record.columns, "performance": np.array(values)})
     with pytest.raises(ValueError, match="read-only"):
         record["collected"][0] = 1
 
@@ -142,10 +137,56 @@ def test_rates_and_lengths(record):
     assert all(part in told for part in (record.run_id, "noise = 0.1", "600 s, delivered 30 (50.0 per 1,000 s)"))
 
 
-def test_whole_intervals():
-    config = scenario("warehouse_small")
-    assert whole_intervals(config) == 50
-    assert whole_intervals(config, 2000) == 2
-    for ticks in (0, 999, 1001):
-        with pytest.raises(ConfigError, match="whole number of intervals of 200 s"):
-            whole_intervals(config, ticks)
+SPEC = RunSpec(world=World(scenario("warehouse_small", n_robots=2, horizon_s=2.0, interval_s=1.0)), policy="random")
+
+
+@pytest.fixture
+def folder(tmp_path) -> Path:
+    """A folder with two runs."""
+    for seed in range(2):
+        store(tmp_path / "new", run_one(replace(SPEC, seed=seed)))
+    return tmp_path / "new"
+
+
+def test_what_is_written_is_loaded_and_nothing_else(folder):
+    (folder / "performance.png").write_bytes(b"x")
+    (folder / ".abc.parquet").write_bytes(b"x")
+    found = load(folder)
+    assert sorted(record.seed for record in found) == [0, 1]
+    assert all(record.equals(run_one(record.spec)) for record in found)
+
+
+def test_an_empty_or_missing_folder_has_nothing_to_load(tmp_path):
+    for empty in (tmp_path, tmp_path / "missing"):
+        with pytest.raises(RecordError, match="found none"):
+            load(empty)
+
+
+def test_a_run_is_stored_unless_it_is_missing_failed_or_damaged(folder):
+    failed = replace(SPEC, seed=3)
+    store(folder, RunFailure(spec=failed, error="ValueError: no", traceback="line 1"))
+    record_file(folder, replace(SPEC, seed=1).run_id).write_bytes(b"damaged")
+    assert [is_stored(folder, replace(SPEC, seed=seed)) for seed in range(4)] == [True, False, False, False]
+
+
+def test_runs_of_a_policy_that_failed_for_one_reason_share_a_line():
+    runs = [replace(SPEC, seed=seed) for seed in range(3)]
+    other = replace(SPEC, policy="crw")
+    told = [(runs[0], "no room"), (runs[1], "killed"), (runs[2], "no room"), (other, "no room")]
+    failures = [RunFailure(spec=spec, error=error, traceback="") for spec, error in told]
+    assert failure_lines(failures) == (
+        f"{runs[0].describe()}, and 1 more of its runs: no room",
+        f"{runs[1].describe()}: killed",
+        f"{other.describe()}: no room",
+    )
+
+
+def test_versions_are_known_for_every_package():
+    found = software_versions()
+    assert set(PACKAGES) <= found.keys() <= set(VERSION_NAMES)
+    assert found["numpy"] == np.__version__
+
+
+def test_the_commit_is_absent_outside_a_checkout(tmp_path, monkeypatch):
+    monkeypatch.setattr(versions, "__file__", str(tmp_path / "versions.py"))
+    assert "commit" not in software_versions.__wrapped__()

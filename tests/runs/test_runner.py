@@ -13,19 +13,17 @@ import numpy as np
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.policies.registry import RandomPolicy
 from swarm_forage_env.policies.trust import UntrustedModelError, only_typed
 from swarm_forage_env.runs import runner, workers
-from swarm_forage_env.runs.plan import Condition, Plan, planned_line, run_plan
+from swarm_forage_env.runs.plan import Plan, run_plan
 from swarm_forage_env.runs.record import RecordError
-from swarm_forage_env.runs.run import WARM_UP_TICKS, run_one, run_policy, warm_up
+from swarm_forage_env.runs.run import run_one, run_policy
 from swarm_forage_env.runs.runner import longest_first, rerun, run_all
 from swarm_forage_env.runs.spec import RunSpec, policy_spec
 from swarm_forage_env.runs.store import failure_file, load, read_failure, record_file
 from swarm_forage_env.runs.workers import WorkerError, each_run
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.wrappers.world import World
 
 WORLD = scenario("warehouse_small", n_robots=3, n_objects=20, horizon_s=4.0, interval_s=2.0)
@@ -76,19 +74,6 @@ def test_tasks_of_a_policy_are_recorded():
     record = run_policy(Tasked(), SPECS[0])
     np.testing.assert_allclose(record["task_share_generalist"], 2 / 3)
     np.testing.assert_allclose(record["task_share_harvester"], 1 / 3)
-
-
-def test_warm_up_stops_after_a_few_ticks_and_reaches_the_interactions(monkeypatch):
-    steps, step = [], ForagingArena.step
-
-    def spied(arena, actions, **options):
-        steps.append((arena.tick, actions[:, 2].tolist()))
-        return step(arena, actions, **options)
-
-    monkeypatch.setattr(ForagingArena, "step", spied)
-    chipmunk = World(replace(WORLD, physics="chipmunk"))  # in Python, tick by tick
-    warm_up(replace(SPECS[0], policy="crw", world=chipmunk))
-    assert steps[-1] == (WARM_UP_TICKS, [Grip.GRASP] * 3)
 
 
 def test_the_code_that_runs_share_is_compiled_before_the_first_is_timed(monkeypatch):
@@ -176,6 +161,7 @@ def test_ctrl_c_keeps_what_is_finished_and_says_so(tmp_path, monkeypatch):
     assert run_here(SPECS, tmp_path).n_stored == 2
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_the_workers_at_once(tmp_path):
     """A terminal sends it to all processes of a command."""
     script = """
@@ -229,10 +215,15 @@ def test_closing_the_iterator_cancels_the_rest():
     assert [future.cancelled() for future in executor.futures] == [False, True, True, True]
 
 
-def test_local_processes_give_the_same_records_and_a_killed_one_ends_the_call(tmp_path):
+def test_local_processes_give_the_same_records():
+    """Three seconds: two processes start."""
     found = run_all([*SPECS, UNKNOWN], jobs=2, progress=False)
     assert same(found.records, run_here(SPECS).records)
     assert [failure.spec for failure in found.failures.values()] == [UNKNOWN]
+
+
+@pytest.mark.slow
+def test_a_killed_process_ends_the_call(tmp_path):
     (tmp_path / "deadly.py").write_text(
         "import os\nfrom swarm_forage_env import RandomPolicy\n"
         "class Deadly(RandomPolicy):\n    def act(self, obs, active):\n        os._exit(9)\n"
@@ -262,28 +253,9 @@ def test_runs_that_their_executor_cancels_are_no_failures(tmp_path):
     assert not (tmp_path / "failures").exists()
 
 
-def test_a_folder_that_cannot_be_written_to_is_told_before_the_first_run(full_disk, tmp_path):
-    with pytest.raises(OSError, match="File too large") as caught:
-        run_here(SPECS, tmp_path / "runs", executor=Refusing())
-    assert caught.value.filename == str(tmp_path / "runs")
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_long_runs_come_first_and_then_a_run_of_each_policy():
     large = replace(SPECS[0], world=World(replace(WORLD, horizon_s=8.0)))
     assert longest_first([*SPECS[:2], UNKNOWN, large]) == (large, SPECS[0], UNKNOWN, SPECS[1])
-
-
-def test_progress_where_stderr_is_no_terminal_is_plain(tmp_path, capsys):
-    run_here(SPECS[:1], tmp_path)
-    run_here([*SPECS[:2], UNKNOWN], tmp_path, progress=True)
-    shown = capsys.readouterr()
-    assert shown.out == ""
-    assert shown.err.splitlines() == [
-        "1 of 3 runs stored already.",
-        "1/3 runs, an estimate follows the first run",
-        "3/3 runs, all done, 1 failed",
-    ]
 
 
 def test_stored_runs_of_other_versions_are_pointed_out(tmp_path, monkeypatch, capsys):
@@ -311,42 +283,12 @@ def test_a_plan_runs_what_only_this_process_can_build(tmp_path):
     assert len(run_plan(plan, out=tmp_path, executor=Refusing()).records) == 4
 
 
-def test_a_plan_goes_on_after_runs_that_fail():
-    def fails(obs):
-        raise RuntimeError("I would rather not")
-
-    plan = plan_of(policy_spec(fails), policy_spec("random"))
-    table = run_plan(plan, jobs=1)
-    (line,) = table.failure_lines("fails")
-    assert line.endswith(", and 1 more of its runs: RuntimeError: I would rather not")
-    assert len(table.of(plan.conditions[1])) == 2
-
-
 def test_runs_of_a_policy_without_a_name_are_not_stored(tmp_path):
     plan = plan_of(policy_spec(RandomPolicy))
     with pytest.raises(ValueError, match=r"for the policy RandomPolicy, by which its runs in .* are found again"):
         run_plan(plan, out=tmp_path)
     assert list(tmp_path.iterdir()) == []
     assert len(run_plan(plan).of(plan.conditions[0])) == 2
-
-
-def test_a_name_that_another_policy_has_is_refused():
-    with pytest.raises(ValueError, match="Expected a name of its own for the policy, got 'crw'"):
-        run_plan(plan_of(policy_spec(RandomPolicy, label="crw")))
-
-
-def test_conditions_of_one_run_share_it():
-    """Two names of one policy are the same runs."""
-    one, other = policy_spec("random"), policy_spec("random", label="again")
-    plan = Plan(conditions=(Condition(one, World(WORLD)), Condition(other, World(WORLD))), seeds=(0,))
-    table = run_plan(plan, jobs=1)
-    assert len(table.records) == 1
-    assert table.of(plan.conditions[0]) == table.of(plan.conditions[1])
-
-
-def test_what_would_be_run_is_one_line(tmp_path):
-    run_here(SPECS[:1], tmp_path)
-    assert planned_line(SPECS, tmp_path) == f"4 runs, 1 stored, 3 to do with 180 robot-ticks; records go to {tmp_path}"
 
 
 def test_a_stored_run_is_made_again(tmp_path):
@@ -373,6 +315,7 @@ def test_what_a_function_of_runs_raises_is_raised_here():
         list(each_run(seed_of, [*SPECS, replace(SPECS[0], seed=9)], executor=executor))
 
 
+@pytest.mark.slow
 def test_other_processes_open_no_models_that_this_one_may_not(tmp_path):
     (tmp_path / "mine.zip").write_bytes(b"")
     specs = [RunSpec(world=World(WORLD), policy=str(tmp_path / "mine.zip"), seed=seed) for seed in (0, 1)]

@@ -2,12 +2,10 @@
 
 import pytest
 
-from metrics import plot, verdict
+from metrics import verdict
 from swarm_forage_env import (
     ConfigError,
     Plan,
-    RandomPolicy,
-    Record,
     World,
     build_stack,
     check_determinism,
@@ -17,10 +15,6 @@ from swarm_forage_env import (
     parse_wrapper,
     plan_run,
     policy_specs,
-    read_study,
-    record_replay,
-    record_run,
-    rerun,
     run_all,
     run_one,
     run_plan,
@@ -49,35 +43,21 @@ def test_one_or_several_names_or_objects_are_taken_by_all_alike():
     [
         (lambda: plan_run(TINY, "crw", wrappers=NOISE), "wrappers as a list of configurations or words"),
         (lambda: plan_run(TINY, "crw", parameters=["x"]), "parameters to be a table of values by name"),
-        (lambda: plan_run({"n_robots": 3}, "crw"), "scenario to be a ScenarioConfig"),
-        (lambda: World(TINY, parse_wrapper(NOISE)), "wrappers as a list"),
         (lambda: run_one("crw"), r"spec to be a RunSpec, got 'crw'; plan_run\(world, policy\) makes one"),
         (lambda: run_policy("crw", SPEC), "a policy object with reset and act, got 'crw'; load_policy makes one"),
-        (lambda: run_policy(RandomPolicy, SPEC), "a policy object with reset and act"),
-        (lambda: record_replay("crw"), "spec to be a RunSpec"),
         (lambda: run_all(SPEC), r"specs to be an Iterable, got RunSpec.* Plan.product\(...\).specs are many"),
-        (lambda: run_all(["crw"]), "a run to be a RunSpec, got 'crw'"),
         (lambda: run_all([SPEC], executor=4), "executor to be an Executor, got 4; jobs= sets the number"),
         (lambda: run_plan("crw"), r"plan to be a Plan, got 'crw'; Plan.product\(policies, worlds, seeds\)"),
         (lambda: Plan.product("crw", TINY, seeds=3), r"seeds to be an Iterable, got 3; range\(n\)"),
-        (lambda: Plan(conditions=("crw",), seeds=(0,)), "a condition to be a Condition, got 'crw'"),
-        (lambda: rerun(Record), "file to be a text or a Path"),
-        (lambda: load_study(None), "name to be a text or a Path, got None"),
         (lambda: run_study("S1a", "out"), r"spec to be a StudySpec, got 'S1a'; load_study\(file\) reads one"),
-        (lambda: run_study(load_study("S1a"), "out", part=2), "shard to be a text, got 2"),
-        (lambda: read_study(PLAN), "path to be a text or a Path"),
         (lambda: check_policy("random", World(TINY)), "scenario to be a ScenarioConfig"),
-        (lambda: check_policy("random", TINY, ticks=0), "ticks to be a whole number >= 1, got 0"),
         (lambda: check_determinism("random", TINY, seeds=2), "seeds to be a Sequence, got 2"),
-        (lambda: check_determinism("random", TINY, seconds=-4), "seconds to be a number > 0, got -4"),
         (lambda: with_overrides("classroom", n_robots=3), r"config to be a ScenarioConfig.* scenario\(name\)"),
         (lambda: parse_wrapper(parse_wrapper(NOISE)), "a wrapper to be a text"),
         (lambda: verdict("results"), r"a study to be a StudyTable, got 'results'; read_study\(path\) reads one"),
-        (lambda: plot("results", "figures"), r"table to be a StudyTable, got 'results'; read_study\(path\)"),
         (lambda: policy_specs(policy_specs("crw"), caches="static"), "a name, a file or an object for parameters"),
         (lambda: plan_run(TINY, "crw", parameters={"x": float("inf")}), "policy parameters to be plain JSON values"),
         (lambda: from_callable(3), "function to be callable, got 3"),
-        (lambda: record_run(TINY, RandomPolicy, "x.gif", seconds=2.0), "a policy object with reset and act"),
     ],
 )
 def test_a_wrong_call_is_told_in_a_line(call, told):
