@@ -1,12 +1,13 @@
 """The command `benchmark`, with a tiny protocol in place of the real one."""
 
-import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from metrics import PAPER_POLICIES
 from metrics.benchmark import load_protocol
+from swarm_forage_env.training.datasets import Dataset
 from tests.support.entries import TINY, made_up_entry
 
 
@@ -26,28 +27,6 @@ def tiny(folder, monkeypatch):
     monkeypatch.setattr("metrics.benchmark.protocol.FOLDER", folder)
 
 
-@pytest.fixture
-def mine(tiny, tmp_path):
-    """Entries in the folder of the command; the second one has the name of a scripted controller."""
-    for name in ("mine", "dpo"):
-        made_up_entry(load_protocol(), name, lambda k: 30.0).write(tmp_path / f"{name}.json")
-
-
-def test_a_policy_becomes_an_entry_that_can_be_shown(command, tiny):
-    words = ("crw", "--name", "again", "--trained-in", "nothing", "--jobs", "1")
-    code, out, err = command("benchmark", *words)
-    assert code == 0, err
-    header, *rows = out.splitlines()
-    assert header.split()[:3] == ["entry", "track", "score"]
-    assert {row.split()[0] for row in rows} == {*PAPER_POLICIES, "again"}
-    file = Path("results/benchmark/again.json")
-    content = json.loads(file.read_text())
-    assert content["command"] == "swarm-forage benchmark crw --name again"
-    assert content["training"]["worlds"] == "nothing"
-    code, shown, _ = command("benchmark", "show", str(file))
-    assert (code, shown) == (0, out)
-
-
 def test_a_quick_look_writes_no_entry(command, tiny):
     code, out, err = command("benchmark", "random", "--quick", "--jobs", "1")
     assert code == 0, err
@@ -56,14 +35,21 @@ def test_a_quick_look_writes_no_entry(command, tiny):
     assert not list(Path("results/benchmark").glob("*.json"))
 
 
-def spoil(name, change):
-    file = Path(name)
-    file.write_text(change(file.read_text()))
+SHORT = ("--robots", "3", "--set", "n_objects=20", "--horizon", "200", "--set", "physics=compiled")
 
 
-def test_an_altered_entry_is_refused_in_one_line(command, mine):
-    spoil("mine.json", lambda text: text.replace('"interference": [[0.1, 0.1]]', '"interference": [[0.0, 0.1]]', 1))
-    code, out, err = command("benchmark", "show", "mine.json")
-    assert (code, out) == (2, "")
-    assert err.startswith("swarm-forage: Expected the numbers of mine.json as swarm-forage benchmark wrote them")
-    assert len(err.splitlines()) == 1
+def test_a_data_set_is_written_and_kept(command, tmp_path):
+    words = ("dataset", "ppo_warehouse_small", "--seeds", "2", "--out", "here", *SHORT)
+    assert command(*words)[:2] == (0, "2 runs recorded in here, 0 there before\n")
+    assert [len(run) for run in Dataset(tmp_path / "here").runs()] == [200, 200]
+    assert command(*words)[1] == "0 runs recorded in here, 2 there before\n"
+
+
+def test_ctrl_c_says_how_to_go_on(command, monkeypatch):
+    def interrupted(file, **arrays):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(np, "savez_compressed", interrupted)
+    code, _, err = command("dataset", "random", "--out", "here", *SHORT)
+    assert code == 130
+    assert "Finished runs are kept in here; the same command does the rest." in err

@@ -19,19 +19,6 @@ SHORT = ("--robots", "3", "--set", "n_objects=20", "--horizon", "4", "--set", "i
 RUN = ("run", "random", *SHORT)
 
 
-def test_run_shows_a_table_and_keeps_records_and_a_picture(command, painted):
-    code, out, err = command(*RUN, "--seeds", "2")
-    assert code == 0
-    assert "warehouse_small: 3 robots, 20 objects, 4 s" in out
-    for word in ("random", "none", "deliveries", "per 1,000 s", "interference", "simulated s"):
-        assert word in out
-    assert "± 95% t interval over 2 seeds, wide because so few say little (make 4 or more);" in out
-    folder = Path("results/warehouse_small_3_robots_4_s_33b9a3")
-    assert [record.seed for record in sorted(load(folder), key=lambda record: record.seed)] == [0, 1]
-    assert (folder / "warehouse_small_3_robots_4_s_33b9a3_random.png").read_bytes().startswith(b"\x89PNG")
-    assert "2 records in results/warehouse_small_3_robots_4_s_33b9a3" in err
-
-
 def test_any_column_is_the_performance_and_the_runs_stay(command, monkeypatch):
     command(*RUN, "--seeds", "2")
     monkeypatch.setattr(RandomPolicy, "reset", lambda *_: pytest.fail("a stored run was repeated"))
@@ -111,3 +98,38 @@ def test_pictures_of_other_questions_have_other_names(command):
     assert len(names) == 4
     code, out, _ = command(*RUN, "--seeds", "2", "--seed", "3", "--json")
     assert (code, [run["seed"] for run in json.loads(out)["runs"]]) == (0, [3, 4])
+
+
+CONFIG = """
+scenario = "warehouse_small"
+
+[set]
+n_robots = 3
+n_objects = 20
+horizon_s = 4.0
+interval_s = 2
+physics_substeps = [0.2, 0.2, 0.2, 0.2, 0.2]
+
+[wrappers.throttle]
+waveform = "constant"
+amplitude = 0.2
+
+[wrappers.actuator_noise]
+sigma = 0.1
+"""
+
+
+def test_a_file_gives_scenario_fields_and_wrappers_and_options_go_before_it(command):
+    Path("world.toml").write_text(CONFIG)
+    words = ("--set", "n_objects=9", "--wrapper", "actuator_noise:sigma=0.3", "--jobs", "1")
+    assert command("run", "random", "--scenario", "world.toml", *words)[0] == 0
+    (folder,) = Path("results").glob("world_*")
+    (record,) = load(folder)
+    spec = json.loads(json.dumps(record.spec.to_mapping()))
+    world, wrappers = spec["scenario"], spec["wrappers"]
+    assert (world["robots"]["n_robots"], world["objects"]["n_objects"], world["horizon_s"]) == (3, 9, 4.0)
+    assert world["physics_substeps"] == [0.2] * 5
+    assert [(wrapper["wrapper"], wrapper.get("sigma")) for wrapper in wrappers] == [
+        ("throttle", None),
+        ("actuator_noise", 0.3),
+    ]

@@ -3,10 +3,12 @@
 import os
 import subprocess
 import sys
+from importlib.util import find_spec
 
 import pytest
 
 from swarm_forage_env._internal.files import check_file, replacing
+from swarm_forage_env.env import ForageEnv
 
 
 def test_what_nobody_foresaw_is_raised(command, monkeypatch):
@@ -35,6 +37,7 @@ MAIN = f"{sys.executable} -c 'from swarm_forage_env.cli import main; main()'"
 DRAWS_AT_LAST = MAIN.replace("-c '", '-c \'import atexit; atexit.register(__import__, "matplotlib"); ')
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "out", "err"),
     [
@@ -67,3 +70,31 @@ def test_a_file_is_written_where_a_link_leads_and_nothing_but_a_file_is_replaced
             check_file(place)
         with pytest.raises(OSError, match="Expected a file to write, got a"), replacing(place):
             pytest.fail("it would have been replaced")
+
+
+RUN = ("run", "random", "--robots", "3", "--horizon", "4", "--set", "interval_s=2", "--jobs", "1")
+needs_training = pytest.mark.skipif(
+    find_spec("stable_baselines3") is None or find_spec("torch") is None, reason="needs the train extra"
+)
+FILMED = ("random", "--robots", "3")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        RUN,
+        ("score", "random", "--budget", "quick", "--jobs", "1"),
+        ("score", "random,crw", "--budget", "quick", "--jobs", "1"),
+        ("study", "run", "S1a", "--budget", "smoke", "--jobs", "1"),
+        ("record", *FILMED),
+        ("replay", "random", "--robots", "3"),
+        pytest.param(("train", "--robots", "3", "--steps", "1", "--set", "n_arenas=1"), marks=needs_training),
+    ],
+    ids=lambda words: words[0],
+)
+def test_a_full_disk_is_told_before_anything_is_run(command, full_disk, monkeypatch, words):
+    monkeypatch.setattr(ForageEnv, "reset_batch", lambda *_, **__: pytest.fail("a run was started"))
+    code, out, err = command(*words)
+    assert (code, out) == (1, "")
+    assert err.splitlines()[-1].startswith("swarm-forage: File too large: results")
+    assert "Traceback" not in err

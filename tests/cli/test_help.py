@@ -4,8 +4,6 @@ import subprocess
 import sys
 from importlib.metadata import version
 
-import pytest
-
 from swarm_forage_env.cli.app import COMMANDS, made
 
 ALL = {name: line for group in COMMANDS.values() for name, (_, line) in group.items()}
@@ -35,20 +33,13 @@ def test_version_and_help(command):
         assert line in out
 
 
-@pytest.mark.parametrize("columns", ["60", "120"])
-def test_help_is_as_wide_as_the_terminal(command, monkeypatch, columns):
-    monkeypatch.setenv("COLUMNS", columns)
-    lines = command("run", "-h")[1].splitlines()
-    assert max(map(len, lines)) == int(columns)
-
-
-@pytest.mark.parametrize("words", [*ALL, *(f"{first} {second}" for first, those in BELOW.items() for second in those)])
-def test_every_command_tells_of_itself_and_of_each_option(words):
-    _, apps, _ = made(words.split()).parse_commands(words.split())
-    assert apps[-1].help
-    if apps[-1].default_command is not None:
-        arguments = apps[-1].assemble_argument_collection(parse_docstring=True)
-        assert all(argument.parameter.help for argument in arguments if not argument.children)
+def test_every_command_tells_of_itself_and_of_each_option():
+    for words in [*ALL, *(f"{first} {second}" for first, those in BELOW.items() for second in those)]:
+        _, apps, _ = made(words.split()).parse_commands(words.split())
+        assert apps[-1].help, words
+        if apps[-1].default_command is not None:
+            arguments = apps[-1].assemble_argument_collection(parse_docstring=True)
+            assert all(argument.parameter.help for argument in arguments if not argument.children), words
 
 
 def test_a_command_that_lacks_its_words_shows_its_help(command):
@@ -62,9 +53,3 @@ def test_a_command_that_lacks_its_words_shows_its_help(command):
 
 def test_only_what_is_asked_for_is_imported():
     assert imported("--help") == imported("study", "-h") == imported("run", "--help") == set()
-
-
-def test_shells_can_complete_commands_and_options():
-    script = made().generate_completion(shell="bash")
-    assert "curves" in script
-    assert "--wrapper" in script

@@ -13,7 +13,6 @@ WORLD = ("--robots", "3", "--set", "n_objects=20", "--jobs", "1", "--budget", "t
 SCORE = ("score", "random", *WORLD)
 COMPARE = ("score", "random,crw", *WORLD)
 FEW = ("--measures", "t_lost_fraction,adaptability")
-CURVES = "n_robots,seed,interval,performance\n2,0,0,3\n4,0,0,5\n"
 
 
 @pytest.fixture(autouse=True)
@@ -21,32 +20,6 @@ def tiny_budget(monkeypatch):
     """Offer a budget called tiny."""
     tiny = Budget(horizon_s=4.0, interval_s=2.0, n_seeds=2, n_sizes=2, n_levels=1)
     monkeypatch.setitem(BUDGETS, "tiny", tiny)
-
-
-def test_score_shows_every_measure_keeps_records_and_draws_a_picture(command, painted):
-    code, out, err = command(*SCORE)
-    assert code == 0
-    assert out.splitlines()[0] == "random in warehouse_small with 20 objects, budget tiny, 2 seeds, 4 s"
-    for word in ("reactivity", "throttle 0.4", "higher", "95% t interval over 2 seeds, wide"):
-        assert word in out
-    folder = Path("results/warehouse_small_3_robots_bcf754")
-    assert len(load(folder)) == 14
-    assert (folder / f"{folder.name}_random_scores.png").read_bytes().startswith(b"\x89PNG")
-    assert f"picture {folder}/{folder.name}_random_scores.png" in err
-
-
-def test_compare_shows_values_differences_and_the_test(command):
-    code, out, _ = command(*COMPARE, *FEW, "--out", "here")
-    assert code == 0
-    assert out.splitlines()[0] == "random, crw in warehouse_small with 20 objects, budget tiny, 2 seeds, 4 s"
-    assert "No certain difference: " in out
-    assert ["measure", "at", "better", "random", "crw"] in [line.split() for line in out.splitlines()]
-    _, out, _ = command(*COMPARE, *FEW, "--out", "here", "--all", "--against", "crw")
-    for word in ("95 % interval", "noise floor", "objects (DTW)", "random - crw", "paired t test", "Holm"):
-        assert word in out
-    rows = [line for line in out.splitlines() if line.startswith(("at ", "N = ", "throttle ", "sigma "))]
-    assert max(map(len, rows)) <= 100
-    assert list(Path("here").glob("*_random_crw_scores.png"))
 
 
 def test_sizes_keep_a_density_if_asked(command):
@@ -73,34 +46,6 @@ def test_json_is_the_only_thing_on_stdout(command):
     assert answer["policies"] == ["random", "crw"]
     assert {difference["first"] for difference in answer["differences"]} == {"random"}
     assert answer["picture"].endswith("_random_crw_scores.png")
-
-
-def test_a_dry_run_shows_the_experiments_and_runs_nothing(command):
-    code, out, _ = command(*COMPARE, "--dry-run")
-    assert code == 0
-    assert out.startswith("28 runs, 0 stored, 28 to do with ")
-    assert out.endswith("; records go to results/warehouse_small_3_robots_bcf754\n")
-    assert not Path("results").exists()
-    command(*SCORE, *FEW)
-    _, out, _ = command(*COMPARE, *FEW, "--dry-run")
-    assert "16 runs, 8 stored, 8 to do" in out
-    _, out, _ = command(*COMPARE, *FEW, "--dry-run", "--json")
-    assert {run["policy"] for run in json.loads(out)} == {"random", "crw"}
-
-
-def test_curves_from_elsewhere_are_scored(command):
-    Path("curves.csv").write_text(CURVES)
-    code, out, _ = command("score", "--curves", "curves.csv")
-    assert code == 0
-    assert out.startswith("curves from curves.csv, ")
-    assert "task emergence" in out
-    assert "not computed: reactivity, adaptability: there are no runs with criterion throttle" in out
-    assert not Path("results").exists()
-    code, out, _ = command("score", "--curves", "curves.csv", "--variant", "paper", "--all")
-    assert "scalability, paper" in out
-    code, out, err = command("score", "--curves", "curves.csv", "--measures", "reactivity")
-    assert (code, out) == (2, "")
-    assert "Cannot compute reactivity for curves" in err
 
 
 def test_real_robots_stand_beside_policies_in_one_table_and_picture(command, painted):

@@ -1,11 +1,13 @@
 """Ctrl-C and SIGTERM end a command in one line, whatever it is doing when they come."""
 
+import http.client
 import os
 import signal
 import subprocess
 import sys
 import time
 from contextlib import suppress
+from urllib.parse import urlsplit
 
 import pytest
 
@@ -43,6 +45,7 @@ def heard():
     sys.unraisablehook = hook
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("words", "after_s", "sent"), [
     (RUN, 0.0, signal.SIGINT), (RUN, 0.4, signal.SIGTERM), (("list",), 0.05, signal.SIGTERM),
     (("study", "list"), 0.4, signal.SIGINT),
@@ -63,6 +66,7 @@ def test_a_signal_ends_a_command_in_one_line(tmp_path, words, after_s, sent):
         assert [line[:25] for line in err.splitlines() if "nterrupt" in line] == ["swarm-forage: Interrupted"], err
 
 
+@pytest.mark.slow
 def test_a_signal_that_is_ignored_where_the_command_begins_stays_so(tmp_path):
     """So begin commands behind nohup, and those that a script puts into the background."""
     words = ["bash", "-c", f"trap '' INT; exec {sys.executable} -c '{HEARS}' list"]
@@ -108,3 +112,29 @@ def test_whoever_keeps_something_is_left_in_peace(heard):
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
     assert cli.came == [signal.SIGINT]
+
+
+WORDS = ("play", "random", "--robots", "3", "--set", "n_objects=20")
+MAIN = "from swarm_forage_env.cli import main; main()"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+def test_it_serves_the_page_until_it_is_interrupted(tmp_path, sent):
+    command = [sys.executable, "-c", MAIN, *WORDS, "--no-browser"]
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as started:
+        try:
+            said, _, address = started.stdout.readline().strip().partition(" at ")
+            place = urlsplit(address)
+            assert (said, place.hostname) == ("play", "127.0.0.1")
+            connection = http.client.HTTPConnection(place.hostname, place.port, timeout=60)
+            connection.request("GET", place.path)
+            assert connection.getresponse().read().startswith(b"<!doctype html>")
+            connection.close()
+            started.send_signal(sent)
+            out, err = started.communicate(timeout=60)
+        finally:
+            started.kill()
+    assert (started.returncode, out) == (-sent, "")
+    assert err.splitlines()[-1] == "swarm-forage: Interrupted. The page has ended; random: 0 s, 0 delivered."
+    assert err.count("swarm-forage: Interrupted") == 1

@@ -2,10 +2,13 @@
 
 import json
 import re
+import shutil
+import tomllib
 from pathlib import Path
 
 import pytest
 
+from swarm_forage_env.policies import pretrained
 from swarm_forage_env.studies.results import read_study
 
 FILE = """
@@ -35,20 +38,6 @@ def written(command):
     """The command in a folder with a study file."""
     Path("mine.toml").write_text(FILE)
     return command
-
-
-def test_a_study_runs_and_is_packed(written):
-    code, out, err = written(*RUN)
-    assert code == 0
-    assert out.splitlines() == ["mine, budget tiny: 8 of 8 runs done", "4 of 4 conditions complete"]
-    assert f"packed into {FOLDER}/mine.parquet" in err
-    for place in (FOLDER, FOLDER / "mine.parquet"):
-        code, out, _ = written("study", "status", str(place))
-        assert code == 0
-        assert out.splitlines() == ["mine, budget tiny: 8 of 8 runs done", "4 of 4 conditions complete"]
-    code, out, err = written(*RUN, "--seeds", "3")
-    assert "8 of 12 runs stored already" in err
-    assert code == 0
 
 
 def test_shards_are_not_packed_until_all_runs_are_asked_for(written):
@@ -84,18 +73,27 @@ def test_failures_are_told_with_the_command_that_makes_them_again(written):
     assert "takes no arguments" in err.splitlines()[-2]
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("run", "mine.tom"), "Expected a study file that exists, or one of S1a"),
-        (("run", "mine.toml", "--budget", "tini"), "Did you mean 'tiny'?"),
-        (("run", "mine.toml", "--rules", "progam"), "Did you mean 'program'?"),
-        (("run", "mine.toml", "--shard", "3/2"), "the shard to be a whole number from 1 to 2"),
-        (("status", "nowhere"), "No such file"),
-        (("verdict", "."), "without study.toml"),
-    ],
-)
-def test_what_is_refused(written, words, message):
-    code, _, err = written("study", *words)
-    assert code == 2
-    assert message in err
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+BLOCKS = re.findall(r"^```toml\n(.*?)^```", (DOCS / "studies.md").read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+FILES = {tomllib.loads(block)["name"]: block for block in BLOCKS if "scenario" in tomllib.loads(block)}
+SHORT = "\n[budget.short]\nseeds = 1\nhorizon_s = 2.0\ninterval_s = 1.0\n"
+
+
+def test_the_page_has_examples():
+    assert [*FILES] == ["speed", "densities"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FILES)
+def test_a_study_file_of_the_page_runs(command, name):
+    """With the trained policy beside it, where the page says that one is there."""
+    Path("mine.toml").write_text(FILES[name] + SHORT)
+    network = Path(next(iter(pretrained.__path__)), "ppo_warehouse_small.npz")
+    if "my_policy.npz" in FILES[name]:
+        shutil.copy(network, "my_policy.npz")
+    code, _, err = command("study", "run", "mine.toml", "--budget", "short", "--jobs", "1", "--out", "done")
+    assert code == 0, err
+    table = read_study(Path("done"))
+    places = table.places()
+    assert places.select("failed", "missing").sum().row(0) == (0, 0)
+    assert len(places) == {"speed": 12, "densities": 9, "share": 5}[name], "every policy at every value"

@@ -1,10 +1,11 @@
 """`swarm-forage train`, as a person uses it."""
 
 import builtins
+import dataclasses
 import json
+import re
 import sys
 from dataclasses import replace
-from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -12,10 +13,18 @@ import pytest
 
 from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.cli import training_report
-from swarm_forage_env.cli.printer import bar
-from swarm_forage_env.training.evaluation import Evaluation, EvaluationPlan, WorldEvaluation, write_evaluations
-from swarm_forage_env.training.plan import named_plan, read_plan
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.training.evaluation import (
+    EVALUATIONS_FILE,
+    PLAN_FILE,
+    Evaluation,
+    EvaluationPlan,
+    WorldEvaluation,
+    write_evaluations,
+)
+from swarm_forage_env.training.plan import Stage, TrainingPlan, named_plan, read_plan
 from swarm_forage_env.training.recipe import recipe
+from swarm_forage_env.wrappers.world import World
 
 TRUSTING = ("--trust-models", "train")
 SETTINGS = ("n_objects=20", "n_arenas=2", "options.n_steps=16", "options.batch_size=64", "small_start=true",
@@ -50,37 +59,11 @@ def test_trains_shows_evaluations_and_goes_on(command, painted):
     code, _, err = command(*words)
     assert code == 2
     assert "resume it (--resume), or choose another folder (--out)" in err
-    code, _, err = command("--trust-models", *words, "--resume")
-    assert code == 0
-    assert "This training was finished: 128 of 128 decisions" in err
-
     both = f"{folder / 'policy.npz'},{folder / 'model.zip'}"
     code, out, _ = command("run", both, "--robots", "3", "--set", "n_objects=20", "--horizon", "4", "--set",
                            "interval_s=2", "--jobs", "1", "--json")  # fmt: skip
     assert code == 0
     assert len(json.loads(out)["runs"]) == 2
-
-
-def test_without_a_terminal_it_says_once_how_long_the_rest_takes(capsys, monkeypatch):
-    pytest.importorskip("torch", reason="needs the train extra")
-    training = import_module("swarm_forage_env.training.sb3.training")
-    times = iter([0.0, 2.0, 6.0, 60.0])
-    monkeypatch.setattr(training_report.time, "monotonic", lambda: next(times))
-    with bar() as shown:
-        report = training_report._Report(recipe(steps=300), [0, 1], shown)
-        for seed, steps in ((0, 0), (0, 30), (1, 60), (1, 90)):
-            report(seed, training.TrainingStatus(steps=steps, episode_return=0.0))
-    first, second = capsys.readouterr().err.splitlines()
-    assert first == "ppo: 2 trainings of 300 decisions in 1 stage, evaluated every 1,000,000 and after each stage"
-    assert second == "About 34 s to go, and the evaluations"  # 90 of 600 decisions took 6 s
-
-
-def test_an_unknown_setting_is_told_with_the_nearest_one(command):
-    code, _, err = command("train", "--set", "hiden=3")
-    assert (code, err) == (
-        2,
-        "swarm-forage: Unknown field of the scenario or the training 'hiden'. Did you mean 'hidden'?\n",
-    )
 
 
 @needs_training
@@ -99,11 +82,6 @@ def test_a_training_is_resumed_by_its_folder_alone(command):
     assert (code, "finished: 256 of 256" in err) == (0, True)
     code, _, err = command(*TRUSTING, "--out", "a", "--resume", "--steps", "255")
     assert (code, "at least the 256 steps" in err) == (2, True)
-
-    code, _, err = command(*TRUSTING, *TINY, "--seed", "3", "--out", "a", "--resume")
-    assert (code, len(err.splitlines())) == (2, 1)
-    assert "to resume its training, got another plan: " in err
-    assert "seed: 0 before, 3 now" in err
 
 
 def test_without_the_training_library_the_message_says_what_to_install(command, monkeypatch):
@@ -209,3 +187,57 @@ def test_fields_of_a_plan_are_set_by_name(command, monkeypatch):
         code, _, err = command("train", "--plan", "ppo_warehouse_small", *words)
         assert (code, err.count("\n")) == (2, 1)
         assert told in err
+
+
+PLAN = TrainingPlan(
+    world=World(scenario("warehouse_small", n_robots=2, n_objects=20, horizon_s=4.0, interval_s=2.0)),
+    stages=(Stage(steps=10), Stage(steps=20)),
+    evaluation=EvaluationPlan(every_steps=10, horizon_s=4.0, n_runs=2),
+)
+
+
+def training(folder: str, plan: TrainingPlan = PLAN, *, best: float = 40.0) -> None:
+    Path(folder).mkdir(parents=True)
+    plan.write(Path(folder, PLAN_FILE))
+    rows = [
+        Evaluation(
+            steps=steps,
+            wall_time_s=1.0,
+            cpu_time_s=1.0,
+            reached=per,
+            worlds=(
+                WorldEvaluation(
+                    world=PLAN.judging_worlds[0].name,
+                    baseline_policy="crw",
+                    performance=per,
+                    baseline=5.0,
+                    ratio=per / 5.0,
+                    interference_fraction=0.25,
+                ),
+            ),
+        )
+        for steps, per in ((10, 0.0), (20, best), (30, best / 2))
+    ]
+    write_evaluations(Path(folder, EVALUATIONS_FILE), rows)
+
+
+def test_trainings_are_drawn_beside_others(command, monkeypatch):
+    pytest.importorskip("matplotlib")
+    training("first")
+    training("second", dataclasses.replace(PLAN, algorithm="a2c"), best=8.0)
+    words = ("train", "curves", "first", "second", "--policy", "random,crw")
+    code, out, _ = command(*words, "--picture", "both.png")
+    assert code == 0
+    rows = [re.split(r" {2,}", line) for line in out.splitlines()]
+    cells = {row[0]: row[1:] for row in rows}
+    assert cells["first"][:3] == ["20", "40.0", "0.250"]
+    assert cells["second"][:3] == ["20", "8.0", "0.250"]
+    assert cells.keys() >= {"random", "crw"}
+    assert Path("both.png").read_bytes().startswith(b"\x89PNG")
+    code, out, _ = command(*words, "--picture", "both.png", "--json")
+    assert (code, bool(json.loads(out))) == (0, True)
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    code, _, err = command("train", "curves", "first", "--policy", "none")
+    assert code == 1
+    assert "No picture without matplotlib" in err
+    assert not Path("first/curves.png").exists()

@@ -6,7 +6,6 @@ import pytest
 
 pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-baselines3 and torch")
 
-from swarm_forage_env.training.sb3 import seeds as module
 from tests.training.test_seeds import fake
 
 SETTINGS = ("--set", "n_objects=20", "--set", "evaluation.horizon_s=200")
@@ -47,21 +46,3 @@ def test_seeds_are_trained_drawn_and_told_and_the_same_command_with_resume_does_
         assert "Seed 2 failed: too large" in err
         assert err.endswith("swarm-forage --trust-models train --out all --seeds 3 --resume\n")
     assert "found no plan.json" in command("train", "--seeds", "3", "--out", "none", "--resume")[2]
-
-
-def test_ctrl_c_says_how_to_go_on(command, pictures, monkeypatch):
-    fake(monkeypatch)
-    started = module._started
-
-    def stopped(job):
-        if job[0].seed == 1:
-            raise KeyboardInterrupt
-        return started(job)
-
-    monkeypatch.setattr(module, "_started", stopped)
-    code, out, err = command(*TINY, "--seeds", "3", *OUT)
-    assert (code, out) == (130, "")
-    assert err.endswith(
-        "swarm-forage: Interrupted: 1 of 3 trainings finished. To go on: swarm-forage --trust-models train --out all "
-        "--seeds 3 --resume\n"
-    )

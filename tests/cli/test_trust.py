@@ -69,15 +69,6 @@ def test_a_plan_that_names_a_model_is_refused_before_anything_starts(command, tm
     assert "which you did not name yourself" in err
 
 
-def test_a_study_that_names_a_model_is_refused(command, model, tmp_path):
-    (tmp_path / "study.toml").write_text(
-        f'name = "s"\nscenario = "warehouse_small"\npolicies = ["{model.name}"]\n', encoding="utf-8"
-    )
-    for words in (("run",), ("run", "--dry-run")):
-        code, _, err = command("study", words[0], "study.toml", *words[1:])
-        assert (code, Path("owned").exists()) == (2, False), err
-
-
 def test_the_option_opens_what_a_file_names(command, model, tmp_path):
     pytest.importorskip("stable_baselines3")
     spec = RunSpec(world=World(scenario("warehouse_small", n_robots=2, n_objects=10)), policy=str(model))

@@ -1,0 +1,130 @@
+"""The command `maps`."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from metrics.scoring.summary import summarize_runs
+from swarm_forage_env.inspect import film
+from swarm_forage_env.inspect.replay.files import read_replays
+from swarm_forage_env.policies import pretrained
+from swarm_forage_env.runs.plan import read_table
+from swarm_forage_env.runs.record import Record
+
+
+def test_maps_of_policies_need_no_page(command):
+    pytest.importorskip("matplotlib")
+    words = ("--robots", "3", "--horizon", "4", "--set", "interval_s=2", "--seeds", "2")
+    code, out, err = command("maps", "random", "crw", *words)
+    assert (code, err) == (0, "")
+    name = "warehouse_small_3_robots_4_s_20cdbe_random_crw_maps"
+    assert out == f"wrote maps to results/{name}.png and .npz files beside it\n"
+    assert {path.name for path in Path("results").glob("*.npz")} == {
+        f"{name}.random.npz",
+        f"{name}.crw.npz",
+        f"{name}.crw_minus_random.npz",
+    }
+
+
+def test_record_draws_one_picture_of_the_run_it_films(command, monkeypatch):
+    image = pytest.importorskip("PIL.Image")
+    render, filmed = film.render_frame, {}
+
+    def note(*args, tick, **options):
+        filmed[tick] = render(*args, tick=tick, **options)
+        return filmed[tick]
+
+    words = ("random", "--robots", "3", "--size", "240")
+    assert command("record", *words, "--seconds", "8")[0] == 0
+    monkeypatch.setattr(film, "render_frame", note)
+    code, out, err = command("record", *words, "--at", "8", "--file", "new/at.png")
+    assert (code, out, err) == (0, "wrote new/at.png\n", "")
+    assert list(filmed) == [40]
+    with image.open("new/at.png") as picture:
+        assert np.array_equal(np.asarray(picture), filmed[40])
+    with image.open("results/warehouse_small_3_robots_random.gif") as gif:
+        gif.seek(gif.n_frames - 1)
+        off = np.abs(np.asarray(gif.convert("RGB"), float) - filmed[40]).mean()
+    assert off < 4.0, "the last picture of the film, but for the colours of a GIF and the length of trails"
+    assert command("record", *words, "--at", "0")[1] == "wrote results/warehouse_small_3_robots_random_0_s.png\n"
+
+
+SHORT = ("--robots", "3", "--seconds", "4")
+
+
+def test_replay_writes_a_page(command):
+    code, out, err = command("replay", "random", *SHORT, "--file", "new/run.html")
+    assert (code, err) == (0, "")
+    assert out.startswith("wrote new/run.html (0.1 MB)")
+    (replay,) = read_replays("new/run.html")
+    assert (replay.label, replay.n_frames, replay.scenario.robots.n_robots) == ("random", 5, 3)
+    assert command("replay", "random", *SHORT)[1].startswith("wrote results/warehouse_small_3_robots_random.html")
+
+
+def test_replay_shows_runs_of_one_world_and_seed_side_by_side(command):
+    shutil.copy(Path(pretrained.__file__).with_name("ppo_warehouse_small.npz"), "mine.npz")
+    words = ("--seed", "7", "--wrapper", "throttle:waveform=constant,amplitude=0.2")
+    code, _, err = command("replay", "stochm", "crw", "mine.npz", *SHORT, *words, "--file", "a.html")
+    assert (code, err) == (0, "")
+    replays = read_replays("a.html")
+    assert [replay.label for replay in replays] == ["stochm", "crw", "mine"]
+    assert [replay.scenario.caches for replay in replays] == ["static", "none", "none"]
+    assert {replay.spec.seed for replay in replays} == {7}
+    assert [list(replay.signals) for replay in replays] == [["throttle"]] * 3
+    starts = {replay.position[0].tobytes() for replay in replays}
+    assert len(starts) == 1
+
+
+def test_replay_makes_a_stored_run_again(command):
+    assert command("run", "dpo", "--robots", "3", "--horizon", "200", "--jobs", "1")[0] == 0
+    (file,) = Path("results/warehouse_small_3_robots_200_s").glob("*.parquet")
+    stored = Record.read(file)
+    code, out, err = command("replay", str(file))
+    assert (code, err) == (0, "")
+    (replay,) = read_replays(out.split()[1])
+    assert replay.spec.run_id == stored.run_id
+    assert replay.counters[-1, 0] == stored["collected"].sum()
+    for beside in (("crw",), ("--seed", "3"), ("--robots", "2")):
+        code, _, err = command("replay", str(file), *beside)
+        assert (code, err.count("\n")) == (2, 1)
+        assert "Expected stored runs alone" in err
+
+
+RUNS = ("--robots", "3", "--set", "n_objects=20", "--set", "interval_s=2", "--horizon", "4", "--jobs", "1")
+
+
+@pytest.fixture
+def folder(command):
+    """Runs of two policies that have different caches."""
+    assert command("run", "random,stochm", *RUNS, "--seeds", "2", "--out", "here")[0] == 0
+    return Path("here")
+
+
+def test_stored_runs_are_the_table_that_made_them(command, folder):
+    _, printed, _ = command("run", "random,stochm", *RUNS, "--seeds", "2", "--out", "here")
+    again = summarize_runs(read_table(folder))
+    assert sorted(str(again).splitlines()) == sorted(printed.rstrip().splitlines())
+
+
+def test_a_figure_for_a_paper(command, folder, painted):
+    from matplotlib import image
+
+    words = ("--width-in", "3.5", "--no-title", "--picture", "figure.png")
+    assert command("plot", "here", *words) == (0, "picture figure.png\n", "")
+    assert image.imread("figure.png").shape[1] == round(3.5 * 150)
+
+
+def test_what_cannot_be_drawn_is_one_line(command, folder):
+    assert command("run", "random", *RUNS[:-4], "--horizon", "8", "--out", "here", "--jobs", "1")[0] == 0
+    for words, complaint in (
+        (("here",), "Expected runs of one length in here, got 4 s in intervals of 2 s, 8 s in intervals of 2 s"),
+        (("study.parquet",), "it is 'swarm-forage study plot study.parquet'"),
+        (("nowhere",), "Expected run records (*.parquet) in nowhere, found none."),
+        (("here", "--picture", "figure.txt"), "Expected"),
+    ):
+        code, out, err = command("plot", *words)
+        assert (code, out) == (2, ""), err
+        assert complaint in err
+        assert len(err.splitlines()) == 1
