@@ -69,8 +69,6 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         for short, name in SCENARIOS.items()
     },
     "sets": (("swarm-forage study list",), ()),
-    "smoke": (("swarm-forage study list --budget smoke",), ()),
-    "reduced": (("swarm-forage study list --budget reduced",), ()),
     **{
         f"recipe_{short}_{seed}": (
             (
