@@ -82,7 +82,7 @@ def described_fields(options: WorldOptions) -> WorldDescription:
 
 
 def parse_setting(word: str) -> tuple[str, Any]:
-    """Turn "key=value" into a name and a value: as TOML says it, several between commas, else a text.
+    """Turn "key=value" into a name and a value: as TOML says it, else a text; several between commas.
 
     Raises:
         ConfigError: no "=".
@@ -101,7 +101,7 @@ def _value(text: str) -> Any:
             return tomllib.loads(f"value = {form}")["value"]
         except tomllib.TOMLDecodeError:
             continue
-    return text
+    return text.split(",") if "," in text else text
 
 
 def plan_runs(options: WorldOptions, policies: Sequence[str], seeds: Sequence[int]) -> tuple[RunSpec, ...]:

@@ -6,7 +6,7 @@ use the same translation, so a policy runs exactly as it was trained.
 """
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias, get_args
@@ -16,7 +16,7 @@ from gymnasium import spaces
 from msgspec import Meta
 
 from swarm_forage_env._internal.compiling import Calls
-from swarm_forage_env._internal.fields import Checked, ConfigError, Count, Positive, Whole, read
+from swarm_forage_env._internal.fields import Checked, ConfigError, Count, Positive, Whole, known_name, read
 from swarm_forage_env._internal.held import hold
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.contract.kernel_policy import Driver
@@ -97,11 +97,14 @@ class InterfaceConfig(Checked):
     frame_decisions: Count = 0
     """Decisions for which each robot sees the world in a frame of its own, turned and mirrored in one of eight ways,
     before it takes another, see `policies.kernels.frames`. 0: all see the world as it is."""
+    without: tuple[str, ...] = ()
+    """Slices of the learner's layout that are 0 throughout: ("position", "heading") are robots without GPS and compass.
+    What is counted by the world stays: an automatic gripper and `mask` need neither of these two."""
     extra_columns: Annotated[int, Meta(ge=0, le=MOST_EXTRA_COLUMNS)] = 0
     """Columns K of the user's `extra_observation`, which come last; environments and trainings fill them in."""
 
     def check(self) -> None:
-        """Refuse messages of discrete actions, and frames of what only its author can turn."""
+        """Refuse messages of discrete actions, frames of what only its author can turn, and memory without places."""
         if self.message_size and self.actions != "continuous":
             raise ConfigError(
                 f"Expected interface.actions 'continuous' for messages of {self.message_size} numbers, got "
@@ -112,6 +115,8 @@ class InterfaceConfig(Checked):
                 f"Expected interface.frame_decisions of 0 beside extra_observation, because only its author knows what "
                 f"a turn does to it, got {self.frame_decisions}; give interface={{'frame_decisions': 0}}."
             )
+        if self.site_memory and {"position", "heading"} & {*self.without}:
+            raise ConfigError("Expected position and heading for site_memory, which needs both; got interface without.")
 
     def decisions_in(self, ticks: int) -> int:
         """Return how many decisions there are in so many ticks of a run, with one that its end cuts short."""
@@ -162,6 +167,7 @@ class LearnerInterface:
     Attributes:
         config: The choices.
         layout: Columns of what the learner sees.
+        hidden: Those of them that are 0 throughout, see `InterfaceConfig.without`.
         translation: What kernels need for both ways.
         observation_space: Box of one robot's row, (d,) float32 in [-1, 1].
         action_space: Box or Discrete of one robot's action.
@@ -188,6 +194,7 @@ class LearnerInterface:
         )
         self._commands = np.zeros((spec.n_robots, spec.action_size), np.float32)
         self.layout = learner_layout(source, config)
+        self.hidden = hidden_columns(self.layout, config.without)
         self._n_columns = source.size
         own = [column for name in config.sensors for column in range(source[name].start, source[name].stop)]
         half_x, half_y = source.part("position").scale
@@ -301,6 +308,8 @@ class LearnerInterface:
         if extra is not None:
             out[:, -extra.shape[1] :] = extra
         self._call(see, obs, decision, self._held, out)
+        if self.hidden.size:
+            out[:, self.hidden] = 0.0
 
     def command(self, actions: np.ndarray, obs: ObsArray) -> ActionArray:
         """Return actions of the environment, (N, A) float32, in a reused buffer.
@@ -437,6 +446,14 @@ def learner_layout(source: ObservationLayout, config: InterfaceConfig) -> Observ
         built_in += SITE_ROWS
     extra = [(EXTRA, (1.0,) * config.extra_columns, "", "extra_observation of the user")] * bool(config.extra_columns)
     return layout_of([*built_in, *(source.part(name).row for name in config.sensors), *extra])
+
+
+def hidden_columns(layout: ObservationLayout, without: Sequence[str]) -> IntArray:
+    """Return the columns of some slices; raises ConfigError for a name that the layout does not have."""
+    for name in without:
+        known_name("slice of the interface without", name, layout.names)
+    columns = [column for name in without for column in range(layout[name].start, layout[name].stop)]
+    return np.array(columns, np.int32)
 
 
 def _check_company(source: ObservationLayout, config: InterfaceConfig) -> None:

@@ -19,7 +19,13 @@ from swarm_forage_env._internal.files import json_text, parse_json, replacing
 from swarm_forage_env.contract.kernel_policy import KernelPolicy
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ObsArray
-from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, any_swarm, interface_from_mapping
+from swarm_forage_env.policies.interface import (
+    InterfaceConfig,
+    LearnerInterface,
+    any_swarm,
+    hidden_columns,
+    interface_from_mapping,
+)
 from swarm_forage_env.policies.kernels.network import Choice, Layers, forward, step_network
 from swarm_forage_env.policies.kernels.products import LANES, ROWS
 from swarm_forage_env.policies.learned import InterfacePolicy, check_extra
@@ -97,6 +103,10 @@ class Network:
             raise NetworkError(f"Expected layers that follow on each other, got weights {sizes}.")
         if not all(array.dtype.kind == "f" and _is_finite(array) for array in (*self.weights, *self.biases)):
             raise NetworkError("Expected weights and biases that are finite numbers; did the training diverge?")
+        if hidden := self.about.interface.without:
+            first = self.weights[0].copy()
+            first[hidden_columns(any_swarm(self.about.interface).layout, hidden)] = 0.0  # it weighs nothing unseen
+            object.__setattr__(self, "weights", (first, *self.weights[1:]))
 
     def check_fits(self, interface: LearnerInterface) -> None:
         """Refuse an interface with other columns or actions than the network takes and gives; raises NetworkError."""

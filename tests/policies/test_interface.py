@@ -1,5 +1,8 @@
 """What learners see and do: the compact view against a slow twin, actions and masks by hand."""
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gymnasium import spaces
@@ -7,14 +10,17 @@ from gymnasium import spaces
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.codes import Event, Grip
+from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import (
     GRIPS,
     MOTIONS,
     InterfaceConfig,
     LearnerInterface,
+    any_swarm,
     chosen_interface,
 )
+from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import Quirks
@@ -246,3 +252,35 @@ def test_arrays_that_compiled_code_would_read_or_write_beyond_are_refused(name, 
         interface.command(np.zeros(4, np.int64), obs[:3])
     with pytest.raises(ValueError, match="contiguous float32"):
         interface.observe(obs, out[:3])
+
+
+@pytest.mark.parametrize("observation", ["full", "compact"])
+def test_slices_that_are_left_out_are_zeros_in_rows_and_weigh_nothing_in_networks(observation):
+    config = InterfaceConfig(observation=observation, actions="discrete", without=("position", "heading"))
+    interface = any_swarm(config)
+    spec = SwarmSpec.of(scenario("warehouse_small"))
+    obs = np.random.default_rng(1).uniform(0.1, 0.9, (spec.n_robots, spec.layout.size)).astype(np.float32)
+    seen, whole = interface.observe(obs), any_swarm(replace(config, without=())).observe(obs)
+    names = [part.name for part in interface.layout for _ in range(part.size)]
+    is_hidden = np.isin(names, config.without)
+    assert is_hidden.sum() == 4
+    assert not seen[:, is_hidden].any()
+    assert whole[:, is_hidden].any()
+    np.testing.assert_array_equal(seen[:, ~is_hidden], whole[:, ~is_hidden])
+    width, n_actions = interface.widths
+    layer = np.ones((width, n_actions), np.float32)
+    about = NetworkAbout(interface=config, activation="tanh", samples=False)
+    network = Network((layer,), (np.zeros(n_actions, np.float32),), about)
+    np.testing.assert_array_equal(network.outputs(whole), network.outputs(seen))
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"without": ("gps",)}, "Unknown slice of the interface without 'gps'. Known: proximity"),
+        ({"without": ("position",), "site_memory": True}, "Expected position and heading for site_memory"),
+    ],
+)
+def test_slices_that_cannot_be_left_out_are_refused(given, words):
+    with pytest.raises(ConfigError, match=re.escape(words)):
+        any_swarm(InterfaceConfig(**given))
