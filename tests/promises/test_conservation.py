@@ -1,5 +1,7 @@
 """Objects never appear, vanish or lie in two places, whatever robots do and whichever robots come and go."""
 
+from itertools import cycle
+
 import numpy as np
 import pytest
 
@@ -43,10 +45,14 @@ def test_objects_are_conserved_while_controllers_forage(name):
     assert env.events.counters[Counter.OBJECTS_MOVED] > 100
 
 
+COMING_AND_GOING = (("none", 0.2), ("static", 0.03), ("dynamic", 0.03), ("dynamic", 0.2))
+"""Caches, and their side as a share of the arena's."""
+
+
 @pytest.mark.parametrize(
-    ("caches", "side_share"), [("none", 0.2), ("static", 0.03), ("dynamic", 0.03), ("dynamic", 0.2)]
+    ("name", "caches", "side_share"),
+    [(name, *caches) for name, caches in zip([*DENSE, *DENSE], cycle(COMING_AND_GOING), strict=False)],
 )
-@pytest.mark.parametrize("name", DENSE)
 def test_objects_are_conserved_when_robots_come_and_go(name, caches, side_share):
     config = scenario(
         name,

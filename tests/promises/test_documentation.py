@@ -2,8 +2,6 @@
 
 import json
 import re
-import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -29,6 +27,7 @@ def run_all(blocks, page):
         exec(compile(block, f"{page.name}, example {number}", "exec"), names)  # noqa: S102 - our own documentation
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "page", [page for page in PAGES if "```python" in page.read_text()], ids=lambda page: page.name
 )
@@ -40,6 +39,7 @@ def test_python_examples_run(page, tmp_path, monkeypatch):
     run_all([block for needs, block in examples(page) if not needs], page)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "page", [page for page in PAGES if "<!-- needs " in page.read_text()], ids=lambda page: page.name
 )
@@ -58,33 +58,11 @@ def test_files_of_examples_stand_in_a_page_or_are_linked_from_one(file):
     assert any(shown in text or linked in text for text in texts), f"{file}: no page shows it as it is, or links to it"
 
 
-@pytest.mark.parametrize("name", ["run", "tests"])
-def test_marked_commands_of_the_readme_are_one_line_each(name):
-    text = (ROOT / "README.md").read_text()
-    blocks = re.findall(rf"^<!-- ci:{name} -->\n```bash\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
-    assert len(blocks) == 1
-    assert len(blocks[0].splitlines()) == 1
-
-
 def test_relative_links_lead_to_files():
     targets = [
         (page, link) for page in PAGES for link in re.findall(r"\]\((?!https?://|#)([^)#\s]+)", page.read_text())
     ]
     assert [(page.name, target) for page, target in targets if not (page.parent / target).exists()] == []
-
-
-def test_what_pages_show_is_not_left_out_of_the_repository(tmp_path):
-    """What runs write is, such as the folder results in the root, but not docs/images/results."""
-    shutil.copy(ROOT / ".gitignore", tmp_path)
-    subprocess.run(["git", "init", "--quiet", "."], cwd=tmp_path, check=True)
-    shown = [
-        (page.parent.relative_to(ROOT) / target).as_posix()
-        for page in PAGES
-        for target in re.findall(r"!\[.*?\]\((?!https?://)(.+?)\)", page.read_text())
-    ]
-    asked = ["git", "check-ignore", "results/of_a_run", "docs/images/results/picture.png", *shown]
-    left_out = subprocess.run(asked, cwd=tmp_path, check=True, capture_output=True, text=True).stdout
-    assert left_out.split() == ["results/of_a_run"]
 
 
 def test_index_lists_every_page():
@@ -150,13 +128,3 @@ def test_answers_and_means_are_those_beside_the_results(tmp_path):
     assert found["readings"].splitlines()[2] == "| R1 | +/-/? | +/+/? |"
     block = "<!-- generated: results.split by scripts/update_docs -->"
     assert f"{block}\n\n| claim |" in update_docs.written(f"{block}<!-- end -->", {"results": found})
-
-
-def test_commands_of_the_store_are_those_that_the_pages_show():
-    shown = {"run": "README.md", "trained": "docs/training.md"}
-    assert [
-        command
-        for name, page in shown.items()
-        for command in update_docs.SOURCES[name][0]
-        if command not in (ROOT / page).read_text()
-    ] == []

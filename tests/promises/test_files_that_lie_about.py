@@ -14,6 +14,8 @@ from pathlib import Path
 import pytest
 from numba.core.caching import UserProvidedCacheLocator
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("swarm_forage_env", "baselines", "metrics")
 SHORT = ("--robots", "2", "--set", "n_objects=10", "--horizon", "4", "--set", "interval_s=2")

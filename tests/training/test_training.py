@@ -11,7 +11,6 @@ pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-b
 
 import torch
 from stable_baselines3 import PPO
-from stable_baselines3.common.callbacks import BaseCallback
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.env import ForageEnv
@@ -71,32 +70,38 @@ def same(one: list[np.ndarray], other: list[np.ndarray]) -> bool:
     return all(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
 
 
-def test_a_plan_is_carried_out_stage_by_stage(tmp_path):
-    told = []
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A finished training of two stages, its folder, and what it told on the way."""
+    folder, told = tmp_path_factory.mktemp("whole"), []
     with trust.only_typed(()):  # its own checkpoints need no leave
-        result = train(tiny_plan(), tmp_path, report=told.append)
+        return train(tiny_plan(), folder, report=told.append), folder, told
+
+
+def test_a_plan_is_carried_out_stage_by_stage(whole):
+    result, folder, told = whole
     assert result.model.num_timesteps == 768
     assert result.model.gamma == 0.9
     assert [evaluation.steps for evaluation in result.evaluations] == [256, 384, 640, 768]
     assert [news for news in told if news in result.evaluations] == list(result.evaluations)
-    assert read_evaluations(tmp_path / "evaluations.csv") == list(result.evaluations)
-    about = Network.load(tmp_path / "policy.npz").about
+    assert read_evaluations(folder / "evaluations.csv") == list(result.evaluations)
+    about = Network.load(folder / "policy.npz").about
     best = max(evaluation.reached for evaluation in result.evaluations)
     assert about.interface == NUMBERED
     assert about.card["evaluation"]["reached"] == best
     assert about.card["versions"]["torch"] == torch.__version__
-    assert {path.name for path in tmp_path.iterdir()} >= {"plan.json", "model.zip", "policy.npz"}
+    assert {path.name for path in folder.iterdir()} >= {"plan.json", "model.zip", "policy.npz"}
 
 
-def test_the_same_plan_gives_the_same_weights(tmp_path):
-    first, again = train(tiny_plan(), tmp_path / "a"), train(tiny_plan(), tmp_path / "b")
-    assert not same(weights(first.model), weights(train(tiny_plan(seed=1), tmp_path / "c").model))
-    assert same(weights(first.model), weights(again.model))
-    assert [each.reached for each in first.evaluations] == [each.reached for each in again.evaluations]
+def test_the_same_plan_gives_the_same_weights(whole, tmp_path):
+    """Two seconds: a whole training."""
+    again = train(tiny_plan(), tmp_path)
+    assert same(weights(whole[0].model), weights(again.model))
+    assert [each.reached for each in whole[0].evaluations] == [each.reached for each in again.evaluations]
+    assert not same(weights(whole[0].model), weights(train(tiny_plan(seed=1), tmp_path / "other").model))
 
 
-@pytest.mark.parametrize(("plan", "evaluated"), [(tiny_plan(), [256, 384, 640, 768]), (SHORT, [128])])
-def test_a_training_that_was_killed_in_an_evaluation_goes_on_with_it(tmp_path, monkeypatch, plan, evaluated):
+def test_a_training_that_was_killed_in_an_evaluation_goes_on_with_it(tmp_path, monkeypatch):
     """Without the help of Ctrl-C, which keeps a checkpoint itself; after the last decision, too."""
 
     def kill(*_, **__):
@@ -105,54 +110,32 @@ def test_a_training_that_was_killed_in_an_evaluation_goes_on_with_it(tmp_path, m
     with monkeypatch.context() as patched:
         patched.setattr(Evaluator, "evaluate", kill)
         with pytest.raises(SystemExit):
-            train(plan, tmp_path)
+            train(SHORT, tmp_path)
     assert not (tmp_path / "policy.npz").exists()
-    result = train(plan, tmp_path, resume=True)
-    assert [each.steps for each in result.evaluations] == evaluated
-    assert result.steps == evaluated[-1] - evaluated[0]
+    result = train(SHORT, tmp_path, resume=True)
+    assert [each.steps for each in result.evaluations] == [128]
+    assert result.steps == 0
     assert (tmp_path / "policy.npz").exists()
 
 
-def test_training_goes_on_where_it_stopped(tmp_path):
+def test_training_goes_on_where_it_stopped(whole, tmp_path):
+    """As if it had been stopped after the first evaluation of the second stage."""
     plan = tiny_plan()
-    done = train(plan, tmp_path).model
-    again = train(plan, tmp_path, resume=True)
-    assert same(weights(done), weights(again.model))
-    assert len(again.evaluations) == 4
-
-    # As if it had been stopped after the first evaluation of the second stage.
-    other = tmp_path / "stopped"
-    stopped = train(dataclasses.replace(plan, stages=(plan.stages[0], Stage(steps=256))), other)
+    stopped = train(dataclasses.replace(plan, stages=(plan.stages[0], Stage(steps=256))), tmp_path)
     assert stopped.model.num_timesteps == 640
-    plan.write(other / "plan.json")
-    finished = train(plan, other, resume=True)
+    plan.write(tmp_path / "plan.json")
+    finished = train(plan, tmp_path, resume=True)
     assert finished.model.num_timesteps == 768
     assert finished.model.learning_rate == 1e-4
     assert not same(weights(stopped.model), weights(finished.model))
+    again = train(plan, tmp_path, resume=True)
+    assert same(weights(finished.model), weights(again.model))
+    assert len(again.evaluations) == 4
 
 
-def test_a_second_training_in_one_folder_is_refused_while_the_first_is_under_way(tmp_path):
-    pytest.importorskip("fcntl")
-    told = []
-
-    class Second(BaseCallback):
-        """Before the first one has written anything that tells of it."""
-
-        def _on_training_start(self):
-            with pytest.raises(ConfigError, match="another command does; wait until it has ended"):
-                train(tiny_plan(seed=5), tmp_path)
-            told.append(read_plan(tmp_path / "plan.json").seed)
-
-        def _on_step(self):
-            return True
-
-    train(tiny_plan(stages=(Stage(steps=128),)), tmp_path, callbacks=[Second()])
-    assert told == [0]
-
-
-def test_a_training_that_diverges_leaves_the_checkpoint_before(tmp_path):
+def test_a_training_that_diverges_leaves_the_checkpoint_before(trained, tmp_path):
     plan = tiny_plan(stages=(Stage(steps=128),))
-    train(plan, tmp_path)
+    shutil.copytree(trained, tmp_path, dirs_exist_ok=True)
     sound = (tmp_path / "model.zip").read_bytes()
     wild = {"learning_rate": 1e15, "batch_size": 128, "n_epochs": 1}  # one update, which only the end looks at
     longer = dataclasses.replace(plan, stages=(*plan.stages, Stage(steps=128, options=wild)))
@@ -174,13 +157,6 @@ def test_ctrl_c_before_the_first_evaluation_loses_nothing(tmp_path, monkeypatch)
     assert PPO.load(tmp_path / "model.zip").num_timesteps == 256
     result = train(plan, tmp_path, resume=True)
     assert [each.steps for each in result.evaluations] == [384, 768]
-
-
-def test_seeds_of_stages_and_of_resumed_trainings_are_new_and_none_of_the_evaluations():
-    seeds = {training.training_seed(seed, done) for seed in (0, 1) for done in (0, 1_000_000, 1_000_001)}
-    assert len(seeds) == 6
-    evaluated = range(EvaluationPlan().first_seed, EvaluationPlan().first_seed + EvaluationPlan().n_runs)
-    assert not any(seed + arena in evaluated for seed in seeds for arena in range(64))
 
 
 def test_extra_columns_and_rewards_reach_training_and_evaluations(tmp_path):
