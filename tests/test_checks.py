@@ -1,10 +1,7 @@
 """check_env, check_policy, check_determinism: correct subjects pass, and each fault is noticed."""
 
-import sys
-
 import numpy as np
 import pytest
-from gymnasium import spaces
 from pettingzoo.utils import BaseParallelWrapper
 
 from swarm_forage_env import CheckError, ConfigError, check_determinism, check_env, check_policy
@@ -42,15 +39,6 @@ def test_wrapped_stacks_and_views_for_learners_pass():
     check_env(build_stack(scenario("classroom", n_robots=5, message_size=2), dying), ticks=20)
 
 
-def test_short_episodes_pass_and_keep_their_horizon():
-    env = ForageEnv(SMALL, max_cycles=7)
-    check_env(env)
-    assert env.max_cycles == 7
-    stack = build_stack(SMALL)
-    check_env(stack)
-    assert "max_cycles" not in vars(stack)
-
-
 class BeyondTheSpace(BaseParallelWrapper):
     def step(self, actions):
         obs, *rest = super().step(actions)
@@ -61,11 +49,6 @@ class RewardsNobody(BaseParallelWrapper):
     def step(self, actions):
         obs, _, *rest = super().step(actions)
         return obs, {}, *rest
-
-
-class NewSpaces(BaseParallelWrapper):
-    def action_space(self, agent):
-        return spaces.Box(-1.0, 1.0, (3,), np.float32)
 
 
 class Unseeded(SwarmWrapper):
@@ -121,7 +104,6 @@ class BadState(ForageEnv):
     [
         (lambda: BeyondTheSpace(ForageEnv(SMALL)), r"Expected the observation of robot_0 in its space .* at tick 1"),
         (lambda: RewardsNobody(ForageEnv(SMALL)), "parallel_api_test, got: Live agent was not given reward"),
-        (lambda: NewSpaces(ForageEnv(SMALL)), "parallel_api_test, got: action_space should return the exact same"),
         (lambda: Unseeded(ForageEnv(SMALL)), "equal seeds and actions to give equal runs, got another observation"),
         (lambda: DictsOnly(ForageEnv(SMALL)), "Expected step_batch to give what step gives, got another reward"),
         (lambda: SometimesFour(SMALL), r"give equal runs, got other agents at tick 0: \['robot_0'\]"),
@@ -129,17 +111,11 @@ class BadState(ForageEnv):
         (lambda: BadState(SMALL), r"Expected state\(\) in state_space"),
         (lambda: "warehouse_small", "Expected a parallel environment of PettingZoo, got 'warehouse_small'"),
     ],
-    ids=["space", "reward", "new spaces", "seeds", "batch", "agents", "horizon", "state", "text"],
+    ids=["space", "reward", "seeds", "batch", "agents", "horizon", "state", "text"],
 )
 def test_each_fault_of_an_environment_is_found(make, fault):
     with pytest.raises(CheckError, match=fault):
         check_env(make())
-
-
-def test_without_pytest_it_says_what_to_install(monkeypatch):
-    monkeypatch.setitem(sys.modules, "pettingzoo.test", None)
-    with pytest.raises(ImportError, match=r"PettingZoo's tests need pytest: pip install"):
-        check_env(ForageEnv(SMALL))
 
 
 # Policies
@@ -155,13 +131,10 @@ def drive(obs):
     return np.full((len(obs), 3), 0.5, np.float32)
 
 
-@pytest.mark.parametrize("given", [BusyPolicy, BusyPolicy(), drive], ids=["class", "object", "function"])
-def test_policies_may_be_classes_objects_and_functions(given):
-    check_policy(given, SMALL)
-    check_determinism(given, SMALL, seconds=10.0)
-
-
-def test_a_swarm_of_one_robot_can_be_checked():
+def test_policies_may_be_classes_objects_and_functions():
+    for given in (BusyPolicy, BusyPolicy(), drive):
+        check_policy(given, SMALL)
+    check_determinism(drive, SMALL, seconds=10.0)
     check_policy(BusyPolicy, scenario("warehouse_small", n_robots=1))
 
 
@@ -226,10 +199,6 @@ def test_each_fault_of_an_act_is_found(act, fault):
 
 class UnknownSlice(Sound):
     reads = ("proximty",)
-
-
-class TextForReads(Sound):
-    reads = "proximity"
 
 
 class ReadsMore(Sound):
@@ -300,27 +269,10 @@ class OneSize(Sound):
         super().reset(task, rng)
 
 
-class FirstSize(Sound):
-    """Keeps the size of its first swarm."""
-
-    actions = None
-
-    def act(self, obs, active):
-        if self.actions is None:
-            self.actions = np.zeros((len(obs), 3), np.float32)
-        return self.actions
-
-
 class UnknownTask(Sound):
     def reset(self, task, rng):
         super().reset(task, rng)
         self.task = np.full(task.n_robots, len(Task), np.int8)
-
-
-class WideTask(Sound):
-    def reset(self, task, rng):
-        super().reset(task, rng)
-        self.task = np.zeros(task.n_robots, np.int64)
 
 
 class UnknownCaches(Sound):
@@ -332,7 +284,6 @@ class UnknownCaches(Sound):
     [
         (NoAct, "got one without act"),
         (UnknownSlice, "got 'proximty'. Did you mean 'proximity'"),
-        (TextForReads, r"got 'proximity'; write \('proximity',\)"),
         (ReadsMore, r"not in reads = \('proximity',\) hold other numbers, got other actions at tick 0"),
         (ReadsMoreButZeros, "hold other numbers, got other actions"),
         (Remembers, "Expected reset to begin a new run, got other actions at tick 0"),
@@ -341,9 +292,7 @@ class UnknownCaches(Sound):
         (AwayAreNotNumbers, r"got \[nan, nan, nan\] for robot 1 at tick 37, which is away, but may come back in this"),
         (FollowsTheAway, "when the observations of robots that are away are others, got other actions at tick 37"),
         (OneSize, "a swarm of 2 robots, got ValueError: I steer five robots"),
-        (FirstSize, r"shape \(n_robots, 3\) = \(2, 3\)"),
         (UnknownTask, r"codes of Task \(0 to 7\), got codes \[8\]"),
-        (WideTask, r"Expected task as int8 of shape \(n_robots,\) = \(5,\)"),
         (UnknownCaches, "caches of the policy to be one of none, static, dynamic, got 'some'"),
     ],
     ids=lambda value: value.__name__ if callable(value) else "",
@@ -374,8 +323,3 @@ def test_a_difference_in_the_record_alone_is_found():
 
     with pytest.raises(CheckError, match="got another task_share_generalist"):
         check_determinism(Tasked, SMALL, seeds=[0], seconds=10.0)
-
-
-def test_seeds_are_needed():
-    with pytest.raises(ValueError, match="Expected seeds to run, got none"):
-        check_determinism(BusyPolicy, SMALL, seeds=[])

@@ -41,9 +41,3 @@ def test_forms_are_written_by_the_ending_of_the_file(tmp_path):
     assert (answer["who is best"][1]["value"], answer["notes"]) == (None, ["runs of 4,000 s", "the end"])
     with pytest.raises(ConfigError, match=r"ends with \.txt, \.md, \.csv, \.json, got found\.pdf"):
         FOUND.write(tmp_path / "found.pdf")
-
-
-def test_without_a_picture_nothing_is_drawn(tmp_path):
-    assert not FOUND.has_picture
-    with pytest.raises(ValueError, match="nothing to draw"):
-        FOUND.draw(tmp_path / "found.png")

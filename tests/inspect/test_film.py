@@ -44,6 +44,7 @@ def test_a_gif_shows_every_picture_in_true_colours_for_ever(tmp_path):
         assert np.abs(shown.astype(int) - drawn).max() <= 4
 
 
+@pytest.mark.slow
 def test_an_mp4_has_every_picture_even_of_odd_size(tmp_path):
     imageio_ffmpeg, imageio = pytest.importorskip("imageio_ffmpeg"), pytest.importorskip("imageio.v2")
     write_film(pictures(12), tmp_path / "film.MP4", fps=10)
@@ -53,18 +54,6 @@ def test_an_mp4_has_every_picture_even_of_odd_size(tmp_path):
         shown = film.get_data(5)
     assert shown.shape == (60, 82, 3)
     assert shown[25, 15] == pytest.approx(THEMES["dark"].empty, abs=30)
-
-
-def test_a_film_that_fails_leaves_nothing_behind(tmp_path):
-    def broken():
-        yield from pictures(3)
-        raise RuntimeError("the run broke")
-
-    (tmp_path / "old.gif").write_bytes(b"an older film")
-    for name in ("old.gif", "new.gif"):
-        with pytest.raises(RuntimeError, match="the run broke"):
-            write_film(broken(), tmp_path / name, fps=20)
-    assert [(entry.name, entry.read_bytes()) for entry in tmp_path.iterdir()] == [("old.gif", b"an older film")]
 
 
 class Witness(RandomPolicy):
@@ -81,16 +70,10 @@ class Witness(RandomPolicy):
     ("options", "expected"),
     [
         ({"path": "run.avi"}, r"to end in .gif or .mp4, got"),
-        ({"path": "run.png"}, "at_s in Python"),
         ({"at_s": 1.0}, r"to end in .png, got"),
-        ({"at_s": -1.0, "path": "run.png"}, "at_s"),
         ({"fps": 51.0}, r"fps of a \.gif to be a number from 1 to 50"),
         ({"seconds": 2000.0}, "at most 1500 frames for a GIF, got 2001"),
-        ({"seconds": 20_000.0}, "seconds .* <= 10,000"),
         ({"seconds": 0.5}, "seconds .*two pictures.* >= 1"),
-        ({"speedup": 1.0}, "speedup .* >= 4"),
-        ({"size_px": 10}, "size_px"),
-        ({"trail_s": -1.0}, "trail_s"),
         ({"parameters": {"wander_speed_mps": 0.05}}, "parameters with a policy's name or file only"),
     ],
 )

@@ -9,7 +9,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.inspect.play import session as playing
 from swarm_forage_env.inspect.play.levels import LEVELS
-from swarm_forage_env.inspect.play.session import SPEEDS, PlaySession, Setting, wall_of
+from swarm_forage_env.inspect.play.session import SPEEDS, PlaySession, Setting
 from swarm_forage_env.inspect.replay.files import read_replays
 from swarm_forage_env.inspect.replay.frames import Status
 from swarm_forage_env.runs.run import run_one
@@ -61,7 +61,7 @@ def counted(frame, counter=Counter.COLLECTED):
 
 
 @pytest.mark.parametrize(
-    ("policy", "wrappers"), [("crw", ()), ("stochm", NOISY), ("ppo_warehouse_small", ())], ids=lambda one: str(one)[:9]
+    ("policy", "wrappers"), [("stochm", NOISY), ("ppo_warehouse_small", ())], ids=["stochm", "ppo"]
 )
 def test_a_run_that_nobody_touches_is_that_of_run_one(policy, wrappers):
     session, clock = session_of(policy, wrappers)
@@ -96,14 +96,6 @@ def test_a_level_that_was_set_changes_the_run_and_is_told(name):
             each.carry_out({"do": "step"})
     assert not np.array_equal(*(each.world.swarm.position for each in runs))
     assert runs[0].summary().endswith(f"changed by hand: {told.replace(' is', '')}")
-
-
-def test_a_swarm_that_is_dead_ends_the_run():
-    session, _ = session_of()
-    for robot in range(8):
-        session.carry_out({"do": "kill", "robot": robot})
-    session.carry_out({"do": "step"})
-    assert session.run.over
 
 
 def test_pause_step_and_speed():
@@ -168,19 +160,6 @@ def test_a_wall_starts_the_run_again_with_the_same_seed():
     assert session.setting.world.scenario.arena.obstacles == ()
 
 
-@pytest.mark.parametrize(
-    ("drawn", "wall"),
-    [
-        ((4.4, 5.0, 4.0, 2.0), (4.0, 2.0, 4.4, 5.0)),
-        ((4.0, 2.0, 4.05, 5.0), (3.83, 2.0, 4.23, 5.0)),
-        ((7.9, 7.0, 9.0, 7.5), (7.6, 7.0, 8.0, 7.5)),
-        ((-3.0, 7.95, -1.0, 8.0), (0.0, 7.6, 0.4, 8.0)),
-    ],
-)
-def test_walls_are_inside_and_thick_enough(drawn, wall):
-    assert wall_of(drawn, 8.0, 8.0) == pytest.approx(wall)
-
-
 def test_robots_policy_scenario_and_seed_start_another_run():
     session, _ = session_of()
     session.carry_out({"do": "wall", "box": WALL})
@@ -197,20 +176,13 @@ def test_robots_policy_scenario_and_seed_start_another_run():
 @pytest.mark.parametrize(
     ("command", "expected"),
     [
-        (None, "a command of the page"),
         ({"do": "fly"}, "a command of the page"),
-        ({"do": "speed", "value": 0}, "Expected speed"),
         ({"do": "level", "name": "gravity", "value": 1.0}, "Unknown level"),
         ({"do": "level", "name": "throttle", "value": 2.0}, "amplitude|throttle"),
-        ({"do": "level", "name": "deaths", "value": -1.0}, "deaths"),
         ({"do": "kill", "robot": 8}, "robot to be a whole number from 0 to 7"),
         ({"do": "wall", "box": [1.0, 4.0, 1.5, 4.5]}, "A wall cannot stand there"),
-        ({"do": "wall", "box": [1.0, 2.0, 3.0, "4"]}, "a command of the page"),
-        ({"do": "remove_wall", "index": 0}, "number of a wall"),
-        ({"do": "start", "robots": 201}, "robots to be a whole number from 1 to 200"),
         ({"do": "start", "policy": "/tmp/other.py:Mine"}, "Unknown policy"),
         ({"do": "start", "scenario": "/etc/passwd.toml"}, "Unknown scenario"),
-        ({"do": "start", "now": True}, "Unknown key"),
     ],
 )
 def test_a_wrong_command_is_refused_and_changes_nothing(command, expected):

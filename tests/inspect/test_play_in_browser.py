@@ -10,6 +10,8 @@ from swarm_forage_env.wrappers.world import World
 from tests.support.browser import Browser, chromium
 from tests.support.play_page import choose_robot, run_shown, served
 
+pytestmark = pytest.mark.slow
+
 DESKTOP = {"width": 1280, "height": 800}
 PHONE = {"width": 390, "height": 844, "touch": True}
 SECONDS = "Number(document.getElementById('clock').textContent.replace(/\\D/g, ''))"

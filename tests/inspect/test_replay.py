@@ -5,12 +5,16 @@ import json
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Counter, ObjectStatus, Task
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.inspect.replay import capture
 from swarm_forage_env.inspect.replay.capture import record_replay
+from swarm_forage_env.inspect.replay.coding import pack, unpack
 from swarm_forage_env.inspect.replay.files import read_replays, write_replays
 from swarm_forage_env.inspect.replay.frames import HEADING_STEPS, Replay, Status
 from swarm_forage_env.policies.registry import load_policy
@@ -189,21 +193,6 @@ def test_many_robots_and_long_runs_get_fewer_frames(monkeypatch, most, expected)
     assert kept.frame_ticks == expected
 
 
-@pytest.mark.parametrize(
-    ("options", "expected"),
-    [
-        ({"seconds": 81.0}, "seconds .* <= 80"),
-        ({"seconds": 0.0}, "seconds"),
-        ({"frame_s": 0.1}, "frame_s"),
-        ({"frame_s": 0.3}, r"whole ticks of 0.2 s, got 0.3; take 0.2 or 0.4\."),
-    ],
-)
-def test_impossible_wishes_are_refused_before_the_run(monkeypatch, options, expected):
-    monkeypatch.setattr(capture, "build_env", None)
-    with pytest.raises(ConfigError, match=expected):
-        record_replay(spec_of(), **options)
-
-
 # Files
 
 
@@ -255,3 +244,28 @@ def test_damaged_files_are_told_in_one_line(replay, tmp_path, damage, expected):
     with pytest.raises(ConfigError, match=rf"^Cannot read .*run\.html: .*({expected})") as caught:
         read_replays(path)
     assert "\n" not in str(caught.value)
+
+
+@settings(max_examples=30)
+@given(
+    st.sampled_from(["u1", "u2", "i4", "f4"]).flatmap(
+        lambda dtype: arrays.arrays(dtype, arrays.array_shapes(min_dims=1, max_dims=3, min_side=0, max_side=5))
+    )
+)
+def test_arrays_come_back(array):
+    again = unpack(pack(array), f"{array.dtype.kind}{array.dtype.itemsize}", array.shape)
+    assert again.dtype == array.dtype
+    assert np.array_equal(again, array, equal_nan=array.dtype.kind == "f")
+
+
+@pytest.mark.parametrize(("dtype", "shape"), [("u1", (4,)), ("u2", (3,)), ("u1", (2,))])
+def test_arrays_of_another_size_are_refused(dtype, shape):
+    with pytest.raises(ConfigError, match=r"numbers of an array of shape .*, got 3 bytes"):
+        unpack(pack(np.zeros(3, np.uint8)), dtype, shape)
+
+
+def test_damaged_bytes_are_refused():
+    packed = pack(np.arange(50, dtype=np.uint8))
+    for bad in (packed[:-1], packed[:8], packed[:-4] + b"xxxx"):
+        with pytest.raises(ConfigError, match="got damaged ones"):
+            unpack(bad, "u1", (50,))

@@ -31,6 +31,8 @@ DISTURBED = (
 )
 NUMBER = "Number(document.querySelector('.amount').textContent.replaceAll(',', ''))"
 PIXELS = "document.querySelector('.arena canvas').toDataURL()"
+pytestmark = pytest.mark.slow
+
 DESKTOP = {"width": 1280, "height": 900}
 PHONE = {"width": 390, "height": 844, "touch": True}
 

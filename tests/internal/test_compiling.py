@@ -10,6 +10,7 @@ import subprocess
 import sys
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -17,6 +18,8 @@ import pytest
 
 from swarm_forage_env._internal import compiling
 from swarm_forage_env._internal.compiling import Callback, direct, kernel
+from swarm_forage_env._internal.held import hold, opened
+from tests.support.branches import pickled
 
 INNER = """
 from swarm_forage_env._internal.compiling import kernel
@@ -241,8 +244,51 @@ def beyond(row: object) -> float:
 """
 
 
+@pytest.mark.slow
 def test_kernels_check_every_index_where_numba_is_told_to(package, monkeypatch):
     (package / "beyond.py").write_text(BEYOND)
     monkeypatch.setenv("NUMBA_BOUNDSCHECK", "1")
     reading = "import numpy as np; from controllers.beyond import beyond\ntry: beyond(np.zeros(3))"
     assert call(package, f"{reading}\nexcept IndexError: print('refused')") == "refused"
+
+
+class Inner(NamedTuple):
+    counts: np.ndarray
+    is_odd: bool
+
+
+class Outer(NamedTuple):
+    inner: Inner
+    places: tuple[int, float]
+    values: np.ndarray
+
+
+@kernel
+def add_up(given: Any) -> None:
+    outer = opened(given)
+    if outer.inner.is_odd:
+        outer.values[0, 0] += outer.inner.counts[1] + outer.places[0] * outer.places[1]
+
+
+def new_outer() -> Outer:
+    return Outer(Inner(np.array([1, 2], np.int32), True), (3, 0.5), np.zeros((2, 2)))
+
+
+def test_a_held_tuple_is_read_and_written_as_the_tuple_is():
+    plain, outer = new_outer(), new_outer()
+    held = hold(outer)
+    for _ in range(3):
+        add_up(plain)
+        add_up(held)
+        outer.inner.counts[1] += 1
+        plain.inner.counts[1] += 1
+    assert outer.values[0, 0] == plain.values[0, 0] == 2 + 3 + 4 + 3 * 1.5
+
+
+def test_copies_have_arrays_of_their_own():
+    outer = new_outer()
+    pair = outer, hold(outer)
+    for theirs, held in (copy.deepcopy(pair), pickled(pair)):
+        add_up(held)
+        assert theirs.values[0, 0] == 3.5
+    assert outer.values[0, 0] == 0.0

@@ -1,6 +1,9 @@
 """Pictures of hand-built states: what is where, in which colour, and that drawing changes no state."""
 
 import copy
+import re
+import sys
+from importlib import resources
 from itertools import product
 
 import numpy as np
@@ -9,6 +12,14 @@ import pytest
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.rendering.frame import Trails, _headline, render_frame
+from swarm_forage_env.rendering.pages import (
+    PLAY_SCRIPTS,
+    REPLAY_SCRIPTS,
+    SHARED_SCRIPTS,
+    build_play_page,
+    build_replay_page,
+    take_replay_page_apart,
+)
 from swarm_forage_env.rendering.view import (
     CACHE_OPACITY,
     NEST_OPACITY,
@@ -18,6 +29,7 @@ from swarm_forage_env.rendering.view import (
     legend_rows,
     text_width,
 )
+from swarm_forage_env.rendering.window import Window
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M
 from swarm_forage_env.scenarios.presets import scenario
@@ -219,3 +231,81 @@ def test_a_light_picture_shows_the_same_in_other_colours(world):
     assert world.pixel(picture, *world.swarm.position[0]) == light.empty
     with pytest.raises(ConfigError, match="Expected theme to be one of dark, light, got 'lite'"):
         world.draw(theme="lite")
+
+
+FOLDER = resources.files("swarm_forage_env.rendering")
+PAGES = {
+    "replay_page": (build_replay_page("", {}, []), SHARED_SCRIPTS + REPLAY_SCRIPTS),
+    "play_page": (build_play_page(), PLAY_SCRIPTS),
+}
+
+
+def test_data_come_back_whatever_they_hold():
+    header = {"name": "</script><b>", "list": [1, None, 2.5]}
+    blocks = [b"", bytes(range(256)), b"</script>"]
+    page = build_replay_page("a <title> & more", header, blocks)
+    assert take_replay_page_apart(page) == (header, blocks)
+    assert "<title>a &lt;title&gt; &amp; more</title>" in page
+
+
+@pytest.mark.parametrize("text", ["<html></html>", '<script type="application/json" id="header">{}</script>'])
+def test_other_texts_are_refused(text):
+    with pytest.raises(ConfigError, match="no replay page or cut short"):
+        take_replay_page_apart(text)
+
+
+@pytest.mark.parametrize("folder", PAGES)
+def test_every_script_is_in_its_page_which_loads_nothing(folder):
+    page, scripts = PAGES[folder]
+    files = {file.name: file.read_text() for file in FOLDER.joinpath(folder).iterdir() if file.name.endswith(".js")}
+    assert files.keys() == set(scripts)
+    assert all(script in page for script in files.values())
+    assert re.findall(r"https?:|//[\w.]+\.\w+/|\b(?:src|href)=\"(?!data:,\")|@import|url\(", page) == []
+    asked = ["place"] if folder == "play_page" else []  # relative to the address with the token
+    assert re.findall(r"\bfetch\((\w+)", page) == asked
+
+
+def test_what_a_server_sends_is_shown_as_text():
+    assert not any("innerHTML" in FOLDER.joinpath("play_page", name).read_text() for name in PLAY_SCRIPTS)
+
+
+pygame = pytest.importorskip("pygame")
+
+FRAME = np.full((120, 200, 3), (10, 200, 30), np.uint8)
+
+
+@pytest.fixture
+def window(monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    window = Window()
+    yield window
+    window.close()
+
+
+def test_a_picture_fills_the_window(window):
+    for picture in (FRAME, FRAME[:60]):
+        copy.deepcopy(window).show(picture, "a run")
+        shown = pygame.surfarray.array3d(pygame.display.get_surface()).swapaxes(0, 1)
+        np.testing.assert_array_equal(shown, picture)
+    assert pygame.display.get_caption()[0] == "a run"
+
+
+def test_a_closed_window_opens_again_and_one_that_the_user_has_closed_does_not(window):
+    window.show(FRAME, "")
+    window.close()
+    assert not pygame.display.get_init()
+    window.show(FRAME, "")
+    pygame.event.post(pygame.event.Event(pygame.QUIT))
+    for _ in range(2):
+        window.show(FRAME, "")
+        assert window.was_closed
+        assert not pygame.display.get_init()
+
+
+def test_without_a_display_or_pygame_the_message_says_what_to_do(monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "there is no such driver")
+    with pytest.raises(ConfigError, match="swarm-forage record"):
+        Window().show(FRAME, "")
+    monkeypatch.setitem(sys.modules, "pygame", None)
+    with pytest.raises(ImportError, match=r'pygame-ce.*pip install ".\[render\]"'):
+        Window()

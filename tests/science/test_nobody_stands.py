@@ -3,12 +3,17 @@
 import numpy as np
 import pytest
 
+from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
-from swarm_forage_env.runs.run import LiveRun, build_env
+from swarm_forage_env.runs.run import LiveRun, build_env, run_one
 from swarm_forage_env.runs.spec import plan_run
-from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.scenarios.config import PHYSICS_ENGINES
+from swarm_forage_env.scenarios.presets import scenario, warehouse_medium
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
+from swarm_forage_env.wrappers.base import wrap_in_order
 from swarm_forage_env.wrappers.registry import parse_wrapper
+from tests.support.drivers import WAYS, towards
+from tests.support.foraging import mild_wrappers
 
 pytestmark = pytest.mark.slow
 
@@ -74,3 +79,44 @@ def test_carriers_side_by_side_part():
     """Two of them turned to and fro for 1,080 s in this run, from 555 s on."""
     fields = {"n_robots": 200, "horizon_s": 1400.0}
     assert longest_stand_s(("warehouse_medium", fields), "dpo", 6, quirks=AUTHORS_PROGRAM) < LONG_S
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_dpo_delivers_as_much_in_the_second_half_of_a_run(seed):
+    collected = run_one(plan_run(warehouse_medium(), "dpo", seed=seed))["collected"]
+    half = len(collected) // 2
+    first, second = np.mean(collected[1:half]), np.mean(collected[half:])  # nobody delivers in the first minutes
+    print(f"\nseed {seed}: deliveries per interval {first:.1f}, then {second:.1f}")  # noqa: T201 - the finding
+    assert second > 0.9 * first
+
+
+TICKS = 3000
+PLACES = (*WAYS, "random")
+CASES = [(n, place, wrapped) for n in (50, 128) for place in PLACES for wrapped in (False, True)]
+CASES += [(200, "NE", True), (200, "S", False), (512, "SW", False), (512, "NE", True), (512, "random", True)]
+
+
+def actions_towards(env: ForageEnv, place: str, rng: np.random.Generator) -> np.ndarray:
+    """Towards a wall or a corner; or at random."""
+    if place == "random":
+        return rng.uniform(-1, 1, (len(env.active), 3)).astype(np.float32)
+    return towards(env, place)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("physics", PHYSICS_ENGINES)
+@pytest.mark.parametrize(("n_robots", "place", "wrapped"), CASES)
+def test_nobody_is_outside(n_robots, place, wrapped, physics):
+    env = ForageEnv(scenario("warehouse_small", n_robots=n_robots, n_objects=5, physics=physics))
+    stack = wrap_in_order(env, mild_wrappers()) if wrapped else env
+    stack.reset_batch(n_robots)
+    x_low, y_low, x_high, y_high = env.scenario.arena.interior_m
+    radius, rng = env.scenario.robots.radius_m, np.random.default_rng(1)
+    arrived = 0.0
+    for _ in range(TICKS):
+        stack.step_batch(actions_towards(env, place, rng))
+        x, y = env.swarm.position[env.swarm.present].T
+        low, high = min((x - x_low).min(), (y - y_low).min()), min((x_high - x).min(), (y_high - y).min())
+        assert min(low, high) >= radius - 1e-9
+        arrived += min(low, high) < radius + 0.01
+    assert place == "random" or arrived > TICKS / 3, "they push"
