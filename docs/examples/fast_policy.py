@@ -11,7 +11,7 @@ from swarm_forage_env.contract.detection import ring_sum, sees_nest, sees_object
 class SearchNearby(RobotPolicy):
     reads = ("proximity", "light if carrying", "ground", "position", "heading", "carrying")
     memory = {"bend": 0.0, "found": False, "place_m": (0.0, 0.0)}  # of each robot, when a run starts
-    parameters = {"restless": 0.4, "near_m": 1.0}
+    parameters = {"restless": 0.05, "near_m": 1.0}
     draws = 1  # random numbers per robot and tick
 
     @staticmethod

@@ -13,7 +13,7 @@ from swarm_forage_env.policies.registry import policy_label
 from swarm_forage_env.runs.spec import PolicySpec, RunSpec, policy_specs
 from swarm_forage_env.scenarios.differences import digest_of, preset_of
 from swarm_forage_env.wrappers.registry import parse_wrapper
-from swarm_forage_env.wrappers.world import FILE, World, WorldDescription, describe_file
+from swarm_forage_env.wrappers.world import World, WorldDescription, described
 
 RESULTS = Path("results")
 LONGEST_NAME = 100
@@ -45,8 +45,8 @@ def described_world(options: WorldOptions) -> tuple[World, str | None]:
     Raises:
         ConfigError: unknown names, values of a wrong type or that do not fit together, or a file that cannot be used.
     """
-    described = described_fields(options)
-    return described.world(), described.fields.get("caches")
+    found = described_fields(options)
+    return found.world(), found.fields.get("caches")
 
 
 def described_runs(options: WorldOptions, policies: Sequence[str]) -> tuple[World, tuple[PolicySpec, ...]]:
@@ -65,20 +65,13 @@ def described_fields(options: WorldOptions) -> WorldDescription:
     Raises:
         ConfigError: see `described_world`; names and values of fields are not looked at here.
     """
-    is_file = Path(options.scenario).suffix == FILE
-    file = describe_file(options.scenario) if is_file else WorldDescription(preset=options.scenario)
     fields = dict(parse_setting(word) for word in options.settings)
     for name, value in (("n_robots", options.robots), ("horizon_s", options.horizon)):
         if value is not None and name in fields:
             raise ConfigError(f"Expected {name} once, got it from an option and from --set.")
         if value is not None:
             fields[name] = value
-    wrappers = tuple(parse_wrapper(word) for word in options.wrappers)
-    named = {wrapper.name for wrapper in wrappers}
-    left = (wrapper for wrapper in file.wrappers if wrapper.name not in named)
-    return WorldDescription(
-        preset=file.preset, fields={**file.fields, **fields}, wrappers=(*wrappers, *left), name=file.name
-    )
+    return described(options.scenario).changed(fields, map(parse_wrapper, options.wrappers))
 
 
 def parse_setting(word: str) -> tuple[str, Any]:

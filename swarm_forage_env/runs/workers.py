@@ -6,8 +6,9 @@ Workers need no shared disk, because results are sent back.
 import logging
 import os
 import signal
+import sys
 import threading
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager, nullcontext, suppress
 from itertools import islice
@@ -44,8 +45,8 @@ class WorkerError(RuntimeError):
     def __init__(
         self,
         message: str = "A worker process was killed, most likely because memory ran out: the same call makes what is "
-        "missing, with fewer processes at a time (--jobs 1) or smaller runs. A script must start runs under "
-        "`if __name__ == '__main__':`.",
+        "missing, with fewer processes at a time (--jobs 1) or smaller runs. A script with wrappers of its "
+        "own must start runs under `if __name__ == '__main__':`.",
     ) -> None:
         super().__init__(message)
 
@@ -107,9 +108,10 @@ def _done(
     workers: Executor, do: Callable[[RunSpec], Result], specs: Sequence[RunSpec], at_a_time: int
 ) -> Generator[tuple[RunSpec, Result]]:
     waiting, running = iter(specs), dict[Future[Result], RunSpec]()
+    wrappers = {type(config) for spec in specs for config in spec.wrappers}
     try:
         while True:
-            with deaf_children():
+            with deaf_children(), scriptless_children(wrappers):
                 running |= {workers.submit(do, spec): spec for spec in islice(waiting, at_a_time - len(running))}
             if not running:
                 return
@@ -175,6 +177,22 @@ def deaf_children() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def scriptless_children(used: Iterable[type] = ()) -> Iterator[None]:
+    """Processes started inside this context do not read the user's script again, which then needs no guard.
+
+    They have to where a class that they use stands in it.
+    """
+    script = vars(sys.modules["__main__"])
+    has_used = any(one.__module__ == "__main__" for one in used)
+    hidden = {name: script[name] for name in ("__file__", "__spec__") if name in script and not has_used}
+    script.update(dict.fromkeys(hidden))
+    try:
+        yield
+    finally:
+        script.update(hidden)
 
 
 def live_with_driver() -> None:

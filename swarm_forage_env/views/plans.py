@@ -12,11 +12,10 @@ from swarm_forage_env.policies.extras import ExtraFunction, extra_columns
 from swarm_forage_env.policies.interface import GivenInterface, InterfaceConfig, chosen_interface
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import scenario_of_same_size
-from swarm_forage_env.scenarios.presets import chosen_scenario
 from swarm_forage_env.views.sampler import ScenarioSampler
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig, wrap_in_order
 from swarm_forage_env.wrappers.registry import wrapper_configs
-from swarm_forage_env.wrappers.world import World
+from swarm_forage_env.wrappers.world import World, WorldLike, changed_world
 
 Options = ParamSpec("Options")
 Result = TypeVar("Result")
@@ -84,7 +83,7 @@ SAMPLED = "sampled"
 
 
 def plan_arena(
-    scenario: str | ScenarioConfig | None = None,
+    scenario: WorldLike | None = None,
     *,
     sampler: ScenarioSampler | None = None,
     interface: GivenInterface = None,
@@ -98,7 +97,7 @@ def plan_arena(
     """Plan an arena.
 
     Args:
-        scenario: Name of a preset, or a complete configuration; default warehouse_small.
+        scenario: Name of a preset, a complete configuration, a `World` or the file of one; default warehouse_small.
         sampler: Draws the world of each run, instead of `scenario`, `wrappers` and `overrides`.
         interface: What a learner sees and does, an `InterfaceConfig` or its fields by name; default full observations
             and continuous actions.
@@ -124,7 +123,7 @@ def plan_arena(
             raise ConfigError(
                 "Expected a sampler for swarm_forage/sampled-v0, got none; give sampler=ScenarioSampler(...)."
             )
-        config = chosen_scenario(scenario or DEFAULT_SCENARIO, overrides)
+        world = changed_world(scenario or DEFAULT_SCENARIO, overrides, disturbing)
     else:
         instance("sampler", sampler, ScenarioSampler, hint="; ScenarioSampler takes a table")
         given = ["scenario"] * (scenario not in (None, SAMPLED)) + ["wrappers"] * bool(disturbing) + list(overrides)
@@ -133,15 +132,15 @@ def plan_arena(
                 f"Expected either a sampler, which decides on the worlds, or {', '.join(given)}; got both. Write it "
                 "into the sampler, where all worlds can share it. By id, make swarm_forage/sampled-v0."
             )
-        config = sampler.largest
+        world = World(sampler.largest)
     for name, function in (("extra_reward", extra_reward), ("extra_observation", extra_observation)):
         if function is not None and not callable(function):
             raise ConfigError(f"Expected {name} to be a function of the world, got {function!r}.")
-    chosen = chosen_interface(interface).for_scenario(config)
+    chosen = chosen_interface(interface).for_scenario(world.scenario)
     return ArenaPlan(
-        world=World(config, disturbing),
+        world=world,
         sampler=sampler,
-        interface=_with_extra_columns(chosen, config, extra_observation),
+        interface=_with_extra_columns(chosen, world.scenario, extra_observation),
         max_cycles=max_cycles,
         render_mode=render_mode,
         extra_reward=extra_reward,

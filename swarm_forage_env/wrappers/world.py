@@ -9,6 +9,7 @@ n_robots = 30
 sigma = 0.03
 """
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -19,7 +20,7 @@ from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.differences import difference_words, differences, digest_of, is_resized
 from swarm_forage_env.scenarios.overrides import field_sections
-from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.scenarios.presets import chosen_scenario, scenario
 from swarm_forage_env.wrappers.registry import wrapper_configs, wrappers_from_mapping
 
 if TYPE_CHECKING:
@@ -167,9 +168,20 @@ class WorldDescription:
     name: str = ""
     """Of the file without its ending; empty for a preset."""
 
+    def changed(self, fields: Mapping[str, Any], wrappers: "Iterable[WrapperConfig]") -> "WorldDescription":
+        """Return it with other fields, and with wrappers in place of those of their kinds."""
+        given = tuple(wrappers)
+        left = (wrapper for wrapper in self.wrappers if wrapper.name not in {one.name for one in given})
+        return replace(self, fields={**self.fields, **fields}, wrappers=(*given, *left))
+
     def world(self) -> World:
         """Return the world; raises ConfigError where it cannot be."""
         return World(scenario(self.preset, **self.fields), self.wrappers, name=self.name)
+
+
+def described(name: str | Path) -> WorldDescription:
+    """Return what a file says of a world, or the preset of that name; errors as `describe_file`."""
+    return describe_file(name) if Path(name).suffix == FILE else WorldDescription(preset=str(name))
 
 
 def describe_file(file: str | Path) -> WorldDescription:
@@ -226,3 +238,15 @@ def world_of(given: WorldLike) -> World:
     if isinstance(given, Path):
         raise ConfigError(f"Expected the file of a world, which ends with {FILE}, got {given}.")
     return World(scenario(given) if isinstance(given, str) else given)
+
+
+def changed_world(given: WorldLike, fields: Mapping[str, Any], wrappers: "Iterable[WrapperConfig]") -> World:
+    """Return a world with fields of its scenario overridden, and further wrappers; of a file or preset as `changed`.
+
+    Raises:
+        ConfigError: as `world_of`, an unknown field, or values or wrappers that do not fit together.
+    """
+    if isinstance(given, str | Path):
+        return described(given).changed(fields, wrappers).world()
+    world = world_of(given)
+    return replace(world, scenario=chosen_scenario(world.scenario, fields), wrappers=(*world.wrappers, *wrappers))

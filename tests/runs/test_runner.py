@@ -163,19 +163,18 @@ def test_ctrl_c_keeps_what_is_finished_and_says_so(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 def test_ctrl_c_ends_the_workers_at_once(tmp_path):
-    """A terminal sends it to all processes of a command."""
+    """A terminal sends it to all processes of a command. A script needs no guard against being read again."""
     script = """
 import sys
 from dataclasses import replace
 from swarm_forage_env import plan_run, run_all, scenario
 
-if __name__ == "__main__":
-    world = scenario("warehouse_small", n_robots=5, n_objects=20, horizon_s=200.0)
-    spec = plan_run(world, "random")
-    try:
-        run_all([replace(spec, seed=seed) for seed in range(9999)], out=sys.argv[1], jobs=2)
-    except KeyboardInterrupt as interrupt:
-        sys.exit(str(interrupt))
+world = scenario("warehouse_small", n_robots=5, n_objects=20, horizon_s=200.0)
+spec = plan_run(world, "random")
+try:
+    run_all([replace(spec, seed=seed) for seed in range(9999)], out=sys.argv[1], jobs=2)
+except KeyboardInterrupt as interrupt:
+    sys.exit(str(interrupt))
 """
     (tmp_path / "script.py").write_text(script)
     words = [sys.executable, str(tmp_path / "script.py"), str(tmp_path / "runs")]

@@ -6,6 +6,7 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError, FileName, checked
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.views.pettingzoo import parallel_env
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.world import SIZE, UNDISTURBED, World, read_world, world_of
 from tests.support.wrapper_configs import InnerConfig, OuterConfig
@@ -117,6 +118,12 @@ def test_a_world_may_stand_in_a_file(tmp_path):
     file.write_text('scenario = "warehouse_small"\n[set]\nn_robots = 7\n[wrappers.sensor_noise]\nsigma = 0.1\n')
     world = World(scenario("warehouse_small", n_robots=7), (parse_wrapper("sensor_noise:sigma=0.1"),))
     assert read_world(file) == world_of(file) == world_of(str(file)) == world
+    env = parallel_env(file, n_objects=50, wrappers=["throttle:waveform=constant,amplitude=0.2"])
+    assert (env.unwrapped.scenario.objects.n_objects, len(env.possible_agents)) == (50, 7)
+    assert [type(wrapper).__name__ for wrapper in env.stack] == ["SensorNoise", "Throttle"]
+    assert [one.made_from.sigma for one in parallel_env(world, wrappers=[]).stack] == [0.1]
+    (changed,) = parallel_env(str(file), wrappers=["sensor_noise:sigma=0.2"]).stack
+    assert changed.made_from.sigma == 0.2
     file.write_text("[set]\nn_robts = 7\n")
     with pytest.raises(ConfigError, match=r"Cannot use .*mine\.toml: .*n_robts.*n_robots"):
         read_world(file)

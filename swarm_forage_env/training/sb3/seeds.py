@@ -26,6 +26,7 @@ from swarm_forage_env.runs.workers import (
     deaf_children,
     live_with_driver,
     processes_of,
+    scriptless_children,
     single_threaded_children,
 )
 from swarm_forage_env.training.curves import Trainings, beside_baseline, read_training
@@ -175,7 +176,8 @@ def _started(job: _Job) -> tuple[Any, BaseProcess]:
     context = get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_train_here, args=(job, theirs), name=job[1].name)
-    with single_threaded_children(), deaf_children():
+    wrappers = map(type, job[0].world.wrappers)
+    with single_threaded_children(), deaf_children(), scriptless_children(wrappers):
         process.start()
     theirs.close()
     return ours, process
