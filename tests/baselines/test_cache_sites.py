@@ -70,7 +70,7 @@ def test_quirk_site_box_truncated(changes, box):
     assert sides == pytest.approx(box)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_no_allowed_point_is_nearer(seed):
     """Caches anywhere, even overlapping, as a memory of caches that are long gone may have them."""
     rng = np.random.default_rng(seed)
@@ -128,7 +128,7 @@ def in_scatter(**changes: object) -> TaskRobot:
     return TaskRobot(quirks=Quirks(scattered_sites=True), **changes)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_quirk_scattered_sites_as_the_slow_twin(seed):
     rng = np.random.default_rng(seed)
     robot = in_scatter(**(MEDIUM if seed % 2 else {}))
@@ -147,9 +147,9 @@ def test_scattered_sites_have_a_heavy_tail_and_a_share_that_lies_anywhere(x, sca
     robot = in_scatter()
     rng = np.random.default_rng(3)
     best = (0.5 * (x + 3.2), 8.0) if x > 20.0 else (9.6, 8.0)
-    sites = np.array([choose(robot, x, 8.0, *rng.random(2)) for _ in range(20_000)])
+    sites = np.array([choose(robot, x, 8.0, *rng.random(2)) for _ in range(5_000)])
     distance = np.hypot(*(sites - best).T)
-    assert np.median(distance) == pytest.approx(2 * scale_m, rel=0.08)
-    assert np.mean(distance > 8 * scale_m) == pytest.approx(far + 1 / 8, rel=0.1)
+    assert np.median(distance) == pytest.approx(2 * scale_m, rel=0.15)
+    assert np.mean(distance > 8 * scale_m) == pytest.approx(far + 1 / 8, rel=0.2)
     anywhere = np.mean(distance > 3.0)
-    assert anywhere == pytest.approx(far + scale_m / 3.0, rel=0.25), "few of the tail reach so far"
+    assert anywhere == pytest.approx(far + scale_m / 3.0, rel=0.5), "few of the tail reach so far"

@@ -1,28 +1,25 @@
-"""The object memory, against a dictionary whose every density decays in every tick."""
+"""Memory of objects, against a dictionary whose every density decays in every tick; memory of caches, by hand."""
 
 import numpy as np
 import pytest
 
 from baselines.dpo import DPOPolicy
 from baselines.memory import density
+from swarm_forage_env.scenarios.quirks import Quirks
 from tests.reference.controllers import ObjectDictionary, visible_objects
-from tests.support.memories import objects_of
+from tests.support.memories import caches_of, objects_of
 from tests.support.observations import Observations, make_spec
+from tests.support.task_robot import TaskRobot
 
-ACTIVE = np.ones(1, bool)
+CENTRE = (72, 40)
+"""Centre cell of a cache of 31 x 31 cells: x 57 .. 87, y 25 .. 55, which is 11.4 .. 17.6 m by 5.0 .. 11.2 m."""
+CACHE_SEEN = (7, CENTRE, 12)
 
 
 def new_policy(task) -> DPOPolicy:
     policy = DPOPolicy()
     policy.reset(task, np.random.default_rng(0))
     return policy
-
-
-def look(policy: DPOPolicy, observations: Observations, x: float, y: float, objects: dict) -> dict:
-    observations.pose(x, y)
-    observations.window(objects)
-    policy.act(observations.array, ACTIVE)
-    return objects_of(policy, 0)
 
 
 def test_density_of_an_object_seen_now_and_long_ago():
@@ -37,15 +34,14 @@ def test_positions_come_from_the_exact_cell_not_from_the_noisy_position():
     observations.pose(10.1, 8.1)
     observations.believed_position(10.9, 7.3)
     observations.window({(0, 0): 7})
-    policy.act(observations.array, ACTIVE)
+    policy.act(observations.array, np.ones(1, bool))
     assert objects_of(policy, 0)[7][:2] == (50, 40)
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_memory_equals_the_naive_rule(seed):
+def test_memory_equals_the_naive_rule():
     """Robots walk over a patch on which objects move, vanish, come back; some ticks are slept through."""
-    rng = np.random.default_rng(seed)
-    n_robots, n_objects, side, ticks = 4, 40, 14, 700
+    rng = np.random.default_rng(0)
+    n_robots, n_objects, side, ticks = 4, 40, 14, 400
     task = make_spec(n_robots, n_objects=n_objects)
     observations = Observations(task)
     policy = new_policy(task)
@@ -81,3 +77,78 @@ def test_memory_equals_the_naive_rule(seed):
             for row, entry in known.items():
                 assert entry[2] == pytest.approx(twin.known[row][1], abs=1e-12)
     assert policy._robots["n_known"].min() > 5
+
+
+# Caches
+
+
+def stand(robot: TaskRobot, cell: tuple[int, int], *caches) -> None:
+    robot.seen.pose((cell[0] + 0.5) * 0.2, (cell[1] + 0.5) * 0.2)
+    robot.seen.caches(*caches)
+    robot.act()
+
+
+def test_a_cache_is_remembered_with_place_count_and_decaying_density():
+    robot = TaskRobot()
+    stand(robot, (56, 40), CACHE_SEEN)
+    assert caches_of(robot.policy, 0) == {7: (72, 40, 12, pytest.approx(1 - 1e-5))}
+    stand(robot, (40, 40))
+    stand(robot, (40, 40))
+    assert caches_of(robot.policy, 0) == {7: (72, 40, 12, pytest.approx((1 - 1e-5) ** 3, abs=1e-12))}
+    stand(robot, (56, 40), (7, CENTRE, 11))
+    assert caches_of(robot.policy, 0) == {7: (72, 40, 11, pytest.approx(1 - 1e-5))}
+    assert robot.record.n_caches == 1
+
+
+@pytest.mark.parametrize(
+    ("cell", "forgets"),
+    [
+        ((55, 40), True),
+        ((54, 40), False),
+        ((89, 40), True),
+        ((90, 40), False),
+        ((72, 23), True),
+        ((72, 22), False),
+        ((72, 57), True),
+        ((72, 58), False),
+        ((54, 22), False),
+    ],
+)
+def test_a_cache_whose_square_should_be_in_the_window_but_is_not_seen_is_forgotten(cell, forgets):
+    robot = TaskRobot()
+    stand(robot, (56, 40), CACHE_SEEN)
+    stand(robot, cell)
+    assert (caches_of(robot.policy, 0) == {}) == forgets
+
+
+@pytest.mark.parametrize(
+    ("cell", "forgets"),
+    [
+        ((8, 70), False),
+        ((9, 70), True),
+        ((19, 70), True),
+        ((20, 70), False),
+        ((100, 2), False),
+        ((100, 3), True),
+        ((100, 13), True),
+        ((100, 14), False),
+        ((72, 23), False),
+    ],
+)
+def test_quirk_cache_forget_unit_mismatch_compares_metres_with_cells_in_either_axis(cell, forgets):
+    robot = TaskRobot(quirks=Quirks(cache_forget_unit_mismatch=True))
+    stand(robot, (56, 40), CACHE_SEEN)
+    stand(robot, cell)
+    assert (caches_of(robot.policy, 0) == {}) == forgets
+
+
+@pytest.mark.parametrize("at_every_sight", [False, True])
+def test_quirk_last_cache_at_every_sight(at_every_sight):
+    robot = TaskRobot(quirks=Quirks(last_cache_at_every_sight=at_every_sight))
+    stand(robot, (56, 40), CACHE_SEEN)
+    assert not robot.record.knows_last_cache, "seen once"
+    stand(robot, (56, 40), CACHE_SEEN, (8, (30, 40), 5))
+    assert robot.record.knows_last_cache == at_every_sight
+    robot.record.knows_last_cache = False
+    stand(robot, (56, 40), CACHE_SEEN, (8, (30, 40), 5))
+    assert not robot.record.knows_last_cache, "two are known"

@@ -1,8 +1,8 @@
-"""What all scripted controllers share: copies in the middle of a run, arrays of any layout."""
+"""What all scripted controllers share: parameters, copies in the middle of a run, arrays of any layout."""
 
 import copy
+import dataclasses
 import pickle
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -10,14 +10,18 @@ import pytest
 from baselines.cpfa import CPFAPolicy
 from baselines.crw import CRWPolicy
 from baselines.dpo import DPOPolicy
+from baselines.object_choice import MemoryParameters
+from baselines.parameters import ParameterError
 from baselines.stochm import STOCHMPolicy
 from baselines.stochx import STOCHXPolicy
+from baselines.tasks import NO_TAB, ROOTED_TAB, STOCHM_PARAMETERS, STOCHX_PARAMETERS
+from swarm_forage_env.contract.codes import TAB_CHILDREN, TAB_ROOT, Tab, Task
+from swarm_forage_env.contract.kernel_policy import ObservationError
 from tests.support.observations import Observations, make_spec
 from tests.support.stage import OPEN_CELL, load, stand, tidy_world
 
 N_ROBOTS = 5
-TICKS = 40
-POLICIES = [CRWPolicy, DPOPolicy, CPFAPolicy, STOCHMPolicy, STOCHXPolicy]
+each_policy = pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy, CPFAPolicy, STOCHMPolicy, STOCHXPolicy])
 
 
 def started(policy_class):
@@ -29,47 +33,28 @@ def started(policy_class):
     seen.window({(1, 1): 7}, 3)
     policy = policy_class()
     policy.reset(spec, np.random.default_rng(1))
-    for _ in range(TICKS):
+    for _ in range(40):
         policy.act(seen.array, np.ones(N_ROBOTS, np.bool_))
     return policy, seen.array
 
 
-@pytest.mark.parametrize("copied", [copy.deepcopy, lambda policy: pickle.loads(pickle.dumps(policy))])  # noqa: S301 - made here
-@pytest.mark.parametrize("policy_class", POLICIES)
-def test_a_copy_continues_as_the_original_does(policy_class, copied):
+@each_policy
+def test_a_copy_continues_as_the_original_does_in_whatever_layout(policy_class):
+    """A pickle takes no compiled function along: another process would compile a copy of it anew, for a minute."""
     policy, obs = started(policy_class)
-    twin = copied(policy)
-    active = np.ones(N_ROBOTS, np.bool_)
-    of_twin = [twin.act(obs, active).copy() for _ in range(2 * TICKS)]
-    of_policy = [policy.act(obs, active).copy() for _ in range(2 * TICKS)]
-    np.testing.assert_array_equal(of_twin, of_policy)
-    np.testing.assert_array_equal(twin.activity, policy.activity)
-    changes = [not np.array_equal(before, after) for before, after in pairwise(of_policy)]
-    # CPFA drives straight for a while; the others turn at once.
-    assert any(changes) if policy_class is CPFAPolicy else changes[0], "they do something"
-
-
-@pytest.mark.parametrize("policy_class", POLICIES)
-def test_a_pickle_takes_no_compiled_function_along(policy_class):
-    """Another process would have to compile a copy of it anew, which takes a minute."""
-    policy, _ = started(policy_class)
     assert b"numba" not in pickle.dumps(policy)
-
-
-@pytest.mark.parametrize("policy_class", POLICIES)
-def test_the_layout_of_observations_in_memory_does_not_matter(policy_class):
-    policy, obs = started(policy_class)
-    twin = copy.deepcopy(policy)
+    copies = copy.deepcopy(policy), pickle.loads(pickle.dumps(policy))  # noqa: S301 - made here
     wide = np.full((2 * N_ROBOTS, 2 * obs.shape[1]), np.nan, np.float32)
     wide[::2, ::2] = obs
-    active = np.array([True, False, True, True, True])
-    there = np.repeat(active, 2)
-    there[1::2] = True
-    for other in (wide[::2, ::2], np.asfortranarray(obs), obs.astype(np.float64)):
-        np.testing.assert_array_equal(twin.act(other, there[::2]), policy.act(obs, active))
+    shown, active = (wide[::2, ::2], np.asfortranarray(obs)), np.array([True, False, True, True, True])
+    expected = [policy.act(obs, active).copy() for _ in range(80)]
+    for twin, rows in zip(copies, shown, strict=True):
+        np.testing.assert_array_equal([twin.act(rows, active).copy() for _ in range(80)], expected)
+        np.testing.assert_array_equal(twin.activity, policy.activity)
+    assert len({actions.tobytes() for actions in expected}) > 1, "they do something"
 
 
-@pytest.mark.parametrize("policy_class", POLICIES)
+@each_policy
 def test_a_robot_keeps_its_cargo_when_it_comes_back_to_work(policy_class):
     """It does so in a step that policies do not foresee: for them the robot is still in repair."""
     env = tidy_world(caches=policy_class.caches)
@@ -82,3 +67,65 @@ def test_a_robot_keeps_its_cargo_when_it_comes_back_to_work(policy_class):
     env.step_batch(actions)
     assert env.swarm.carried_object.tolist() == [0, 1, 2, -1]
     assert not env.swarm.wheel_speed.any()
+
+
+# Parameters
+
+
+def test_parameters_that_make_no_sense_are_refused():
+    with pytest.raises(ParameterError, match="Did you mean 'wander_speed_mps'"):
+        CRWPolicy(wander_speed=0.1)
+    for field in dataclasses.fields(MemoryParameters):
+        if not isinstance(field.default, bool):
+            for value in (-1.0, float("nan"), float("inf"), True, "1"):
+                with pytest.raises(ParameterError, match=field.name):
+                    MemoryParameters(**{field.name: value})
+    for policy_class, given, message in (
+        (CRWPolicy, {"wander_speed_mps": 0.1}, "to be ControllerParameters, got dict; give single numbers by name"),
+        (STOCHXPolicy, MemoryParameters(), "to be TaskParameters, got MemoryParameters"),
+    ):
+        with pytest.raises(ParameterError, match=message):
+            policy_class(given)
+
+
+@each_policy
+def test_observations_of_another_swarm_are_refused(policy_class):
+    policy = policy_class()
+    policy.reset(make_spec(4), np.random.default_rng(0))
+    for rows, columns in ((3, policy._spec.layout.size), (4, 10)):
+        with pytest.raises(ObservationError, match=rf"\(n_robots, columns\) = \(4, .*got \({rows}, {columns}\)"):
+            policy.act(np.zeros((rows, columns), np.float32), np.ones(rows, np.bool_))
+    with pytest.raises(ObservationError, match=r"active with shape \(n_robots,\) = \(4,\), got \(5,\)"):
+        policy.act(np.zeros((4, policy._spec.layout.size), np.float32), np.ones(5, np.bool_))
+
+
+def test_every_task_but_the_root_is_a_subtask_once():
+    children = TAB_CHILDREN.ravel().tolist()
+    assert sorted(children) == sorted(set(Task) - {Task.NONE, Task.GENERALIST})
+    for tab in Tab:
+        assert ROOTED_TAB[TAB_ROOT[tab]] == tab
+    assert [Task(code) for code in np.flatnonzero(ROOTED_TAB != NO_TAB)] == [
+        Task.GENERALIST,
+        Task.HARVESTER,
+        Task.COLLECTOR,
+    ]
+
+
+def test_numbers_that_the_two_controllers_do_not_share():
+    names = ("partition_reactivity", "partition_gamma", "subtask_reactivity", "subtask_gamma", "smallest_cache")
+    assert [getattr(STOCHM_PARAMETERS, name) for name in names] == [4.0, 1.75, 0.5, 0.75, 0.0]
+    assert [getattr(STOCHX_PARAMETERS, name) for name in names] == [1.0, 1.0, 1.0, 1.0, 3.0]
+    assert STOCHMPolicy().parameters == STOCHM_PARAMETERS
+    assert STOCHXPolicy().parameters == STOCHX_PARAMETERS
+    assert STOCHXPolicy(estimate_weight=0.25).parameters.estimate_weight == 0.25
+
+
+@pytest.mark.parametrize("policy_class", [CRWPolicy, CPFAPolicy])
+@pytest.mark.parametrize("max_speed_mps", [0.05, 0.2])
+def test_speeds_are_shares_of_the_robots_own(policy_class, max_speed_mps):
+    policy = policy_class()
+    policy.reset(dataclasses.replace(make_spec(4), max_speed_mps=max_speed_mps), np.random.default_rng(0))
+    constants = policy._constants[0]
+    assert constants.wander_speed_mps == 0.09 * (max_speed_mps / 0.1)
+    assert constants.wander_wheel_share == constants.wander_speed_mps / 0.2
+    assert constants.slowing_radius_m == 0.2

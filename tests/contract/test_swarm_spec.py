@@ -1,5 +1,7 @@
 """The constants of a swarm come from its scenario alone, and environments give the same ones."""
 
+import itertools
+
 import pytest
 
 from swarm_forage_env.contract.policy import SwarmSpec
@@ -8,8 +10,7 @@ from swarm_forage_env.scenarios.config import CACHE_KINDS
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 
 
-@pytest.mark.parametrize("name", SCENARIO_NAMES)
-@pytest.mark.parametrize("caches", CACHE_KINDS)
+@pytest.mark.parametrize(("name", "caches"), [*zip(SCENARIO_NAMES, itertools.cycle(CACHE_KINDS), strict=False)])
 def test_a_scenario_tells_what_its_environment_tells(name, caches):
     config = scenario(name, n_robots=3, n_objects=20, caches=caches)
     env = ForageEnv(config)

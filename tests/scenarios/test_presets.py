@@ -124,7 +124,7 @@ def test_the_arena_is_the_smallest_that_holds_the_swarm(name, n_robots, density,
 
 
 @pytest.mark.parametrize("name", SCENARIO_NAMES)
-@pytest.mark.parametrize("n_robots", [50, 333, 800])
+@pytest.mark.parametrize("n_robots", [50, 800])
 def test_proportions_sources_and_static_caches_fit_in_every_size(name, n_robots):
     base, config = scenario(name, caches="static"), scenario(name, n_robots=n_robots, density=0.05, caches="static")
     factor = config.arena.width_m / base.arena.width_m

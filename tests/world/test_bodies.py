@@ -1,19 +1,19 @@
 """Compiled bodies: their slow twin, Chipmunk as the oracle, order and symmetry, room for pairs."""
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 from scipy.spatial.distance import pdist
 
-from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.bodies import PAIRS_PER_ROBOT
 from swarm_forage_env.world.kernels.bodies import find_pairs, move_bodies, tell_poses
 from swarm_forage_env.world.kernels.drive import sinc_and_cosine
 from swarm_forage_env.world.state import SwarmState
 from tests.reference.bodies import moved
-from tests.support.engines import SensedBodies, drive_at, make_bodies
+from tests.support.engines import drive_at, make_bodies
 from tests.support.heaps import DIAMETER_M, RADIUS_M, heap
 
 MIDDLE = np.array([16.0, 8.0])
@@ -37,8 +37,7 @@ def poses_of(bodies):
 # The twin
 
 
-@pytest.mark.parametrize("at_wall", [False, True])
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize(("seed", "at_wall"), [(0, False), (1, True)])
 def test_compiled_bodies_are_their_slow_twin(seed, at_wall):
     rng = np.random.default_rng(seed)
     n_robots = 24
@@ -104,8 +103,7 @@ def tracks(physics, places, heading, speed, ticks=40):
     return np.array(seen)
 
 
-@pytest.mark.parametrize("name", SCENES)
-@pytest.mark.parametrize("angle", [0.0, 0.7])
+@pytest.mark.parametrize(("name", "angle"), [*zip(SCENES, itertools.cycle((0.7, 0.0)), strict=False)])
 def test_single_contacts_are_those_of_chipmunk(name, angle):
     places, heading, speed = SCENES[name]
     turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
@@ -116,8 +114,8 @@ def test_single_contacts_are_those_of_chipmunk(name, angle):
     assert np.abs(compiled[-1, :, :2] - free).max() > 0.01, "they touched"
 
 
-@pytest.mark.parametrize("heading", [0.0, 0.3, -0.6, math.pi / 2, 2.0, math.pi, -2.5, -math.pi / 2])
-@pytest.mark.parametrize("place", [(31.5, 8.0), (16.0, 15.7), (31.5, 15.7), (0.3, 8.0), (16.0, 0.3), (0.3, 0.3)])
+@pytest.mark.parametrize("heading", [0.3, 2.0, -2.5])
+@pytest.mark.parametrize("place", [(31.5, 15.7), (0.3, 8.0), (16.0, 0.3)])
 def test_a_disc_at_a_wall_moves_as_in_chipmunk(place, heading):
     chipmunk, compiled = (tracks(physics, [place], [heading], [0.1]) for physics in ("chipmunk", "compiled"))
     np.testing.assert_allclose(compiled, chipmunk, atol=TOLERATED_M)
@@ -136,12 +134,6 @@ def run_heap(places, twists, present=None, place=MIDDLE):
     return swarm.position - place
 
 
-def test_a_run_can_be_repeated_bit_for_bit():
-    rng = np.random.default_rng(3)
-    places, twists = heap(rng, 30), rng.uniform(-0.07, 0.07, (20, 30, 3))
-    np.testing.assert_array_equal(run_heap(places, twists), run_heap(places, twists))
-
-
 def test_absent_robots_touch_nobody_and_stay():
     places = np.array([(0.0, 0.0), (0.05, 0.0), (0.1, 0.02)])
     twists = np.tile([(0.05, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)], (10, 1, 1))
@@ -152,7 +144,7 @@ def test_absent_robots_touch_nobody_and_stay():
 # Turning
 
 
-@pytest.mark.parametrize("angle", [0.0, 1e-9, 0.1, -0.3, 0.4999, 0.51, -3.0])
+@pytest.mark.parametrize("angle", [0.0, 1e-9, -0.3, 0.4999, 0.51, -3.0])
 def test_sine_and_cosine_are_those_of_the_library(angle):
     sinc, cosine = sinc_and_cosine(angle)
     assert (angle * sinc, cosine) == pytest.approx((math.sin(angle), math.cos(angle)), rel=1e-15, abs=1e-17)
@@ -161,7 +153,7 @@ def test_sine_and_cosine_are_those_of_the_library(angle):
 def test_facing_stays_the_direction_of_the_heading_for_a_whole_run():
     bodies, swarm = bodies_at([(16.0, 8.0), (12.0, 8.0)], [3.0, -3.0])
     rng = np.random.default_rng(0)
-    for _ in range(5_000):
+    for _ in range(1_000):
         bodies.twist[:-1, 2] = rng.uniform(-1.4, 1.4, 2)
         bodies.advance(swarm)
     expected = np.column_stack((np.cos(swarm.heading), np.sin(swarm.heading)))
@@ -185,15 +177,3 @@ def test_a_pile_gets_more_room_for_pairs_and_keeps_its_impulses():
             bodies.advance(state)
     np.testing.assert_array_equal(swarm.position, same.position)
     assert pdist(swarm.position).min() > 0.9 * DIAMETER_M, "they are pushed apart"
-
-
-def test_an_arena_has_the_engine_that_its_scenario_names():
-    ends = []
-    for physics in ("chipmunk", "compiled"):
-        env = ForageEnv(scenario("warehouse_small", n_robots=8, physics=physics))
-        env.reset_batch(0)
-        assert isinstance(env.arena._physics, SensedBodies.__base__) == (physics == "compiled")
-        for _ in range(20):
-            env.step_batch(np.full((8, 3), (0.4, 0.5, 1.0), np.float32))
-        ends.append(env.swarm.position.copy())
-    np.testing.assert_allclose(*ends, atol=1e-9)

@@ -92,8 +92,8 @@ def test_gain_multiplies_after_the_limit(lone_robot):
     assert drive(lone_robot, 1.0, 1.0, gain=(0.0, 0.0)) == [0.0, 0.0]
 
 
-@pytest.mark.parametrize("gain", [(1.2, 3.0), (30.0, -30.0), (-9.0, 1.0), (1.0, 1.5), (1e300, 1e300)])
-@pytest.mark.parametrize("command", [(1.0, 1.0), (-1.0, 1.0), (0.0, 1.0), (0.4, 0.5)])
+@pytest.mark.parametrize("gain", [(1.2, 3.0), (30.0, -30.0), (1.0, 1.5), (1e300, 1e300)])
+@pytest.mark.parametrize("command", [(-1.0, 1.0), (0.4, 0.5)])
 def test_no_gain_makes_a_robot_faster_than_its_motors(lone_robot, command, gain):
     put(lone_robot, 0, 16.0, 8.0)
     left, right = drive(lone_robot, *command, gain=gain)
@@ -103,8 +103,7 @@ def test_no_gain_makes_a_robot_faster_than_its_motors(lone_robot, command, gain)
     assert abs(right - left) <= MAX_DIFFERENCE_MPS * (1 + 1e-9)
 
 
-@pytest.mark.parametrize("column", [0, 1, 2])
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize(("column", "value"), [(0, np.inf), (1, np.nan), (2, -np.inf)])
 def test_a_command_that_is_not_finite_is_refused_and_nothing_moves(column, value):
     env = tidy_world(n_robots=3)
     stand(env, 0, (60, 40))

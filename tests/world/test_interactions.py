@@ -1,20 +1,20 @@
-"""Pick-ups and drops, rule by rule: what each gripper band does where."""
+"""Pick-ups and drops, rule by rule: what each gripper band does where, when it takes effect, who comes first."""
 
 from collections import Counter as Tally
 
 import numpy as np
 import pytest
 
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import CELL_EMPTY, CELL_OBJECT, Counter, Event, Grip, ObjectStatus
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.world.kernels.interact import CREATE_CACHE, DELIVER_ONLY, GRASP, RELEASE, SITE, band_of, serve
 from swarm_forage_env.world.state import listed
-from tests.support.engines import in_each_engine
 from tests.support.stage import (
     BASE_CELL,
     CORNER_CACHE,
+    CORNERS,
     NEST_CELL,
     OPEN_CELL,
     WALL_CELL,
@@ -25,47 +25,38 @@ from tests.support.stage import (
     clear,
     count,
     events_of,
+    kill,
     lay,
     load,
     put,
+    repair,
     stand,
     tidy_world,
 )
 
 NONE, PICKED_UP, PICKED_FROM_CACHE = Event.NONE, Event.PICKED_UP, Event.PICKED_FROM_CACHE
 DELIVERED, DROPPED, ELSEWHERE, JOINED = Event.DELIVERED, Event.DROPPED, Event.DROPPED_ELSEWHERE, Event.JOINED_CACHE
-NOTHING_HERE, TOO_NEAR = Event.NOTHING_HERE, Event.CACHE_TOO_NEAR
+NOTHING_HERE, VANISHED, TOO_NEAR = Event.NOTHING_HERE, Event.VANISHED, Event.CACHE_TOO_NEAR
 ANY_RELEASE = (Grip.RELEASE, Grip.DELIVER, Grip.SITE, Grip.CREATE_CACHE)
 
 
 @pytest.mark.parametrize(
-    ("grip", "band"),
+    ("band", "grips"),
     [
-        (1.0, GRASP),
-        (1e-6, GRASP),
-        (0.0, RELEASE),
-        (-0.125, RELEASE),
-        (-0.2499, RELEASE),
-        (-0.25, DELIVER_ONLY),
-        (-0.375, DELIVER_ONLY),
-        (-0.4999, DELIVER_ONLY),
-        (-0.5, SITE),
-        (-0.625, SITE),
-        (-0.7499, SITE),
-        (-0.75, CREATE_CACHE),
-        (-1.0, CREATE_CACHE),
-        (-7.0, CREATE_CACHE),
-        (7.0, GRASP),
+        (GRASP, (7.0, 1.0, 1e-6)),
+        (RELEASE, (0.0, -0.125, -0.2499)),
+        (DELIVER_ONLY, (-0.25, -0.375, -0.4999)),
+        (SITE, (-0.5, -0.625, -0.7499)),
+        (CREATE_CACHE, (-0.75, -1.0, -7.0)),
     ],
 )
-def test_bands(grip, band):
-    assert band_of(np.float32(grip)) == band
+def test_bands(band, grips):
+    assert {band_of(np.float32(grip)) for grip in grips} == {band}
 
 
 # Empty robots
 
 
-@in_each_engine
 def test_grasping_over_an_object_picks_it_up_one_tick_later():
     env = tidy_world()
     stand(env, 0, OPEN_CELL)
@@ -85,7 +76,6 @@ def test_grasping_over_an_object_picks_it_up_one_tick_later():
     assert_conserved(env)
 
 
-@in_each_engine
 @pytest.mark.parametrize("cell", [OPEN_CELL, NEST_CELL, WALL_CELL])
 def test_grasping_over_nothing_is_refused_at_once_and_every_time(cell):
     env = tidy_world()
@@ -94,44 +84,12 @@ def test_grasping_over_nothing_is_refused_at_once_and_every_time(cell):
     assert env.events.event_object[0] == -1
 
 
-@in_each_engine
-@pytest.mark.parametrize("grip", ANY_RELEASE)
-def test_empty_robots_have_nothing_to_release(grip):
-    env = tidy_world(caches="dynamic")
-    lay(env, 0, OPEN_CELL)
-    build_cache(env, [1, 2], CORNER_CACHE)
-    for cell in (OPEN_CELL, NEST_CELL, CORNER_CACHE, WALL_CELL):
-        stand(env, 0, cell)
-        assert events_of(env, grip, 2) == [NONE, NONE]
-        assert env.swarm.pending_kind[0] == 0
-
-
 # Carrying robots
 
 
-@in_each_engine
-@pytest.mark.parametrize("caches", ["none", "dynamic"])
 @pytest.mark.parametrize("grip", ANY_RELEASE)
-def test_quirk_only_delivering_counts(grip, caches):
-    env = tidy_world(caches=caches, quirks=Quirks(only_delivering_counts=True))
-    stand(env, 0, NEST_CELL)
-    load(env, 0, 2)
-    waits = grip == Grip.DELIVER or (caches == "dynamic" and grip in (Grip.SITE, Grip.CREATE_CACHE))
-    found = events_of(env, grip, 2 if waits else 1)
-    assert found[-1] == (DELIVERED if grip == Grip.DELIVER else ELSEWHERE)
-    assert env.swarm.carried_object[0] == -1
-    delivered = int(grip == Grip.DELIVER)
-    counters = (Counter.COLLECTED, Counter.FLOOR_DROPS, Counter.DISPLACED_DROPS)
-    assert [count(env, counter) for counter in counters] == [delivered, 1 - delivered, 1 - delivered]
-    assert env.objects.status[2] == ObjectStatus.FREE, "placed again"
-    assert_conserved(env)
-
-
-@in_each_engine
-@pytest.mark.parametrize("caches", ["none", "static", "dynamic"])
-@pytest.mark.parametrize("grip", ANY_RELEASE)
-def test_any_release_in_the_nest_delivers_one_tick_later(grip, caches):
-    env = tidy_world(caches=caches)
+def test_any_release_in_the_nest_delivers_one_tick_later(grip):
+    env = tidy_world(caches="dynamic")
     stand(env, 0, NEST_CELL)
     load(env, 0, 2)
     assert act(env, {0: grip})[0] == NONE
@@ -149,11 +107,9 @@ def test_any_release_in_the_nest_delivers_one_tick_later(grip, caches):
     assert_conserved(env)
 
 
-@in_each_engine
-@pytest.mark.parametrize("caches", ["static", "dynamic"])
 @pytest.mark.parametrize("grip", ANY_RELEASE)
-def test_any_release_in_a_cache_joins_it_one_tick_later(grip, caches):
-    env = tidy_world(caches=caches)
+def test_any_release_in_a_cache_joins_it_one_tick_later(grip):
+    env = tidy_world(caches="dynamic")
     slot = build_cache(env, [0, 1], BASE_CELL)
     stand(env, 0, (BASE_CELL[0] - 15, BASE_CELL[1] + 15))
     load(env, 0, 2)
@@ -165,7 +121,6 @@ def test_any_release_in_a_cache_joins_it_one_tick_later(grip, caches):
     assert_conserved(env)
 
 
-@in_each_engine
 @pytest.mark.parametrize("grip", [Grip.SITE, Grip.CREATE_CACHE])
 def test_site_and_found_are_refused_near_a_cache(grip):
     env = tidy_world(caches="dynamic")
@@ -181,7 +136,6 @@ def test_site_and_found_are_refused_near_a_cache(grip):
     assert events_of(env, grip, 2) == [NONE, DROPPED]
 
 
-@in_each_engine
 @pytest.mark.parametrize(
     ("place", "why"),
     [(OPEN_CELL, "another object lies there"), (WALL_CELL, "no object may lie there")],
@@ -268,7 +222,6 @@ def test_objects_without_any_free_cell_wait_and_come_back():
 # Caches in use
 
 
-@in_each_engine
 def test_the_last_pair_dissolves_the_cache_and_the_orphan_lies_on_the_centre():
     env = tidy_world(caches="static")
     slot = build_cache(env, [0, 1], BASE_CELL)
@@ -311,7 +264,6 @@ def test_an_object_leaves_a_cache_uniformly():
 # First pick-ups
 
 
-@in_each_engine
 def test_a_first_pick_up_is_one_since_the_object_was_placed():
     env = tidy_world()
     stand(env, 0, OPEN_CELL)
@@ -329,3 +281,92 @@ def test_a_first_pick_up_is_one_since_the_object_was_placed():
     stand(env, 0, tuple(env.objects.cell[5].tolist()))
     assert events_of(env, Grip.GRASP, 2)[-1] == PICKED_UP
     assert count(env, Counter.FIRST_PICKED) == 2, "delivered and placed anew"
+
+
+# Timing
+
+
+def test_another_band_cancels_silently_and_a_lost_condition_is_told():
+    env = tidy_world()
+    stand(env, 0, OPEN_CELL)
+    lay(env, 0, OPEN_CELL)
+    act(env, {0: Grip.GRASP})
+    assert act(env, {0: Grip.RELEASE})[0] == NONE
+    assert env.swarm.pending_kind[0] == 0
+    act(env, {0: Grip.GRASP})
+    lay(env, 0, (70, 30))
+    assert events_of(env, Grip.GRASP, 2) == [VANISHED, NOTHING_HERE]
+    lay(env, 0, OPEN_CELL)
+    assert events_of(env, Grip.GRASP, 3) == [NONE, PICKED_UP, NONE], "an event lasts one tick"
+    assert not env.events.first_picked.any()
+
+
+def test_pick_ups_and_drops_of_several_ticks():
+    env = tidy_world(pickup_ticks=3, drop_ticks=2)
+    stand(env, 0, OPEN_CELL)
+    lay(env, 0, OPEN_CELL)
+    actions = np.zeros((4, 3), np.float32)
+    actions[0] = 0.5, 0.5, Grip.GRASP
+    shown, speeds = [], []
+    for _ in range(5):
+        obs = env.step_batch(actions)[0]
+        shown.append(int(obs[0, env.layout["interacting"]][0]))
+        speeds.append(round(100 * float(env.swarm.wheel_speed[0, 0]), 6))
+    assert env.swarm.carried_object[0] == 0
+    assert shown == [1, 1, 1, 0, 0]
+    assert speeds == [10.0, 0.0, 0.0, 0.0, 10.0]
+    stand(env, 0, NEST_CELL)
+    assert events_of(env, Grip.DELIVER, 3) == [NONE, NONE, DELIVERED]
+    with pytest.raises(ConfigError, match="pickup, in ticks, to be a whole number"):
+        env.set_handling_ticks(pickup=1.5, drop=1)
+
+
+@pytest.mark.parametrize(("rows", "tick"), [((0, 3), 0), ((1, 2), 3), ((3, 1), 5)])
+def test_the_turn_goes_round(rows, tick):
+    env = tidy_world(n_robots=5)
+    lay(env, 0, OPEN_CELL)
+    x, y = cell_centre(OPEN_CELL)
+    for robot, (dx, dy) in zip(rows, CORNERS, strict=True):
+        put(env, robot, x + dx, y + dy)
+    env.arena.tick = 100 + tick
+    act(env, dict.fromkeys(rows, Grip.GRASP))
+    events = act(env, dict.fromkeys(rows, Grip.GRASP))
+    first, second = sorted(rows, key=lambda robot: (robot - env.tick) % 5)
+    assert (events[first], events[second]) == (PICKED_UP, VANISHED)
+
+
+# Robots in repair, robots that die
+
+
+@pytest.mark.parametrize("grip", [Grip.RELEASE, Grip.GRASP])
+def test_a_robot_in_repair_completes_what_is_running(grip):
+    env = tidy_world()
+    stand(env, 0, NEST_CELL)
+    load(env, 0, 2)
+    act(env, {0: Grip.DELIVER})
+    repair(env, 0)
+    assert act(env, {0: grip})[0] == DELIVERED
+    assert env.swarm.carried_object[0] == -1
+
+
+def test_a_robot_in_repair_starts_nothing_and_keeps_its_cargo():
+    env = tidy_world()
+    stand(env, 0, OPEN_CELL)
+    lay(env, 0, OPEN_CELL)
+    stand(env, 1, NEST_CELL)
+    load(env, 1, 1)
+    repair(env, 0, 1)
+    for _ in range(3):
+        assert act(env, {0: Grip.GRASP, 1: Grip.RELEASE}) == [NONE] * 4
+    assert env.swarm.carried_object.tolist() == [-1, 1, -1, -1]
+
+
+def test_a_dying_robot_drops_its_cargo_on_the_floor():
+    env = tidy_world()
+    stand(env, 0, OPEN_CELL)
+    load(env, 0, 3)
+    kill(env, 0)
+    assert env.objects.cell[3].tolist() == list(OPEN_CELL)
+    assert env.swarm.carried_object[0] == -1
+    assert_conserved(env)
+    assert act(env, {0: Grip.GRASP}) == [NONE] * 4

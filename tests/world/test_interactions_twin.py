@@ -134,13 +134,17 @@ def create_somewhere(env: ForageEnv, rng: np.random.Generator) -> None:
         build_cache(env, rows, (x, y))
 
 
-@pytest.mark.parametrize("longest", [1, 4])
 @pytest.mark.parametrize(
-    "quirks",
-    [Quirks(), Quirks(serialized_interactions=True), Quirks(only_delivering_counts=True)],
-    ids=["described", "serialized", "only delivering"],
+    ("caches", "quirks", "longest"),
+    [
+        ("none", Quirks(only_delivering_counts=True), 4),
+        ("static", Quirks(serialized_interactions=True), 1),
+        ("dynamic", Quirks(), 4),
+        ("dynamic", Quirks(serialized_interactions=True), 4),
+        ("dynamic", Quirks(only_delivering_counts=True), 1),
+    ],
+    ids=["no caches", "static, serialized", "dynamic", "dynamic, serialized", "dynamic, only delivering"],
 )
-@pytest.mark.parametrize("caches", ["none", "static", "dynamic"])
 def test_every_tick_equals_the_twin(caches, quirks, longest):
     """With `longest` above 1, picking up and dropping take 1 to that many ticks, drawn in every tick."""
     env = crowd(caches, quirks)

@@ -1,20 +1,16 @@
 """Neighbours and messages: what robots perceive of each other."""
 
-import copy
 from typing import Any
 
 import gymnasium
 import numpy as np
 import pytest
 
-from swarm_forage_env import ConfigError, ForageEnv, load_policy, parallel_env, plan_run, run_one, scenario
-from swarm_forage_env.checks import check_policy
+from swarm_forage_env import ConfigError, ForageEnv, parallel_env, scenario
 from swarm_forage_env.contract.policy import ActionError, SwarmSpec
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
-from swarm_forage_env.policies.registry import from_callable, policy_file
-from swarm_forage_env.training.datasets import Dataset, record_dataset
+from swarm_forage_env.policies.registry import policy_file
 from tests.reference import neighbourhood
-from tests.support.branches import pickled
 
 N_ROBOTS = 12
 SMALL: dict[str, Any] = {
@@ -112,31 +108,6 @@ def test_a_message_that_is_not_finite_is_refused():
     assert env.tick == 0
 
 
-@pytest.mark.parametrize("physics", ["chipmunk", "compiled"])
-def test_runs_of_scripted_policies_stay_what_they_are(physics):
-    small = scenario("warehouse_small", **SMALL | {"physics": physics}, horizon_s=40.0, interval_s=20.0)
-    rich = scenario("warehouse_small", **SMALL | {"physics": physics} | BOTH, horizon_s=40.0, interval_s=20.0)
-    plain, spoken = (run_one(plan_run(world, "crw", seed=1)).columns for world in (small, rich))
-    for name, column in plain.items():
-        np.testing.assert_array_equal(column, spoken[name])
-
-
-def test_snapshots_and_copies_go_on_alike():
-    env, actions = made(**BOTH), drawn(12)
-    env.reset_batch(seed=1)
-    for action in actions[:6]:
-        env.step_batch(action)
-    snapshot, twin, other = env.snapshot(), copy.deepcopy(env), pickled(env)
-    seen = [env.step_batch(action)[0].copy() for action in actions[6:]]
-    env.restore_batch(snapshot)
-    for branch in (env, twin, other):
-        np.testing.assert_array_equal(seen, [branch.step_batch(action)[0].copy() for action in actions[6:]])
-    env.restore_batch(snapshot)
-    assert part(env, "messages").any()
-    before = env.last_obs.copy()
-    np.testing.assert_array_equal(env.arena.observe(), before)
-
-
 @pytest.mark.parametrize("observation", ["full", "compact"])
 def test_learners_see_and_say_them_through_every_view(observation):
     fields: dict[str, Any] = {**SMALL, **BOTH, "interface": {"observation": observation}}
@@ -159,27 +130,6 @@ def test_learners_see_and_say_them_through_every_view(observation):
         np.testing.assert_array_equal(seen[0], seen[2])
     assert stepped[0][:, -1].any()
     assert (stepped[0][:, -3:-1] != 0.0).any(), "what is heard are not only zeros"
-
-
-def test_an_automatic_gripper_leaves_wheels_and_message():
-    interface = {"observation": "compact", "automatic_gripper": True, "decision_ticks": 2}
-    env = parallel_env("warehouse_small", **SMALL, **BOTH, interface=interface)
-    env.reset(seed=1)
-    assert env.action_space("robot_0").shape == (4,)
-    spec = SwarmSpec.of(scenario("warehouse_small", **SMALL | BOTH))
-    bound = LearnerInterface(env.interface.config, spec)
-    obs = made(**BOTH).reset_batch(seed=1)
-    said = bound.command(np.tile(np.float32([0.1, 0.2, 0.3, 0.4]), (N_ROBOTS, 1)), obs)
-    np.testing.assert_array_equal(said[:, [0, 1, 3, 4]], np.tile(np.float32([0.1, 0.2, 0.3, 0.4]), (N_ROBOTS, 1)))
-
-
-def test_trained_policies_run_where_there_are_messages():
-    env = made(**BOTH)
-    policy = load_policy("ppo_warehouse_small")
-    policy.reset(env.swarm_spec, np.random.default_rng(1))
-    actions = policy.act(env.reset_batch(seed=1), env.active)
-    assert not actions[:, 3:].any()
-    env.step_batch(actions)
 
 
 def test_a_policy_says_what_it_needs():
@@ -205,24 +155,6 @@ def test_an_interface_can_be_said_in_words():
         interface_from_mapping({"neighbour_range_m": "far"})
 
 
-def test_a_data_set_has_the_columns_of_messages(tmp_path):
-    world = scenario("warehouse_small", **SMALL | BOTH, horizon_s=2.0, interval_s=2.0)
-    record_dataset(plan_run(world, "random"), [3], tmp_path)
-    dataset = Dataset(tmp_path)
-    (run,) = dataset.runs()
-    assert run.actions.shape[2:] == (5,)
-    assert run.observations.shape[2] == len(dataset.columns)
-    assert "messages" in dataset.columns
-
-
-def test_a_random_policy_says_something():
-    policy = load_policy("random")
-    policy.reset(SwarmSpec.of(scenario("warehouse_small", **SMALL | BOTH)), np.random.default_rng(0))
-    actions = policy.act(np.zeros((N_ROBOTS, 5), np.float32), np.ones(N_ROBOTS, np.bool_))
-    assert actions.shape == (N_ROBOTS, 5)
-    assert (actions != 0.0).all()
-
-
 def test_numbered_actions_carry_no_message():
     with pytest.raises(ConfigError, match=r"'continuous' for messages of 2 numbers, got 'discrete'.*message_size=0"):
         parallel_env("warehouse_small", **BOTH, interface={"actions": "discrete"})
@@ -231,30 +163,6 @@ def test_numbered_actions_carry_no_message():
     assert "messages" not in env.interface.layout.names
     env.reset(seed=1)
     env.step(dict.fromkeys(env.agents, 1))
-
-
-def test_a_policy_may_speak():
-    speaker = from_callable(lambda obs: np.full((len(obs), 5), 0.5, np.float32), name="speaker")
-    check_policy(speaker, scenario("warehouse_small", **SMALL | BOTH), ticks=30)
-    wrong = from_callable(lambda obs: np.zeros((len(obs), 4), np.float32))
-    wrong.reset(SwarmSpec.of(scenario("warehouse_small", **SMALL | BOTH)), np.random.default_rng(0))
-    with pytest.raises(ValueError, match=r"\(12, 3\) or \(12, 5\), got \(12, 4\)"):
-        wrong.act(np.zeros((N_ROBOTS, 5), np.float32), np.ones(N_ROBOTS, bool))
-
-
-@pytest.mark.parametrize(
-    ("fields", "words"),
-    [
-        ({"neighbours_seen": -1}, "robots.neighbours_seen"),
-        ({"neighbours_seen": 65}, "from 0 to 64"),
-        ({"neighbour_range_m": 0.0}, "robots.neighbour_range_m"),
-        ({"message_size": 1.5}, "robots.message_size"),
-        ({"message_range_m": -1.0}, "robots.message_range_m"),
-    ],
-)
-def test_fields_are_checked(fields, words):
-    with pytest.raises(ConfigError, match=words):
-        scenario("warehouse_small", **fields)
 
 
 def test_a_reset_keeps_the_spaces():

@@ -66,27 +66,6 @@ def test_walk_agrees_with_its_slow_twin(probability, self_conflict):
         np.testing.assert_array_equal(objects.cell, twin.cell)
 
 
-@pytest.mark.parametrize("self_conflict", [False, True])
-def test_objects_are_conserved_and_stay_on_their_floor(self_conflict):
-    rng = np.random.default_rng(9)
-    objects, area = crowded_world(rng)
-    before = copy.deepcopy(objects)
-    moved = sum(step(objects, area, 0.3, rng, self_conflict=self_conflict) for _ in range(200))
-    assert moved > 100
-    free = np.flatnonzero(objects.status == ObjectStatus.FREE)
-    x, y = objects.cell[free].T
-    np.testing.assert_array_equal(objects.floor[y, x], CELL_OBJECT + free)
-    np.testing.assert_array_equal(np.sort(objects.floor[objects.floor >= CELL_OBJECT]), CELL_OBJECT + free)
-    np.testing.assert_array_equal(objects.status, before.status)
-    np.testing.assert_array_equal(objects.floor <= CELL_NEST, before.floor <= CELL_NEST)
-    others = np.flatnonzero(objects.status != ObjectStatus.FREE)
-    np.testing.assert_array_equal(objects.cell[others], before.cell[others])
-    changed = np.any(objects.cell[free] != before.cell[free], axis=1)
-    in_x = (x[changed] >= area[0]) & (x[changed] < area[2])
-    in_y = (y[changed] >= area[1]) & (y[changed] < area[3])
-    assert np.all(in_x & in_y)
-
-
 def test_moves_happen_with_the_given_probability():
     objects = world([(5 * x + 2, 5 * y + 2) for x in range(20) for y in range(20)], 100, 100)
     rng = np.random.default_rng(3)
@@ -122,19 +101,6 @@ def test_the_number_that_triggers_a_move_does_not_bias_its_direction():
     assert chisquare(counts).pvalue > SIGNIFICANCE
 
 
-def test_long_run_visits_are_proportional_to_the_number_of_neighbours():
-    # A walk to a uniform choice of neighbours is reversible: its stationary law is the number of neighbours.
-    rng = np.random.default_rng(7)
-    objects = world([(0, 0)], 4, 3)
-    visits = np.zeros((3, 4), int)
-    for tick in range(40_000):
-        step(objects, (0, 0, 4, 3), 1.0, rng)
-        if tick % 10 == 0:
-            visits += objects.floor == CELL_OBJECT
-    neighbours = np.array([[3, 5, 5, 3], [5, 8, 8, 5], [3, 5, 5, 3]])
-    assert chisquare(visits.ravel(), (4_000 * neighbours / neighbours.sum()).ravel()).pvalue > SIGNIFICANCE
-
-
 @pytest.mark.parametrize(
     ("x", "y", "dx", "dy", "crosses"),
     [
@@ -155,9 +121,7 @@ def test_self_conflict_lets_objects_across_open_borders_only(x, y, dx, dy, cross
     assert crosses_open_border(x, y, dx, dy) == crosses
 
 
-@pytest.mark.parametrize(
-    ("side", "percent"), [(16, 67), (32, 75), (48, 61), (64, 44), (80, 31), (96, 21), (112, 15), (128, 10)]
-)
+@pytest.mark.parametrize(("side", "percent"), [(16, 67), (48, 61), (128, 10)])
 def test_share_of_places_from_which_an_object_can_move_at_all(side, percent):
     n_cells = 5 * side
     area = distributable_box(n_cells, n_cells)

