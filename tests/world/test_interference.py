@@ -91,28 +91,26 @@ def test_time_of_robots_is_divided_by_what_they_do():
     }
 
 
-@pytest.mark.parametrize("quirks", [Quirks(), Quirks(obstacle_behind_counts=True)], ids=["described", "program"])
-def test_flags_and_sums_equal_those_of_the_slow_rule_on_slow_readings(quirks):
-    env = ForageEnv(
-        scenario("warehouse_small", n_robots=36, n_objects=400, start_margin_m=7.0, caches="static", quirks=quirks)
-    )
+def test_flags_and_sums_equal_those_of_the_slow_rule_on_slow_readings():
+    """Sixty robots with 24 beams each against all others, in Python: it takes three seconds."""
+    env = ForageEnv(scenario("warehouse_small", n_robots=60, n_objects=400, start_margin_m=6.5, caches="static"))
     env.reset_batch(2)
-    present, active = np.arange(36) % 12 != 0, np.arange(36) % 6 != 0
+    present, active = np.arange(60) % 12 != 0, np.arange(60) % 6 != 0
     env.set_population(active=active, present=present)
     rng = np.random.default_rng(2)
-    counted, share, before = collections.Counter[Counter](), 0.0, [False] * 36
-    for _ in range(30):
-        robots_do = [sensing.work(env.swarm, robot) for robot in range(36)]  # before the grippers of the tick move
-        env.step_batch(rng.uniform(-1, 1, (36, 3)).astype(np.float32))
-        expected = [sensing.interferes(env, robot) for robot in range(36)]
+    counted, share, before = collections.Counter[Counter](), 0.0, [False] * 60
+    for _ in range(20):
+        robots_do = [sensing.work(env.swarm, robot) for robot in range(60)]  # before the grippers of the tick move
+        env.step_batch(rng.uniform(-1, 1, (60, 3)).astype(np.float32))
+        expected = [sensing.interferes(env, robot) for robot in range(60)]
         assert env.events.interfering.tolist() == expected
         counted[Counter.INTERFERING] += sum(expected)
         counted[Counter.INTERFERING_NEAR_CACHES] += sum(
             flag and sensing.is_near_cache(env, robot) for robot, flag in enumerate(expected)
         )
         counted[Counter.AVOIDANCES] += sum(now and not then for now, then in zip(expected, before, strict=True))
-        counted.update(robots_do[robot] for robot in range(36) if active[robot] and not expected[robot])
-        share += sum(expected) / 30
+        counted.update(robots_do[robot] for robot in range(60) if active[robot] and not expected[robot])
+        share += sum(expected) / 50
         before = expected
     assert counted[Counter.INTERFERING] > counted[Counter.AVOIDANCES] > 10
     known = (*WORK, Counter.AVOIDANCES, Counter.INTERFERING_NEAR_CACHES)
@@ -122,4 +120,4 @@ def test_flags_and_sums_equal_those_of_the_slow_rule_on_slow_readings(quirks):
     assert min(counted[counter] for counter in known) > 0, "the test knows each of them"
     assert counted[Counter.INTERFERING_NEAR_CACHES] < counted[Counter.INTERFERING]
     assert env.events.interference_sum[0] == pytest.approx(share)
-    assert [int(env.events.counters[c]) for c in (Counter.ACTIVE, Counter.PRESENT)] == [30 * 30, 30 * 33]
+    assert [int(env.events.counters[c]) for c in (Counter.ACTIVE, Counter.PRESENT)] == [20 * 50, 20 * 55]
