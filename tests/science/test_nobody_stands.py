@@ -12,7 +12,6 @@ from swarm_forage_env.scenarios.presets import scenario, warehouse_medium
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
 from swarm_forage_env.wrappers.base import wrap_in_order
 from swarm_forage_env.wrappers.registry import parse_wrapper
-from tests.support.drivers import WAYS, towards
 from tests.support.foraging import mild_wrappers
 
 pytestmark = pytest.mark.slow
@@ -91,16 +90,25 @@ def test_dpo_delivers_as_much_in_the_second_half_of_a_run(seed):
 
 
 TICKS = 3000
+WAYS = {"E": (1, 0), "W": (-1, 0), "N": (0, 1), "S": (0, -1)}
+WAYS |= {"NE": (1, 1), "NW": (-1, 1), "SE": (1, -1), "SW": (-1, -1)}
+"""Directions of walls and corners."""
 PLACES = (*WAYS, "random")
 CASES = [(n, place, wrapped) for n in (50, 128) for place in PLACES for wrapped in (False, True)]
 CASES += [(200, "NE", True), (200, "S", False), (512, "SW", False), (512, "NE", True), (512, "random", True)]
 
 
 def actions_towards(env: ForageEnv, place: str, rng: np.random.Generator) -> np.ndarray:
-    """Towards a wall or a corner; or at random."""
+    """Full speed towards a wall or a corner, turning on the spot to face it, or at random; (N, 3)."""
+    swarm, arena = env.swarm, env.scenario.arena
     if place == "random":
         return rng.uniform(-1, 1, (len(env.active), 3)).astype(np.float32)
-    return towards(env, place)
+    actions, way = np.zeros((len(swarm.active), 3), np.float32), np.array(WAYS[place])
+    to = np.where(way == 0, 0.0, np.where(way > 0, (arena.width_m, arena.height_m), 0.0) - swarm.position)
+    turn = np.angle(np.exp(1j * (np.arctan2(to[:, 1], to[:, 0]) - swarm.heading)))
+    actions[:, 0] = np.where(np.abs(turn) < 0.3, 1.0, -np.sign(turn))
+    actions[:, 1] = np.where(np.abs(turn) < 0.3, 1.0, np.sign(turn))
+    return actions
 
 
 @pytest.mark.slow
