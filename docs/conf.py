@@ -8,6 +8,8 @@ import os
 import posixpath
 import re
 import tomllib
+from importlib import import_module
+from inspect import isroutine
 from pathlib import Path
 from typing import Any
 
@@ -105,6 +107,33 @@ def add_contents(_app: Sphinx, docname: str, source: list[str]) -> None:
         source[0] += contents()
 
 
+def full_name(page: str, name: str) -> str:
+    """Return the full name of a public name as its page shows it."""
+    ours = ("swarm_forage_env", "metrics", "baselines")
+    package = "metrics" if page.endswith(("measures", "scoring")) else "swarm_forage_env"
+    return name if name.startswith(tuple(f"{one}." for one in ours)) else f"{package}.{name}"
+
+
+def add_docstrings(_app: Sphinx, docname: str, source: list[str]) -> None:
+    """Append the docstrings of the names in the first column of the table of a page of public names."""
+    if not docname.startswith("docs/api/"):
+        return
+    lines = []
+    for names, text in re.findall(r"^\| (`.+?`) \| (.+?) \|$", source[0], re.MULTILINE):
+        for name in re.findall(r"`([\w.]+)`", names):
+            full = full_name(docname, name)
+            module, _, attribute = full.rpartition(".")
+            found = getattr(import_module(module), attribute)
+            if isinstance(found, type):
+                kind = "autoexception" if issubclass(found, Exception) else "autoclass"
+                lines.append(f".. {kind}:: {full}")
+            else:
+                lines += (
+                    [f".. autofunction:: {full}"] if isroutine(found) else [f".. data:: {full}", "", f"   {text}", ""]
+                )
+    source[0] += "\n```{eval-rst}\n" + "\n".join(lines) + "\n```\n"
+
+
 def markdown_to_rst(_app: Sphinx, what: str, _name: str, _object: Any, _options: Any, lines: list[str]) -> None:
     """Let reStructuredText keep what it would misread in docstrings: tables stay as typed, a bar is a bar."""
     rows = [line.lstrip().startswith(("| ", "|-")) for line in lines]
@@ -154,6 +183,7 @@ def write_formula(translator: Any, node: nodes.math | nodes.math_block) -> None:
 def setup(app: Sphinx) -> None:
     """Connect what Sphinx does not do by itself."""
     app.connect("source-read", add_contents)
+    app.connect("source-read", add_docstrings)
     app.connect("autodoc-process-docstring", markdown_to_rst, priority=400)  # before napoleon's 500
     app.connect("autodoc-process-docstring", colons_back, priority=600)
     app.connect("autodoc-process-signature", name_arrays)

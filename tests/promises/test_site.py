@@ -11,7 +11,8 @@ ROOT = Path(__file__).resolve().parents[2]
 LISTED = [
     name
     for page in (ROOT / "docs/api").glob("*.md")
-    for name in re.findall(r"^\.\. (?:auto\w+|data):: ([\w.]+)$", page.read_text(), re.MULTILINE)
+    for row in re.findall(r"^\| (`.+?`) \|", page.read_text(), re.MULTILINE)
+    for name in re.findall(r"`([\w.]+)`", row)
 ]
 
 
