@@ -9,7 +9,6 @@ from metrics import PopulationRates, availability, mean_away, queue_statistics, 
 from tests.reference.population_chain import (
     generator,
     mean_away_by_exponential,
-    share_of_time_by_events,
     stationary_by_null_vector,
 )
 
@@ -32,27 +31,6 @@ def test_a_queue_by_hand():
     assert (alone.truncated_length, alone.truncated_distribution) == (None, None)
 
 
-def test_all_four_processes_merge():
-    rates = PopulationRates(0.001, 0.002, 0.003, 0.004)
-    assert (rates.lambda_d, rates.lambda_bd, rates.mu_b, rates.mu_bd) == (0.001, 0.002, 0.003, 0.004)
-    assert (rates.lam, rates.mu) == pytest.approx((0.003, 0.007), abs=1e-15)
-
-
-@pytest.mark.parametrize(("n", "textbook", "finite"), [(50, 45.0, 20.3), (200, 180.0, 81.7)])
-def test_the_study_set_its_rates_by_the_textbook_length_and_has_far_fewer_robots_away(n, textbook, finite):
-    queue = queue_statistics(warehouse(n, 1), n)
-    assert queue.length == pytest.approx(textbook, rel=1e-3)
-    assert queue.truncated_length == pytest.approx(finite, abs=0.05)
-
-
-@pytest.mark.parametrize("rho", [0.1, 0.9, 1.0, 1.1, 20.0])
-def test_truncated_length_is_the_closed_form(rho):
-    n = 12
-    closed = n / 2 if rho == 1.0 else rho / (1 - rho) - (n + 1) * rho ** (n + 1) / (1 - rho ** (n + 1))
-    queue = queue_statistics(PopulationRates(lambda_bd=0.001 * rho, mu_bd=0.001), n)
-    assert queue.truncated_length == pytest.approx(closed, abs=1e-9)
-
-
 @pytest.mark.parametrize("q", [0.3, 0.5, 0.999999, 1.0, 1.000001, 2.5])
 def test_shares_of_robots_away_are_the_null_vector_of_the_generator(q):
     expected = stationary_by_null_vector(generator(q, 1.0, 9))
@@ -60,11 +38,6 @@ def test_shares_of_robots_away_are_the_null_vector_of_the_generator(q):
     assert found == pytest.approx(expected, abs=1e-12)
     for n_min in range(1, 10):
         assert availability(9, n_min, q) == pytest.approx(expected[: 9 - n_min + 1].sum(), abs=1e-12)
-
-
-def test_shares_of_robots_away_are_shares_of_time_in_a_simulation():
-    queue = queue_statistics(PopulationRates(lambda_bd=0.0009, mu_bd=0.001), 6)
-    assert queue.truncated_distribution == pytest.approx(share_of_time_by_events(0.9, 1.0, 6, 200_000, 11), abs=0.01)
 
 
 def test_large_swarms_do_not_overflow():
@@ -96,22 +69,25 @@ def test_mean_away_of_one_robot():
 
 
 @pytest.mark.parametrize(("lam", "mu"), [(0.001, 0.002), (0.002, 0.002), (0.005, 0.001), (0.001, 0.0)])
-@pytest.mark.parametrize("horizon", [10.0, 5_000.0])
-def test_mean_away_is_the_integrated_matrix_exponential(lam, mu, horizon):
-    expected = mean_away_by_exponential(generator(lam, mu, 7), horizon)
-    assert mean_away(PopulationRates(lambda_bd=lam, mu_bd=mu), 7, horizon) == pytest.approx(expected, rel=1e-9)
+def test_mean_away_is_the_integrated_matrix_exponential(lam, mu):
+    for horizon in (10.0, 5_000.0):
+        expected = mean_away_by_exponential(generator(lam, mu, 7), horizon)
+        assert mean_away(PopulationRates(lambda_bd=lam, mu_bd=mu), 7, horizon) == pytest.approx(expected, rel=1e-9)
 
 
-@pytest.mark.parametrize(("n", "k", "away"), [(50, 1, 4.6), (50, 8, 12.3), (200, 1, 4.8), (200, 8, 14.0)])
-def test_most_of_the_studys_swarm_is_at_work_throughout(n, k, away):
-    assert mean_away(warehouse(n, k), n, 50_000) == pytest.approx(away, abs=0.05)
-
-
-@pytest.mark.parametrize(("n", "ticks"), [(50, 253_000), (200, 4_000_000)])
-def test_the_studys_queues_relax_far_more_slowly_than_its_runs_last(n, ticks):
-    rates = warehouse(n, 1)
-    decay = np.sort(-np.linalg.eigvals(generator(rates.lam, rates.mu, n)).real)
-    assert 1 / decay[1] == pytest.approx(ticks, rel=0.02)  # decay[0] = 0 is equilibrium itself
+def test_numbers_of_the_errata():
+    for n, textbook, finite, away in ((50, 45.0, 20.3, {1: 4.6, 8: 12.3}), (200, 180.0, 81.7, {1: 4.8, 8: 14.0})):
+        queue = queue_statistics(warehouse(n, 1), n)
+        assert queue.length == pytest.approx(textbook, rel=1e-3)
+        assert queue.truncated_length == pytest.approx(finite, abs=0.05)
+        for k, robots in away.items():
+            assert mean_away(warehouse(n, k), n, 50_000) == pytest.approx(robots, abs=0.05)
+    for n, ticks in ((50, 253_000), (200, 4_000_000)):
+        decay = np.sort(-np.linalg.eigvals(generator(warehouse(n, 1).lam, warehouse(n, 1).mu, n)).real)
+        assert 1 / decay[1] == pytest.approx(ticks, rel=0.02)  # decay[0] = 0 is equilibrium itself
+    # Reading 0.40 off the figure decides between rho / (1 - rho) = 5 and the printed rho^2 / (1 - rho) = 5.
+    assert availability(50, 5, 1.2) == pytest.approx(0.4018, abs=1e-4)
+    assert availability(50, 5, 2.0 / (-5 + math.sqrt(5**2 + 4 * 5))) == pytest.approx(0.454, abs=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -129,10 +105,7 @@ def test_availability_by_hand(n, n_min, q, expected):
     ("n", "team", "shares"),
     [
         (50, 5, [0.833, 0.402, 0.161, 0.026, 0.001]),
-        (50, 10, [0.908, 0.618, 0.381, 0.142, 0.014]),
         (50, 20, [0.948, 0.764, 0.579, 0.320, 0.064]),
-        (200, 5, [0.833, 0.402, 0.162, 0.026, 0.001]),
-        (200, 10, [0.909, 0.621, 0.386, 0.149, 0.022]),
         (200, 20, [0.952, 0.784, 0.614, 0.377, 0.142]),
     ],
 )
@@ -143,10 +116,3 @@ def test_availability_of_the_papers_teams(n, team, shares):
     at_work = n - queue_statistics(PopulationRates(lambda_bd=ratio, mu_bd=1.0), n).truncated_length
     assert sum(availability(n, needed, ratio) for needed in range(1, n + 1)) == pytest.approx(at_work, rel=1e-9)
     assert at_work < team
-
-
-def test_the_paper_took_the_queue_length_for_the_number_at_work():
-    # Reading 0.40 off the figure decides between rho / (1 - rho) = 5 and the printed rho^2 / (1 - rho) = 5.
-    printed_rho = (-5 + math.sqrt(5**2 + 4 * 5)) / 2
-    assert availability(50, 5, 1.2) == pytest.approx(0.4018, abs=1e-4)
-    assert availability(50, 5, 1 / printed_rho) == pytest.approx(0.454, abs=1e-3)

@@ -1,6 +1,7 @@
 """What an installed package promises: light imports, complete names, one version, commands that are pinned."""
 
 import os
+import pkgutil
 import subprocess
 import sys
 import tomllib
@@ -9,6 +10,9 @@ from pathlib import Path
 
 import pytest
 
+import metrics
+import metrics.claims
+import metrics.scoring
 import swarm_forage_env
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.registry import POLICIES
@@ -41,17 +45,22 @@ def run_python(code: str, *arguments: str, **environment: str) -> str:
     return result.stdout
 
 
-def test_importing_the_package_loads_nothing_heavy():
-    code = f"import sys, swarm_forage_env; print(*[name for name in {HEAVY} if name in sys.modules])"
-    assert run_python(code).split() == []
+@pytest.mark.parametrize("package", [swarm_forage_env, metrics], ids=lambda package: package.__name__)
+def test_a_package_loads_its_names_and_nothing_heavy(package):
+    assert [name for name in package.__all__ if getattr(package, name) is None or name not in dir(package)] == []
+    assert sorted(homes_of(package)) == sorted(package.__all__), "each is written once"
+    heavy = {*HEAVY, "numpy", "swarm_forage_env"} - {package.__name__} if package is metrics else HEAVY
+    name = package.__name__
+    assert run_python(f"import sys, {name}; print(*[name for name in {heavy} if name in sys.modules])").split() == []
+    with pytest.raises(AttributeError, match="Scenaroi"):
+        _ = package.Scenaroi
 
 
-def test_every_public_name_loads():
-    assert [name for name in swarm_forage_env.__all__ if getattr(swarm_forage_env, name) is None] == []
-
-
-def test_each_public_name_is_written_once():
-    assert sorted(homes_of(swarm_forage_env)) == sorted(swarm_forage_env.__all__)
+@pytest.mark.parametrize("package", [metrics, metrics.claims, metrics.scoring], ids=["metrics", "claims", "scoring"])
+def test_no_public_name_is_that_of_a_module(package):
+    """So that functions are what they are, whatever is imported first."""
+    modules = {module.name for module in pkgutil.iter_modules(package.__path__)}
+    assert not modules & {*package.__all__, *(name for name in vars(package) if callable(vars(package)[name]))}
 
 
 def test_version_comes_from_the_installed_package():

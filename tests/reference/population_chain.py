@@ -33,16 +33,3 @@ def mean_away_by_exponential(q: Matrix, horizon: float) -> float:
     block[:size, size:] = np.eye(size)
     integral = expm(block * horizon)[:size, size:]
     return float(integral[0] @ np.arange(size)) / horizon
-
-
-def share_of_time_by_events(lam: float, mu: float, n: int, n_events: int, seed: int) -> Matrix:
-    """Share of time with 0 ... n robots away, simulated event by event; void events count as time passing."""
-    rng = np.random.default_rng(seed)
-    waits = rng.exponential(1.0 / (lam + mu), size=n_events)
-    leaves = rng.random(n_events) < lam / (lam + mu)
-    time = np.zeros(n + 1)
-    away = 0
-    for wait, leave in zip(waits, leaves, strict=True):
-        time[away] += wait
-        away = min(away + 1, n) if leave else max(away - 1, 0)
-    return time / time.sum()

@@ -1,14 +1,20 @@
 """From policies to an entry, and its numbers made again, in a tiny protocol."""
 
+import contextlib
+import itertools
+import tomllib
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from metrics.benchmark import SAME, BenchmarkError, Training, load_protocol, read_entry, run_benchmark, verify_entry
 from metrics.benchmark.entry import WorldRuns
-from swarm_forage_env import plan_run, run_one
+from swarm_forage_env import plan_run, run_one, scenario
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policies import pretrained
 from swarm_forage_env.policies.registry import RandomPolicy
 from swarm_forage_env.runs import runner
 from tests.support.entries import TINY, made_up_entry
@@ -42,14 +48,6 @@ def test_an_entry_has_the_runs_of_all_policies(entry, protocol):
     assert row[1] == pytest.approx(record["performance"].sum() / 0.2)  # per 1,000 s, of 200 s
     assert entry.interference("room, 2 robots")[0, 1] == pytest.approx(record["interference_fraction"].mean(), rel=1e-5)
     assert entry.performance("room, noisy wheels").shape == (2, 2)
-
-
-def test_an_entry_tells_how_it_was_made(entry):
-    crw, ppo = entry.policies
-    assert (crw.name, crw.digest) == ("crw", "")
-    assert (ppo.name, len(ppo.digest)) == ("ppo_warehouse_small", 16)
-    assert (entry.training.command, entry.training.track) == ("a command", "open")
-    assert entry.versions["swarm-forage-env"]
 
 
 def test_stored_runs_answer_and_an_entry_is_read_back(entry, protocol, folder, tmp_path, monkeypatch):
@@ -108,12 +106,6 @@ def test_an_entry_comes_again_and_one_altered_number_is_found(entry, file):
     assert {row[1] for row in verified(file, n_worlds=99) if row[-1] != SAME} == {world}
 
 
-def test_a_seed_draws_the_worlds(file):
-    first, again, other = ([row[:2] for row in verified(file, n_worlds=2, seed=seed)] for seed in (1, 1, 2))
-    assert first == again != other
-    assert len(first) == 2
-
-
 def test_policies_must_be_those_of_the_entry(file, tmp_path):
     for policies in (["crw"], ["ppo_warehouse_small", "crw"]):
         with pytest.raises(BenchmarkError, match=r"Expected the policies of .* \(crw, ppo_.*\), got others"):
@@ -121,3 +113,101 @@ def test_policies_must_be_those_of_the_entry(file, tmp_path):
     made_up_entry(load_protocol(), "mine", lambda k: 1.0).write(tmp_path / "mine.json")
     with pytest.raises(BenchmarkError, match=r"Expected --policy FILE,... for each of mine_0.npz"):
         verify_entry(tmp_path / "mine.json")
+
+
+PLAN = Path(pretrained.__file__).with_name("generalist.toml")
+
+
+@pytest.fixture(scope="module")
+def real():
+    return load_protocol()
+
+
+def test_it_has_three_worlds_or_more_of_eight_kinds(real):
+    assert len(real.scored) == 27
+    kinds = [world.group for world in real.scored]
+    assert len({*kinds}) == 8
+    assert min(kinds.count(kind) for kind in kinds) >= 3
+
+
+def test_held_out_worlds_differ_from_those_to_train_in(real):
+    given = [world for world in real.worlds if not world.group]
+    assert len(given) == 3
+    assert not any(world.counts for world in given)
+    known = [world.world.scenario for world in given]
+    assert [world.name for world in real.scored if world.world.scenario in known] == []
+
+
+@pytest.mark.parametrize("policy", ["crw", "stochm", "stochx"])
+def test_controllers_with_and_without_caches_fit_into_every_calm_world(real, policy):
+    for world in real.scored:
+        if not world.is_disturbed:
+            ForageEnv(plan_run(world.world, policy).scenario).reset(seed=real.seeds[0])
+
+
+@pytest.mark.parametrize(
+    ("fields", "n_policies", "message"),
+    [
+        ({}, 5, None),
+        ({"track": "40M", "decisions": 40_000_000}, 5, None),
+        ({"worlds": "other", "track": "open", "decisions": 10**12}, 1, None),
+        ({"decisions": 10_000_001}, 5, "at most 10,000,000 decisions .* for the track 10M, got 10,000,001"),
+        ({"decisions": None}, 5, r"\(--decisions\) for the track 10M, got none"),
+        ({"worlds": "other"}, 5, "trained-in given.* got 'other'; or choose --track open"),
+        ({}, 4, "Expected 5 trainings, a file each, for the track 10M, got 4"),
+        ({"track": "20M"}, 5, "--track to be one of 10M, 40M, open, got '20M'"),
+    ],
+)
+def test_a_training_fits_its_track_or_is_refused(real, fields, n_policies, message):
+    training = replace(Training(worlds="given", track="10M", decisions=10_000_000), **fields)
+    with contextlib.nullcontext() if message is None else pytest.raises(BenchmarkError, match=message):
+        training.check_track(real, n_policies)
+
+
+def test_no_world_has_an_arena_in_which_the_shipped_generalist_was_trained_or_evaluated(real):
+    plan = tomllib.loads(PLAN.read_text())
+    parts = (plan["sampler"], *(stage["sampler"] for stage in plan["stages"] if "sampler" in stage), plan["evaluation"])
+    drawn = [world["scenario"] for part in parts for world in part["worlds"]]
+    arenas = {
+        scenario(fields["preset"], **variant | {"n_robots": n_robots}).arena
+        for fields in drawn
+        for variant in variants(fields)
+        for n_robots in bounds(fields["n_robots"])
+    }
+    assert len(arenas) > 20
+    assert not [world.name for world in real.scored if world.world.scenario.arena in arenas]
+
+
+def bounds(value):
+    return value["uniform"] if isinstance(value, dict) else [value]
+
+
+def variants(fields):
+    """Fields of a sampled world as a scenario takes them, once for each choice; those within bounds are left out."""
+    choices = {
+        name: value["choice"] if isinstance(value, dict) else [value]
+        for name, value in fields.items()
+        if name != "preset" and not (isinstance(value, dict) and "uniform" in value)
+    }
+    for picked in itertools.product(*choices.values()):
+        yield dict(zip(choices, picked, strict=True))
+
+
+def test_a_swarm_of_one_does_not_count():
+    assert {world.name: world.counts for world in load_protocol(TINY).worlds} == {
+        "training: here": False,
+        "room, source below": True,
+        "room, 1 robot": False,
+        "room, 2 robots": True,
+        "room, 4 robots": True,
+        "room, slow": True,
+        "room, noisy wheels": True,
+    }
+
+
+def test_quick_is_shorter_and_another_identity():
+    full, quick = load_protocol(TINY), load_protocol(TINY, quick=True)
+    assert [world.name for world in quick.worlds] == [world.name for world in full.worlds]
+    assert quick.seeds == (1,)
+    assert quick.worlds[0].world.scenario.horizon_s == 100.0
+    assert quick.identity != full.identity

@@ -1,7 +1,6 @@
 """The table of measures: what each compares, by hand, and why some cannot be computed."""
 
 import math
-import re
 from pathlib import Path
 from typing import Any
 
@@ -16,21 +15,15 @@ from tests.support.curve_tables import CLOCK, IDEAL, SIGNAL, SLOWED, missing, ro
 DOCS = Path(__file__).resolve().parents[3] / "docs"
 
 
-@pytest.mark.parametrize("name", MEASURES)
-def test_a_measure_is_named_after_a_public_function_and_stands_on_its_page(name):
-    measure = MEASURES[name]
-    assert callable(getattr(metrics, name))
-    assert f"`{name}`" in (DOCS / "equations.md").read_text()
-    assert measure.lowest < measure.highest
-    assert measure.neutral is None or measure.lowest <= measure.neutral <= measure.highest
-    assert not measure.is_distance or (measure.higher_is_better, measure.neutral, measure.lowest) == (False, 0.0, 0.0)
-
-
-@pytest.mark.parametrize("criterion", sorted({measure.varies for measure in MEASURES.values()}))
-def test_the_page_of_scores_says_what_is_varied_for_which_measure(criterion):
-    what_is_run = (DOCS / "scoring.md").read_text().split("\n## ")[1]
-    (row,) = re.findall(rf"^\| `{criterion}` \|.*\|(.+)\|$", what_is_run, re.MULTILINE)
-    assert re.findall(r"`(\w+)`", row) == [name for name, measure in MEASURES.items() if measure.varies == criterion]
+def test_a_measure_is_named_after_a_public_function_and_stands_on_its_page():
+    page = (DOCS / "equations.md").read_text()
+    for name, measure in MEASURES.items():
+        assert callable(getattr(metrics, name))
+        assert f"`{name}`" in page
+        assert measure.lowest < measure.highest
+        assert measure.neutral is None or measure.lowest <= measure.neutral <= measure.highest
+        best = (measure.higher_is_better, measure.neutral, measure.lowest)
+        assert not measure.is_distance or best == (False, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(("names", "message"), [(["scalabilty"], "Did you mean 'scalability'"), ([], "got none")])
@@ -252,17 +245,12 @@ UNRATED = {"malfunctions_per_s": None, "repairs_per_s": None}
 LACKING = [
     ((rows(2, IDEAL),), "scalability", "there is one swarm size only, N = 2"),
     (COLLAPSE[1:], "performance_lost", "no reference run of one robot, the smallest swarm has 2"),
-    ((rows(2, IDEAL), rows(4, IDEAL)), "time_emergence", "there is no column interference_fraction"),
     ((rows(2, IDEAL),), "adaptability", "no runs with criterion throttle or handling_cost and a value other than 0"),
-    (throttled(), "raw_performance", "there are no runs with criterion population_size"),
-    (handled(0.0, 2.0, [4.0] * 4), "reactivity", "the ticks that handling takes, and 0 or less"),
     (handled(1.0, [1.0, 0.0, 2.0, 2.0], [4.0] * 4), "reactivity", "the ticks that handling takes, and 0 or less"),
     ((changed(throttled()[0], adversity=0.0), throttled()[1]), "reactivity, paper", "divides by the ideal conditions"),
     ((IDEAL_SWARM, changed(LEVEL, n_active=None)), "recorded_population_robustness", "no column n_active"),
-    ((changed(IDEAL_SWARM, n_active=0.0), LEVEL), "recorded_population_robustness", "no robot of the reference"),
     ((IDEAL_SWARM, changed(LEVEL, repairs_per_s=0.01)), "population_robustness, paper", "more returns than departures"),
     ((IDEAL_SWARM, changed(LEVEL, **UNRATED)), "population_robustness", "there are no rates"),
-    ((IDEAL_SWARM, changed(LEVEL, **UNRATED)), "availability", "there are no rates"),
 ]
 
 
