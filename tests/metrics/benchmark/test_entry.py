@@ -181,13 +181,7 @@ def test_readme_tells_of_the_minute_what_its_entry_says():
     protocol = load_protocol()
     entry = read_entry(root / "docs/benchmark/minute.json")
     standing = standing_of(entry, reference_of(scripted_entries(protocol), protocol), protocol)
-    assert len(standing.won_by_policy) == 5
-    median = sorted(standing.won_by_policy)[2]
-    assert median >= 20
+    *most, last = sorted(standing.won_by_policy, reverse=True)
     words = " ".join((root / "README.md").read_text(encoding="utf-8").split())
-    n_worlds = len(protocol.scored)
-    assert (
-        f"of five such trainings, the median beats all four of the paper's controllers in {median} of {n_worlds}"
-        in words
-    )
-    assert f", and the worst in {min(standing.won_by_policy)}. " in words
+    won = f"{', '.join(map(str, most))} and {last} of {len(protocol.scored)} worlds"
+    assert f"five such trainings beat the paper's four controllers in {won}" in words
