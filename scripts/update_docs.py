@@ -68,7 +68,6 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         )
         for short, name in SCENARIOS.items()
     },
-    "sets": (("swarm-forage study list",), ()),
     **{
         f"recipe_{short}_{seed}": (
             (
@@ -81,22 +80,6 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         for seed in (0, 1)
         if (short, seed) != ("small", 0)  # that is "trained"
     },
-    "five": (("swarm-forage train --seeds 5 --jobs 2 --out results/training/five",), ()),
-    "cpfa_evolved": (
-        (
-            f"python {ROOT}/scripts/evolve_controller.py cpfa search_per_tick=0.001:0.5:log@0.05 "
-            "give_up_per_tick=0.00001:0.02:log@0.0005 uninformed_turn_rad=0:1.5@0.3 "
-            "informed_decay_per_tick=0.001:1:log@0.02 site_fidelity_rate=0.01:20:log@1 --generations 18",
-        ),
-        (),
-    ),
-    "wall": (
-        (
-            "swarm-forage run dpo,generalist --scenario warehouse_small --robots 20 --set n_objects=60 "
-            "--set obstacles=10,4,11,12 --seeds 4",
-        ),
-        ("dpo", "generalist"),
-    ),
     **{
         f"near_wall{suffix}": (
             (
@@ -116,9 +99,6 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     },
 }
 """Name -> commands, of which the last prints the table, and what its rows are called in blocks."""
-
-PROGRAMS = {"swarm-forage": (sys.executable, "-m", "swarm_forage_env.cli"), "python": (sys.executable,)}
-"""First word of a command -> the program of this interpreter, whatever PATH says."""
 
 
 def made_with() -> dict[str, str]:
@@ -143,31 +123,24 @@ def make(name: str) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         for command in commands:
             print(f"{name}: {command}", file=sys.stderr)
-            program, *words = shlex.split(command)
-            printed = subprocess.run(
-                [*PROGRAMS[program], *words], cwd=folder, stdout=subprocess.PIPE, text=True, check=True
-            ).stdout
+            words = [sys.executable, "-m", "swarm_forage_env.cli", *shlex.split(command)[1:]]  # whatever PATH says
+            printed = subprocess.run(words, cwd=folder, stdout=subprocess.PIPE, text=True, check=True).stdout
     return {"made_with": made_with(), **fields(printed, labels)}
 
 
 def fields(printed: str, labels: tuple[str, ...]) -> dict[str, str]:
     """Return the table without the text around it, and the deliveries of each row by its label.
 
-    Without labels, the table is all that was printed.
-
     Raises:
         ValueError: The table has another number of rows than labels.
     """
-    found = deliveries(printed) if labels else []
+    found = deliveries(printed)
     if len(found) != len(labels):
         raise ValueError(f"Expected a table with deliveries of {', '.join(labels)}, got:\n{printed}")
     lines = [line.rstrip() for line in printed.rstrip().splitlines()]
-    if labels:  # a table of runs: a headline, and a note on its intervals
-        top = next(number for number, line in enumerate(lines) if line.startswith("policy "))
-        bottom = next(number for number, line in enumerate(lines) if line.startswith("±"))
-        lines = lines[top - 1 : bottom + 1]
-    table = "\n".join(lines)
-    return {"table": table, **dict(zip(labels, found, strict=True))}
+    top = next(number for number, line in enumerate(lines) if line.startswith("policy "))
+    bottom = next(number for number, line in enumerate(lines) if line.startswith("±"))
+    return {"table": "\n".join(lines[top - 1 : bottom + 1]), **dict(zip(labels, found, strict=True))}
 
 
 def compare(printed: str, stored: dict[str, Any]) -> int:
