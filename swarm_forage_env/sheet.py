@@ -1,7 +1,7 @@
 """Sheets: tables with a title above and notes below. Everything that is printed is one, and is printed here.
 
     print(answer)                   # as text
-    answer.write("answer.md")       # as Markdown; .txt, .csv and .json likewise
+    answer.write("answer.md")       # as Markdown; .txt, .tex, .csv and .json likewise
     answer.draw("answer.png")       # as a picture, where there is one
 
 A function that finds a table returns a `Sheet`. One that finds more returns an `Answer` of its own, which says what its
@@ -19,8 +19,8 @@ import polars as pl
 import polars.selectors as cs
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.files import replacing
-from swarm_forage_env._internal.wording import aligned, folded, number, plain_markdown
+from swarm_forage_env._internal.files import check_file, replacing
+from swarm_forage_env._internal.wording import aligned, folded, number, plain_latex, plain_markdown
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 
 
@@ -64,6 +64,10 @@ class Answer(ABC):
         """Return everything as Markdown, with tables as on GitHub; names make no links."""
         return "\n\n".join(filter(None, (sheet.as_markdown() for sheet in self.sheets()))) + "\n"
 
+    def latex(self) -> str:
+        """Return the tables for LaTeX and its package booktabs; titles and notes are comments."""
+        return "\n\n".join(filter(None, (sheet.as_latex() for sheet in self.sheets()))) + "\n"
+
     def csv(self) -> str:
         """Return the tables as CSV, an empty line between two of them."""
         return "\n".join(sheet.frame.write_csv() for sheet in self.sheets() if len(sheet.frame))
@@ -80,8 +84,7 @@ class Answer(ABC):
             OSError: the file cannot be written.
         """
         path = Path(file)
-        if path.suffix not in FORMS:
-            raise ConfigError(f"Expected a file that ends with {', '.join(FORMS)}, got {path.name}.")
+        check_form(path)
         with replacing(path) as draft:
             draft.write_text(FORMS[path.suffix](self), encoding="utf-8")
 
@@ -91,11 +94,19 @@ class Answer(ABC):
 
 FORMS: dict[str, Callable[[Answer], str]] = {
     ".txt": lambda answer: f"{answer.text()}\n",
-    ".md": Answer.markdown,
-    ".csv": Answer.csv,
+    ".md": lambda answer: answer.markdown(),
+    ".tex": lambda answer: answer.latex(),
+    ".csv": lambda answer: answer.csv(),
     ".json": lambda answer: f"{answer.json()}\n",
 }
 """Ending of a file -> what stands in it."""
+
+
+def check_form(file: Path) -> None:
+    """Refuse a file whose ending is none of `FORMS`, or that cannot be written; ConfigError or OSError."""
+    if file.suffix not in FORMS:
+        raise ConfigError(f"Expected a file that ends with {', '.join(FORMS)}, got {file.name}.")
+    check_file(file)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -137,6 +148,16 @@ class Sheet(Answer):
             lines = [header, ["---"] * len(header), *rows]
             parts.append("\n".join(f"| {' | '.join(map(plain_markdown, line))} |" for line in lines))
         return "\n\n".join([*parts, *self.notes])
+
+    def as_latex(self) -> str:
+        """Return the table as a tabular."""
+        about = [f"% {line}" for note in (self.title, *self.notes) for line in note.split("\n") if line]
+        if not len(self.frame):
+            return "\n".join(about)
+        header, *rows = (f"{' & '.join(map(plain_latex, line))} \\\\" for line in self._cells())
+        columns = "l" + "r" * (self.frame.width - 1)
+        begin, end = f"\\begin{{tabular}}{{{columns}}}", "\\end{tabular}"
+        return "\n".join([*about, begin, "\\toprule", header, "\\midrule", *rows, "\\bottomrule", end])
 
     def _cells(self) -> list[list[str]]:
         return [self.frame.columns, *([_cell(value) for value in row] for row in self.frame.iter_rows())]

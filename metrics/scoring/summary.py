@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
+import polars.selectors as cs
 
 from swarm_forage_env._internal.wording import counted, percent, plain
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
@@ -87,6 +89,14 @@ class RunSummary(Answer):
             return f"{scenario.name} and others: {counted(self.n_worlds, 'world')}"
         sizes = counted(self.world.n_robots, "robot"), counted(scenario.objects.n_objects, "object")
         return self.world.title(*sizes, f"{scenario.horizon_s:g} s")
+
+    def csv(self) -> str:
+        """Return `rows` as CSV: a column for each mean, and one for each end of its interval."""
+        found = pl.DataFrame(self.rows, infer_schema_length=None)
+        for name in found.select(cs.struct()).columns:
+            parts = [name, f"{name}_low", f"{name}_high"]
+            found = found.with_columns(pl.col(name).struct.rename_fields(parts)).unnest(name)
+        return found.write_csv()
 
     def to_mapping(self) -> dict[str, Any]:
         """Return policies, runs and failures as plain values."""

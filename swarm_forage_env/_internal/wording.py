@@ -126,6 +126,25 @@ def plain_markdown(text: str) -> str:
     return re.sub(r"://|(?<=www)\.|@", rf"{_NOTHING}\g<0>", words, flags=re.IGNORECASE)
 
 
+def plain_latex(text: str) -> str:
+    """Return a text for LaTeX, in one line, without commands."""
+    return " ".join(text.split()).translate(_LATEX)
+
+
+_LATEX = str.maketrans(
+    {
+        **{sign: f"\\{sign}" for sign in "&%$#_{}"},
+        "\\": r"\textbackslash{}",
+        "~": r"\textasciitilde{}",
+        "^": r"\textasciicircum{}",
+        "±": r"$\pm$",
+        "²": "$^2$",
+        "<": "$<$",
+        ">": "$>$",
+    }
+)
+
+
 def shown(value: Any) -> str:
     """Return the representation of a value for a message, cut where it is long."""
     try:

@@ -53,6 +53,9 @@ Performance = Annotated[
     ),
 ]
 Picture = Annotated[Path | None, Parameter(help="Picture to draw: .png, .svg or .pdf; default beside the results.")]
+AnswerFile = Annotated[
+    Path | None, Parameter(name="--file", help="Also write the answer to a file: .txt, .md, .tex, .csv or .json.")
+]
 AsJson = Annotated[bool, Parameter(name="--json", help="Print the results as JSON.")]
 DryRun = Annotated[bool, Parameter(help="Say how many runs there are, how many are stored, and how large the rest is.")]
 
@@ -105,6 +108,7 @@ class RunOptions:
     jobs: Jobs = None
     dry_run: DryRun = False
     as_json: AsJson = False
+    file: AnswerFile = None
     picture: Picture = None
 
 

@@ -74,9 +74,12 @@ def ask_and_show(
     from swarm_forage_env.cli.worlds import default_file, default_folder
     from swarm_forage_env.rendering.figures import picture_ending
     from swarm_forage_env.runs.plan import planned_line, run_plan
+    from swarm_forage_env.sheet import check_form
 
     folder = options.out or default_folder(world)
     picture = options.picture or default_file(folder, world, policies, ending, seed=seed)
+    if options.file is not None:
+        check_form(options.file)
     picture_ending(picture)  # before the work; a place that cannot be written to is told of beside the answer
     if options.dry_run:
         specs = question.plan.specs
@@ -90,18 +93,19 @@ def ask_and_show(
         if not table.failures:
             raise
         raise CommandError(str(error)) from None
-    show(answer, picture, as_json=options.as_json)
+    show(answer, picture, as_json=options.as_json, file=options.file)
     _tell_of_records(table, folder)
     return int(bool(table.failures))
 
 
-def show(answer: "Answer", picture: Path | None = None, *, as_json: bool = False) -> None:
-    """Print an answer, and draw it.
+def show(answer: "Answer", picture: Path | None = None, *, as_json: bool = False, file: Path | None = None) -> None:
+    """Print an answer, draw it, and write it.
 
     Args:
         answer: What was found.
         picture: File for the picture; one that cannot be made is told of, because the answer is worth more.
         as_json: Print JSON; it names the picture.
+        file: See `Answer.write`.
     """
     drawn = None if picture is None or not answer.has_picture else drawn_or_told(answer, picture)
     if as_json:
@@ -111,6 +115,9 @@ def show(answer: "Answer", picture: Path | None = None, *, as_json: bool = False
         say(answer.text(width=width_of_terminal()))
     if drawn is not None:
         note(f"picture {drawn}")
+    if file is not None:
+        answer.write(file)
+        note(f"written {file}")
 
 
 def width_of_terminal() -> int | None:

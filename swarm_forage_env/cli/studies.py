@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Annotated, cast
 from cyclopts import App, Parameter
 from cyclopts.types import PositiveInt
 
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli import EXIT_FAILURE
-from swarm_forage_env.cli.options import AsJson, DryRun, Jobs, Names, StyleOptions
+from swarm_forage_env.cli.options import AnswerFile, AsJson, DryRun, Jobs, Names, StyleOptions
 from swarm_forage_env.cli.printer import note, say, show
 
 if TYPE_CHECKING:
@@ -115,31 +114,21 @@ def _read(place: Path) -> "StudyTable":
 
 
 @app.command
-def verdict(places: Places, /, *, file: Path | None = None, as_json: AsJson = False) -> None:
+def verdict(places: Places, /, *, file: AnswerFile = None, as_json: AsJson = False) -> None:
     """Test the claims of the paper with runs of its sets: which claims they support, contradict or leave open.
 
     First come the counts of each answer and one table of all claims; then the evidence for each answer. The same
     follows for the paper's intuitions, what the authors expected of each algorithm before the experiments.
-
-    Args:
-        file: Also write the answer to a file: .txt, .md, .csv or .json, with more numbers.
     """
     from metrics import verdict as verdict_of
-    from swarm_forage_env._internal.files import check_file
-    from swarm_forage_env.sheet import FORMS
+    from swarm_forage_env.sheet import check_form
 
-    if file is not None and file.suffix not in FORMS:
-        raise ConfigError(f"Expected --file as a file ending in {', '.join(FORMS)}, got {str(file)!r}.")
-    tables = [_read(place) for place in places]
     if file is not None:
-        check_file(file)
-    found = verdict_of(*tables, tell=note)
+        check_form(file)
+    found = verdict_of(*map(_read, places), tell=note)
     for remark in found.remarks:
         note(f"note: {remark}")
-    show(found, as_json=as_json)
-    if file is not None:
-        found.write(file)
-        note(f"written {file}")
+    show(found, as_json=as_json, file=file)
 
 
 @app.command

@@ -219,7 +219,10 @@ def test_conditions_in_several_worlds_have_a_row_each(tmp_path, monkeypatch):
     lines = str(summary).splitlines()
     assert lines[0] == "warehouse_small and others: 2 worlds"
     assert "warehouse_small, 3 robots, 20 objects, sensor noise: sigma 0.03 (all sensors)" in lines[3]
-    assert summary.csv().splitlines()[0].startswith("policy,world,caches,runs,")
+    summary.write(tmp_path / "runs.csv")
+    rows = pl.read_csv(tmp_path / "runs.csv")
+    assert rows["controller", "world", "n_runs"].rows() == [(of.label, world.name, 2) for of, world in plan.conditions]
+    assert (rows["performance_low"] <= rows["performance"]).all()
     answer = json.loads(summary.json())
     assert [len(answer[name]) for name in ("controllers", "runs", "failures")] == [4, 8, 0]
     assert (answer["out"], answer["runs"][0]["file"]) == (None, None)
