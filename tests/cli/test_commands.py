@@ -6,14 +6,13 @@ from pathlib import Path
 import pytest
 
 from swarm_forage_env.cli.options import WorldOptions
-from swarm_forage_env.cli.worlds import default_file, described_world
+from swarm_forage_env.cli.worlds import described_world
 from swarm_forage_env.inspect.descriptions import _scenario_lines
 from swarm_forage_env.policies.registry import RandomPolicy
 from swarm_forage_env.runs.record import Record
 from swarm_forage_env.runs.store import load
 from swarm_forage_env.scenarios.overrides import field_sections
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
-from swarm_forage_env.wrappers.world import World
 
 SHORT = ("--robots", "3", "--set", "n_objects=20", "--horizon", "4", "--set", "interval_s=2", "--jobs", "1")
 RUN = ("run", "random", *SHORT)
@@ -51,16 +50,6 @@ def test_a_dry_run_plans_and_touches_nothing(command):
     assert not list(Path.cwd().iterdir())
 
 
-def test_wrappers_disturb_the_run_and_are_part_of_its_record(command):
-    words = ("--wrapper", "actuator_noise:sigma=0.1", "--wrapper", "throttle:waveform=constant,amplitude=0.2")
-    code, out, _ = command(*RUN, *words, "--json")
-    assert code == 0
-    record = Record.read(json.loads(out)["runs"][0]["file"])
-    assert record["adversity"].tolist() == pytest.approx([0.2, 0.2])
-    assert "4 s, with throttle: robots lose 20 % of their speed, wheel noise: sigma 0.1" in command(*RUN, *words)[1]
-    assert [wrapper["wrapper"] for wrapper in record.spec.to_mapping()["wrappers"]] == ["throttle", "actuator_noise"]
-
-
 def test_a_failed_run_is_reported_with_the_way_to_run_it_again(command, monkeypatch):
     def refuse(self, obs, active):
         raise RuntimeError("I would rather not")
@@ -90,14 +79,6 @@ def test_info_prints_each_field_as_set_takes_it(name):
     assert len(fields) > 50
     words = tuple(f"{field}={told[field]}" for field in fields)
     assert described_world(WorldOptions(scenario=name, settings=words))[0].scenario == config
-
-
-def test_pictures_of_other_questions_have_other_names(command):
-    names = {default_file(Path(), World(scenario("classroom")), policies, ".png", seed=seed)
-             for policies in (["crw"], ["crw", "dpo"]) for seed in (0, 3)}  # fmt: skip
-    assert len(names) == 4
-    code, out, _ = command(*RUN, "--seeds", "2", "--seed", "3", "--json")
-    assert (code, [run["seed"] for run in json.loads(out)["runs"]]) == (0, [3, 4])
 
 
 CONFIG = """

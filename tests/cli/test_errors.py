@@ -1,13 +1,11 @@
 """How commands end that fail: what a user can mend is a line on stderr, all else a traceback."""
 
-import os
 import subprocess
 import sys
 from importlib.util import find_spec
 
 import pytest
 
-from swarm_forage_env._internal.files import check_file, replacing
 from swarm_forage_env.env import ForageEnv
 
 
@@ -55,21 +53,6 @@ def test_where_a_command_reads_and_writes_may_be_gone(tmp_path, words, out, err)
     assert ended.stdout.startswith(out)
     assert ended.stderr.startswith(err)
     assert (ended.stdout.count("\n"), ended.stderr.count("\n")) == (bool(out), bool(err))
-
-
-def test_a_file_is_written_where_a_link_leads_and_nothing_but_a_file_is_replaced(tmp_path):
-    (tmp_path / "link").symlink_to("behind")
-    with replacing(tmp_path / "link") as draft:
-        draft.write_text("new")
-    assert (tmp_path / "link").is_symlink()
-    assert (tmp_path / "behind").read_text() == "new"
-    os.mkfifo(tmp_path / "pipe")
-    (tmp_path / "device").symlink_to(os.devnull)
-    for place in (tmp_path, tmp_path / "pipe", tmp_path / "device"):
-        with pytest.raises(OSError, match="Expected a file to write, got a"):
-            check_file(place)
-        with pytest.raises(OSError, match="Expected a file to write, got a"), replacing(place):
-            pytest.fail("it would have been replaced")
 
 
 RUN = ("run", "random", "--robots", "3", "--horizon", "4", "--set", "interval_s=2", "--jobs", "1")

@@ -42,14 +42,5 @@ def test_every_command_tells_of_itself_and_of_each_option():
             assert all(argument.parameter.help for argument in arguments if not argument.children), words
 
 
-def test_a_command_that_lacks_its_words_shows_its_help(command):
-    code, out, err = command("run")
-    assert (code, out.startswith("Usage: swarm-forage run ")) == (2, True)
-    assert err.count("\n") == 1
-    assert command("run", "--seeds", "2")[:2] == (2, "")
-    code, out, err = command("score")
-    assert (code, out.startswith("Usage: swarm-forage score "), err.count("\n")) == (2, True, 1)
-
-
 def test_only_what_is_asked_for_is_imported():
     assert imported("--help") == imported("study", "-h") == imported("run", "--help") == set()

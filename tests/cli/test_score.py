@@ -22,17 +22,6 @@ def tiny_budget(monkeypatch):
     monkeypatch.setitem(BUDGETS, "tiny", tiny)
 
 
-def test_sizes_keep_a_density_if_asked(command):
-    words = ("--robots", "20", "--set", "density=0.05", "--measures", "raw_performance")
-    code, _, _ = command("score", "random", "--jobs", "1", "--budget", "tiny", *words)
-    assert code == 0
-    arenas = {
-        (record.spec.world.n_robots, record.spec.scenario.arena.width_m)
-        for record in load(Path("results/warehouse_small_20_robots_9db01d"))
-    }
-    assert arenas == {(1, 28.4), (20, 28.4)}
-
-
 def test_json_is_the_only_thing_on_stdout(command):
     _, out, _ = command(*SCORE, *FEW, "--json")
     told = json.loads(out)

@@ -66,18 +66,6 @@ def test_a_signal_ends_a_command_in_one_line(tmp_path, words, after_s, sent):
         assert [line[:25] for line in err.splitlines() if "nterrupt" in line] == ["swarm-forage: Interrupted"], err
 
 
-@pytest.mark.slow
-def test_a_signal_that_is_ignored_where_the_command_begins_stays_so(tmp_path):
-    """So begin commands behind nohup, and those that a script puts into the background."""
-    words = ["bash", "-c", f"trap '' INT; exec {sys.executable} -c '{HEARS}' list"]
-    with subprocess.Popen(words, cwd=tmp_path, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as started:
-        assert started.stderr.readline() == "heard\n"
-        started.send_signal(signal.SIGINT)
-        out, err = started.communicate(timeout=60)
-    assert (started.returncode, err) == (0, "")
-    assert "scenarios" in out
-
-
 def test_what_a_library_swallows_is_raised_again(heard, monkeypatch, capsys):
     def careless(_):
         with suppress(BaseException):  # as some libraries do around imports

@@ -1,6 +1,5 @@
 """`swarm-forage train`, as a person uses it."""
 
-import builtins
 import dataclasses
 import json
 import re
@@ -11,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.cli import training_report
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.training.evaluation import (
@@ -82,22 +80,6 @@ def test_a_training_is_resumed_by_its_folder_alone(command):
     assert (code, "finished: 256 of 256" in err) == (0, True)
     code, _, err = command(*TRUSTING, "--out", "a", "--resume", "--steps", "255")
     assert (code, "at least the 256 steps" in err) == (2, True)
-
-
-def test_without_the_training_library_the_message_says_what_to_install(command, monkeypatch):
-    real = builtins.__import__
-
-    def without(name, *rest, **named):
-        if name.split(".")[0] == "stable_baselines3":
-            raise ModuleNotFoundError("No module named 'stable_baselines3'", name="stable_baselines3")
-        return real(name, *rest, **named)
-
-    for name in [name for name in sys.modules if name.startswith("swarm_forage_env.training.sb3")]:
-        monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setattr(builtins, "__import__", without)
-    code, _, err = command("train", *TINY)
-    assert code == 1
-    assert install_command("train") in err
 
 
 @needs_training

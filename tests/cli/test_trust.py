@@ -69,14 +69,6 @@ def test_a_plan_that_names_a_model_is_refused_before_anything_starts(command, tm
     assert "which you did not name yourself" in err
 
 
-def test_the_option_opens_what_a_file_names(command, model, tmp_path):
-    pytest.importorskip("stable_baselines3")
-    spec = RunSpec(world=World(scenario("warehouse_small", n_robots=2, n_objects=10)), policy=str(model))
-    store(tmp_path / "store", RunFailure(spec=spec, error="e", traceback="t"))
-    code, _, _ = command("--trust-models", "rerun", str(failure_file(tmp_path / "store", spec.run_id)))
-    assert (code, Path("owned").exists()) == (2, True)  # it holds no model
-
-
 def test_networks_need_no_trust(tmp_path):
     with trust.only_typed(()):
         load_policy("ppo_warehouse_small")

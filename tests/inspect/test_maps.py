@@ -132,12 +132,3 @@ def test_the_layers_and_every_field_of_the_interface_are_told(told):
     fields = {line.split()[0]: line.split()[-1] for line in lines if line.startswith("    ")}
     assert {*(item.name for item in dataclasses.fields(InterfaceConfig)), "samples", "caches"} == set(fields)
     assert (fields["decision_ticks"], fields["frame_decisions"], fields["caches"]) == ("5", "200", "static")
-
-
-def test_a_card_may_hold_anything_and_long_entries_are_cut(told):
-    lines = told(card={"plan": {"stages": [{"steps": 7}] * 99, "hidden": [64, 32]}, "was": "me"})
-    assert ["hidden", "64", "x", "32"] in [line.split() for line in lines]
-    (stages,) = (line for line in lines if line.split()[:1] == ["stages"])
-    assert stages.endswith(" ...")
-    assert len(stages) < 200
-    assert lines[-1].strip() == "me"

@@ -112,18 +112,6 @@ def test_pause_step_and_speed():
     assert session.frame()["time_s"] == pytest.approx(0.2 + SPEEDS[-1] * playing.LONGEST_WAIT_S)
 
 
-def test_levels_change_while_the_run_goes_on():
-    session, clock = session_of()
-    look_after(session, clock, 1.0)
-    assert session.carry_out({"do": "level", "name": "throttle", "value": 0.5}) == "throttle is 0.5"
-    session.carry_out({"do": "level", "name": "failures", "value": 400.0})
-    frame = look_after(session, clock, 4.0)
-    assert (frame["levels"]["throttle"], frame["levels"]["failures"]) == (0.5, 400.0)
-    assert frame["changes"] == "throttle 0.5, failures per 1,000 s 400"
-    assert any(status & Status.REPAIR for status in frame["status"])
-    assert frame["run"] == 1, "nothing was started again"
-
-
 def test_a_robot_is_killed_broken_and_repaired():
     session, clock = session_of()
     look_after(session, clock, 0.5)
@@ -142,22 +130,6 @@ def test_a_robot_is_killed_broken_and_repaired():
     assert not frame["status"][5] & Status.REPAIR
     assert (frame["x"][5], frame["y"][5]) != where
     assert frame["changes"] == "robot 2 killed, robot 5 broken, robot 5 repaired"
-
-
-def test_a_wall_starts_the_run_again_with_the_same_seed():
-    session, clock = session_of()
-    look_after(session, clock, 1.0)
-    session.carry_out({"do": "level", "name": "throttle", "value": 0.2})
-    assert session.carry_out({"do": "wall", "box": WALL}) == "started again with 1 wall"
-    frame = session.frame({"run": 1})
-    assert (frame["time_s"], frame["run"], frame["levels"]["throttle"]) == (0.0, 2, 0.2)
-    assert frame["about"]["header"]["world"]["obstacles_m"] == (WALL,)
-    assert frame["about"]["header"]["seed"] == 3
-    assert session.carry_out({"do": "wall", "box": [6.0, 6.0, 6.5, 6.5]}) == "started again with 2 walls"
-    assert session.carry_out({"do": "remove_wall", "index": 0}) == "started again with 1 wall"
-    assert session.setting.world.scenario.arena.obstacles == ((6.0, 6.0, 6.5, 6.5),)
-    session.carry_out({"do": "remove_walls"})
-    assert session.setting.world.scenario.arena.obstacles == ()
 
 
 def test_robots_policy_scenario_and_seed_start_another_run():
@@ -191,17 +163,6 @@ def test_a_wrong_command_is_refused_and_changes_nothing(command, expected):
     with pytest.raises(ConfigError, match=expected):
         session.carry_out(command)
     assert (session.setting, session.run, session.levels.changes) == (before, run, [])
-
-
-def test_a_chosen_robot_is_told_of():
-    session, clock = session_of("stochm")
-    session.carry_out({"do": "speed", "value": 100})
-    frame = look_after(session, clock, 2.0, run=1, robot=3)
-    assert frame["robot"]["wheels"].endswith("cm/s")
-    assert len(frame["robot"]["places"]) == sum(map(len, session._policy.describe_memories().of_robot(3)))
-    assert frame["words"][frame["activity"][3]]
-    plain, clock = session_of("ppo_warehouse_small")
-    assert look_after(plain, clock, 0.2, run=1, robot=0)["robot"]["places"] == []
 
 
 def test_the_curve_adds_up_to_what_was_counted():

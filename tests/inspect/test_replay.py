@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.contract.codes import Counter, ObjectStatus, Task
+from swarm_forage_env.contract.codes import Counter, ObjectStatus
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.inspect.replay import capture
 from swarm_forage_env.inspect.replay.capture import record_replay
 from swarm_forage_env.inspect.replay.coding import pack, unpack
 from swarm_forage_env.inspect.replay.files import read_replays, write_replays
@@ -169,28 +168,6 @@ def test_places_are_those_that_robots_remember(name, tmp_path):
             n_places += len(expected)
     assert n_places > 0
     assert (kept.memory_events[:, 2] < 0).any(), "something has been forgotten"
-
-
-def test_tasks_and_activities_are_those_of_the_policy():
-    spec = spec_of("stochm", ())
-    kept = record_replay(spec, frame_s=2.0)
-    policy = load_policy("stochm")
-    run = LiveRun(build_env(spec.scenario, reads=policy.reads), policy, spec.seed)
-    for frame, tick in enumerate(kept.ticks.tolist()):
-        run.advance(to_tick=tick)
-        assert np.array_equal(kept.task[frame], policy.task)
-        states = policy.describe_robots()
-        assert np.array_equal(kept.activity[frame], states.activity)
-    assert kept.has_tasks
-    assert (kept.task[-1] != Task.NONE).any()
-    assert kept.activities == states.words
-
-
-@pytest.mark.parametrize(("most", "expected"), [(12 * 81, 5), (12 * 80, 10), (12 * 20, 25), (12 * 2, 500)])
-def test_many_robots_and_long_runs_get_fewer_frames(monkeypatch, most, expected):
-    monkeypatch.setattr(capture, "MOST_POSES", most)
-    kept = record_replay(spec_of("random", ()))
-    assert kept.frame_ticks == expected
 
 
 # Files

@@ -4,7 +4,6 @@ import ast
 import copy
 import logging
 import os
-import pickle
 import re
 import subprocess
 import sys
@@ -144,13 +143,6 @@ def test_a_direct_call_does_what_the_kernel_does_for_arrays_of_any_length():
         np.testing.assert_array_equal(out, 2.0 * values)
 
 
-@pytest.mark.skipif(os.environ.get("NUMBA_DISABLE_JIT") == "1", reason="only compiled code has fixed types")
-def test_a_direct_call_refuses_arrays_of_another_type():
-    call_it = compiling.direct(_doubled, np.zeros(3), 1.0, np.zeros(3))
-    with pytest.raises(TypeError):
-        call_it(np.zeros(3, np.float32), 2.0, np.zeros(3))
-
-
 @kernel
 def double(numbers):
     for i in range(numbers.size):
@@ -176,12 +168,6 @@ def test_a_kernel_takes_any_function_of_a_type_as_an_argument():
     for function, expected in ((double, [8.0, 24.0]), (negate, [-8.0, -24.0])):
         call(Callback(function, numbers), numbers)
         assert numbers.tolist() == expected
-
-
-@pytest.mark.parametrize("copied", [pickle.dumps, copy.deepcopy, copy.copy])
-def test_a_callback_is_not_taken_to_another_process(copied):
-    with pytest.raises(TypeError, match="cannot be pickled; make it anew from its function"):
-        copied(Callback(double, np.zeros(2)))
 
 
 # Caches that cannot be used

@@ -3,12 +3,11 @@
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from threading import Thread
 
 import numpy as np
 import pytest
 
-from swarm_forage_env._internal.files import alone_in, check_folder, replacing
+from swarm_forage_env._internal.files import alone_in, replacing
 from swarm_forage_env._internal.rng import Stream, TickDraws, stream_rng
 
 HOLDER = """
@@ -49,23 +48,6 @@ class RefusalError(ValueError, LookupError):
     """An error of whoever asks."""
 
 
-def test_who_waits_comes_after_the_first(tmp_path):
-    pytest.importorskip("fcntl")
-    told = []
-
-    def second():
-        with alone_in(tmp_path):
-            told.append("second")
-
-    waiting = Thread(target=second)
-    with alone_in(tmp_path):
-        waiting.start()
-        waiting.join(0.2)
-        told.append("first")
-    waiting.join()
-    assert told == ["first", "second"]
-
-
 def test_drafts_of_one_file_have_different_names_in_every_thread(tmp_path):
     def draft_name(_) -> str:
         with replacing(tmp_path / "record.parquet") as draft:
@@ -86,12 +68,6 @@ def test_a_file_keeps_its_content_when_its_successor_does_not_fit(full_disk, tmp
     assert caught.value.filename == str(path), "the draft's name means nothing to people"
     assert path.read_bytes() == b"short"
     assert [file.name for file in tmp_path.iterdir()] == ["record.parquet"]
-
-
-def test_a_full_disk_is_told_by_the_name_of_the_folder(full_disk, tmp_path):
-    with pytest.raises(OSError, match="File too large") as caught:
-        check_folder(tmp_path / "runs")
-    assert caught.value.filename == str(tmp_path / "runs")
 
 
 def test_stream_numbers_are_stored_history():

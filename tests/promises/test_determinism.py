@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.support.busy import BusyPolicy, change_population
 from tests.support.crowded_runs import EPISODES, RUNS, digest, episode_digest, fresh, make
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -44,19 +43,6 @@ def test_a_seed_is_a_run(policy, name, caches, elsewhere):
 @pytest.mark.parametrize(("name", "policy"), EPISODES)
 def test_a_seed_is_a_whole_episode_through_all_wrappers(name, policy, elsewhere):
     assert episode_digest(name, policy) == elsewhere[f"{name} {policy}"]
-
-
-def test_a_reset_in_the_middle_of_a_run_leaves_nothing_behind():
-    env = make("warehouse_small", "dynamic")
-    expected = digest(env, BusyPolicy(), 5)
-    policy = BusyPolicy()
-    policy.reset(env.swarm_spec, np.random.default_rng(0))
-    obs = env.reset_batch(99)
-    rng = np.random.default_rng(1)
-    for _ in range(25):
-        change_population(env, rng)
-        obs = env.step_batch(policy.act(obs, env.active))[0]
-    assert digest(env, BusyPolicy(), 5) == expected
 
 
 def test_the_world_does_not_depend_on_who_draws_actions():

@@ -19,60 +19,60 @@ from tests.support.entries import TINY
 from tests.support.small_files import small_file
 
 
-def test_a_replay_of_another_version_is_refused(tmp_path):
-    page = small_file("replay.html").read_text(encoding="utf-8")
-    told = f'"version": {FORMAT_VERSION},'
-    assert page.count(told) == 1
-    (tmp_path / "a.html").write_text(page.replace(told, '"version": 99,'), encoding="utf-8")
-    with pytest.raises(ConfigError, match=f"version 99 of the format, this version .* reads {FORMAT_VERSION}; "):
-        read_replays(tmp_path / "a.html")
+def in_text(old, new):
+    """Write other words into a file."""
+
+    def change(file):
+        text = file.read_text(encoding="utf-8")
+        assert text.count(old) == 1
+        file.write_text(text.replace(old, new), encoding="utf-8")
+
+    return change
 
 
-def test_a_data_set_with_an_unknown_field_is_refused(tmp_path):
-    shutil.copytree(small_file("dataset"), tmp_path / "other")
-    card = tmp_path / "other/dataset.json"
-    card.write_text(json.dumps(json.loads(card.read_text(encoding="utf-8")) | {"colour": 1}), encoding="utf-8")
-    with pytest.raises(DatasetError, match="'colour'"):
-        Dataset(tmp_path / "other")
+def in_json(*path):
+    """Write an unknown field into a table of a file, found by its keys."""
+
+    def change(file):
+        content = json.loads(file.read_text(encoding="utf-8"))
+        table = content
+        for key in path:
+            table = table[key]
+        table["colour"] = 1
+        file.write_text(json.dumps(content), encoding="utf-8")
+
+    return change
 
 
-def test_a_network_with_unknown_fields_is_refused(tmp_path):
-    with np.load(small_file("network.npz")) as stored:
-        parts = dict(stored)
-    for changed, reason in (
-        ({"gates": 1}, "Unknown key about a network 'gates'"),
-        ({"interface": {"colour": 1}}, "Unknown"),
-    ):
+def in_network(**changed):
+    """Write something else about a network."""
+
+    def change(file):
+        with np.load(file) as stored:
+            parts = dict(stored)
         about = np.array(json.dumps(json.loads(str(parts["about"])) | changed))
-        np.savez(tmp_path / "a.npz", **(parts | {"about": about}))
-        with pytest.raises(NetworkError, match=reason):
-            Network.load(tmp_path / "a.npz")
+        np.savez(file, **(parts | {"about": about}))
+
+    return change
 
 
-@pytest.mark.parametrize(
-    ("name", "read", "error"),
-    [
-        ("entry.json", lambda file: read_entry(file, load_protocol(TINY)), BenchmarkError),
-        ("plan.json", read_plan, ConfigError),
-    ],
-)
-def test_an_unknown_field_is_refused(tmp_path, name, read, error):
-    content = json.loads(small_file(name).read_text(encoding="utf-8"))
-    (tmp_path / name).write_text(json.dumps(content | {"colour": 1}), encoding="utf-8")
-    with pytest.raises(error, match=r"Unknown key .*'colour'"):
-        read(tmp_path / name)
+VERSION = in_text(f'"version": {FORMAT_VERSION},', '"version": 99,')
+OTHER = [
+    ("replay.html", "", VERSION, read_replays, ConfigError, f"version 99 of the format, .* reads {FORMAT_VERSION}; "),
+    ("dataset", "dataset.json", in_json(), Dataset, DatasetError, "'colour'"),
+    ("network.npz", "", in_network(gates=1), Network.load, NetworkError, "Unknown key about a network 'gates'"),
+    ("network.npz", "", in_network(interface={"colour": 1}), Network.load, NetworkError, "Unknown"),
+    ("entry.json", "", in_json(), lambda file: read_entry(file, load_protocol(TINY)), BenchmarkError, "key .*'colour'"),
+    ("plan.json", "", in_json(), read_plan, ConfigError, "key .*'colour'"),
+    ("failure.json", "", in_json("spec", "scenario"), read_failure, RecordError, "key .*colour"),
+    ("evaluations.csv", "", in_text("wall_time_s", "colour"), read_evaluations, ConfigError, r"evaluations\.csv"),
+]
 
 
-def test_a_failure_in_an_unknown_world_is_refused(tmp_path):
-    content = json.loads(small_file("failure.json").read_text(encoding="utf-8"))
-    content["spec"]["scenario"]["gravity"] = 1.0
-    (tmp_path / "a.json").write_text(json.dumps(content), encoding="utf-8")
-    with pytest.raises(RecordError, match=r"Unknown key .*gravity"):
-        read_failure(tmp_path / "a.json")
-
-
-def test_evaluations_with_an_unknown_column_are_refused(tmp_path):
-    first, *rows = small_file("evaluations.csv").read_text(encoding="utf-8").splitlines()
-    (tmp_path / "evaluations.csv").write_text("\n".join([f"{first},loss", *(f"{row},1" for row in rows)]))
-    with pytest.raises(ConfigError, match=r"evaluations\.csv"):
-        read_evaluations(tmp_path / "evaluations.csv")
+@pytest.mark.parametrize(("name", "part", "change", "read", "error", "told"), OTHER)
+def test_files_that_are_not_as_this_version_writes_them_are_refused(tmp_path, name, part, change, read, error, told):
+    original, file = small_file(name), tmp_path / name
+    (shutil.copytree if original.is_dir() else shutil.copy)(original, file)
+    change(file / part if part else file)
+    with pytest.raises(error, match=told):
+        read(file)

@@ -20,10 +20,8 @@ from swarm_forage_env.rendering.figures import (
     FORMATS,
     FigureStyle,
     check_picture,
-    log_height,
     looks,
     saved_figure,
-    size_axis,
 )
 from swarm_forage_env.rendering.plots import Curve, draw_curves
 from tests.support.pictures import words_in
@@ -94,35 +92,3 @@ def test_policies_of_the_paper_have_its_names_and_always_their_own_looks(tmp_pat
     assert len({look.colour for look in looks([f"policy {k}" for k in range(20)])}) == len(COLOURS)
     words = words_in(draw(tmp_path / "it.svg", names=("mine", "dpo", "crw")))
     assert [word for word in words if word in ("mine", "DPO", "CRW")] == ["CRW", "DPO", "mine"], "in the paper's order"
-
-
-def test_numbers_that_would_run_into_each_other_stand_on_two_lines(tmp_path):
-    with saved_figure(tmp_path / "it.svg", (2.5, 2.0)) as figure:
-        panel = figure.subplots()
-        size_axis(panel, [2**k for k in range(11)])
-    words = [label.get_text() for label in panel.get_xticklabels()]
-    assert words[-1] == "1024", "the largest swarm has its number"
-    assert {word[:1] == "\n" for word in words if word} == {False, True}
-
-
-def test_legends_of_several_rows_are_read_row_by_row(tmp_path):
-    names = ("generalist", "crw", "dpo", "stochm", "stochx", "my own policy")
-    words = words_in(draw(tmp_path / "it.svg", names=names, style=FigureStyle(width_in=3.4)))
-    shown = [word for word in words if word.lower() in names]  # as it is drawn, column by column
-    n_rows = shown.index("DPO")
-    assert n_rows > 1
-    assert [*shown[::n_rows], *shown[1::n_rows]] == ["CRW", "DPO", "STOCHM", "STOCHX", "generalist", "my own policy"]
-
-
-def test_a_bar_that_reaches_below_zero_is_drawn_to_the_edge_of_a_logarithmic_axis(tmp_path):
-    with saved_figure(tmp_path / "bars.png", (3.0, 3.0)) as figure:
-        panel = figure.subplots()
-        log_height(panel)
-        panel.errorbar([1.0, 2.0], [5.0, 50.0], yerr=[[8.0, 5.0], [8.0, 5.0]])
-        (bars,) = panel.containers[0][2]
-        low, high = panel.get_ylim()
-        bottom, top = panel.transData.transform(bars.get_segments()[0])[:, 1]
-        edge = panel.transData.transform((1.0, low))[1]
-    assert bottom < edge < top
-    assert low > 1.0
-    assert high < 100.0

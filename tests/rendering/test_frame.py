@@ -190,24 +190,6 @@ def test_obstacles_are_walls_and_the_legend_names_what_the_world_has():
     assert not {"obstacle", "source", "cache"} & elsewhere
 
 
-def test_trails_fade_towards_the_past(world):
-    trails = Trails(4, 30)
-    for step in range(30):
-        world.swarm.position[0] = (10.0 + 0.1 * step, 10.0)
-        trails.add(world.swarm)
-    world.swarm.present[1] = False
-    trails.add(world.swarm)
-    assert np.isnan(trails.position[-1]).all(axis=1).tolist() == [False, True, False, False], "nobody drives there"
-    picture = world.draw(trails=trails)
-    blue = [world.pixel(picture, x, 10.0)[2] for x in (10.5, 11.2, 12.0, 12.6)]
-    assert blue == sorted(blue)
-    assert PALETTE.floor[2] < blue[0] < blue[-1] < PALETTE.empty[2]
-    with pytest.raises(ConfigError, match="4 robots, got 5"):
-        world.draw(trails=Trails(5, 3))
-    with pytest.raises(ConfigError, match="n_samples"):
-        Trails(4, 1)
-
-
 def test_a_long_headline_is_wrapped_and_hides_no_figures(world):
     short, long = (world.draw(title=title)[: world.view.header] for title in ("a", "many words of a title " * 9))
     ink = (long != PALETTE.page).any(axis=2)
@@ -221,16 +203,6 @@ def test_a_headline_without_room_is_cut_off_and_stays_legible():
     assert (size, len(lines), lines[-1].endswith(" ...")) == (9.0, 2, True)
     assert max(text_width(line, size) for line in lines) < 200.0
     assert _headline("a title", 9.0, 200.0, 24.0) == (["a title"], 1.35 * 9.0)
-
-
-def test_a_light_picture_shows_the_same_in_other_colours(world):
-    light = THEMES["light"]
-    picture = world.draw(theme="light")
-    assert tuple(picture[0, 0]) == light.page
-    assert world.pixel(picture, 16.0, 8.0) == light.floor
-    assert world.pixel(picture, *world.swarm.position[0]) == light.empty
-    with pytest.raises(ConfigError, match="Expected theme to be one of dark, light, got 'lite'"):
-        world.draw(theme="lite")
 
 
 FOLDER = resources.files("swarm_forage_env.rendering")
@@ -248,12 +220,6 @@ def test_data_come_back_whatever_they_hold():
     assert "<title>a &lt;title&gt; &amp; more</title>" in page
 
 
-@pytest.mark.parametrize("text", ["<html></html>", '<script type="application/json" id="header">{}</script>'])
-def test_other_texts_are_refused(text):
-    with pytest.raises(ConfigError, match="no replay page or cut short"):
-        take_replay_page_apart(text)
-
-
 @pytest.mark.parametrize("folder", PAGES)
 def test_every_script_is_in_its_page_which_loads_nothing(folder):
     page, scripts = PAGES[folder]
@@ -263,10 +229,6 @@ def test_every_script_is_in_its_page_which_loads_nothing(folder):
     assert re.findall(r"https?:|//[\w.]+\.\w+/|\b(?:src|href)=\"(?!data:,\")|@import|url\(", page) == []
     asked = ["place"] if folder == "play_page" else []  # relative to the address with the token
     assert re.findall(r"\bfetch\((\w+)", page) == asked
-
-
-def test_what_a_server_sends_is_shown_as_text():
-    assert not any("innerHTML" in FOLDER.joinpath("play_page", name).read_text() for name in PLAY_SCRIPTS)
 
 
 pygame = pytest.importorskip("pygame")

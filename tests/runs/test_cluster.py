@@ -1,6 +1,7 @@
 """Runs on Dask: workers of this machine, and a scheduler that is not there."""
 
 import os
+from importlib.util import find_spec
 
 import pytest
 
@@ -13,8 +14,10 @@ from swarm_forage_env.runs.workers import WorkerError
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.world import World
 
-pytest.importorskip("distributed")
-pytestmark = pytest.mark.slow
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(find_spec("distributed") is None, reason="needs the cluster extra"),
+]
 
 WORLD = World(scenario("warehouse_small", n_robots=2, n_objects=20, horizon_s=4.0, interval_s=2.0))
 SPECS = [RunSpec(world=WORLD, policy="random", seed=seed) for seed in range(3)]

@@ -14,7 +14,6 @@ from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env._internal.prefetching import LARGE
 from swarm_forage_env.contract.codes import Counter, Task
 from swarm_forage_env.contract.policy import ActionError, Policy, SwarmSpec
-from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkPolicy
 from swarm_forage_env.policies.registry import load_policy
@@ -258,18 +257,6 @@ def test_a_run_goes_on_from_a_snapshot_and_from_a_copy(name, wrappers):
         np.testing.assert_array_equal(stack.last_obs, expected["obs"])
 
 
-def test_the_compiled_policy_is_kept_for_one_run_only():
-    policy = load_policy("dpo")
-    world = scenario("warehouse_small", n_robots=6, n_objects=20, horizon_s=200.0)
-    live(policy, world).advance(to_tick=10)
-    first = policy.compiled()
-    again, fresh = live(policy, world), live(load_policy("dpo"), world)
-    assert policy.compiled() is not first
-    again.advance(to_tick=200)
-    fresh.advance(to_tick=200)
-    assert_same(again, fresh)
-
-
 # Where Python is asked
 
 THROTTLED = ThrottleConfig(waveform=Waveform(kind="constant", amplitude=0.1))
@@ -355,16 +342,6 @@ def test_python_is_asked_wherever_it_has_a_say():
         assert not is_compiled(RunRecorder(below))
 
 
-def test_every_tick_is_shown_in_a_window(monkeypatch):
-    shown = []
-    monkeypatch.setattr("swarm_forage_env.env._new_window", lambda: None)
-    monkeypatch.setattr(ForageEnv, "render", lambda env: shown.append(env.tick))
-    env = ForageEnv(scenario("warehouse_small", n_robots=2), render_mode="human")
-    env._window = object()  # type: ignore[assignment] - only that there is one counts
-    LiveRun(RunRecorder(env), CRWPolicy(), seed=0).advance(to_tick=3)
-    assert shown == [0, 1, 2, 3]
-
-
 # What others' wrappers say
 
 N_ROBOTS = 6
@@ -391,10 +368,6 @@ class Teller(SwarmWrapper):
 
     def ahead(self, n_ticks):
         return 5, {"draws": np.zeros(3, np.uint32)}
-
-
-class Second(Throttle):
-    stack_position = 4
 
 
 @pytest.mark.parametrize(
@@ -430,16 +403,6 @@ def test_what_others_hand_over_is_checked():
     run = LiveRun(RunRecorder(Teller(build_env(scenario("warehouse_small", n_robots=N_ROBOTS)))), CRWPolicy(), seed=1)
     with pytest.raises(ValueError, match=r"Expected `ahead` of Teller to return \{\} .* got draws"):
         run.advance(to_tick=5)
-
-
-def test_two_wrappers_that_do_the_same_thing_both_do_it():
-    runs = []
-    for by_ticks in (False, True):
-        inner, outer = (ThrottleConfig(waveform=Waveform(kind="constant", amplitude=share)) for share in (0.2, 0.5))
-        stack = Throttle(Second(build_env(scenario("warehouse_small", n_robots=2)), inner), outer)
-        runs.append(LiveRun(RunRecorder(stack), tick_by_tick(CRWPolicy()) if by_ticks else CRWPolicy(), seed=1))
-        runs[-1].advance(to_tick=20)
-    assert_same(*runs)
 
 
 # Faults

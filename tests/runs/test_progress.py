@@ -5,7 +5,7 @@ import math
 import pytest
 
 from swarm_forage_env.runs import progress
-from swarm_forage_env.runs.progress import RunProgress, duration
+from swarm_forage_env.runs.progress import RunProgress
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.world import World
@@ -59,10 +59,3 @@ def test_starting_is_not_in_the_estimate_and_no_more_processes_work_than_there_a
         shown.advance(todo[1], 4.0)
         shown.advance(todo[2], 4.0)
         assert shown.remaining_s() == pytest.approx(4.0)
-
-
-@pytest.mark.parametrize(
-    ("seconds", "told"), [(0.2, "1 s"), (89.0, "89 s"), (720.0, "12 min"), (5399.0, "90 min"), (12_600.0, "3.5 h")]
-)
-def test_lengths_of_time_are_told_in_round_numbers(seconds, told):
-    assert duration(seconds) == told

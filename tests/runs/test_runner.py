@@ -67,15 +67,6 @@ def test_a_policy_object_drives_the_same_run_as_its_name():
     assert by_object.equals(run_one(SPECS[0]))
 
 
-def test_tasks_of_a_policy_are_recorded():
-    class Tasked(RandomPolicy):
-        task = np.array([1, 1, 2], np.int8)
-
-    record = run_policy(Tasked(), SPECS[0])
-    np.testing.assert_allclose(record["task_share_generalist"], 2 / 3)
-    np.testing.assert_allclose(record["task_share_harvester"], 1 / 3)
-
-
 def test_the_code_that_runs_share_is_compiled_before_the_first_is_timed(monkeypatch):
     """Also for policies of this process alone, which must not notice."""
     calls = []
@@ -101,17 +92,6 @@ def test_finished_runs_are_read_and_not_repeated(tmp_path):
     assert (again.n_stored, again.n_done) == (2, 2)
     assert same(first.records, again.records)
     assert run_here(SPECS, tmp_path).n_stored == 2
-
-
-def test_a_stored_run_is_read_with_the_performance_that_is_asked_for(tmp_path):
-    run_here(SPECS[:1], tmp_path)
-    other = replace(SPECS[0], world=World(replace(WORLD, performance="n_active")))
-    (record,) = run_here([other], tmp_path, executor=Refusing()).records.values()
-    assert record["performance"].tolist() == [3.0, 3.0]
-    assert record.spec == other
-    assert record.equals(run_one(other))
-    (last,) = run_here([other, SPECS[0]], tmp_path, executor=Refusing()).records.values()
-    assert last["performance"].tolist() == last["collected"].tolist()
 
 
 def test_a_failed_run_says_why_and_is_tried_again(tmp_path, monkeypatch):
@@ -193,25 +173,6 @@ except KeyboardInterrupt as interrupt:
             os.killpg(started.pid, 0)
             time.sleep(0.1)
         pytest.fail("processes are left")
-
-
-def test_closing_the_iterator_cancels_the_rest():
-    class OnlyTheFirst(Executor):
-        def __init__(self):
-            self.futures = []
-
-        def submit(self, fn, /, *args, **kwargs):
-            future = Future()
-            if not self.futures:
-                future.set_result(fn(*args, **kwargs))
-            self.futures.append(future)
-            return future
-
-    executor = OnlyTheFirst()
-    made = each_run(seed_of, SPECS, executor=executor)
-    assert next(made) == (SPECS[0], 0)
-    made.close()
-    assert [future.cancelled() for future in executor.futures] == [False, True, True, True]
 
 
 def test_local_processes_give_the_same_records():

@@ -217,20 +217,6 @@ def test_what_only_this_process_can_build_has_a_factory(given, label, caches):
     assert policy_spec(given, label="mine").is_named
 
 
-@pytest.mark.parametrize(
-    ("given", "options", "error", "message"),
-    [
-        ("crv", {}, ConfigError, r"Unknown policy 'crv'\. Did you mean 'crw'"),
-        ("gone.npz", {}, ConfigError, r"gone\.npz"),
-        (7, {}, TypeError, "Expected a policy as a registered name, .* got 7"),
-        (forward, {"parameters": {"a": 1}}, ValueError, "parameters with a name, a file or a class only"),
-    ],
-)
-def test_what_is_no_policy_is_refused(given, options, error, message):
-    with pytest.raises(error, match=message):
-        policy_spec(given, **options)
-
-
 def test_several_have_names_of_their_own():
     assert [spec.label for spec in policy_specs(["crw", "dpo"])] == ["crw", "dpo"]
     assert [spec.label for spec in policy_specs({"one": policy_spec("crw")})] == ["one"]
@@ -246,9 +232,3 @@ def test_files_of_one_name_are_told_apart_by_their_folders(network_in):
     one, other = network_in("a"), network_in("b")
     assert [spec.label for spec in policy_specs([one, other])] == ["a/net.npz", "b/net.npz"]
     assert [spec.label for spec in policy_specs([one, "crw"])] == ["net", "crw"]
-
-
-@pytest.mark.parametrize("given", [["crw", "crw"], [forward, forward], ["crw", "dpo", "crw"]])
-def test_equal_names_are_refused(given):
-    with pytest.raises(ConfigError, match=r"policies of different names, got .*; give a mapping from names"):
-        policy_specs(given)

@@ -68,24 +68,6 @@ def head_on_overlap(base: ScenarioConfig, substeps: tuple[float, ...]) -> float:
     return worst
 
 
-def crowd_overlap(base: ScenarioConfig, n_robots: int, ticks: int = 300) -> float:
-    """Deepest overlap in a crowd in which every robot drives at one point."""
-    rng = np.random.default_rng(0)
-    start = rng.uniform((14.0, 6.0), (18.0, 10.0), (n_robots, 2))
-    while len(pairs := cKDTree(start).query_pairs(DIAMETER_M, output_type="ndarray")):
-        again = np.unique(pairs.max(axis=1))
-        start[again] = rng.uniform((14.0, 6.0), (18.0, 10.0), (len(again), 2))
-    swarm = SwarmState.empty(n_robots)
-    swarm.position[:] = start
-    physics = make_bodies(with_overrides(base, n_robots=n_robots), swarm)
-    worst = 0.0
-    for _ in range(ticks):
-        towards = np.array(MIDDLE) - swarm.position
-        drive_at(physics, swarm, np.arctan2(towards[:, 1], towards[:, 0]), 0.10)
-        worst = max(worst, deepest(swarm))
-    return worst
-
-
 @pytest.fixture(scope="module")
 def table(base) -> dict[int, float]:
     """Overlap head-on by number of equal substeps."""
@@ -122,12 +104,6 @@ def test_free_motion_does_not_depend_on_the_substeps(base):
     assert np.linalg.norm(ends[0][0]) > 0.1
 
 
-@pytest.mark.parametrize("n_robots", [60, 150])
-def test_a_crowd_that_pushes_to_one_point_hardly_overlaps(base, n_robots):
-    """Far beyond what a swarm with avoidance does to itself."""
-    assert crowd_overlap(base, n_robots) < TOLERATED
-
-
 def jam(base: ScenarioConfig, substeps: tuple[float, ...], n_robots: int, ticks: int = 600) -> float:
     """Mean of the deepest overlap per tick of a swarm that drives into the upper right corner, once it is there.
 
@@ -162,26 +138,3 @@ def test_a_swarm_that_pushes_into_a_corner_overlaps_little(base, n_robots):
 def test_fewer_or_unequal_substeps_pile_robots_up(substeps):
     """Why the configuration refuses them: an overlap seen in a short substep is undone too fast in a long one."""
     assert jam(BASE, substeps, 512, ticks=300) > 0.3
-
-
-@pytest.mark.parametrize(
-    ("name", "n_robots"), [("warehouse_medium", 200), ("warehouse_small", 400), ("warehouse_small", 1000)]
-)
-def test_robots_that_drive_at_random_hardly_overlap(base, name, n_robots):
-    """Without any avoidance, in the densities of the study and beyond."""
-    env = ForageEnv(scenario(name, n_robots=n_robots, physics=base.physics))
-    env.reset_batch(0)
-    rng = np.random.default_rng(0)
-    worst, touching = 0.0, 0
-    command = rng.uniform(-1, 1, (n_robots, 2))
-    for _ in range(2_000):
-        turned = rng.random(n_robots) < 0.02
-        command[turned] = rng.uniform(-1, 1, (n_robots, 2))[turned]
-        env.step_batch(np.column_stack((command, np.ones(n_robots))).astype(np.float32))
-        pairs = cKDTree(env.swarm.position).query_pairs(DIAMETER_M, output_type="ndarray")
-        if len(pairs):
-            touching += len(pairs)
-            apart = np.linalg.norm(np.diff(env.swarm.position[pairs], axis=1)[:, 0], axis=1)
-            worst = max(worst, 1.0 - apart.min() / DIAMETER_M)
-    assert touching > 100
-    assert worst < TOLERATED

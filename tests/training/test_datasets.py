@@ -107,24 +107,6 @@ def env_spec():
     return build_env(WORLD).unwrapped.swarm_spec
 
 
-def test_episodes_end_where_robots_do(tmp_path):
-    dataset = recorded(tmp_path, "random", seeds=(3, 4), wrappers=DEADLY)
-    by_seed = {run.seed: run for run in dataset.runs()}
-    episodes = list(dataset.episodes())
-    assert [(one.seed, one.robot) for one in episodes] == [(seed, robot) for seed in (3, 4) for robot in range(4)]
-    assert any(one.terminated[-1] for one in episodes)
-    for one in episodes:
-        steps = by_seed[one.seed]
-        length = len(one.rewards)
-        assert len(one.observations) == len(one.active) == length + 1
-        assert one.terminated[-1] != one.truncated[-1] or len(steps) < 100
-        assert steps.terminated[length - 1, one.robot] == one.terminated[-1]
-        assert not one.terminated[:-1].any()
-        if one.terminated[-1]:
-            assert not one.observations[-1].any()
-            assert not steps.active[length:, one.robot].any()
-
-
 def test_transitions_are_the_decisions_of_robots_at_work(tmp_path):
     wrappers = (parse_wrapper("population:malfunction_per_tick=0.3,repair_per_tick=0.3"),)
     dataset = recorded(tmp_path, "random", wrappers=wrappers)

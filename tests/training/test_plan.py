@@ -9,7 +9,6 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.interface import InterfaceConfig
-from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import scenario, warehouse_small
 from swarm_forage_env.training.evaluation import EVALUATE_EVERY, EvaluationPlan, EvaluationWorld
 from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
@@ -213,42 +212,12 @@ def test_policies_draw_their_actions_where_they_have_probabilities(algorithm, ac
             recipe(algorithm=algorithm, interface={"actions": actions}, samples=True)
 
 
-@pytest.mark.parametrize("name", ["warehouse_medium", "search_and_rescue"])
-def test_what_was_measured_for_a_scenario_goes_before_the_general_recipe(name):
-    plan = recipe(name)
-    assert plan.scenario.reward.interference == -0.002
-    assert plan.options["ent_coef"] == 0.01
-    assert len({stage.scenario["horizon_s"] for stage in plan.stages}) == 1
-    other = recipe(name, interference=-0.1, horizon_s=500.0, options={"ent_coef": 0.02})
-    assert (other.scenario.reward.interference, other.options["ent_coef"]) == (-0.1, 0.02)
-    assert {stage.scenario["horizon_s"] for stage in other.stages} == {500.0}
-    assert "ent_coef" not in recipe(name, algorithm="dqn").options
-    assert recipe(scenario(name)).scenario == scenario(name)
-
-
 def test_large_swarms_are_evaluated_less_often():
     assert recipe("warehouse_medium").evaluation.every_steps == 4_000_000
     assert recipe("warehouse_medium", evaluation={"horizon_s": 2000.0}).evaluation.every_steps == EVALUATE_EVERY
     assert recipe("warehouse_medium", evaluation={"every_steps": 7}).evaluation == EvaluationPlan(every_steps=7)
     with pytest.raises(ConfigError, match=r"evaluation\.every_step'.*Did you mean"):
         recipe(evaluation={"every_step": 7})
-
-
-@pytest.mark.parametrize(
-    ("name", "expected"),
-    [
-        ("warehouse_small", (12.8, 16.0, (1.28, 8.0), (1.28, 12.8))),
-        ("warehouse_dual", (12.8, 16.0, (6.4, 8.0), (1.28, 12.8))),
-        ("warehouse_quad", (19.2, 19.2, (9.6, 9.6), (3.84, 3.84))),
-    ],
-)
-def test_a_small_start_keeps_proportions(name, expected):
-    config = scenario(name)
-    small = with_overrides(config, **small_arena(config)).arena
-    width, height, centre, size = expected
-    assert (small.width_m, small.height_m) == pytest.approx((width, height))
-    assert small.nest_centre_m == pytest.approx(centre)
-    assert small.nest_size_m == pytest.approx(size)
 
 
 def test_a_sampler_is_judged_in_the_largest_world_of_each_name():

@@ -5,19 +5,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+
+pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-baselines3 and torch")
+
 import torch
 from gymnasium import spaces
 from stable_baselines3 import DQN, PPO
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.vec_env import VecFrameStack
 
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.network import Network, NetworkError
 from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmPPO, SwarmVecEnv
 from swarm_forage_env.training.sb3.export import export_network, note_interface
 from tests.support import lives
-
-pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-baselines3 and torch")
 
 NUMBERED = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5)
 DRIVEN = InterfaceConfig(observation="compact", automatic_gripper=True, decision_ticks=5)
@@ -93,8 +93,6 @@ def test_choices_are_those_of_the_network_for_robots_at_work_and_zeros_for_other
         np.testing.assert_allclose(log_probs.numpy()[at_work], expected_log_probs.numpy(), rtol=1e-5, atol=1e-6)
         assert np.abs(expected_log_probs.numpy()).min() > 0.0
 
-
-pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-baselines3 and torch")
 
 VALUE = 4.0
 """What the network of these tests thinks of every state."""
@@ -201,41 +199,6 @@ def test_replay_draws_every_present_step_and_no_other():
     np.testing.assert_array_equal(samples.dones.numpy().ravel(), (steps == 1) & (robots != 0))
 
 
-def test_a_wait_is_one_transition_for_lambda_too():
-    # One robot, at work in steps 0 and 3 and away between; values 4, rewards 1 at work, gamma = lambda = 1/2.
-    buffer = ActiveRolloutBuffer(
-        4, spaces.Box(0, 1, (1,)), spaces.Box(-1, 1, (1,)), gamma=0.5, gae_lambda=0.5, active_column=0
-    )
-    for active in (1.0, 0.0, 0.0, 1.0):
-        there, value = np.full(1, active), torch.full((1,), VALUE)
-        buffer.add(there[None], np.zeros((1, 1)), there, np.zeros(1), value, torch.zeros(1))
-    buffer.compute_returns_and_advantage(torch.full((1,), VALUE), np.zeros(1))
-    # Step 3: 1 + 4/2 - 4 = -1. Step 0: 1 + 4/8 - 4 = -2.5, and lambda gamma^3 = 1/16 of the -1 after the wait.
-    np.testing.assert_allclose(buffer.advantages[[0, 3], 0], [-2.5625, -1.0])
-
-
-def test_behind_stacked_frames_the_newest_one_counts():
-    """Robot 1 is in repair in the ticks 2 and 3; an older frame would show it at work, or not, too late."""
-    env = SwarmVecEnv(**lives.WORLD, interface=InterfaceConfig(observation="compact"))
-    stacked = VecFrameStack(env, 3)
-    model = PPO(
-        "MlpPolicy",
-        stacked,
-        n_steps=lives.N_TICKS,
-        batch_size=6,
-        rollout_buffer_class=ActiveRolloutBuffer,
-        rollout_buffer_kwargs=env.rollout_buffer_kwargs,
-        device="cpu",
-    )
-    _, callback = model._setup_learn(lives.N_TICKS * lives.N_ROBOTS, _Story())
-    model.collect_rollouts(stacked, callback, model.rollout_buffer, lives.N_TICKS)
-    assert len(next(model.rollout_buffer.get()).returns) == lives.ACTIVE_BEFORE.sum()
-    np.testing.assert_array_equal(model.rollout_buffer._is_active, lives.ACTIVE_BEFORE)
-
-
-pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-baselines3 and torch")
-
-
 @pytest.mark.parametrize(
     ("algorithm", "interface", "fields"),
     [
@@ -284,3 +247,16 @@ def test_the_interface_of_an_export_is_that_of_the_model(wrong, reason):
     note_interface(model, DRIVEN)
     with pytest.raises(NetworkError, match=r"Expected the interface that the model was trained with, .*decision_ticks"):
         export_network(model, dataclasses.replace(DRIVEN, decision_ticks=4))
+
+
+def test_a_wait_is_one_transition_for_lambda_too():
+    # One robot, at work in steps 0 and 3 and away between; values 4, rewards 1 at work, gamma = lambda = 1/2.
+    buffer = ActiveRolloutBuffer(
+        4, spaces.Box(0, 1, (1,)), spaces.Box(-1, 1, (1,)), gamma=0.5, gae_lambda=0.5, active_column=0
+    )
+    for active in (1.0, 0.0, 0.0, 1.0):
+        there, value = np.full(1, active), torch.full((1,), VALUE)
+        buffer.add(there[None], np.zeros((1, 1)), there, np.zeros(1), value, torch.zeros(1))
+    buffer.compute_returns_and_advantage(torch.full((1,), VALUE), np.zeros(1))
+    # Step 3: 1 + 4/2 - 4 = -1. Step 0: 1 + 4/8 - 4 = -2.5, and lambda gamma^3 = 1/16 of the -1 after the wait.
+    np.testing.assert_allclose(buffer.advantages[[0, 3], 0], [-2.5625, -1.0])

@@ -14,7 +14,6 @@ import pytest
 pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-baselines3 and torch")
 
 from metrics.statistics import aggregate
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.presets import warehouse_small
 from swarm_forage_env.training.curves import read_training
@@ -121,33 +120,6 @@ def test_what_is_finished_is_kept_and_the_rest_goes_on(tmp_path, monkeypatch):
     train_seeds(longer, range(1), tmp_path, resume=True)
     assert calls[3:] == [(0, True)]
     assert read_plan(tmp_path / "plan.json") == longer
-
-
-def test_what_cannot_begin_is_refused_before_anything_is_trained(tmp_path, monkeypatch):
-    calls = fake(monkeypatch)
-    made(tmp_path / "old", 1, evaluated(64, 4.0))
-    PLAN.write(tmp_path / "old" / "plan.json")
-    wide = dataclasses.replace(PLAN, hidden=(16,))
-    for plan, seeds, folder, words, reason in (
-        (PLAN, (0, 1), "new", {"jobs": 0}, "jobs to be a whole number >= 1"),
-        (PLAN, (), "new", {}, "one or more different seeds, got none"),
-        (PLAN, (1, 1), "new", {}, "different seeds, got 1, 1"),
-        (dataclasses.replace(PLAN, options={"gama": 0.9}), (0, 1), "new", {}, "Unknown option of ppo 'gama'"),
-        (PLAN, (0, 1), "old", {}, r"an unused folder, got .*seed_1 with a training run; resume it"),
-        (wide, (0, 1), "old", {"resume": True}, "for further trainings there, got another plan: hidden"),
-        (PLAN, (0, 1), "old/seed_1", {}, r"several trainings, got .*seed_1, which is that of one"),
-    ):
-        with pytest.raises(ConfigError, match=reason):
-            train_seeds(plan, seeds, tmp_path / folder, **words)
-    assert not (tmp_path / "new").exists()
-
-    def again(seed, news):
-        with pytest.raises(ConfigError, match="Expected to be the only one that writes to"):
-            train_seeds(PLAN, range(2), tmp_path / "new", resume=True)
-
-    assert calls == []
-    train_seeds(PLAN, range(1), tmp_path / "new", report=again)
-    assert calls == [(0, False)]
 
 
 @pytest.mark.slow

@@ -18,7 +18,7 @@ from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.policies.registry import load_policy
-from swarm_forage_env.scenarios.presets import search_and_rescue, warehouse_small
+from swarm_forage_env.scenarios.presets import warehouse_small
 from swarm_forage_env.training.evaluation import EvaluationPlan, EvaluationWorld, Evaluator, read_evaluations
 from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.sb3 import PresentReplayBuffer, training
@@ -49,8 +49,6 @@ def tiny_plan(**changes) -> TrainingPlan:
     return dataclasses.replace(plan, **changes)
 
 
-ROOMLESS = {"width_m": 9.6, "height_m": 9.6, "nest_centre_m": (4.8, 4.8), "nest_size_m": (1.92, 1.92)}
-"""An arena too small for the clusters of search and rescue."""
 SHORT = tiny_plan(stages=(Stage(steps=128),))
 
 
@@ -172,32 +170,6 @@ def test_extra_columns_and_rewards_reach_training_and_evaluations(tmp_path):
     assert kept.about.interface.extra_columns == 1
     assert kept.n_columns == result.model.observation_space.shape[0]
     assert max(seen) >= 900, "evaluations of whole runs call it, too"
-
-
-@pytest.mark.parametrize(
-    ("changes", "resume", "reason"),
-    [
-        ({"options": {"learning_rat": 1.0}}, False, "Did you mean 'learning_rate'"),
-        ({"options": {"n_steps": 1, "batch_size": 1}}, False, "Cannot prepare ppo with its options: `batch_size`"),
-        # Clusters are drawn by the first reset.
-        (
-            {"world": World(search_and_rescue(side_m=48.0, n_robots=4, horizon_s=200.0)),
-             "stages": (Stage(steps=64, scenario=ROOMLESS),)},
-            False,
-            r"Cannot train in stage 1, with width_m = 9.6, .*: Expected room for \d+ clusters",
-        ),
-        ({}, True, r"to hold a training to resume, .* found no plan\.json"),
-        (
-            {"algorithm": "dqn", "options": {"buffer_size": 400, "learning_starts": 768}},
-            False,
-            "more steps than the 768 after which dqn begins to learn",
-        ),
-    ],
-)  # fmt: skip
-def test_what_cannot_begin_leaves_nothing_behind(tmp_path, changes, resume, reason):
-    with pytest.raises(ConfigError, match=reason):
-        train(tiny_plan(**changes), tmp_path / "new" / "folder", resume=resume)
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_folder_goes_on_with_its_own_training_only(trained, tmp_path):

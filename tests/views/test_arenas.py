@@ -12,16 +12,14 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.views.arenas import ArenaBatch, ArenaStep, set_on_stack
-from swarm_forage_env.views.gymnasium import JointForageEnv, SwarmVectorEnv
+from swarm_forage_env.views.arenas import ArenaBatch, ArenaStep
+from swarm_forage_env.views.gymnasium import JointForageEnv
 from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv
 from swarm_forage_env.views.plans import ArenaPlan, plan_arena
 from swarm_forage_env.views.sampler import ScenarioSampler
 from swarm_forage_env.world.arena import UNDISTURBED
 from swarm_forage_env.wrappers.base import SwarmWrapper
-from swarm_forage_env.wrappers.registry import parse_wrapper
-from swarm_forage_env.wrappers.world import World
 from tests.support import lives
 from tests.support.sampled import sampler
 
@@ -73,23 +71,6 @@ def test_final_observations_are_the_last_of_the_old_run_and_the_returned_ones_th
     assert np.all(end.obs[:, position] != end.final_obs[:, position])
     assert end.obs.any(axis=1).all()
     assert [outcome.seconds for outcome in end.outcomes] == [1.0]
-
-
-def test_the_arena_ends_with_its_last_robot():
-    batch = ArenaBatch(plan(), 1)
-    batch.reset([0], [None])
-    actions, nobody = np.zeros((3, 3), np.float32), np.zeros(3, bool)
-    batch.envs[0].unwrapped.set_population(active=~nobody, present=~nobody)
-    one = np.array([True, False, False])
-    batch.envs[0].unwrapped.set_population(active=one, present=one, terminated=~one)
-    first = batch.step(actions)
-    assert first.terminated.tolist() == [False, True, True]
-    batch.envs[0].unwrapped.set_population(active=nobody, present=nobody, terminated=~nobody)
-    last = batch.step(actions)
-    assert last.terminated.tolist() == [True, True, True]
-    assert not last.truncated.any()
-    assert last.is_episode.tolist() == [True, False, False]
-    assert last.active.all()
 
 
 def test_an_action_is_kept_for_the_ticks_of_a_decision_and_rewards_add_up():
@@ -183,21 +164,6 @@ def test_actions_that_are_not_finite_are_refused_by_name(interface):
         batch.step(np.zeros_like(actions))
     batch.reset([0, 1], [None, None])
     assert batch.step(np.zeros_like(actions)).obs.shape[0] == 6
-
-
-def test_attributes_are_set_where_they_are_also_below_wrappers():
-    wrapped = ArenaPlan(
-        world=World(
-            scenario("warehouse_small", n_robots=3, n_objects=4),
-            (parse_wrapper("sensor_noise:sigma=0.01"), parse_wrapper("actuator_noise:sigma=0.01")),
-        ),
-        max_cycles=9,
-    )
-    batch = ArenaBatch(wrapped, 1)
-    batch.reset([0], [None])
-    set_on_stack(batch.envs[0], "max_cycles", 1)
-    assert batch.arenas[0].forage_env.max_cycles == 1
-    assert batch.step(np.zeros((3, 3), np.float32)).truncated.all()
 
 
 class TickByTick(LearnerArena):
@@ -336,14 +302,6 @@ def test_rows_to_spare_are_absent_from_the_first_step_to_the_last():
     assert present != sizes()
 
 
-def test_fields_of_a_reset_hold_in_every_world():
-    batch = ArenaBatch(PLAN, 2)
-    batch.reset([3, 5], [{"scenario": {"delivery": 7.0}}] * 2)
-    assert batch.envs[0].unwrapped.scenario.reward.delivery == 7.0
-    batch.reset([8, 9], [None] * 2)
-    assert {env.unwrapped.scenario.reward.delivery for env in batch.envs} == {7.0}
-
-
 # PettingZoo's test wonders about possible agents that a run does not have; that is what a drawn size means.
 @pytest.mark.filterwarnings("ignore:No agents present but not all possible_agents:UserWarning")
 def test_a_parallel_environment_has_the_agents_of_the_run():
@@ -379,12 +337,3 @@ def test_the_central_view_is_padded():
     assert not obs[n_robots:].any()
     with pytest.raises(ActionError, match="6 rows"):
         env.step(np.zeros(n_robots, np.int64))
-
-
-def test_vector_environments_of_gymnasium_have_spare_rows():
-    envs = gymnasium.make_vec("swarm_forage/sampled-v0", num_envs=12, sampler=WORLDS, interface=COMPACT)
-    assert isinstance(envs, SwarmVectorEnv)
-    obs, infos = envs.reset(seed=[3, 5])
-    expected = np.arange(6) < np.array(sizes([3, 5]))[:, None]
-    np.testing.assert_array_equal(infos["active"], expected.ravel())
-    np.testing.assert_array_equal(obs.any(axis=1), expected.ravel())

@@ -3,11 +3,9 @@
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium import spaces
 from gymnasium.utils.env_checker import check_env
 from pettingzoo.test import parallel_api_test, parallel_seed_test
 
-from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.views.arenas import ArenaBatch
@@ -45,18 +43,6 @@ def test_shows_the_same_world_as_the_parallel_environment():
         assert truncated == all(truncations.values())
 
 
-def test_terminates_only_when_every_robot_is_dead():
-    env = JointForageEnv("warehouse_small", n_robots=3)
-    env.reset(seed=0)
-    idle = np.zeros((3, 3), np.float32)
-    alive = np.array([False, False, True])
-    env.forage_env.set_population(active=alive, present=alive, terminated=~alive)
-    assert not env.step(idle)[2]
-    nobody = np.zeros(3, np.bool_)
-    env.forage_env.set_population(active=nobody, present=nobody, terminated=~nobody)
-    assert env.step(idle)[2]
-
-
 INTERFACES = {
     "full": InterfaceConfig(),
     "driven": InterfaceConfig(observation="compact", automatic_gripper=True),
@@ -68,18 +54,6 @@ INTERFACES = {
 def test_passes_the_checker_with_an_interface(interface):
     env = gymnasium.make("swarm_forage/warehouse_small-v0", interface=interface, n_robots=4)
     check_env(env.unwrapped, skip_render_check=True)
-
-
-def test_an_interface_decides_what_is_seen_and_done():
-    driven = JointForageEnv(n_robots=4, interface=INTERFACES["driven"])
-    assert driven.observation_space.shape == (4, driven.interface.layout.size)
-    assert driven.action_space == spaces.Box(-1.0, 1.0, (4, 2), np.float32)
-    assert "action_mask" not in driven.reset(seed=0)[1]
-    numbered = JointForageEnv(n_robots=4, interface=INTERFACES["numbered"])
-    assert numbered.action_space == spaces.MultiDiscrete([11] * 4)
-    numbered.reset(seed=0)
-    with pytest.raises(ActionError, match="whole numbers from 0 to 10, got float64"):
-        numbered.step(np.full(4, 0.7))
 
 
 @pytest.mark.parametrize("interface", INTERFACES.values(), ids=INTERFACES)
@@ -161,3 +135,15 @@ def test_actions_that_would_have_to_be_stretched_or_cut_are_refused():
         env.reset(seed=0)
         with pytest.raises(ValueError, match=r"Expected each action as .* of shape"):
             env.step(dict.fromkeys(env.agents, action))
+
+
+def test_terminates_only_when_every_robot_is_dead():
+    env = JointForageEnv("warehouse_small", n_robots=3)
+    env.reset(seed=0)
+    idle = np.zeros((3, 3), np.float32)
+    alive = np.array([False, False, True])
+    env.forage_env.set_population(active=alive, present=alive, terminated=~alive)
+    assert not env.step(idle)[2]
+    nobody = np.zeros(3, np.bool_)
+    env.forage_env.set_population(active=nobody, present=nobody, terminated=~nobody)
+    assert env.step(idle)[2]

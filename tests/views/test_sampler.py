@@ -72,14 +72,6 @@ def test_log_uniform_whole_numbers_are_as_frequent_as_their_ranges_are_wide():
         assert counts[number] / len(shares) == pytest.approx(expected, abs=0.015)
 
 
-def test_static_caches_without_room_are_refused_before_one_is_drawn():
-    crowded = {"preset": "warehouse_medium", "caches": "static", "side_share": {"uniform": [0.05, 0.5]}}
-    with pytest.raises(
-        ConfigError, match=r"World 1 of the sampler .* side_share = 0\.5: Expected static caches inside"
-    ):
-        ScenarioSampler({"worlds": [{"scenario": crowded}]})
-
-
 def changed(**fields):
     return {"worlds": [{"scenario": {"preset": "warehouse_small", "n_robots": 3, **fields}}]}
 
@@ -109,10 +101,3 @@ def test_worlds_with_other_columns_are_refused(other):
     worlds = [{"preset": "warehouse_small", **fields} for fields in ({"neighbours_seen": 2}, other)]
     with pytest.raises(ConfigError, match="same columns"):
         ScenarioSampler({"worlds": [{"scenario": world} for world in worlds]})
-
-
-def test_what_only_a_draw_finds_impossible_says_what_was_drawn():
-    between = {"preset": "search_and_rescue", "n_robots": 4, "side_m": {"uniform": [16.0, 32.0]}}
-    worlds = ScenarioSampler({"worlds": [{"scenario": between}]})
-    with pytest.raises(ConfigError, match=r"side_m = .*one of 16, 32"):
-        drawn(worlds, 5)

@@ -53,19 +53,6 @@ def test_infos_by_hand():
     assert last[0]["run"] == told
 
 
-def test_seeds_count_up_by_arena_and_hold_for_one_reset():
-    env = SwarmVecEnv(**lives.WORLD, n_arenas=2)
-    assert env.seed(5) == [5, 5, 5, 6, 6, 6]
-    first = env.reset()
-    assert env.get_attr("seed_value") == [5, 5, 5, 6, 6, 6]
-    assert not np.array_equal(env.reset(), first), "without a seed the sequence goes on"
-    env.seed(5)
-    np.testing.assert_array_equal(env.reset(), first)
-    drawn = env.seed()
-    assert drawn[0] == drawn[2]
-    assert drawn[3] == drawn[0] + 1
-
-
 def test_evaluations_of_the_library_count_episodes_and_no_absences():
     wrappers = [parse_wrapper("population:death_per_tick=0.05")]
     env = SwarmVecEnv("warehouse_small", n_robots=4, max_cycles=20, delivery=0.0, first_pickup=0.0, tick=1.0,
@@ -76,16 +63,6 @@ def test_evaluations_of_the_library_count_episodes_and_no_absences():
         returns, lengths = evaluate_policy(model, env, n_eval_episodes=12, return_episode_rewards=True)
     lost = np.array(lengths) - np.array(returns)
     assert set(lost) == {0.0, 1.0}, "whoever dies earns nothing in the last step of its episode, and in no other"
-
-
-def test_masks_are_found_where_masking_algorithms_look():
-    env = SwarmVecEnv(**lives.WORLD, interface=InterfaceConfig(actions="discrete"))
-    env.reset()
-    masks = np.stack(env.env_method("action_masks"))
-    assert env.has_attr("action_masks")
-    assert masks.shape == (3, env.action_space.n)
-    np.testing.assert_array_equal(masks, env.action_masks())
-    assert not SwarmVecEnv(**lives.WORLD).has_attr("action_masks")
 
 
 def test_works_inside_the_wrappers_of_the_library():

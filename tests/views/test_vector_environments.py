@@ -5,16 +5,12 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
-from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 import swarm_forage_env
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.policies.interface import InterfaceConfig
-from swarm_forage_env.views.gymnasium import JointForageEnv, SwarmVectorEnv
-from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv
+from swarm_forage_env.views.gymnasium import SwarmVectorEnv
 from swarm_forage_env.views.plans import plan_arena
-from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.support import lives
 
 IDLE = np.zeros((lives.N_ROBOTS, 3), np.float32)
@@ -59,26 +55,6 @@ def test_the_number_of_sub_environments_is_a_whole_number_of_swarms():
         gymnasium.make_vec(env_id, n_robots=4, n_arenas=0)
 
 
-def test_words_of_the_command_line_and_plain_values_are_taken_everywhere():
-    words, fields = ["sensor_noise:sigma=0.1"], {"actions": "discrete"}
-    seen = []
-    for wrappers, interface in (
-        (words, fields),
-        ([parse_wrapper(word) for word in words], InterfaceConfig(actions="discrete")),
-    ):
-        choices = {"n_robots": 4, "interface": interface}
-        envs = SwarmVectorEnv(**choices, wrappers=wrappers)
-        joint = JointForageEnv(**choices, wrappers=iter(wrappers))
-        parallel = ParallelLearnerEnv(**choices, wrappers=wrappers)
-        made = gymnasium.make_vec("swarm_forage/warehouse_small-v0", **choices, swarm_wrappers=wrappers)
-        assert envs.single_action_space == parallel.action_space("robot_0") == made.single_action_space
-        rows, _ = parallel.reset(seed=0)
-        seen += [envs.reset(seed=0)[0], joint.reset(seed=0)[0], np.stack(list(rows.values())), made.reset(seed=0)[0]]
-    assert not np.array_equal(seen[0], SwarmVectorEnv(n_robots=4).reset(seed=0)[0])
-    for other in seen[1:]:
-        np.testing.assert_array_equal(other, seen[0])
-
-
 @pytest.mark.parametrize(
     ("given", "reason"),
     [
@@ -120,26 +96,6 @@ def test_infos_by_hand():
             assert not np.array_equal(infos["final_obs"][robot], obs[robot])
 
 
-def test_the_end_of_a_run_tells_what_it_brought():
-    worlds = {"n_robots": 3, "n_objects": 500, "max_cycles": 400, "interface": {"automatic_gripper": True}}
-    curve = np.array([0.6, 0.5], np.float32)
-    envs = RecordEpisodeStatistics(SwarmVectorEnv("warehouse_small", n_arenas=2, **worlds))
-    single = ParallelLearnerEnv("warehouse_small", **worlds)
-    envs.reset(seed=10)
-    single.reset(seed=11)
-    for _ in range(400):
-        *_, infos = envs.step(np.tile(curve, (6, 1)))
-        single.step(dict.fromkeys(single.agents, curve))
-    run = infos["final_info"]["run"]
-    assert infos["final_info"]["_run"].all()
-    assert run["seed"].tolist() == [10, 10, 10, 11, 11, 11]
-    counters = single.forage_env.events.counters
-    assert run["collected"][3:].tolist() == [counters[Counter.COLLECTED]] * 3
-    assert run["first_picked"][3] == counters[Counter.FIRST_PICKED] > 0
-    assert (run["seconds"][0], run["n_robots"][0]) == (80.0, 3)
-    assert infos["episode"]["l"].tolist() == infos["final_info"]["episode"]["l"].tolist() == [400] * 6
-
-
 def test_seeds_per_arena_and_their_number():
     envs = SwarmVectorEnv("warehouse_small", num_envs=6, n_robots=3)
     one, _ = envs.reset(seed=[4, 9])
@@ -150,29 +106,3 @@ def test_seeds_per_arena_and_their_number():
     assert not np.array_equal(other, again)
     with pytest.raises(ValueError, match="one seed per arena"):
         envs.reset(seed=[1])
-
-
-def test_attributes_and_methods_reach_the_arenas():
-    envs = SwarmVectorEnv("warehouse_small", num_envs=6, n_robots=3)
-    try:
-        envs.reset(seed=0)
-        envs.set_attr("max_cycles", [2, 3])
-        assert envs.call("max_cycles") == (2, 3)
-        envs.set_attr("max_cycles", 4)
-        assert envs.get_attr("max_cycles") == (4, 4)
-        with pytest.raises(ValueError, match="one value per arena"):
-            envs.set_attr("max_cycles", [1])
-        with pytest.raises(AttributeError):
-            envs.call("no_such_thing")
-    finally:
-        envs.close()
-
-
-def test_masks_come_with_discrete_actions():
-    envs = SwarmVectorEnv("warehouse_small", num_envs=6, n_robots=3, interface=INTERFACES[2])
-    envs.reset(seed=0)
-    masks = envs.action_masks()
-    *_, infos = envs.step(np.zeros(6, np.int64))
-    np.testing.assert_array_equal(infos["action_mask"], envs.action_masks())
-    assert masks.shape == (6, envs.single_action_space.n)
-    assert masks[:, :6].all()

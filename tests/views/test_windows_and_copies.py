@@ -10,7 +10,7 @@ from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.gymnasium import JointForageEnv
-from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv, env, parallel_env
+from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv, parallel_env
 from tests.support.branches import pickled
 
 SMALL = {"scenario": "warehouse_small", "n_robots": 5, "n_objects": 20}
@@ -64,12 +64,6 @@ def test_a_window_that_the_user_closes_stays_closed(display):
     for _ in range(3):
         env.step({agent: np.zeros(3, np.float32) for agent in env.agents})
         assert not display.get_init()
-
-
-def test_without_pygame_the_message_tells_what_to_install(monkeypatch):
-    monkeypatch.setitem(sys.modules, "pygame", None)
-    with pytest.raises(ImportError, match=r'pip install ".\[render\]"'):
-        parallel_env(**SMALL, render_mode="human")
 
 
 NUMBERED = InterfaceConfig(observation="compact", actions="discrete", decision_ticks=3)
@@ -129,16 +123,3 @@ def test_copies_before_the_first_reset_draw_worlds_of_their_own(make):
     for twin in twins:
         twin.reset()
     assert len({getattr(twin, "forage_env", twin).state().tobytes() for twin in twins}) == 3
-
-
-def test_agent_by_agent_is_copied():
-    one = env("warehouse_small", n_robots=3, n_objects=5, physics="compiled", wrappers=DEATHS[1:])
-    one.reset(seed=1)
-    for _ in range(4):
-        one.step(np.ones(3, np.float32))
-    other = copy.deepcopy(one)
-    for _ in range(7):
-        assert other.agent_selection == one.agent_selection
-        np.testing.assert_array_equal(other.last()[0], one.last()[0])
-        one.step(np.ones(3, np.float32))
-        other.step(np.ones(3, np.float32))

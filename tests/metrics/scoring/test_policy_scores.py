@@ -120,17 +120,6 @@ def test_seeds_and_length_of_runs_can_be_chosen():
     assert (found.settings["budget"], found.settings["seeds"]) == ("custom", [0])
 
 
-def test_policies_are_compared_in_the_same_worlds(tmp_path):
-    found = scored({"stands": still, "noise": "random"}, measures=SIZES, out=tmp_path)
-    assert scored(still, measures=SIZES).policies == ("still",)
-    assert {spec.scenario.caches for spec in planned(policy_specs(["crw"], caches="dynamic")).specs} == {"dynamic"}
-    assert set(found.differences.select("first", "second").rows()) == {("stands", "noise")}
-    for row in found.differences.filter(is_relative=False).iter_rows(named=True):
-        rows = found.frame.filter(measure=row["measure"], at=row["at"])
-        stands, noise = (rows.filter(policy=name)["value"] for name in ("stands", "noise"))
-        assert row["difference"] == pytest.approx((stands - noise).mean())
-
-
 def test_wrappers_of_the_world_are_in_all_runs(tmp_path):
     slow = World(WORLD, (parse_wrapper("throttle:waveform=constant,amplitude=0.3"),))
     found = scored("random", slow, measures=[*SIZES, "population_robustness"], out=tmp_path)
