@@ -24,7 +24,6 @@ HORIZON_S = 1000.0
 FRAME_S = 1.0
 SEED = 1
 TRAIL_S = 40.0
-PICTURE_PX = 560
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,13 +200,6 @@ MOST_FILM_BYTES = 400_000
 """The page shows all films at once."""
 
 
-def draw(exhibit: Exhibit) -> None:
-    """Draw the last run of an exhibit at its end, with trails."""
-    spec, file = exhibit.specs()[-1], FOLDER / f"{exhibit.name}.png"
-    look: dict[str, Any] = {"seed": spec.seed, "size_px": PICTURE_PX, "trail_s": TRAIL_S}
-    record_run(spec.world, spec.policy, file, at_s=exhibit.horizon_s, **look)
-
-
 def picture(name: str) -> None:
     """Draw robots at work, or film them, for the other pages."""
     world, policy, options = PICTURES[name]
@@ -218,7 +210,6 @@ def show(exhibit: Exhibit) -> None:
     """Make the replay and the picture of an exhibit."""
     replays = [record_replay(spec, frame_s=exhibit.frame_s) for spec in exhibit.specs()]
     path = write_replays(FOLDER / f"{exhibit.name}.html", replays)
-    draw(exhibit)
     print(f"{path.name}: {path.stat().st_size / 1e3:.0f} kB")
 
 
@@ -233,15 +224,14 @@ def page() -> str:
     lines = [
         "# Gallery",
         "",
-        "[Replays](look.md#replays) of every scenario, controller and kind of adversity. A click on a picture opens",
-        "one. Runs side by side have the same seed; most last 1,000 s. `scripts/make_gallery.py` makes them.",
+        "A click on a film opens its [replay](look.md#replays). Runs side by side have one seed; most last 1,000 s.",
         "",
         *table_of_films(),
+        "",
     ]
     for exhibit in EXHIBITS:
         title = exhibit.name.replace("_", " ")
-        lines += ["", f"## {title[0].upper()}{title[1:]}", "", f"{exhibit.text} ({', '.join(exhibit.policies)})", ""]
-        lines += [f"[![{title}](gallery/{exhibit.name}.png)](gallery/{exhibit.name}.html)"]
+        lines += [f"- [{title}](gallery/{exhibit.name}.html) ({', '.join(exhibit.policies)}): {exhibit.text}"]
     return "\n".join(lines) + "\n"
 
 
@@ -271,7 +261,7 @@ def table_of_films() -> list[str]:
     lines: list[list[str]] = []
     for first in range(0, len(FILMS), FILM_COLUMNS):
         row = FILMS[first : first + FILM_COLUMNS]
-        pictures = [f"[![{film.caption}](gallery/{film.name}.gif)](#{film.exhibit.replace('_', '-')})" for film in row]
+        pictures = [f"[![{film.caption}](gallery/{film.name}.gif)](gallery/{film.exhibit}.html)" for film in row]
         captions = [film.caption for film in row]
         lines += [captions, pictures] if lines else [captions, ["---"] * len(row), pictures]
     return [f"| {' | '.join(cells)} |" for cells in lines]
