@@ -187,7 +187,6 @@ PICTURES: dict[str, tuple[ScenarioConfig, str, dict[str, Any]]] = {
     "warehouse_small_ppo.png": (scenario("warehouse_small"), "ppo_warehouse_small", {"at_s": 900.0}),
     "warehouse_quad_dpo.png": (scenario("warehouse_quad"), "dpo", {"at_s": 300.0, "size_px": 700}),
     "obstacles_crw.png": (scenario("warehouse_small", obstacles=WALLS), "crw", {"at_s": 300.0, "size_px": 700}),
-    "warehouse_small_light.png": (scenario("warehouse_small"), "stochm", {"at_s": 300.0, "theme": "light"}),
     "small.gif": (scenario("warehouse_small"), "ppo_warehouse_small", {"speedup": 30.0, "fps": 10.0, "size_px": 560}),
 }
 """File in docs/images -> the world, the policy and how it is drawn; the film is README's."""
