@@ -7,7 +7,7 @@ import numpy as np
 from swarm_forage_env._internal.compiling import kernel, part
 from swarm_forage_env.contract.types import Row
 
-from .cache_memory import NOT_TO_ADD, NOT_TO_TAKE, OneTaskMemory, covers, is_listed, keep_away_m
+from .cache_memory import NOT_TO_ADD, NOT_TO_TAKE, OneTaskMemory, covers, is_shunned, keep_away_m
 from .memory import OneMemory, density
 from .robots import ACQUIRE, TRANSPORT, Senses, nearest_nest
 from .tasks import DRAW_POINT_X, DRAW_POINT_Y
@@ -64,12 +64,12 @@ def select_cache(robot: np.record, senses: Senses, c: np.record, draws: Row, mem
         Whether there is one; then goal, tolerance and target (the cache's serial) of the robot are set.
     """
     takes = robot.activity == ACQUIRE
-    shunned = memory.shunned_caches[NOT_TO_TAKE if takes else NOT_TO_ADD]
+    kind = NOT_TO_TAKE if takes else NOT_TO_ADD
     best = 0.0
     best_entry = -1
     for entry in range(robot.n_caches):
         cache = memory.caches[entry]
-        if covers(cache, senses.x, senses.y, c) or is_listed(cache.serial, shunned):
+        if covers(cache, senses.x, senses.y, c) or is_shunned(memory, kind, cache.serial):
             continue
         if takes and not is_large_enough(cache, c):
             continue
@@ -118,8 +118,8 @@ def is_isolated(robot: np.record, entry: int, c: np.record, memory: OneTaskMemor
     objects = memory.objects
     for k in range(robot.n_caches):
         limit = keep_away_m(memory.caches[k], c) ** 2
-        dx = (memory.caches[k].cell_x - objects.cell_x[entry]) * c.cell_m
-        dy = (memory.caches[k].cell_y - objects.cell_y[entry]) * c.cell_m
+        dx = (memory.caches[k].cell_x - objects.known[entry].cell_x) * c.cell_m
+        dy = (memory.caches[k].cell_y - objects.known[entry].cell_y) * c.cell_m
         if dx * dx + dy * dy <= limit:
             return False
     limit = c.proximity_m * c.proximity_m
@@ -128,8 +128,8 @@ def is_isolated(robot: np.record, entry: int, c: np.record, memory: OneTaskMemor
         other = entry + step
         if other >= robot.n_known:
             other -= robot.n_known
-        dx = (objects.cell_x[other] - objects.cell_x[entry]) * c.cell_m
-        dy = (objects.cell_y[other] - objects.cell_y[entry]) * c.cell_m
+        dx = (objects.known[other].cell_x - objects.known[entry].cell_x) * c.cell_m
+        dy = (objects.known[other].cell_y - objects.known[entry].cell_y) * c.cell_m
         if dx * dx + dy * dy <= limit:
             return False
     return True
@@ -149,17 +149,17 @@ def select_isolated_object(robot: np.record, senses: Senses, c: np.record, memor
     for entry in range(robot.n_known):
         if not is_isolated(robot, entry, c, memory):
             continue
-        x = objects.cell_x[entry] * c.cell_m + half
-        y = objects.cell_y[entry] * c.cell_m + half
-        pheromone = density(robot.clock - objects.seen[entry], c.log_keep)
+        x = objects.known[entry].cell_x * c.cell_m + half
+        y = objects.known[entry].cell_y * c.cell_m + half
+        pheromone = density(robot.clock - objects.known[entry].seen, c.log_keep)
         utility = cache_utility(x, y, 1, senses.x, senses.y, pheromone, c)
         if utility > best:
             best = utility
             best_entry = entry
     if best_entry < 0:
         return False
-    robot.goal_x_m = objects.cell_x[best_entry] * c.cell_m + half
-    robot.goal_y_m = objects.cell_y[best_entry] * c.cell_m + half
+    robot.goal_x_m = objects.known[best_entry].cell_x * c.cell_m + half
+    robot.goal_y_m = objects.known[best_entry].cell_y * c.cell_m + half
     robot.goal_tolerance_m = c.creation_tolerance_m
     return True
 
@@ -170,8 +170,8 @@ def object_is_near(robot: np.record, senses: Senses, c: np.record, objects: OneM
     limit = c.creation_distance_m * c.creation_distance_m
     half = 0.5 * c.cell_m
     for entry in range(robot.n_known):
-        dx = objects.cell_x[entry] * c.cell_m + half - senses.x
-        dy = objects.cell_y[entry] * c.cell_m + half - senses.y
+        dx = objects.known[entry].cell_x * c.cell_m + half - senses.x
+        dy = objects.known[entry].cell_y * c.cell_m + half - senses.y
         if dx * dx + dy * dy <= limit:
             return True
     return False

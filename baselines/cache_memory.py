@@ -20,7 +20,16 @@ from swarm_forage_env.contract.layout import CACHE_FIELDS, SERIAL_SCALE, VISIBLE
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import IntArray, Row
 
-from .memory import ObjectMemory, OneMemory, forget, memory_of, new_memory, object_row_of
+from .memory import (
+    ObjectMemory,
+    OneMemory,
+    forget,
+    memory_of,
+    new_memory,
+    object_memory_with_room,
+    object_row_of,
+    with_room,
+)
 
 _FIELDS: list[tuple[str, type]] = [
     ("cell_x", np.int32),  # centre cell
@@ -41,9 +50,9 @@ class TaskMemory(NamedTuple):
     caches: np.ndarray
     """(N, K) records of `CACHE`; row i holds a compact list of `n_caches[i]` caches, in no particular order."""
     shunned: IntArray
-    """(N, M) by object row: the robot's `shun_round` in which it was to be left alone, 0 = never."""
-    shunned_caches: IntArray
-    """(N, 2, K) serials of caches not to take from and not to add to, newest first, 0 = no more."""
+    """(N, 3, K) what is left alone, by `OBJECTS`, `NOT_TO_TAKE` and `NOT_TO_ADD`: rows + 1, serials, serials."""
+    n_shunned: IntArray
+    """(N, 3) how many."""
 
 
 class OneTaskMemory(NamedTuple):
@@ -51,27 +60,42 @@ class OneTaskMemory(NamedTuple):
 
     objects: OneMemory
     caches: Row
-    shunned: Row
-    shunned_caches: np.ndarray
+    shunned: np.ndarray
+    n_shunned: Row
 
 
-NOT_TO_TAKE = 0
-"""Place in `TaskMemory.shunned_caches` of the caches that a robot takes nothing from."""
-NOT_TO_ADD = 1
+OBJECTS = 0
+"""Place in `TaskMemory.shunned` of objects."""
+NOT_TO_TAKE = 1
+"""The same of caches that a robot takes nothing from."""
+NOT_TO_ADD = 2
 """The same for those that it adds nothing to."""
 
 
 def new_task_memory(spec: SwarmSpec) -> TaskMemory:
-    """Return empty memories; twice as many caches can be remembered as fit into the arena side by side."""
+    """Return empty memories, without room; see `task_memory_with_room`."""
+    return TaskMemory(
+        objects=new_memory(spec.n_robots, spec.n_objects),
+        caches=np.zeros((spec.n_robots, 0), CACHE),
+        shunned=np.zeros((spec.n_robots, 3, 0), np.int32),
+        n_shunned=np.zeros((spec.n_robots, 3), np.int32),
+    )
+
+
+def task_memory_with_room(memory: TaskMemory, robots: np.ndarray, n_ticks: int, spec: SwarmSpec) -> TaskMemory:
+    """Return memories with room for what robots may see and shun in so many ticks.
+
+    Twice as many caches can be remembered as fit into the arena side by side.
+    """
     width_m, height_m = spec.arena_size_m
     n_side_by_side = int(width_m / spec.cache_side_m + 1e-9) * int(height_m / spec.cache_side_m + 1e-9)
-    shape = (spec.n_robots, spec.n_objects)
-    return TaskMemory(
-        objects=new_memory(*shape),
-        caches=np.zeros((spec.n_robots, 2 * n_side_by_side), CACHE),
-        shunned=np.zeros(shape, np.int32),
-        shunned_caches=np.zeros((spec.n_robots, 2, 2 * n_side_by_side), np.int32),
-    )
+    objects = object_memory_with_room(memory.objects, robots, n_ticks, spec.n_objects)
+    seen = n_ticks * (VISIBLE_CACHES + 1)  # and one in an event
+    caches = with_room(memory.caches, robots["n_caches"], seen, 2 * n_side_by_side)
+    shunned = with_room(memory.shunned, memory.n_shunned, n_ticks)
+    if objects is memory.objects and caches is memory.caches and shunned is memory.shunned:
+        return memory
+    return TaskMemory(objects, caches, shunned, memory.n_shunned)
 
 
 @part
@@ -81,7 +105,7 @@ def task_memory_of(memory: TaskMemory, robot_index: int) -> OneTaskMemory:
         memory_of(memory.objects, robot_index),
         memory.caches[robot_index],
         memory.shunned[robot_index],
-        memory.shunned_caches[robot_index],
+        memory.n_shunned[robot_index],
     )
 
 
@@ -160,10 +184,9 @@ def _forget_objects_under(robot: np.record, objects: OneMemory, cache: np.record
     """Forget objects on the square of a cache: they are inside it now."""
     half = c.cell_m / 2.0
     for entry in range(robot.n_known - 1, -1, -1):  # backwards: forgetting moves the last entry here
-        x = objects.cell_x[entry] * c.cell_m + half
-        y = objects.cell_y[entry] * c.cell_m + half
-        if covers(cache, x, y, c):
-            forget(robot, objects, objects.row[entry])
+        known = objects.known[entry]
+        if covers(cache, known.cell_x * c.cell_m + half, known.cell_y * c.cell_m + half, c):
+            forget(robot, objects, known.row)
 
 
 @part
@@ -230,53 +253,26 @@ def _is_visible(cache: np.record, visible: Row, c: np.record) -> bool:
 
 
 @part
-def shun_object(robot: np.record, memory: OneTaskMemory, object_row: int) -> None:
-    """Leave an object alone until `stop_shunning_objects`; nothing happens for row -1."""
-    if object_row >= 0:
-        memory.shunned[object_row] = robot.shun_round
-        robot.shunned_in_task = True
+def is_shunned(memory: OneTaskMemory, kind: int, name: int) -> bool:
+    """Whether an object (its row + 1) or a cache (its serial) is among those to be left alone."""
+    return name in memory.shunned[kind, : memory.n_shunned[kind]]
 
 
 @part
-def stop_shunning_objects(robot: np.record) -> None:
-    """Make every object selectable again."""
-    robot.shun_round += 1
+def shun(robot: np.record, memory: OneTaskMemory, kind: int, name: int) -> None:
+    """Leave an object or a cache alone, also when it is forgotten meanwhile and seen again; nothing happens for 0.
 
-
-@part
-def is_listed(serial: int, serials: Row) -> bool:
-    """Whether a serial is among those of a list that ends at its first 0."""
-    for known in serials:
-        if known == 0:
-            return False
-        if known == serial:
-            return True
-    return False
-
-
-@part
-def shun_cache(robot: np.record, serials: Row, serial: int) -> None:
-    """Leave a cache alone until `stop_shunning_caches`, also when it is forgotten meanwhile and seen again.
-
-    Args:
-        robot: Record of the robot.
-        serials: Part of `TaskMemory.shunned_caches`, edited; a full list loses the serial that was added first.
-        serial: Identity of the cache; nothing happens for 0.
+    `TaskMemory.n_shunned` says for how long: until it is set to 0.
     """
-    if serial == 0:
+    if name == 0:
         return
-    robot.shunned_cache_in_task = True
-    if is_listed(serial, serials):
-        return
-    for place in range(serials.shape[0] - 1, 0, -1):
-        serials[place] = serials[place - 1]
-    serials[0] = serial
-
-
-@part
-def stop_shunning_caches(serials: np.ndarray) -> None:
-    """Make every cache selectable again."""
-    serials[:] = 0
+    if kind == OBJECTS:
+        robot.shunned_in_task = True
+    else:
+        robot.shunned_cache_in_task = True
+    if not is_shunned(memory, kind, name):
+        memory.shunned[kind, memory.n_shunned[kind]] = name
+        memory.n_shunned[kind] += 1
 
 
 @part

@@ -4,7 +4,7 @@ States as in `crw`, but ACQUIRE goes to the best remembered object, and explores
 it can go to. The memory is updated in every state. Source: DPO of the paper, section "Candidate Algorithms".
 """
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -30,6 +30,7 @@ from .memory import (
     memory_of,
     new_memory,
     object_memories,
+    object_memory_with_room,
     object_row_of,
 )
 from .object_choice import MemoryParameters, object_is_known, object_is_reached, select_object
@@ -102,8 +103,11 @@ class DPOPolicy(ScriptedPolicy):
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run: every robot explores and remembers nothing."""
         constants = kernel_constants(self.parameters, spec, **self.parameters.derived())
-        self._memory = new_memory(spec.n_robots, spec.n_objects)
-        self._start_script(spec, rng, DRAWS, constants, new_robots(spec.n_robots), self._memory)
+        memory = new_memory(spec.n_robots, spec.n_objects)
+        self._start_script(spec, rng, DRAWS, constants, new_robots(spec.n_robots), memory)
+
+    def _with_room(self, memory: Any, n_ticks: int, spec: SwarmSpec) -> ObjectMemory:
+        return object_memory_with_room(memory, self._robots, n_ticks, spec.n_objects)
 
     def describe_memories(self) -> Memories:
         """Return where all robots remember objects."""

@@ -10,6 +10,8 @@ The third step has a closed form: an object last seen a ticks ago has density (1
 of last sight is stored. The first two need a look through the memory only when the window has changed;
 otherwise the objects in view are just stamped with the time. Source: object memory of the paper's cognitive
 controllers; there is no limit on its size and no forgetting by age.
+
+Compiled code cannot make arrays. So before it runs there is room for whatever robots may see in that time: `with_room`.
 """
 
 import math
@@ -24,21 +26,27 @@ from swarm_forage_env.contract.types import CodeArray, IntArray, ObsArray, Row
 
 _WINDOW = WINDOW_CELLS * WINDOW_CELLS
 _REACH = WINDOW_CELLS // 2
+_MOST_LISTS = 1024
+"""A list is searched from its head: with so many lists per robot, and few objects known, at once."""
+
+_FIELDS: list[tuple[str, type]] = [
+    ("row", np.int32),  # of the object
+    ("cell_x", np.int32),  # cell at which it was last seen
+    ("cell_y", np.int32),
+    ("seen", np.int32),  # tick of the robot's own clock at which it was last seen
+    ("next", np.int32),  # entry + 1 of the next object in the same list, or 0
+]
+KNOWN = np.dtype((np.record, np.dtype(_FIELDS, align=True)))
+"""One remembered object."""
 
 
 class ObjectMemory(NamedTuple):
-    """Memories of all robots. Row i holds a compact list of `n_known[i]` objects, in no particular order."""
+    """Memories of all robots."""
 
-    row: IntArray
-    """(N, M) object row of each list entry."""
-    cell_x: IntArray
-    """(N, M) cell at which it was last seen."""
-    cell_y: IntArray
-    """(N, M)."""
-    seen: IntArray
-    """(N, M) tick of the robot's own clock at which it was last seen."""
-    entry: IntArray
-    """(N, M) by object row: its list entry + 1, or 0 when it is not remembered."""
+    known: np.ndarray
+    """(N, K) records of `KNOWN`; row i holds a compact array of `n_known[i]` objects, in no particular order."""
+    head: IntArray
+    """(N, lists) by the last bits of an object's row: entry + 1 of the first such object, or 0."""
     window: ObsArray
     """(N, 27) readings of the window seen last, then those of the cell in its centre; not a number before the first."""
     shown: CodeArray
@@ -48,44 +56,48 @@ class ObjectMemory(NamedTuple):
 class OneMemory(NamedTuple):
     """`ObjectMemory` of one robot: the same arrays without their first axis."""
 
-    row: Row
-    cell_x: Row
-    cell_y: Row
-    seen: Row
-    entry: Row
+    known: Row
+    head: Row
     window: Row
     shown: Row
 
 
 def new_memory(n_robots: int, n_objects: int) -> ObjectMemory:
-    """Return empty memories of `n_robots` robots for `n_objects` objects.
-
-    They reserve 20 bytes per robot and object. Zeroed pages are only touched as objects become known, so that a run
-    may well need less.
-    """
-    shape = (n_robots, n_objects)
+    """Return empty memories of `n_robots` robots for some of `n_objects` objects, without room; see `with_room`."""
+    n_lists = min(_MOST_LISTS, 1 << (n_objects - 1).bit_length())
     return ObjectMemory(
-        row=np.zeros(shape, np.int32),
-        cell_x=np.zeros(shape, np.int32),
-        cell_y=np.zeros(shape, np.int32),
-        seen=np.zeros(shape, np.int32),
-        entry=np.zeros(shape, np.int32),
+        known=np.zeros((n_robots, 0), KNOWN),
+        head=np.zeros((n_robots, n_lists), np.int32),
         window=np.full((n_robots, _WINDOW + 2), np.nan, np.float32),
         shown=np.zeros((n_robots, _WINDOW), np.int8),
     )
+
+
+def with_room(array: np.ndarray, used: IntArray, more: int, at_most: int = 2**31) -> np.ndarray:
+    """Return lists (..., K), of which the first `used` (...) places are in use, with room for `more`.
+
+    That is the array itself, or a copy that is half as long again at least, `at_most` at most: that is always enough.
+    """
+    length, most_used = array.shape[-1], int(used.max(initial=0))
+    needed = min(most_used + more, at_most)
+    if needed <= length:
+        return array
+    longer = np.zeros((*array.shape[:-1], min(max(needed, length * 3 // 2), at_most)), array.dtype)
+    longer[..., :most_used] = array[..., :most_used]
+    return longer
+
+
+def object_memory_with_room(memory: ObjectMemory, robots: np.ndarray, n_ticks: int, n_objects: int) -> ObjectMemory:
+    """Return memories with room for the objects that robots may see in so many ticks."""
+    known = with_room(memory.known, robots["n_known"], n_ticks * _WINDOW, n_objects)
+    return memory if known is memory.known else memory._replace(known=known)
 
 
 @part
 def memory_of(memory: ObjectMemory, robot_index: int) -> OneMemory:
     """Return views of one robot's memory."""
     return OneMemory(
-        memory.row[robot_index],
-        memory.cell_x[robot_index],
-        memory.cell_y[robot_index],
-        memory.seen[robot_index],
-        memory.entry[robot_index],
-        memory.window[robot_index],
-        memory.shown[robot_index],
+        memory.known[robot_index], memory.head[robot_index], memory.window[robot_index], memory.shown[robot_index]
     )
 
 
@@ -95,34 +107,57 @@ def object_row_of(reading: float, c: np.record) -> int:
     return int(reading * c.n_objects + 0.5) - 1
 
 
+@part
+def find_object(memory: OneMemory, object_row: int) -> int:
+    """Entry of a remembered object, or -1."""
+    entry = memory.head[object_row & (memory.head.shape[0] - 1)] - 1
+    while entry >= 0 and memory.known[entry].row != object_row:
+        entry = memory.known[entry].next - 1
+    return entry
+
+
 @kernel
 def remember(robot: np.record, memory: OneMemory, object_row: int, cell_x: int, cell_y: int) -> None:
     """Store an object as seen now at a cell, whether known before or not."""
-    entry = memory.entry[object_row] - 1
+    entry = find_object(memory, object_row)
     if entry < 0:
         entry = robot.n_known
         robot.n_known += 1
-        memory.entry[object_row] = entry + 1
-        memory.row[entry] = object_row
-    memory.cell_x[entry] = cell_x
-    memory.cell_y[entry] = cell_y
-    memory.seen[entry] = robot.clock
+        place = object_row & (memory.head.shape[0] - 1)
+        memory.known[entry].row = object_row
+        memory.known[entry].next = memory.head[place]
+        memory.head[place] = entry + 1
+    known = memory.known[entry]
+    known.cell_x = cell_x
+    known.cell_y = cell_y
+    known.seen = robot.clock
 
 
 @part
 def forget(robot: np.record, memory: OneMemory, object_row: int) -> None:
-    """Remove an object; nothing happens if it is not remembered. The last list entry takes its place."""
-    entry = memory.entry[object_row] - 1
+    """Remove an object; nothing happens if it is not remembered. The last entry takes its place."""
+    entry = find_object(memory, object_row)
     if entry < 0:
         return
+    _lead(memory, entry, memory.known[entry].next)
     last = robot.n_known - 1
-    memory.row[entry] = memory.row[last]
-    memory.cell_x[entry] = memory.cell_x[last]
-    memory.cell_y[entry] = memory.cell_y[last]
-    memory.seen[entry] = memory.seen[last]
-    memory.entry[memory.row[entry]] = entry + 1
-    memory.entry[object_row] = 0
+    if entry != last:
+        _lead(memory, last, entry + 1)
+        memory.known[entry] = memory.known[last]
     robot.n_known = last
+
+
+@part
+def _lead(memory: OneMemory, entry: int, to: int) -> None:
+    """Let what leads to an entry of a list lead to another one, given as entry + 1, or to none, 0."""
+    place = memory.known[entry].row & (memory.head.shape[0] - 1)
+    before = memory.head[place] - 1
+    if before == entry:
+        memory.head[place] = to
+        return
+    while memory.known[before].next - 1 != entry:
+        before = memory.known[before].next - 1
+    memory.known[before].next = to
 
 
 @part
@@ -168,12 +203,13 @@ def _forget_what_is_gone(robot: np.record, c: np.record, memory: OneMemory) -> N
     One that shows elsewhere in the window comes back at once with its new cell.
     """
     for entry in range(robot.n_known - 1, -1, -1):  # backwards: forgetting moves the last entry here
-        x = memory.cell_x[entry] - robot.window_x
-        y = memory.cell_y[entry] - robot.window_y
+        known = memory.known[entry]
+        x = known.cell_x - robot.window_x
+        y = known.cell_y - robot.window_y
         if abs(x - _REACH) <= _REACH and abs(y - _REACH) <= _REACH:
             shown = object_row_of(memory.window[y * WINDOW_CELLS + x], c)
-            if shown != memory.row[entry]:
-                forget(robot, memory, memory.row[entry])
+            if shown != known.row:
+                forget(robot, memory, known.row)
 
 
 @kernel
@@ -182,8 +218,14 @@ def density(age_ticks: int, log_keep: float) -> float:
     return math.exp(log_keep * (age_ticks + 1))
 
 
+def listed(lists: np.ndarray, used: IntArray) -> tuple[IntArray, np.ndarray]:
+    """Return robot and record of everything in the first `used[i]` places of rows of `lists` (N, K)."""
+    robot = np.repeat(np.arange(len(used), dtype=np.int32), used)
+    place = np.arange(len(robot)) - np.repeat(np.cumsum(used) - used, used)
+    return robot, lists[robot, place]
+
+
 def object_memories(memory: ObjectMemory, robots: np.ndarray) -> Memories:
     """Return where all robots remember objects."""
-    robot, entry = np.nonzero(np.arange(memory.row.shape[1]) < robots["n_known"][:, None])
-    cells = np.column_stack((memory.cell_x[robot, entry], memory.cell_y[robot, entry]))
-    return Memories.of_cells(robot.astype(np.int32), cells)
+    robot, known = listed(memory.known, robots["n_known"])
+    return Memories.of_cells(robot, np.column_stack((known["cell_x"], known["cell_y"])))

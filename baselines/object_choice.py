@@ -12,7 +12,7 @@ from swarm_forage_env.contract.detection import sees_object
 from swarm_forage_env.contract.layout import GROUND_SENSORS
 from swarm_forage_env.contract.types import Row
 
-from .memory import OneMemory, density
+from .memory import OneMemory, density, find_object
 from .parameters import ControllerParameters, ParameterError
 from .robots import Senses, nearest_nest
 
@@ -74,7 +74,7 @@ def select_best_object(
     """Choose the remembered object of highest utility as goal; the first one found wins a tie.
 
     Objects whose centre is within `object_exclusion_m` of the robot are left out, and those for which the compiled
-    function `is_left_out(robot, whole_memory, object_row)` holds.
+    function `is_left_out(whole_memory, object_row)` holds.
 
     Returns:
         Whether there is one; then goal (its centre), tolerance and target of the robot are set.
@@ -84,28 +84,30 @@ def select_best_object(
     nearest = c.object_exclusion_m * c.object_exclusion_m
     half = 0.5 * c.cell_m
     for entry in range(robot.n_known):
-        anchor_x = memory.cell_x[entry] * c.cell_m
-        anchor_y = memory.cell_y[entry] * c.cell_m
+        known = memory.known[entry]
+        anchor_x = known.cell_x * c.cell_m
+        anchor_y = known.cell_y * c.cell_m
         dx = anchor_x + half - senses.x
         dy = anchor_y + half - senses.y
-        if dx * dx + dy * dy <= nearest or is_left_out(robot, whole_memory, memory.row[entry]):
+        if dx * dx + dy * dy <= nearest or is_left_out(whole_memory, known.row):
             continue
-        pheromone = density(robot.clock - memory.seen[entry], c.log_keep)
+        pheromone = density(robot.clock - known.seen, c.log_keep)
         utility = object_utility(anchor_x, anchor_y, senses.x, senses.y, pheromone, c)
         if utility > best:
             best = utility
             best_entry = entry
     if best_entry < 0:
         return False
-    robot.goal_x_m = memory.cell_x[best_entry] * c.cell_m + half
-    robot.goal_y_m = memory.cell_y[best_entry] * c.cell_m + half
+    chosen = memory.known[best_entry]
+    robot.goal_x_m = chosen.cell_x * c.cell_m + half
+    robot.goal_y_m = chosen.cell_y * c.cell_m + half
     robot.goal_tolerance_m = c.object_tolerance_m
-    robot.target = memory.row[best_entry]
+    robot.target = chosen.row
     return True
 
 
 @part
-def _never(_robot: np.record, _memory: OneMemory, _object_row: int) -> bool:
+def _never(_memory: OneMemory, _object_row: int) -> bool:
     return False
 
 
@@ -118,7 +120,7 @@ def select_object(robot: np.record, senses: Senses, c: np.record, _draws: Row, m
 @part
 def object_is_known(robot: np.record, _c: np.record, memory: OneMemory) -> bool:
     """Whether the target object is still remembered."""
-    return memory.entry[robot.target] > 0
+    return find_object(memory, robot.target) >= 0
 
 
 @part

@@ -1,6 +1,6 @@
 """What the scripted controllers have in common: records of robots, one kernel for all of them, and words for people."""
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 
@@ -10,6 +10,9 @@ from swarm_forage_env.contract.types import CodeArray
 
 from .parameters import ControllerParameters, chosen_parameters
 from .robots import ACTIVITY_WORDS, activity_codes
+
+_CALLS_AHEAD = 10
+"""For how many of the longest calls of a kernel there is room in the memory when it was made."""
 
 
 class ScriptedPolicy(KernelPolicy):
@@ -55,6 +58,27 @@ class ScriptedPolicy(KernelPolicy):
         self._robots = robots
         actions = np.zeros((spec.n_robots, spec.action_size), np.float32)
         self._start(spec, rng, n_draws, constants, robots, *memory, actions)
+        self._room_until = 0
+        self.after_ticks()
+
+    @property
+    def _memory(self) -> Any:
+        """What the robots remember, for controllers that have a memory: the third part of the state."""
+        return self._state[2]
+
+    def _with_room(self, memory: Any, n_ticks: int, spec: SwarmSpec) -> Any:
+        """Return the memory itself, or a longer one, with room for what robots may see in so many ticks."""
+        return memory
+
+    def after_ticks(self) -> None:
+        """Make room in the memory for the ticks until the next call, and for some more: it takes microseconds."""
+        if self.n_ticks + self._chance.n_ticks <= self._room_until:
+            return
+        self._room_until = self.n_ticks + _CALLS_AHEAD * self._chance.n_ticks
+        constants, robots, memory, *others = self._state
+        wider = self._with_room(memory, self._room_until - self.n_ticks, cast(SwarmSpec, self._spec))
+        if wider is not memory:
+            self._go_on_with(constants, robots, wider, *others)
 
     @property
     def activity(self) -> CodeArray:

@@ -32,6 +32,7 @@ from .cache_choice import (
 from .cache_memory import (
     NOT_TO_ADD,
     NOT_TO_TAKE,
+    OBJECTS,
     OneTaskMemory,
     TaskMemory,
     cell_of,
@@ -39,12 +40,10 @@ from .cache_memory import (
     event_cache_serial,
     event_object_row,
     forgive_refusals,
+    is_shunned,
     look_for_caches,
     remember_cache,
-    shun_cache,
-    shun_object,
-    stop_shunning_caches,
-    stop_shunning_objects,
+    shun,
     task_memory_of,
 )
 from .cache_sites import select_site
@@ -107,21 +106,19 @@ def new_task_robots(n_robots: int) -> np.ndarray:
             ("last_cache_y_m", np.float64),
             ("cargo_from_nest_m", np.float64),  # a Cache Transferer's: how far from the nest its cache is; else inf
             ("n_caches", np.int32),  # remembered caches
-            ("shun_round", np.int32),  # objects stamped with this number are left alone
             ("goal_kind", np.int8),  # `tasks.Goal` code of what it acquires
             ("knows_last_cache", np.bool_),
             ("shunned_in_task", np.bool_),  # an object, during the current task
             ("shunned_cache_in_task", np.bool_),
         ],
     )
-    robots["shun_round"] = 1
     robots["cargo_from_nest_m"] = np.inf
     return robots
 
 
 @part
-def _is_shunned(robot: np.record, memory: OneTaskMemory, object_row: int) -> bool:
-    return memory.shunned[object_row] == robot.shun_round
+def _is_shunned(memory: OneTaskMemory, object_row: int) -> bool:
+    return is_shunned(memory, OBJECTS, object_row + 1)
 
 
 @part
@@ -213,7 +210,7 @@ def follow_events(
         forget(robot, memory.objects, object_row_of(row[c.cargo], c))
         robot.cargo_from_nest_m = np.inf
         if task == _TRANSFERER:
-            shun_cache(robot, memory.shunned_caches[NOT_TO_ADD], event_cache_serial(row, c))
+            shun(robot, memory, NOT_TO_ADD, event_cache_serial(row, c))
             if not c.transferer_goes_anywhere and row[c.event_cache] > 0.0:
                 # From the event: the cache may have been used up in the same tick, and be forgotten.
                 x = cell_of(row[c.event_cache + 1], c.half_width_m, c)
@@ -221,9 +218,9 @@ def follow_events(
                 robot.cargo_from_nest_m = from_nest_m((x + 0.5) * c.cell_m, (y + 0.5) * c.cell_m, c)
     elif robot.activity == FINISHED:
         if task in (_STARTER, _FINISHER):
-            shun_object(robot, memory, event_object_row(row, c))
+            shun(robot, memory, OBJECTS, event_object_row(row, c) + 1)
         elif task == _TRANSFERER:
-            shun_cache(robot, memory.shunned_caches[NOT_TO_TAKE], event_cache_serial(row, c))
+            shun(robot, memory, NOT_TO_TAKE, event_cache_serial(row, c))
     elif senses.event == _CACHE_TOO_NEAR:
         remember_cache(robot, memory, row[c.event_cache : c.event_cache + CACHE_FIELDS], c)
         entry = event_cache_entry(robot, row, c, memory.caches)
@@ -253,9 +250,10 @@ def manage_task(
         end_task(a, i, now, c)
     next_task(a, i, now, c, draws[DRAW_MOVE], draws[DRAW_PARTITION], draws[DRAW_SWITCH])
     if not robot.shunned_in_task:
-        stop_shunning_objects(robot)
+        memory.n_shunned[OBJECTS] = 0
     if not (robot.shunned_cache_in_task and a.task[i] == _TRANSFERER):
-        stop_shunning_caches(memory.shunned_caches)
+        memory.n_shunned[NOT_TO_TAKE] = 0
+        memory.n_shunned[NOT_TO_ADD] = 0
     forgive_refusals(robot, memory.caches)
     robot.shunned_in_task = False
     robot.shunned_cache_in_task = False

@@ -1,15 +1,15 @@
 """What STOCHM and STOCHX have in common: a policy that runs the task machines of `task_machines`."""
 
 import math
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from swarm_forage_env.contract.policy import Memories, SwarmSpec
 from swarm_forage_env.contract.types import CodeArray
 
-from .cache_memory import new_task_memory
-from .memory import object_memories
+from .cache_memory import TaskMemory, new_task_memory, task_memory_with_room
+from .memory import listed, object_memories
 from .parameters import kernel_constants
 from .robots import READS
 from .scripted import ScriptedPolicy
@@ -79,9 +79,11 @@ class TaskPolicy(ScriptedPolicy):
         """Start a run: estimates are drawn, no robot has a task, and all memories are empty."""
         constants = task_constants(self.parameters, spec, self.n_tabs)
         robots = new_task_robots(spec.n_robots)
-        self._memory = new_task_memory(spec)
         self._allocation = new_allocation(spec.n_robots, self.parameters, spec.quirks, self.n_tabs, rng)
-        self._start_script(spec, rng, TASK_DRAWS, constants, robots, self._memory, self._allocation)
+        self._start_script(spec, rng, TASK_DRAWS, constants, robots, new_task_memory(spec), self._allocation)
+
+    def _with_room(self, memory: Any, n_ticks: int, spec: SwarmSpec) -> TaskMemory:
+        return task_memory_with_room(memory, self._robots, n_ticks, spec)
 
     @property
     def task(self) -> CodeArray:
@@ -90,9 +92,7 @@ class TaskPolicy(ScriptedPolicy):
 
     def describe_memories(self) -> Memories:
         """Return where all robots remember objects and caches."""
-        caches = self._memory.caches
-        robot, entry = np.nonzero(np.arange(caches.shape[1]) < self._robots["n_caches"][:, None])
-        known = caches[robot, entry]
+        robot, known = listed(self._memory.caches, self._robots["n_caches"])
         cells = np.column_stack((known["cell_x"], known["cell_y"]))
         objects = object_memories(self._memory.objects, self._robots)
-        return Memories.together((objects, Memories.of_cells(robot.astype(np.int32), cells, is_cache=True)))
+        return Memories.together((objects, Memories.of_cells(robot, cells, is_cache=True)))

@@ -57,6 +57,11 @@ class TickDraws:
         self._rows = np.empty((0, *shape))  # numbers come with the first draw: snapshots hold none that is never used
         self._block = -1
 
+    @property
+    def n_ticks(self) -> int:
+        """Of how many ticks `rows` returns the numbers at most."""
+        return self._shape[0]
+
     def row(self, tick: int) -> np.ndarray:
         """Return the numbers of a tick, float64 of the given shape.
 

@@ -67,11 +67,16 @@ class Driver:
         decision_ticks: int = 1,
     ) -> None:
         """Take the kernel as one that other kernels call; it is compiled when it is used. See `KernelPolicy._start`."""
-        self.held = hold((state, Callback(kernel, *example_of(state))))
+        self._callback = Callback(kernel, *example_of(state))
         self.actions: ActionArray = state[-1]
+        self.go_on_with(state)
         self.task = task
         self.decision_ticks = decision_ticks
         self.call = Calls()
+
+    def go_on_with(self, state: tuple[Any, ...]) -> None:
+        """Take a state of other arrays, of the same types; the actions stay where they are."""
+        self.held = hold((state, self._callback))
 
     def next_ticks(self) -> tuple[int, FloatArray]:
         """Return the number of the next tick, and the draws (ticks, N, draws) of it and of some that follow."""
@@ -97,9 +102,9 @@ class CompiledPolicy(Driver):
         return tick, self._chance.rows(tick)
 
     def count_ticks(self, n_ticks: int) -> None:
-        """Note the ticks, and see `KernelPolicy.check_ticks`."""
+        """Note the ticks, and see `KernelPolicy.after_ticks`."""
         self._policy.n_ticks += n_ticks
-        self._policy.check_ticks()
+        self._policy.after_ticks()
 
 
 def example_of(state: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -153,11 +158,17 @@ class KernelPolicy:
         self.n_ticks += 1
         self._draws = self._chance.row(self.n_ticks)
         self._call(self._kernel, obs, active, self._draws, self._state, self.n_ticks)
-        self.check_ticks()
+        self.after_ticks()
         return self._actions
 
-    def check_ticks(self) -> None:
-        """Raise what has gone wrong inside the kernel since the last call; here nothing does."""
+    def after_ticks(self) -> None:
+        """Do what is to be done before the kernel is called again, and raise what has gone wrong; here nothing."""
+
+    def _go_on_with(self, *state: Any) -> None:
+        """Take a state of other arrays, of the same types; the actions stay where they are."""
+        self._state = state
+        if self._compiled is not None:
+            self._compiled.go_on_with(state)
 
     def compiled(self) -> CompiledPolicy | None:
         """The policy for runs without Python between ticks.

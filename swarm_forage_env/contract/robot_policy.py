@@ -107,7 +107,7 @@ class RobotPolicy(KernelPolicy):
     def _kernel(self) -> Callable[..., None]:  # type: ignore[override] - made of the types of a run
         return _kernel_of(type(self).step, self._types, self._carrying)
 
-    def check_ticks(self) -> None:
+    def after_ticks(self) -> None:
         """Raise what `step` has raised as a StepError, found by asking it once more, in Python, with what it got."""
         known, _, before, seen, failed, _ = self._state
         if failed[0] < 0:

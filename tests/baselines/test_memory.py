@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from baselines.dpo import DPOPolicy
-from baselines.memory import density
+from baselines.memory import density, with_room
 from swarm_forage_env.scenarios.quirks import Quirks
 from tests.reference.controllers import ObjectDictionary, visible_objects
 from tests.support.memories import caches_of, objects_of
@@ -38,8 +38,16 @@ def test_positions_come_from_the_exact_cell_not_from_the_noisy_position():
     assert objects_of(policy, 0)[7][:2] == (50, 40)
 
 
-def test_memory_equals_the_naive_rule():
+def test_lists_grow_and_lose_nothing():
+    lists = np.arange(6).reshape(2, 3)
+    assert with_room(lists, np.array([1, 2]), 1) is lists
+    assert with_room(lists, np.array([3, 0]), 1).tolist() == [[0, 1, 2, 0], [3, 4, 5, 0]]
+    assert with_room(lists, np.array([3, 0]), 9, at_most=5).shape == (2, 5)
+
+
+def test_memory_equals_the_naive_rule(monkeypatch):
     """Robots walk over a patch on which objects move, vanish, come back; some ticks are slept through."""
+    monkeypatch.setattr("baselines.memory._MOST_LISTS", 4)  # objects share lists, as thousands of them do
     rng = np.random.default_rng(0)
     n_robots, n_objects, side, ticks = 4, 40, 14, 400
     task = make_spec(n_robots, n_objects=n_objects)

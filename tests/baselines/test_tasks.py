@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from baselines.cache_choice import cache_utility, object_is_near, select_cache
+from baselines.cache_memory import NOT_TO_ADD, NOT_TO_TAKE, OBJECTS
 from baselines.robots import Activity, VectorState
 from baselines.tasks import DRAW_POINT_X, DRAW_POINT_Y, TASK_DRAWS
 from swarm_forage_env.contract.codes import Event, Grip, Task
@@ -319,7 +320,7 @@ def test_dropped_objects_add_up_over_successive_tasks_that_drop(robot):
     robot.record.activity = Activity.WAIT_DROP
     robot.policy._allocation.task[0] = Task.FINISHER
     drop(robot, object_row=4)
-    assert [bool(robot.memory.shunned[row] == robot.record.shun_round) for row in (3, 4)] == [True, True]
+    assert robot.left_alone[OBJECTS] == [3 + 1, 4 + 1]
 
 
 @pytest.mark.parametrize("next_task", [Task.TRANSFERER, Task.COLLECTOR])
@@ -329,5 +330,5 @@ def test_caches_of_a_transfer_are_left_alone_by_the_next_transfer_only(robot, ne
     robot.policy._constants["tab_gamma"] = 0.0
     drop(robot, Event.JOINED_CACHE, object_row=3, cache=(8, NEARER, 6))
     assert robot.task is next_task
-    take, add = ([serial for serial in serials.tolist() if serial] for serials in robot.memory.shunned_caches)
+    take, add = robot.left_alone[NOT_TO_TAKE], robot.left_alone[NOT_TO_ADD]
     assert (take, add) == (([8], [7]) if next_task is Task.TRANSFERER else ([], []))

@@ -13,8 +13,8 @@ def objects_of(policy: DPOPolicy | TaskPolicy, robot: int) -> dict[int, tuple[in
     """Object row -> (cell x, cell y, pheromone density)."""
     memory = policy._memory
     memory = memory if isinstance(memory, ObjectMemory) else memory.objects
-    entries = zip(*(part[robot, : policy._robots["n_known"][robot]].tolist() for part in memory[:4]), strict=True)
-    return {row: (x, y, _density(policy, robot, seen)) for row, x, y, seen in entries}
+    known = memory.known[robot, : policy._robots["n_known"][robot]].tolist()
+    return {row: (x, y, _density(policy, robot, seen)) for row, x, y, seen, _ in known}
 
 
 def caches_of(policy: TaskPolicy, robot: int) -> dict[int, tuple[int, int, int, float]]:

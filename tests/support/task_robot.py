@@ -67,6 +67,12 @@ class TaskRobot:
         return OneTaskMemory(OneMemory(*(part[0] for part in objects)), *(part[0] for part in others))
 
     @property
+    def left_alone(self) -> list[list[int]]:
+        """What it shuns, by place in `TaskMemory.shunned`."""
+        _, _, shunned, n_shunned = self.memory
+        return [names[:n].tolist() for names, n in zip(shunned, n_shunned, strict=True)]
+
+    @property
     def senses(self) -> Any:
         return sense(self.seen.array[0], self.constants)
 
