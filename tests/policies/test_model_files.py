@@ -23,7 +23,7 @@ from swarm_forage_env.policies.model_files import (
     file_digest,
 )
 from swarm_forage_env.policies.network import Network, NetworkAbout
-from swarm_forage_env.policies.registry import load_policy, local_policy, policy_class
+from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.spec import RunSpec, plan_run, policy_spec
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.studies.ladders import Budget
@@ -79,7 +79,6 @@ def started(path, seed=0, **parameters) -> ModelPolicy:
     ("algorithm", "options"),
     [
         ("PPO", {"use_sde": True, "policy_kwargs": {"net_arch": [16]}}),
-        ("A2C", {}),
         ("SAC", {"buffer_size": 10}),
     ],
 )
@@ -102,9 +101,7 @@ DISCRETE = {"actions": "discrete", "automatic_gripper": True}
 @pytest.mark.parametrize(
     ("algorithm", "fields", "said"),
     [
-        ("PPO", {"observation": "compact", **DISCRETE, "site_memory": True}, {}),
         ("DQN", {"observation": "compact", **DISCRETE}, {}),
-        ("PPO", {"observation": "compact", "automatic_gripper": True}, {"decision_ticks": 2}),
         ("PPO", {}, {"neighbours_seen": 3, "neighbour_range_m": 1.5}),
     ],
 )
@@ -136,9 +133,9 @@ def test_what_is_deduced_is_said_once_on_one_line_before_any_run(tmp_path):
 def test_models_with_probabilities_draw_by_the_chance_of_their_run(tmp_path):
     made, path = model("PPO", tmp_path, dataclasses.replace(NUMBERED, decision_ticks=1))
     rows = np.repeat(OBS[:1], 4, axis=0)
-    drawn = [[started(path, seed).act(rows, ACTIVE).copy() for _ in range(2)] for seed in range(20)]
+    drawn = [[started(path, seed).act(rows, ACTIVE).copy() for _ in range(2)] for seed in range(6)]
     assert all(np.array_equal(*pair) for pair in drawn), "the same chance, the same actions"
-    assert len({pair[0].tobytes() for pair in drawn}) > 10
+    assert len({pair[0].tobytes() for pair in drawn}) > 3
     _, path = model("PPO", tmp_path, NUMBERED, note=note())
     bound = LearnerInterface(NUMBERED, ENV.swarm_spec)
     best, _ = made.predict(bound.observe(rows), deterministic=True)
@@ -291,17 +288,3 @@ def test_files_of_equal_names_go_by_their_folders_or_paths(network_file, tmp_pat
     plan = score_question(files, scenario("warehouse_small", n_robots=3), budget=TINY).plan
     expected = {"short": ["a/straight.npz", "b/straight.npz"], "whole": [str(file) for file in files]}
     assert [policy.label for policy in plan.policies] == expected[labels]
-
-
-def test_a_local_policy_has_a_name_of_its_own():
-    with local_policy("mine", lambda: "policy"):
-        assert policy_class("mine")() == "policy"
-        with pytest.raises(ValueError, match="name of its own"), local_policy("mine", list):
-            pass
-    for name in ("crw", "model.zip"):
-        with pytest.raises(ValueError, match="name of its own"), local_policy(name, list):
-            pass
-    with pytest.raises(
-        ValueError, match=r"Unknown policy 'mine'.* by its file: policy\.npz, model\.zip, my_module\.py"
-    ):
-        load_policy("mine")

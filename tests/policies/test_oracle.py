@@ -7,7 +7,7 @@ import pytest
 
 from metrics.benchmark import run_benchmark
 from metrics.benchmark.protocol import BenchmarkError
-from swarm_forage_env import CheckError, check_determinism, check_policy, scenario
+from swarm_forage_env import CheckError, check_policy, scenario
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Grip, ObjectStatus
 from swarm_forage_env.contract.policy import SwarmSpec
@@ -90,7 +90,3 @@ def test_it_is_no_contestant():
         check_policy("oracle")
     with pytest.raises(BenchmarkError, match="oracle, which reads the world"):
         run_benchmark(["oracle"], name="mine")
-
-
-def test_its_runs_repeat():
-    check_determinism("oracle", scenario("warehouse_small", n_robots=8, n_objects=40), seeds=[3], seconds=20.0)
