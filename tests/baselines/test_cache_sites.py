@@ -140,16 +140,3 @@ def test_quirk_scattered_sites_as_the_slow_twin(seed):
         v = rng.random() * (1.0 if rng.random() < 0.5 else 0.05)
         found, expected = scattered(robot, x, y, rng.random(), v)
         assert abs(found - expected) < 2e-4, "positions are float32"
-
-
-@pytest.mark.parametrize(("x", "scale_m", "far"), [(24.0, 0.0125, 0.005), (8.0, 0.03, 0.05)], ids=["inside", "border"])
-def test_scattered_sites_have_a_heavy_tail_and_a_share_that_lies_anywhere(x, scale_m, far):
-    robot = in_scatter()
-    rng = np.random.default_rng(3)
-    best = (0.5 * (x + 3.2), 8.0) if x > 20.0 else (9.6, 8.0)
-    sites = np.array([choose(robot, x, 8.0, *rng.random(2)) for _ in range(5_000)])
-    distance = np.hypot(*(sites - best).T)
-    assert np.median(distance) == pytest.approx(2 * scale_m, rel=0.15)
-    assert np.mean(distance > 8 * scale_m) == pytest.approx(far + 1 / 8, rel=0.2)
-    anywhere = np.mean(distance > 3.0)
-    assert anywhere == pytest.approx(far + scale_m / 3.0, rel=0.5), "few of the tail reach so far"

@@ -114,9 +114,9 @@ def by_library(x: float, y: float, c: np.record) -> tuple[np.float32, np.float32
 def forces(soft_turn_rad: float) -> list[tuple[float, float]]:
     """Forces of all sizes and directions, many near the borders where a formula changes."""
     rng = np.random.default_rng(5)
-    borders = rng.choice([0.0, soft_turn_rad, math.atan(0.3), math.pi / 2, math.pi], 1000) * rng.choice([-1, 1], 1000)
-    offsets = rng.choice([0.0, 1e-17, 1e-16, 1e-13, 1e-9, 1e-6], 1000) * rng.choice([-1, 1], 1000)
-    every = np.concatenate([rng.uniform(-math.pi, math.pi, 3000), rng.uniform(-0.3, 0.3, 5000), borders + offsets])
+    borders = rng.choice([0.0, soft_turn_rad, math.atan(0.3), math.pi / 2, math.pi], 500) * rng.choice([-1, 1], 500)
+    offsets = rng.choice([0.0, 1e-17, 1e-16, 1e-13, 1e-9, 1e-6], 500) * rng.choice([-1, 1], 500)
+    every = np.concatenate([rng.uniform(-math.pi, math.pi, 1000), rng.uniform(-0.3, 0.3, 1000), borders + offsets])
     lengths = rng.choice([1e-9, 0.01, 0.08, 0.09, 0.1, 0.17], len(every))
     whole = [(0.0, 0.0), (-0.0, 0.0), (0.0, 0.05), (0.0, -0.05), (-0.05, 0.0), (-0.05, -0.0), (0.05, 0.0), (0.05, -0.0)]
     return [*zip((lengths * np.cos(every)).tolist(), (lengths * np.sin(every)).tolist(), strict=True), *whole]
@@ -135,11 +135,8 @@ def test_wheels_are_those_of_the_library_to_the_last_bit(soft_turn_deg):
     ("changes", "has_series"),
     [
         ({}, True),
-        ({"wander_circle_distance": 0.0}, True),
         ({"wander_circle_distance": 10.0, "wander_max_change_deg": 11.0, "soft_turn_deg": 12.0}, True),
-        ({"wander_speed_mps": 0.0}, True),
         ({"wander_circle_distance": 11.0}, False),
-        ({"wander_max_change_deg": 12.0}, False),
     ],
 )
 def test_wandering_freely_is_wandering_to_the_last_bit(changes, has_series):
@@ -149,7 +146,7 @@ def test_wandering_freely_is_wandering_to_the_last_bit(changes, has_series):
     rng = np.random.default_rng(6)
     n_quick = 0
     extremes = [0.0, 0.5, 1.0 - 2.0**-53]
-    for u in np.where(rng.random(5000) < 0.1, rng.choice(extremes, 5000), rng.random(5000)).tolist():
+    for u in np.where(rng.random(2000) < 0.1, rng.choice(extremes, 2000), rng.random(2000)).tolist():
         before = free.wander_deg
         if wander_freely(free, constants, u, quick):
             n_quick += 1
@@ -160,4 +157,4 @@ def test_wandering_freely_is_wandering_to_the_last_bit(changes, has_series):
         assert tuple(quick[:2]) == tuple(slow[:2])
         most = constants.wander_max_change_deg
         assert free.wander_deg == other.wander_deg == math.fmod(before + most * (2.0 * u - 1.0), most)
-    assert (n_quick > 4000) == has_series
+    assert (n_quick > 1600) == has_series

@@ -113,13 +113,9 @@ def test_a_cache_is_remembered_with_place_count_and_decaying_density():
     [
         ((55, 40), True),
         ((54, 40), False),
-        ((89, 40), True),
         ((90, 40), False),
-        ((72, 23), True),
-        ((72, 22), False),
         ((72, 57), True),
         ((72, 58), False),
-        ((54, 22), False),
     ],
 )
 def test_a_cache_whose_square_should_be_in_the_window_but_is_not_seen_is_forgotten(cell, forgets):
@@ -134,12 +130,8 @@ def test_a_cache_whose_square_should_be_in_the_window_but_is_not_seen_is_forgott
     [
         ((8, 70), False),
         ((9, 70), True),
-        ((19, 70), True),
         ((20, 70), False),
-        ((100, 2), False),
-        ((100, 3), True),
         ((100, 13), True),
-        ((100, 14), False),
         ((72, 23), False),
     ],
 )

@@ -1,19 +1,15 @@
 """Task allocation: every equation by worked numbers, the procedures step by step, and the long run of both."""
 
-import math
-
 import numpy as np
 import pytest
 
 from baselines import stoch_n1
 from baselines.robots import Activity
-from baselines.stochm import STOCHMPolicy
 from baselines.stochx import STOCHXPolicy
 from baselines.task_policy import task_constants
 from baselines.tasks import STOCHM_PARAMETERS, STOCHX_PARAMETERS
 from swarm_forage_env.contract.codes import Tab, Task
 from swarm_forage_env.scenarios.quirks import Quirks
-from tests.reference import task_chain
 from tests.support.observations import make_spec
 
 M_PARTITION = (4.0, 1.25, 1.75)
@@ -134,31 +130,6 @@ def test_first_block_estimates_and_coins():
     assert (m.tab == Tab.GENERALIST).all()
 
 
-@pytest.mark.parametrize(
-    ("tab", "last", "moves_to"),
-    [
-        (Tab.HARVESTER, Task.HARVESTER, Tab.GENERALIST),
-        (Tab.COLLECTOR, Task.COLLECTOR, Tab.GENERALIST),
-        (Tab.GENERALIST, Task.HARVESTER, Tab.HARVESTER),
-        (Tab.GENERALIST, Task.COLLECTOR, Tab.COLLECTOR),
-        (Tab.GENERALIST, Task.GENERALIST, Tab.GENERALIST),
-        (Tab.HARVESTER, Task.STARTER, Tab.HARVESTER),
-        (Tab.HARVESTER, Task.FINISHER, Tab.HARVESTER),
-        (Tab.COLLECTOR, Task.TRANSFERER, Tab.COLLECTOR),
-        (Tab.COLLECTOR, Task.CACHE_COLLECTOR, Tab.COLLECTOR),
-        (Tab.HARVESTER, Task.NONE, Tab.HARVESTER),
-    ],
-)
-def test_active_block_moves_by_one_level(tab, last, moves_to):
-    robot = Robot()
-    robot.be(tab, last)
-    robot.next(move=0.0)
-    assert robot.tab is moves_to
-    robot.be(tab, last)
-    robot.next(move=0.6)  # p <= 0.5
-    assert robot.tab is tab
-
-
 def test_ending_a_task_updates_its_estimate_and_its_block_only():
     robot = Robot()
     robot.be(Tab.HARVESTER, Task.STARTER)
@@ -176,28 +147,6 @@ def test_ending_a_task_updates_its_estimate_and_its_block_only():
 def run_ticks(robot: Robot, first: int, last: int, activity: Activity) -> None:
     for now in range(first, last + 1):
         stoch_n1.after_tick(robot.a, 0, now, activity, robot.c)
-
-
-@pytest.mark.parametrize(
-    ("task", "activities"),
-    [
-        (Task.GENERALIST, {}),
-        (Task.HARVESTER, {Activity.TRANSPORT}),
-        (Task.STARTER, {Activity.TRANSPORT}),
-        (Task.FINISHER, {Activity.TRANSPORT}),
-        (Task.COLLECTOR, {Activity.ACQUIRE}),
-        (Task.CACHE_COLLECTOR, {Activity.ACQUIRE}),
-        (Task.TRANSFERER, {Activity.ACQUIRE, Activity.TRANSPORT}),
-    ],
-)
-def test_interfaces_are_active_where_tasks_meet(task, activities):
-    robot = Robot()
-    goes_home = task in (Task.GENERALIST, Task.COLLECTOR, Task.CACHE_COLLECTOR)
-    way = [Activity.HOMING, Activity.HOMING_IN_NEST] if goes_home else [Activity.TRANSPORT]
-    has_interface = False
-    for activity in [Activity.ACQUIRE, Activity.WAIT_PICKUP, *way, Activity.WAIT_DROP, Activity.FINISHED]:
-        has_interface = stoch_n1.interface_after(has_interface, task, activity, robot.c)
-        assert has_interface == (activity in activities), activity
 
 
 def test_quirk_transferer_interface_is_entered_with_the_transport_and_never_left():
@@ -238,41 +187,3 @@ def test_abort_probability_is_the_least_without_an_interface_except_for_generali
     robot.be(Tab.GENERALIST, Task.GENERALIST)
     run_ticks(robot, 2000, 2000, Activity.ACQUIRE)
     assert robot.a.p_abort[0, Task.GENERALIST] == pytest.approx(0.018, abs=1e-4)
-
-
-# The long run
-
-NAMES = {task.name.lower(): task for task in Task if task is not Task.NONE}
-EVEN = {name: 3000 if name == "generalist" else 1500 for name in NAMES}
-UNEVEN = dict(zip(NAMES, (2500, 900, 1300, 1000, 800, 1200, 700), strict=True))
-CONTROLLERS = {"stochm": (STOCHMPolicy, ("generalist",)), "stochx": (STOCHXPolicy, tuple(task_chain.CHILDREN))}
-
-
-def chain_shares(controller: str, is_integer: bool, estimates: dict[str, float]) -> dict[str, float]:
-    policy_class, blocks = CONTROLLERS[controller]
-    p = policy_class.default_parameters
-    k, gamma = p.partition_reactivity, p.partition_gamma
-    partition = {block: task_chain.partition(estimates, block, k, gamma, is_integer) for block in blocks}
-    subtask = (p.subtask_reactivity, p.subtask_gamma)
-    return task_chain.stationary_shares(estimates, blocks, partition, subtask, is_integer)
-
-
-@pytest.mark.parametrize(
-    ("controller", "is_integer", "estimates"),
-    [("stochm", False, UNEVEN), ("stochx", True, EVEN), ("stochx", False, UNEVEN)],
-    ids=["stochm", "stochx, whole", "stochx"],
-)
-def test_long_sequences_approach_the_exact_chain(controller, is_integer, estimates):
-    robot = Robot(CONTROLLERS[controller][0], Quirks(integer_estimates=is_integer), estimate_weight=0.0)
-    for name, task in NAMES.items():
-        robot.a.estimate[0, task] = estimates[name]
-    counts = np.zeros(len(Task))
-    n = 6_000
-    for now, draws in enumerate(np.random.default_rng(7).random((n + 200, 3)).tolist()):
-        if robot.task is not Task.NONE:
-            stoch_n1.end_task(robot.a, 0, now, robot.c)
-        robot.next(*draws, now=now)
-        counts[robot.task] += now >= 200
-    for name, share in chain_shares(controller, is_integer, estimates).items():
-        # Successive tasks depend on each other, which is worth a few times the error of independent draws.
-        assert counts[NAMES[name]] / n == pytest.approx(share, abs=1e-9 + 5 * math.sqrt(max(share, 0) / n)), name

@@ -1,15 +1,15 @@
-"""Scores, verdicts, batches and trainings stay as they are, whatever becomes of the code that makes them."""
+"""Scores, verdicts and trainings stay as they are, whatever becomes of the code that makes them."""
 
 import pytest
 
-from tests.support.frozen import FROZEN, batch_with_deaths, score_values, stored, training_weights, verdict_answers
+from tests.support.frozen import FROZEN, score_values, stored, training_weights, verdict_answers
 from tests.support.golden_runs import AS_THEN
 
 pytestmark = [*AS_THEN]
 
 
 def test_all_files_are_tested():
-    assert set(FROZEN) == {"score", "verdict", "batch", "training"}
+    assert set(FROZEN) == {"score", "verdict", "training"}
     assert all(stored(name) for name in FROZEN)
 
 
@@ -26,10 +26,6 @@ def test_scores_of_four_policies_have_the_same_values():
 def test_claims_have_the_same_answers():
     """Three seconds: it makes the runs of a small study under both rules."""
     assert verdict_answers() == stored("verdict")
-
-
-def test_a_batch_with_deaths_tells_the_same():
-    assert batch_with_deaths() == stored("batch")
 
 
 def test_a_training_learns_the_same():

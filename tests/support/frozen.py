@@ -1,10 +1,9 @@
-"""What must not move: values of a score, answers of a verdict, arrays of a batch with deaths, and a training.
+"""What must not move: values of a score, answers of a verdict, and a training.
 
 `python -m tests.support.frozen` writes `tests/promises/frozen/*.json` anew. Do that only for a change that is meant to
 change results. All that these values take from the package is asked for here.
 """
 
-import hashlib
 import json
 import re
 import tempfile
@@ -21,8 +20,6 @@ from swarm_forage_env import scenario
 from swarm_forage_env.studies.ladders import Budget
 from swarm_forage_env.studies.results import read_study, run_study
 from swarm_forage_env.studies.study import load_study, study_of
-from swarm_forage_env.views.gymnasium import SwarmVectorEnv
-from swarm_forage_env.wrappers.registry import parse_wrapper
 
 FOLDER = Path(__file__).parent.parent / "promises" / "frozen"
 MINUTE = Path(__file__).parent.parent.parent / "docs" / "benchmark" / "plans" / "minute.toml"
@@ -69,33 +66,6 @@ def verdict_answers() -> dict[str, str]:
     }
 
 
-def batch_with_deaths() -> dict[str, Any]:
-    """Return digests and totals of what a vector environment tells in 300 steps in which robots die and fail."""
-    wrappers = [parse_wrapper("population:malfunction_per_tick=0.02,repair_per_tick=0.05,death_per_tick=0.004")]
-    env = SwarmVectorEnv(
-        "warehouse_small",
-        n_arenas=3,
-        wrappers=wrappers,
-        interface={"observation": "compact", "actions": "discrete", "automatic_gripper": True, "decision_ticks": 5},
-        **CROWDED,
-        horizon_s=200.0,
-        interval_s=40.0,
-    )
-    obs, _ = env.reset(seed=11)
-    chance = np.random.default_rng(5)
-    digest = hashlib.sha256(np.asarray(obs).tobytes())
-    rewards, n_terminated, n_truncated = 0.0, 0, 0
-    for _ in range(300):
-        actions = chance.integers(env.single_action_space.n, size=env.num_envs)
-        obs, reward, terminated, truncated, _ = env.step(actions)
-        for part in (obs, reward, terminated, truncated):
-            digest.update(np.asarray(part).tobytes())
-        rewards += float(reward.sum())
-        n_terminated += int(terminated.sum())
-        n_truncated += int(truncated.sum())
-    return {"digest": digest.hexdigest()[:16], "rewards": rewards, "terminated": n_terminated, "truncated": n_truncated}
-
-
 def training_weights() -> dict[str, float]:
     """Return the norm of each layer after the first 20,000 decisions of the minute's plan; needs torch."""
     from swarm_forage_env.policies.network import Network
@@ -118,7 +88,7 @@ def training_weights() -> dict[str, float]:
     }
 
 
-FROZEN = {"score": score_values, "verdict": verdict_answers, "batch": batch_with_deaths, "training": training_weights}
+FROZEN = {"score": score_values, "verdict": verdict_answers, "training": training_weights}
 """Name of a file -> what makes its values."""
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from swarm_forage_env.contract.codes import Event
 from swarm_forage_env.contract.layout import CACHE_FIELDS, EVENT_SCALE, SERIAL_SCALE, VISIBLE_CACHES, observation_layout
 from swarm_forage_env.contract.policy import SwarmSpec
-from swarm_forage_env.scenarios.quirks import Quirks
+from swarm_forage_env.scenarios.presets import scenario
 
 GREYS = {"floor": 1.0, "nest": 0.7, "cache": 0.4, "object": 0.0}
 CELL_M = 0.2
@@ -18,41 +18,17 @@ Cache: TypeAlias = tuple[int, tuple[int, int], int]
 
 
 def make_spec(n_robots: int = 1, **changes: Any) -> SwarmSpec:
-    """The task of a 32 x 16 m warehouse with 200 objects, or a variation of it."""
-    width_m, height_m = changes.get("arena_size_m", (32.0, 16.0))
-    n_objects = changes.get("n_objects", 200)
-    task = SwarmSpec(
-        n_robots=n_robots,
-        n_objects=n_objects,
-        dt_s=0.2,
-        horizon_s=10_000.0,
-        layout=observation_layout(width_m, height_m, n_objects),
-        max_speed_mps=0.1,
-        max_wheel_difference_mps=0.2,
-        wheel_scale_mps=0.2,
-        wheel_base_m=0.14,
-        arena_size_m=(width_m, height_m),
-        cell_m=CELL_M,
-        nest_centre_m=(3.2, 8.0),
-        nest_size_m=(3.2, 12.8),
-        nest_boxes_m=(),
-        has_obstacles=False,
-        placement="single_source",
-        caches="none",
-        cache_side_m=6.2,
-        cache_half_side_cells=round(changes.get("cache_side_m", 6.2) / CELL_M) // 2,
-        cache_side_nominal_m=6.4,
-        min_dist_m=3.2,
-        cache_proximity_m=12.8,
-        message_size=0,
-        quirks=Quirks(),
-    )
-    task = dataclasses.replace(task, **changes)
-    if "nest_boxes_m" not in changes:
-        (x, y), (width, height) = task.nest_centre_m, task.nest_size_m
-        box = x - width / 2, y - height / 2, x + width / 2, y + height / 2
-        task = dataclasses.replace(task, nest_boxes_m=(box,))
-    return task
+    """The task of the small warehouse, 32 x 16 m with 200 objects, or a variation of it."""
+    spec = SwarmSpec.of(scenario("warehouse_small", n_robots=n_robots))
+    size_m, n_objects = changes.get("arena_size_m", spec.arena_size_m), changes.get("n_objects", spec.n_objects)
+    x, y = changes.get("nest_centre_m", spec.nest_centre_m)
+    width, height = changes.get("nest_size_m", spec.nest_size_m)
+    derived = {
+        "layout": observation_layout(*size_m, n_objects),
+        "cache_half_side_cells": round(changes.get("cache_side_m", spec.cache_side_m) / CELL_M) // 2,
+        "nest_boxes_m": ((x - width / 2, y - height / 2, x + width / 2, y + height / 2),),
+    }
+    return dataclasses.replace(spec, **derived | changes)
 
 
 class Observations:

@@ -6,15 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.contract.codes import CELL_CACHE, Counter, Event, Grip, ObjectStatus
+from swarm_forage_env.contract.codes import Counter, Event, Grip, ObjectStatus
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.floor import overlap_cells, square_box
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.world.caches import cache_members, clear_centre, n_cache_slots
-from swarm_forage_env.world.placement import place_objects
-from swarm_forage_env.world.state import Source, listed
-from tests.support.stage import act, assert_conserved, build_cache, clear, lay, lift, load, stand, tidy_world
+from swarm_forage_env.world.state import Source
+from tests.support.stage import act, assert_conserved, clear, lay, load, stand, tidy_world
 
 MIDDLE = (70, 40)
 """A cell around which a square of 31 cells is clear of nest, source and border."""
@@ -87,21 +86,6 @@ def test_objects_on_the_square_join_although_they_are_far_or_alone():
     (slot,) = found_at(env, MIDDLE)
     assert contents(env, slot) == [0, 1, 2]
     assert env.objects.status[3] == ObjectStatus.FREE
-
-
-@pytest.mark.parametrize(("side_share", "forms"), [(0.2, False), (0.14, True)])
-def test_a_quad_source_has_room_for_smaller_caches_only(side_share, forms):
-    # 36 cells between the nest (96 .. 143) and a strip (36 .. 59): too few for the usual 47, enough for 33.
-    env = ForageEnv(
-        scenario("warehouse_quad", n_robots=1, n_objects=8, caches="dynamic", side_share=side_share, distance_share=0.1)
-    )
-    env.reset_batch(0)
-    clear(env)
-    for row in range(8):
-        lay(env, row, (40, 60 + 10 * row))  # on the left strip
-    lay(env, 1, (79, 120))
-    slots = found_at(env, (77, 120))
-    assert [env.caches.cell[slot].tolist() for slot in slots] == ([[78, 120]] if forms else [])
 
 
 def test_a_second_cache_stands_clear_of_the_first():
@@ -210,33 +194,6 @@ def test_a_cache_stands_on_clusters_that_leave_it_no_room():
     # Mean of the two that found it; the square covers the cells 39 .. 85, 37 .. 83.
     assert env.caches.cell[slot].tolist() == [62, 60]
     assert contents(env, slot) == [0, 1, 2]
-
-
-def test_a_cluster_takes_objects_on_the_cells_that_a_cache_leaves_to_it():
-    cluster = (40, 44, 48, 50)
-    env = clustered_world([cluster], n_objects=10)
-    for row in range(10):
-        lay(env, row, (150 + row, 60))
-    slot = build_cache(env, [0, 1], (64, 60))  # the cells 41 .. 87, 37 .. 83: column 40 is left, 6 cells
-    for row in range(2, 10):
-        lift(env, row)
-    area, source = env.scenario.arena.distributable_cells, env.arena._arrays.source
-    place_objects(range(2, 10), env.objects, source, area, np.random.default_rng(0))
-    assert sorted(env.objects.cell[2:8].tolist()) == [[40, y] for y in range(44, 50)]
-    assert listed(env.objects.waiting).tolist() == [8, 9]
-    assert np.count_nonzero(env.objects.floor == CELL_CACHE - slot) == 47 * 47
-    assert_conserved(env)
-    # A robot takes one of the last pair and delivers it: the square is floor again, and there is room for all.
-    stand(env, 0, (64, 60))
-    act(env, {0: Grip.GRASP})
-    assert act(env, {0: Grip.GRASP})[0] == Event.PICKED_FROM_CACHE
-    stand(env, 0, (120, 120))
-    act(env, {0: Grip.DELIVER})
-    assert act(env, {0: Grip.DELIVER})[0] == Event.DELIVERED
-    assert len(listed(env.objects.waiting)) == 0
-    x, y = env.objects.cell.T
-    assert np.count_nonzero((x >= 40) & (x < 48) & (y >= 44) & (y < 50)) == 9
-    assert_conserved(env)
 
 
 # As the authors' program does it (quirk)

@@ -1,7 +1,6 @@
 """Touching robots: a pressing pair keeps its common speed; turned, mirrored or swapped it behaves the same."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -162,44 +161,6 @@ def test_contact_is_its_slow_twin(seed):
         n_pressing += len(memory)
         contact.position += rng.normal(0.0, 1e-4, (n_robots, 2))
     assert n_pressing > 50
-
-
-SYMMETRIES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
-    "left and right": lambda at: at * (-1.0, 1.0),
-    "up and down": lambda at: at * (1.0, -1.0),
-    "half a turn": lambda at: -at,
-    "a quarter turn": lambda at: at[:, ::-1] * (-1.0, 1.0),
-}
-
-
-@pytest.mark.parametrize("name", SYMMETRIES)
-def test_a_mirrored_or_turned_scene_moves_mirrored_or_turned(name):
-    rng = np.random.default_rng(1)
-    places = heap(rng, 20)
-    image = SYMMETRIES[name]
-    everybody = np.ones(20, np.bool_)
-    seen = [Pressing(MIDDLE + places, everybody), Pressing(MIDDLE + image(places), everybody)]
-    for _ in range(5):
-        command = rng.uniform(-0.1, 0.1, (20, 2))
-        moved = []
-        for contact, velocity in zip(seen, (command, image(command)), strict=True):
-            moved.append(contact.velocities(np.column_stack((velocity, np.zeros(20))))[:, :2])
-        np.testing.assert_allclose(moved[1], image(moved[0]), atol=1e-12)
-        assert np.abs(moved[0] - command).max() > 0.01
-
-
-def test_the_order_of_rows_does_not_matter():
-    rng = np.random.default_rng(2)
-    places = heap(rng, 20)
-    order = rng.permutation(20)
-    everybody = np.ones(20, np.bool_)
-    seen = [Pressing(MIDDLE + places, everybody), Pressing(MIDDLE + places[order], everybody)]
-    for _ in range(5):
-        command = rng.uniform(-0.1, 0.1, (20, 2))
-        moved = []
-        for contact, velocity in zip(seen, (command, command[order]), strict=True):
-            moved.append(contact.velocities(np.column_stack((velocity, np.zeros(20))))[:, :2])
-        np.testing.assert_allclose(moved[1], moved[0][order], atol=1e-15)
 
 
 # Walls, and robots that do not drive

@@ -8,8 +8,7 @@ import pytest
 
 from swarm_forage_env import ConfigError, ForageEnv, parallel_env, scenario
 from swarm_forage_env.contract.policy import ActionError, SwarmSpec
-from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
-from swarm_forage_env.policies.registry import policy_file
+from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from tests.reference import neighbourhood
 
 N_ROBOTS = 12
@@ -89,13 +88,6 @@ def test_of_equally_near_robots_the_lower_row_comes_first():
     np.testing.assert_allclose(part(env, "neighbours")[0, [0, 1, 4, 5]], [0.25, 0.0, -0.25, 0.0], atol=1e-6)
 
 
-def test_policies_without_messages_say_zeros():
-    env = made(**BOTH | {"message_range_m": 20.0})
-    env.reset_batch(seed=1)
-    env.step_batch(np.zeros((N_ROBOTS, 3), np.float32))
-    np.testing.assert_array_equal(part(env, "messages"), np.tile([0.0, 0.0, 1.0], (N_ROBOTS, 1)))
-
-
 def test_a_message_that_is_not_finite_is_refused():
     env = made(**BOTH)
     env.reset_batch(seed=1)
@@ -146,13 +138,6 @@ def test_a_policy_says_what_it_needs():
         ForageEnv(scenario("warehouse_small"), reads=shown.reads)
     blind = InterfaceConfig(neighbours_seen=0, message_size=0).for_scenario(scenario("warehouse_small", **BOTH))
     assert blind.sensors == ()
-
-
-def test_an_interface_can_be_said_in_words():
-    said = policy_file("model.zip:neighbours_seen=3,neighbour_range_m=1.3,message_size=2").interface()
-    assert interface_from_mapping(said) == InterfaceConfig(neighbours_seen=3, neighbour_range_m=1.3, message_size=2)
-    with pytest.raises(ConfigError, match=r"interface\.neighbour_range_m.*'far'"):
-        interface_from_mapping({"neighbour_range_m": "far"})
 
 
 def test_numbered_actions_carry_no_message():

@@ -5,10 +5,10 @@ import pytest
 from scipy.stats import chisquare
 
 from swarm_forage_env._internal.rng import Stream, stream_rng
-from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, CELL_OBJECT, ObjectStatus
+from swarm_forage_env.contract.codes import CELL_EMPTY, CELL_NEST, CELL_OBJECT, ObjectStatus
 from swarm_forage_env.contract.types import IntArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.floor import PLACEMENTS, Box, source_boxes
+from swarm_forage_env.scenarios.floor import Box
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.world.allocation import new_objects
 from swarm_forage_env.world.kernels.placement import (
@@ -82,30 +82,6 @@ def test_presets_place_every_object_on_its_own_free_cell(name):
     np.testing.assert_array_equal(objects.floor == CELL_NEST, before == CELL_NEST)
 
 
-@pytest.mark.parametrize("placement", [name for name in PLACEMENTS if name != "power_law"])
-def test_sources_are_the_regions_without_limit(placement):
-    config = scenario("warehouse_medium", placement=placement)
-    rng = stream_rng(0, Stream.PLACEMENT)
-    source = draw_source(config, new_objects(config).floor, rng)
-    assert tuple(map(tuple, source.regions.tolist())) == source_boxes(placement, 240, 240)
-    assert np.all(source.capacity == UNLIMITED)
-    assert source.group_start.tolist() == [0, len(source.regions)]
-    assert rng.bit_generator.state == stream_rng(0, Stream.PLACEMENT).bit_generator.state
-
-
-def test_place_all_leaves_objects_in_caches_alone():
-    objects = bare_objects(6, 20, 20)
-    objects.status[[1, 4]] = ObjectStatus.CACHED
-    objects.cache_slot[[1, 4]] = 0
-    objects.cell[[1, 4]] = (15, 15)
-    objects.floor[14:17, 14:17] = CELL_CACHE
-    make_list(objects.waiting, [0, 2, 3, 5])
-    place_all(objects, one_region((0, 0, 20, 20)), (0, 0, 20, 20), np.random.default_rng(0))
-    assert objects.status.tolist() == [0, 2, 0, 0, 2, 0]
-    assert objects.cache_slot.tolist() == [-1, 0, -1, -1, 0, -1]
-    assert np.all(objects.floor[14:17, 14:17] == CELL_CACHE)
-
-
 @pytest.mark.parametrize("share_free", [0.9, 0.02], ids=["by trying", "by listing"])
 def test_every_free_cell_is_equally_likely(share_free):
     rng = np.random.default_rng(11)
@@ -136,22 +112,6 @@ def test_groups_then_regions_are_equally_likely():
         counts[np.searchsorted([5, 10, 15], objects.cell[0, 0], side="right")] += 1
         lift(objects, 0)
     assert chisquare(counts, [1_000, 1_000, 1_000, 3_000]).pvalue > SIGNIFICANCE
-
-
-def test_the_two_sources_are_equally_likely_and_stand_in_for_each_other():
-    source = Source(
-        np.array([(0, 0, 2, 2), (5, 0, 9, 4)], np.int32), np.full(2, UNLIMITED, np.int32), np.array([0, 2], np.int32)
-    )
-    rng = np.random.default_rng(4)
-    left = 0
-    for _ in range(2_000):
-        objects = bare_objects(1, 10, 5)
-        place_all(objects, source, (0, 0, 10, 5), rng)
-        left += objects.cell[0, 0] < 2
-    assert chisquare([left, 2_000 - left]).pvalue > SIGNIFICANCE
-    objects = bare_objects(20, 10, 5)
-    place_all(objects, source, (0, 0, 10, 5), rng)  # 4 + 16 cells: both end up full
-    assert_consistent(objects)
 
 
 def test_a_region_at_capacity_is_skipped_dropped_objects_included():

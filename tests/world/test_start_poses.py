@@ -42,12 +42,6 @@ def test_positions_and_headings_are_uniform():
         assert stats.kstest(values, "uniform", (low, high - low)).pvalue > 1e-3
 
 
-def test_a_dense_swarm_still_starts_apart():
-    config = scenario("warehouse_small", n_robots=400, start_margin_m=5.0)
-    position, _ = draw(config)
-    assert pdist(position).min() > DIAMETER_M
-
-
 def test_of_two_overlapping_robots_the_higher_row_is_drawn_again():
     config = scenario("warehouse_small", n_robots=200, start_margin_m=6.0)
     rng = stream_rng(3, Stream.START_POSE)
@@ -59,12 +53,6 @@ def test_of_two_overlapping_robots_the_higher_row_is_drawn_again():
     assert set(overlapping[:, 1]) <= set(moved.tolist())
     never_higher = set(range(200)) - set(moved.tolist())
     assert min(overlapping[:, 0].tolist()) in never_higher
-
-
-def test_seeds_decide():
-    config = scenario("warehouse_small")
-    np.testing.assert_array_equal(draw(config, 1)[0], draw(config, 1)[0])
-    assert not np.array_equal(draw(config, 1)[0], draw(config, 2)[0])
 
 
 def test_impossible_density_says_what_to_do(monkeypatch):

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from swarm_forage_env.wrappers.population import death_levels, malfunction_levels
+from swarm_forage_env.wrappers.population import death_levels
 from swarm_forage_env.wrappers.population_process import (
     EventClock,
     EventClocks,
@@ -15,7 +15,6 @@ from swarm_forage_env.wrappers.population_process import (
     advance_population,
 )
 from tests.reference.adversity import SlowPopulation
-from tests.reference.population_chain import generator, mean_away_by_exponential
 from tests.support.population import simulate_population
 
 RUN_TICKS = 50_000
@@ -51,31 +50,6 @@ def test_waiting_times_are_floored_exponentials(rate):
     survival = np.exp(-rate * edges)
     expected = np.append(survival[:-1] - survival[1:], survival[-1]) * len(waits)
     assert stats.chisquare(counts, expected).pvalue > SURE
-
-
-LEVELS = malfunction_levels(50)
-N_SEEDS = 24
-
-
-@pytest.fixture(scope="module")
-def at_work():
-    """(levels, seeds) mean robots at work over a run."""
-    return np.array(
-        [
-            [simulate_population(level.rates, 50, RUN_TICKS, seed).n_active.mean() for seed in range(N_SEEDS)]
-            for level in LEVELS
-        ]
-    )
-
-
-def test_robots_at_work_are_those_of_the_chain_with_few_seeds_too(at_work):
-    """At every level, and in the first four seeds of all levels together."""
-    chains = [generator(level.malfunction_per_tick, level.repair_per_tick, 50) for level in LEVELS]
-    expected = np.array([50.0 - mean_away_by_exponential(chain, RUN_TICKS) for chain in chains])
-    deviation = at_work.std(axis=1, ddof=1)
-    assert (abs(at_work.mean(axis=1) - expected) < 3.3 * deviation / np.sqrt(N_SEEDS)).all()
-    few = (at_work[:, :4].mean(axis=1) - expected) / (deviation / np.sqrt(4))
-    assert abs(few.mean()) < 3.3 / np.sqrt(len(LEVELS))
 
 
 # The four processes
