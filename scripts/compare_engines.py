@@ -10,7 +10,7 @@ equivalent. A difference is compiled minus Chipmunk, the mean over seeds with a 
 With --check the cases are fixed, among them a crowded floor, all rows are printed, and the command fails (exit code 1)
 if more than one run in eight of a case has other numbers. Engines that are alike pass it: all runs of these cases are
 the same. With friction or driving speed in contact changed by a tenth in one of them, half of the runs or more are
-others, long before an interval leaves out zero (`tests/world/test_engines_agree.py`).
+others, long before an interval leaves out zero.
 """
 
 import argparse

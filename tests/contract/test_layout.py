@@ -1,9 +1,15 @@
-"""The observation layout: named slices that partition the columns, in the published order."""
+"""Observation layout and constants of a swarm."""
+
+import itertools
 
 import numpy as np
 import pytest
 
 from swarm_forage_env.contract.layout import SERIAL_SCALE, observation_layout
+from swarm_forage_env.contract.policy import SwarmSpec
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.scenarios.config import CACHE_KINDS
+from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 
 SIZES = {
     "proximity": 24,
@@ -55,3 +61,23 @@ def test_unknown_slice_lists_the_known_ones(layout):
 def test_serial_numbers_survive_float32():
     serials = np.array([1, 2, 12_345_678, 2**24 - 1])
     np.testing.assert_array_equal(np.float32(serials / SERIAL_SCALE).astype(np.float64) * SERIAL_SCALE, serials)
+
+
+@pytest.mark.parametrize(("name", "caches"), [*zip(SCENARIO_NAMES, itertools.cycle(CACHE_KINDS), strict=False)])
+def test_a_scenario_tells_what_its_environment_tells(name, caches):
+    config = scenario(name, n_robots=3, n_objects=20, caches=caches)
+    env = ForageEnv(config)
+    assert SwarmSpec.of(config) == env.swarm_spec
+    assert SwarmSpec.of(config).layout is env.layout
+    assert SwarmSpec.of(config, horizon_s=7 * config.dt_s) == ForageEnv(config, max_cycles=7).swarm_spec
+
+
+def test_sizes_by_hand():
+    spec = SwarmSpec.of(scenario("warehouse_small", horizon_s=200.0))
+    assert (spec.n_robots, spec.n_objects, spec.horizon_s, spec.caches) == (50, 200, 200.0, "none")
+    assert (spec.arena_size_m, spec.cell_m, spec.wheel_scale_mps) == ((32.0, 16.0), 0.2, 0.2)
+    assert spec.nest_centre_m == pytest.approx((3.2, 8.0))
+    assert spec.nest_size_m == pytest.approx((3.2, 12.8))
+    assert spec.cache_side_nominal_m == pytest.approx(6.4)
+    assert spec.cache_side_m == pytest.approx(6.2)  # an odd number of cells of 0.2 m
+    assert spec.cache_half_side_cells == 15

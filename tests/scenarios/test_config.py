@@ -1,4 +1,4 @@
-"""Configurations are complete, can be changed by the name of a field, and refuse worlds that cannot be."""
+"""Configurations are complete, changed by the name of a field, told in words, and refuse worlds that cannot be."""
 
 import dataclasses
 import json
@@ -8,6 +8,7 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError, read
 from swarm_forage_env.scenarios.config import SECTIONS, ArenaConfig, ScenarioConfig, to_mapping
+from swarm_forage_env.scenarios.differences import difference_words, differences
 from swarm_forage_env.scenarios.overrides import field_sections, with_overrides
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM
@@ -100,3 +101,36 @@ def test_a_nest_is_snapped_to_whole_cells():
     assert arena.nest_cells == (32, 32, 48, 48)
     assert arena.nest_box_m == (6.4, 6.4, 9.6, 9.6)
     assert ArenaConfig(width_m=2, height_m=2, nest_centre_m=(1, 1), nest_size_m=(0.4, 0.4)).n_cells == (10, 10)
+
+
+# What a scenario has that its preset has not
+
+
+WALL = ((10.0, 4.0, 11.0, 12.0),)
+
+
+@pytest.mark.parametrize("name", SCENARIO_NAMES)
+def test_a_preset_of_any_size_differs_in_nothing(name):
+    for sizes in ({}, {"n_robots": 5}):
+        config = scenario(name, **sizes)
+        assert (differences(config), difference_words(config)) == ({}, ())
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"n_objects": 1}, ("1 object",)),
+        ({"obstacles": WALL}, ("obstacles 10,4,11,12",)),
+        ({"nest_centre_m": (16.0, 8.0)}, ("nest 3.2 x 12.8 m at 16,8",)),
+        ({"width_m": 40.0}, ("40 x 16 m", "nest 3.2 x 12.8 m at 3.2,8")),
+        ({"density": 0.05, "n_robots": 200}, ("89.6 x 44.8 m", "1,568 objects")),
+        ({"caches": "static"}, ("static caches",)),
+        ({"physics": "chipmunk"}, ("physics chipmunk",)),
+        ({"max_speed_mps": 0.05}, ("max speed 0.05 m/s",)),
+        ({"quirks": "AUTHORS_PROGRAM"}, ("rules AUTHORS_PROGRAM",)),
+        ({"scattered_sites": True}, ("quirks scattered_sites",)),
+        ({"horizon_s": 400.0, "interval_s": 100.0, "performance": "n_active"}, ()),
+    ],
+)
+def test_differences_are_told_in_words(fields, words):
+    assert difference_words(scenario("warehouse_small", **fields)) == words

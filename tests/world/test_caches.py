@@ -1,22 +1,29 @@
-"""Static caches: which objects they hold, and when they are restored. Slots and serial numbers."""
+"""Static and dynamic caches: what they hold, where they stand, when they come and go."""
 
 import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, Counter, Grip, ObjectStatus, Task
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, Counter, Event, Grip, ObjectStatus, Task
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.scenarios.floor import square_box
+from swarm_forage_env.scenarios.floor import overlap_cells, square_box
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.world.caches import (
+    cache_members,
+    clear_centre,
     count_cache_users,
     create_static_caches,
+    n_cache_slots,
     restoration_probability,
     restore_static_caches,
 )
 from swarm_forage_env.world.placement import static_cache_centres
-from swarm_forage_env.world.state import listed, make_list
+from swarm_forage_env.world.state import Source, listed, make_list
 from tests.support.stage import act, assert_conserved, build_cache, clear, lay, load, stand, tidy_world
 
 STATIC_CENTRE = (72, 40)
@@ -184,3 +191,244 @@ def test_a_freed_slot_is_used_again_under_a_new_serial():
         for row in (turn, turn + 1):
             lay(env, row, (121 + row % 10, 14 + row // 10))
     assert serials == [1, 2, 3, 4, 5, 6]
+
+
+# Dynamic caches: which objects a CREATE_CACHE drop gathers, where the cache is placed, when none is created
+
+
+MIDDLE = (70, 40)
+"""A cell around which a square of 31 cells is clear of nest, source and border."""
+STRIP_CELL = (125, 60)
+
+
+def found_at(env: ForageEnv, cell: tuple[int, int], row: int = 0, grip: float = Grip.CREATE_CACHE) -> list[int]:
+    """Robot 0 creates a cache with an object at a cell; returns the slots of the caches that stand afterwards."""
+    stand(env, 0, cell)
+    load(env, 0, row)
+    act(env, {0: grip})
+    assert act(env, {0: grip})[0] == Event.DROPPED
+    assert_conserved(env)
+    return np.flatnonzero(env.caches.alive).tolist()
+
+
+def test_a_cache_forms_from_the_objects_around_at_their_mean():
+    env = tidy_world(caches="dynamic")
+    for row, cell in enumerate([(60, 40), (64, 40), (69, 44)], start=1):
+        lay(env, row, cell)
+    (slot,) = found_at(env, (62, 38))
+    assert contents(env, slot) == [0, 1, 2, 3]
+    # Mean of the centres: (60 + 64 + 69 + 62) / 4 + 0.5 = 64.25, (40 + 40 + 44 + 38) / 4 + 0.5 = 41.0
+    assert env.caches.cell[slot].tolist() == [64, 41]
+    assert env.caches.serial[slot] == 1
+    assert env.events.counters[Counter.CACHES_CREATED] == 1
+    assert np.all(env.objects.cell[:4] == (64, 41))
+
+
+@pytest.mark.parametrize(
+    ("offset", "joins"),
+    [((16, 0), True), ((0, -16), True), ((17, 0), False), ((11, 11), True), ((12, 11), False)],
+)
+def test_members_lie_within_min_dist_of_the_dropped_object(offset, joins):
+    env = tidy_world(caches="dynamic")
+    assert env.scenario.min_dist_m == pytest.approx(3.2)  # 16 cells
+    lay(env, 1, (MIDDLE[0] + offset[0], MIDDLE[1] + offset[1]))
+    slots = found_at(env, MIDDLE)
+    assert bool(slots) == joins
+
+
+def test_a_site_drop_and_the_source_strip_create_nothing():
+    for cell, grip in ((MIDDLE, Grip.SITE), (STRIP_CELL, Grip.CREATE_CACHE)):
+        env = tidy_world(caches="dynamic")
+        lay(env, 1, (cell[0] - 1, cell[1]))
+        assert found_at(env, cell, grip=grip) == []
+        assert env.objects.status[0] == ObjectStatus.FREE
+
+
+def test_distances_are_compared_in_whole_cells():
+    # 48 and 64 cells make exactly min_dist = 16 m; the same sum in metres exceeds it by rounding.
+    config = scenario("search_and_rescue", side_m=80.0, caches="dynamic", n_robots=1)
+    env = ForageEnv(config)
+    env.reset_batch(0)
+    clear(env)
+    for row, cell in ((0, (100, 100)), (1, (148, 164)), (2, (149, 164))):
+        lay(env, row, cell)
+    assert cache_members(0, config, env.objects, []).tolist() == [0, 1]
+
+
+def test_objects_on_the_square_join_although_they_are_far_or_alone():
+    env = tidy_world(caches="dynamic")
+    lay(env, 1, (MIDDLE[0] + 2, MIDDLE[1]))
+    lay(env, 2, (MIDDLE[0] - 14, MIDDLE[1] + 14))  # farther than min_dist, on the square
+    lay(env, 3, (MIDDLE[0] + 17, MIDDLE[1]))  # neither
+    (slot,) = found_at(env, MIDDLE)
+    assert contents(env, slot) == [0, 1, 2]
+    assert env.objects.status[3] == ObjectStatus.FREE
+
+
+def test_a_second_cache_stands_clear_of_the_first():
+    # Caches this close are refused to robots; two CREATE_CACHE drops that finish in the same tick can still come close.
+    env = tidy_world(n_robots=2, caches="dynamic")
+    for row, cell in ((0, (52, 40)), (1, (51, 44)), (2, (80, 40)), (3, (81, 44))):
+        if row % 2:
+            lay(env, row, cell)
+        else:
+            stand(env, row // 2, cell)
+            load(env, row // 2, row)
+    for _ in range(2):
+        act(env, {0: Grip.CREATE_CACHE, 1: Grip.CREATE_CACHE})
+    assert env.caches.alive.sum() == 2
+    assert_conserved(env)  # no two squares overlap
+
+
+# Pushing a centre clear
+
+
+boxes = st.tuples(st.integers(0, 140), st.integers(0, 70), st.integers(1, 20), st.integers(1, 10)).map(
+    lambda box: (box[0], box[1], box[0] + box[2], box[1] + box[3])
+)
+
+
+@settings(max_examples=40)
+@given(
+    centre=st.tuples(st.integers(0, 159), st.integers(0, 79)),
+    obstacles=st.lists(boxes, max_size=6),
+    seed=st.integers(0, 99),
+)
+def test_an_accepted_centre_is_clear_and_a_place_for_an_object(centre, obstacles, seed):
+    config = scenario("warehouse_small", caches="dynamic", side_share=0.05)
+    accepted = clear_centre(centre, config, obstacles, np.random.default_rng(seed))
+    # Objects may lie in the cells 24 .. 136 and 12 .. 68; with D = 1.6 m = 8 cells the border is farther away.
+    clamped = min(max(centre[0], 24), 136), min(max(centre[1], 12), 68)
+    untouched = all(
+        overlap_cells(square_box(clamped, config.cache_side_cells), obstacle) == 0 for obstacle in obstacles
+    )
+    if untouched:
+        assert accepted == clamped
+    if accepted is not None:
+        box = square_box(accepted, config.cache_side_cells)
+        assert all(overlap_cells(box, obstacle) == 0 for obstacle in obstacles)
+        assert 24 <= accepted[0] <= 136
+        assert 12 <= accepted[1] <= 68
+
+
+def test_objects_stay_when_no_cache_finds_room():
+    # The nest in the middle leaves less than a square on every side.
+    env = ForageEnv(
+        scenario(
+            "warehouse_medium",
+            n_robots=1,
+            n_objects=2,
+            caches="dynamic",
+            nest_size_m=(20.0, 20.0),
+        )
+    )
+    env.reset_batch(0)
+    clear(env)
+    lay(env, 1, (60, 120))
+    assert found_at(env, (62, 120)) == []
+    assert env.objects.status.tolist() == [ObjectStatus.FREE, ObjectStatus.FREE]
+
+
+# Among power-law clusters
+
+
+EVERYWHERE = [(x, y, x + 8, y + 6) for x in range(40, 200, 36) for y in range(44, 200, 36)]
+"""Clusters 36 cells apart, of which a square of 47 cells overlaps some wherever it stands."""
+
+
+def clustered_world(clusters=EVERYWHERE, *, n_objects: int = 4, **overrides) -> ForageEnv:
+    """Search and rescue on 48 m, 240 x 240 cells, with hand-made clusters of 16 objects and nothing on the floor.
+
+    Nest: the cells 96 .. 143 of both axes. Objects may lie in the cells 36 .. 204.
+    """
+    env = ForageEnv(
+        scenario(
+            "search_and_rescue",
+            side_m=48.0,
+            n_robots=2,
+            n_objects=n_objects,
+            walk_probability=0.0,
+            caches="dynamic",
+            **overrides,
+        )
+    )
+    env.reset_batch(0)
+    clear(env)
+    n_clusters = len(clusters)
+    source = Source(
+        np.array(clusters, np.int32), np.full(n_clusters, 16, np.int32), np.array([0, n_clusters], np.int32)
+    )
+    env.arena._arrays = env.arena._arrays._replace(source=source)
+    return env
+
+
+def test_a_cache_stands_on_clusters_that_leave_it_no_room():
+    env = clustered_world()
+    lay(env, 1, (64, 60))
+    lay(env, 2, (41, 45))  # in a cluster, on the square
+    lay(env, 3, (41, 84))  # in a cluster, within min_dist = 48 cells of the dropped object, off the square
+    (slot,) = found_at(env, (60, 60))
+    # Mean of the two that found it; the square covers the cells 39 .. 85, 37 .. 83.
+    assert env.caches.cell[slot].tolist() == [62, 60]
+    assert contents(env, slot) == [0, 1, 2]
+
+
+# As the authors' program does it (quirk)
+
+
+def test_quirk_founds_no_cache_where_clusters_leave_no_room():
+    env = clustered_world(quirks=Quirks(dynamic_cache_avoids_clusters=True))
+    lay(env, 1, (64, 60))
+    lay(env, 2, (41, 45))
+    lay(env, 3, (41, 84))
+    assert found_at(env, (60, 60)) == []
+    assert np.all(env.objects.status == ObjectStatus.FREE)
+
+
+def test_quirk_merges_all_usable_objects_wherever_they_lie():
+    env = tidy_world(caches="dynamic", quirks=Quirks(dynamic_cache_merges_all=True))
+    for row, cell in ((1, (30, 60)), (2, (110, 20)), (3, (60, 66))):
+        lay(env, row, cell)
+    (slot,) = found_at(env, MIDDLE)
+    assert contents(env, slot) == [0, 1, 2, 3]
+
+
+# Room in every arena
+
+
+NARROW = {"width_m": 32.0, "nest_size_m": (3.2, 3.2), "start_margin_m": 0.5, "n_objects": 9}
+
+
+@pytest.mark.parametrize(("height_m", "fitting_share"), [(9.4, 0.193), (6.0, 0.125)])
+def test_arenas_too_narrow_for_dynamic_caches_are_refused_with_a_side_that_fits(height_m, fitting_share):
+    arena = {**NARROW, "height_m": height_m, "nest_centre_m": (3.2, height_m / 2), "caches": "dynamic"}
+    with pytest.raises(ConfigError, match=f"lower side_share to {fitting_share}, or"):
+        scenario("warehouse_small", **arena)
+    assert scenario("warehouse_small", **arena, side_share=fitting_share).cache_side_cells > 1
+    assert scenario("warehouse_small", **{**arena, "caches": "none"}).arena.height_m == height_m
+
+
+@settings(max_examples=100)
+@given(
+    nx=st.integers(10, 200),
+    ny=st.integers(10, 200),
+    share=st.floats(0.02, 0.5),
+    at=st.tuples(st.integers(0, 200), st.integers(0, 200)),
+)
+def test_squares_of_dynamic_caches_are_inside_every_arena_that_is_accepted(nx, ny, share, at):
+    size = {"width_m": nx / 5, "height_m": ny / 5, "nest_centre_m": (0.5, 0.5), "nest_size_m": (0.2, 0.2)}
+    few = {"n_robots": 1, "n_objects": 1, "start_margin_m": 0.5, "placement": "random"}
+    try:
+        config = scenario("warehouse_small", **size, **few, side_share=share, caches="dynamic")
+    except ConfigError as error:
+        assert "cache" in str(error)  # noqa: PT017 - only some are refused
+        return
+    centre = clear_centre(at, config, [], np.random.default_rng(0))
+    assert centre is not None
+    x_low, y_low, x_high, y_high = square_box(centre, config.cache_side_cells)
+    assert 0 <= x_low < x_high <= nx
+    assert 0 <= y_low < y_high <= ny
+    area = config.arena.distributable_cells
+    assert area[0] <= centre[0] < area[2]
+    assert area[1] <= centre[1] < area[3]
+    assert n_cache_slots(config) >= 1

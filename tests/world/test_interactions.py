@@ -361,11 +361,14 @@ def test_a_robot_in_repair_starts_nothing_and_keeps_its_cargo():
     assert env.swarm.carried_object.tolist() == [-1, 1, -1, -1]
 
 
-def test_a_dying_robot_drops_its_cargo_on_the_floor():
-    env = tidy_world()
-    stand(env, 0, OPEN_CELL)
-    load(env, 0, 3)
-    kill(env, 0)
+def test_a_dying_robot_drops_its_cargo_on_the_floor_or_into_the_cache():
+    env = tidy_world(caches="dynamic")
+    slot = build_cache(env, [6, 7], CORNER_CACHE)
+    for robot, cell in enumerate((OPEN_CELL, CORNER_CACHE)):
+        stand(env, robot, cell)
+        load(env, robot, 3 + robot)
+        kill(env, robot)
+    assert env.objects.cache_slot[4] == slot
     assert env.objects.cell[3].tolist() == list(OPEN_CELL)
     assert env.swarm.carried_object[0] == -1
     assert_conserved(env)

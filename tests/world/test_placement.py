@@ -1,24 +1,41 @@
-"""Where objects appear: uniform over free cells, one per cell, and a waiting list for those without a place."""
+"""Where objects, clusters, static caches and robots are placed."""
+
+import itertools
 
 import numpy as np
 import pytest
+from scipy import stats
+from scipy.spatial.distance import pdist
 from scipy.stats import chisquare
 
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.rng import Stream, stream_rng
-from swarm_forage_env.contract.codes import CELL_EMPTY, CELL_NEST, CELL_OBJECT, ObjectStatus
+from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, CELL_OBJECT, ObjectStatus
 from swarm_forage_env.contract.types import IntArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.floor import Box
-from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
+from swarm_forage_env.scenarios.floor import Box, overlap_cells
+from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, SEARCH_AND_RESCUE_OBJECTS, scenario
+from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.world.allocation import new_objects
-from swarm_forage_env.world.kernels.placement import (
-    DRAWS,
-    UNLIMITED,
-    count_objects,
-    place_displaced,
-    scatter,
+from swarm_forage_env.world.clusters import (
+    ClusterLaw,
+    cluster_law,
+    draw_clusters,
+    draw_program_sizes,
+    draw_sizes,
+    footprint,
 )
-from swarm_forage_env.world.placement import draw_ahead, draw_source, give_back, new_draws, place_all, place_objects
+from swarm_forage_env.world.kernels.placement import DRAWS, UNLIMITED, count_objects, place_displaced, scatter
+from swarm_forage_env.world.placement import (
+    draw_ahead,
+    draw_source,
+    draw_start_poses,
+    give_back,
+    new_draws,
+    place_all,
+    place_objects,
+    static_cache_centres,
+)
 from swarm_forage_env.world.state import ObjectState, Requests, Source, listed, make_list
 from tests.reference.object_placement import choose_cell, random_source, scatter_slowly, waiting_by_the_word
 
@@ -207,3 +224,256 @@ def test_scatter_agrees_with_its_slow_twin(seed):
     assert n_placed == len(placed) > 5
     np.testing.assert_array_equal(floor, slow_floor)
     assert {row: tuple(cell[row].tolist()) for row in placed} == placed
+
+
+# Power-law clusters: how many, how large, where
+
+
+LAW_TABLE = {
+    16: (3, 4, {8}, 10),
+    32: (4, 5, {16}, 17),
+    48: (4, 5, {16}, 23),
+    64: (4, 5, {16}, 28),
+    80: (4, 6, {16, 32}, 34),
+    96: (5, 6, {32}, 39),
+    112: (5, 6, {32}, 44),
+    128: (5, 7, {32, 64}, 49),
+}
+"""Side in metres: k_min, k_max, sizes and number of clusters in the authors' program."""
+PROGRAM = Quirks(large_clusters_likelier=True)
+
+
+def painted(config: ScenarioConfig) -> ObjectState:
+    """Return the objects of a world whose static caches stand already."""
+    objects = new_objects(config)
+    half = config.cache_side_cells // 2
+    for slot, (x, y) in enumerate(static_cache_centres(config)):
+        objects.floor[y - half : y + half + 1, x - half : x + half + 1] = CELL_CACHE - slot
+    return objects
+
+
+@pytest.mark.parametrize("side", LAW_TABLE)
+def test_cluster_law_table(side):
+    k_min, k_max, sizes, n_clusters = LAW_TABLE[side]
+    law = cluster_law(side)
+    assert law == ClusterLaw(k_min, k_max, n_clusters)
+    drawn = np.concatenate([draw_program_sizes(law, np.random.default_rng(seed)) for seed in range(20)])
+    assert set(drawn.tolist()) == sizes
+
+
+@pytest.mark.parametrize(("k_min", "k_max"), [(4, 6), (3, 8)])
+def test_larger_sizes_are_more_likely_in_the_program(k_min, k_max):
+    n_clusters = 20_000
+    sizes = draw_program_sizes(ClusterLaw(k_min, k_max, n_clusters), np.random.default_rng(1))
+    exponents = np.arange(k_min, k_max)
+    observed = [np.count_nonzero(sizes == 2**k) for k in exponents]
+    expected = n_clusters * ((exponents + 1) ** 3 - exponents**3) / (k_max**3 - k_min**3)
+    assert np.all(np.diff(expected) > 0)
+    assert sum(observed) == n_clusters
+    assert chisquare(observed, expected).pvalue > 0.001
+
+
+def test_twice_as_large_is_half_as_likely():
+    law = ClusterLaw(4, 6, 34)
+    sizes = draw_sizes(law, 400_000, np.random.default_rng(1))
+    observed = [np.count_nonzero(sizes == size) for size in (8, 16, 32, 64)]
+    assert len(sizes) - sum(observed) <= 1  # the last one is cut
+    expected = np.array([8, 4, 2, 1]) / 15 * sum(observed)
+    assert chisquare(observed, expected).pvalue > 0.001
+
+
+@pytest.mark.parametrize("side", [16, 48, 128])
+@pytest.mark.parametrize(("quirks", "caches"), [(Quirks(), "static"), (PROGRAM, "none")], ids=["described", "program"])
+def test_clusters_keep_off_nest_caches_and_each_other(side, quirks, caches):
+    config = scenario("search_and_rescue", side_m=side, caches=caches, quirks=quirks)
+    floor = (painted(config) if caches == "static" else new_objects(config)).floor
+    x_low, y_low, x_high, y_high = config.arena.distributable_cells
+    for seed in range(5):
+        boxes, sizes = draw_clusters(config, floor, np.random.default_rng(seed))
+        assert len(boxes) == len(sizes)
+        if quirks == PROGRAM:
+            assert len(boxes) == LAW_TABLE[side][3]
+        for box, size in zip(boxes.tolist(), sizes.tolist(), strict=True):
+            assert (box[2] - box[0], box[3] - box[1]) == footprint(size)
+            assert x_low <= box[0] < box[2] <= x_high
+            assert y_low <= box[1] < box[3] <= y_high
+            assert np.all(floor[box[1] : box[3], box[0] : box[2]] == CELL_EMPTY)
+        for a, b in itertools.combinations(boxes.tolist(), 2):
+            assert a[2] < b[0] or b[2] < a[0] or a[3] < b[1] or b[3] < a[1]  # at least one cell between them
+
+
+@pytest.mark.parametrize("side", LAW_TABLE)
+def test_preset_counts_always_fit(side):
+    quirks = PROGRAM if side in (16, 48, 80) else Quirks()
+    config = scenario("search_and_rescue", side_m=side, quirks=quirks)
+    floor = new_objects(config).floor
+    for seed in range(10):
+        source = draw_source(config, floor, stream_rng(seed, Stream.PLACEMENT))
+        assert source.capacity.sum() >= SEARCH_AND_RESCUE_OBJECTS[side]
+
+
+@pytest.mark.parametrize(("side", "seed"), [(16, 0), (48, 1), (128, 2)])
+def test_every_object_lies_in_a_cluster_within_its_capacity(side, seed):
+    config = scenario("search_and_rescue", side_m=side, caches="static")
+    objects = painted(config)
+    rng = stream_rng(seed, Stream.PLACEMENT)
+    source = draw_source(config, objects.floor, rng)
+    place_all(objects, source, config.arena.distributable_cells, rng)
+    occupancy = np.array([count_objects(objects.floor, *box) for box in source.regions.tolist()])
+    assert occupancy.sum() == config.objects.n_objects
+    assert np.all(occupancy <= source.capacity)
+
+
+# Static caches
+
+
+CACHE_SIDES = {16: 15, 32: 31, 48: 47, 64: 63, 80: 79, 96: 95, 112: 111, 128: 127}
+"""Side of the arena in metres: side of a cache in cells."""
+
+
+def metres(centres):
+    return [pytest.approx(((2 * x + 1) / 10, (2 * y + 1) / 10)) for x, y in centres]
+
+
+def test_single_source_has_one_half_way_between_nest_and_strip():
+    assert metres(static_cache_centres(scenario("warehouse_small"))) == [(14.5, 8.1)]
+
+
+def test_random_placement_has_four_at_the_quarters():
+    centres = static_cache_centres(scenario("warehouse_medium"))
+    assert metres(centres) == [(12.1, 24.1), (36.1, 24.1), (24.1, 12.1), (24.1, 36.1)]
+
+
+@pytest.mark.parametrize("side", SEARCH_AND_RESCUE_OBJECTS)
+def test_search_and_rescue_has_four_at_the_quarters(side):
+    config = scenario("search_and_rescue", side_m=side)
+    quarter = side / 4
+    assert [
+        (quarter + 0.1, 2 * quarter + 0.1),
+        (3 * quarter + 0.1, 2 * quarter + 0.1),
+        (2 * quarter + 0.1, quarter + 0.1),
+        (2 * quarter + 0.1, 3 * quarter + 0.1),
+    ] == metres(static_cache_centres(config))
+    assert config.cache_side_cells == CACHE_SIDES[side]
+
+
+def test_dual_source_has_one_on_either_side_of_the_nest():
+    config = scenario("warehouse_dual")  # half way from 16.0 to 25.6 m and to 6.4 m, on the centre of a cell
+    assert metres(static_cache_centres(config)) == [(20.9, 8.1), (11.3, 8.1)]
+
+
+def test_quad_source_stands_clear_of_the_nest():
+    config = scenario("warehouse_quad")
+    west, east, south, north = static_cache_centres(config)
+    assert (west, south) == ((72, 120), (120, 72))  # 0.30 X
+    # 0.675 X = cell 162 would reach 4 cells into the nest (cells 96 .. 143) with a half side of 23.
+    assert (east, north) == ((167, 120), (120, 167))
+
+
+@pytest.mark.parametrize(
+    "config",
+    [
+        scenario("warehouse_small"),
+        scenario("warehouse_medium"),
+        scenario("warehouse_quad"),
+        scenario("warehouse_dual"),
+        *(scenario("search_and_rescue", side_m=side) for side in SEARCH_AND_RESCUE_OBJECTS),
+    ],
+    ids=lambda config: f"{config.objects.placement}-{config.arena.width_m:g}",
+)
+def test_squares_share_no_cell_with_nest_or_each_other(config):
+    half = config.cache_side_cells // 2
+    squares = [(x - half, y - half, x + half + 1, y + half + 1) for x, y in static_cache_centres(config)]
+    for a, b in itertools.combinations([*squares, config.arena.nest_cells], 2):
+        assert overlap_cells(a, b) == 0
+    nx, ny = config.arena.n_cells
+    assert all(overlap_cells(square, (0, 0, nx, ny)) == config.cache_side_cells**2 for square in squares)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "way_out"),
+    [({"nest_centre_m": (12.0, 24.0)}, "move nest"), ({"side_share": 0.5}, "lower side_share, move nest")],
+    ids=["on the nest", "over each other"],
+)
+def test_squares_that_cannot_be_told_apart_are_refused(overrides, way_out):
+    config = scenario("warehouse_medium", **overrides)
+    with pytest.raises(
+        ConfigError, match=rf"clear of nest, obstacles and each other, got a square of .* m; {way_out} or obstacles"
+    ):
+        static_cache_centres(config)
+
+
+def test_squares_outside_the_arena_are_refused():
+    config = scenario("warehouse_medium", width_m=16.0, nest_centre_m=(8.0, 24.0), nest_size_m=(2.0, 2.0), n_robots=5)
+    with pytest.raises(ConfigError, match="Expected static caches inside the arena"):
+        static_cache_centres(config)
+
+
+def test_a_centre_where_no_object_may_lie_is_refused():
+    """The last object of a cache stays on its centre; here the eastern one has to stand beyond a nest in the east."""
+    small = {
+        "width_m": 11.2,
+        "height_m": 13.0,
+        "side_share": 0.03,
+        "start_margin_m": 0.5,
+        "n_robots": 2,
+        "n_objects": 9,
+    }
+    config = scenario("warehouse_quad", nest_centre_m=(9.2, 4.6), nest_size_m=(1.2, 4.4), **small)
+    with pytest.raises(ConfigError, match=r"centres between 15 % and 85 % .* got one at \(9\.9, 6\.5\) m"):
+        static_cache_centres(config)
+
+
+# Start poses: uniform, apart, away from the border; or an error that says why not
+
+
+DIAMETER_M = 2 * 0.085036758
+
+
+def draw_poses(config, seed=0):
+    return draw_start_poses(config, stream_rng(seed, Stream.START_POSE))
+
+
+@pytest.mark.parametrize("name", SCENARIO_NAMES)
+def test_robots_start_apart_and_away_from_the_border(name):
+    config = scenario(name)
+    for seed in range(5):
+        position, heading = draw_poses(config, seed)
+        assert position.shape == (config.robots.n_robots, 2)
+        assert pdist(position).min() > DIAMETER_M
+        margin = config.robots.start_margin_m
+        assert np.all(position >= margin)
+        assert np.all(position <= (config.arena.width_m - margin, config.arena.height_m - margin))
+        assert np.all((heading > -np.pi) & (heading <= np.pi))
+
+
+def test_positions_and_headings_are_uniform():
+    config = scenario("warehouse_small", n_robots=20)
+    poses = [draw_poses(config, seed) for seed in range(100)]
+    position, heading = np.concatenate([pose[0] for pose in poses]), np.concatenate([pose[1] for pose in poses])
+    for values, low, high in (
+        (position[:, 0], 2.8, 29.2),
+        (position[:, 1], 2.8, 13.2),
+        (heading, -np.pi, np.pi),
+    ):
+        assert stats.kstest(values, "uniform", (low, high - low)).pvalue > 1e-3
+
+
+def test_of_two_overlapping_robots_the_higher_row_is_drawn_again():
+    config = scenario("warehouse_small", n_robots=200, start_margin_m=6.0)
+    rng = stream_rng(3, Stream.START_POSE)
+    first = rng.uniform((6.0, 6.0), (26.0, 10.0), (200, 2))
+    overlapping = np.argwhere(np.triu(np.linalg.norm(first[:, None] - first, axis=2) < DIAMETER_M, 1))
+    assert len(overlapping) > 5
+    position, _ = draw_poses(config, 3)
+    moved = np.flatnonzero(np.any(position != first, axis=1))
+    assert set(overlapping[:, 1]) <= set(moved.tolist())
+    never_higher = set(range(200)) - set(moved.tolist())
+    assert min(overlapping[:, 0].tolist()) in never_higher
+
+
+def test_impossible_density_says_what_to_do(monkeypatch):
+    monkeypatch.setattr("swarm_forage_env.world.placement._TRIALS", 3)
+    config = scenario("warehouse_small", n_robots=1500, start_margin_m=4.0)
+    with pytest.raises(ConfigError, match="1500 robots in 3 trials; use fewer robots"):
+        draw_poses(config)

@@ -1,0 +1,339 @@
+"""Every slice of the observation against a slow twin, the sensor models by numbers, and interference, by one rule."""
+
+import collections
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from swarm_forage_env.contract.codes import CELL_OBJECT, Counter, Event, Grip
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.scenarios.quirks import Quirks
+from swarm_forage_env.world.kernels.beams import proximity, proximity_reading
+from swarm_forage_env.world.kernels.bins import bin_robots, mark_cells, may_be_beside
+from swarm_forage_env.world.kernels.floor import fading, quarter_turns
+from tests.reference import sensing
+from tests.support.foraging import NEAR
+from tests.support.stage import OPEN_CELL, act, build_cache, cell_centre, lay, load, put, stand, tidy_world
+
+MODELLED = ("proximity", "light", "ground", "wheel_speed", "position", "heading")
+"""Slices that come out of sensor models; all others are exact to the last bit."""
+CACHE_KINDS = ("none", "static", "dynamic")
+
+
+def assert_matches_twin(env: ForageEnv, obs: np.ndarray) -> None:
+    expected = sensing.observe(env)
+    for part in env.layout:
+        columns = slice(part.start, part.stop)
+        if part.name in MODELLED:
+            np.testing.assert_allclose(obs[:, columns], expected[:, columns], atol=1e-6, rtol=0, err_msg=part.name)
+        else:
+            np.testing.assert_array_equal(
+                obs[:, columns], expected[:, columns].astype(np.float32), err_msg=part.name, strict=True
+            )
+
+
+def crowded_world(rng: np.random.Generator, caches: str) -> ForageEnv:
+    """Forty robots, some of them away, packed so that many touch, over objects, nest, caches and walls."""
+    env = ForageEnv(scenario("warehouse_small", n_robots=40, n_objects=60, caches=caches, side_share=0.05))
+    env.reset_batch(int(rng.integers(1000)))
+    x, y = rng.choice([(0.3, 0.3), (13.0, 6.5), (29.5, 13.5), (4.0, 7.0), (24.0, 5.0)])
+    swarm = env.swarm
+    swarm.position[:] = rng.uniform((x, y), (x + 2.0, y + 2.0), (40, 2))
+    swarm.heading[:] = rng.uniform(-np.pi, np.pi, 40)
+    swarm.facing[:] = np.column_stack((np.cos(swarm.heading), np.sin(swarm.heading)))
+    swarm.wheel_speed[:] = rng.uniform(-0.25, 0.25, (40, 2))
+    swarm.present[:] = rng.random(40) < 0.9
+    swarm.active[:] = swarm.present & (rng.random(40) < 0.9)
+    swarm.pending_kind[:] = rng.integers(0, 3, 40)
+    return env
+
+
+def random_events(env: ForageEnv, rng: np.random.Generator) -> None:
+    """Events as the interactions could have left them."""
+    n_robots, n_objects = len(env.active), env.scenario.objects.n_objects
+    nx, ny = env.scenario.arena.n_cells
+    events = env.events
+    events.code[:] = rng.integers(0, max(Event) + 1, n_robots)
+    events.event_object[:] = rng.integers(-1, n_objects, n_robots)
+    events.event_cache[:] = rng.integers(0, (2**24, nx, ny, n_objects + 1), (n_robots, 4))
+    events.event_cache[rng.random(n_robots) < 0.5] = 0
+
+
+@pytest.mark.parametrize("caches", CACHE_KINDS)
+@settings(max_examples=8)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_every_slice_equals_its_twin_in_crowded_worlds(caches, seed):
+    rng = np.random.default_rng(seed)
+    env = crowded_world(rng, caches)
+    if caches == "dynamic":
+        build_two_caches(env)
+    random_events(env, rng)
+    assert_matches_twin(env, env.arena.observe())
+
+
+def build_two_caches(env: ForageEnv) -> None:
+    for rows, centre in (([0, 1], (60, 40)), ([2, 3, 4], (72, 40))):
+        half = env.scenario.cache_side_cells // 2
+        (x, y), floor = centre, env.objects.floor
+        square = floor[y - half : y + half + 1, x - half : x + half + 1]
+        build_cache(env, sorted({*rows, *(square[square >= CELL_OBJECT] - CELL_OBJECT).tolist()}), centre)
+
+
+@pytest.mark.parametrize(("name", "caches"), [*zip(NEAR, itertools.cycle(CACHE_KINDS), strict=False)])
+def test_every_slice_equals_its_twin_along_a_run(name, caches):
+    env = ForageEnv(scenario(name, n_robots=12, caches=caches, **crowding(name)))
+    assert_matches_twin(env, env.reset_batch(5))
+    rng = np.random.default_rng(5)
+    for tick in range(1, 61):
+        obs = env.step_batch(rng.uniform(-1, 1, (12, 3)).astype(np.float32))[0]
+        if tick % 6 == 0:
+            assert_matches_twin(env, obs)
+
+
+def crowding(name: str) -> dict[str, object]:
+    """Enough objects that robots meet some."""
+    return {"n_objects": 80} if name == "search_and_rescue" else {"n_objects": 300}
+
+
+def test_events_and_cargo_are_seen_in_the_step_that_brings_them():
+    env = tidy_world(n_robots=3, caches="static")
+    slot = build_cache(env, [4, 5, 6], (60, 40))
+    stand(env, 0, (60, 40))
+    stand(env, 1, (90, 30))
+    lay(env, 0, (90, 30))
+    load(env, 2, 1)
+    stand(env, 2, (60, 42))
+    act(env, {0: Grip.GRASP, 1: Grip.GRASP, 2: Grip.RELEASE})
+    columns = env.layout
+    obs = env.arena.observe()
+    assert obs[:, columns["interacting"]].ravel().tolist() == [1, 1, 1]
+    assert_matches_twin(env, obs)
+    assert act(env, {0: Grip.GRASP, 1: Grip.GRASP, 2: Grip.RELEASE}) == [
+        Event.PICKED_FROM_CACHE,
+        Event.PICKED_UP,
+        Event.JOINED_CACHE,
+    ]
+    assert_matches_twin(env, obs)
+    assert obs[:, columns["interacting"]].ravel().tolist() == [0, 0, 0]
+    assert obs[:, columns["carrying"]].ravel().tolist() == [1, 1, 0]
+    assert obs[1, columns["cargo"]] == np.float32(1 / 8)
+    assert obs[1, columns["event_object"]] == np.float32(1 / 8)
+    # The drop comes first, so the cache held 4 when an object left it.
+    assert obs[0, columns["event_cache"]][3] * 8 == 3
+    assert obs[2, columns["event_cache"]][3] * 8 == 4
+    assert obs[2, columns["event_cache"]][0] * 2**24 == env.caches.serial[slot]
+
+
+@pytest.mark.parametrize(("gap", "value"), [(0.1, 0.1004), (0.05, 0.2004), (0.02, 0.4986), (0.01, 0.9891)])
+def test_proximity_readings(gap, value):
+    assert proximity_reading(gap) == pytest.approx(value, abs=5e-5)
+
+
+def test_rows_of_absent_robots_are_zero_and_those_in_repair_are_not():
+    env = tidy_world(n_robots=3)
+    for robot in range(3):
+        put(env, robot, *cell_centre((16, 40 + 2 * robot)))
+    env.set_population(active=np.array([True, False, False]), present=np.array([True, True, False]))
+    act(env, {})
+    obs = env.arena.observe()
+    np.testing.assert_array_equal(obs[2], np.zeros(env.layout.size))
+    assert obs[:, env.layout["active"]].ravel().tolist() == [1, 0, 0]
+    assert obs[1, env.layout["ground"]] == pytest.approx([179 / 255] * 4)
+    assert_matches_twin(env, obs)
+
+
+# Reading less
+
+
+def test_light_fades_and_turns_as_the_library_says():
+    scaled = np.linspace(0.0, 2.5, 251)
+    np.testing.assert_allclose([fading(at) for at in scaled], np.exp(-2.0 * scaled), rtol=1e-9)
+    angles = np.concatenate((np.linspace(0.0, 2.0 * np.pi, 720, endpoint=False), np.pi / 4 * np.arange(8) + 1e-12))
+    turns = [quarter_turns(2.0 * np.cos(angle), 2.0 * np.sin(angle)) for angle in angles]
+    np.testing.assert_allclose(np.exp(0.5j * np.pi * np.array(turns)), np.exp(1j * angles), atol=2e-10)
+    assert quarter_turns(0.0, 0.0) == 0.0
+
+
+@pytest.mark.parametrize("reads", [(), ("ground", "event")])
+def test_reads_may_only_skip_slices_that_nobody_reads(reads):
+    config = scenario("warehouse_small", n_robots=20, caches="static")
+    full, partial = ForageEnv(config), ForageEnv(config, reads=reads)
+    expected, obs = full.reset_batch(3), partial.reset_batch(3)
+    rng = np.random.default_rng(3)
+    for _ in range(40):
+        for part in full.layout:
+            columns = slice(part.start, part.stop)
+            if part.name in reads or np.any(obs[:, columns]):
+                np.testing.assert_array_equal(obs[:, columns], expected[:, columns], err_msg=part.name)
+        actions = rng.uniform(-1, 1, (20, 3)).astype(np.float32)
+        expected, obs = full.step_batch(actions)[0], partial.step_batch(actions)[0]
+    np.testing.assert_array_equal(full.state(), partial.state())
+    np.testing.assert_array_equal(full.events.counters, partial.events.counters)
+
+
+# Bits of cells with robots, by which large swarms leave out cells where nobody is
+
+
+N_ROBOTS, SIDE_M, RADIUS_M, REACH_M = 1500, 40.0, 0.085, 0.1
+CELL_M = 2 * RADIUS_M + REACH_M
+
+
+@pytest.fixture
+def many_robots():
+    """Robots, some in pairs, in lines along the ends of words and in the corners; some are away."""
+    rng = np.random.default_rng(5)
+    position = rng.uniform(0.1, SIDE_M - 0.1, (N_ROBOTS, 2))
+    position[500:1000] = np.clip(position[:500] + rng.uniform(-0.2, 0.2, (500, 2)), 0.1, SIDE_M - 0.1)
+    position[1000:1100, 0] = 32 * CELL_M * rng.integers(1, 4, 100) + rng.uniform(-0.3, 0.3, 100)
+    angle = rng.uniform(-np.pi, np.pi, N_ROBOTS)
+    return position, np.column_stack((np.cos(angle), np.sin(angle))), rng.random(N_ROBOTS) < 0.9
+
+
+def seen_with(many_robots, n_bins, n_words):
+    """Readings and who is near, as it is with so many bins and words."""
+    position, facing, present = many_robots
+    first_in_bin, next_in_bin = np.full(n_bins, -1, np.int32), np.full(N_ROBOTS, -1, np.int32)
+    occupied = np.full(n_words, 2**32 - 1, np.uint32)
+    bin_robots(position, present, CELL_M, first_in_bin, next_in_bin)
+    mark_cells(position, present, CELL_M, occupied)
+    obs, near = np.zeros((N_ROBOTS, 24), np.float32), np.zeros(N_ROBOTS, np.bool_)
+    bins, room = (CELL_M, first_in_bin, next_in_bin), np.array([0.0, 0.0, SIDE_M, SIDE_M])
+    walls = room, np.zeros((0, 4))
+    proximity(position, facing, present, bins, occupied, *walls, RADIUS_M, REACH_M, obs, 0, near, False)
+    return obs, near
+
+
+@pytest.mark.parametrize(("n_words", "n_bins"), [(2, 8192), (64, 64), (4096, 8192)])
+def test_with_them_robots_see_what_they_see_without(many_robots, n_bins, n_words):
+    (obs, near), (plain, plainly_near) = seen_with(many_robots, n_bins, n_words), seen_with(many_robots, n_bins, 1)
+    assert 0.4 < near.mean() < 0.9
+    np.testing.assert_array_equal(near, plainly_near)
+    np.testing.assert_array_equal(obs, plain)
+
+
+def test_who_is_alone_is_mostly_known_to_be(many_robots):
+    position, _, _ = many_robots
+    occupied = np.zeros(4096, np.uint32)
+    alone = np.ones(N_ROBOTS, np.bool_)
+    alone[100:] = False
+    mark_cells(position, alone, CELL_M, occupied)
+    cells = (position[:100] / CELL_M).astype(int)
+    assert np.mean([may_be_beside(int(x), int(y), occupied) for x, y in cells]) < 0.2
+
+
+# Interference: which robots lose time to avoidance, measured by one rule from true readings
+
+
+WORK = (Counter.SEARCHING, Counter.HANDLING, Counter.HOMING, Counter.AT_CACHES, Counter.INTERFERING)
+"""What a robot at work can do, one at a time."""
+PAIR = ((16.0, 8.0, 0.0), (16.25, 8.0, math.pi))
+"""Places and headings of two robots that face each other."""
+
+
+def met(env: ForageEnv, *rows: int) -> None:
+    """Two robots within reach of each other, the others alone."""
+    for robot in range(len(env.active)):
+        put(env, robot, 6.0 + 2.0 * robot, 12.0)
+    for robot, place in zip(rows, PAIR, strict=True):
+        put(env, robot, *place)
+
+
+def test_robots_that_meet_interfere_and_others_do_not():
+    env = tidy_world()
+    met(env, 1, 3)
+    act(env, {})
+    assert env.events.interfering.tolist() == [False, True, False, True]
+    assert env.events.counters[Counter.INTERFERING] == 2
+    assert env.events.interference_sum[0] == pytest.approx(2 / 4)
+
+
+@pytest.mark.parametrize("quirks", [Quirks(), Quirks(obstacle_behind_counts=True)], ids=["described", "program"])
+def test_who_is_behind_interferes_in_the_program_only(quirks):
+    env = tidy_world(quirks=quirks)
+    met(env, 0, 1)
+    put(env, 1, 16.25, 8.0, 0.0)  # turns its back to robot 0
+    act(env, {})
+    assert env.events.interfering.tolist() == [True, quirks.obstacle_behind_counts, False, False]
+
+
+def test_an_avoidance_begins_once_and_again_after_a_break():
+    env = tidy_world()
+    for places in ((), PAIR, PAIR, (), PAIR):
+        for robot in range(4):
+            put(env, robot, 6.0 + 2.0 * robot, 12.0)
+        for robot, place in enumerate(places):
+            put(env, robot, *place)
+        act(env, {})
+    assert env.events.counters[Counter.INTERFERING] == 6
+    assert env.events.counters[Counter.AVOIDANCES] == 4
+
+
+@pytest.mark.parametrize(("away_m", "near"), [(1.9, 1), (2.1, 0)], ids=["near", "farther"])
+def test_time_lost_near_a_cache_is_told_from_other_time(away_m, near):
+    """Of a pair that stand along a circle around a cache, and of a robot at a wall, the pair alone may be near it."""
+    env = tidy_world(caches="dynamic")
+    build_cache(env, (0, 1), OPEN_CELL)
+    x, y = cell_centre(OPEN_CELL)
+    put(env, 0, x + away_m, y, math.pi / 2)
+    put(env, 1, x + away_m, y + 0.25, -math.pi / 2)
+    put(env, 2, 31.6 - 0.1, 8.0)
+    put(env, 3, 6.0, 12.0)
+    act(env, {})
+    assert env.events.interfering.tolist() == [True, True, True, False]
+    assert env.events.counters[Counter.INTERFERING_NEAR_CACHES] == 2 * near
+
+
+def test_time_of_robots_is_divided_by_what_they_do():
+    """Robot 0 lays hands on an object for three ticks and carries it; robots 1 and 2 avoid each other; 3 searches."""
+    env = tidy_world(pickup_ticks=3)
+    met(env, 1, 2)
+    lay(env, 0, (30, 20))
+    stand(env, 0, (30, 20))
+    for _ in range(6):
+        act(env, {0: Grip.GRASP})
+    counted = {counter: int(env.events.counters[counter]) for counter in WORK}
+    # Seen before the grippers move: the request of the first tick counts from the second on.
+    assert counted == {
+        Counter.SEARCHING: 6 + 1,
+        Counter.HANDLING: 3,
+        Counter.HOMING: 2,
+        Counter.AT_CACHES: 0,
+        Counter.INTERFERING: 12,
+    }
+
+
+def test_flags_and_sums_equal_those_of_the_slow_rule_on_slow_readings():
+    """Sixty robots with 24 beams each against all others, in Python: it takes three seconds."""
+    env = ForageEnv(scenario("warehouse_small", n_robots=60, n_objects=400, start_margin_m=6.5, caches="static"))
+    env.reset_batch(2)
+    present, active = np.arange(60) % 12 != 0, np.arange(60) % 6 != 0
+    env.set_population(active=active, present=present)
+    rng = np.random.default_rng(2)
+    counted, share, before = collections.Counter[Counter](), 0.0, [False] * 60
+    for _ in range(20):
+        robots_do = [sensing.work(env.swarm, robot) for robot in range(60)]  # before the grippers of the tick move
+        env.step_batch(rng.uniform(-1, 1, (60, 3)).astype(np.float32))
+        expected = [sensing.interferes(env, robot) for robot in range(60)]
+        assert env.events.interfering.tolist() == expected
+        counted[Counter.INTERFERING] += sum(expected)
+        counted[Counter.INTERFERING_NEAR_CACHES] += sum(
+            flag and sensing.is_near_cache(env, robot) for robot, flag in enumerate(expected)
+        )
+        counted[Counter.AVOIDANCES] += sum(now and not then for now, then in zip(expected, before, strict=True))
+        counted.update(robots_do[robot] for robot in range(60) if active[robot] and not expected[robot])
+        share += sum(expected) / 50
+        before = expected
+    assert counted[Counter.INTERFERING] > counted[Counter.AVOIDANCES] > 10
+    known = (*WORK, Counter.AVOIDANCES, Counter.INTERFERING_NEAR_CACHES)
+    assert {counter: int(env.events.counters[counter]) for counter in known} == {
+        counter: counted[counter] for counter in known
+    }
+    assert min(counted[counter] for counter in known) > 0, "the test knows each of them"
+    assert counted[Counter.INTERFERING_NEAR_CACHES] < counted[Counter.INTERFERING]
+    assert env.events.interference_sum[0] == pytest.approx(share)
+    assert [int(env.events.counters[c]) for c in (Counter.ACTIVE, Counter.PRESENT)] == [20 * 50, 20 * 55]
