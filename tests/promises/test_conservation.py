@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from swarm_forage_env._internal.rng import Stream, stream_rng
-from swarm_forage_env.contract.codes import Counter, Event
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM
@@ -62,38 +61,3 @@ def test_objects_are_conserved_as_the_authors_program_does_it(caches):
         "search_and_rescue", side_m=32.0, n_robots=40, caches=caches, walk_probability=0.05, quirks=AUTHORS_PROGRAM
     )
     run_conserved(ForageEnv(config), BusyPolicy(), 150, seed=2, population=True)
-
-
-def test_the_busy_runs_do_something():
-    """The checks above mean little unless caches form and dissolve, objects move and robots deliver."""
-    config = scenario(
-        "search_and_rescue",
-        side_m=32.0,
-        n_robots=60,
-        caches="dynamic",
-        n_objects=272,
-        side_share=0.03,
-        distance_share=0.05,
-        walk_probability=0.02,
-    )
-    env, policy, rng = ForageEnv(config), BusyPolicy(), np.random.default_rng(0)
-    policy.reset(env.swarm_spec, rng)
-    obs = env.reset_batch(0)
-    seen = set()
-    counted = (
-        Counter.COLLECTED,
-        Counter.DISPLACED_DROPS,
-        Counter.OBJECTS_MOVED,
-        Counter.CACHES_CREATED,
-        Counter.CACHES_DEPLETED,
-        Counter.CACHE_PICKUPS,
-        Counter.CACHE_DROPS,
-    )
-    for _ in range(2500):
-        obs = env.step_batch(policy.act(obs, env.active))[0]
-        seen.update(env.events.code.tolist())
-        if seen == set(Event) and env.events.counters[[*counted]].all():
-            break
-    assert seen == set(Event)
-    assert [counter for counter in counted if env.events.counters[counter] == 0] == []
-    assert_conserved(env)

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from scripts import update_docs
-from scripts.results_numbers import results_fields
 from swarm_forage_env.runs import workers
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -92,39 +91,3 @@ def test_numbers_of_runs_are_those_of_the_store():
         by_hand = update_docs.BLOCK.sub("", text)
         numbers = {values[name] for source, values in store.items() for name in update_docs.SOURCES[source][1]}
         assert [number for number in numbers if number in by_hand] == [], f"{page}: a number outside of a block"
-
-
-def test_answers_and_means_are_those_beside_the_results(tmp_path):
-    (tmp_path / "runs.csv").write_text("set,runs,version,hours\nS1a,1200,0.1.0,0.26\nS1b,40,0.1.0,\n")
-    (tmp_path / "measures.csv").write_text(
-        "set,measure,form,rules,others,policy,value,mean\n"
-        "S1a,raw_performance,marginal,described,,crw,128.0,456.375\n"
-        "S2a,raw_performance,marginal,described,walk_probability 0,crw,128.0,1\n"
-        "S1a,spatial_emergence,interactive,described,,crw,4.0,1\n"
-    )
-    (tmp_path / "verdicts.csv").write_text(
-        "claim,rules,reading,is_main,answer,n_held,n_statements\n"
-        "R1,described,amounts,false,supported,2,2\nR1,described,shares,true,contradicted,0,2\n"
-        "R1,described,bands,false,open,1,2\nR1,program,amounts,false,supported,2,2\n"
-        "R1,program,shares,true,supported,2,2\nR1,program,bands,false,open,1,2\n"
-        "V1,described,amounts,true,supported,0,0\nV1,program,amounts,true,supported,0,0\n"
-    )
-    (tmp_path / "contrasts.csv").write_text(
-        "claim,rules,reading,mean,lower,upper\nR1,described,shares,,,\nR1,described,shares,0.0512,0.021,0.0833\n"
-    )
-    found = results_fields(tmp_path)
-    assert (found["V1"], found["R1"]) == ("supported, supported", "contradicted, supported")
-    assert (found["R1_amounts"], found["R1_shares_described"]) == ("supported, supported", "0 of 2")
-    assert found["R1_2_shares_described"] == "5.1 % (2.1 to 8.3)"
-    assert [name for name in found if name.startswith(("S1", "S2"))] == [
-        "S1a_raw_performance_described_crw_128",
-        "S2a_raw_performance_described_crw_128_walk_probability_0",
-    ]
-    assert found["S1a_raw_performance_described_crw_128"] == "456.4"
-    assert (found["runs"], found["sets"], found["hours"], found["version"]) == ("1,240", "2", "0.3", "0.1.0")
-    assert found["contradicted"] == "None."
-    assert found["split"].splitlines()[2].endswith("| contradicted | supported |")
-    assert found["answers"].splitlines()[2].startswith("| described | 1 | 1 | 0 | 0 | 0 |")
-    assert found["readings"].splitlines()[2] == "| R1 | +/-/? | +/+/? |"
-    block = "<!-- generated: results.split by scripts/update_docs -->"
-    assert f"{block}\n\n| claim |" in update_docs.written(f"{block}<!-- end -->", {"results": found})
