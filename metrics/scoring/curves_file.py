@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
+from swarm_forage_env._internal.fields import checked
 from swarm_forage_env._internal.wording import shown, suggestion
 from swarm_forage_env.scenarios.columns import Column
 from swarm_forage_env.scenarios.performance import INVERTED, PERFORMANCE_COLUMNS, Performance
@@ -75,7 +76,7 @@ def read_curves(path: str | Path, performance: str | None = None, **how: Any) ->
         CurveError: as `study_curves`; or the file cannot be read, there is no reference run for what is varied, or no
             runs can be paired.
     """
-    file = Path(path)
+    file = Path(checked("path", path, str | Path))
     try:
         frame = pl.read_parquet(file) if file.suffix.lower() == ".parquet" else _read_text(file)
     except OSError as error:

@@ -73,7 +73,7 @@ def made(words: Sequence[str] = ()) -> App:
         group = Group.create_ordered(heading)
         for name, (place, about) in commands.items():
             line = None if name in words else about
-            app.command(f"swarm_forage_env.cli.{place}", name=name, help=line, group=group)
+            app.command(f"swarm_forage_env.cli.{place}", name=name, help=line, group=group, sort_key=names.index(name))
     app.register_install_completion_command(help="Let the shell complete commands and options.")
     return app
 

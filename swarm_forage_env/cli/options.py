@@ -66,7 +66,7 @@ class WorldOptions:
     """Options that describe a world; None = the scenario's own value."""
 
     scenario: Scenario = "warehouse_small"
-    robots: Annotated[PositiveInt | None, Parameter(help="Number of robots.")] = None
+    robots: Annotated[PositiveInt | None, Parameter(help="Number of robots; default the scenario's.")] = None
     horizon: Annotated[float | None, Parameter(help="Simulated seconds per run, a multiple of 200.")] = None
     settings: Annotated[
         tuple[str, ...],

@@ -13,6 +13,7 @@ from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import resources
+from itertools import chain
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -144,7 +145,8 @@ def saved_figure(
         figure = Drawing(figsize=(width, height))
         if title and style.title:
             most = int(width * 72.0 / (_LETTER * style.font_size))
-            lines = textwrap.wrap(title, max(20, most), break_long_words=False)
+            wrapped = (textwrap.wrap(line, max(20, most), break_long_words=False) for line in title.splitlines())
+            lines = [*chain.from_iterable(wrapped)]
             figure.suptitle("\n".join(lines))
             if style.width_in is not None:  # the height was made for one line and a wider page
                 _grow(figure, len(lines) * _LINE * style.font_size)

@@ -164,7 +164,10 @@ def run_plan(
     instance("plan", plan, Plan, hint="; Plan.product(policies, worlds, seeds) makes one")
     unnamed = [policy.label for policy in plan.policies if not policy.is_named]
     if out is not None and unnamed:
-        raise ValueError(f"Expected name= for the policy {unnamed[0]}, by which its runs in {out} are found again.")
+        raise ValueError(
+            f"Expected a name for the policy {unnamed[0]}, by which its runs in {out} are found again; give a mapping "
+            "{name: policy}."
+        )
     made_here = {policy.policy: policy.factory for policy in plan.policies if policy.factory is not None}
     found = run_all(plan.specs, out=out, executor=executor, jobs=jobs, progress=progress, made_here=made_here)
     folder = None if out is None else Path(out)

@@ -56,7 +56,7 @@ class RunSpec:
 
     def __post_init__(self) -> None:
         whole("seed", self.seed, at_least=0, at_most=_MAX_SEED)
-        instance("world", self.world, World)
+        instance("world", self.world, World, hint="; plan_run takes names, too")
         instance("policy", self.policy, str)
         table("parameters", self.parameters)
         whole_intervals(self.scenario)

@@ -218,6 +218,8 @@ def scenario(name: str, /, *, density: float | None = None, **overrides: Any) ->
     Raises:
         ConfigError: unknown name or field (with the nearest known one), or values that do not fit together.
     """
+    if str(name).endswith(".toml"):
+        raise ConfigError(f"Expected the name of a scenario, got the file {name}; read_world({name!r}) reads it.")
     known_name("scenario", name, SCENARIO_NAMES)
     if "side_m" in overrides and name != "search_and_rescue":
         raise ConfigError(

@@ -68,7 +68,7 @@ class World:
     """Name for people; default made of scenario, number of robots and what is varied or differs from the preset."""
 
     def __post_init__(self) -> None:
-        instance("scenario", self.scenario, ScenarioConfig)
+        instance("scenario", self.scenario, ScenarioConfig, hint="; scenario(name) makes one")
         checked("criterion", self.criterion, Name)
         object.__setattr__(self, "value", checked("criterion_value", self.value, Number))
         ordered = tuple(sorted(wrapper_configs(self.wrappers), key=lambda config: config.stack_position))

@@ -40,8 +40,9 @@ def draw(path, names=("crw", "dpo", "$a$ mine"), **options):
 
 
 def test_words_in_svg_are_text(tmp_path):
-    words = words_in(draw(tmp_path / "it.svg"))
-    assert {"CRW", "DPO", "$a$ mine", "deliveries", "time (s)", "bands: two", "the headline"} <= {*words}
+    words = words_in(draw(tmp_path / "it.svg", title="the headline\nits second line"))
+    told = {"CRW", "DPO", "$a$ mine", "deliveries", "time (s)", "bands: two", "the headline", "its second line"}
+    assert told <= {*words}
 
 
 def test_widths_and_sizes_of_letters_are_exact(tmp_path):

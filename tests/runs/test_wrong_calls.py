@@ -53,6 +53,7 @@ def test_one_or_several_names_or_objects_are_taken_by_all_alike():
         (lambda: check_policy("random", World(TINY)), "scenario to be a ScenarioConfig"),
         (lambda: check_determinism("random", TINY, seeds=2), "seeds to be a Sequence, got 2"),
         (lambda: with_overrides("classroom", n_robots=3), r"config to be a ScenarioConfig.* scenario\(name\)"),
+        (lambda: scenario("hall.toml"), r"the name of a scenario, got the file hall.toml; read_world\('hall.toml'\)"),
         (lambda: parse_wrapper(parse_wrapper(NOISE)), "a wrapper to be a text"),
         (lambda: verdict("results"), r"a study to be a StudyTable, got 'results'; read_study\(path\) reads one"),
         (lambda: policy_specs(policy_specs("crw"), caches="static"), "a name, a file or an object for parameters"),
