@@ -31,10 +31,9 @@ from swarm_forage_env.layer import at_rest
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import LiveRun, build_stack
 from swarm_forage_env.runs.spec import policy_spec
-from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import with_overrides
-from swarm_forage_env.scenarios.presets import scenario as preset
 from swarm_forage_env.wrappers.base import SwarmWrapper
+from swarm_forage_env.wrappers.world import World, WorldLike, world_of
 
 _INTERVAL_TICKS = 10
 """Length of a recording interval in compared records. Our choice: short, so that small differences are seen."""
@@ -177,7 +176,7 @@ def _summary(values: Any) -> str:
     return f"{values.dtype} of shape {values.shape}{ends}"
 
 
-def check_policy(policy: Any, scenario: str | ScenarioConfig = "warehouse_small", *, ticks: int = 150) -> None:
+def check_policy(policy: Any, world: WorldLike = "warehouse_small", *, ticks: int = 150) -> None:
     """Check a policy against `contract.policy.Policy`.
 
     The policy acts for a while, with some robots away and then with all robots away. Its actions must have the right
@@ -190,8 +189,8 @@ def check_policy(policy: Any, scenario: str | ScenarioConfig = "warehouse_small"
     Args:
         policy: As in `runs.spec.policy_spec`: a name, the path of a file, a class that needs no arguments, an object
             (which is copied), or a function of observations.
-        scenario: Where it acts, with the caches that the policy states. Choose one in which your policy meets
-            everything that it reacts to.
+        world: Where it acts, with the caches that the policy states and without wrappers. Choose one in which your
+            policy meets everything that it reacts to.
         ticks: How long it acts.
 
     Raises:
@@ -199,18 +198,17 @@ def check_policy(policy: Any, scenario: str | ScenarioConfig = "warehouse_small"
         ValueError: an unknown name or scenario, or caches that there are not.
     """
     whole("ticks", ticks, at_least=1)
-    build, config = _subject(policy, scenario)
-    subject = build()
-    world = ForageEnv(config)
+    build, chosen = _subject(policy, world)
+    subject, env = build(), ForageEnv(chosen.scenario)
     if sees_world(subject):
         raise CheckError(
             "Expected a policy that decides by what robots observe, got one that reads the world (it has see_world): "
             "it is a yardstick and no contestant, and check_determinism alone says something about it."
         )
-    reads = _checked_reads(subject, world.layout)
-    scenes = list(_act_in(subject, world, ticks, away=True))
+    reads = _checked_reads(subject, env.layout)
+    scenes = list(_act_in(subject, env, ticks, away=True))
     seen = [scene.obs for scene in scenes]
-    act_again = partial(_check_same_actions, subject, world.swarm_spec, scenes)
+    act_again = partial(_check_same_actions, subject, env.swarm_spec, scenes)
     advice = "make all memory in reset, and draw random numbers from the generator that reset is given only."
     act_again((obs.copy() for obs in seen), "Expected reset to begin a new run", advice)
     expected = "Expected a policy that keeps no reference to the observation array"
@@ -218,13 +216,13 @@ def check_policy(policy: Any, scenario: str | ScenarioConfig = "warehouse_small"
     if reads is not None:
         expected = f"Expected equal actions when the slices that are not in reads = {reads!r} hold other numbers"
         advice = "name every slice that act looks at in reads; the others are not computed in runs."
-        act_again((_without_unread(world.layout, reads, obs) for obs in seen), expected, advice)
+        act_again((_without_unread(env.layout, reads, obs) for obs in seen), expected, advice)
     expected = "Expected equal actions of robots at work when the observations of robots that are away are others"
     advice = "look at the rows of act that active names only; others can hold anything."
     early = scenes[: ticks // 2]  # later those at work have been away, and remember it
-    _check_same_actions(subject, world.swarm_spec, early, map(_without_away, early), expected, advice)
-    n_robots = config.robots.n_robots
-    other = ForageEnv(with_overrides(config, n_robots=n_robots // 2 if n_robots > 1 else 2))
+    _check_same_actions(subject, env.swarm_spec, early, map(_without_away, early), expected, advice)
+    n_robots = chosen.n_robots
+    other = ForageEnv(with_overrides(chosen.scenario, n_robots=n_robots // 2 if n_robots > 1 else 2))
     for _ in _act_in(subject, other, min(ticks, _INTERVAL_TICKS), away=False):
         pass
 
@@ -367,7 +365,7 @@ def _checked_reads(policy: Policy, layout: ObservationLayout) -> tuple[str, ...]
 
 def check_determinism(
     policy: Any,
-    scenario: str | ScenarioConfig = "warehouse_small",
+    world: WorldLike = "warehouse_small",
     *,
     seeds: Sequence[int] = (0, 1),
     seconds: float = 60.0,
@@ -376,7 +374,7 @@ def check_determinism(
 
     Args:
         policy: As in `check_policy`; each run gets a fresh one.
-        scenario: Where it runs, with the caches that the policy states.
+        world: Where it runs, with the caches that the policy states.
         seeds: Seeds of the runs.
         seconds: Simulated length of a run, rounded to recording intervals of ten ticks.
 
@@ -388,11 +386,12 @@ def check_determinism(
     if not len(seeds):
         raise ValueError("Expected seeds to run, got none; give at least one.")
     number("seconds", seconds, above=0.0)
-    build, config = _subject(policy, scenario)
-    interval_s = _INTERVAL_TICKS * config.dt_s
-    config = replace(config, interval_s=interval_s, horizon_s=max(1, round(seconds / interval_s)) * interval_s)
+    build, chosen = _subject(policy, world)
+    interval_s = _INTERVAL_TICKS * chosen.scenario.dt_s
+    length = {"interval_s": interval_s, "horizon_s": max(1, round(seconds / interval_s)) * interval_s}
+    chosen = replace(chosen, scenario=replace(chosen.scenario, **length))
     for seed in seeds:
-        run, again = (_results(config, build(), seed) for _ in range(2))
+        run, again = (_results(chosen, build(), seed) for _ in range(2))
         for name, values in run.items():
             if not np.array_equal(values, again.get(name, np.empty(0))):
                 raise CheckError(
@@ -401,9 +400,9 @@ def check_determinism(
                 )
 
 
-def _results(config: ScenarioConfig, policy: Policy, seed: int) -> dict[str, np.ndarray]:
+def _results(world: World, policy: Policy, seed: int) -> dict[str, np.ndarray]:
     """Make a run; return the poses at its end, which show differences first, and its columns."""
-    recorder = build_stack(config, reads=getattr(policy, "reads", None))
+    recorder = build_stack(world.scenario, world.wrappers, reads=getattr(policy, "reads", None))
     run = LiveRun(recorder, policy, seed)
     run.advance()
     swarm = run.forage_env.swarm
@@ -411,13 +410,11 @@ def _results(config: ScenarioConfig, policy: Policy, seed: int) -> dict[str, np.
     return {**poses, **recorder.columns(), **recorder.contributed()}
 
 
-def _subject(policy: Any, scenario: str | ScenarioConfig) -> tuple[Callable[[], Policy], ScenarioConfig]:
-    """Return what builds a fresh policy, and the scenario with the caches that the policy states."""
-    config = preset(scenario) if isinstance(scenario, str) else scenario
-    instance("scenario", config, ScenarioConfig)
-    found = policy_spec(policy)
+def _subject(policy: Any, world: WorldLike) -> tuple[Callable[[], Policy], World]:
+    """Return what builds a fresh policy, and the world with the caches that the policy states."""
+    found, chosen = policy_spec(policy), world_of(world)
     build = found.factory or partial(load_policy, found.policy, found.parameters)
     missing = [name for name in ("reset", "act") if not callable(getattr(build(), name, None))]
     if missing:
         raise CheckError(f"Expected a policy with the methods reset and act, got one without {' and '.join(missing)}.")
-    return build, replace(config, caches=found.caches or config.caches)
+    return build, chosen.with_caches(found.caches)

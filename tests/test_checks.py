@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pettingzoo.utils import BaseParallelWrapper
 
-from swarm_forage_env import CheckError, ConfigError, check_determinism, check_env, check_policy
+from swarm_forage_env import CheckError, ConfigError, World, check_determinism, check_env, check_policy
 from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import POLICIES
@@ -134,7 +134,7 @@ def drive(obs):
 def test_policies_may_be_classes_objects_and_functions():
     for given in (BusyPolicy, BusyPolicy(), drive):
         check_policy(given, SMALL)
-    check_determinism(drive, SMALL, seconds=10.0)
+    check_determinism(drive, World(SMALL, ("sensor_noise:sigma=0.1",)), seconds=10.0)
     check_policy(BusyPolicy, scenario("warehouse_small", n_robots=1))
 
 

@@ -167,14 +167,14 @@ def _score_curves(
 def check(policies: Policies, /, *, world: WorldOptions = WorldOptions()) -> None:
     """Check that policies keep the rules; exit code 1 at the first that breaks one.
 
-    swarm_forage_env.checks.check_policy lists the rules.
+    swarm_forage_env.checks.check_policy lists the rules. Wrappers are left out.
     """
     from swarm_forage_env.checks import CHECKED, CheckError, check_policy
     from swarm_forage_env.cli.worlds import plan_runs
 
     for spec in plan_runs(world, policies, [0]):
         try:
-            check_policy(spec.policy, spec.scenario)
+            check_policy(spec.policy, spec.world)
         except CheckError as error:
             raise CommandError(f"{spec.policy} breaks a rule: {error}") from None
         say(f"{spec.policy} keeps the rules in {spec.world.name}. {CHECKED}")

@@ -50,7 +50,7 @@ def test_one_or_several_names_or_objects_are_taken_by_all_alike():
         (lambda: run_plan("crw"), r"plan to be a Plan, got 'crw'; Plan.product\(policies, worlds, seeds\)"),
         (lambda: Plan.product("crw", TINY, seeds=3), r"seeds to be an Iterable, got 3; range\(n\)"),
         (lambda: run_study("S1a", "out"), r"spec to be a StudySpec, got 'S1a'; load_study\(file\) reads one"),
-        (lambda: check_policy("random", World(TINY)), "scenario to be a ScenarioConfig"),
+        (lambda: check_policy("random", 7), "scenario to be a ScenarioConfig"),
         (lambda: check_determinism("random", TINY, seeds=2), "seeds to be a Sequence, got 2"),
         (lambda: with_overrides("classroom", n_robots=3), r"config to be a ScenarioConfig.* scenario\(name\)"),
         (lambda: scenario("hall.toml"), r"the name of a scenario, got the file hall.toml; read_world\('hall.toml'\)"),
