@@ -16,9 +16,6 @@ from swarm_forage_env.contract.codes import Event, Grip
 from swarm_forage_env.scenarios.quirks import Quirks
 from tests.support.observations import Observations, make_spec
 
-GOAL = (10.5, 10.1)
-"""Centre of the object two cells ahead of a robot at (10.1, 10.1)."""
-
 
 class Robot:
     """A single robot under a controller that faces +x, at (10.1, 10.1)."""
@@ -99,34 +96,6 @@ def test_drop_depth_is_uniform_between_a_centimetre_and_the_entry_distance():
     assert np.all(policy.activity == Activity.WAIT_DROP)
 
 
-def test_quirk_nest_left_at_random_wanders_out_then_explores_with_a_new_lock():
-    robot = Robot(CRWPolicy(), quirks=Quirks(nest_left_at_random=True))
-    robot.seen.carry(4)
-    robot.seen.ground("nest")
-    robot.seen.pose(3.2, 8.0)
-    robot.act(2)
-    assert robot.act() == pytest.approx([0.0, 0.0, Grip.DELIVER])
-    robot.seen.carry(None)
-    left, right, _ = robot.act()
-    assert robot.activity is Activity.LEAVE_NEST
-    assert (left + right) / 2 * 20.0 == pytest.approx(9.0, abs=1e-5)
-    robot.seen.ground("object")
-    robot.act(50)
-    assert robot.activity is Activity.ACQUIRE
-    robot.act()
-    assert robot.activity is Activity.WAIT_PICKUP
-
-
-def test_an_inactive_robot_is_frozen(walker):
-    walker.seen.ground("object")
-    walker.act(30)
-    before = walker.policy._robots.copy()
-    assert walker.act(100, active=False) == pytest.approx([0.0, 0.0, Grip.RELEASE])
-    assert walker.policy._robots == before
-    walker.act(21)
-    assert walker.activity is Activity.WAIT_PICKUP
-
-
 def test_quirk_explore_double_start_runs_the_strategy_twice_in_the_first_tick():
     quirky = Robot(CRWPolicy(), quirks=Quirks(explore_double_start=True))
     first, second = quirky.act(), quirky.act()
@@ -181,24 +150,6 @@ def test_an_obstacle_is_avoided_then_recovered_from_for_10_ticks(robot):
     assert robot.vector is VectorState.VECTOR
     assert action == pytest.approx([0.5, 0.5, Grip.RELEASE], abs=1e-6)  # recovery and arrival, limited to 10 cm/s
     assert robot.act() == pytest.approx([0.4, 0.4, Grip.RELEASE], abs=1e-6)
-
-
-def test_a_missed_pick_up_event_still_forgets_the_object(robot):
-    robot.seen.window({(2, 0): 7})
-    robot.act()
-    assert robot.vector is VectorState.VECTOR
-    robot.seen.believed_position(*GOAL)
-    robot.seen.ground("object")
-    robot.act()
-    robot.seen.carry(7)
-    robot.seen.event(Event.PICKED_UP)
-    robot.act(active=False)  # in repair when it happened
-    robot.seen.event(Event.NONE)
-    robot.seen.pose(14.0, 10.1)
-    robot.seen.window({})
-    robot.act()
-    assert robot.activity is Activity.HOMING
-    assert robot.record.n_known == 0
 
 
 def test_starting_within_tolerance_is_an_arrival_unless_the_quirk_is_on():

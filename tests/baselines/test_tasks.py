@@ -177,24 +177,6 @@ def test_quirk_waits_for_cache(task):
     assert robot.activity is Activity.ACQUIRE, "nothing to wait for"
 
 
-@pytest.mark.parametrize("by_identity", [False, True])
-def test_quirk_cache_goal_by_identity(by_identity):
-    robot = TaskRobot(quirks=Quirks(cache_goal_by_identity=by_identity))
-    robot.start(Task.COLLECTOR)
-    robot.finish_soon()
-    robot.seen.pose(22.0, 8.1)
-    robot.seen.caches(CACHE_SEEN)
-    robot.act(3)
-    goal = robot.goal
-    assert robot.record.target == CACHE_SEEN[0]
-    robot.seen.caches((CACHE_SEEN[0] + 1, *CACHE_SEEN[1:]))  # used up and created again in the same place
-    robot.act()
-    assert robot.stage is (VectorState.IDLE if by_identity else VectorState.VECTOR)
-    robot.act()
-    assert robot.stage is VectorState.VECTOR
-    assert (robot.goal == goal) != by_identity, "chosen anew, so another point in it"
-
-
 @pytest.mark.parametrize("doubled", [False, True])
 def test_quirk_explore_double_start_of_a_search(doubled):
     robot = TaskRobot(quirks=Quirks(explore_double_start=doubled))

@@ -10,34 +10,10 @@ from swarm_forage_env import Snapshot, SnapshotError, parallel_env, scenario
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
 from tests.support.branches import Branch, pickled
-from tests.support.busy import BusyPolicy
-from tests.support.crowded_runs import DENSE, side
-
-
-def crowded(name: str, caches: str) -> ForageEnv:
-    world = scenario(
-        name, caches=caches, physics="compiled", n_objects=DENSE[name], n_robots=20, walk_probability=0.01, **side(name)
-    )
-    return ForageEnv(world)
 
 
 def small(**options) -> ForageEnv:
     return parallel_env("warehouse_small", **{"n_robots": 3, "n_objects": 9, "physics": "compiled", **options})
-
-
-@pytest.mark.parametrize(
-    ("name", "caches"), [("warehouse_small", "static"), ("warehouse_quad", "none"), ("search_and_rescue", "dynamic")]
-)
-def test_a_run_goes_on_from_a_snapshot(name, caches):
-    run = Branch(crowded(name, caches), BusyPolicy()).go_on(150)
-    snapshot = run.env.snapshot()
-    branches = [run.beside(env, env.restore_batch(snapshot)) for env in [crowded(name, caches)]]
-    branches += [run.beside(env, run.obs) for env in (copy.deepcopy(run.env), pickled(run.env))]
-    expected = run.beside(run.env, run.obs).go_on(50)
-    branches.append(run.beside(run.env, run.env.restore_batch(snapshot)))
-    assert expected.env.events.counters.any()
-    for branch in branches:
-        assert branch.go_on(50).seen == expected.seen
 
 
 def test_a_heap_of_robots_goes_on_from_a_snapshot():

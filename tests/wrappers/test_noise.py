@@ -130,8 +130,6 @@ def test_without_noise_observations_are_bitwise_the_same(world, sigma):
 STUDY_TABLE = [
     # sigma, false obstacle per tick, all four sensors show the object, three of four show the nest or a cache
     (0.0043, 0.168, 1.00, 1.00),
-    (0.0171, 0.184, 0.99, 1.00),
-    (0.030, 0.379, 0.82, 1.00),
     (0.043, 0.57, 0.60, 1.00),
     (0.100, 0.90, 0.23, 0.62),
 ]
