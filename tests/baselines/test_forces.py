@@ -101,36 +101,6 @@ def test_heading_is_forgotten_at_the_expected_rate(turns_deg, seconds, cosine):
     assert np.cos(change).mean() == pytest.approx(cosine, abs=0.02)
 
 
-def by_library(x: float, y: float, c: np.record) -> tuple[np.float32, np.float32]:
-    """Wheel commands of `drive`, by the formula in its docstring."""
-    angle, soft, most, scale = math.atan2(y, x), c.soft_turn_rad, c.max_speed_mps, c.wheel_scale_mps
-    base = min(math.sqrt(x * x + y * y), most)
-    share = (soft - abs(angle)) / soft
-    slow, fast = (base * share, base * (2.0 - share)) if abs(angle) <= soft else (-most, most)
-    left, right = (slow, fast) if angle > 0.0 else (fast, slow)
-    return np.float32(left / scale), np.float32(right / scale)
-
-
-def forces(soft_turn_rad: float) -> list[tuple[float, float]]:
-    """Forces of all sizes and directions, many near the borders where a formula changes."""
-    rng = np.random.default_rng(5)
-    borders = rng.choice([0.0, soft_turn_rad, math.atan(0.3), math.pi / 2, math.pi], 500) * rng.choice([-1, 1], 500)
-    offsets = rng.choice([0.0, 1e-17, 1e-16, 1e-13, 1e-9, 1e-6], 500) * rng.choice([-1, 1], 500)
-    every = np.concatenate([rng.uniform(-math.pi, math.pi, 1000), rng.uniform(-0.3, 0.3, 1000), borders + offsets])
-    lengths = rng.choice([1e-9, 0.01, 0.08, 0.09, 0.1, 0.17], len(every))
-    whole = [(0.0, 0.0), (-0.0, 0.0), (0.0, 0.05), (0.0, -0.05), (-0.05, 0.0), (-0.05, -0.0), (0.05, 0.0), (0.05, -0.0)]
-    return [*zip((lengths * np.cos(every)).tolist(), (lengths * np.sin(every)).tolist(), strict=True), *whole]
-
-
-@pytest.mark.parametrize("soft_turn_deg", [15.0, 120.0])
-def test_wheels_are_those_of_the_library_to_the_last_bit(soft_turn_deg):
-    constants = kernel_constants(ControllerParameters(soft_turn_deg=soft_turn_deg), TASK)[0]
-    action = np.zeros(3, np.float32)
-    for force in forces(constants.soft_turn_rad):
-        drive(*force, constants, action)
-        assert tuple(action[:2]) == by_library(*force, constants), force
-
-
 @pytest.mark.parametrize(
     ("changes", "has_series"),
     [

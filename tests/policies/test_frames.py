@@ -10,7 +10,7 @@ from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.frames import TURNS, turned_columns
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
-from swarm_forage_env.policies.kernels.frames import N_FRAMES, N_UPRIGHT, frame_of
+from swarm_forage_env.policies.kernels.frames import N_FRAMES, frame_of
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.plans import plan_arena
@@ -149,25 +149,3 @@ def test_turned_rows_are_those_of_a_turned_world(turn):
     for part in interface.layout:
         columns = slice(part.start, part.stop)
         np.testing.assert_allclose(seen[:, columns], there[:, columns], atol=2e-6, err_msg=part.name)
-
-
-@pytest.mark.parametrize("turn", range(N_FRAMES))
-def test_robots_do_in_the_world_what_they_chose_in_the_turned_one(turn):
-    config = FULL if turn % 3 else COMPACT
-    one, other = world(0), world(turn)
-    (_, own), (_, theirs) = rows(one, config), rows(other, config)
-    rng = np.random.default_rng(0)
-    for _ in range(4):
-        chosen = rng.integers(0, 6, len(ROBOTS)) if config is COMPACT else rng.uniform(-1, 1, (len(ROBOTS), 3))
-        for _ in range(5):
-            commands = own.command(chosen, one.last_obs).copy()
-            commands[:, :2] = commands[:, 1::-1] if turn >= N_UPRIGHT else commands[:, :2]
-            one.step_batch(commands)
-            other.step_batch(theirs.command(chosen, other.last_obs).copy())
-    expected = np.array([place(turn, *at) for at in one.swarm.position])
-    np.testing.assert_allclose(other.swarm.position, expected, atol=5e-4)  # two push each other, in some order
-    (seen, interface), (there, _) = rows(one, config), rows(other, config)
-    wheels = interface.layout["wheel_speed"]
-    np.testing.assert_allclose(turned(seen, turn, interface)[:, wheels], there[:, wheels], atol=1e-6)
-    moved = np.abs(one.swarm.position - np.array([robot[:2] for robot in ROBOTS])).max()
-    assert moved > 0.05

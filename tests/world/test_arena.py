@@ -111,18 +111,6 @@ def test_only_permanent_death_terminates():
     assert not env.step_batch(STRAIGHT)[2].any()
 
 
-def test_a_reset_brings_everybody_back():
-    env = tidy_world()
-    env.set_population(**population(env, gone=(0, 1)))
-    act(env, {})
-    env.reset_batch(5)
-    fresh = tidy_world()
-    fresh.reset_batch(5)
-    assert env.swarm.present.all()
-    for _ in range(5):
-        np.testing.assert_array_equal(env.step_batch(STRAIGHT)[0], fresh.step_batch(STRAIGHT)[0])
-
-
 # Global state
 
 

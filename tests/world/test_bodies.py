@@ -251,20 +251,6 @@ def test_heading_stays_in_range_and_facing_follows():
 
 
 @in_each_engine
-@pytest.mark.parametrize("offset", [0.0, 0.4 * DIAMETER_M, 0.9 * DIAMETER_M])
-def test_two_robots_pushed_together_hardly_overlap(offset):
-    angle = 1.1
-    touching = math.sqrt(DIAMETER_M**2 - offset**2)
-    for gap in np.linspace(0.0, 0.04, 6):
-        across = np.array([touching + gap, offset])
-        turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
-        physics, swarm, _ = bodies_in([MIDDLE, MIDDLE + across @ turn], [angle, angle + math.pi])
-        for _ in range(12):
-            drive_ahead(physics, swarm)
-            assert deepest_overlap(swarm) < DEEPEST_OVERLAP
-
-
-@in_each_engine
 def test_a_robot_at_full_speed_is_stopped_by_one_that_pushes_back():
     physics, swarm, _ = bodies_in([MIDDLE, (16.3, 8.0)], [0.0, math.pi])
     for _ in range(50):
@@ -278,18 +264,6 @@ def room_to_walls(swarm: SwarmState) -> float:
     x_low, y_low, x_high, y_high = scenario("warehouse_small").arena.interior_m
     x, y = swarm.position.T
     return float(np.min([x - x_low, x_high - x, y - y_low, y_high - y])) - RADIUS_M
-
-
-@in_each_engine
-@pytest.mark.parametrize("corner", [(0.2, 0.2), (31.6, 15.8), (31.6, 8.0)])
-def test_walls_hold(corner):
-    x_low, y_low, x_high, y_high = scenario("warehouse_small").arena.interior_m
-    start = np.clip(corner, (x_low + RADIUS_M + 0.01, y_low + RADIUS_M + 0.01), (x_high - 0.1, y_high - 0.1))
-    for heading in np.linspace(-math.pi, math.pi, 9):
-        physics, swarm, _ = bodies_in([start], [heading])
-        for _ in range(15):
-            drive_ahead(physics, swarm)
-            assert room_to_walls(swarm) >= -ROUNDING_M, heading
 
 
 @in_each_engine

@@ -1,16 +1,11 @@
 """Pick-ups and drops, rule by rule: what each gripper band does where, when it takes effect, who comes first."""
 
-from collections import Counter as Tally
-
 import numpy as np
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import CELL_EMPTY, CELL_OBJECT, Counter, Event, Grip, ObjectStatus
-from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.world.kernels.interact import CREATE_CACHE, DELIVER_ONLY, GRASP, RELEASE, SITE, band_of, serve
-from swarm_forage_env.world.state import listed
+from swarm_forage_env.world.kernels.interact import CREATE_CACHE, DELIVER_ONLY, GRASP, RELEASE, SITE, band_of
 from tests.support.stage import (
     BASE_CELL,
     CORNER_CACHE,
@@ -22,7 +17,6 @@ from tests.support.stage import (
     assert_conserved,
     build_cache,
     cell_centre,
-    clear,
     count,
     events_of,
     kill,
@@ -156,69 +150,6 @@ def test_drops_without_a_free_cell_are_placed_elsewhere(grip, ticks, place, why)
     assert_conserved(env)
 
 
-def full_source_world() -> tuple[ForageEnv, list[tuple[int, int]]]:
-    """A tiny warehouse whose source has 56 cells: 28 under a cache of two objects, 28 with an object each.
-
-    Objects 30 and 31 are carried by robots 0 and 1 in the nest, 32 .. 34 lie on open floor.
-    """
-    env = ForageEnv(
-        scenario(
-            "warehouse_small",
-            n_robots=3,
-            n_objects=35,
-            width_m=8.0,
-            height_m=4.0,
-            nest_centre_m=(0.8, 2.0),
-            nest_size_m=(0.8, 3.2),
-            start_margin_m=0.5,
-            caches="static",
-            respawn_scale=0.0,
-        )
-    )
-    env.reset_batch(0)
-    clear(env)
-    build_cache(env, [28, 29], (33, 10))
-    source = [(x, y) for x in range(30, 34) for y in range(3, 17) if env.objects.floor[y, x] == CELL_EMPTY]
-    for row, cell in enumerate(source):
-        lay(env, row, cell)
-    for row in (32, 33, 34):
-        lay(env, row, (row - 20, 10))
-    for robot in (0, 1):
-        stand(env, robot, (3, 6 + 6 * robot))
-        load(env, robot, 30 + robot)
-    stand(env, 2, source[0])
-    return env, source
-
-
-def test_objects_without_any_free_cell_wait_and_come_back():
-    env, source = full_source_world()
-    assert len(source) == 28
-    act(env, {0: Grip.DELIVER})
-    assert act(env, {0: Grip.DELIVER, 1: Grip.DELIVER})[:2] == [DELIVERED, NONE]
-    assert listed(env.objects.waiting).tolist() == [30], "the source is full"
-    assert act(env, {1: Grip.DELIVER, 2: Grip.GRASP})[1] == DELIVERED
-    assert listed(env.objects.waiting).tolist() == [30, 31], "longest wait first"
-    assert np.all(env.objects.status[[30, 31]] == ObjectStatus.WAITING)
-    assert_conserved(env)
-    # A robot clears a cell and brings its object away: the newest object is tried first, the others wait on.
-    assert act(env, {2: Grip.GRASP})[2] == PICKED_UP
-    taken = int(env.swarm.carried_object[2])
-    stand(env, 2, (3, 10))
-    assert events_of(env, Grip.DELIVER, 2, robot=2) == [NONE, DELIVERED]
-    assert env.objects.cell[taken].tolist() == list(source[0])
-    assert listed(env.objects.waiting).tolist() == [30, 31]
-    assert_conserved(env)
-    # Two cells at once: the newest object takes one, the one that waited longest the other.
-    for row, cell in ((1, (20, 10)), (2, (22, 10))):
-        lay(env, row, cell)
-    load(env, 2, 33)
-    events_of(env, Grip.DELIVER, 2, robot=2)
-    placed = {tuple(env.objects.cell[row].tolist()) for row in (33, 30)}
-    assert placed == {source[1], source[2]}
-    assert listed(env.objects.waiting).tolist() == [31]
-    assert_conserved(env)
-
-
 # Caches in use
 
 
@@ -236,29 +167,6 @@ def test_the_last_pair_dissolves_the_cache_and_the_orphan_lies_on_the_centre():
     assert env.objects.floor[BASE_CELL[::-1]] == CELL_OBJECT + orphan
     assert count(env, Counter.CACHES_DEPLETED) == 1
     assert_conserved(env)
-
-
-def test_an_object_leaves_a_cache_uniformly():
-    env = tidy_world(caches="static")
-    tally: Tally[int] = Tally()
-    rng = np.random.default_rng(0)
-    state, rules = env.arena._arrays.state, env.arena._arrays.rules
-    slot = build_cache(env, [1, 4, 6, 7], BASE_CELL)
-    stand(env, 0, BASE_CELL)
-    rounds = 2000
-    actions = np.array([[0, 0, Grip.GRASP]] + [[0, 0, Grip.RELEASE]] * 3, np.float32)
-    for _ in range(rounds):
-        for tick in (1, 2):
-            serve(state, rules, actions, tick, rng.random(4))
-        row = int(env.swarm.carried_object[0])
-        tally[row] += 1
-        env.swarm.carried_object[0] = -1
-        env.objects.status[row], env.objects.cache_slot[row] = ObjectStatus.CACHED, slot
-        env.objects.cell[row] = BASE_CELL
-        env.caches.count[slot] += 1
-    assert set(tally) == {1, 4, 6, 7}
-    chi_squared = sum((seen - rounds / 4) ** 2 / (rounds / 4) for seen in tally.values())
-    assert chi_squared < 16.3, "0.1 % quantile at 3 degrees of freedom"
 
 
 # First pick-ups

@@ -66,13 +66,6 @@ def test_walk_agrees_with_its_slow_twin(probability, self_conflict):
         np.testing.assert_array_equal(objects.cell, twin.cell)
 
 
-def test_moves_happen_with_the_given_probability():
-    objects = world([(5 * x + 2, 5 * y + 2) for x in range(20) for y in range(20)], 100, 100)
-    rng = np.random.default_rng(3)
-    moved = sum(step(objects, (0, 0, 100, 100), 0.026, rng) for _ in range(100))
-    assert binomtest(moved, 40_000, 0.026).pvalue > SIGNIFICANCE
-
-
 @pytest.mark.parametrize(
     ("start", "n_choices"), [((2, 2), 8), ((0, 2), 5), ((4, 4), 3)], ids=["open", "edge", "corner"]
 )
