@@ -96,18 +96,6 @@ def test_drop_depth_is_uniform_between_a_centimetre_and_the_entry_distance():
     assert np.all(policy.activity == Activity.WAIT_DROP)
 
 
-def test_quirk_explore_double_start_runs_the_strategy_twice_in_the_first_tick():
-    quirky = Robot(CRWPolicy(), quirks=Quirks(explore_double_start=True))
-    first, second = quirky.act(), quirky.act()
-    assert (first[0] + first[1]) / 2 * 20.0 == pytest.approx(10.0, abs=1e-5)  # two forces of 9 cm/s, limited
-    assert (second[0] + second[1]) / 2 * 20.0 == pytest.approx(9.0, abs=1e-5)
-    quirky.seen.ground("object")
-    quirky.act(48)
-    assert quirky.activity is Activity.ACQUIRE
-    quirky.act()
-    assert quirky.activity is Activity.WAIT_PICKUP
-
-
 # DPO
 
 

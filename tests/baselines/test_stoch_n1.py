@@ -159,21 +159,6 @@ def test_quirk_transferer_interface_is_entered_with_the_transport_and_never_left
     assert not stoch_n1.interface_after(True, Task.HARVESTER, Activity.WAIT_DROP, robot.c)
 
 
-@pytest.mark.parametrize("survives", [False, True])
-def test_quirk_interface_flag_survives_abort(survives):
-    robot = Robot(quirks=Quirks(interface_flag_survives_abort=survives))
-    robot.be(Tab.HARVESTER, Task.HARVESTER)
-    robot.a.estimate[0, Task.HARVESTER] = 1000
-    run_ticks(robot, 1, 5, Activity.TRANSPORT)
-    assert robot.a.has_interface[0, Task.HARVESTER]
-    stoch_n1.end_task(robot.a, 0, 6, robot.c)  # an abort during the transport
-    assert robot.next(partition=1.0, now=6) is Task.HARVESTER
-    run_ticks(robot, 7, 8, Activity.ACQUIRE)
-    assert robot.a.has_interface[0, Task.HARVESTER] == survives
-    formula = robot.a.p_abort[0, Task.HARVESTER] != robot.c.least_abort_probability
-    assert formula == survives
-
-
 def test_abort_probability_is_the_least_without_an_interface_except_for_generalists():
     robot = Robot()
     robot.a.estimate[0] = 1000

@@ -164,34 +164,6 @@ def test_creation_needs_an_object_within_eighty_centimetres():
 # The authors' quirks
 
 
-@pytest.mark.parametrize("task", [Task.TRANSFERER])
-def test_quirk_waits_for_cache(task):
-    robot = TaskRobot(quirks=Quirks(waits_for_cache=True))
-    wait_for_pickup(robot, task)
-    for count, grip in ((2, Grip.RELEASE), (2, Grip.RELEASE), (3, Grip.GRASP), (2, Grip.RELEASE)):
-        robot.seen.caches((7, CACHE, count))
-        assert robot.act().tolist() == [0.0, 0.0, np.float32(grip)]
-        assert robot.activity is Activity.WAIT_PICKUP
-    robot.seen.caches()
-    robot.act()
-    assert robot.activity is Activity.ACQUIRE, "nothing to wait for"
-
-
-@pytest.mark.parametrize("doubled", [False, True])
-def test_quirk_explore_double_start_of_a_search(doubled):
-    robot = TaskRobot(quirks=Quirks(explore_double_start=doubled))
-    robot.start(Task.COLLECTOR)
-    robot.act()
-    robot.record.explore_ticks = -1
-    single = robot.record.wander_deg
-    robot.act()
-    draws = robot.policy._draws[0]
-    steps = [10.0 * draws[2] - 5.0] * doubled + [10.0 * draws[1] - 5.0]
-    for step in steps:
-        single = np.fmod(single + step, 5.0)
-    assert robot.record.wander_deg == pytest.approx(single)
-
-
 @pytest.mark.parametrize("task", [Task.STARTER, Task.FINISHER])
 def test_quirk_refusals_not_remembered(task):
     robot = TaskRobot(quirks=Quirks(refusals_not_remembered=True))
@@ -207,37 +179,6 @@ def test_quirk_refusals_not_remembered(task):
     assert not robot.memory.caches[0].has_refused
     assert math.dist(robot.goal, (x, y)) < 0.6, "where it will be refused again"
     assert robot.activity is (Activity.TRANSPORT if task is Task.STARTER else Activity.WAIT_DROP)
-
-
-@pytest.mark.parametrize("stays", [False, True])
-@pytest.mark.parametrize("sees_obstacle", [False, True])
-def test_quirk_no_walk_at_site(stays, sees_obstacle):
-    quirks = Quirks(no_walk_at_site=stays, scattered_sites=True, finisher_tolerance_mismatch=True)
-    robot = TaskRobot(quirks=quirks)
-    wait_for_pickup(robot, Task.STARTER)
-    robot.policy._constants["far_site_share_at_border"] = 0.0
-    robot.policy._constants["site_scatter_at_border_m"] = 1e-6  # all choices in one place, 6.4 m from the nest
-    robot.seen.pose(9.2, 8.0, 1.0)
-    if sees_obstacle:
-        robot.seen.obstacle(0.0)
-    robot.seen.window({})
-    robot.seen.carry(3)
-    seen = []
-    for _ in range(4):
-        robot.act()
-        seen.append((robot.stage, robot.record.explore_ticks, robot.record.wander_deg))
-    assert math.dist(robot.goal, (9.6, 8.0)) < 0.01
-    alone = [(VectorState.IDLE, -1, seen[0][2])] * 4
-    assert (seen == alone) == stays, "else it avoids or wanders"
-    assert robot.activity is Activity.TRANSPORT
-    robot.policy._constants["far_site_share_at_border"] = 1.0
-    robot.seen.obstacle(None)
-    robot.act(12)
-    if stays:
-        assert robot.stage is VectorState.VECTOR, "a choice farther away"
-        robot.seen.pose(*robot.goal)
-        robot.act()
-        assert robot.activity is Activity.WAIT_DROP
 
 
 @pytest.mark.parametrize("mismatch", [False, True])
