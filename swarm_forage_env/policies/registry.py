@@ -18,6 +18,7 @@ from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.policies import trust
 
 POLICIES = {
+    "beeline": "baselines.beeline:BeelinePolicy",
     "cpfa": "baselines.cpfa:CPFAPolicy",
     "crw": "baselines.crw:CRWPolicy",
     "dpo": "baselines.dpo:DPOPolicy",
