@@ -6,7 +6,9 @@ from metrics.benchmark import evaluate
 from swarm_forage_env import plan_run, run_one, scenario
 
 STANDS = "class Stands:\n def reset(self, spec, rng): pass\n def act(self, obs, active): return obs[:, :3] * 0 + 1\n"
-CANNOT = "from swarm_forage_env import RobotPolicy\nclass A(RobotPolicy):\n @staticmethod\n def step(a, b, c, d):\n  nil\n"
+CANNOT = (
+    "from swarm_forage_env import RobotPolicy\nclass A(RobotPolicy):\n @staticmethod\n def step(a, b, c, d):\n  nil\n"
+)
 
 
 def test_feedback_holds_the_numbers_of_short_runs():
