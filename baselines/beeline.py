@@ -1,7 +1,8 @@
 """A controller of one page: straight home, straight back to the last find, and wider and wider around it."""
 
 import math
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.contract.detection import ring_sum
@@ -15,8 +16,15 @@ class BeelinePolicy(RobotPolicy):
     reads = ("proximity", "position", "heading", "carrying", "los_object")
     memory: ClassVar = {"find_m": (0.0, 0.0), "radius_m": math.inf, "goal_m": (0.0, 0.0), "going": False}
     memory |= {"blocked": 0, "detour": 0, "course": (0.0, 0.0)}
-    parameters: ClassVar = {"first_m": 0.0, "wider": 2.0, "near_m": 0.5, "sight_cells": 2, "inside": 0.4}
-    parameters |= {"right": 2.0, "patience": 300}
+    parameters: Mapping[str, Any] = {
+        "first_m": 0.0,  # half a side of the square for the first goal: the find itself
+        "wider": 2.0,  # the next square: this times the last one,
+        "near_m": 0.5,  # and this
+        "sight_cells": 2,  # sees objects so far
+        "inside": 0.4,  # aims at the inner part of the nest, as a share of its sides to either side
+        "right": 2.0,  # turns so hard from what is in the way
+        "patience": 300,  # ticks
+    }
     draws = 2
 
     @staticmethod
@@ -59,6 +67,5 @@ class BeelinePolicy(RobotPolicy):
         robot.blocked = robot.blocked + 1 if in_the_way > 0.3 else max(0, robot.blocked - 1)
         turn, most = math.atan2(left, ahead), known.max_wheel_difference_mps / 2.0
         turning = min(most, max(-most, turn * known.wheel_base_m / known.dt_s / 2.0))
-        speed = known.max_speed_mps * max(0.0, math.cos(turn))
-        scale = known.wheel_scale_mps
+        speed, scale = known.max_speed_mps * max(0.0, math.cos(turn)), known.wheel_scale_mps
         return (speed - turning) / scale, (speed + turning) / scale, Grip.DELIVER if carrying else Grip.GRASP

@@ -14,7 +14,6 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -35,7 +34,7 @@ FIRST_EFFORT = 0.1
 SHORT_TICKS = 20
 """Of a run that tells what making a world costs."""
 SMALL, MEDIUM = "warehouse_small", "warehouse_medium"
-EXAMPLE = f"{Path(__file__).resolve().parents[1] / 'docs/examples/fast_policy.py'}:SearchNearby"
+EXAMPLE = "beeline"
 
 
 @dataclass(frozen=True)

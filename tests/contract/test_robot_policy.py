@@ -5,7 +5,6 @@ import inspect
 import math
 import pickle
 import re
-from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -31,7 +30,7 @@ from swarm_forage_env.runs.run import LiveRun, build_stack
 from tests.support.drivers import tick_by_tick
 from tests.support.foraging import mild_wrappers, quick_world
 
-EXAMPLE = f"{Path(__file__).resolve().parents[2] / 'docs/examples/fast_policy.py'}:SearchNearby"
+EXAMPLE = "beeline"
 FEW = scenario("warehouse_small", n_robots=3, n_objects=40, horizon_s=20.0, interval_s=20.0)
 
 
@@ -87,7 +86,7 @@ def test_a_run_without_python_is_the_run_with_it(name, wrappers):
         np.testing.assert_array_equal(*(getattr(run.forage_env.swarm, state) for run in runs))
     np.testing.assert_array_equal(one.robots, other.robots)
     assert results[0]["first_picked"].sum() > 0
-    assert one.robots["place_m"].any()
+    assert one.robots["find_m"].any()
 
 
 # What a robot is given, and what it remembers

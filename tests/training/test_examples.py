@@ -28,7 +28,7 @@ LENGTH = re.compile(r"^N_DECISIONS = [\d_]+", re.MULTILINE)
 
 
 def test_every_example_of_a_library_is_short_and_tried():
-    paths = [path for path in EXAMPLES.glob("*.py") if path.name != "fast_policy.py"]
+    paths = [path for path in EXAMPLES.glob("*.py") if path.name != "leave_rules_out.py"]
     assert {path.stem for path in paths} == set(NEEDS)
     assert all(len(path.read_text().splitlines()) < 80 for path in paths)
 
