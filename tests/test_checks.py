@@ -9,7 +9,7 @@ from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import POLICIES
 from swarm_forage_env.runs.run import build_stack
-from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
+from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv
 from swarm_forage_env.wrappers.base import SwarmWrapper
 from swarm_forage_env.wrappers.registry import parse_wrapper
@@ -25,11 +25,6 @@ ADVERSE = (
 
 
 # Environments
-
-
-@pytest.mark.parametrize("name", SCENARIO_NAMES)
-def test_our_environments_pass(name):
-    check_env(ForageEnv(scenario(name, n_robots=5, n_objects=80, caches="dynamic")))
 
 
 def test_wrapped_stacks_and_views_for_learners_pass():

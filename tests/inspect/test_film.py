@@ -140,11 +140,3 @@ def test_a_film_shows_the_run_that_its_name_promises(filmed, tmp_path, monkeypat
     assert counters[Counter.FREE_PICKUPS] > 0
     for name, counter in TOTALS.items():
         assert counters[counter] == record[name].sum(), name
-
-
-def test_a_run_that_is_over_stays_as_it_ended(filmed, tmp_path):
-    deadly = World(scenario("warehouse_small", n_robots=2), (parse_wrapper("population:death_per_tick=0.9"),))
-    record_run(deadly, "random", tmp_path / "run.gif", seconds=40.0)
-    ticks = [tick for tick, *_ in filmed]
-    assert len(ticks) == 41
-    assert ticks[-1] == ticks[-2] < 200

@@ -11,7 +11,7 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import ObjectStatus
-from swarm_forage_env.rendering.frame import Trails, _headline, render_frame
+from swarm_forage_env.rendering.frame import Trails, render_frame
 from swarm_forage_env.rendering.pages import (
     PLAY_SCRIPTS,
     REPLAY_SCRIPTS,
@@ -188,21 +188,6 @@ def test_obstacles_are_walls_and_the_legend_names_what_the_world_has():
         assert len(narrow) > 1
         assert max(x + text_width(name, 9.0) + 1.45 * 9.0 for row in narrow for name, x, _ in row) < width
     assert not {"obstacle", "source", "cache"} & elsewhere
-
-
-def test_a_long_headline_is_wrapped_and_hides_no_figures(world):
-    short, long = (world.draw(title=title)[: world.view.header] for title in ("a", "many words of a title " * 9))
-    ink = (long != PALETTE.page).any(axis=2)
-    assert ink[:, : world.view.width // 2].any(axis=1).sum() > (short != PALETTE.page).any(axis=2).any(axis=1).sum()
-    counts = slice(int(0.66 * world.view.header), world.view.header)
-    np.testing.assert_array_equal(short[counts], long[counts])
-
-
-def test_a_headline_without_room_is_cut_off_and_stays_legible():
-    lines, size = _headline("many words of a title " * 9, 9.0, 200.0, 24.0)
-    assert (size, len(lines), lines[-1].endswith(" ...")) == (9.0, 2, True)
-    assert max(text_width(line, size) for line in lines) < 200.0
-    assert _headline("a title", 9.0, 200.0, 24.0) == (["a title"], 1.35 * 9.0)
 
 
 FOLDER = resources.files("swarm_forage_env.rendering")
