@@ -5,12 +5,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from metrics import CurveError
 from metrics.claims import EXPERIMENTS, PanelName
 from metrics.scoring import StudyPanel, study_panels
+from metrics.scoring.frame import scores
+from metrics.scoring.run_curves import study_lines
+from swarm_forage_env import read_study, run_study
+from swarm_forage_env.runs.store import record_file
 from swarm_forage_env.studies.study import load_study, set_names
 from swarm_forage_env.studies.study_file import Axis
 from tests.support.made_tables import FOUR, made_study, made_table
+from tests.support.tiny_study import RANDOM, tiny_study
 
 SIMPLE_FIRST = {"crw": 10.0, "dpo": 11.0, "stochm": 5.0, "stochx": 4.0}
 
@@ -41,13 +45,6 @@ def test_a_panel_has_a_row_per_level_and_a_column_per_seed():
 def test_a_level_without_deliveries_is_left_out_of_claims():
     (panel,) = panels_of(made_study(), lambda place: 0.0 if place.values[-1] == 1 else by_policy(place))
     assert panel.for_claims().curves(["crw"], shares=False).levels.tolist() == [2.0, 4.0]
-
-
-def test_a_missing_run_is_no_score():
-    spec = made_study()
-    (panel,) = panels_of(spec, lost={(spec.places[2], 3)})  # of four robots
-    assert np.argwhere(np.isnan(panel.scores["crw"])).tolist() == [[2, 3]]
-    assert np.isfinite(panel.scores["dpo"]).all()
 
 
 def test_a_panel_per_value_of_the_first_axis():
@@ -116,14 +113,6 @@ def test_rates_of_a_population_are_told_in_events():
     assert panel.departures.tolist() == pytest.approx([5.0, 10.0])
 
 
-def test_a_measure_has_a_panel_in_each_variant_that_it_has():
-    panels, _ = study_panels(made_table(made_study(), by_policy), ("corrected", "paper"))
-    found = [(panel.variant, panel.measure) for panel in panels if panel.measure in ("raw_performance", "scalability")]
-    assert found == [("corrected", "raw_performance"), ("corrected", "scalability"), ("paper", "scalability")]
-    with pytest.raises(CurveError, match="Unknown variant 'papr'"):
-        study_panels(made_table(made_study(), by_policy), ("papr",))
-
-
 def test_a_study_over_a_field_has_performance_where_the_axis_has_numbers():
     spec = made_study("mine", Axis(name="n_objects", values=(30, 10)), set={})
     (panel,) = panels_of(spec, lambda place: 2.0)
@@ -142,3 +131,58 @@ def test_every_experiment_of_the_claims_is_in_a_set():
             line = SimpleNamespace(others=dict(enumerate(others)))
             found.add(StudyPanel(spec=spec, lines=(line,), **about).name.experiment)
     assert found - {""} == set(EXPERIMENTS)
+
+
+@pytest.fixture
+def made(tmp_path):
+    """Run a study in this process and return its table."""
+
+    def make(*axes, **changes):
+        run_study(tiny_study(*axes, policies=(RANDOM,), **changes), tmp_path, jobs=1)
+        return read_study(tmp_path)
+
+    return make
+
+
+def test_a_line_is_what_differs_on_the_last_axis(made):
+    table = made(Axis(name="walk_probability", values=(0.0, 0.5)), Axis(name="noise", values=(0.0, 0.02, 0.03)))
+    lines = study_lines(table)
+    assert [(line.rules, line.policy, line.others) for line in lines] == [
+        ("described", "random", {"walk_probability": 0.0}),
+        ("described", "random", {"walk_probability": 0.5}),
+    ]
+    for line in lines:
+        assert [place.values[-1] for place in line.places] == [0.0, 0.02, 0.03]
+        pairs = line.curves.levels("noise")
+        assert [(reference.criterion, level.value) for reference, level in pairs] == [("none", 0.02), ("none", 0.03)]
+        found, missing = scores([line.curves], ["noise_robustness"])
+        assert found.select("x", "seed").rows() == [(0.02, 0), (0.02, 1), (0.03, 0), (0.03, 1)]
+        assert missing == {}
+
+
+def test_sizes_are_scored_from_the_smallest(made):
+    (line,) = study_lines(made(Axis(name="population_size", values=(1, 2)), reference=1))
+    found, missing = scores([line.curves], ["scalability", "time_emergence", "raw_performance"])
+    assert set(found["measure"]) == {"scalability", "time_emergence", "raw_performance"}
+    assert missing == {}
+    assert line.curves.horizon_s == 4.0
+
+
+def test_the_lowest_rates_may_be_the_reference(made):
+    """The authors compare with their lowest level; both forms of the measure then use the same runs."""
+    (line,) = study_lines(made(Axis(name="population_dynamics", values=(1.0, 2.0, 4.0)), reference=1.0,
+                               set={"n_robots": 4, "n_objects": 20}))  # fmt: skip
+    pairs = line.curves.levels("population_dynamics")
+    assert [(reference.value, level.value) for reference, level in pairs] == [(1.0, 2.0), (1.0, 4.0)]
+    assert all(reference.rates.lambda_bd == pytest.approx(0.005) for reference, _ in pairs), "0.001 per tick of 0.2 s"
+    found, _ = scores([line.curves], ["population_robustness"])
+    assert found["x"].unique(maintain_order=True).to_list() == [2.0, 4.0]
+
+
+def test_lost_runs_are_counted(made, tmp_path):
+    table = made(Axis(name="noise", values=(0.0, 0.02)))
+    noisy = table.spec.places[-1]
+    record_file(tmp_path / "runs", table.spec.specs_of(noisy)[1].run_id).unlink()
+    (line,) = study_lines(read_study(tmp_path))
+    reference, level = line.curves.experiments
+    assert (reference.n_lost, level.n_lost, level.seeds) == (0, 1, (0,))

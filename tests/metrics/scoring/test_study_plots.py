@@ -15,7 +15,6 @@ from swarm_forage_env.studies.study_file import Axis
 from tests.support.made_tables import FOUR, made_study, made_table
 from tests.support.pictures import PNG, words_in
 
-WALKING = Axis(name="walk_probability", values=(0.0, 0.3))
 SIZES = Axis(name="population_size", values=(2, 4, 8))
 
 
@@ -71,8 +70,7 @@ def test_the_numbers_behind_a_figure():
     )
 
 
-def test_a_figure_is_drawn_the_same_twice(tmp_path):
-    """A second: three pictures."""
+def test_a_figure_shows_its_words_and_numbers(tmp_path):
     figure = figures()[0]
     files = [tmp_path / "figure.svg", tmp_path / "figure.png"]
     draw_figure(figure, files, band="sd")
@@ -82,14 +80,6 @@ def test_a_figure_is_drawn_the_same_twice(tmp_path):
     for shown in ("CRW", "DPO", "STOCHM", "STOCHX", "robots N", "P(N), objects in 40 s", title):
         assert shown in words
     assert "bars: mean ± 2 standard deviations of runs; dots: runs" in words
-    draw_figure(figure, [tmp_path / "again.svg"], band="sd")
-    assert (tmp_path / "again.svg").read_bytes() == files[0].read_bytes()
-
-
-@pytest.mark.parametrize(("n_runs", "is_image"), [(6, False), (60, True)])
-def test_many_dots_are_an_image_in_vector_pictures(tmp_path, n_runs, is_image):
-    draw_figure(figures(seeds=tuple(range(n_runs)))[0], [tmp_path / "dots.svg"])
-    assert ("<image" in (tmp_path / "dots.svg").read_text()) == is_image
 
 
 def test_fewer_than_four_runs_have_no_bar_and_the_caption_says_why(tmp_path, monkeypatch):
@@ -113,23 +103,6 @@ def test_bars_stay_within_the_range_of_the_measure(tmp_path, monkeypatch, band):
     np.testing.assert_allclose(reach[:, 1], expected)
 
 
-def test_policies_stand_beside_each_other_and_closer_than_levels(tmp_path, monkeypatch):
-    close = Axis(name="noise", values=(0.0, 0.001, 0.002, 0.1))
-    x, *_ = bars_of(monkeypatch, figures(close, name="S1e", reference=0.0)[0], tmp_path)
-    assert (np.diff(x, axis=0) > 0.0).all(), "no bar covers another"
-    assert (x[-1, :-1] < x[0, 1:]).all(), "nor stands at the next level"
-    one, *_ = bars_of(monkeypatch, figures(Axis(name="population_size", values=(2,)))[0], tmp_path)
-    np.testing.assert_allclose(one, 2.0, rtol=0.1)
-
-
-def test_performance_over_sizes_has_two_logarithmic_axes(tmp_path):
-    figure = figures()[0]
-    grown = np.array([[1.0] * 6, [100.0] * 6, [10_000.0] * 6])
-    draw_figure(with_scores(figure, grown), [tmp_path / "grown.svg"])
-    assert {"1", "100", "10,000"} <= {*words_in(tmp_path / "grown.svg")}
-    draw_figure(with_scores(figure, 0.0 * grown), [tmp_path / "nothing.svg"])
-
-
 def test_distances_have_their_noise_floor_beside_them(tmp_path):
     noise = Axis(name="noise", values=(0.0, 0.01, 0.02))
     (figure,) = figures(noise, name="S1e", reference=0.0, performance=lambda place: 10.0 + place.values[0])
@@ -140,22 +113,6 @@ def test_distances_have_their_noise_floor_beside_them(tmp_path):
     for row in figure.to_frame().filter(noise=0.02).rows(named=True):
         assert row["noise_floor"] == pytest.approx(panel.floors[row["policy"]])
     assert "noise_floor" not in figures()[0].to_frame().columns
-
-
-@pytest.mark.parametrize(
-    ("axes", "name", "measure", "words"),
-    [
-        ((Axis(name="population_dynamics", values=(0.0, 1.0, 2.0)),), "S1g", "population_robustness",
-         "departures λ, robots per 1,000 s"),
-        ((WALKING, SIZES), "S2a", "raw_performance", "walk probability 0.3"),
-        ((SIZES, Axis(name="n_objects", values=(30, 10))), "mine", "raw_performance", "n objects"),
-    ],
-)  # fmt: skip
-def test_axes_are_shown_in_words(tmp_path, axes, name, measure, words):
-    changes = {"reference": 0.0} if name == "S1g" else {"set": {}}
-    (figure,) = (one for one in figures(*axes, name=name, **changes) if one.panels[0].measure == measure)
-    draw_figure(figure, [tmp_path / "panels.svg"])
-    assert words in words_of(tmp_path / "panels.svg")
 
 
 def test_what_cannot_be_drawn_is_told(tmp_path):

@@ -2,13 +2,11 @@
 
 from types import SimpleNamespace
 
-import polars as pl
 import pytest
 
 from metrics import CLAIMS, CurveError, verdict
 from metrics.claims import INTUITIONS
 from metrics.scoring import StudyVerdict
-from swarm_forage_env.studies.description import status
 from swarm_forage_env.studies.results import StudyTable
 from swarm_forage_env.studies.study import load_study
 from swarm_forage_env.studies.study_file import Axis
@@ -85,19 +83,6 @@ def test_the_opposite_order_contradicts_and_no_run_decides_nothing():
     assert answers(verdict(nothing))["P2"] == "no runs"
 
 
-def test_a_claim_may_need_two_studies():
-    found = verdict(*(made_table(made_study(name), by_policy) for name in ("S1a", "S1b")))
-    answered = found.frame.filter(pl.col("answer") != "no runs")["claim"]
-    assert {"H1", "H3", "H12"} <= {*answered}
-
-
-def test_search_and_rescue_needs_no_lone_robot():
-    axes = (Axis(name="walk_probability", values=(0.051,)), Axis(name="population_size", values=(12, 51, 115)))
-    found = answers(verdict(made_table(made_study("S2a", *axes), by_policy)))
-    assert found["E9"] != "no runs"
-    assert found["E7"] == "no runs"
-
-
 @pytest.mark.parametrize(
     ("specs", "message"),
     [
@@ -125,11 +110,3 @@ def test_what_sets_have_less_of_than_the_paper_is_told_in_a_line():
     assert told("paper", "S1a", "S1c") == ()
     (smoke,) = told("smoke", "S1a")
     assert smoke.startswith("S1a: budget smoke, runs of 1,000 s instead of 10,000 s, without population_size ")
-
-
-def test_a_status_tells_what_is_missing():
-    spec = made_study()
-    found = status(made_table(spec, by_policy, lost={(spec.places[0], spec.seeds[0])}))
-    assert not found.is_complete
-    assert found.sheets()[0].title.endswith(", 1 missing")
-    assert found.sheets()[1].frame.rows()[0][:2] == ("described", "crw")
