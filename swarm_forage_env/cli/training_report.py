@@ -132,12 +132,14 @@ class _Report:
 
     def _show(self, seed: str, news: Evaluation) -> None:
         what, plan, say = counted_in(self._plan), self._plan.evaluation, self._shown.console.out
-        baseline = "" if plan.worlds else f"{news.worlds[0].baseline:.1f}"
+        beside = "" if plan.worlds else plan.baseline
+        baseline = f"{news.worlds[0].baseline:.1f}" if beside else ""
+        width = max(len(beside), 6)
         if not self._has_begun:
             say(f"Evaluated in {counted(plan.n_runs, 'run')} in {place_of(self._plan)}:")
-            say(f"{'seed ' if seed else '':>{len(seed)}}{'decisions':>12}  {what}  {'baseline':>8}  interference")
+            say(f"{'seed ' if seed else '':>{len(seed)}}{'decisions':>12}  {what}  {beside:>{width}}  interference")
         reached = f"{news.reached:>{len(what)}.2f}"
-        say(f"{seed}{news.steps:>12,}  {reached}  {baseline:>8}  {news.interference_fraction:>12.3f}")
+        say(f"{seed}{news.steps:>12,}  {reached}  {baseline:>{width}}  {news.interference_fraction:>12.3f}")
         if not self._has_begun and baseline == "0.0":
             say(
                 f"{plan.baseline} scores 0 in such short runs. Longer ones say more (--set "

@@ -44,7 +44,7 @@ def test_trains_shows_evaluations_and_goes_on(command, painted):
     assert err.startswith("ppo: 128 decisions in 3 stages, evaluated every 128 and after each stage\n")
     assert "Evaluated in 1 run in warehouse_small, 4 robots" in err
     folder = Path("results/training/warehouse_small_ppo")
-    assert "decisions  deliveries per 1,000 s" in err
+    assert "decisions  deliveries per 1,000 s     crw  interference" in err
     assert str(folder / "policy.npz") in err
     assert "Both files draw their actions by probability." in err
     if find_spec("matplotlib"):
