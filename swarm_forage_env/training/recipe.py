@@ -23,7 +23,7 @@ from swarm_forage_env.views.plans import DEFAULT_SCENARIO
 from swarm_forage_env.views.sampler import ScenarioSampler
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import wrapper_configs
-from swarm_forage_env.wrappers.world import World
+from swarm_forage_env.wrappers.world import World, WorldLike, described
 
 MOST_ARENAS = 8
 """Arenas side by side, at most."""
@@ -76,7 +76,7 @@ MEASURED: dict[str, dict[str, Any]] = {
 
 
 def recipe(
-    scenario: str | ScenarioConfig | None = None,
+    scenario: WorldLike | None = None,
     *,
     sampler: ScenarioSampler | None = None,
     algorithm: str = "ppo",
@@ -98,7 +98,8 @@ def recipe(
     Args:
         scenario: Name of a preset (default warehouse_small), which gets the recipe's length of episodes (`EPISODE_S`,
             or that of its runs or of a third of the training if these are shorter), where deliveries count its rewards
-            (`REWARDS`), and what `MEASURED` says; or a complete configuration, which is taken as it is.
+            (`REWARDS`), and what `MEASURED` says; the file of a world likewise, with what it says instead; or a
+            complete configuration or `World`, which is taken as it is.
         sampler: Draws the world of each episode, instead of `scenario`, `wrappers`, `small_start` and `overrides`; its
             worlds are taken as they are, with their rewards and horizons. Evaluations take place in the largest world
             of each name that it draws, unless `evaluation` has worlds.
@@ -133,7 +134,7 @@ def recipe(
         if given:
             raise ConfigError(f"Expected either a sampler or {', '.join(given)}, which it decides; got both.")
         scenario, small_start = sampler.largest, False
-    scenario = scenario or DEFAULT_SCENARIO
+    scenario, overrides, disturbing = _told(scenario or DEFAULT_SCENARIO, overrides, wrapper_configs(wrappers))
     measured = MEASURED.get(scenario, {}) if isinstance(scenario, str) else {}
     config = _rewarding(scenario, overrides, measured.get("rewards", {}))
     chosen = chosen_interface(interface, _interface(algorithm, config))
@@ -151,7 +152,7 @@ def recipe(
         small_start = config.performance == "collected" and bool(measured.get("small_start", True))
     late = {name: value for name, value in LATE_OPTIONS.get(algorithm, {}).items() if name not in given_options}
     return TrainingPlan(
-        world=World(config, wrapper_configs(wrappers)),
+        world=World(config, disturbing),
         algorithm=algorithm,  # type: ignore[arg-type] - words are checked there
         interface=chosen,
         n_arenas=n_arenas,
@@ -164,6 +165,18 @@ def recipe(
         samples=algorithm in SAMPLING and chosen.actions == "discrete" if samples is None else samples,
         sampler=sampler,
     )
+
+
+def _told(
+    given: WorldLike, fields: dict[str, Any], wrappers: tuple[WrapperConfig, ...]
+) -> tuple[str | ScenarioConfig, dict[str, Any], tuple[WrapperConfig, ...]]:
+    """Return a preset or a configuration, and fields and wrappers, with those that a world or its file has."""
+    if isinstance(given, World):
+        return given.scenario, fields, (*given.wrappers, *wrappers)
+    if isinstance(given, ScenarioConfig):
+        return given, fields, wrappers
+    told = described(given).changed(fields, wrappers)
+    return told.preset, told.fields, told.wrappers
 
 
 def _rewarding(

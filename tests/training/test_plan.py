@@ -13,6 +13,7 @@ from swarm_forage_env.scenarios.presets import scenario, warehouse_small
 from swarm_forage_env.training.evaluation import EVALUATE_EVERY, EvaluationPlan, EvaluationWorld
 from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.recipe import LATE_OPTIONS, recipe, small_arena
+from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.world import World
 from tests.support.sampled import TWO_WORLDS, sampler
 
@@ -150,6 +151,14 @@ def test_plans_that_go_on_with_a_training_differ_in_steps_to_come_alone(plan):
         ({"stages": (first,)}, "stages[1].steps: 200 before, nothing now"),
     ):
         assert difference in replace(plan, **changes).differences(plan)
+
+
+def test_a_world_or_its_file_brings_its_fields_and_wrappers(tmp_path):
+    file, noise = tmp_path / "hall.toml", parse_wrapper("sensor_noise:sigma=0.1")
+    file.write_text("[set]\nn_robots = 7\nnest_progress = 0.1\n[wrappers.sensor_noise]\nsigma = 0.1\n")
+    plan = recipe("warehouse_small", n_robots=7, nest_progress=0.1, wrappers=[noise])
+    assert plan == recipe(file) == recipe(str(file), n_robots=7)
+    assert recipe(plan.world).world == plan.world
 
 
 def test_where_deliveries_count_the_way_to_them_is_rewarded_and_short_at_first():
