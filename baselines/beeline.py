@@ -10,7 +10,7 @@ from swarm_forage_env.contract.robot_policy import RobotPolicy
 
 
 class BeelinePolicy(RobotPolicy):
-    """Drive straight home and straight back to the last find, and search wider and wider around it."""
+    """Straight home, and straight back to the last find."""
 
     caches: ClassVar[str] = "none"
     reads = ("proximity", "position", "heading", "carrying", "los_object")

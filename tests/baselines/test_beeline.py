@@ -31,6 +31,8 @@ def test_it_goes_home_straight_back_and_wider(ticks):
     left, right, grip = ticks(carrying=1.0, position=(0.5, 0.0), heading=(-1.0, 0.0))
     assert (left, right) == pytest.approx((FULL, FULL))  # the nest lies in the west
     assert grip == pytest.approx(Grip.DELIVER)
+    left, right, _ = ticks(carrying=1.0, position=(-0.85, 0.9), heading=(0.0, -1.0))
+    assert (left, right) == pytest.approx((FULL, FULL))  # the nearest point of the nest lies due south
     ticks()  # the first goal needs no find
     ticks(carrying=1.0, position=(0.5, 0.0))
     left, right, grip = ticks()
@@ -45,9 +47,9 @@ def test_it_goes_home_straight_back_and_wider(ticks):
 
 def test_it_turns_to_the_nearest_object_and_passes_on_the_right(ticks):
     north = np.zeros(25)
-    north[[17, 20]] = 1.0  # one cell north, and the corner in the north-west
+    north[[17, 24]] = 1.0  # one cell north, and the corner in the north-east
     left, right, _ = ticks(los_object=north)
-    assert left < 0.0 < right
+    assert (left, right) == pytest.approx((-FULL, FULL))
     ahead = np.zeros(24)
     ahead[[0, 23]] = 0.5
     left, right, _ = ticks(carrying=1.0, heading=(-1.0, 0.0), proximity=ahead)
@@ -58,11 +60,13 @@ def test_it_loses_patience_for_a_while(ticks):
     ahead = np.zeros(24)
     ahead[[0, 23]] = 0.5
     seen = {"carrying": 1.0, "heading": (-1.0, 0.0)}
+    ticks(n=200, proximity=ahead, **seen)
+    ticks(n=200, **seen)  # it forgets
     ticks(n=301, proximity=ahead, **seen)
     assert ticks.robot()["detour"] == 0
     ticks(proximity=ahead, **seen)
     assert 0 < ticks.robot()["detour"] < 300
     left, right, _ = ticks(**seen)
-    assert left != pytest.approx(right)
+    assert left == pytest.approx(-right)  # at a right angle to its way
     left, right, _ = ticks(n=300, **seen)
     assert (left, right) == pytest.approx((FULL, FULL))
