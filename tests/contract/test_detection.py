@@ -21,8 +21,6 @@ from swarm_forage_env.contract.detection import (
 )
 from tests.support.stage import cell_centre, lay, put, tidy_world
 
-FAR_BEHIND_RAD = 2.61
-OBSTACLE_LENGTH = 0.1
 ring = npst.arrays(np.float32, 24, elements=st.floats(0, 1, width=32))
 
 
@@ -43,17 +41,6 @@ def test_a_ring_is_empty_when_all_its_readings_are_zero():
         readings[k] = np.finfo(np.float32).smallest_subnormal
         assert not ring_is_empty(readings)
         readings[k] = 0.0
-
-
-@given(readings=ring, scale=st.sampled_from([1.0, 0.1, 0.02]))
-def test_obstacle_is_a_long_vector_within_the_field_of_view(readings, scale):
-    readings = readings * np.float32(scale)
-    vector = vector_of(readings)
-    length, angle = abs(vector), abs(math.atan2(vector.imag, vector.real))
-    if length > 1e-5 and abs(length - OBSTACLE_LENGTH) > 1e-6 and abs(angle - FAR_BEHIND_RAD) > 1e-6:
-        assert sees_obstacle(readings, False) == (length > OBSTACLE_LENGTH and angle <= FAR_BEHIND_RAD)
-        # The authors' program takes anything behind for an obstacle, too.
-        assert sees_obstacle(readings, True) == (length > OBSTACLE_LENGTH or angle > FAR_BEHIND_RAD)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """The stack of wrappers: order, hooks, gains, snapshots, and the record of a run."""
 
+import collections
 import copy
 import itertools
 
@@ -20,7 +21,6 @@ from swarm_forage_env.world.kernels.counting import add_task_shares
 from swarm_forage_env.wrappers.base import STACK_ORDER, SwarmWrapper
 from swarm_forage_env.wrappers.recorder import COUNTED, RunRecorder
 from swarm_forage_env.wrappers.registry import parse_wrapper
-from tests.reference.task_shares import task_shares
 from tests.support.branches import Branch, pickled, whole_stack
 from tests.support.fake_arena import FakeArena, small_scenario
 
@@ -337,6 +337,13 @@ def test_task_shares_are_means_over_ticks_of_active_robots():
     np.testing.assert_allclose(shares["task_share_collector"], [0.25, 0.5, 0.5])
     np.testing.assert_allclose(shares["task_share_generalist"], [0.25, 0.0, 0.0])
     np.testing.assert_allclose(shares["task_share_none"], 0.0)
+
+
+def task_shares(tasks, active, n_codes):
+    """Share of active robots in each of `n_codes` tasks; zeros while no robot is active."""
+    working = [int(task) for task, at_work in zip(tasks, active, strict=True) if at_work]
+    counts = collections.Counter(working)
+    return [counts[code] / len(working) if working else 0.0 for code in range(n_codes)]
 
 
 @given(st.lists(st.tuples(st.integers(0, 7), st.booleans()), min_size=1, max_size=30))
