@@ -138,9 +138,9 @@ def create_somewhere(env: ForageEnv, rng: np.random.Generator) -> None:
     ("caches", "quirks", "longest"),
     [
         ("none", Quirks(only_delivering_counts=True), 4),
-        ("static", Quirks(serialized_interactions=True), 1),
+        ("static", Quirks(serialized_interactions=True), 4),
         ("dynamic", Quirks(), 4),
-        ("dynamic", Quirks(serialized_interactions=True), 4),
+        ("dynamic", Quirks(serialized_interactions=True), 1),
         ("dynamic", Quirks(only_delivering_counts=True), 1),
     ],
     ids=["no caches", "static, serialized", "dynamic", "dynamic, serialized", "dynamic, only delivering"],
