@@ -74,6 +74,7 @@ def made(words: Sequence[str] = ()) -> App:
         for name, (place, about) in commands.items():
             line = None if name in words else about
             app.command(f"swarm_forage_env.cli.{place}", name=name, help=line, group=group, sort_key=names.index(name))
+    app.group_commands = Group.create_ordered("Commands")  # after ours
     app.register_install_completion_command(help="Let the shell complete commands and options.")
     return app
 
