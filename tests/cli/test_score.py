@@ -51,6 +51,8 @@ def test_real_robots_stand_beside_policies_in_one_table_and_picture(command, pai
     asked = ("score", "random", "--curves", "real.csv", *words, "--set", "n_objects=20", "--out", "here")
     code, out, _ = command(*asked, "--dry-run")
     assert (code, out[:27], Path("here").exists()) == (0, "4 runs, 0 stored, 4 to do w", False)
+    _, out, _ = command("score", "stochm", *asked[2:], "--set", "caches=none", "--dry-run", "--json")
+    assert {run["scenario"]["caches"] for run in json.loads(out)} == {"none"}
     code, out, err = command(*asked)
     assert code == 0
     assert out.splitlines()[0] == "random, real in warehouse_small with 20 objects and from real.csv, 2 seeds, 4 s"
