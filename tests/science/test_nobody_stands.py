@@ -1,4 +1,4 @@
-"""Nobody stands for ever: no robot at work stays within 5 cm for ten minutes without a reason."""
+"""Nobody stands for ever, walls hold, and deliveries go on: no robot at work stays within 5 cm for ten minutes."""
 
 import numpy as np
 import pytest
