@@ -10,7 +10,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.contract.policy import COMMANDS, ActionError
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
-from swarm_forage_env.world.arena import UNDISTURBED, Stop
+from swarm_forage_env.world.arena import Stop
 from swarm_forage_env.world.kernels.disturbances import Disturbances
 from swarm_forage_env.world.snapshots import Origin, Snapshot, read, take
 
@@ -60,14 +60,14 @@ class SwarmLayer(ABC):
 
     # Ticks without Python
 
-    def told_ahead(self, n_ticks: int) -> tuple[int, Disturbances]:
+    def told_ahead(self, n_ticks: int) -> tuple[int, Disturbances | None]:
         """Return in how many ticks, at most `n_ticks`, no hook is needed from here inwards, and what happens in them.
 
         Raises:
             ValueError: a wrapper from elsewhere wants compiled code to do something.
         """
         if not self.stack:
-            return n_ticks, UNDISTURBED
+            return n_ticks, None
         fields: dict[str, Any] = {}
         for wrapper in self.stack:
             n_ticks, told = wrapper.ahead(n_ticks)
@@ -80,7 +80,8 @@ class SwarmLayer(ABC):
                 n_ticks = 0
             fields |= told
         # The last death may have come between two ticks; then the coming one ends the run.
-        return 0 if self.unwrapped.terminated.all() else max(0, n_ticks), Disturbances(**fields)
+        n_ticks = 0 if self.unwrapped.terminated.all() else max(0, n_ticks)
+        return n_ticks, Disturbances(**fields) if fields else None
 
     def pass_ticks(self, n_ticks: int, stop: Stop, tasks: CodeArray | None = None) -> None:
         """Note, from here inwards, that ticks have passed as `told_ahead` said.

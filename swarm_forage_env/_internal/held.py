@@ -1,10 +1,11 @@
-"""Tuples of arrays that stay where they are: compiled code is told one address and finds all arrays there.
+"""Named tuples of arrays that stay where they are: compiled code is told one address and finds all arrays there.
 
-To hand over a tuple from Python, numba takes it apart, array by array; that of a world takes longer than a small swarm
-takes for a tick. So it is taken apart once, by `hold`, and kernels begin with `opened`.
+To hand over a tuple, from Python or from one kernel to another, numba takes it apart, array by array; that of a world
+takes longer than a small swarm takes for a tick, and every function that is given one takes longer to compile. So it is
+taken apart once, by `hold`. Kernels read its fields by their names, held or not.
 """
 
-from collections.abc import Callable
+import hashlib
 from dataclasses import dataclass
 from typing import Any, TypeVar, cast
 
@@ -17,7 +18,9 @@ from llvmlite import ir
 from numba import typeof, types
 from numba.core import cgutils
 from numba.core.datamodel.models import OpaqueModel
+from numba.core.imputils import lower_getattr_generic
 from numba.core.registry import cpu_target
+from numba.core.typing.templates import AttributeTemplate, infer_getattr
 from numba.extending import NativeValue, intrinsic, register_model, typeof_impl, unbox
 
 T = TypeVar("T")
@@ -27,9 +30,9 @@ class HeldType(types.Type):
     """What numba knows of a tuple that is held. As a value it is an address."""
 
     def __init__(self, of: Any) -> None:
-        """Take the type of the tuple."""
+        """Take the type of the tuple. Its whole name is pages long, and would be in the names of functions."""
         self.of = of
-        super().__init__(f"Held({of})")
+        super().__init__(f"Held({hashlib.sha256(str(of).encode()).hexdigest()[:16]})")
 
 
 register_model(HeldType)(OpaqueModel)
@@ -103,23 +106,29 @@ def _keep(value: Any, room: np.ndarray) -> None:
     _written_to(value, room)
 
 
-def _opened(typingctx: Any, given: Any) -> Any:  # noqa: ARG001 - as above
-    """Say how compiled code has the tuple that it is given, held or not."""
-    if not isinstance(given, HeldType):
-        return given(given), lambda context, builder, signature, args: args[0]  # noqa: ARG005
+@infer_getattr
+class _Attributes(AttributeTemplate):
+    """What kernels see of a held tuple: its fields. A field that has fields itself is held, too."""
 
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return _read(builder, builder.bitcast(args[0], context.get_value_type(signature.return_type).as_pointer()))
+    key = HeldType
 
-    return given.of(given), generate
+    def generic_resolve(self, held: Any, name: str) -> Any:
+        fields = getattr(held.of, "fields", ())
+        if name not in fields:
+            return None
+        kind = held.of.types[fields.index(name)]
+        return HeldType(kind) if isinstance(kind, types.BaseNamedTuple) else kind
 
 
-def _as_given(given: T) -> T:
-    return given
-
-
-opened: Callable[[Any], Any] = cast(Any, intrinsic(_opened)) if is_compiled(_keep) else _as_given
-"""For compiled code: returns the tuple that it is given, held or not."""
+@lower_getattr_generic(HeldType)
+def _field(context: Any, builder: Any, held: Any, address: Any, name: str) -> Any:
+    """Read one field, or say where it is."""
+    number = held.of.fields.index(name)
+    tuple_at = builder.bitcast(address, context.get_value_type(held.of).as_pointer())
+    place = cgutils.gep_inbounds(builder, tuple_at, 0, number)
+    if isinstance(held.of.types[number], types.BaseNamedTuple):
+        return builder.bitcast(place, cgutils.voidptr_t)
+    return _read(builder, place)
 
 
 _types: dict[Any, HeldType] = {}
@@ -127,10 +136,10 @@ _types: dict[Any, HeldType] = {}
 
 
 def hold(value: T) -> T:
-    """Return a tuple as compiled functions take it from Python, fast; where the compiler is switched off, itself.
+    """Return a named tuple as compiled functions take it fast; where the compiler is switched off, itself.
 
-    To the eyes of Python it is a `Held`, which is of no use but to be handed to kernels that begin with `opened`. Its
-    arrays may change, but not be replaced.
+    To the eyes of Python it is a `Held`, which is of no use but to be handed to kernels. Its arrays may change, but not
+    be replaced.
     """
     if not is_compiled(_keep):
         return value

@@ -1,7 +1,7 @@
 """KernelPolicy: a policy whose tick is one kernel, called by Python or by the compiled tick of the world."""
 
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -46,6 +46,15 @@ NO_DRAWS = np.zeros((1, 1, 1))
 """Draws of a driver that reads none."""
 
 
+class Drive(NamedTuple):
+    """A driver for compiled code."""
+
+    state: tuple[Any, ...]
+    """What the kernel reads and edits; the last are the actions, (N, A) float32, that it writes."""
+    act: Callable[..., None]
+    """The kernel: (obs, active, draws, state, tick)."""
+
+
 class Driver:
     """What drives robots in the compiled loop of the world: a kernel and its state.
 
@@ -55,7 +64,7 @@ class Driver:
         actions: (N, A) float32 that the kernel writes, the last of the state.
         task: (N,) `Task` codes that the kernel keeps up to date, None for a driver without tasks.
         decision_ticks: See `KernelPolicy`.
-        call: Calls of the loop, whose types depend on the state.
+        calls: Calls of the loop, whose types depend on the state: without disturbances, and with.
     """
 
     def __init__(
@@ -72,11 +81,11 @@ class Driver:
         self.go_on_with(state)
         self.task = task
         self.decision_ticks = decision_ticks
-        self.call = Calls()
+        self.calls = Calls(), Calls()
 
     def go_on_with(self, state: tuple[Any, ...]) -> None:
         """Take a state of other arrays, of the same types; the actions stay where they are."""
-        self.held = hold((state, self._callback))
+        self.held = hold(Drive(state, self._callback))
 
     def next_ticks(self) -> tuple[int, FloatArray]:
         """Return the number of the next tick, and the draws (ticks, N, draws) of it and of some that follow."""
@@ -143,10 +152,10 @@ class KernelPolicy:
         self._spec = spec
         self._shapes = ((spec.n_robots, spec.layout.size), (spec.n_robots,))
         self._chance = TickDraws(rng, spec.n_robots, n_draws)
-        self._state = state
         self._actions: ActionArray = state[-1]
         self.n_ticks = 0
         self._compiled = None
+        self._go_on_with(*state)
         self._call = Calls()
 
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
@@ -157,7 +166,7 @@ class KernelPolicy:
         obs, active = np.ascontiguousarray(obs, np.float32), np.ascontiguousarray(active, np.bool_)
         self.n_ticks += 1
         self._draws = self._chance.row(self.n_ticks)
-        self._call(self._kernel, obs, active, self._draws, self._state, self.n_ticks)
+        self._call(self._kernel, obs, active, self._draws, self._given, self.n_ticks)
         self.after_ticks()
         return self._actions
 
@@ -167,8 +176,9 @@ class KernelPolicy:
     def _go_on_with(self, *state: Any) -> None:
         """Take a state of other arrays, of the same types; the actions stay where they are."""
         self._state = state
+        self._given = tuple(hold(part) if hasattr(part, "_fields") else part for part in state)
         if self._compiled is not None:
-            self._compiled.go_on_with(state)
+            self._compiled.go_on_with(self._given)
 
     def compiled(self) -> CompiledPolicy | None:
         """The policy for runs without Python between ticks.
@@ -179,7 +189,7 @@ class KernelPolicy:
         is_own = type(self).act is KernelPolicy.act and "act" not in vars(self)
         is_own = is_own and getattr(self, "task", None) is getattr(self, "task", None)
         if is_own and self._compiled is None:  # kept, because its types take milliseconds to find out
-            self._compiled = CompiledPolicy(self, self._state, self._chance)
+            self._compiled = CompiledPolicy(self, self._given, self._chance)
         return self._compiled if is_own else None
 
     def __getstate__(self) -> dict[str, Any]:

@@ -384,7 +384,7 @@ class LearnerInterface:
 
     @cached_property
     def _driver(self) -> Driver:
-        state = (self.translation, *self._chosen, self._commands)
+        state = (self._held, *self._chosen, self._commands)
         return Driver(keep_on, state, decision_ticks=self.config.decision_ticks)
 
     def __getstate__(self) -> dict[str, Any]:

@@ -16,7 +16,6 @@ from swarm_forage_env.policies.extras import ExtraFunctionError, extra_columns, 
 from swarm_forage_env.policies.interface import MOTIONS, LearnerInterface
 from swarm_forage_env.policies.kernels.network import keep_on
 from swarm_forage_env.views.plans import ArenaPlan
-from swarm_forage_env.world.arena import UNDISTURBED
 from swarm_forage_env.world.kernels.disturbances import Disturbances
 from swarm_forage_env.wrappers.base import SwarmWrapper, needs_no_python
 from swarm_forage_env.wrappers.world import World
@@ -156,9 +155,9 @@ class LearnerArena:
                 env.break_off()
             raise
 
-    def _told_ahead(self, n_ticks: int) -> tuple[int, Disturbances]:
+    def _told_ahead(self, n_ticks: int) -> tuple[int, Disturbances | None]:
         """Return how many ticks can be one compiled call, and what wrappers do in them; 0 = Python steps one."""
-        return self.env.told_ahead(n_ticks) if self._tells_ahead else (0, UNDISTURBED)
+        return self.env.told_ahead(n_ticks) if self._tells_ahead else (0, None)
 
     def _add_extra(self, rewards: np.ndarray) -> None:
         """Add the user's `extra_reward` of a decision to the rewards of the robots (N,)."""

@@ -38,7 +38,6 @@ from swarm_forage_env.world.rewards import RewardModel
 from swarm_forage_env.world.sensors import light_of_carriers_only, new_sensors, read_slices
 from swarm_forage_env.world.state import Source, listed
 
-UNDISTURBED = Disturbances()
 _NO_TASKS, _NO_SHARES, _UNPAID = np.zeros(0, np.int8), np.zeros(1), np.zeros(0, np.float32)
 
 
@@ -232,7 +231,7 @@ class ForagingArena:
         driver: Driver,
         n_ticks: int,
         *,
-        disturbances: Disturbances = UNDISTURBED,
+        disturbances: Disturbances | None = None,
         wheel_gain: FloatArray | None = None,
         acts: bool = True,
         kept: bool = False,
@@ -248,7 +247,7 @@ class ForagingArena:
             driver: A compiled policy, or a decision of a learner.
             n_ticks: At most so many ticks, and at least one; it ends earlier where Python draws numbers or places
                 objects. With 0 the driver acts, and that is all.
-            disturbances: What wrappers do in so many ticks.
+            disturbances: What wrappers do in so many ticks, if anything.
             wheel_gain: See `step`.
             acts: Whether the driver acts; else its actions stand as they are.
             kept: Whether nobody has written into the observation since the last call.
@@ -273,7 +272,7 @@ class ForagingArena:
         is_kept = self._arrays.sensors.kept
         is_kept[0] = kept  # the world may rely on the observation, but not longer than this call lasts
         try:
-            n_begun, outcome, tasks_counted = driver.call(
+            n_begun, outcome, tasks_counted = driver.calls[disturbances is not None](
                 kernels.run,
                 self._held,
                 self._bodies.held,
@@ -300,7 +299,9 @@ class ForagingArena:
             if not n_begun:
                 return Stop(self.tick, by_python=False)
             self.tick, self.has_changed = first + n_begun - 2, self.has_changed and n_begun == 1
-            self.conclude(outcome, driver.actions, disturbances.gain if len(disturbances.gain) else gain, driver.task)
+            if disturbances is not None and len(disturbances.gain):
+                gain = disturbances.gain
+            self.conclude(outcome, driver.actions, gain, driver.task)
         finally:
             is_kept[0] = False
         if rewards is not None and outcome != DONE:

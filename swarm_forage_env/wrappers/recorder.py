@@ -103,7 +103,7 @@ class RunRecorder(SwarmWrapper):
                 continue
             before = env.tick
             stop = arena.run(policy, n_ahead, disturbances=disturbances, kept=kept, task_shares=self._task_sums)
-            kept = len(disturbances.lanes) == 0
+            kept = disturbances is None or len(disturbances.lanes) == 0
             n_done = stop.tick - before
             inner.pass_ticks(n_done, stop, policy.task)
             self._ticks_left -= n_done

@@ -17,7 +17,7 @@ import pytest
 
 from swarm_forage_env._internal import compiling
 from swarm_forage_env._internal.compiling import Callback, direct, kernel
-from swarm_forage_env._internal.held import hold, opened
+from swarm_forage_env._internal.held import hold
 from tests.support.branches import pickled
 
 INNER = """
@@ -250,8 +250,7 @@ class Outer(NamedTuple):
 
 
 @kernel
-def add_up(given: Any) -> None:
-    outer = opened(given)
+def add_up(outer: Any) -> None:
     if outer.inner.is_odd:
         outer.values[0, 0] += outer.inner.counts[1] + outer.places[0] * outer.places[1]
 

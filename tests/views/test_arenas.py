@@ -18,7 +18,6 @@ from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv
 from swarm_forage_env.views.plans import ArenaPlan, plan_arena
 from swarm_forage_env.views.sampler import ScenarioSampler
-from swarm_forage_env.world.arena import UNDISTURBED
 from swarm_forage_env.wrappers.base import SwarmWrapper
 from tests.support import lives
 from tests.support.sampled import sampler
@@ -170,7 +169,7 @@ class TickByTick(LearnerArena):
     """Python steps every tick: what the compiled decisions of others have to equal."""
 
     def _told_ahead(self, n_ticks):
-        return 0, UNDISTURBED
+        return 0, None
 
 
 @pytest.mark.parametrize("interface", [{}, {"observation": "compact", "automatic_gripper": True, "decision_ticks": 7}])

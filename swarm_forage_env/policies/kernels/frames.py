@@ -70,13 +70,14 @@ def take_frames(view: ObsArray, decision: int, frames: Frames) -> None:
     """Show every robot what it sees, (N, d), in its frame of this decision."""
     if frames.length == 0:
         return
+    row, source, sign, taken = frames.row, frames.source, frames.sign, frames.taken
     for i in range(view.shape[0]):
         frame = frame_of(i, decision, frames.length)
-        frames.taken[i] = frame
+        taken[i] = frame
         for c in range(view.shape[1]):
-            frames.row[c] = view[i, c]
+            row[c] = view[i, c]
         for c in range(view.shape[1]):
-            view[i, c] = frames.row[frames.source[frame, c]] * frames.sign[frame, c]
+            view[i, c] = row[source[frame, c]] * sign[frame, c]
 
 
 @kernel

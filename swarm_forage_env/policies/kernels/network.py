@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel, part
-from swarm_forage_env._internal.held import opened
 from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, IntArray, ObsArray, Row
 from swarm_forage_env.policies.kernels.frames import leave_frames, take_frames
 from swarm_forage_env.policies.kernels.learner import (
@@ -174,7 +173,6 @@ def pick(logits: Row, samples: bool, chance: float, powers: FloatArray) -> int:
 @kernel
 def see(obs: ObsArray, decision: int, t: Translation, view: ObsArray) -> None:
     """Write what robots see (N, d), as `LearnerInterface.observe` does, and let them remember it."""
-    t = opened(t)
     if t.is_compact:
         compact_view(obs, t.view_starts, t.half[0], t.half[1], t.behind_counts, view)
     else:
@@ -215,7 +213,6 @@ def decide(obs: ObsArray, draws: FloatArray, decision: int, t: Translation, laye
 @kernel
 def carry_out(obs: ObsArray, t: Translation, number: IntArray, values: ObsArray, actions: ActionArray) -> None:
     """Write the commands (N, A) of actions by number (N,), or by value (N, m) where they are continuous."""
-    t = opened(t)
     if t.is_discrete:
         numbered_actions(number, t.wheels, t.grips, obs, t.cargo_starts[0], actions)
     else:

@@ -41,7 +41,9 @@ def mark(
         events: `interfering` is that of the last tick, and written, `counters` are added to, and the share of active
             robots (0/0 = 0) is added to `interference_sum`.
     """
-    active, counters = swarm.active, events.counters
+    active, present, position = swarm.active, swarm.present, swarm.position
+    carried_object, pending_kind = swarm.carried_object, swarm.pending_kind
+    interfering, counters = events.interfering, events.counters
     n_interfering = 0
     n_begun = 0
     n_active = 0
@@ -54,15 +56,15 @@ def mark(
     for i in range(active.shape[0]):
         ring = obs[i, proximity : proximity + RING_SENSORS]
         flag = active[i] and near[i] and sees_obstacle(ring, behind_counts)
-        carries = active[i] and swarm.carried_object[i] >= 0
-        n_begun += flag and not events.interfering[i]
-        events.interfering[i] = flag
+        carries = active[i] and carried_object[i] >= 0
+        n_begun += flag and not interfering[i]
+        interfering[i] = flag
         n_interfering += flag
-        n_near_caches += flag and _is_near_cache(swarm.position[i], caches)
+        n_near_caches += flag and _is_near_cache(position[i], caches)
         n_active += active[i]
-        n_present += swarm.present[i]
+        n_present += present[i]
         n_carrying += carries
-        kind = swarm.pending_kind[i]
+        kind = pending_kind[i]
         if kind == NO_REQUEST:
             n_homing += carries and not flag
         elif active[i] and not flag:

@@ -54,15 +54,17 @@ _DEPLETED = int(Counter.CACHES_DEPLETED)
 @part
 def clear_events(swarm: SwarmState, events: StepEvents, gripper: ActionArray) -> bool:
     """Forget last tick's events; returns whether any robot asks for or is in an interaction."""
+    code, first_picked = events.code, events.first_picked
+    active, pending_kind, carried_object = swarm.active, swarm.pending_kind, swarm.carried_object
     busy = False
-    for i in range(events.code.shape[0]):
-        events.code[i] = 0
-        events.first_picked[i] = False
-        if swarm.pending_kind[i] != 0:
+    for i in range(code.shape[0]):
+        code[i] = 0
+        first_picked[i] = False
+        if pending_kind[i] != 0:
             busy = True
-        elif swarm.active[i]:
+        elif active[i]:
             grasps = gripper[i, 2] > 0.0
-            if grasps != (swarm.carried_object[i] >= 0):
+            if grasps != (carried_object[i] >= 0):
                 busy = True
     return busy
 
@@ -418,17 +420,18 @@ def interact(state: WorldState, rules: Rules, gripper: ActionArray, tick: int, c
     `gripper` is the (N, 3) action array; `chance` (N,) uniform in [0, 1) decides which object leaves a cache.
     """
     swarm, queue = state.swarm, state.requests.queue
-    n_robots = swarm.active.shape[0]
+    active, pending_kind, carried_object = swarm.active, swarm.pending_kind, swarm.carried_object
+    n_robots = active.shape[0]
     state.requests.handler_used[:] = False
     n_queued = 0
     for k in range(n_robots):
         i = (tick + k) % n_robots
-        idle = not swarm.active[i] or (swarm.carried_object[i] >= 0) == (gripper[i, 2] > 0.0)
-        if swarm.pending_kind[i] == NO_REQUEST and idle:
+        idle = not active[i] or (carried_object[i] >= 0) == (gripper[i, 2] > 0.0)
+        if pending_kind[i] == NO_REQUEST and idle:
             continue  # absent, or carrying and holding, or empty and not grasping: most robots in most ticks
         band = _band_now(swarm, gripper, i)
         kind, _ = request_of(state, rules, band, i)
-        if kind != NO_REQUEST or swarm.pending_kind[i] != NO_REQUEST:
+        if kind != NO_REQUEST or pending_kind[i] != NO_REQUEST:
             queue[n_queued] = i
             queue[n_robots + n_queued] = _phase_of(kind, band)
             n_queued += 1

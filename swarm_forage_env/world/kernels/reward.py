@@ -7,7 +7,6 @@ import math
 from typing import NamedTuple
 
 from swarm_forage_env._internal.compiling import kernel, part
-from swarm_forage_env._internal.held import opened
 from swarm_forage_env.contract.codes import Event
 from swarm_forage_env.contract.types import FloatArray, ObsArray
 from swarm_forage_env.world.state import StepEvents, SwarmState
@@ -83,7 +82,6 @@ def lost_time(p: Payment, i: int) -> float:
 @kernel
 def rewards(p: Payment) -> None:
     """Write the weighted sums to `total`, and rounded to `reward`. Inactive robots receive none."""
-    p = opened(p)
     weights = p.weights
     for i in range(p.total.shape[0]):
         value = weights.delivery * delivered(p, i) + weights.first_pickup * picked_first(p, i)

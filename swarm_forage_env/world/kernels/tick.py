@@ -21,9 +21,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swarm_forage_env._internal.compiling import Callback, inline_kernel, kernel, kind_of, part
-from swarm_forage_env._internal.held import hold, opened
+from swarm_forage_env._internal.held import hold
 from swarm_forage_env._internal.prefetching import LARGE
 from swarm_forage_env.contract.codes import Counter
+from swarm_forage_env.contract.kernel_policy import Drive
 from swarm_forage_env.contract.types import ActionArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.world.kernels import beams, floor, proprioception
 from swarm_forage_env.world.kernels.bins import bin_robots, mark_cells
@@ -54,7 +55,6 @@ def start(a: ArenaArrays, actions: ActionArray, wheel_gain: FloatArray) -> int:
 
     Returns `DONE`, or the first active row whose action or gain is not finite; then nothing has happened.
     """
-    a = opened(a)
     swarm, m = a.state.swarm, a.motion
     return drive(
         actions,
@@ -72,7 +72,6 @@ def start(a: ArenaArrays, actions: ActionArray, wheel_gain: FloatArray) -> int:
 @kernel
 def push(a: ArenaArrays, tick: int) -> None:
     """Let robots in touch press against each other, in tick number `tick`."""
-    a = opened(a)
     swarm, m, s = a.state.swarm, a.motion, a.sensors
     before, now = (m.touching[0], m.touching[1]) if tick % 2 == 0 else (m.touching[1], m.touching[0])
     press(swarm.position, swarm.present, s.near, s.bins, m.touch_m, before, now, m.command, m.twist)
@@ -81,7 +80,6 @@ def push(a: ArenaArrays, tick: int) -> None:
 @kernel
 def move(a: ArenaArrays, b: BodyState) -> bool:
     """Move compiled bodies; returns whether there was room for all pairs that might touch, else nobody was moved."""
-    a, b = opened(a), opened(b)
     swarm = a.state.swarm
     if not move_bodies(b, a.motion.twist, swarm.present, a.motion.dt_s):
         return False
@@ -92,7 +90,6 @@ def move(a: ArenaArrays, b: BodyState) -> bool:
 @kernel
 def look(a: ArenaArrays) -> None:
     """Find out who is near whom, and write the proximity readings: a ring of beams, 1 at contact, 0 without a hit."""
-    a = opened(a)
     swarm, s = a.state.swarm, a.sensors
     bin_robots(swarm.position, swarm.present, s.bins[0], s.bins[1], s.bins[2])
     mark_cells(swarm.position, swarm.present, s.bins[0], s.occupied)
@@ -119,7 +116,6 @@ def meet(a: ArenaArrays, actions: ActionArray, tick: int, chance: FloatArray) ->
 
     `chance` (N,) uniform in [0, 1) decides which object leaves a cache. Returns whether anything is to be placed.
     """
-    a = opened(a)
     state, s = a.state, a.sensors
     mark(s.obs, s.columns.proximity, s.near, s.behind_counts, state.swarm, state.caches, state.events)
     serve(state, a.rules, actions, tick, chance)
@@ -141,7 +137,6 @@ def _alive(caches: CacheState) -> int:
 @kernel
 def sense(a: ArenaArrays) -> None:
     """Complete the observation after `look`; slices that are not read may stay zero."""
-    a = opened(a)
     swarm, objects, events, s = a.state.swarm, a.state.objects, a.state.events, a.sensors
     position, facing, present, c = swarm.position, swarm.facing, swarm.present, s.columns
     if s.reads_light and s.light_is_due[0]:
@@ -229,7 +224,6 @@ _phases: dict[Any, Phases] = {}
 @inline_kernel
 def observe(a: ArenaArrays, p: Phases) -> None:
     """Write the observation of the world as it is now."""
-    p = opened(p)
     p.look(a)
     p.sense(a)
 
@@ -239,7 +233,6 @@ def set_out(
     a: ArenaArrays, p: Phases, actions: ActionArray, wheel_gain: FloatArray, tick: int, look_first: bool
 ) -> int:
     """What comes before the bodies move; `look_first`: robots came or went. Returns as `start`."""
-    p = opened(p)
     refused = p.start(a, actions, wheel_gain)
     if refused != DONE:
         return refused
@@ -255,15 +248,14 @@ def close(a: ArenaArrays, p: Phases, walk_chance: FloatArray) -> None:
 
     `walk_chance` (M,) uniform in [0, 1); not read where objects lie still.
     """
-    world, p = opened(a), opened(p)
-    objects, caches = world.state.objects, world.state.caches
-    counters, w = world.state.events.counters, world.wandering
+    objects, caches = a.state.objects, a.state.caches
+    counters, w = a.state.events.counters, a.wandering
     if w.probability > 0.0:
         counters[_OBJECTS_MOVED] += walk(
             objects.floor, objects.status, objects.cell, walk_chance, w.probability, w.area, w.self_conflict
         )
-        world.state.requests.changed[-1, 0] = CHANGES + 1
-    if world.has_caches:
+        a.state.requests.changed[-1, 0] = CHANGES + 1
+    if a.has_caches:
         counters[_CACHES_ALIVE] += _alive(caches)
         for slot in range(caches.count.shape[0]):
             counters[_OBJECTS_CACHED] += caches.count[slot]
@@ -275,7 +267,6 @@ def meet_and_close(
     a: ArenaArrays, p: Phases, actions: ActionArray, tick: int, chance: FloatArray, walk_chance: FloatArray
 ) -> int:
     """After the bodies have moved; returns `DONE`, or `TO_PLACE` if `close` is still to come."""
-    p = opened(p)
     p.look(a)
     if p.meet(a, actions, tick, chance):
         return TO_PLACE
@@ -296,7 +287,6 @@ def whole(
     walk_chance: FloatArray,
 ) -> int:
     """The whole tick, with compiled bodies; returns `DONE`, `TO_PLACE`, `NO_ROOM` or the row of a refused action."""
-    p = opened(p)
     refused = set_out(a, p, actions, wheel_gain, tick, look_first)
     if refused != DONE:
         return refused
@@ -331,8 +321,8 @@ def run(
     a: ArenaArrays,
     b: BodyState,
     p: Phases,
-    d: Disturbances,
-    driver: tuple[tuple[Any, ...], Callable[..., None]],
+    d: Disturbances | None,
+    driver: Drive,
     payment: Payment | None,
     paid: ObsArray,
     wheel_gain: FloatArray,
@@ -356,9 +346,8 @@ def run(
         a: The arena.
         b: Its bodies.
         p: Its phases.
-        d: What disturbs the robots. The observation after a tick that is not `DONE` is left as it is.
-        driver: Its state, of which the last are the actions, and a function (obs, active, draws, state, tick) that
-            writes them.
+        d: What disturbs the robots, if anything. The observation after a tick that is not `DONE` is left as it is.
+        driver: Who acts.
         payment: What rewards are made of; None = there are none.
         paid: (N,) float32, the rewards of ticks that are `DONE` are added.
         wheel_gain: (N, 2), see `set_out`.
@@ -378,19 +367,22 @@ def run(
         How many ticks have begun, the outcome of the last of them, and whether its tasks were codes of `Task`, one per
         robot. Tasks of a tick with a refused action are not looked at.
     """
-    world, p, driver = opened(a), opened(p), opened(driver)
-    state, act = driver
-    obs, swarm, s, actions = world.sensors.obs, world.state.swarm, world.sensors, state[-1]
+    state, act = driver.state, driver.act
+    obs, swarm, s, actions = a.sensors.obs, a.state.swarm, a.sensors, state[-1]
     light_is_due = s.light_is_due
-    gain = d.gain if d.gain.shape[0] > 0 else wheel_gain
+    gain, is_noisy = wheel_gain, False
+    if d is not None:
+        gain = d.gain if d.gain.shape[0] > 0 else wheel_gain
+        is_noisy = d.draws.shape[0] > 0
     if n_ticks == 0:
         act(obs, swarm.active, driver_draws[0], state, driver_first)
     for k in range(n_ticks):
         if payment is not None:
-            remember(opened(payment))
+            remember(payment)
         if acts:
             act(obs, swarm.active, driver_draws[k % driver_draws.shape[0]], state, driver_first + k)
-        disturb_wheels(d, k, actions, swarm.carried_object, world.motion.drive_limits, wheel_gain)
+        if d is not None:
+            disturb_wheels(d, k, actions, swarm.carried_object, a.motion.drive_limits, wheel_gain)
         chance, walk_chance = chances[k % chances.shape[0]], walk_chances[k % walk_chances.shape[0]]
         now_then = driver_first + k + 1  # the tick in which the driver sees what is sensed here
         is_due = (now_then - 1) % decision_ticks == 0 or k == n_ticks - 1
@@ -398,10 +390,11 @@ def run(
         outcome = whole(a, b, p, actions, gain, first + k, look_first and k == 0, chance, walk_chance)
         light_is_due[0] = True  # for what Python may have to finish
         if outcome == DONE:
-            disturb_senses(d, k, world)
-            s.kept[0] = d.draws.shape[0] == 0 and (is_due or s.kept[0])
+            if d is not None:
+                disturb_senses(d, k, a)
+            s.kept[0] = not is_noisy and (is_due or s.kept[0])
             if payment is not None:
-                pay(opened(payment), paid)
+                pay(payment, paid)
         counted = outcome >= 0 or tasks.shape[0] == 0 or add_task_shares(tasks, swarm.active, task_shares)
         if outcome != DONE or not counted:
             return k + 1, outcome, counted
