@@ -2,7 +2,9 @@
 
 import pytest
 
-from metrics.benchmark import evaluate
+from metrics.benchmark import evaluate, load_protocol
+from metrics.benchmark.standing import scripted_entries
+from metrics.scoring.limits import limit_of
 from swarm_forage_env import plan_run, run_one, scenario
 
 STANDS = "class Stands:\n def reset(self, spec, rng): pass\n def act(self, obs, active): return obs[:, :3] * 0 + 1\n"
@@ -12,17 +14,21 @@ CANNOT = (
 
 
 def test_feedback_holds_the_numbers_of_short_runs():
-    feedback = evaluate("crw", horizon_s=40.0, seeds=(3,))
+    feedback = evaluate("crw", horizon_s=120.0, seeds=(3,))
     small, medium, rescue = feedback.worlds
-    run = run_one(plan_run(scenario("search_and_rescue", horizon_s=40.0, interval_s=20.0), "crw", seed=3))
-    assert rescue.performance == pytest.approx(run["performance"].sum() * 25.0)
+    deliver = scenario("warehouse_medium", horizon_s=120.0)
+    run = run_one(plan_run(scenario("search_and_rescue", horizon_s=120.0, interval_s=60.0), "crw", seed=3))
+    assert rescue.performance == pytest.approx(run["performance"].sum() / 0.12)
     assert rescue.performance > 0.0
     assert rescue.later == pytest.approx(run["performance"][1] / run["performance"][0])
     assert rescue.time["avoid"] == pytest.approx(run["interference_fraction"].mean())
     assert rescue.time["search"] == pytest.approx(run["n_searching"].sum() / run["n_active"].sum())
     assert sum(medium.time.values()) == pytest.approx(1.0)
     assert rescue.of_limit is None
-    assert small.of_limit is not None
+    assert medium.of_limit == pytest.approx(medium.performance * 0.12 / limit_of(deliver).deliveries)
+    assert min(medium.of_limit, abs(rescue.later - 1.0)) > 0.0
+    best = next(one for one in scripted_entries(load_protocol()) if one.name == "dpo")
+    assert rescue.ratio == pytest.approx(rescue.performance / best.performance("training: search and rescue").mean())
     assert feedback.score == pytest.approx((small.ratio + medium.ratio + rescue.ratio) / 3.0)
     assert len(str(feedback).splitlines()) == 7
 
@@ -31,6 +37,7 @@ def test_feedback_holds_the_numbers_of_short_runs():
     ("program", "told"),
     [
         ("x = 1\n", "a class"),
+        ("class A: pass\n" + STANDS.replace("reset", "begin"), "got Stands without reset"),
         ("class A:\n  def\n", "program.py, line 2"),
         ("nobody", "Unknown policy 'nobody'"),
         ("1 / 0\nclass A: pass\n", "ZeroDivisionError: division by zero (line 1)"),
