@@ -52,15 +52,6 @@ def test_record_draws_one_picture_of_the_run_it_films(command, monkeypatch):
 SHORT = ("--robots", "3", "--seconds", "4")
 
 
-def test_replay_writes_a_page(command):
-    code, out, err = command("replay", "random", *SHORT, "--file", "new/run.html")
-    assert (code, err) == (0, "")
-    assert out.startswith("wrote new/run.html (0.1 MB)")
-    (replay,) = read_replays("new/run.html")
-    assert (replay.label, replay.n_frames, replay.scenario.robots.n_robots) == ("random", 5, 3)
-    assert command("replay", "random", *SHORT)[1].startswith("wrote results/warehouse_small_3_robots_random.html")
-
-
 def test_replay_shows_runs_of_one_world_and_seed_side_by_side(command):
     shutil.copy(Path(pretrained.__file__).with_name("ppo_warehouse_small.npz"), "mine.npz")
     words = ("--seed", "7", "--wrapper", "throttle:waveform=constant,amplitude=0.2")

@@ -27,21 +27,6 @@ def tiny_budget(monkeypatch):
     monkeypatch.setitem(BUDGETS, "tiny", tiny)
 
 
-def test_json_is_the_only_thing_on_stdout(command):
-    _, out, _ = command(*SCORE, *FEW, "--json")
-    told = json.loads(out)
-    assert told["policies"] == ["random"]
-    assert told["settings"]["seeds"] == [0, 1]
-    score = next(score for score in told["scores"] if score["measure"] == "adaptability")
-    assert score["per_seed"].keys() == {"0", "1"}
-    assert (score["higher_is_better"], score["n_robots"], score["unit"]) == (False, 3, "objects (DTW)")
-    _, out, _ = command(*COMPARE, *FEW, "--json")
-    answer = json.loads(out)
-    assert answer["policies"] == ["random", "crw"]
-    assert {difference["first"] for difference in answer["differences"]} == {"random"}
-    assert answer["picture"].endswith("_random_crw_scores.png")
-
-
 def test_real_robots_stand_beside_policies_in_one_table_and_picture(command, painted):
     times = [(n, run, 2.0 * k + n / 8) for n in (1, 3) for run in (0, 1) for k in range(2)]
     Path("real.csv").write_text(

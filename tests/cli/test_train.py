@@ -4,7 +4,6 @@ import dataclasses
 import json
 import re
 import sys
-from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -20,7 +19,7 @@ from swarm_forage_env.training.evaluation import (
     WorldEvaluation,
     write_evaluations,
 )
-from swarm_forage_env.training.plan import Stage, TrainingPlan, named_plan, read_plan
+from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.recipe import recipe
 from swarm_forage_env.wrappers.world import World
 
@@ -146,29 +145,6 @@ def test_words_are_arguments_of_the_recipe(command, monkeypatch):
         nest_progress=0.0,
         horizon_s=400.0,
     )
-
-
-def test_fields_of_a_plan_are_set_by_name(command, monkeypatch):
-    settings = ("n_arenas=2", "hidden=32,16", "options.learning_rate=0.01", "evaluation.n_runs=2")
-    each = (word for setting in settings for word in ("--set", setting))
-    plan = planned(monkeypatch, command, "--plan", "ppo_warehouse_small", "--seed", "3", *each)
-    shipped = named_plan("ppo_warehouse_small")
-    assert plan == replace(
-        shipped,
-        seed=3,
-        n_arenas=2,
-        hidden=(32, 16),
-        options={**shipped.options, "learning_rate": 0.01},
-        evaluation=replace(shipped.evaluation, n_runs=2),
-    )
-    for words, told in (
-        (("--set", "n_arenass=2"), "Did you mean 'n_arenas'"),
-        (("--set", "interfac.observation=full"), "Did you mean 'interface.observation'"),
-        (("--robots", "3"), "Expected --plan without a world"),
-    ):
-        code, _, err = command("train", "--plan", "ppo_warehouse_small", *words)
-        assert (code, err.count("\n")) == (2, 1)
-        assert told in err
 
 
 PLAN = TrainingPlan(

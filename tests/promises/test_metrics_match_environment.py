@@ -29,13 +29,6 @@ def test_waveforms_agree_at_every_tick_of_a_run(kind, phase, period_s):
     np.testing.assert_allclose(measured, [signal(tick) for tick in TICKS.tolist()], rtol=0.0, atol=1e-13)
 
 
-def test_constant_waveforms_agree():
-    signal = Waveform(kind="constant", amplitude=0.1).signal(DT_S)
-    np.testing.assert_array_equal(
-        waveform("constant", TICKS[:5], amplitude=0.1), [signal(tick) for tick in range(1, 6)]
-    )
-
-
 def test_criteria_have_the_same_names():
     assert {*ladders.CRITERIA, worlds.UNDISTURBED} == set(CRITERIA)
     assert worlds.UNDISTURBED == UNDISTURBED

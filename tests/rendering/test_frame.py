@@ -237,18 +237,6 @@ def test_a_picture_fills_the_window(window):
     assert pygame.display.get_caption()[0] == "a run"
 
 
-def test_a_closed_window_opens_again_and_one_that_the_user_has_closed_does_not(window):
-    window.show(FRAME, "")
-    window.close()
-    assert not pygame.display.get_init()
-    window.show(FRAME, "")
-    pygame.event.post(pygame.event.Event(pygame.QUIT))
-    for _ in range(2):
-        window.show(FRAME, "")
-        assert window.was_closed
-        assert not pygame.display.get_init()
-
-
 def test_without_a_display_or_pygame_the_message_says_what_to_do(monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "there is no such driver")
     with pytest.raises(ConfigError, match="swarm-forage record"):

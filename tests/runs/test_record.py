@@ -117,14 +117,6 @@ def test_a_run_is_read_with_another_performance(record, tmp_path):
         record.read_as("n_cache")
 
 
-def test_rates_and_lengths(record):
-    assert (record.horizon_s, record.wall_time_s) == (600.0, 1.5)
-    assert record.per_1000_s("collected") == pytest.approx(50.0)
-    assert np.isnan(replace(record, made_with={}).wall_time_s)
-    told = record.describe()
-    assert all(part in told for part in (record.run_id, "noise = 0.1", "600 s, delivered 30 (50.0 per 1,000 s)"))
-
-
 SPEC = RunSpec(world=World(scenario("warehouse_small", n_robots=2, horizon_s=2.0, interval_s=1.0)), policy="random")
 
 

@@ -15,7 +15,7 @@ import pytest
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.registry import RandomPolicy
 from swarm_forage_env.policies.trust import UntrustedModelError, only_typed
-from swarm_forage_env.runs import runner, workers
+from swarm_forage_env.runs import runner
 from swarm_forage_env.runs.plan import Plan, run_plan
 from swarm_forage_env.runs.record import RecordError
 from swarm_forage_env.runs.run import run_one, run_policy
@@ -65,17 +65,6 @@ def test_a_policy_object_drives_the_same_run_as_its_name():
     by_object = run_policy(RandomPolicy(), replace(SPECS[0], policy="mine"))
     assert by_object.spec.policy == "mine"
     assert by_object.equals(run_one(SPECS[0]))
-
-
-def test_the_code_that_runs_share_is_compiled_before_the_first_is_timed(monkeypatch):
-    """Also for policies of this process alone, which must not notice."""
-    calls = []
-    monkeypatch.setattr(workers, "_prepared", set())
-    monkeypatch.setattr(workers, "warm_up", lambda spec: calls.append(("warm up", spec.policy)))
-    monkeypatch.setattr(runner, "run_one", lambda spec: calls.append(("run", spec.policy)) or run_one(spec))
-    run_plan(plan_of(policy_spec("crw"), policy_spec(RandomPolicy, label="mine")), jobs=1)
-    first, last = [("warm up", "crw"), *[("run", "crw")] * 2], [("warm up", "random"), *[("run", "mine")] * 2]
-    assert calls == first + last
 
 
 def test_outcomes_come_in_the_order_of_their_specifications(tmp_path):

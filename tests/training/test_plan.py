@@ -10,7 +10,7 @@ import pytest
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.presets import scenario, warehouse_small
-from swarm_forage_env.training.evaluation import EVALUATE_EVERY, EvaluationPlan, EvaluationWorld
+from swarm_forage_env.training.evaluation import EvaluationPlan, EvaluationWorld
 from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.recipe import LATE_OPTIONS, recipe, small_arena
 from swarm_forage_env.wrappers.registry import parse_wrapper
@@ -219,14 +219,6 @@ def test_policies_draw_their_actions_where_they_have_probabilities(algorithm, ac
         reason = "a temperature for samples of dqn" if algorithm == "dqn" else "discrete actions, got continuous ones"
         with pytest.raises(ConfigError, match=reason):
             recipe(algorithm=algorithm, interface={"actions": actions}, samples=True)
-
-
-def test_large_swarms_are_evaluated_less_often():
-    assert recipe("warehouse_medium").evaluation.every_steps == 4_000_000
-    assert recipe("warehouse_medium", evaluation={"horizon_s": 2000.0}).evaluation.every_steps == EVALUATE_EVERY
-    assert recipe("warehouse_medium", evaluation={"every_steps": 7}).evaluation == EvaluationPlan(every_steps=7)
-    with pytest.raises(ConfigError, match=r"evaluation\.every_step'.*Did you mean"):
-        recipe(evaluation={"every_step": 7})
 
 
 def test_a_sampler_is_judged_in_the_largest_world_of_each_name():

@@ -1,6 +1,5 @@
 """`SwarmPPO` is the library's PPO, and does not ask the network about robots that are not at work."""
 
-import dataclasses
 from typing import Any
 
 import numpy as np
@@ -14,9 +13,9 @@ from stable_baselines3 import DQN, PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
 from swarm_forage_env.policies.interface import InterfaceConfig
-from swarm_forage_env.policies.network import Network, NetworkError
+from swarm_forage_env.policies.network import Network
 from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmPPO, SwarmVecEnv
-from swarm_forage_env.training.sb3.export import export_network, note_interface
+from swarm_forage_env.training.sb3.export import export_network
 from tests.support import lives
 
 NUMBERED = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5)
@@ -224,29 +223,6 @@ def test_exported_networks_choose_as_the_model_does(algorithm, interface, fields
         chosen = outputs.argmax(axis=1) if interface.actions == "discrete" else np.clip(outputs, -1.0, 1.0)
         np.testing.assert_allclose(chosen, expected, atol=1e-5)
         obs, *_ = env.step(expected)
-
-
-@pytest.mark.parametrize(
-    ("wrong", "reason"),
-    [
-        (
-            {"observation": "full"},
-            r"Expected a model from Box\(\d+\) to Box\(2\) .*, got one from Box\(23\) to Box\(2\)",
-        ),
-        ({"actions": "discrete"}, r"to Discrete\(6\) .* to Box\(2\)"),
-    ],
-)
-def test_the_interface_of_an_export_is_that_of_the_model(wrong, reason):
-    env = SwarmVecEnv("warehouse_small", n_robots=2, n_objects=20, interface=DRIVEN)
-    model = PPO("MlpPolicy", env, n_steps=8, batch_size=16, device="cpu")
-    other = dataclasses.replace(DRIVEN, **wrong)
-    with pytest.raises(NetworkError, match=reason):
-        export_network(model, other)
-    with pytest.raises(NetworkError, match=reason):
-        note_interface(model, other)
-    note_interface(model, DRIVEN)
-    with pytest.raises(NetworkError, match=r"Expected the interface that the model was trained with, .*decision_ticks"):
-        export_network(model, dataclasses.replace(DRIVEN, decision_ticks=4))
 
 
 def test_a_wait_is_one_transition_for_lambda_too():

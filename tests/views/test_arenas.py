@@ -148,23 +148,6 @@ def test_refuses_too_few_rows_and_steps_before_a_reset_or_after_the_end():
             call()
 
 
-@pytest.mark.parametrize("interface", [InterfaceConfig(), InterfaceConfig(automatic_gripper=True)])
-def test_actions_that_are_not_finite_are_refused_by_name(interface):
-    batch = ArenaBatch(plan(interface), 2)
-    batch.reset([0, 1], [None, None])
-    actions = np.zeros((6, *batch.interface.action_space.shape), np.float32)
-    actions[4, 0] = np.nan
-    with pytest.raises(ValueError, match="robot_1") as refusal:
-        batch.step(actions)
-    assert "the world was not stepped" in str(refusal.value)
-    (note,) = refusal.value.__notes__
-    assert note == "This was in arena 1; reset before going on."
-    with pytest.raises(RuntimeError, match="Call reset before step"):
-        batch.step(np.zeros_like(actions))
-    batch.reset([0, 1], [None, None])
-    assert batch.step(np.zeros_like(actions)).obs.shape[0] == 6
-
-
 class TickByTick(LearnerArena):
     """Python steps every tick: what the compiled decisions of others have to equal."""
 

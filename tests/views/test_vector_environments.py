@@ -7,10 +7,8 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 import swarm_forage_env
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.views.gymnasium import SwarmVectorEnv
-from swarm_forage_env.views.plans import plan_arena
 from tests.support import lives
 
 IDLE = np.zeros((lives.N_ROBOTS, 3), np.float32)
@@ -53,20 +51,6 @@ def test_the_number_of_sub_environments_is_a_whole_number_of_swarms():
         gymnasium.make_vec(env_id, n_robots=4, num_envs=8, n_arenas=3)
     with pytest.raises(ValueError, match="n_arenas to be a whole number >= 1"):
         gymnasium.make_vec(env_id, n_robots=4, n_arenas=0)
-
-
-@pytest.mark.parametrize(
-    ("given", "reason"),
-    [
-        ({"wrappers": "throttle"}, "wrappers as a list of .* got 'throttle'"),
-        ({"wrappers": ["trottle"]}, "Did you mean 'throttle'"),
-        ({"interface": "discrete"}, "InterfaceConfig or its fields by name.* got 'discrete'"),
-        ({"interface": {"action": "discrete"}}, "Did you mean 'actions'"),
-    ],
-)
-def test_other_wrappers_and_interfaces_are_refused(given, reason):
-    with pytest.raises(ConfigError, match=reason):
-        plan_arena(n_robots=3, **given)
 
 
 def told_story() -> list[tuple]:

@@ -227,16 +227,6 @@ def test_bad_requests_get_one_line(how, message):
         study_curves(CROWDING.with_columns(items=pl.lit("x")), **how)
 
 
-def test_times_that_are_no_times_of_a_run_are_refused():
-    with pytest.raises(CurveError, match=r"at most 5 s, the shortest run of the table, got 10 s"):
-        only(table(rows(1, [[1.0]], t_end_s=5.0)), interval_s=10.0)
-    with pytest.raises(CurveError, match=r"from the start of each run .* got 1\.7e\+09 s"):
-        only(LOG.with_columns(time_s=1.7e9), events=True, interval_s=10.0)
-    for time in ("noon", "2026-13-01"):
-        with pytest.raises(CurveError, match=r"a number of seconds, or a date and time in line 1 .*, column time_s"):
-            only(LOG.with_columns(time_s=pl.lit(time)), events=True, interval_s=10.0)
-
-
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [

@@ -231,20 +231,6 @@ def test_one_panel_per_measure_and_one_line_per_policy(tmp_path, monkeypatch):
     ]
 
 
-def test_values_that_mislead_have_hollow_marks(tmp_path, monkeypatch):
-    given = summarized(
-        scored(
-            rows(1, [[1.0], [2.0]], interference_fraction=0.1),
-            rows(4, [[8.0], [9.0]], interference_fraction=0.2),
-            rows(8, [[2.0], [3.0]], interference_fraction=0.6),
-            measures=["spatial_emergence"],
-        )
-    )
-    panel = panel_of(drawn(monkeypatch, tmp_path / "scores.png", given), "spatial emergence")
-    (hollow,) = [line for line in panel.get_lines() if line.get_markerfacecolor() == "w"]
-    assert hollow.get_ydata().tolist() == [given["relative"][1]]
-
-
 def test_the_x_axis_of_flexibility_is_the_distance_of_the_conditions(tmp_path, monkeypatch):
     ends = np.arange(1000, 50_001, 1000)
     levels = [
