@@ -143,7 +143,8 @@ def test_one_world_in_which_a_policy_is_lucky_does_not_decide(protocol, referenc
     standing = standing_of(lucky, reference, protocol)
     assert standing.score.value == pytest.approx(0.5, abs=0.1)
     assert standing.n_won == 1
-    assert standing.disturbed > standing.calm
+    assert standing.disturbed > 1000.0, "no calm world is among them"
+    assert standing.calm == pytest.approx(0.5)
 
 
 def test_each_training_seed_has_a_score_of_its_own(protocol, reference):
