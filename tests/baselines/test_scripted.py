@@ -80,6 +80,8 @@ def test_parameters_that_make_no_sense_are_refused():
             for value in (-1.0, float("nan"), float("inf"), True, "1"):
                 with pytest.raises(ParameterError, match=field.name):
                     MemoryParameters(**{field.name: value})
+    with pytest.raises(ParameterError, match="otherwise the robot would wander backwards"):
+        MemoryParameters(wander_circle_radius=4.0, wander_circle_distance=4.0)
     for policy_class, given, message in (
         (CRWPolicy, {"wander_speed_mps": 0.1}, "to be ControllerParameters, got dict; give single numbers by name"),
         (STOCHXPolicy, MemoryParameters(), "to be TaskParameters, got MemoryParameters"),

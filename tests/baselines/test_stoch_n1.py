@@ -64,6 +64,13 @@ def test_move_probability_by_ratio_of_imbalances(ratio, expected):
     # Imbalances of ratio / 10 and 1 / 10 of a root of 1000 ticks.
     p = stoch_n1.move_probability(1000, 1000 + 100 * ratio, 1000, 900, 4.0, 3.0, 0.5, False)
     assert p == pytest.approx(expected, abs=6e-4)
+    unknown = stoch_n1.move_probability(0, 100 * ratio, 0, 100, 4.0, 3.0, 0.5, False)
+    assert unknown == pytest.approx(expected, abs=6e-4), "without estimates of roots, by those of subtasks"
+
+
+@pytest.mark.parametrize("blocks", [(0, 300, 1000, 900), (1000, 900, 0, 300), (1000, 1000, 1000, 900)])
+def test_a_balanced_or_unknown_block_is_left_or_entered_by_a_coin(blocks):
+    assert stoch_n1.move_probability(*blocks, 4.0, 3.0, 0.5, False) == 0.5
 
 
 @pytest.mark.parametrize(
