@@ -234,3 +234,5 @@ def test_it_returns_to_where_it_found_many():
     robot.act()
     assert robot.record["stage"] == Stage.SEARCH
     assert robot.record["is_informed"]
+    told = robot.policy.describe_robots()
+    assert told.words[told.activity[0]] == "searching"
