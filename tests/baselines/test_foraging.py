@@ -89,7 +89,7 @@ def test_what_robots_remember_of_caches_was_true_and_is_while_they_see_them():
 
 @pytest.mark.parametrize(("policy", "caches"), [("dpo", "none"), ("stochm", "static")])
 def test_objects_come_home_round_a_wide_wall(policy, caches):
-    """Without detours hardly an object does: light and avoidance cancel before the wall."""
+    """Without detours hardly an object does: light and avoidance cancel before the wall. Two runs of 3,000 s."""
     walled = scenario("warehouse_small", n_robots=20, horizon_s=3000.0, obstacles=((7.0, 3.0, 7.4, 13.0),))
     delivered = [
         run_one(plan_run(walled, policy, seed=1, caches=caches, parameters=parameters))["performance"].sum()

@@ -266,6 +266,7 @@ def twin_of(policy, i: int, task) -> ReferenceTaskRobot:
     ids=["STOCHM", "STOCHX", "STOCHX, authors' program"],
 )
 def test_tasks_are_as_in_the_slow_ones(policy_class, quirks, ticks):
+    """Three seconds each: the slow robots need some thousand ticks to come through every task and state."""
     task = crowded_task(quirks=quirks)
     fuzz = TaskFuzz(task, seed=1)
     # Short estimates let robots give up, and a high probability of subtasks lets them do all, often enough.
