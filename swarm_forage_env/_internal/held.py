@@ -6,8 +6,9 @@ taken apart once, by `hold`. Kernels read its fields by their names, held or not
 """
 
 import hashlib
+import warnings
 from dataclasses import dataclass
-from typing import Any, TypeVar, cast
+from typing import Any, TypeAlias, TypeVar, cast
 
 import numpy as np
 
@@ -18,21 +19,31 @@ from llvmlite import ir
 from numba import typeof, types
 from numba.core import cgutils
 from numba.core.datamodel.models import OpaqueModel
+from numba.core.errors import NumbaExperimentalFeatureWarning
 from numba.core.imputils import lower_getattr_generic
 from numba.core.registry import cpu_target
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
 from numba.extending import NativeValue, intrinsic, register_model, typeof_impl, unbox
 
 T = TypeVar("T")
+Fields: TypeAlias = dict[str, Any]
+"""Names of the fields of a named tuple -> those of a field that is one, None of others."""
 
 
 class HeldType(types.Type):
-    """What numba knows of a tuple that is held. As a value it is an address."""
+    """What numba knows of a tuple that is held. As a value it is an address.
 
-    def __init__(self, of: Any) -> None:
-        """Take the type of the tuple. Its whole name is pages long, and would be in the names of functions."""
-        self.of = of
-        super().__init__(f"Held({hashlib.sha256(str(of).encode()).hexdigest()[:16]})")
+    It knows no class: what is compiled for somebody's tuple is kept on disk beside the rest, and is read where there is
+    no such class.
+    """
+
+    def __init__(self, fields: Fields, of: Any) -> None:
+        """Take the names of the fields, and the type of a plain tuple of their values.
+
+        The whole name of that is pages long, and would be in the names of functions.
+        """
+        self.fields, self.of = fields, of
+        super().__init__(f"Held({hashlib.sha256(f'{fields}{of}'.encode()).hexdigest()[:16]})")
 
 
 register_model(HeldType)(OpaqueModel)
@@ -113,26 +124,34 @@ class _Attributes(AttributeTemplate):
     key = HeldType
 
     def generic_resolve(self, held: Any, name: str) -> Any:
-        fields = getattr(held.of, "fields", ())
-        if name not in fields:
+        if name not in held.fields:
             return None
-        kind = held.of.types[fields.index(name)]
-        return HeldType(kind) if isinstance(kind, types.BaseNamedTuple) else kind
+        fields, kind = held.fields[name], held.of.types[list(held.fields).index(name)]
+        return kind if fields is None else HeldType(fields, kind)
 
 
 @lower_getattr_generic(HeldType)
 def _field(context: Any, builder: Any, held: Any, address: Any, name: str) -> Any:
     """Read one field, or say where it is."""
-    number = held.of.fields.index(name)
+    number = list(held.fields).index(name)
     tuple_at = builder.bitcast(address, context.get_value_type(held.of).as_pointer())
     place = cgutils.gep_inbounds(builder, tuple_at, 0, number)
-    if isinstance(held.of.types[number], types.BaseNamedTuple):
+    if held.fields[name] is not None:
         return builder.bitcast(place, cgutils.voidptr_t)
     return _read(builder, place)
 
 
 _types: dict[Any, HeldType] = {}
 """Kinds of tuples -> what numba knows of them held; it takes milliseconds to find out, and every run asks."""
+
+
+def _fields(value: Any) -> Fields | None:
+    return {name: _fields(getattr(value, name)) for name in value._fields} if hasattr(value, "_fields") else None
+
+
+def _plain(value: Any) -> Any:
+    """Return a tuple without names in it."""
+    return tuple(map(_plain, value)) if isinstance(value, tuple) else value
 
 
 def hold(value: T) -> T:
@@ -143,10 +162,13 @@ def hold(value: T) -> T:
     """
     if not is_compiled(_keep):
         return value
-    kind, target = kind_of(value), cast(Any, cpu_target).target_context
+    kind, target, plain = kind_of(value), cast(Any, cpu_target).target_context, _plain(value)
     if kind not in _types:
-        _types[kind] = HeldType(typeof(value))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)  # tuples of functions
+            _types[kind] = HeldType(cast(Fields, _fields(value)), typeof(plain))
+            direct(_keep, plain, np.zeros(1, np.uint8))
     held = _types[kind]
     room = np.zeros(target.get_abi_sizeof(target.get_value_type(held.of)), np.uint8)
-    direct(_keep, value, room)(value, room)
+    direct(_keep, plain, room)(plain, room)
     return cast(T, Held(value, held, room, room.ctypes.data))

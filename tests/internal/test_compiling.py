@@ -4,6 +4,7 @@ import ast
 import copy
 import logging
 import os
+import pickle
 import re
 import subprocess
 import sys
@@ -268,6 +269,10 @@ def test_a_held_tuple_is_read_and_written_as_the_tuple_is():
         outer.inner.counts[1] += 1
         plain.inner.counts[1] += 1
     assert outer.values[0, 0] == plain.values[0, 0] == 2 + 3 + 4 + 3 * 1.5
+
+
+def test_what_is_compiled_for_a_tuple_can_be_read_without_its_class():
+    assert b"Outer" not in pickle.dumps(numba.typeof(hold(new_outer())))
 
 
 def test_copies_have_arrays_of_their_own():
