@@ -1,6 +1,12 @@
 """Columns of what learners see in place of single readings: the compact view, and remembered sites."""
 
+from collections.abc import Iterable
+
+import numpy as np
+
+from swarm_forage_env._internal.fields import known_name
 from swarm_forage_env.contract.layout import LayoutRow, ObservationLayout, layout_of
+from swarm_forage_env.contract.types import IntArray
 from swarm_forage_env.policies.kernels.learner import COMPACT_COLUMNS, SITE_COLUMNS
 
 _SHARED = ("wheel_speed", "position", "heading", "carrying", "interacting", "active")
@@ -14,6 +20,14 @@ SITE_ROWS: tuple[LayoutRow, ...] = tuple(
 )
 COMPACT_READS = ("proximity", "light", "ground", *_SHARED, "los_cell", "los_object", "los_cache")
 """Slices of the environment's observations that the compact view is made from."""
+
+
+def columns_of(layout: ObservationLayout, names: Iterable[str]) -> IntArray:
+    """Return the columns of some slices, (K,); raises ConfigError for a name that the layout does not have."""
+    for name in names:
+        known_name("slice", name, layout.names)
+    columns = [column for name in names for column in range(layout[name].start, layout[name].stop)]
+    return np.array(columns, np.int32)
 
 
 def compact_layout(source: ObservationLayout) -> ObservationLayout:

@@ -6,7 +6,7 @@ use the same translation, so a policy runs exactly as it was trained.
 """
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias, get_args
@@ -16,7 +16,7 @@ from gymnasium import spaces
 from msgspec import Meta
 
 from swarm_forage_env._internal.compiling import Calls
-from swarm_forage_env._internal.fields import Checked, ConfigError, Count, Positive, Whole, known_name, read
+from swarm_forage_env._internal.fields import Checked, ConfigError, Count, Positive, Whole, read
 from swarm_forage_env._internal.held import hold
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.contract.kernel_policy import Driver
@@ -31,7 +31,7 @@ from swarm_forage_env.contract.layout import (
 )
 from swarm_forage_env.contract.policy import COMMANDS, ActionError, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, IntArray, ObsArray
-from swarm_forage_env.policies.compact_layout import COMPACT_READS, SITE_ROWS, compact_layout
+from swarm_forage_env.policies.compact_layout import COMPACT_READS, SITE_ROWS, columns_of, compact_layout
 from swarm_forage_env.policies.frames import frames_of
 from swarm_forage_env.policies.kernels.frames import frame_of
 from swarm_forage_env.policies.kernels.learner import (
@@ -98,8 +98,7 @@ class InterfaceConfig(Checked):
     """Decisions for which each robot sees the world in a frame of its own, turned and mirrored in one of eight ways,
     before it takes another, see `policies.kernels.frames`. 0: all see the world as it is."""
     without: tuple[str, ...] = ()
-    """Slices of the learner's layout that are 0 throughout: ("position", "heading") are robots without GPS and compass.
-    What is counted by the world stays: an automatic gripper and `mask` need neither of these two."""
+    """Slices of what it sees that are 0 throughout: ("position", "heading") are robots without GPS and compass."""
     extra_columns: Annotated[int, Meta(ge=0, le=MOST_EXTRA_COLUMNS)] = 0
     """Columns K of the user's `extra_observation`, which come last; environments and trainings fill them in."""
 
@@ -194,9 +193,9 @@ class LearnerInterface:
         )
         self._commands = np.zeros((spec.n_robots, spec.action_size), np.float32)
         self.layout = learner_layout(source, config)
-        self.hidden = hidden_columns(self.layout, config.without)
+        self.hidden = columns_of(self.layout, config.without)
         self._n_columns = source.size
-        own = [column for name in config.sensors for column in range(source[name].start, source[name].stop)]
+        own = columns_of(source, config.sensors)
         half_x, half_y = source.part("position").scale
         self.translation = Translation(
             is_compact=config.observation == "compact",
@@ -207,7 +206,7 @@ class LearnerInterface:
             decision_ticks=config.decision_ticks,
             n_shown=self.layout.size - len(own) - config.extra_columns - N_SITES * SITE_COLUMNS * config.site_memory,
             n_driven=2 if config.automatic_gripper else COMMANDS,
-            own_columns=np.array(own, np.int32),
+            own_columns=own,
             view_starts=tuple(start[name] for name in COMPACT_READS),
             pose_starts=(start["position"], start["heading"]),
             cargo_starts=(start["carrying"], start["los_cell"], start["los_object"]),
@@ -364,11 +363,7 @@ class LearnerInterface:
         return self._commands
 
     def driver(self, actions: np.ndarray) -> Driver:
-        """Return what does in the compiled loop of the world what `carry_out` does, tick by tick.
-
-        Args:
-            actions: As in `carry_out`.
-        """
+        """Return what does in the compiled loop of the world what `carry_out` does with these actions, tick by tick."""
         self._kept(actions)
         return self._driver
 
@@ -446,14 +441,6 @@ def learner_layout(source: ObservationLayout, config: InterfaceConfig) -> Observ
         built_in += SITE_ROWS
     extra = [(EXTRA, (1.0,) * config.extra_columns, "", "extra_observation of the user")] * bool(config.extra_columns)
     return layout_of([*built_in, *(source.part(name).row for name in config.sensors), *extra])
-
-
-def hidden_columns(layout: ObservationLayout, without: Sequence[str]) -> IntArray:
-    """Return the columns of some slices; raises ConfigError for a name that the layout does not have."""
-    for name in without:
-        known_name("slice of the interface without", name, layout.names)
-    columns = [column for name in without for column in range(layout[name].start, layout[name].stop)]
-    return np.array(columns, np.int32)
 
 
 def _check_company(source: ObservationLayout, config: InterfaceConfig) -> None:

@@ -23,7 +23,6 @@ from swarm_forage_env.policies.interface import (
     InterfaceConfig,
     LearnerInterface,
     any_swarm,
-    hidden_columns,
     interface_from_mapping,
 )
 from swarm_forage_env.policies.kernels.network import Choice, Layers, forward, step_network
@@ -103,9 +102,9 @@ class Network:
             raise NetworkError(f"Expected layers that follow on each other, got weights {sizes}.")
         if not all(array.dtype.kind == "f" and _is_finite(array) for array in (*self.weights, *self.biases)):
             raise NetworkError("Expected weights and biases that are finite numbers; did the training diverge?")
-        if hidden := self.about.interface.without:
+        if self.about.interface.without:
             first = self.weights[0].copy()
-            first[hidden_columns(any_swarm(self.about.interface).layout, hidden)] = 0.0  # it weighs nothing unseen
+            first[any_swarm(self.about.interface).hidden] = 0.0  # it weighs nothing unseen
             object.__setattr__(self, "weights", (first, *self.weights[1:]))
 
     def check_fits(self, interface: LearnerInterface) -> None:

@@ -241,8 +241,6 @@ class ForagingArena:
     ) -> Stop:
         """Let a driver and the world act in turn for a while; what happens is what `act` and `step` do by turns.
 
-        Bodies must be compiled, too.
-
         Args:
             driver: A compiled policy, or a decision of a learner.
             n_ticks: At most so many ticks, and at least one; it ends earlier where Python draws numbers or places

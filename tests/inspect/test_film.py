@@ -18,6 +18,7 @@ from swarm_forage_env.wrappers.recorder import TOTALS
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.world import World
 from tests.support.drivers import tick_by_tick
+from tests.support.foraging import CROWDED
 
 Image = pytest.importorskip("PIL.Image")
 ImageSequence = pytest.importorskip("PIL.ImageSequence")
@@ -99,17 +100,6 @@ def filmed(monkeypatch):
     return shown
 
 
-CROWDED = scenario(
-    "warehouse_small",
-    n_robots=12,
-    width_m=8.0,
-    height_m=8.0,
-    nest_centre_m=(1.0, 4.0),
-    nest_size_m=(1.6, 4.0),
-    n_objects=60,
-    horizon_s=80.0,
-    interval_s=20.0,
-)
 DISTURBED = (
     parse_wrapper("population:malfunction_per_tick=0.01,repair_per_tick=0.02"),
     parse_wrapper("throttle:waveform=constant,amplitude=0.3"),

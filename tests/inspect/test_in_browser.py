@@ -9,24 +9,16 @@ from swarm_forage_env.inspect.play.session import PlaySession, Setting
 from swarm_forage_env.inspect.replay.capture import record_replay
 from swarm_forage_env.inspect.replay.files import write_replays
 from swarm_forage_env.runs.spec import plan_run
+from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.world import World
 from tests.support.browser import Browser, chromium
+from tests.support.foraging import CROWDED
 from tests.support.play_page import choose_robot, run_shown, served
 from tests.support.replay_page import choose, seek
 
-WORLD = scenario(
-    "warehouse_small",
-    n_robots=12,
-    width_m=8.0,
-    height_m=8.0,
-    nest_centre_m=(1.0, 4.0),
-    nest_size_m=(1.6, 4.0),
-    n_objects=40,
-    horizon_s=400.0,
-    interval_s=100.0,
-)
+WORLD = with_overrides(CROWDED, n_objects=40, horizon_s=400.0, interval_s=100.0)
 DISTURBED = (
     parse_wrapper("population:death_per_tick=0.0002,malfunction_per_tick=0.0005,repair_per_tick=0.01"),
     parse_wrapper("throttle:waveform=sine,amplitude=0.2,offset=0.2,period_s=200"),

@@ -19,22 +19,11 @@ from swarm_forage_env.inspect.replay.frames import HEADING_STEPS, Replay, Status
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import LiveRun, build_env, run_one, run_policy
 from swarm_forage_env.runs.spec import plan_run
-from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.recorder import TOTALS
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.support.drivers import tick_by_tick
+from tests.support.foraging import CROWDED
 
-CROWDED = scenario(
-    "warehouse_small",
-    n_robots=12,
-    width_m=8.0,
-    height_m=8.0,
-    nest_centre_m=(1.0, 4.0),
-    nest_size_m=(1.6, 4.0),
-    n_objects=60,
-    horizon_s=80.0,
-    interval_s=20.0,
-)
 DISTURBED = (
     parse_wrapper("population:malfunction_per_tick=0.01,repair_per_tick=0.02,death_per_tick=0.0005"),
     parse_wrapper("throttle:waveform=sine,amplitude=0.2,offset=0.2,period_s=40"),

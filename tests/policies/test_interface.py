@@ -238,7 +238,7 @@ def test_slices_that_are_left_out_are_zeros_in_rows_and_weigh_nothing_in_network
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"without": ("gps",)}, "Unknown slice of the interface without 'gps'. Known: proximity"),
+        ({"without": ("gps",)}, "Unknown slice 'gps'. Known: proximity"),
         ({"without": ("position",), "site_memory": True}, "Expected position and heading for site_memory"),
     ],
 )

@@ -27,6 +27,18 @@ NEAR: dict[str, dict[str, Any]] = {
     "search_and_rescue": {"side_m": 16.0},
 }
 """What makes each scenario quick, by its name. A preset of another kind of placement gets an entry here."""
+CROWDED = scenario(
+    "warehouse_small",
+    n_robots=12,
+    width_m=8.0,
+    height_m=8.0,
+    nest_centre_m=(1.0, 4.0),
+    nest_size_m=(1.6, 4.0),
+    n_objects=60,
+    horizon_s=80.0,
+    interval_s=20.0,
+)
+"""Twelve robots that meet all the time: for pages and films."""
 
 
 def quick_world(name: str, **overrides: Any) -> ScenarioConfig:
