@@ -73,6 +73,8 @@ class ArenaStep:
     """(E,) steps that began with the robot in the world."""
     outcomes: tuple[RunOutcome, ...] = ()
     """Runs that ended."""
+    final_states: tuple[ObsArray, ...] = ()
+    """Their last global views, see `LearnerArena.state`."""
 
 
 def set_on_stack(env: ForageEnv | SwarmWrapper, name: str, value: Any) -> None:
@@ -202,6 +204,7 @@ class ArenaBatch:
             active=self._active.flatten(),
             **(self._endings(ended, obs) if len(ended) else self._no_endings),
             outcomes=tuple(map(self._outcome, over)),
+            final_states=tuple(self.arenas[number].state() for number in over),
         )
         self._absent |= self._dead
         for number in over:
@@ -235,6 +238,10 @@ class ArenaBatch:
             scenario=env.scenario.name,
             n_robots=env.scenario.robots.n_robots,
         )
+
+    def states(self) -> ObsArray:
+        """Return the global view of each arena, (n_arenas, S) float32, see `LearnerArena.state`."""
+        return np.stack([arena.state() for arena in self.arenas])
 
     def action_masks(self) -> BoolArray:
         """Return which discrete actions make sense now, (R, number of actions); spare rows can only stand.

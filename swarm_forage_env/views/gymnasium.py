@@ -120,8 +120,8 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
     and with discrete actions `action_mask` (num_envs, number of actions) int8. Rows that are done have `final_obs`
     (objects, None elsewhere) and `final_info` with, for rows whose episode ended, `episode`: its return "r", steps "l"
     and seconds since creation "t"; and, for all rows of an arena whose run ended, `run`: seed, simulated seconds,
-    collected, first_picked and n_robots. Gymnasium's `RecordEpisodeStatistics` works, and counts absent rows as
-    episodes.
+    collected, first_picked and n_robots, and `state`: the last global view of the run (objects, None elsewhere), from
+    which a central critic bootstraps. Gymnasium's `RecordEpisodeStatistics` works, and counts absent rows as episodes.
 
     `gymnasium.make_vec(id, vectorization_mode="sync")` makes something else: a sub-environment is then a whole swarm, a
     `JointForageEnv`.
@@ -213,13 +213,15 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
         told: dict[str, Any] = {"episode": {"r": returns, "l": lengths, "t": seconds}, "_episode": is_episode}
         if step.outcomes:
             of_run = {item.name: np.zeros(self.num_envs, item.type) for item in _OF_RUN}
-            has_ended = np.zeros(self.num_envs, np.bool_)
-            for outcome in step.outcomes:
+            has_ended, states = np.zeros(self.num_envs, np.bool_), np.full(self.num_envs, None, object)
+            for outcome, state in zip(step.outcomes, step.final_states, strict=True):
                 rows = slice(outcome.arena * self.n_robots, (outcome.arena + 1) * self.n_robots)
                 has_ended[rows] = True
                 for name, values in of_run.items():
                     values[rows] = getattr(outcome, name)
-            told |= {"run": of_run, "_run": has_ended}
+                for row in range(rows.start, rows.stop):
+                    states[row] = state
+            told |= {"run": of_run, "_run": has_ended, "state": states, "_state": has_ended.copy()}
         return told
 
     def _now(self, active: BoolArray) -> dict[str, Any]:
@@ -231,6 +233,14 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
                 "_action_mask": infos["_active"].copy(),
             }
         return infos
+
+    def state(self) -> ObsArray:
+        """Return the global view of each arena now, (n_arenas, S) float32, see `ForageEnv.state`; for central critics.
+
+        The last views of runs that ended are in infos, as their arenas have started anew. With a sampler, views have
+        zeros for robots and objects that a run does not have.
+        """
+        return self._arenas.states()
 
     def action_masks(self) -> BoolArray:
         """Return which discrete actions make sense now, (num_envs, number of actions)."""

@@ -5,10 +5,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 
 from swarm_forage_env._internal.compiling import is_compiled
 from swarm_forage_env._internal.fields import ConfigError, table
-from swarm_forage_env.contract.policy import ActionError
+from swarm_forage_env.contract.policy import ActionError, state_size
 from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
 from swarm_forage_env.env import ForageEnv, checked_seed
 from swarm_forage_env.layer import OPTION_OF_TESTS
@@ -200,6 +201,26 @@ class LearnerArena:
         except ExtraFunctionError:
             self.forage_env.break_off()
             raise
+
+    @property
+    def state_space(self) -> spaces.Box:
+        """Space of `state()`; with a sampler, as large as the most robots and the most objects need."""
+        sampler = self._plan.sampler
+        if sampler is None:
+            return self.forage_env.state_space
+        return spaces.Box(-1.0, 1.0, (state_size(sampler.n_robots, sampler.n_objects),), np.float32)
+
+    def state(self) -> ObsArray:
+        """Return the global view, see `ForageEnv.state`; zeros for robots and objects that this run does not have."""
+        state = self.forage_env.state()
+        if self._plan.sampler is None:
+            return state
+        robots, things = np.split(state, [state_size(self.n_robots, 0)])
+        padded = np.zeros(self.state_space.shape, np.float32)
+        padded[: len(robots)] = robots
+        first_object = state_size(self.n_rows, 0)
+        padded[first_object : first_object + len(things)] = things
+        return padded
 
     def mask(self) -> BoolArray:
         """Return which discrete actions make sense now, (rows, number of actions); see `LearnerInterface.mask`.

@@ -8,7 +8,7 @@ from pettingzoo import ParallelEnv
 from pettingzoo.utils.conversions import parallel_to_aec
 
 from swarm_forage_env.contract.layout import ObservationLayout
-from swarm_forage_env.contract.policy import SwarmSpec, state_size
+from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.layer import is_over, packed_actions
 from swarm_forage_env.policies.interface import LearnerInterface
@@ -36,7 +36,6 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
         plan = plan_arena(*args, **options)
         self._is_discrete = plan.interface.actions == "discrete"
         self._arena = LearnerArena(plan)
-        self._sampler = plan.sampler
         self.render_mode = plan.render_mode
         self.possible_agents = list(self._arena.forage_env.possible_agents)
         self.agents: list[str] = []
@@ -81,21 +80,11 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
     @property
     def state_space(self) -> spaces.Box:
         """Space of `state()`; with a sampler, as large as the most robots and the most objects need."""
-        if self._sampler is None:
-            return self.forage_env.state_space
-        return spaces.Box(-1.0, 1.0, (state_size(self._sampler.n_robots, self._sampler.n_objects),), np.float32)
+        return self._arena.state_space
 
     def state(self) -> np.ndarray:
         """Return the global view, see `ForageEnv.state`; zeros for robots and objects that this run does not have."""
-        state = self.forage_env.state()
-        if self._sampler is None:
-            return state
-        robots, things = np.split(state, [state_size(self._arena.n_robots, 0)])
-        padded = np.zeros(self.state_space.shape, np.float32)
-        padded[: len(robots)] = robots
-        first_object = state_size(self._sampler.n_robots, 0)
-        padded[first_object : first_object + len(things)] = things
-        return padded
+        return self._arena.state()
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None

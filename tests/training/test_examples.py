@@ -16,6 +16,7 @@ NEEDS = {
     "agilerl_ppo": "agilerl",
     "benchmarl_ippo": "benchmarl",
     "cleanrl_ppo": "torch",
+    "mappo": "torch",
     "optuna_search": "optuna",
     "rllib_ppo": "ray",
     "sb3_contrib_recurrent_ppo": "sb3_contrib",

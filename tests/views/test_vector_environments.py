@@ -80,6 +80,26 @@ def test_infos_by_hand():
             assert not np.array_equal(infos["final_obs"][robot], obs[robot])
 
 
+def test_a_central_critic_has_the_state_now_and_at_the_end_of_a_run():
+    world = {"n_robots": 3, "max_cycles": 4}
+    twin = swarm_forage_env.parallel_env("warehouse_small", **world).unwrapped
+    envs = SwarmVectorEnv("warehouse_small", n_arenas=2, **world)
+    envs.reset(seed=7)
+    twin.reset(seed=8)
+    actions = np.ones((6, 3), np.float32)
+    for tick in range(4):
+        np.testing.assert_array_equal(envs.state()[1], twin.state())
+        *_, truncated, infos = envs.step(actions)
+        twin.step_batch(actions[:3])
+        assert ("final_info" in infos) == truncated.any() == (tick == 3)
+    told = infos["final_info"]
+    assert told["_state"].all()
+    for row in (3, 4, 5):
+        np.testing.assert_array_equal(told["state"][row], twin.state())
+    assert not np.array_equal(told["state"][0], told["state"][3])
+    assert not np.array_equal(envs.state()[1], twin.state())
+
+
 def test_seeds_per_arena_and_their_number():
     envs = SwarmVectorEnv("warehouse_small", num_envs=6, n_robots=3)
     one, _ = envs.reset(seed=[4, 9])
