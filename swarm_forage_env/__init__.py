@@ -4,7 +4,15 @@ Public names stand in `__init__.pyi` and load on first use. Importing the packag
 Gymnasium and PettingZoo, under ids such as `swarm_forage/warehouse_small-v0`.
 """
 
+import signal
+import sys
+from pathlib import Path
 from typing import Any
+
+if {"swarm-forage", "swarm_forage_env.cli"} & {Path(word).name for word in sys.orig_argv} and (
+    signal.getsignal(signal.SIGINT) is signal.default_int_handler
+):
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends the command quietly until `cli.hear` hears it
 
 import gymnasium
 import lazy_loader

@@ -66,6 +66,20 @@ def test_a_signal_ends_a_command_in_one_line(tmp_path, words, after_s, sent):
         assert [line[:25] for line in err.splitlines() if "nterrupt" in line] == ["swarm-forage: Interrupted"], err
 
 
+@pytest.mark.slow
+def test_ctrl_c_before_the_command_hears_is_quiet(tmp_path):
+    (tmp_path / "gymnasium.py").write_text("import time; print('asked', flush=True); time.sleep(60)")
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])}
+    command = [sys.executable, "-m", "swarm_forage_env.cli", "list"]
+    with subprocess.Popen(
+        command, text=True, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as started:
+        assert started.stdout.readline() == "asked\n"
+        started.send_signal(signal.SIGINT)
+        assert started.communicate(timeout=60) == ("", "")
+    assert started.returncode == -signal.SIGINT
+
+
 def test_what_a_library_swallows_is_raised_again(heard, monkeypatch, capsys):
     def careless(_):
         with suppress(BaseException):  # as some libraries do around imports
