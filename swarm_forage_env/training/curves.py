@@ -166,8 +166,7 @@ class Trainings(Answer):
     def _stage_ends(self) -> list[int]:
         """Decisions at which stages ended, after a whole rollout and with an evaluation; as planned where none is."""
         evaluated = [each.steps for each in self.trainings[0].evaluations]
-        planned = np.cumsum([stage.steps for stage in self.plan.stages]).tolist()
-        return [next((steps for steps in evaluated if steps >= end), end) for end in planned]
+        return [next((steps for steps in evaluated if steps >= end), end) for end in self.plan.ends]
 
     def _mean(self) -> tuple[list[int], FloatArray, FloatArray] | None:
         """The mean of those that are averaged, as far as all of them have come; None where there is none."""

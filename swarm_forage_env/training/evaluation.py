@@ -357,11 +357,10 @@ class Evaluator:
     def is_due(self, steps: int) -> bool:
         """Return whether an evaluation is due after so many decisions of single robots.
 
-        That is when `every_steps` of the plan have passed since the last one, and at the end of each stage.
+        That is when `every_steps` of the plan have passed since the last one, and at the end of each stage and start.
         """
         last = self.evaluations[-1].steps if self.evaluations else 0
-        ends = np.cumsum([stage.steps for stage in self.plan.stages])
-        return steps - last >= self.plan.evaluation.every_steps or bool(np.any((ends > last) & (ends <= steps)))
+        return steps - last >= self.plan.evaluation.every_steps or any(last < end <= steps for end in self.plan.ends)
 
     def evaluate(
         self, network: Network | None, steps: int, *, policy: Callable[[], Policy] | None = None

@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import accumulate
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -79,6 +80,8 @@ class TrainingPlan(Checked):
     options: Mapping[str, Any] = field(default_factory=dict)
     """Arguments of the algorithm's class; what is not here keeps the library's default."""
     stages: Annotated[tuple[Stage, ...], Meta(min_length=1)] = (Stage(steps=DEFAULT_STEPS),)
+    starts: Whole = 1
+    """How often the first stage is trained anew, one after the other; the best by its last evaluation goes on."""
     evaluation: EvaluationPlan = field(default_factory=EvaluationPlan)
     seed: Count = 0
     samples: bool = False
@@ -109,6 +112,8 @@ class TrainingPlan(Checked):
                 f"Expected a temperature for samples of {self.algorithm}, whose actions have values and no "
                 "probabilities; write a plan with one that is small beside a reward, for example 0.005."
             )
+        if self.starts > 1 and len(self.stages) == 1:
+            raise ConfigError(f"Expected a second stage for the best of {self.starts} starts, got one stage.")
         self._check_in_runs()
         self._check_worlds()
 
@@ -185,9 +190,19 @@ class TrainingPlan(Checked):
         return self.evaluation.worlds_of(self.world)
 
     @property
+    def parts(self) -> tuple[Stage, ...]:
+        """The stages as they are trained one after the other, the first as often as there are starts."""
+        return (self.stages[0],) * self.starts + self.stages[1:]
+
+    @property
+    def ends(self) -> tuple[int, ...]:
+        """Decisions of single robots up to the end of each part."""
+        return tuple(accumulate(stage.steps for stage in self.parts))
+
+    @property
     def total_steps(self) -> int:
-        """Decisions of single robots in all stages."""
-        return sum(stage.steps for stage in self.stages)
+        """Decisions of single robots in all parts."""
+        return self.ends[-1]
 
     def arenas_of(self, stage: Stage) -> dict[str, Any]:
         """Return the arguments of the vector environments of a stage, such as `SwarmVecEnv`."""

@@ -102,6 +102,7 @@ def test_plans_that_cannot_be_are_refused_with_their_file(tmp_path, old, new, re
         ({**PRESET, "stages": {"steps": 100}}, r"stages to be a list of tables, \[\[stages\]\]"),
         ({"sampler": TWO_WORLDS}, r"evaluation\.worlds beside a sampler"),
         ({"sampler": TWO_WORLDS, **PRESET}, "either sampler or scenario"),
+        ({**PRESET, "starts": 2}, "a second stage for the best of 2 starts"),
         (
             {**PRESET, "wrappers": {"sensor_noise": {"sigma": 0.1}}, "evaluation": {"worlds": [PRESET]}},
             "without wrappers beside samplers and evaluation.worlds",

@@ -19,6 +19,7 @@ from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.presets import warehouse_small
+from swarm_forage_env.training import evaluation
 from swarm_forage_env.training.evaluation import EvaluationPlan, EvaluationWorld, Evaluator, read_evaluations
 from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.sb3 import PresentReplayBuffer, training
@@ -155,6 +156,35 @@ def test_ctrl_c_before_the_first_evaluation_loses_nothing(tmp_path, monkeypatch)
     assert PPO.load(tmp_path / "model.zip").num_timesteps == 256
     result = train(plan, tmp_path, resume=True)
     assert [each.steps for each in result.evaluations] == [384, 768]
+
+
+@pytest.mark.parametrize("better", [0, 1])
+def test_the_better_of_two_starts_goes_on(tmp_path, monkeypatch, better):
+    """Killed in the second start's evaluation and stopped after its first rollout; all decisions count."""
+    plan = tiny_plan(starts=2, stages=(Stage(steps=128), Stage(steps=128, options={"learning_rate": 0.0})))
+    plan = dataclasses.replace(plan, evaluation=dataclasses.replace(plan.evaluation, every_steps=10_000))
+    monkeypatch.setattr(training, "_REPORT_EVERY_S", 0.0)
+    judge, ways, found = Evaluator.evaluate, ["stop", "kill"], {}
+
+    def stop(news):
+        if news.steps == 256 and ways[:1] == ["stop"]:
+            raise KeyboardInterrupt(ways.pop(0))
+
+    def judged(self, network, steps, **kwargs):
+        if steps == 256 and ways:
+            raise SystemExit(ways.pop(0))
+        found[steps] = network.weights[0]
+        return judge(self, network, steps, **kwargs)
+
+    monkeypatch.setattr(Evaluator, "evaluate", judged)
+    monkeypatch.setattr(evaluation, "reached_in", lambda *_: float([*found][-1] == 128 + 128 * better))
+    for error in (KeyboardInterrupt, SystemExit):
+        with pytest.raises(error):
+            train(plan, tmp_path, report=stop, resume=error is SystemExit)
+    result = train(plan, tmp_path, report=stop, resume=True)
+    assert (plan.total_steps, result.model.num_timesteps, [*found]) == (384, 384, [128, 256, 384])
+    assert not same(found[128], found[256])
+    assert same(found[384], found[128 + 128 * better])
 
 
 def test_extra_columns_and_rewards_reach_training_and_evaluations(tmp_path):

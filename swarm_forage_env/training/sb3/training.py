@@ -49,6 +49,10 @@ from swarm_forage_env.views.stable_baselines3 import SwarmVecEnv
 
 ALGORITHM_CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": SwarmPPO, "a2c": A2C, "dqn": DQN, "sac": SAC}
 """The class that carries out a plan, by the plan's word."""
+START_FILE = "start.zip"
+"""Checkpoint of the best start so far, of a training with several."""
+_PART = "swarm_forage_part"
+"""Attribute of a model: which of the plan's parts it is in."""
 _REPORT_EVERY_S = 1.0
 _MOST_WEIGHT = 1e6
 """Where torch fails over the outputs of a network, weights this large tell that the training diverged; our choice."""
@@ -136,17 +140,18 @@ def _train(
     plan: TrainingPlan, folder: Path, watch: "_Watch", callbacks: BaseCallback, extras: Mapping[str, Any]
 ) -> TrainingResult:
     """Train in a folder that is checked, and that nobody else writes to."""
-    model = _opened(plan, folder) if (folder / MODEL_FILE).exists() else None
+    model = _opened(plan, folder / MODEL_FILE) if (folder / MODEL_FILE).exists() else None
     begun = done = 0 if model is None else model.num_timesteps
-    end = 0
-    for number, stage in enumerate(plan.stages, 1):
-        end += stage.steps
-        is_last = number == len(plan.stages)
-        if done >= end and not (is_last and watch.evaluator.is_due(done)):
+    for part, (stage, end) in enumerate(zip(plan.parts, plan.ends, strict=True)):
+        latest = getattr(model, _PART, 0)
+        if done >= end and not (part == latest and watch.evaluator.is_due(done)):
             continue
         env = SwarmVecEnv(**plan.arenas_of(stage), **extras)
         try:
-            model = _prepared(plan, stage, folder, env, done)
+            checkpoint = None if model is None else _checkpoint(plan, folder, latest, part, watch.evaluator)
+            model = _prepared(plan, stage, folder, env, done, checkpoint)
+            setattr(model, _PART, part)
+            number = max(1, part + 2 - plan.starts)
             _learn(model, max(0, end - done), callbacks, watch, f"stage {number}{_changes(stage)}")
         finally:
             env.close()
@@ -160,6 +165,21 @@ def _train(
         policy_file=folder / POLICY_FILE if plan.algorithm in EXPORTABLE else None,
         steps=done - begun,
     )
+
+
+def _checkpoint(plan: TrainingPlan, folder: Path, latest: int, part: int, evaluator: Evaluator) -> Path | None:
+    """Return what a part begins with when the latest checkpoint is of another part, or of itself; None = a new model.
+
+    The best start so far is kept beside the checkpoint.
+    """
+    if plan.starts == 1 or latest == part or latest >= plan.starts:
+        return folder / MODEL_FILE
+    ends = plan.ends[: latest + 1]
+    reached = [next(each.reached for each in evaluator.evaluations if each.steps >= end) for end in ends]
+    if reached[-1] == max(reached):
+        with replacing(folder / START_FILE) as draft:
+            draft.write_bytes((folder / MODEL_FILE).read_bytes())
+    return folder / START_FILE if part == plan.starts else None
 
 
 def check_plan(plan: TrainingPlan) -> None:
@@ -198,9 +218,8 @@ def check_place(folder: Path, plan: TrainingPlan, *, resume: bool) -> None:
         )
 
 
-def _opened(plan: TrainingPlan, folder: Path, **options: Any) -> BaseAlgorithm:
-    """Return the checkpoint, with other options."""
-    path = folder / MODEL_FILE
+def _opened(plan: TrainingPlan, path: Path, **options: Any) -> BaseAlgorithm:
+    """Return a checkpoint, with other options."""
     try:
         return ALGORITHM_CLASSES[plan.algorithm].load(path, device="cpu", **options)
     except Exception as error:  # torch and the library raise many kinds
@@ -208,18 +227,21 @@ def _opened(plan: TrainingPlan, folder: Path, **options: Any) -> BaseAlgorithm:
         raise ConfigError(f"Cannot open the checkpoint {path}: {reason}; train anew in another folder.") from error
 
 
-def _prepared(plan: TrainingPlan, stage: Stage, folder: Path, env: SwarmVecEnv, done: int) -> BaseAlgorithm:
-    """Return the model for a stage: a new one, or the checkpoint with the options of the stage."""
+def _prepared(
+    plan: TrainingPlan, stage: Stage, folder: Path, env: SwarmVecEnv, done: int, checkpoint: Path | None
+) -> BaseAlgorithm:
+    """Return the model for a stage: a new one, or a checkpoint with the options of the stage."""
     env.set_options({"scenario": stage.scenario})
     options: dict[str, Any] = {**plan.options, **stage.options, "seed": training_seed(plan.seed, done)}
     options["tensorboard_log"] = str(folder / "tensorboard") if importlib.util.find_spec("tensorboard") else None
-    if (folder / MODEL_FILE).exists():
-        model = _opened(plan, folder, env=env, **options)
+    if checkpoint is not None:
+        model = _opened(plan, checkpoint, env=env, **options)
     else:
         try:
             model = ALGORITHM_CLASSES[plan.algorithm](env=env, device="cpu", **_arguments(plan, env), **options)
         except (AssertionError, TypeError, ValueError) as error:  # how the library refuses values
             raise ConfigError(f"Cannot prepare {plan.algorithm} with its options: {error}") from error
+    model.num_timesteps = done  # those of other starts, too
     note_interface(model, plan.interface, caches=plan.scenario.caches, samples=plan.samples)
     return model
 
