@@ -7,6 +7,10 @@ no run: it puts the present style sheet and scripts around the runs of the store
 change of the page. Needs the render extra.
 """
 
+import base64
+import html
+import json
+import re
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +19,8 @@ from typing import Any
 from swarm_forage_env import RunSpec, plan_run, scenario
 from swarm_forage_env.inspect.film import record_run
 from swarm_forage_env.inspect.replay.capture import record_replay
-from swarm_forage_env.inspect.replay.files import read_replays, write_replays
+from swarm_forage_env.inspect.replay.files import write_replays
+from swarm_forage_env.rendering.pages import build_replay_page
 from swarm_forage_env.scenarios.config import ScenarioConfig
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
@@ -215,7 +220,11 @@ def show(exhibit: Exhibit) -> None:
 def renew(exhibit: Exhibit) -> None:
     """Write the replay of an exhibit with the present page around its stored runs."""
     path = FOLDER / f"{exhibit.name}.html"
-    write_replays(path, read_replays(path))
+    text = path.read_text(encoding="utf-8")
+    (title,) = re.findall("<title>(.*?)</title>", text)
+    header, *blocks = re.findall(r'<script type="(?:application/json|text/plain)"[^>]*>(.*?)</script>', text)
+    page = build_replay_page(html.unescape(title), json.loads(header), [base64.b64decode(block) for block in blocks])
+    path.write_text(page, encoding="utf-8")
 
 
 def page() -> str:

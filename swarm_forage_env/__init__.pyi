@@ -42,7 +42,6 @@ from .wrappers.recorder import RunRecorder as RunRecorder
 
 # replays, films and figures
 from .inspect.replay.capture import record_replay as record_replay
-from .inspect.replay.files import read_replays as read_replays
 from .inspect.replay.files import write_replays as write_replays
 from .inspect.film import record_run as record_run
 from .rendering.figures import FigureStyle as FigureStyle

@@ -34,7 +34,6 @@ def record_run(
     fps: float = 20.0,
     size_px: int = 900,
     trail_s: float = 20.0,
-    theme: str = "dark",
     caches: str | None = None,
     parameters: Mapping[str, Any] | None = None,
     progress: Callable[[int, int], None] | None = None,
@@ -52,7 +51,6 @@ def record_run(
         fps: Pictures per second of film.
         size_px: Longer side of the drawn arena.
         trail_s: Simulated time over which the robots' trails fade; 0 for none.
-        theme: "dark" or "light".
         caches: "none", "static" or "dynamic"; default what the policy states in `caches`, or what the scenario has if
             the policy states nothing.
         parameters: Keyword arguments of a policy that is given by name or path.
@@ -79,15 +77,15 @@ def record_run(
     else:
         raise ConfigError(f"Expected a picture's path to end in .png, got {str(path)!r}; for a film, leave --at out.")
     check_file(path)
-    arena_view(given.scenario, size_px, theme)  # refuses a bad size or theme before the run starts
+    arena_view(given.scenario, size_px)  # refuses a bad size before the run starts
     given, name, driver = _driven(given, policy, caches, parameters)
     arena = given.scenario.arena
-    look = {"title": given.title(name, f"{arena.width_m:g} x {arena.height_m:g} m"), "size_px": size_px, "theme": theme}
+    look = {"title": given.title(name, f"{arena.width_m:g} x {arena.height_m:g} m"), "size_px": size_px}
     run = LiveRun(build_env(given.scenario, given.wrappers, reads=getattr(driver, "reads", None)), driver, seed)
     trails = Trails(given.n_robots, n_samples) if n_samples > 1 else None
     pictures = _pictures(run, ticks, shown[0], trails, progress, look)
     if at_s is None:
-        write_film(pictures, path, fps=fps, theme=theme)
+        write_film(pictures, path, fps=fps)
     else:
         write_picture(next(pictures), path)
     return path

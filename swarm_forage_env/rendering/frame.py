@@ -73,7 +73,6 @@ def render_frame(
     size_px: int = 900,
     trails: Trails | None = None,
     title: str | None = None,
-    theme: str = "dark",
 ) -> NDArray[np.uint8]:
     """Draw the world. Reads the state, never writes it; equal states give equal pictures.
 
@@ -93,29 +92,28 @@ def render_frame(
         size_px: Longer side of the drawn arena in pixels; a header and a legend come on top.
         trails: Past positions to draw as fading lines.
         title: Headline; default the scenario's name and size.
-        theme: "dark" or "light".
 
     Returns:
         (H, W, 3) uint8 picture, first row at the top.
 
     Raises:
-        ConfigError: `size_px` out of range, no such theme, or trails of another number of robots.
+        ConfigError: `size_px` out of range, or trails of another number of robots.
         ImportError: Pillow is not installed.
     """
-    view = arena_view(scenario, size_px, theme)
-    image = _ground(scenario, size_px, theme).copy()
+    view = arena_view(scenario, size_px)
+    image = _ground(scenario, size_px).copy()
     if trails is not None:
         _draw_trails(image, view, trails, len(swarm.heading))
-    pen = _Pen(image, view.palette)
+    pen = _Pen(image)
     there = caches.alive
     places = [*zip(view.pixels((caches.cell[there] + 0.5) * CELL_M).tolist(), caches.count[there], strict=True)]
     for (x, y), _ in places:
         pen.sign("cache", x, y, scenario.cache_side_cells * CELL_M * view.scale / 2, line=max(1.0, 1.5 * view.unit))
     for x, y in view.pixels((objects.cell[objects.status == ObjectStatus.FREE] + 0.5) * CELL_M).tolist():
-        pen.square(x, y, view.object_px, view.palette.object)
+        pen.square(x, y, view.object_px, Palette.object)
     _draw_robots(pen, view, swarm, events)
     for (x, y), n_objects in places:
-        pen.text(x, y, str(n_objects), view.palette.text, 1.5 * view.text_px, "mm", rim=view.palette.floor)
+        pen.text(x, y, str(n_objects), Palette.text, 1.5 * view.text_px, "mm", rim=Palette.floor)
     _write_header(pen, view, scenario, swarm, events, tick, title)
     return np.asarray(image.reduce(DETAIL))
 
@@ -123,11 +121,10 @@ def render_frame(
 class _Pen:
     """Draws on an image of `DETAIL` times the size; places and lengths are pixels of the finished picture."""
 
-    def __init__(self, image: "Image.Image", palette: Palette) -> None:
+    def __init__(self, image: "Image.Image") -> None:
         from PIL import ImageDraw
 
         self._draw = ImageDraw.Draw(image, "RGBA")
-        self._colours = palette
 
     def box(self, box: Box, colour: Colour, opacity: float = 1.0) -> None:
         left, top, right, bottom = (round(DETAIL * edge) for edge in box)
@@ -168,71 +165,69 @@ class _Pen:
 
     def sign(self, name: str, x: float, y: float, radius: float, *, heading: float = 0.0, line: float = 1.0) -> None:
         """Draw a thing by its name in the legend."""
-        colours = self._colours
         box = (x - radius, y - radius, x + radius, y + radius)
         if name in ("empty", "carrying"):
-            colour = colours.empty if name == "empty" else colours.carrying
+            colour = Palette.empty if name == "empty" else Palette.carrying
             if radius >= _SMALLEST_DETAILED_PX:  # a rim separates robots that touch
-                self.disc(x, y, radius + max(0.5, 0.22 * radius), colours.floor)
+                self.disc(x, y, radius + max(0.5, 0.22 * radius), Palette.floor)
                 ahead, aside = 2.1 * radius * math.cos(heading), -2.1 * radius * math.sin(heading)
                 self.line((x, y, x + ahead, y + aside), 0.5 * radius, colour)
             self.disc(x, y, radius, colour)
             if name == "carrying":
-                self.square(x, y, 0.85 * radius, colours.object)
+                self.square(x, y, 0.85 * radius, Palette.object)
         elif name == "in interference":
-            self.ring(x, y, 1.55 * radius + 0.5, max(1.5, 0.4 * radius), colours.interference)
+            self.ring(x, y, 1.55 * radius + 0.5, max(1.5, 0.4 * radius), Palette.interference)
         elif name == "in repair":
-            self.ring(x, y, 0.8 * radius, 0.4 * radius, colours.repair)
+            self.ring(x, y, 0.8 * radius, 0.4 * radius, Palette.repair)
         elif name == "dead":
             half = 0.75 * radius
-            self.line((x - half, y - half, x + half, y + half), 0.4 * radius, colours.repair)
-            self.line((x - half, y + half, x + half, y - half), 0.4 * radius, colours.repair)
+            self.line((x - half, y - half, x + half, y + half), 0.4 * radius, Palette.repair)
+            self.line((x - half, y + half, x + half, y - half), 0.4 * radius, Palette.repair)
         elif name == "object":
-            self.square(x, y, 1.2 * radius, colours.object)
+            self.square(x, y, 1.2 * radius, Palette.object)
         elif name == "obstacle":
-            self.box(box, colours.wall)
+            self.box(box, Palette.wall)
         elif name == "source":
-            self.box(box, colours.source, 4 * SOURCE_OPACITY)
+            self.box(box, Palette.source, 4 * SOURCE_OPACITY)
         else:
-            colour, opacity = (colours.nest, NEST_OPACITY) if name == "nest" else (colours.cache, CACHE_OPACITY)
+            colour, opacity = (Palette.nest, NEST_OPACITY) if name == "nest" else (Palette.cache, CACHE_OPACITY)
             self.box(box, colour, opacity)
             self.frame(box, line, colour)
 
 
 @lru_cache(maxsize=4)
-def _ground(scenario: ScenarioConfig, size_px: int, theme: str) -> "Image.Image":
+def _ground(scenario: ScenarioConfig, size_px: int) -> "Image.Image":
     """Return what never changes during a run, at `DETAIL` times the size."""
     from PIL import Image
 
-    view, arena = arena_view(scenario, size_px, theme), scenario.arena
-    colours = view.palette
-    image = Image.new("RGB", (DETAIL * view.width, DETAIL * view.height), colours.page)
-    pen = _Pen(image, colours)
+    view, arena = arena_view(scenario, size_px), scenario.arena
+    image = Image.new("RGB", (DETAIL * view.width, DETAIL * view.height), Palette.page)
+    pen = _Pen(image)
     outer = view.box((-WALL_M, -WALL_M, arena.width_m + WALL_M, arena.height_m + WALL_M))
     inner, line = view.box(arena.interior_m), 2.0 * view.unit  # walls of huge arenas would vanish
-    pen.box(outer, colours.wall)
+    pen.box(outer, Palette.wall)
     lows = max(inner[0], outer[0] + line), max(inner[1], outer[1] + line)
-    pen.box((*lows, min(inner[2], outer[2] - line), min(inner[3], outer[3] - line)), colours.floor)
+    pen.box((*lows, min(inner[2], outer[2] - line), min(inner[3], outer[3] - line)), Palette.floor)
     if scenario.objects.placement != "power_law":  # its clusters are drawn anew in each run
         for left, low, right, high in scenario.source_cells:
             box = view.box((CELL_M * left, CELL_M * low, CELL_M * right, CELL_M * high))
-            pen.box(box, colours.source, SOURCE_OPACITY)
+            pen.box(box, Palette.source, SOURCE_OPACITY)
     for nest in map(view.box, arena.nest_boxes_m):
-        pen.box(nest, colours.floor)  # a source may reach under a nest
-        pen.box(nest, colours.nest, NEST_OPACITY)
-        pen.frame(nest, max(1.0, 1.5 * view.unit), colours.nest)
+        pen.box(nest, Palette.floor)  # a source may reach under a nest
+        pen.box(nest, Palette.nest, NEST_OPACITY)
+        pen.frame(nest, max(1.0, 1.5 * view.unit), Palette.nest)
     for box in arena.obstacles:
-        pen.box(view.box(box), colours.wall)
+        pen.box(view.box(box), Palette.wall)
     for x, y in view.pixels(np.asarray(arena.lights_m)[:, :2]).tolist():
         for ring in range(12):
-            pen.disc(x, y, 22.0 * view.unit * (12 - ring) / 12, colours.light, 0.03)
-        pen.disc(x, y, max(1.5, 3.0 * view.unit), colours.light)
+            pen.disc(x, y, 22.0 * view.unit * (12 - ring) / 12, Palette.light, 0.03)
+        pen.disc(x, y, max(1.5, 3.0 * view.unit), Palette.light)
     _draw_legend(pen, view, scenario)
     return image
 
 
 def _draw_legend(pen: _Pen, view: View, scenario: ScenarioConfig) -> None:
-    text_px, colour = view.text_px, view.palette.faint_text
+    text_px, colour = view.text_px, Palette.faint_text
     top = view.bottom + WALL_M * view.scale
     rows = legend_rows(scenario, view.width, view.scale)
     for name, x, y in (entry for row in rows for entry in row):
@@ -258,7 +253,7 @@ def _draw_trails(image: "Image.Image", view: View, trails: Trails, n_robots: int
     ends = DETAIL * view.pixels(np.concatenate((trails.position[:-1], trails.position[1:]), axis=2).reshape(-1, 2))
     ends = ends.reshape(n_samples - 1, n_robots, 4)
     width = max(1, round(DETAIL * max(0.8, 0.4 * view.robot_px)))
-    for loaded, colour in ((False, view.palette.empty), (True, view.palette.carrying)):
+    for loaded, colour in ((False, Palette.empty), (True, Palette.carrying)):
         share = Image.new("L", image.size)
         pen = ImageDraw.Draw(share)
         for sample in range(n_samples - 1):
@@ -284,7 +279,7 @@ def _draw_robots(pen: _Pen, view: View, swarm: SwarmState, events: StepEvents) -
         for robot in np.flatnonzero(rows).tolist():
             pen.sign(name, *places[robot], view.robot_px, heading=heading[robot])
     for robot in np.flatnonzero(shown["in repair"] & carrying).tolist():
-        pen.square(*places[robot], 0.85 * view.robot_px, view.palette.object)
+        pen.square(*places[robot], 0.85 * view.robot_px, Palette.object)
 
 
 def _write_header(
@@ -310,11 +305,11 @@ def _write_header(
     lines, size = _headline(headline, margin, room - text_width(f"{clock}  ", 1.35 * margin), 0.6 * view.header)
     for k, line in enumerate(lines):
         y = 0.33 * view.header + (k - (len(lines) - 1) / 2) * 1.2 * size
-        pen.text(margin, y, line, view.palette.text, size, "lm")
-    pen.text(margin + room, 0.33 * view.header, clock, view.palette.text, size, "rm")
+        pen.text(margin, y, line, Palette.text, size, "lm")
+    pen.text(margin + room, 0.33 * view.header, clock, Palette.text, size, "rm")
     size = _fitting(f"{done}    {now}", margin, room)
-    pen.text(margin, 0.75 * view.header, done, view.palette.faint_text, size, "lm")
-    pen.text(margin + room, 0.75 * view.header, now, view.palette.faint_text, size, "rm")
+    pen.text(margin, 0.75 * view.header, done, Palette.faint_text, size, "lm")
+    pen.text(margin + room, 0.75 * view.header, now, Palette.faint_text, size, "rm")
 
 
 def _headline(words: str, text_px: float, width: float, height: float) -> tuple[list[str], float]:

@@ -1,6 +1,6 @@
 """The replay page and the page to play with, each one HTML file that loads nothing from elsewhere.
 
-The replay page is made of a style sheet, scripts and data, and gives the data back. Its parts lie in `replay_page`.
+The replay page is made of a style sheet, scripts and data. Its parts lie in `replay_page`.
 Data are a header in JSON and one block of bytes per run, in base64. The page to play with draws with the scripts and
 the style sheet of the replay page; what it has beside them lies in `play_page`.
 """
@@ -8,14 +8,10 @@ the style sheet of the replay page; what it has beside them lies in `play_page`.
 import base64
 import html
 import json
-import re
 from functools import cache
 from importlib import resources
 from string import Template
 from typing import Any
-
-from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.files import parse_json
 
 SHARED_SCRIPTS = (
     "theme.js",
@@ -35,8 +31,6 @@ _POLICY = (
     '<meta http-equiv="Content-Security-Policy" '
     "content=\"default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:\">"
 )
-_HEADER = re.compile(r'<script type="application/json" id="header">(.*?)</script>', re.DOTALL)
-_DATA = re.compile(r'<script type="text/plain" class="run">(.*?)</script>', re.DOTALL)
 
 
 def build_replay_page(title: str, header: dict[str, Any], blocks: list[bytes]) -> str:
@@ -54,19 +48,6 @@ def build_replay_page(title: str, header: dict[str, Any], blocks: list[bytes]) -
         f'<script type="text/plain" class="run">{base64.b64encode(one).decode("ascii")}</script>' for one in blocks
     ]
     return _page(html.escape(title), "replay_page", REPLAY_SCRIPTS, policy=_POLICY, data="\n".join(data))
-
-
-def take_replay_page_apart(text: str) -> tuple[dict[str, Any], list[bytes]]:
-    """Return header and blocks of a page, as they were given to `build_replay_page`.
-
-    Raises:
-        ConfigError: there is no header.
-        ValueError: the header or a block is damaged.
-    """
-    found = _HEADER.search(text)
-    if found is None or not text.rstrip().endswith("</html>"):
-        raise ConfigError("it is no replay page or cut short")
-    return parse_json(found[1]), [base64.b64decode(block, validate=True) for block in _DATA.findall(text)]
 
 
 def build_play_page() -> str:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from swarm_forage_env._internal.fields import ConfigError, number
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.wording import install_command
-from swarm_forage_env.rendering.view import CACHE_OPACITY, NEST_OPACITY, SOURCE_OPACITY, THEMES, Colour, Palette
+from swarm_forage_env.rendering.view import CACHE_OPACITY, NEST_OPACITY, SOURCE_OPACITY, Colour, Palette
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -45,7 +45,7 @@ def check_film(path: Path, fps: float, n_frames: int) -> None:
         )
 
 
-def write_film(frames: Iterable[Frame], path: Path, *, fps: float, theme: str = "dark") -> None:
+def write_film(frames: Iterable[Frame], path: Path, *, fps: float) -> None:
     """Write pictures as a film, whole or not at all; the suffix of `path`, as in `check_film`, chooses the format.
 
     GIFs use one palette made for this package's pictures, without dithering, and store only what changed from frame to
@@ -56,20 +56,19 @@ def write_film(frames: Iterable[Frame], path: Path, *, fps: float, theme: str = 
         frames: (H, W, 3) uint8 pictures of equal size, consumed one at a time.
         path: Ends in .gif or .mp4; a missing folder is made.
         fps: Pictures per second.
-        theme: That of the pictures, whose colours a GIF keeps.
     """
     suffix = path.suffix.lower()
     with replacing(path, ending=suffix) as draft:
         if suffix == ".gif":
-            _write_gif(frames, draft, fps, THEMES[theme])
+            _write_gif(frames, draft, fps)
         else:
             _write_mp4(frames, draft, fps)
 
 
-def _write_gif(frames: Iterable[Frame], path: Path, fps: float, colours: Palette) -> None:
+def _write_gif(frames: Iterable[Frame], path: Path, fps: float) -> None:
     from PIL import Image
 
-    palette = _gif_palette(colours)
+    palette = _gif_palette()
     pictures = (Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
     next(pictures).save(
         path,
@@ -82,21 +81,21 @@ def _write_gif(frames: Iterable[Frame], path: Path, fps: float, colours: Palette
     )
 
 
-def _gif_palette(colours: Palette) -> "Image.Image":
+def _gif_palette() -> "Image.Image":
     """Colours of our pictures: grounds, things on them, and the mixtures that soft edges and fading need most.
 
     There are fewer than 256, since one index means "unchanged".
     """
     from PIL import Image
 
-    floor = colours.floor
-    tints = ((colours.nest, NEST_OPACITY), (colours.cache, CACHE_OPACITY), (colours.source, SOURCE_OPACITY))
-    grounds = (floor, colours.page, colours.wall, *(_mix(floor, colour, share) for colour, share in tints))
-    things = (colours.empty, colours.carrying, colours.interference, colours.text, colours.object, colours.repair)
-    things += (colours.nest, colours.cache, colours.light)
+    floor = Palette.floor
+    tints = ((Palette.nest, NEST_OPACITY), (Palette.cache, CACHE_OPACITY), (Palette.source, SOURCE_OPACITY))
+    grounds = (floor, Palette.page, Palette.wall, *(_mix(floor, colour, share) for colour, share in tints))
+    things = (Palette.empty, Palette.carrying, Palette.interference, Palette.text, Palette.object, Palette.repair)
+    things += (Palette.nest, Palette.cache, Palette.light)
     mixed = [_mix(ground, thing, share) for share, ground, thing in product((1.0, 0.5, 0.25, 0.75), grounds, things)]
     fading = [_mix(floor, thing, share) for thing, share in product(things[:2], (0.06, 0.12, 0.18, 0.37))]
-    glow = [_mix(grounds[3], colours.light, share) for share in (0.06, 0.12, 0.18, 0.31)]
+    glow = [_mix(grounds[3], Palette.light, share) for share in (0.06, 0.12, 0.18, 0.31)]
     chosen = list(dict.fromkeys([*grounds, *fading, *glow, *mixed]))[:255]
     picture = Image.new("P", (1, 1))
     picture.putpalette([channel for entry in chosen for channel in entry])

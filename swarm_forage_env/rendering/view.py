@@ -1,6 +1,6 @@
 """How a picture is laid out: colours, fonts, and where the arena and the legend go.
 
-Robots, objects and caches are bright on a dark floor, or dark on a light one (our choice). The colours differ for
+Robots, objects and caches are bright on a dark floor (our choice). The colours differ for
 readers with the common forms of colour blindness, and shape is a second sign: interference is a ring, repair a hollow
 disc.
 """
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swarm_forage_env._internal.fields import one_of, whole
+from swarm_forage_env._internal.fields import whole
 from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -33,9 +33,8 @@ _REFERENCE_PX = 900.0
 """Picture width for which text and symbol sizes are given; other widths scale them."""
 
 
-@dataclass(frozen=True, slots=True)
 class Palette:
-    """Colours of everything that is drawn; the defaults are for a dark floor."""
+    """Colours of everything that is drawn."""
 
     page: Colour = (13, 17, 23)
     floor: Colour = (24, 31, 42)
@@ -53,26 +52,6 @@ class Palette:
     faint_text: Colour = (150, 160, 176)
 
 
-THEMES = {
-    "dark": Palette(),
-    "light": Palette(
-        page=(238, 241, 245),
-        floor=(251, 252, 253),
-        wall=(154, 167, 182),
-        nest=(10, 143, 120),
-        light=(199, 154, 0),
-        source=(150, 105, 10),
-        cache=(100, 30, 200),
-        object=(152, 104, 30),
-        empty=(18, 118, 211),
-        carrying=(230, 144, 0),
-        interference=(210, 23, 87),
-        repair=(135, 147, 161),
-        text=(23, 32, 44),
-        faint_text=(90, 102, 117),
-    ),
-}
-"""Name of a theme -> its colours: dark for screens, light for paper."""
 NEST_OPACITY = 0.30
 SOURCE_OPACITY = 0.07
 CACHE_OPACITY = 0.22
@@ -97,7 +76,6 @@ class View:
     """Radius that robots are drawn with."""
     object_px: float
     """Side that objects are drawn with."""
-    palette: Palette
 
     @property
     def unit(self) -> float:
@@ -120,15 +98,14 @@ class View:
 
 
 @lru_cache(maxsize=8)
-def arena_view(scenario: ScenarioConfig, size_px: int = 900, theme: str = "dark") -> View:
+def arena_view(scenario: ScenarioConfig, size_px: int = 900) -> View:
     """Return where `render_frame` puts the arena in its picture.
 
     Raises:
-        ConfigError: `size_px` is not a whole number in [240, 4000], or there is no such theme.
+        ConfigError: `size_px` is not a whole number in [240, 4000].
         ImportError: Pillow is not installed (the legend's height depends on its text).
     """
     whole("size_px", size_px, at_least=MIN_SIZE_PX, at_most=MAX_SIZE_PX)
-    one_of("theme", theme, THEMES)
     arena = scenario.arena
     width_m, height_m = arena.width_m + 2 * WALL_M, arena.height_m + 2 * WALL_M
     scale = size_px / max(width_m, height_m)
@@ -150,7 +127,6 @@ def arena_view(scenario: ScenarioConfig, size_px: int = 900, theme: str = "dark"
         header=header,
         robot_px=max(scenario.robots.radius_m * scale, min(4.6 * grow, max(least_px, 0.065 * robot_gap))),
         object_px=max(0.9 * CELL_M * scale, min(2.6 * grow, max(0.8, 0.35 * object_gap))),
-        palette=THEMES[theme],
     )
 
 

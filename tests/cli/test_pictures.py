@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from swarm_forage_env.inspect import film
-from swarm_forage_env.inspect.replay.files import read_replays
 from swarm_forage_env.policies import pretrained
 from swarm_forage_env.runs.record import Record
+from tests.reference.replay_arrays import runs_of
 
 
 def test_maps_of_policies_need_no_page(command):
@@ -57,13 +57,12 @@ def test_replay_shows_runs_of_one_world_and_seed_side_by_side(command):
     words = ("--seed", "7", "--wrapper", "throttle:waveform=constant,amplitude=0.2")
     code, _, err = command("replay", "stochm", "crw", "mine.npz", *SHORT, *words, "--file", "a.html")
     assert (code, err) == (0, "")
-    replays = read_replays("a.html")
-    assert [replay.label for replay in replays] == ["stochm", "crw", "mine"]
-    assert [replay.scenario.caches for replay in replays] == ["static", "none", "none"]
-    assert {replay.spec.seed for replay in replays} == {7}
-    assert [list(replay.signals) for replay in replays] == [["throttle"]] * 3
-    starts = {replay.position[0].tobytes() for replay in replays}
-    assert len(starts) == 1
+    runs = runs_of(Path("a.html"))
+    assert [about["label"] for about, _ in runs] == ["stochm", "crw", "mine"]
+    assert [about["world"]["caches"] for about, _ in runs] == ["static", "none", "none"]
+    assert {about["seed"] for about, _ in runs} == {7}
+    assert [[one["name"] for one in about["signals"]] for about, _ in runs] == [["throttle"]] * 3
+    assert len({arrays["position"][0].tobytes() for _, arrays in runs}) == 1
 
 
 def test_replay_makes_a_stored_run_again(command):
@@ -72,9 +71,9 @@ def test_replay_makes_a_stored_run_again(command):
     stored = Record.read(file)
     code, out, err = command("replay", str(file))
     assert (code, err) == (0, "")
-    (replay,) = read_replays(out.split()[1])
-    assert replay.spec.run_id == stored.run_id
-    assert replay.counters[-1, 0] == stored["collected"].sum()
+    ((about, arrays),) = runs_of(Path(out.split()[1]))
+    assert about["run_id"] == stored.run_id
+    assert arrays["counters"][-1, 0] == stored["collected"].sum()
     for beside in (("crw",), ("--seed", "3"), ("--robots", "2")):
         code, _, err = command("replay", str(file), *beside)
         assert (code, err.count("\n")) == (2, 1)

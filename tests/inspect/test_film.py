@@ -10,7 +10,7 @@ from swarm_forage_env.inspect import film as film_module
 from swarm_forage_env.inspect.film import record_run
 from swarm_forage_env.policies.registry import RandomPolicy, load_policy
 from swarm_forage_env.rendering.video import write_film
-from swarm_forage_env.rendering.view import THEMES
+from swarm_forage_env.rendering.view import Palette
 from swarm_forage_env.runs.run import run_policy
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import scenario
@@ -27,8 +27,8 @@ ImageSequence = pytest.importorskip("PIL.ImageSequence")
 def pictures(n_frames: int, height: int = 60, width: int = 81):
     """A blue square that crosses the floor."""
     for frame in range(n_frames):
-        picture = np.full((height, width, 3), THEMES["dark"].floor, np.uint8)
-        picture[20:30, 2 * frame : 2 * frame + 10] = THEMES["dark"].empty
+        picture = np.full((height, width, 3), Palette.floor, np.uint8)
+        picture[20:30, 2 * frame : 2 * frame + 10] = Palette.empty
         yield picture
 
 
@@ -54,7 +54,7 @@ def test_an_mp4_has_every_picture_even_of_odd_size(tmp_path):
     with imageio.get_reader(tmp_path / "film.MP4") as film:
         shown = film.get_data(5)
     assert shown.shape == (60, 82, 3)
-    assert shown[25, 15] == pytest.approx(THEMES["dark"].empty, abs=30)
+    assert shown[25, 15] == pytest.approx(Palette.empty, abs=30)
 
 
 class Witness(RandomPolicy):

@@ -10,7 +10,6 @@ from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.inspect.play import session as playing
 from swarm_forage_env.inspect.play.levels import LEVELS
 from swarm_forage_env.inspect.play.session import SPEEDS, PlaySession, Setting
-from swarm_forage_env.inspect.replay.files import read_replays
 from swarm_forage_env.inspect.replay.frames import Status
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import plan_run
@@ -19,6 +18,7 @@ from swarm_forage_env.wrappers.noise import SensorNoiseConfig
 from swarm_forage_env.wrappers.throttle import ThrottleConfig
 from swarm_forage_env.wrappers.waveform import Waveform
 from swarm_forage_env.wrappers.world import World
+from tests.reference.replay_arrays import runs_of
 
 ROOM = {"width_m": 8.0, "height_m": 8.0, "nest_centre_m": (1.0, 4.0), "nest_size_m": (1.6, 4.0), "n_objects": 40}
 SMALL = scenario("warehouse_small", n_robots=8, horizon_s=400.0, interval_s=100.0, **ROOM)
@@ -178,7 +178,7 @@ def test_the_curve_adds_up_to_what_was_counted():
     assert len(frame["deliveries"]) <= counted(frame)
 
 
-def test_a_run_is_saved_as_a_replay_and_goes_on(tmp_path):
+def test_a_run_is_saved_as_a_replay_and_goes_on():
     session, clock = session_of()
     with pytest.raises(ConfigError, match="let it go on"):
         session.replay_page()
@@ -191,12 +191,11 @@ def test_a_run_is_saved_as_a_replay_and_goes_on(tmp_path):
     name, page = session.replay_page()
     assert name.startswith("warehouse_small")
     assert name.endswith("_crw.html")
-    (tmp_path / name).write_text(page)
-    (replay,) = read_replays(tmp_path / name)
-    assert (replay.end_tick, replay.n_frames) == (1000, 201)
-    assert replay.label == "crw, changed by hand: robot 1 killed, throttle 0.3"
-    assert replay.has(Status.ABSENT)[-1].tolist() == [False, True] + 6 * [False]
-    assert replay.signals["throttle"][[0, -1]].tolist() == pytest.approx([0.0, 0.3])
-    assert len(replay.deliveries) == replay.counters[-1, Counter.COLLECTED]
+    ((about, arrays),) = runs_of(page)
+    assert (about["end_tick"], about["n_frames"]) == (1000, 201)
+    assert about["label"] == "crw, changed by hand: robot 1 killed, throttle 0.3"
+    assert (arrays["status"][-1] & Status.ABSENT != 0).tolist() == [False, True] + 6 * [False]
+    assert arrays["signal_throttle"][[0, -1]].tolist() == pytest.approx([0.0, 0.3])
+    assert len(arrays["deliveries"]) == arrays["counters"][-1, Counter.COLLECTED]
     session.carry_out({"do": "play"})
     assert look_after(session, clock, 2.0)["over"]

@@ -8,7 +8,6 @@ import pytest
 
 from metrics.benchmark import BenchmarkError, load_protocol, read_entry
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.inspect.replay.files import FORMAT_VERSION, read_replays
 from swarm_forage_env.policies.network import Network, NetworkError
 from swarm_forage_env.runs.record import RecordError
 from swarm_forage_env.runs.store import read_failure
@@ -56,9 +55,7 @@ def in_network(**changed):
     return change
 
 
-VERSION = in_text(f'"version": {FORMAT_VERSION},', '"version": 99,')
 OTHER = [
-    ("replay.html", "", VERSION, read_replays, ConfigError, f"version 99 of the format, .* reads {FORMAT_VERSION}; "),
     ("dataset", "dataset.json", in_json(), Dataset, DatasetError, "'colour'"),
     ("network.npz", "", in_network(gates=1), Network.load, NetworkError, "Unknown key about a network 'gates'"),
     ("network.npz", "", in_network(interface={"colour": 1}), Network.load, NetworkError, "Unknown"),

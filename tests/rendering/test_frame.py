@@ -1,6 +1,8 @@
 """Pictures of hand-built states: what is where, in which colour, and that drawing changes no state."""
 
+import base64
 import copy
+import json
 import re
 import sys
 from importlib import resources
@@ -18,13 +20,12 @@ from swarm_forage_env.rendering.pages import (
     SHARED_SCRIPTS,
     build_play_page,
     build_replay_page,
-    take_replay_page_apart,
 )
 from swarm_forage_env.rendering.view import (
     CACHE_OPACITY,
     NEST_OPACITY,
     SOURCE_OPACITY,
-    THEMES,
+    Palette,
     arena_view,
     legend_rows,
     text_width,
@@ -37,7 +38,6 @@ from swarm_forage_env.world.allocation import new_objects
 from swarm_forage_env.world.state import CacheState, StepEvents, SwarmState
 
 pytest.importorskip("PIL")
-PALETTE = THEMES["dark"]
 
 
 class World:
@@ -98,12 +98,12 @@ def test_drawing_writes_nothing(world):
 
 def test_grounds_have_their_colours(world):
     picture = world.draw()
-    assert world.pixel(picture, 16.0, 8.0) == PALETTE.floor
-    assert world.pixel(picture, 2.0, 2.2) == pytest.approx(mix(PALETTE.floor, PALETTE.nest, NEST_OPACITY), abs=1)
-    assert world.pixel(picture, 25.0, 8.0) == pytest.approx(mix(PALETTE.floor, PALETTE.source, SOURCE_OPACITY), abs=1)
-    assert tuple(picture[0, 0]) == PALETTE.page
+    assert world.pixel(picture, 16.0, 8.0) == Palette.floor
+    assert world.pixel(picture, 2.0, 2.2) == pytest.approx(mix(Palette.floor, Palette.nest, NEST_OPACITY), abs=1)
+    assert world.pixel(picture, 25.0, 8.0) == pytest.approx(mix(Palette.floor, Palette.source, SOURCE_OPACITY), abs=1)
+    assert tuple(picture[0, 0]) == Palette.page
     for x, y in ((0.0, 8.0), (31.8, 8.0), (16.0, 0.0), (16.0, 16.0)):
-        assert world.pixel(picture, x, y) == PALETTE.wall
+        assert world.pixel(picture, x, y) == Palette.wall
 
 
 def test_only_free_objects_lie_on_the_floor(world):
@@ -111,7 +111,7 @@ def test_only_free_objects_lie_on_the_floor(world):
     x, y = (cell[0] + 0.5) * CELL_M, (cell[1] + 0.5) * CELL_M
     bare = world.draw()
     world.lay(3, cell)
-    assert world.pixel(world.draw(), x, y) == PALETTE.object
+    assert world.pixel(world.draw(), x, y) == Palette.object
     for status in (ObjectStatus.CARRIED, ObjectStatus.CACHED, ObjectStatus.WAITING):
         world.objects.status[3] = status
         np.testing.assert_array_equal(world.draw(), bare)
@@ -123,10 +123,10 @@ def test_a_cache_is_a_square_with_the_number_of_its_objects(world):
     picture = world.draw()
     half = world.config.cache_side_cells * CELL_M / 2
     x, y = 80.5 * CELL_M, 40.5 * CELL_M
-    tint = mix(PALETTE.floor, PALETTE.cache, CACHE_OPACITY)
+    tint = mix(Palette.floor, Palette.cache, CACHE_OPACITY)
     for dx, dy in product((-0.9, 0.9), (-0.9, 0.9)):
         assert world.pixel(picture, x + dx * half, y + dy * half) == pytest.approx(tint, abs=1)
-    assert world.pixel(picture, x + 1.1 * half, y) == PALETTE.floor
+    assert world.pixel(picture, x + 1.1 * half, y) == Palette.floor
     changed = np.argwhere((picture != bare).any(axis=2))
     left, top, right, bottom = world.view.box((x - half, y - half, x + half, y + half))
     assert changed.min(axis=0) == pytest.approx((top, left), abs=1.5)
@@ -146,8 +146,8 @@ def test_the_needle_points_where_the_robot_is_heading(world):
     picture, reach = world.draw(), 1.7 * world.view.robot_px
     x, y = world.swarm.position[0]
     right, down = reach * np.cos(heading), -reach * np.sin(heading)
-    assert near(world.pixel(picture, x, y, right, down), PALETTE.empty, 90)
-    assert world.pixel(picture, x, y, -right, -down) == PALETTE.floor
+    assert near(world.pixel(picture, x, y, right, down), Palette.empty, 90)
+    assert world.pixel(picture, x, y, -right, -down) == Palette.floor
 
 
 @pytest.mark.parametrize(
@@ -168,16 +168,16 @@ def test_colours_and_shapes_tell_what_robots_do(world, state, middle, place, see
         getattr(world.events if name == "interfering" else world.swarm, name)[0] = value
     picture, radius = world.draw(), world.view.robot_px
     x, y = world.swarm.position[0]
-    assert near(world.pixel(picture, x, y), getattr(PALETTE, middle))
-    assert near(world.pixel(picture, x, y, radius * place[0], radius * place[1]), getattr(PALETTE, seen), 60)
+    assert near(world.pixel(picture, x, y), getattr(Palette, middle))
+    assert near(world.pixel(picture, x, y, radius * place[0], radius * place[1]), getattr(Palette, seen), 60)
 
 
 def test_obstacles_are_walls_and_the_legend_names_what_the_world_has():
     config = scenario("warehouse_small", n_robots=2, n_objects=2, obstacles=((10.0, 5.0, 11.0, 7.0),))
     walled = World(config)
     picture = walled.draw()
-    assert walled.pixel(picture, 10.1, 6.9) == walled.pixel(picture, 10.9, 5.1) == PALETTE.wall
-    assert walled.pixel(picture, 11.2, 6.0) == PALETTE.floor
+    assert walled.pixel(picture, 10.1, 6.9) == walled.pixel(picture, 10.9, 5.1) == Palette.wall
+    assert walled.pixel(picture, 11.2, 6.0) == Palette.floor
     there, elsewhere = (
         {name for row in legend_rows(one, 900, 20.0) for name, _, _ in row}
         for one in (config, scenario("search_and_rescue"))
@@ -199,9 +199,9 @@ PAGES = {
 
 def test_data_come_back_whatever_they_hold():
     header = {"name": "</script><b>", "list": [1, None, 2.5]}
-    blocks = [b"", bytes(range(256)), b"</script>"]
-    page = build_replay_page("a <title> & more", header, blocks)
-    assert take_replay_page_apart(page) == (header, blocks)
+    page = build_replay_page("a <title> & more", header, [b"", bytes(range(256))])
+    told, *blocks = re.findall(r'<script type="(?:application/json|text/plain)"[^>]*>(.*?)</script>', page)
+    assert (json.loads(told), *map(base64.b64decode, blocks)) == (header, b"", bytes(range(256)))
     assert "<title>a &lt;title&gt; &amp; more</title>" in page
 
 

@@ -11,7 +11,6 @@ from metrics.benchmark import BenchmarkError, load_protocol, read_entry
 from metrics.checks import CurveError
 from metrics.scoring.curves_file import read_curves
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.inspect.replay.files import read_replays
 from swarm_forage_env.policies.model_files import ModelError, open_network
 from swarm_forage_env.policies.network import NetworkError
 from swarm_forage_env.runs.record import Record, RecordError
@@ -28,7 +27,6 @@ READERS: dict[str, tuple[Callable[[Path], Any], type[Exception]]] = {
     "record.parquet": (Record.read, RecordError),
     "packed.parquet": (read_study, RecordError),
     "failure.json": (read_failure, RecordError),
-    "replay.html": (read_replays, ConfigError),
     "dataset": (lambda place: list(Dataset(place).runs()), DatasetError),
     "entry.json": (lambda file: read_entry(file, load_protocol(TINY)), BenchmarkError),
     "network.npz": (open_network, (NetworkError, ModelError)),

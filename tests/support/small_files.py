@@ -10,8 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from metrics.benchmark import load_protocol
-from swarm_forage_env.inspect.replay.capture import record_replay
-from swarm_forage_env.inspect.replay.files import write_replays
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.policies.pretrained import plan_file
@@ -46,10 +44,6 @@ def _packed(file: Path) -> None:
     pack_study(folder, file)
 
 
-def _replay(file: Path) -> None:
-    write_replays(file, record_replay(SPEC, frame_s=1.0))
-
-
 def _dataset(folder: Path) -> None:
     record_dataset(SPEC, (1,), folder)
 
@@ -81,7 +75,6 @@ MAKERS: dict[str, Callable[[Path], None]] = {
     "record.parquet": _record,
     "packed.parquet": _packed,
     "failure.json": _failure,
-    "replay.html": _replay,
     "dataset": _dataset,
     "entry.json": _entry,
     "network.npz": _network,

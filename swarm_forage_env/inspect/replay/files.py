@@ -1,6 +1,6 @@
-"""Replays in files: pages that any browser shows, from which `read_replays` gets the arrays back.
+"""Replays in files: pages that any browser shows.
 
-The header of a page says what it holds: format, version, and per run the specification, units, geometry for the page,
+The header of a page says what it holds: per run the specification, units, geometry for the page,
 and which array lies where in the run's block of bytes (`coding` says how).
 """
 
@@ -13,21 +13,16 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, checked
 from swarm_forage_env._internal.files import replacing
-from swarm_forage_env._internal.wording import shown
 from swarm_forage_env.contract.codes import Counter, Task
-from swarm_forage_env.inspect.replay.coding import pack, unpack
+from swarm_forage_env.inspect.replay.coding import pack
 from swarm_forage_env.inspect.replay.frames import Replay
 from swarm_forage_env.rendering.figures import places_of
-from swarm_forage_env.rendering.pages import build_replay_page, take_replay_page_apart
-from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.rendering.pages import build_replay_page
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M, WALL_M
 from swarm_forage_env.scenarios.performance import performance_of
 from swarm_forage_env.wrappers.recorder import TOTALS
 
-FORMAT = "swarm_forage_env replay"
-FORMAT_VERSION = 4
-"""Raised whenever an array or a field is new, or changes its name, type or meaning."""
 _ARRAYS = {
     "position": "u2",
     "heading": "u1",
@@ -81,34 +76,8 @@ def page_of(replays: Sequence[Replay], *, title: str | None = None) -> str:
         title = f"{replays[0].label}, {replace(replays[0].spec.world, wrappers=()).title()}"
     looks = places_of(replay.label for replay in replays)
     packed = [_packed(replay, look) for replay, look in zip(replays, looks, strict=True)]
-    header = {"format": FORMAT, "version": FORMAT_VERSION, "runs": [about for about, _ in packed]}
-    return build_replay_page(
-        title or ", ".join(replay.label for replay in replays), header, [block for _, block in packed]
-    )
-
-
-def read_replays(path: str | Path) -> tuple[Replay, ...]:
-    """Read the replays of a page.
-
-    Raises:
-        ConfigError: the file is missing, no replay page, damaged, or of another version; the message names it.
-    """
-    try:
-        header, blocks = take_replay_page_apart(Path(path).read_text(encoding="utf-8"))
-        if header.get("format") != FORMAT:
-            raise ConfigError("it is no replay page of swarm_forage_env")
-        if header.get("version") != FORMAT_VERSION:
-            raise ConfigError(
-                f"it has version {shown(header.get('version'))} of the format, this version of swarm_forage_env "
-                f"reads {FORMAT_VERSION}; read it with the version that wrote it"
-            )
-        return tuple(_replay_of(about, block) for about, block in zip(header["runs"], blocks, strict=True))
-    except OSError as error:
-        raise ConfigError(f"Cannot read {path}: {error.strerror or error}.") from error
-    except ConfigError as error:
-        raise ConfigError(f"Cannot read {path}: {str(error).rstrip('.')}.") from error
-    except (ValueError, LookupError, TypeError, AttributeError) as error:
-        raise ConfigError(f"Cannot read {path}: its content is damaged ({error}).") from error
+    title = title or ", ".join(replay.label for replay in replays)
+    return build_replay_page(title, {"runs": [about for about, _ in packed]}, [block for _, block in packed])
 
 
 def _told_apart(replays: Sequence[Replay]) -> list[Replay]:
@@ -193,14 +162,3 @@ def for_page(scenario: ScenarioConfig) -> dict[str, Any]:
             "cache_side_m": scenario.cache_side_cells * CELL_M,
         },
     }
-
-
-def _replay_of(about: dict[str, Any], block: bytes) -> Replay:
-    arrays: dict[str, np.ndarray] = {}
-    for place in about["arrays"]:
-        packed = block[place["offset"] :][: place["size"]]
-        arrays[place["name"]] = unpack(packed, place["dtype"], tuple(place["shape"]))
-    plain: dict[str, Any] = {name: about[name] for name in _PLAIN} | {"activities": tuple(about["activities"])}
-    own: dict[str, Any] = {name: arrays.get(name) for name in _ARRAYS}
-    signals = {name.removeprefix(_SIGNAL): array for name, array in arrays.items() if name.startswith(_SIGNAL)}
-    return Replay(spec=RunSpec.from_mapping(about["spec"]), signals=signals, **plain, **own)

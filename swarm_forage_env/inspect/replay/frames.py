@@ -116,16 +116,6 @@ class Replay:
         """(F, N, 2) m."""
         return np.multiply(self.position, self.position_step_m, dtype=np.float64)
 
-    @property
-    def heading_rad(self) -> FloatArray:
-        """(F, N) rad in [0, 2 pi)."""
-        return np.multiply(self.heading, 2.0 * np.pi / HEADING_STEPS, dtype=np.float64)
-
-    @property
-    def task(self) -> Small:
-        """(F, N) `Task` codes."""
-        return (self.status >> np.uint8(TASK_SHIFT)) & np.uint8(7)
-
     def has(self, flag: Status) -> NDArray[np.bool_]:
         """Return where a flag of the status is set, (F, N)."""
         return (self.status & flag) != 0
