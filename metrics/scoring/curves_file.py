@@ -7,16 +7,17 @@ Whatever is wrong with a table is one line: its place in the file, what was expe
 """
 
 import csv
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import polars as pl
 
 from swarm_forage_env._internal.fields import checked
-from swarm_forage_env._internal.wording import shown, suggestion
+from swarm_forage_env._internal.wording import counted, shown, suggestion
 from swarm_forage_env.scenarios.columns import Column
 from swarm_forage_env.scenarios.performance import INVERTED, PERFORMANCE_COLUMNS, Performance
 from swarm_forage_env.wrappers.world import SIZE, UNDISTURBED
@@ -24,7 +25,6 @@ from swarm_forage_env.wrappers.world import SIZE, UNDISTURBED
 from ..checks import CurveError
 from ..curves import FRACTION_TOLERANCE, FloatArray
 from ..queues import PopulationRates
-from .clocks import END, TIME, Runs, binned, on_one_clock
 from .run_curves import (
     CRITERIA,
     CURVE_COLUMNS,
@@ -40,9 +40,11 @@ from .run_curves import (
     shared_seeds,
 )
 
+TIME, END = "time_s", "t_end_s"
+"""Columns: when a delivery was, and where an interval ends."""
 EVENT_COLUMNS: Mapping[str, Column] = {
     **{name: column for name, column in CURVE_COLUMNS.items() if name not in (*INTERVAL_COLUMNS, "interval")},
-    TIME: Column("amount", "s", "when the delivery was, from the start of the run; or its date and time"),
+    TIME: Column("amount", "s", "when the delivery was, from the start of the run"),
     "performance": Column("amount", "", "how much was delivered; default 1"),
 }
 """Columns of event logs -> what they hold. Further columns are ignored."""
@@ -59,6 +61,11 @@ _KINDS: Mapping[str, tuple[str, Callable[[pl.Series], pl.Series]]] = {
 """Kind of a column -> what its values are, and which are that."""
 _IN_EACH_ROW = ("n_robots", "seed", "interval", "t_end_s", "performance", TIME)
 _EXPERIMENT = ("controller", "criterion", "criterion_value", "n_robots")
+_RUN = (*_EXPERIMENT, "seed")
+MOST_INTERVALS = 1_000_000
+"""Most intervals of a run of deliveries; our choice: some measures need a table of so many by so many."""
+_NEAR = 1e-9
+"""Relative difference of times that are the same."""
 _LINE = "line of the file"
 """Column for places in messages; no table of curves has one of this name."""
 
@@ -97,9 +104,8 @@ def read_curves(path: str | Path, performance: str | None = None, **how: Any) ->
 
 def _read_text(file: Path) -> pl.DataFrame:
     """Return the values of a text as texts, with decimal points, and the line of each row."""
-    content = file.read_bytes()
     try:
-        text = content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
+        text = file.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise CurveError(f"Expected {file} to be text in UTF-8, got other bytes from byte {error.start} on.") from error
     lines = text.splitlines(keepends=True)
@@ -140,17 +146,17 @@ def study_curves(
 
     Args:
         frame: Rows in any order, one per interval of a run with columns as in `CURVE_COLUMNS`, or one per delivery with
-            those of `EVENT_COLUMNS`. Runs of unequal lengths and steps are resampled; `StudyCurves.note` says so.
+            those of `EVENT_COLUMNS`. Runs are cut to the shortest; `StudyCurves.note` says so.
         performance: Column that is read as performance, or "1/" and a column in which less is better; default
             "performance".
         columns: Our name of a column -> its name in the table, or a number, which then stands in each row.
         events: Whether a row is a delivery.
-        interval_s: Length of an interval, s. Needed for events; of curves, the step of the clock that all get.
+        interval_s: Length of an interval, s. Needed for events; of curves without `END`, where it is known.
         where: Name of the table in messages.
         controller: Name of the policy where the table has no such column.
 
     Raises:
-        CurveError: columns are missing or hold what they may not, or runs are incomplete.
+        CurveError: columns are missing or hold what they may not, runs are incomplete, or intervals differ.
     """
     if interval_s is None and events:
         raise CurveError(f"Expected the length of an interval for the deliveries in {where}, got none (--interval S).")
@@ -163,39 +169,73 @@ def study_curves(
     given = _Given.named(frame, names, known, where)
     clock = TIME if events else END if END in given.frame.columns else "interval"
     given.require("n_robots", "seed", clock, *([] if events else ["performance"]))
-    table = _with_experiments(given.typed(known), given, controller)
+    table, note = _with_experiments(given.typed(known), given, controller), ""
     if performance is not None and performance.startswith(INVERTED):  # 1/0 is 0: distances need finite curves
         inverse = pl.when(pl.col("performance") != 0.0).then(1.0 / pl.col("performance")).otherwise(0.0)
         table = table.with_columns(performance=inverse)
-    read_as, is_total = _performance(performance)
-    experiments = table.partition_by(*_EXPERIMENT, as_dict=True, maintain_order=True)
-    found: dict[Any, dict[str, FloatArray]] = {}
-    for key, part in experiments.items():
-        held = [name for name in (*INTERVAL_COLUMNS, "interval") if name in part.columns and part[name].count()]
-        for name in held if not events else ():
-            wanted = f"a value, as in other intervals with N = {key[-1]}"
-            given.refuse(part.filter(pl.col(name).is_null())["row"], name, wanted)
-        for (seed,), run in part.sort(clock).partition_by("seed", as_dict=True, maintain_order=True).items():
-            found[*key, seed] = _delivered(run) if events else _curve(run, seed, held, given)
     if events:
-        runs, ends, note = binned(found, interval_s or MOST, where)
-    else:
-        runs, ends, note = on_one_clock(found, interval_s, is_total=is_total, where=where)
+        table, note = _counted(table, interval_s or MOST, where)
+    runs = table.sort(END if events else clock).partition_by(*_RUN, as_dict=True, maintain_order=True)
+    lengths = [len(run) for run in runs.values()]
+    least, most = min(lengths), max(lengths)
+    if least < most:
+        note = f"runs have from {least} to {most} intervals and are cut to the first {least}"
+    steps = [] if interval_s is None else [interval_s * np.arange(1.0, least + 1.0)]
+    told = [run[END].to_numpy()[:least] for run in runs.values()] if END in table.columns else []
+    ends = _same([*told, *steps], where)
     of_policy: dict[Any, list[RunCurves]] = {}
-    for key, part in experiments.items():
-        of_policy.setdefault(key[0], []).append(_experiment(key, runs, _rates(part, given), ends))
-    told: dict[str, Any] = {"t_end_s": ends, "read_as": read_as, "where": where, "note": note}
-    return tuple(StudyCurves(controller=name, experiments=tuple(of), **told) for name, of in of_policy.items())
+    for key, part in table.partition_by(*_EXPERIMENT, as_dict=True, maintain_order=True).items():
+        mine = {run_key[-1]: run for run_key, run in runs.items() if run_key[:-1] == key}
+        of_policy.setdefault(key[0], []).append(_experiment(key, part, mine, ends, least, given))
+    about: dict[str, Any] = {"t_end_s": ends, "read_as": _performance(performance), "where": where, "note": note}
+    return tuple(StudyCurves(controller=name, experiments=tuple(of), **about) for name, of in of_policy.items())
 
 
-def _performance(name: str | None) -> tuple[Performance, bool]:
-    """Return what a column is as performance, and whether it is a total over its interval."""
+def _counted(table: pl.DataFrame, interval_s: float, where: str) -> tuple[pl.DataFrame, str]:
+    """Add up the deliveries in each interval of each run; returns a row for each, and what was done.
+
+    All runs last as long as the latest delivery tells.
+    """
+    latest = cast("float", table[TIME].max())
+    n_intervals = max(1, math.ceil(latest / interval_s * (1.0 - _NEAR)))
+    if n_intervals > MOST_INTERVALS:
+        raise CurveError(
+            f"Expected times from the start of each run in {where}, got {latest:g} s, which would be {n_intervals:,} "
+            f"intervals of {interval_s:g} s."
+        )
+    place = (pl.col(TIME) / interval_s).floor().clip(upper_bound=n_intervals - 1).cast(pl.Int64)
+    amount = pl.col("performance").sum() if "performance" in table.columns else pl.len().cast(pl.Float64)
+    delivered = table.group_by(*_RUN, interval=place).agg(performance=amount)
+    every = table.unique(_RUN, keep="first", maintain_order=True).drop(TIME, "performance", strict=False)
+    every = every.join(pl.DataFrame({"interval": range(n_intervals)}), how="cross")
+    counts = every.join(delivered, on=[*_RUN, "interval"], how="left", maintain_order="left").with_columns(
+        pl.col("performance").fill_null(0.0), (interval_s * (pl.col("interval") + 1)).alias(END)
+    )
+    note = (
+        f"deliveries are counted in {counted(n_intervals, 'interval')} of {interval_s:g} s; all runs are taken to last "
+        f"{n_intervals * interval_s:g} s, as the latest delivery tells"
+    )
+    return counts, note
+
+
+def _same(ends_s: Sequence[FloatArray], where: str) -> FloatArray | None:
+    """Return the ends of the intervals, which all runs share; None where they are not known."""
+    for each in ends_s:
+        for place in np.flatnonzero(~np.isclose(each, ends_s[0], rtol=_NEAR, atol=0.0)):
+            raise CurveError(
+                f"Expected intervals with the same ends in all runs of {where}, got one that ends at "
+                f"{ends_s[0][place]:g} s and one at {each[place]:g} s; bring the runs to one clock."
+            )
+    return ends_s[0] if ends_s else None
+
+
+def _performance(name: str | None) -> Performance:
+    """Return what a column is as performance."""
     if name is None:
-        return DELIVERIES, True
+        return DELIVERIES
     # Nobody knows what a column of one's own is; it is taken for a total. An inverse is none, and does not add up.
     known = PERFORMANCE_COLUMNS.get(name, Performance(name, is_total=True, adds_up=True))
-    is_inverse = name.startswith(INVERTED)
-    return Performance(name, known.unit, adds_up=known.adds_up and not is_inverse), known.is_total and not is_inverse
+    return Performance(name, known.unit, adds_up=known.adds_up and not name.startswith(INVERTED))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -250,22 +290,15 @@ class _Given:
             self.refuse(texts.is_null().arg_true(), name, "a text")
             return texts
         values = texts.cast(pl.Float64, strict=False)
-        if name == TIME and values.null_count() == len(values):
-            try:
-                dates = texts.str.to_datetime(strict=False)
-            except pl.exceptions.ComputeError:  # no form of dates fits the first ones
-                dates = values
-            self.refuse(dates.is_null().arg_true(), TIME, "a number of seconds, or a date and time")
-            return dates
         wanted, is_right = _KINDS[kind]
         is_known = (values.is_finite() & (values.abs() <= MOST) & is_right(values)).fill_null(False)
         is_bad = ~is_known & (texts.is_not_null() | (name in _IN_EACH_ROW))
         self.refuse(is_bad.arg_true(), name, wanted)
         return values.cast(pl.Int64) if kind == "whole" else values
 
-    def refuse(self, rows: pl.Series, name: str, wanted: str) -> None:
-        """Raise an error about the first of some rows, if there is one."""
-        for row in rows:
+    def refuse(self, wrong: pl.DataFrame | pl.Series, name: str, wanted: str) -> None:
+        """Raise an error about the first of some rows, if there is one: those of a table, or by their numbers."""
+        for row in wrong if isinstance(wrong, pl.Series) else wrong["row"]:
             theirs, got = self.theirs.get(name, name), self.frame[name][row]
             raise CurveError(
                 f"Expected {wanted} in line {self.frame[_LINE][row]} of {self.where}, column {theirs}"
@@ -298,38 +331,36 @@ def _with_experiments(table: pl.DataFrame, given: _Given, controller: str) -> pl
     return table
 
 
-def _curve(run: pl.DataFrame, seed: object, names: list[str], given: _Given) -> dict[str, FloatArray]:
-    """Return the columns of a run, whose intervals follow each other."""
-    if "interval" in names:
-        wrong = pl.col("interval") != pl.int_range(pl.len()) + min(run["interval"][0], 1)
-        given.refuse(run.filter(wrong)["row"], "interval", f"the next interval of run {seed}, each once")
-    if END in names:
-        wrong = pl.col(END).diff().fill_null(pl.col(END).first()) <= 0.0
-        given.refuse(run.filter(wrong)["row"], END, f"a later end of an interval of run {seed}")
-    return {name: run[name].to_numpy() for name in names if name != "interval"}
-
-
-def _delivered(run: pl.DataFrame) -> dict[str, FloatArray]:
-    """Return the times of deliveries, and how much each brought."""
-    times = run[TIME]
-    if times.dtype.is_temporal():  # from the first one on
-        times = (times - times.min()).dt.total_microseconds() / 1e6
-    delivered = run["performance"].to_numpy() if "performance" in run.columns else np.ones(len(run))
-    return {TIME: times.to_numpy(), "performance": delivered}
-
-
-def _experiment(key: tuple[Any, ...], runs: Runs, rates: PopulationRates | None, ends: FloatArray | None) -> RunCurves:
-    """Return the runs of one experiment, in the order of their numbers."""
+def _experiment(
+    key: tuple[Any, ...],
+    part: pl.DataFrame,
+    runs: Mapping[int, pl.DataFrame],
+    ends_s: FloatArray | None,
+    n_intervals: int,
+    given: _Given,
+) -> RunCurves:
+    """Return the runs of one experiment, in the order of their numbers; their intervals follow each other."""
     _, criterion, value, n_robots = key
-    mine = sorted((run_key[-1], run) for run_key, run in runs.items() if run_key[:-1] == key)
+    names = [name for name in INTERVAL_COLUMNS if name in part.columns and part[name].count()]
+    for name in names:
+        wanted = f"a value, as in other intervals with N = {n_robots}"
+        given.refuse(part.filter(pl.col(name).is_null()), name, wanted)
+    for seed, run in runs.items():
+        if END in names:
+            wrong = pl.col(END).diff().fill_null(pl.col(END).first()) <= 0.0
+            given.refuse(run.filter(wrong), END, f"a later end of an interval of run {seed}")
+        elif "interval" in run.columns:
+            wrong = pl.col("interval") != pl.int_range(pl.len()) + min(run["interval"][0], 1)
+            given.refuse(run.filter(wrong), "interval", f"the next interval of run {seed}, each once")
+    seeds = sorted(runs)
     return RunCurves(
         criterion=criterion,
         value=value,
         n_robots=n_robots,
-        seeds=tuple(seed for seed, _ in mine),
-        curves={name: np.stack([run[name] for _, run in mine]) for name in mine[0][1]},
-        rates=rates,
-        horizon_s=None if ends is None else float(ends[-1]),
+        seeds=tuple(seeds),
+        curves={name: np.stack([runs[seed][name].to_numpy()[:n_intervals] for seed in seeds]) for name in names},
+        rates=_rates(part, given),
+        horizon_s=None if ends_s is None else float(ends_s[-1]),
     )
 
 
@@ -339,6 +370,6 @@ def _rates(part: pl.DataFrame, given: _Given) -> PopulationRates | None:
         if name in part.columns and part[name].count():
             first = part[name][0]
             wanted = f"the same rate in each row of {part['criterion'][0]} {part['criterion_value'][0]:g}"
-            given.refuse(part.filter(pl.col(name).ne_missing(first))["row"], name, wanted)
+            given.refuse(part.filter(pl.col(name).ne_missing(first)), name, wanted)
             rates[rate] = first
     return PopulationRates(**rates) if rates else None

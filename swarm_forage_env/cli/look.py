@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from swarm_forage_env.cli.options import AsJson, Picture, Policies, Policy, Seed, Seeds, WorldOptions
-from swarm_forage_env.cli.printer import note, progress_bar, say, show
+from swarm_forage_env.cli.printer import note, say, show
 
 if TYPE_CHECKING:
     from swarm_forage_env.inspect.replay.frames import Replay
@@ -102,6 +102,7 @@ def record(
     """
     from swarm_forage_env.cli.worlds import RESULTS, default_file, described_world
     from swarm_forage_env.inspect.film import record_run
+    from swarm_forage_env.runs.progress import progress_bar
 
     chosen, caches = described_world(world)
     ending = ".gif" if at is None else f"_{at:g}_s.png"
@@ -139,6 +140,7 @@ def replay(
     from swarm_forage_env.cli.worlds import RESULTS, default_file, plan_runs
     from swarm_forage_env.inspect.replay.capture import record_replay
     from swarm_forage_env.inspect.replay.files import write_replays
+    from swarm_forage_env.runs.progress import progress_bar
     from swarm_forage_env.runs.record import Record
 
     is_stored = [Path(word).suffix == ".parquet" for word in policies]
@@ -178,6 +180,7 @@ def maps(
     from swarm_forage_env.cli.worlds import RESULTS, default_file, plan_runs
     from swarm_forage_env.inspect.maps import maps_of_runs, write_maps
     from swarm_forage_env.rendering.figures import check_picture
+    from swarm_forage_env.runs.progress import progress_bar
 
     specs = plan_runs(world, policies, range(seed, seed + seeds))
     file = picture or default_file(RESULTS, specs[0].world, policies, "_maps.png", seed=seed)

@@ -124,9 +124,7 @@ class CurveOptions:
         str, Parameter(help="OURS=THEIRS,...: what columns of the file are called, or a number for all rows.")
     ] = ""
     events: Annotated[bool, Parameter(negative="", help="A row of the file is a delivery with its time_s.")] = False
-    interval: Annotated[
-        float | None, Parameter(help="Length of an interval, s: counts events, or resamples curves.")
-    ] = None
+    interval: Annotated[float | None, Parameter(help="Length of an interval, s; needed for --events.")] = None
 
     def named_columns(self) -> dict[str, str]:
         """Return our name of a column -> theirs.

@@ -6,8 +6,7 @@ Names of policies, files and scenarios are shown as they are: no console reads m
 import json
 import shutil
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +14,6 @@ from swarm_forage_env._internal.wording import counted, printable
 from swarm_forage_env.cli import CommandError
 
 if TYPE_CHECKING:
-    from rich.progress import Progress
-
     from metrics.scoring.question import Question
     from swarm_forage_env.cli.options import RunOptions
     from swarm_forage_env.runs.plan import Table
@@ -32,24 +29,6 @@ def say(text: object) -> None:
 def note(text: object) -> None:
     """Print on stderr what is not the result."""
     sys.stderr.write(f"{printable(str(text))}\n")
-
-
-def bar() -> "Progress":
-    """Return a bar on stderr that shows how long the rest will take; nothing without a terminal."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    screen = Console(stderr=True, highlight=False, markup=False, emoji=False)
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
-    return Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal)
-
-
-@contextmanager
-def progress_bar(text: str, total: float | None = None) -> "Iterator[Callable[..., None]]":
-    """Show on stderr how much is done; what it yields is told so, and of how much where `total` was not known."""
-    with bar() as shown:
-        task = shown.add_task(text, total=total)
-        yield lambda done, total=None: shown.update(task, completed=done, total=total)
 
 
 def ask_and_show(

@@ -11,7 +11,7 @@ from cyclopts.types import NonNegativeInt, PositiveInt
 from swarm_forage_env._internal.fields import ConfigError, known_keys
 from swarm_forage_env.cli import CommandError
 from swarm_forage_env.cli.options import AsJson, Jobs, Names, Picture, Policy, Scenario, Seeds, WorldOptions
-from swarm_forage_env.cli.printer import progress_bar, say
+from swarm_forage_env.cli.printer import say
 
 if TYPE_CHECKING:
     from swarm_forage_env.training.plan import TrainingPlan
@@ -177,6 +177,7 @@ def dataset(
     """
     from swarm_forage_env._internal.wording import counted
     from swarm_forage_env.cli.worlds import RESULTS, default_file, plan_runs
+    from swarm_forage_env.runs.progress import progress_bar
     from swarm_forage_env.training.datasets import record_dataset
 
     (spec,) = plan_runs(world, [policy], [0])

@@ -2,17 +2,14 @@
 
 import math
 import shlex
-import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.progress import Progress
-
 from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.cli import EXIT_FAILURE
-from swarm_forage_env.cli.printer import bar, drawn_or_told, note, show
-from swarm_forage_env.runs.progress import duration
+from swarm_forage_env.cli.printer import drawn_or_told, note, show
+from swarm_forage_env.runs.progress import progress_bar
 from swarm_forage_env.training.curves import beside_baseline, counted_in, place_of, read_training
 from swarm_forage_env.training.evaluation import EVALUATIONS_FILE, MODEL_FILE, PLAN_FILE, Evaluation
 from swarm_forage_env.training.plan import TrainingPlan
@@ -21,16 +18,14 @@ if TYPE_CHECKING:
     from swarm_forage_env.training.sb3.training import TrainingStatus
 
 PICTURE_FILE = "training.png"
-TIMED_S = 5.0
-"""Of a training, before it is said how long the rest takes; our choice."""
 
 
 def run_training(plan: TrainingPlan, folder: Path, *, resume: bool) -> int:
     """Train, show how it goes, and say where the results are; errors as in `training.sb3.training.train`."""
     from swarm_forage_env.training.sb3.training import train
 
-    with bar() as shown:
-        report = _Report(plan, [plan.seed], shown)
+    with progress_bar("training", plan.total_steps) as tell:
+        report = _Report(plan, [plan.seed], tell)
         try:
             result = train(plan, folder, resume=resume, report=lambda news: report(plan.seed, news))
         except KeyboardInterrupt:
@@ -71,8 +66,8 @@ def run_seeds(plan: TrainingPlan, seeds: Sequence[int], folder: Path, *, jobs: i
     from swarm_forage_env.training.sb3.seeds import is_finished, seed_folder, train_seeds
 
     go_on = _go_on(folder, f" --seeds {len(seeds)}")
-    with bar() as shown:
-        report = _Report(plan, seeds, shown)
+    with progress_bar("training", plan.total_steps * len(seeds)) as tell:
+        report = _Report(plan, seeds, tell)
         try:
             found = train_seeds(plan, seeds, folder, jobs=jobs, resume=resume, report=report)
         except KeyboardInterrupt:
@@ -89,59 +84,43 @@ def run_seeds(plan: TrainingPlan, seeds: Sequence[int], folder: Path, *, jobs: i
 
 
 class _Report:
-    """Shows how trainings go: what they will do, a bar for all or how long they take, each evaluation."""
+    """Shows how trainings go: what they will do, a bar for all, each evaluation."""
 
-    def __init__(self, plan: TrainingPlan, seeds: Sequence[int], shown: Progress) -> None:
-        self._plan, self._seeds, self._shown = plan, seeds, shown
+    def __init__(self, plan: TrainingPlan, seeds: Sequence[int], tell: Callable[..., None]) -> None:
+        self._plan, self._seeds, self._tell = plan, seeds, tell
         self._steps: dict[int, int] = {}
-        self._total = plan.total_steps * len(seeds)
-        self._task = shown.add_task("training", total=self._total)
-        self._first: tuple[float, int] | None = None
-        self._has_begun = self._is_timed = False
+        self._has_begun = False
 
     def __call__(self, seed: int, news: "TrainingStatus | Evaluation | str") -> None:
         """Show the news of a training."""
         if isinstance(news, str):
-            self._shown.console.out(f"Seed {seed} failed: {news}")
+            note(f"Seed {seed} failed: {news}")
             return
+        if not self._steps:
+            plan, n_seeds = self._plan, len(self._seeds)
+            note(
+                f"{plan.algorithm}: {f'{n_seeds} trainings of ' if n_seeds > 1 else ''}{plan.total_steps:,} decisions "
+                f"in {counted(len(plan.stages), 'stage')}, evaluated every {plan.evaluation.every_steps:,} and after "
+                "each stage"
+            )
         self._steps[seed] = min(news.steps, self._plan.total_steps)
-        done = sum(self._steps.values())
-        self._shown.update(self._task, completed=done)
-        self._tell_time(done)
+        is_return = not isinstance(news, Evaluation) and not math.isnan(news.episode_return)
+        self._tell(sum(self._steps.values()), text=f"mean return {news.episode_return:.2f}" if is_return else None)
         if isinstance(news, Evaluation):
             self._show(f"{seed:>6} " if len(self._seeds) > 1 else "", news)
-        elif not math.isnan(news.episode_return):
-            self._shown.update(self._task, description=f"mean return {news.episode_return:.2f}")
-
-    def _tell_time(self, done: int) -> None:
-        """Say at once what will happen, and after some seconds, where no bar shows it, how long the rest takes."""
-        now, say = time.monotonic(), self._shown.console.out
-        if self._first is None:
-            self._first = now, done
-            trainings = f"{len(self._seeds)} trainings of " if len(self._seeds) > 1 else ""
-            plan = self._plan
-            say(
-                f"{plan.algorithm}: {trainings}{plan.total_steps:,} decisions in {counted(len(plan.stages), 'stage')}, "
-                f"evaluated every {plan.evaluation.every_steps:,} and after each stage"
-            )
-            return
-        began, before = self._first
-        if self._shown.disable and not self._is_timed and now - began >= TIMED_S and done > before:
-            self._is_timed = True
-            say(f"About {duration((self._total - done) * (now - began) / (done - before))} to go, and the evaluations")
 
     def _show(self, seed: str, news: Evaluation) -> None:
-        what, plan, say = counted_in(self._plan), self._plan.evaluation, self._shown.console.out
+        what, plan = counted_in(self._plan), self._plan.evaluation
         beside = "" if plan.worlds else plan.baseline
         baseline = f"{news.worlds[0].baseline:.1f}" if beside else ""
         width = max(len(beside), 6)
         if not self._has_begun:
-            say(f"Evaluated in {counted(plan.n_runs, 'run')} in {place_of(self._plan)}:")
-            say(f"{'seed ' if seed else '':>{len(seed)}}{'decisions':>12}  {what}  {beside:>{width}}  interference")
+            note(f"Evaluated in {counted(plan.n_runs, 'run')} in {place_of(self._plan)}:")
+            note(f"{'seed ' if seed else '':>{len(seed)}}{'decisions':>12}  {what}  {beside:>{width}}  interference")
         reached = f"{news.reached:>{len(what)}.2f}"
-        say(f"{seed}{news.steps:>12,}  {reached}  {baseline:>{width}}  {news.interference_fraction:>12.3f}")
+        note(f"{seed}{news.steps:>12,}  {reached}  {baseline:>{width}}  {news.interference_fraction:>12.3f}")
         if not self._has_begun and baseline == "0.0":
-            say(
+            note(
                 f"{plan.baseline} scores 0 in such short runs. Longer ones say more (--set "
                 "evaluation.horizon_s=SECONDS)."
             )

@@ -1,79 +1,57 @@
-"""How many runs are done, on stderr, and how long the rest takes.
+"""How far work is, on stderr: a bar on a terminal, a line now and then elsewhere."""
 
-The estimate goes by robot-ticks, at the speed of each policy: one that jams may take 30 times as long as another. It
-leaves out what comes before the first run, such as starting processes and compiling.
-"""
-
-import math
 import time
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from swarm_forage_env.runs.spec import RunSpec
+LINE_EVERY_S = 20.0
+"""Shortest time between two lines where stderr is no terminal; our choice."""
+_DAY_S = 86_400.0
+"""The speed is that of all that was done since; runs may take hours."""
 
-PLAIN_LINE_EVERY_S = 10.0
-"""Shortest time between two lines where stderr is no terminal."""
 
+@contextmanager
+def progress_bar(text: str, total: float | None = None, *, shown: bool = True) -> Generator[Callable[..., None]]:
+    """Show how much is done and how long the rest takes, once two parts are done.
 
-class RunProgress:
-    """Context manager: a bar on a terminal, an occasional plain line elsewhere."""
+    Starting processes and compiling come before the first part, and are no part of the estimate.
 
-    def __init__(self, todo: Sequence[RunSpec], *, n_stored: int, n_processes: int | None, shown: bool = True) -> None:
-        """Begin, with how many runs are stored already, and how many are made at a time (None: nobody knows)."""
-        self._left = {spec.run_id: spec for spec in todo}
-        self._total = n_stored + len(todo)
-        self._n_processes = n_processes
-        self._spent: dict[str, tuple[float, int]] = {}
-        """Policy -> seconds and robot-ticks of its finished runs."""
-        self._first_start, self._last_line, self._n_failed = math.inf, -math.inf, 0
-        console = Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
-        self._plain = console if todo and shown and not console.is_terminal else None
-        columns = (TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-        told = TextColumn("{task.description}", markup=False)
-        self._bar = Progress(*columns, told, console=console, disable=not (todo and shown and console.is_terminal))
-        self._task = self._bar.add_task("", total=self._total)
+    Args:
+        text: What is done.
+        total: How much there is to do, in any unit.
+        shown: Whether to show anything.
 
-    def __enter__(self) -> "RunProgress":
-        self._bar.start()
-        self._show()
-        return self
+    Yields:
+        What is told how much is done, and, where they are new, `total` and `text`.
+    """
+    console = Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
+    has_bar = shown and console.is_terminal
+    bar = Progress(
+        *columns,
+        console=console,
+        transient=True,
+        disable=not has_bar,
+        speed_estimate_period=_DAY_S,
+        get_time=time.monotonic,
+    )
+    task = bar.add_task(text, total=total)
+    last_s = time.monotonic()
 
-    def __exit__(self, *_: Any) -> None:
-        self._bar.stop()
+    def tell(done: float, total: float | None = None, *, text: str | None = None) -> None:
+        nonlocal last_s
+        bar.update(task, completed=done, total=total, description=text)
+        if shown and not has_bar and time.monotonic() - last_s >= LINE_EVERY_S:
+            last_s = time.monotonic()
+            (now,) = bar.tasks
+            left_s = now.time_remaining
+            console.print(now.description + ("" if left_s is None else f", about {duration(left_s)} left"))
 
-    def advance(self, spec: RunSpec, took_s: float) -> None:
-        """Count one more run, and how long it took; NaN = it failed, and the estimate does without it."""
-        del self._left[spec.run_id]
-        if math.isnan(took_s):
-            self._n_failed += 1
-        else:
-            seconds, ticks = self._spent.get(spec.policy, (0.0, 0))
-            self._spent[spec.policy] = seconds + took_s, ticks + spec.robot_ticks
-            self._first_start = min(self._first_start, time.monotonic() - took_s)
-        self._show()
-
-    def _show(self) -> None:
-        n_done, now = self._total - len(self._left), time.monotonic()
-        self._bar.update(self._task, completed=n_done, description=self.told())
-        if self._plain and (not self._left or now - self._last_line >= PLAIN_LINE_EVERY_S):
-            self._last_line = now
-            self._plain.print(f"{n_done}/{self._total} runs, {self.told()}")
-
-    def told(self) -> str:
-        """Return how long the rest takes, in words."""
-        words = f"about {duration(self.remaining_s())} left" if self._spent else "an estimate follows the first run"
-        return (words if self._left else "all done") + (f", {self._n_failed} failed" if self._n_failed else "")
-
-    def remaining_s(self) -> float:
-        """Return how long the runs that are left take, s. Policies without a finished run count as the mean of all."""
-        seconds, ticks = (sum(column) for column in zip(*self._spent.values(), strict=True))
-        speeds = {policy: took_s / n_ticks for policy, (took_s, n_ticks) in self._spent.items()}
-        left_s = sum(speeds.get(spec.policy, seconds / ticks) * spec.robot_ticks for spec in self._left.values())
-        at_a_time = self._n_processes or seconds / max(time.monotonic() - self._first_start, 1e-9)
-        return left_s / max(1e-9, min(at_a_time, len(self._left)))
+    with bar:
+        yield tell
 
 
 def duration(seconds: float) -> str:

@@ -4,7 +4,6 @@ found = run_all(specs, out="results/small")                                    #
 found = run_all(specs, out="results/small", executor=client.get_executor())    # on many machines, by Dask
 """
 
-import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from concurrent.futures import Executor
 from contextlib import ExitStack, closing
@@ -19,13 +18,13 @@ from swarm_forage_env._internal.fields import checked, instance
 from swarm_forage_env._internal.files import check_folder
 from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.policies.registry import load_policy, local_policy
-from swarm_forage_env.runs.progress import RunProgress
+from swarm_forage_env.runs.progress import progress_bar
 from swarm_forage_env.runs.record import Record, RecordError
 from swarm_forage_env.runs.run import run_one, run_policy
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import RunFailure, read_failure, store, stored_record
 from swarm_forage_env.runs.versions import software_versions
-from swarm_forage_env.runs.workers import each_run, prepare, processes_of
+from swarm_forage_env.runs.workers import each_run, prepare
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -90,10 +89,10 @@ def run_all(
         if folder is not None and todo:
             check_folder(folder)
         apart = [spec for spec in todo if spec.policy not in here]
-        n_processes = processes_of(len(apart), jobs) if executor is None else None
+        robot_ticks = 0
         with (
             ExitStack() as names,
-            RunProgress(todo, n_stored=n_stored, n_processes=n_processes, shown=progress) as shown,
+            progress_bar("runs", sum(spec.robot_ticks for spec in todo), shown=progress and bool(todo)) as tell,
             closing(each_run(_tried, apart, jobs=jobs, executor=executor)) as made,
         ):
             for name, factory in here.items():
@@ -106,7 +105,9 @@ def run_all(
                     failures[spec.run_id] = result
                 else:
                     finished(result)
-                shown.advance(spec, math.nan if isinstance(result, RunFailure) else result.wall_time_s)
+                robot_ticks += spec.robot_ticks
+                failed = f", {len(failures)} failed" if failures else ""
+                tell(robot_ticks, text=f"{len(done) + len(failures)}/{len(wanted)} runs{failed}")
     except KeyboardInterrupt as interrupt:
         kept = "" if folder is None else f" They are in {folder}; the same command does the rest."
         told = f"Interrupted: {len(done)} of {counted(len(wanted), 'run')} are finished.{kept}"

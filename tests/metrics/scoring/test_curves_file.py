@@ -35,7 +35,6 @@ FORMS = {
     "tabs.tsv": PLAIN.replace(",", "\t"),
     "decimal_commas_and_tabs.txt": PLAIN.replace(",", "\t").replace(".", ","),
     "mark_and_carriage_returns.csv": ("\ufeff" + PLAIN).replace("\n", "\r\n"),
-    "utf_16.csv": PLAIN.encode("utf-16"),
     "spaces_and_empty_lines.csv": "\n" + PLAIN.replace(",", " , ").replace("\n", "\n\n"),
     "quotes.csv": re.sub(r"(\w+(\.5)?)", r'"\1"', PLAIN),
     "shuffled.csv": "n_robots,seed,interval,performance\n4,0,1,6.5\n1,0,1,2\n4,0,0,5\n1,0,0,1.5\n",
@@ -106,30 +105,15 @@ def test_longer_runs_are_cut_and_it_is_said():
     assert study.note == "runs have from 2 to 3 intervals and are cut to the first 2"
 
 
-def test_unequal_steps_are_resampled_with_the_same_totals_and_means():
-    fine = rows(
-        1,
-        [[1.0, 3.0, 2.0, 2.0, 9.0, 9.0]],
-        t_end_s=[5.0, 10.0, 15.0, 20.0, 25.0, 30.0],
-        n_active=[1.0, 0.0, 1.0, 1.0, 1.0, 1.0],
-    )
-    coarse = rows(2, [[4.0, 6.0]], t_end_s=[10.0, 20.0], n_active=[2.0, 1.0])
-    study = only(table(fine, coarse))
-    assert by_size(study) == {1: [[4.0, 4.0]], 2: [[4.0, 6.0]]}
-    assert study.sizes()[0].curves["n_active"].tolist() == [[0.5, 1.0]]
-    assert study.t_end_s.tolist() == [10.0, 20.0]
-    assert study.note == (
-        "runs with intervals of 5 to 10 s are resampled to 2 intervals of 10 s: totals of performance are kept"
-    )
-    means = only(table(fine, coarse), performance="n_active")
-    assert by_size(means) == {1: [[0.5, 1.0]], 2: [[2.0, 1.0]]}
-
-
-def test_an_interval_is_chosen_and_splits_steps_evenly():
-    study = only(table(rows(1, [[4.0, 6.0]], t_end_s=[10.0, 20.0], throttle=[0.1, 0.2])), interval_s=5.0)
-    assert by_size(study) == {1: [[2.0, 2.0, 3.0, 3.0]]}
-    assert study.experiments[0].curves["throttle"].tolist() == [[0.1, 0.1, 0.2, 0.2]]
+def test_all_runs_have_one_clock():
+    ends = {"t_end_s": [5.0, 10.0]}
+    parts = rows(1, [[1.0, 3.0]], **ends), rows(2, [[4.0, 6.0]], **ends)
+    assert only(table(*parts)).t_end_s.tolist() == only(table(*parts), interval_s=5.0).t_end_s.tolist() == [5.0, 10.0]
     assert only(TWO_SIZES, interval_s=10.0).horizon_s == 20.0
+    with pytest.raises(CurveError, match="one that ends at 5 s and one at 10 s; bring the runs to one clock"):
+        study_curves(table(*parts, rows(4, [[1.0, 2.0]], t_end_s=[10.0, 20.0])))
+    with pytest.raises(CurveError, match="one that ends at 5 s and one at 2 s"):
+        study_curves(table(*parts), interval_s=2.0)
 
 
 LOG = pl.DataFrame({"n_robots": [2, 2, 2, 1, 1], "seed": 0, "time_s": [12.0, 3.0, 40.0, 0.0, 25.0]})
@@ -142,13 +126,6 @@ def test_deliveries_are_counted_in_intervals():
     assert study.note.startswith("deliveries are counted in 4 intervals of 10 s; all runs are taken to last 40 s")
     amounts = LOG.with_columns(performance=pl.Series([1.0, 2.0, 0.0, 0.5, 1.0]))
     assert by_size(only(amounts, events=True, interval_s=40.0)) == {1: [[1.5]], 2: [[3.0]]}
-
-
-@pytest.mark.parametrize("form", ["%Y-%m-%d %H:%M:%S", "%Y-%m-%dT%H:%M:%SZ", None])
-def test_dates_count_from_the_first_delivery_of_a_run(form):
-    times = pl.datetime(2026, 3, 1, 12) + pl.duration(seconds="time_s")
-    frame = LOG.with_columns(time_s=times.dt.strftime(form) if form else times)
-    assert by_size(only(frame, events=True, interval_s=20.0)) == {1: [[1.0, 1.0]], 2: [[2.0, 1.0]]}
 
 
 def in_row(frame, row, **cells):
