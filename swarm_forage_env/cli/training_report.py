@@ -104,8 +104,10 @@ class _Report:
                 "each stage"
             )
         self._steps[seed] = min(news.steps, self._plan.total_steps)
-        is_return = not isinstance(news, Evaluation) and not math.isnan(news.episode_return)
-        self._tell(sum(self._steps.values()), text=f"mean return {news.episode_return:.2f}" if is_return else None)
+        text = None
+        if not isinstance(news, Evaluation) and not math.isnan(news.episode_return):
+            text = f"mean return {news.episode_return:.2f}"
+        self._tell(sum(self._steps.values()), text=text)
         if isinstance(news, Evaluation):
             self._show(f"{seed:>6} " if len(self._seeds) > 1 else "", news)
 
