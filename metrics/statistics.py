@@ -217,7 +217,7 @@ def interquartile_mean(
     _check_resamples(n_resamples)
     rng = np.random.default_rng(seed)
     drawn = [stratum[rng.integers(stratum.size, size=(n_resamples, stratum.size))] for stratum in strata]
-    return _estimate(_middle_mean(np.concatenate(strata)), _middle_mean(np.concatenate(drawn, axis=1)), strata)
+    return _estimate(middle_mean(np.concatenate(strata)), middle_mean(np.concatenate(drawn, axis=1)), strata)
 
 
 def probability_of_improvement(
@@ -285,7 +285,7 @@ def _estimate(value: np.floating | FloatArray, resampled: FloatArray, *policies:
     return Estimate(value=float(value), lower=float(lower), upper=float(upper), n_runs=n_runs)
 
 
-def _middle_mean(values: FloatArray) -> FloatArray:
+def middle_mean(values: FloatArray) -> FloatArray:
     """Mean of the middle half along the last axis."""
     cut = int(_CUT * values.shape[-1])
     return np.sort(values, axis=-1)[..., cut : values.shape[-1] - cut].mean(axis=-1)

@@ -24,10 +24,9 @@ from metrics import aggregate
 from metrics.benchmark import load_protocol
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.policies.registry import load_policy
-from swarm_forage_env.runs.plan import Plan
+from swarm_forage_env.runs.plan import Plan, finished_runs
 from swarm_forage_env.runs.spec import PolicySpec, policy_spec
 from swarm_forage_env.sheet import Sheet
-from swarm_forage_env.training.evaluation import finished_runs
 from swarm_forage_env.wrappers.world import World
 
 YARDSTICK = "dpo"
@@ -165,9 +164,7 @@ def main() -> None:
         parser.error(f"expected numbers of {words.policy}, got {lacking[0]!r}")
     before = {one.name: float(getattr(numbers, one.name)) if one.start is None else one.start for one in words.ranges}
     worlds = [
-        replace(one.world, scenario=replace(one.world.scenario, horizon_s=words.horizon))
-        for one in load_protocol().worlds
-        if not one.group
+        replace(world, scenario=replace(world.scenario, horizon_s=words.horizon)) for world in load_protocol().training
     ]
     found = evolved(words.policy, words.ranges, before, worlds, words)
     print(comparison(words.policy, before, found, worlds, words).text())

@@ -3,7 +3,7 @@
 from .arena import Feedback, evaluate
 from .board import Board, board_of
 from .entry import Entry, Training, read_entry, run_benchmark
-from .protocol import BenchmarkError, Protocol, ProtocolWorld, load_protocol
+from .protocol import Protocol, load_protocol
 from .standing import Standing
 from .verification import SAME, verify_entry
 
@@ -17,10 +17,8 @@ __all__ = [
     "board_of",
     "Board",
     "Protocol",
-    "ProtocolWorld",
     "Entry",
     "Training",
     "Standing",
-    "BenchmarkError",
     "SAME",
 ]

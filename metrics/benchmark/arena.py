@@ -22,9 +22,10 @@ from swarm_forage_env.runs.plan import Plan, run_plan
 from swarm_forage_env.runs.record import Record
 from swarm_forage_env.runs.spec import policy_specs
 
+from ..controllers import PAPER_POLICIES
 from ..scoring.limits import share_of_limit
 from .protocol import load_protocol
-from .standing import Reference, reference_of, scripted_entries
+from .standing import best_of
 
 TIME = {"search": "n_searching", "carry": "n_homing", "handle": "n_handling"}
 """What robots do with their time -> the column that counts them."""
@@ -117,21 +118,20 @@ def _evaluated(program: Any, horizon_s: float, seeds: Sequence[int]) -> Feedback
 
 def _run(program: Any, horizon_s: float, seeds: Sequence[int]) -> Feedback:
     protocol = load_protocol()
-    worlds = [each.world for each in protocol.worlds if not each.group]
     halves = {"horizon_s": horizon_s, "interval_s": horizon_s / 2.0}
-    short = [replace(world, scenario=replace(world.scenario, **halves)) for world in worlds]
+    short = [replace(world, scenario=replace(world.scenario, **halves)) for world in protocol.training]
     try:
         table = run_plan(Plan.product(policy_specs([program]), short, seeds), jobs=1)
     except (ValueError, TypeError) as error:
         return Feedback(score=0.0, error=str(error))
     for failure in table.failures.values():
         return Feedback(score=0.0, error=f"{failure.spec.scenario.name}: {failure.error}")
-    best = reference_of(scripted_entries(protocol), protocol)
-    found = tuple(_in_world(table.of(condition), best) for condition in table.plan.conditions)
+    best = best_of(PAPER_POLICIES, protocol.training, protocol)
+    found = tuple(map(_in_world, map(table.of, table.plan.conditions), best.tolist()))
     return Feedback(score=float(np.mean([each.ratio for each in found])), worlds=found)
 
 
-def _in_world(records: Sequence[Record], best: Reference) -> InWorld:
+def _in_world(records: Sequence[Record], best: float) -> InWorld:
     world = records[0].spec.world
     performance = float(np.mean([record.per_1000_s("performance") for record in records]))
     first, second = np.sum([record["performance"] for record in records], axis=0)
@@ -141,7 +141,7 @@ def _in_world(records: Sequence[Record], best: Reference) -> InWorld:
     return InWorld(
         world=world.name.removeprefix("training: "),
         performance=performance,
-        ratio=performance / float(best[world.name].mean()),
+        ratio=performance / best,
         of_limit=share_of_limit(world, performance * records[0].horizon_s / 1000.0),
         later=float(second / first) if first else 0.0,
         time={**{what: float(share) for what, share in shares.items()}, "avoid": avoiding},

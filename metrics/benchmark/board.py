@@ -5,8 +5,7 @@ print(board)
 board.draw("board.png")
 """
 
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,41 +23,43 @@ from swarm_forage_env.rendering.figures import (
 from swarm_forage_env.sheet import Answer, Sheet
 
 from ..controllers import PAPER_POLICIES
-from ..statistics import Estimate
-from .entry import Entry
-from .protocol import BenchmarkError, Protocol, load_protocol
-from .standing import Reference, Standing, reference_of, scripted_entries, shares_of, standing_of
+from .entry import Entry, TrainedIn
+from .protocol import Protocol, load_protocol
+from .standing import Standing, entries_of_package, standings_of
 
+_TRAINED_IN: Mapping[TrainedIn, str] = {
+    "given": "training worlds",
+    "other": "other worlds, too",
+    "held-out": "held-out worlds, too",
+    "nothing": "not trained",
+    "unknown": "not said",
+}
 _MOST_SHADE = 2.0
 """Share of the best scripted controller at which a cell has the darkest blue: as far above 1 as 0 is below."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Board(Answer):
-    """What entries are worth, including the scripted controllers."""
+    """What entries are worth, with those of the package."""
 
     standings: tuple[Standing, ...]
     """The highest score first."""
-    reference: Reference
-    """The best scripted controllers."""
     protocol: Protocol
-    """The full protocol."""
 
     def sheets(self) -> tuple[Sheet, ...]:
         """Return one row per entry."""
         rows = [
             {
                 "entry": standing.entry.name,
-                "track": standing.entry.training.track,
-                "score": bounded(standing.score),
-                "better than the best scripted": f"{100.0 * standing.improvement.value:.0f} %",
-                "worlds won": f"{standing.n_won} of {standing.n_worlds}",
-                "calm": f"{standing.calm:.2f}",
-                "disturbed": f"{standing.disturbed:.2f}",
-                "training worlds": f"{standing.training:.2f}",
-                "interference": f"{100.0 * standing.interference:.1f} %",
+                "trained in": trained_in(standing.entry),
+                "trainings": trainings(standing.entry),
+                "score": f"{score.value:.2f} ({score.lower:.2f} to {score.upper:.2f})",
+                "worst tenth": f"{standing.worst:.2f}",
+                "worlds won": f"{standing.won} of {len(self.protocol.held_out)}",
+                "training worlds": f"{standing.in_training:.2f}",
             }
             for standing in self.standings
+            for score in [standing.score]
         ]
         return (Sheet.of([*rows[0]], [[*row.values()] for row in rows]),)
 
@@ -68,7 +69,7 @@ class Board(Answer):
         Scores have their intervals; the line at 1 is the best scripted controller of each world. Below, there is a row
         per held-out world and a column per entry: blue is better than that controller, orange is worse.
         """
-        n_entries, n_worlds = len(self.standings), len(self.protocol.scored)
+        n_entries, n_worlds = len(self.standings), len(self.protocol.held_out)
         heights = (0.3 * n_entries + 0.9, 0.27 * n_worlds + 1.2)
         with saved_figure(path, (max(7.0, 3.6 + 1.0 * n_entries), sum(heights)), style=style) as figure:
             above, below = figure.subplots(2, 1, height_ratios=heights)
@@ -85,58 +86,41 @@ class Board(Answer):
         panel.set_yticks(np.arange(len(self.standings)), self._names())
         panel.set_ylim(len(self.standings) - 0.5, -0.5)
         panel.set_xlim(left=0.0)
-        trainings = "; orange: each training" if any(standing.by_policy for standing in self.standings) else ""
-        panel.set_title(f"score with 95 % interval{trainings}")
+        panel.set_title("score with 95 % interval; orange: each training")
         panel.set_xlabel("share of the best scripted controller")
         panel.grid(visible=False, axis="y")
 
     def _draw_worlds(self, panel: Panel) -> None:
-        worlds, entries = self.protocol.scored, [standing.entry for standing in self.standings]
-        shares = np.array([[shares_of(entry, world, self.reference).mean() for entry in entries] for world in worlds])
+        worlds = self.protocol.held_out
+        shares = np.column_stack([standing.by_world for standing in self.standings])
         colours = (COLOURS[1], "white", COLOURS[0])
         heat_map(panel, shares, lambda share: f"{share:.2f}", colours=colours, vmin=0.0, vmax=_MOST_SHADE)
         panel.set_yticks(np.arange(len(worlds)), [world.name for world in worlds])
-        panel.set_xticks(np.arange(len(entries)), self._names(), rotation=20, ha="right")
+        panel.set_xticks(np.arange(len(self.standings)), self._names(), rotation=20, ha="right")
         panel.set_title("share in each held-out world, mean over runs")
 
     def _names(self) -> list[str]:
         return [policy_words(standing.entry.name) for standing in self.standings]
 
 
-def board_of(entries: Sequence[Entry], protocol: Protocol | None = None) -> Board:
-    """Return what entries are worth, and with them the scripted controllers.
+def trained_in(entry: Entry) -> str:
+    """Return where the policies of an entry were trained, in words."""
+    return _TRAINED_IN[entry.training.worlds]
 
-    A new entry of a scripted controller is shown in place of the one in the package. All entries are compared with the
-    scripted controllers of the package.
 
-    Args:
-        entries: Entries of one protocol.
-        protocol: What they are entries of; default that of the package.
+def trainings(entry: Entry) -> str:
+    """Return how many trainings an entry has, and how many decisions the longest of them: "5 x 10.0M"."""
+    if entry.training.worlds == "nothing":
+        return ""
+    decisions = entry.training.decisions
+    return f"{len(entry.policies)}{'' if decisions is None else f' x {decisions / 1e6:.1f}M'}"
 
-    Raises:
-        BenchmarkError: two entries with one name, or another policy under the name of a scripted controller.
-    """
-    full = load_protocol()
-    scripted = scripted_entries(full)
-    reference = reference_of(scripted, full)
-    digests = {entry.digest for entry in scripted}
-    added = [entry for entry in entries if entry.digest not in digests]
-    names = [entry.name for entry in added]
-    for entry in added:
-        if names.count(entry.name) > 1:
-            raise BenchmarkError(f"Expected entries of different names, got {entry.name!r} twice.")
-        if entry.name in PAPER_POLICIES and not entry.is_scripted:
-            raise BenchmarkError(
-                f"Expected entries with names of their own, got one of another policy with the name {entry.name!r} of "
-                "a scripted controller; make it again with another --name."
-            )
-    standings = [standing_of(entry, reference, full) for entry in scripted if entry.name not in names]
-    standings += [standing_of(entry, reference, protocol or full) for entry in added]
+
+def board_of(entries: Sequence[Entry]) -> Board:
+    """Return what entries are worth, beside those of the package; one with the name of these takes its place."""
+    protocol = load_protocol()
+    added = {entry.name for entry in entries}
+    packaged = entries_of_package([name for name in PAPER_POLICIES if name not in added], protocol)
+    standings = standings_of([*packaged, *entries], protocol)
     standings.sort(key=lambda standing: (-standing.score.value, standing.entry.name))
-    return Board(standings=tuple(standings), reference=reference, protocol=full)
-
-
-def bounded(estimate: Estimate) -> str:
-    """Return a score with its interval, "0.87 (0.80 to 0.93)"."""
-    limits = "" if math.isnan(estimate.lower) else f" ({estimate.lower:.2f} to {estimate.upper:.2f})"
-    return f"{estimate.value:.2f}{limits}"
+    return Board(standings=tuple(standings), protocol=protocol)

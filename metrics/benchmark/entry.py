@@ -1,214 +1,115 @@
 """An entry of the benchmark: one JSON file with every number that its score needs.
 
-    entry = run_benchmark(["dpo"], name="mine")
-    entry.write("mine.json")
-    read_entry("mine.json").performance("corridor, long")  # per 1,000 s, (policies, seeds)
-
-`read_entry` accepts a file only if it is whole: it follows the protocol, has every run of every world, and its digest
-matches. This finds mistakes, such as a broken copy or a slip of the hand. It does not find fraud: anyone who alters
-numbers can also write a new digest. To be sure of an entry, verify it.
+entry = run_benchmark(["dpo"], name="mine")
+entry.write("mine.json")
+read_entry("mine.json").performance(load_protocol().held_out)  # per 1,000 s, (policies, worlds, seeds)
 """
 
 import json
-import os
-import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 from msgspec import Meta
 
-from swarm_forage_env._internal.fields import Amount, Checked, Count, Name, Share, checked, read
+from swarm_forage_env._internal.fields import Amount, Checked, ConfigError, Count, Name, checked, read
 from swarm_forage_env._internal.files import read_json, replacing
 from swarm_forage_env.contract.policy import sees_world
-from swarm_forage_env.policies.registry import file_of, is_policy_file, policy_class, policy_label
-from swarm_forage_env.runs.plan import Plan, Table, run_plan
+from swarm_forage_env.policies.registry import policy_class
+from swarm_forage_env.runs.plan import Plan, finished_runs
 from swarm_forage_env.runs.record import Record
-from swarm_forage_env.runs.spec import identity_of, policy_specs
+from swarm_forage_env.runs.spec import PolicySpec, policy_specs
 from swarm_forage_env.runs.versions import software_versions
+from swarm_forage_env.wrappers.world import World
 
 from ..controllers import PAPER_POLICIES
 from ..curves import FloatArray
-from .protocol import OPEN, BenchmarkError, Protocol, load_protocol
+from .protocol import Protocol, load_protocol
+
+TrainedIn: TypeAlias = Literal["given", "other", "held-out", "nothing", "unknown"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Training(Checked):
     """How the author says that the policies of an entry were made."""
 
-    worlds: Literal["given", "other", "nothing", "unknown"] = "unknown"
-    """Where a policy was trained: in the training worlds only, also elsewhere, not at all, or nobody says."""
+    worlds: TrainedIn = "unknown"
+    """Where: in the training worlds only, also elsewhere, also in held-out worlds, not at all, or nobody says."""
     command: str = ""
-    track: str = OPEN
-    """One of the protocol's tracks, or `OPEN`."""
     decisions: Count | None = None
-    """Decisions of its longest training, counted over all robots."""
-
-    def check_track(self, protocol: Protocol, n_policies: int) -> None:
-        """Refuse a training that does not fit its track.
-
-        Args:
-            protocol: That has the tracks.
-            n_policies: How many trainings there are.
-
-        Raises:
-            BenchmarkError: an unknown track; or one with a budget for policies that trained elsewhere, too long or too
-                seldom, or whose author does not say so.
-        """
-        if self.track == OPEN:
-            return
-        if self.track not in protocol.tracks:
-            known = ", ".join((*protocol.tracks, OPEN))
-            raise BenchmarkError(f"Expected --track to be one of {known}, got {self.track!r}.")
-        budget, n_trainings = protocol.tracks[self.track], protocol.n_trainings
-        decisions = "none" if self.decisions is None else f"{self.decisions:,}"
-        is_short = self.decisions is not None and self.decisions <= budget
-        for is_kept, wanted, got in (
-            (self.worlds == "given", "a training in the training worlds only (--trained-in given)", repr(self.worlds)),
-            (is_short, f"at most {budget:,} decisions of a training (--decisions)", decisions),
-            (n_policies >= n_trainings, f"{n_trainings} trainings, a file each,", n_policies),
-        ):
-            if not is_kept:
-                raise BenchmarkError(
-                    f"Expected {wanted} for the track {self.track}, got {got}; or choose --track {OPEN}."
-                )
+    """Decisions of the longest training, counted over all robots."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class EntryPolicy:
-    """One policy of an entry: one training seed of a learner."""
+    """One policy of an entry: one training of a method."""
 
     name: str
-    """Name for people, see `swarm_forage_env.policies.registry.policy_label`; for a file without folder and ending."""
+    """A registered name, or what of its path tells a file from others."""
     digest: str = ""
     """Hash of the content of its file; empty without a file."""
 
-
-@dataclass(frozen=True, kw_only=True)
-class WorldRuns:
-    """The runs of a world; each array has shape (policies, seeds)."""
-
-    performance: tuple[tuple[Amount, ...], ...]
-    """Per 1,000 s."""
-    interference: tuple[tuple[Share, ...], ...]
-    """Share of robot time."""
+    @classmethod
+    def of(cls, spec: PolicySpec) -> "EntryPolicy":
+        """Return what an entry says of a policy."""
+        return cls(name=spec.label, digest=spec.parameters.get("digest", ""))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Entry:
-    """What an entry file holds, its digest aside."""
+    """What an entry file holds."""
 
     protocol: str
     """Identity of the protocol, see `Protocol.identity`."""
     name: Name
-    command: str
-    """What makes it again."""
     policies: Annotated[tuple[EntryPolicy, ...], Meta(min_length=1)]
-    runs: Mapping[str, WorldRuns]
-    """World -> its runs."""
+    runs: Mapping[str, tuple[tuple[Amount, ...], ...]]
+    """World -> performance of its runs per 1,000 s, (policies, seeds)."""
     training: Training = field(default_factory=Training)
     versions: Mapping[str, str] = field(default_factory=dict[str, str])
 
-    def performance(self, world: str) -> FloatArray:
-        """Return the performance of all runs of a world, per 1,000 s, (policies, seeds)."""
-        return np.asarray(self.runs[world].performance, dtype=np.float64)
-
-    def interference(self, world: str) -> FloatArray:
-        """Return the share of robot time lost to interference, (policies, seeds)."""
-        return np.asarray(self.runs[world].interference, dtype=np.float64)
-
-    @property
-    def is_scripted(self) -> bool:
-        """Whether the entry is that of an installed policy, under the name of that policy."""
-        return [(policy.name, policy.digest) for policy in self.policies] == [(self.name, "")]
-
-    @property
-    def is_trained(self) -> bool:
-        """Whether its policies are trained, according to its author: trainings of one plan may differ."""
-        return self.training.worlds != "nothing"
-
-    @property
-    def digest(self) -> str:
-        """Hash of everything that the entry holds."""
-        return identity_of(json.loads(json.dumps(asdict(self))))
+    def performance(self, worlds: Sequence[World]) -> FloatArray:
+        """Return the performance of all runs in some worlds, per 1,000 s, (policies, worlds, seeds)."""
+        return np.stack([np.asarray(self.runs[world.name]) for world in worlds], axis=1)
 
     def write(self, path: str | Path) -> None:
         """Write the entry to a file, whole or not at all: a line per world, so that people can compare them."""
-        content: dict[str, Any] = {**asdict(self), "digest": self.digest}
-        runs = ",\n".join(f"  {json.dumps(name)}: {json.dumps(rows)}" for name, rows in content["runs"].items())
-        lines = [
-            f' "runs": {{\n{runs}\n }}' if key == "runs" else f" {json.dumps(key)}: {json.dumps(value)}"
-            for key, value in content.items()
-        ]
+        content = asdict(self)
+        runs = ",\n".join(f"  {json.dumps(name)}: {json.dumps(rows)}" for name, rows in content.pop("runs").items())
+        others = "".join(f" {json.dumps(key)}: {json.dumps(value)},\n" for key, value in content.items())
         with replacing(Path(path)) as draft:
-            draft.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
-
-    def check(self, protocol: Protocol, where: str) -> None:
-        """Refuse an entry of another protocol, or one that lacks runs; `where` names it in messages.
-
-        Raises:
-            BenchmarkError: see above.
-        """
-        if self.protocol != protocol.identity:
-            raise BenchmarkError(
-                f"Expected an entry of this benchmark, got one of other worlds or seeds in {where}; run swarm-forage "
-                "benchmark again."
-            )
-        digests = [policy.digest for policy in self.policies if policy.digest]
-        if self.training.track != OPEN and len({*digests}) < len(digests):
-            raise BenchmarkError(f"Expected different trainings in {where}, got one file twice.")
-        self.training.check_track(protocol, len(self.policies))
-        odd = sorted({world.name for world in protocol.worlds}.symmetric_difference(self.runs))
-        if odd:
-            raise BenchmarkError(f"Expected runs of all worlds in {where} and of no other; see {odd[0]!r}.")
-        shape = (len(self.policies), len(protocol.seeds))
-        for world, runs in self.runs.items():
-            for name, rows in vars(runs).items():
-                if [len(row) for row in rows] != [shape[1]] * shape[0]:
-                    raise BenchmarkError(
-                        f"Expected {name} in the world {world!r} of {where} as lists of numbers, one for each of "
-                        f"{shape[0]} policies and {shape[1]} seeds."
-                    )
+            draft.write_text(f'{{\n{others} "runs": {{\n{runs}\n }}\n}}\n', encoding="utf-8")
 
 
 def read_entry(path: str | Path, protocol: Protocol | None = None) -> Entry:
-    """Read an entry file.
+    """Read an entry file; it must have all runs of the protocol, by default that of the package.
 
-    Args:
-        path: The file.
-        protocol: What it must be an entry of; default that of the package.
+    This does not find fraud. To be sure of an entry, verify it.
 
     Raises:
-        BenchmarkError: the file cannot be read, its entry of the protocol is not whole, or its digest does not match.
+        ConfigError: the file cannot be read, is an entry of another protocol, or lacks runs.
     """
-    content = dict(read_json(Path(path), BenchmarkError))
-    digest = content.pop("digest", None)
+    asked = protocol or load_protocol()
+    content = read_json(Path(path), ConfigError)
     try:
         entry: Entry = read(Entry, content)
-    except ValueError as error:
-        raise BenchmarkError(f"Cannot use the entry {path}: {error}") from error
-    entry.check(protocol or load_protocol(), str(path))
-    if entry.digest != digest:
-        raise BenchmarkError(
-            f"Expected the numbers of {path} as swarm-forage benchmark wrote them, got others: the digest does not "
-            "fit. Make the entry again."
+    except ConfigError as error:
+        raise ConfigError(f"Cannot use the entry {path}: {error}") from error
+    if entry.protocol != asked.identity:
+        raise ConfigError(
+            f"Expected an entry of this benchmark, got one of other worlds or seeds in {path}; run swarm-forage "
+            "benchmark again."
         )
+    rows = [len(asked.seeds)] * len(entry.policies)
+    for world in asked.worlds:
+        if [len(row) for row in entry.runs.get(world.name, ())] != rows:
+            raise ConfigError(
+                f"Expected in {path} the runs of {len(rows)} policies with {len(asked.seeds)} seeds in the world "
+                f"{world.name!r}."
+            )
     return entry
-
-
-def check_finished(table: Table) -> None:
-    """Refuse a table in which runs are missing.
-
-    Raises:
-        BenchmarkError: runs failed.
-    """
-    for first in table.failures.values():
-        raise BenchmarkError(
-            f"Expected all {len(table.plan.specs)} runs to finish, {len(table.failures)} failed; the first, "
-            f"{first.spec.describe()}: {first.error}"
-        )
 
 
 def run_benchmark(
@@ -224,7 +125,7 @@ def run_benchmark(
     """Run policies in all worlds of a protocol and return the entry.
 
     Args:
-        policies: Registered names or policy files; several are training seeds of one method, and one entry.
+        policies: Registered names or policy files; several are trainings of one method, and one entry.
         name: Name of the entry in tables.
         protocol: Default that of the package.
         training: How the policies were made.
@@ -233,82 +134,38 @@ def run_benchmark(
         progress: Show progress and an estimate on stderr.
 
     Raises:
-        BenchmarkError: runs failed, the name is that of a scripted controller, or the training does not fit its track.
-        ConfigError: a name without characters, or with some that no terminal shows.
+        ConfigError: runs failed, a policy that sees the world, the name of an entry of the package, or one without
+            characters.
         ValueError: an unknown policy, or a file that cannot be opened.
         KeyboardInterrupt: Ctrl-C; finished runs are in `out`.
     """
     checked("the name of an entry", name, Name)
-    chosen, told = protocol or load_protocol(), training or Training()
-    if name in PAPER_POLICIES and (tuple(policies) != (name,) or chosen.is_quick):
-        raise BenchmarkError(
+    if name in PAPER_POLICIES and tuple(policies) != (name,):
+        raise ConfigError(
             f"Expected another name than {name!r}, which is that of an entry that comes with the package; choose one "
             "with --name."
         )
-    if not chosen.is_quick:
-        told.check_track(chosen, len(policies))
-    specs = policy_specs(policies)
+    chosen, specs = protocol or load_protocol(), policy_specs(policies)
     for spec in specs:
         if sees_world(policy_class(spec.policy)):
-            raise BenchmarkError(
+            raise ConfigError(
                 f"Expected policies that decide by what robots observe, got {spec.label}, which reads the world. It is "
                 "a yardstick and no contestant: swarm-forage run puts it beside others."
             )
-    table = run_plan(
-        Plan.product(specs, [each.world for each in chosen.worlds], chosen.seeds),
-        out=out,
-        jobs=jobs,
-        progress=progress,
-    )
-    check_finished(table)
+    table = finished_runs(Plan.product(specs, chosen.worlds, chosen.seeds), out=out, jobs=jobs, progress=progress)
+    runs: dict[str, list[tuple[float, ...]]] = {world.name: [] for world in chosen.worlds}
+    for condition in table.plan.conditions:
+        runs[condition.world.name].append(tuple(rate_of(record) for record in table.of(condition)))
     return Entry(
         protocol=chosen.identity,
         name=name,
-        command=entry_command([spec.policy for spec in specs], name, training=told),
-        policies=tuple(EntryPolicy(name=policy_label(each.policy), digest=digest_of(each.policy)) for each in specs),
-        runs={
-            world.name: WorldRuns(
-                performance=_of_all(table, world.name, lambda record: record.per_1000_s("performance")),
-                interference=_of_all(table, world.name, lambda record: float(record["interference_fraction"].mean())),
-            )
-            for world in chosen.worlds
-        },
-        training=told,
+        policies=tuple(map(EntryPolicy.of, specs)),
+        runs={world: tuple(rows) for world, rows in runs.items()},
+        training=training or Training(),
         versions={package: version for package, version in software_versions().items() if version},
     )
 
 
-def _of_all(table: Table, world: str, value: Callable[[Record], float]) -> tuple[tuple[float, ...], ...]:
-    """A number of each run in a world, (policies, seeds)."""
-    conditions = [condition for condition in table.plan.conditions if condition.world.name == world]
-    return tuple(tuple(six_digits(value(record)) for record in table.of(one)) for one in conditions)
-
-
-def six_digits(value: float) -> float:
-    """Return a number as entry files hold it: further digits would only make files longer."""
-    return float(f"{value:.6g}")
-
-
-def entry_command(policies: Sequence[str], name: str, *, training: Training | None = None) -> str:
-    """Return what makes an entry again from the current folder: policies as given, but files without whole paths.
-
-    What a training was is among the words only where its track asks for it.
-    """
-    words: list[str] = []
-    for policy in policies:
-        file = file_of(policy)
-        is_whole = is_policy_file(policy) and Path(file).is_absolute()
-        words.append(Path(os.path.relpath(file)).as_posix() + policy.removeprefix(file) if is_whole else policy)
-    words += ["--name", name]
-    if training is not None and training.track != OPEN:
-        words += ["--trained-in", training.worlds, "--track", training.track, "--decisions", str(training.decisions)]
-    return shlex.join(["swarm-forage", "benchmark", *words])
-
-
-def digest_of(policy: str) -> str:
-    """Return the hash of the content of a policy's file; empty without a file."""
-    from swarm_forage_env.policies.model_files import file_digest
-    from swarm_forage_env.policies.pretrained import network_file
-
-    file = Path(file_of(policy)) if is_policy_file(policy) else network_file(policy)
-    return "" if file is None else file_digest(file)
+def rate_of(record: Record) -> float:
+    """Return the performance of a run per 1,000 s, with six digits: further ones would only make files longer."""
+    return float(f"{record.per_1000_s('performance'):.6g}")

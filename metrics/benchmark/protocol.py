@@ -1,8 +1,7 @@
 """The protocol of the benchmark: which worlds, which seeds, how long, read from `benchmark.toml`.
 
 protocol = load_protocol()
-protocol.worlds[0].name             # "training: small warehouse"
-load_protocol(quick=True)           # the same worlds, shorter and with fewer seeds: for a look
+protocol.held_out[0].name  # "turned and mirrored, source in the west"
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -10,7 +9,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from swarm_forage_env._internal.files import parse_toml
+from swarm_forage_env.runs.spec import identity_of
 from swarm_forage_env.scenarios.floor import CELL_M, POSITIONS
+from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.registry import wrappers_from_mapping
 from swarm_forage_env.wrappers.world import World
 
@@ -18,97 +20,54 @@ if TYPE_CHECKING:
     from swarm_forage_env.scenarios.config import ScenarioConfig
 
 FOLDER = Path(__file__).parent
-"""Where the protocol is, and in `scripted` the entries of the scripted controllers."""
-OPEN = "open"
-"""The track without a budget."""
-
-
-class BenchmarkError(ValueError):
-    """An entry that cannot be made or used; the message says why, and what to do."""
-
-
-@dataclass(frozen=True, eq=False)
-class ProtocolWorld:
-    """A world where every policy is run once per seed."""
-
-    world: World
-    """With a unique name: "corridor, long", "late, slow wheels"."""
-    group: str = ""
-    """The group of held-out worlds it belongs to; empty for a world to train in."""
-    is_scored: bool = True
-    """Whether its performance counts; that of a lone robot does not."""
-
-    @property
-    def name(self) -> str:
-        """Name of the world."""
-        return self.world.name
-
-    @property
-    def is_disturbed(self) -> bool:
-        """Whether something disturbs the swarm."""
-        return bool(self.world.wrappers)
-
-    @property
-    def counts(self) -> bool:
-        """Whether its performance is part of the score: it is held out, and no lone robot is in it."""
-        return bool(self.group) and self.is_scored
+"""Where the protocol is, and in `scripted` the entries that all others are compared with."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Protocol:
-    """Everything that decides what an entry has to run."""
+    """What an entry has to run: every policy in every world, once per seed."""
 
     identity: str
     """Short hash of what the file says: two protocols with the same one ask for the same runs."""
-    is_quick: bool
     seeds: tuple[int, ...]
-    worlds: tuple[ProtocolWorld, ...]
-    """The worlds to train in first."""
-    tracks: Mapping[str, int]
-    """Track with a budget -> the most decisions that one training may take."""
-    n_trainings: int
-    """Number of trainings that an entry with a budget needs."""
+    training: tuple[World, ...]
+    """The worlds to train in."""
+    held_out: tuple[World, ...]
+    """The worlds that count, named after their group: "corridor, long"."""
 
     @property
-    def scored(self) -> tuple[ProtocolWorld, ...]:
-        """The held-out worlds whose performance counts."""
-        return tuple(world for world in self.worlds if world.counts)
+    def worlds(self) -> tuple[World, ...]:
+        """All worlds, those to train in first."""
+        return self.training + self.held_out
 
 
-def load_protocol(file: Path | None = None, *, quick: bool = False) -> Protocol:
-    """Read a protocol.
-
-    Args:
-        file: Default that of the package.
-        quick: Shorter runs with fewer seeds, as the file says; no entry can be made of them.
-    """
-    from swarm_forage_env._internal.files import parse_toml
-    from swarm_forage_env.runs.spec import identity_of
-
+def load_protocol(file: Path | None = None) -> Protocol:
+    """Read a protocol; default that of the package."""
     content = parse_toml((file or FOLDER / "benchmark.toml").read_text(encoding="utf-8"))
-    chosen = {name: content[name] for name in ("physics", "horizon_s", "interval_s", "seeds")}
-    chosen |= content["quick"] if quick else {}
-    seeds = tuple(chosen.pop("seeds"))
-    worlds = [
-        ProtocolWorld(World(_scenario(entry, chosen), name=f"training: {entry['name']}"))
-        for entry in content["training"]
-    ]
-    for entry in content["group"]:
-        worlds += _of_group(entry, chosen)
+    runs = {name: content[name] for name in ("physics", "horizon_s", "interval_s")}
     return Protocol(
-        identity=identity_of({**content, "is_quick": quick}),
-        is_quick=quick,
-        seeds=seeds,
-        worlds=tuple(worlds),
-        tracks=content["tracks"],
-        n_trainings=content["trainings"],
+        identity=identity_of(content),
+        seeds=tuple(content["seeds"]),
+        training=tuple(World(_scenario(one, runs), name=f"training: {one['name']}") for one in content["training"]),
+        held_out=tuple(world for group in content["group"] for world in _of_group(group, runs)),
     )
 
 
-def _scenario(entry: Mapping[str, Any], of_all: Mapping[str, Any]) -> "ScenarioConfig":
-    from swarm_forage_env.scenarios.presets import scenario
+def _of_group(group: Mapping[str, Any], runs: Mapping[str, Any]) -> Iterator[World]:
+    """Yield the worlds of a group: variants of one scenario, some sizes of it, and what disturbs it."""
+    base = _scenario(group, runs)
+    for what, fields in group.get("variants", {}).items():
+        varied = _scenario({**group, "set": {**group.get("set", {}), **fields}}, runs)
+        yield World(varied, name=f"{group['name']}, {what}")
+    for size in group.get("sizes", ()):
+        sized = replace(base, robots=replace(base.robots, n_robots=size))
+        yield World(sized, name=f"{group['name']}, {size} robots")
+    for what, tables in group.get("disturbed", {}).items():
+        yield World(base, wrappers_from_mapping(tables), name=f"{group['name']}, {what}")
 
-    settings = {**of_all, **entry.get("set", {})}
+
+def _scenario(entry: Mapping[str, Any], runs: Mapping[str, Any]) -> "ScenarioConfig":
+    settings = {**runs, **entry.get("set", {})}
     if "sources" in settings:
         settings |= {"placement": POSITIONS, "object_positions_m": _cell_middles(settings.pop("sources"))}
     return scenario(entry["scenario"], **settings)
@@ -122,17 +81,3 @@ def _cell_middles(boxes: Sequence[Sequence[float]]) -> list[tuple[float, float]]
         for x in range(round(x_low / CELL_M), round(x_high / CELL_M))
         for y in range(round(y_low / CELL_M), round(y_high / CELL_M))
     ]
-
-
-def _of_group(entry: Mapping[str, Any], of_all: Mapping[str, Any]) -> Iterator[ProtocolWorld]:
-    """Yield the worlds of a group: variants of one scenario, some sizes of it, and what disturbs it."""
-    name, base = entry["name"], _scenario(entry, of_all)
-    for what, fields in entry.get("variants", {}).items():
-        varied = _scenario({**entry, "set": {**entry.get("set", {}), **fields}}, of_all)
-        yield ProtocolWorld(World(varied, name=f"{name}, {what}"), name)
-    for size in entry.get("sizes", ()):
-        sized = replace(base, robots=replace(base.robots, n_robots=size))
-        called = f"{name}, {size} robot{'s' if size > 1 else ''}"
-        yield ProtocolWorld(World(sized, name=called), name, is_scored=size > 1)
-    for what, tables in entry.get("disturbed", {}).items():
-        yield ProtocolWorld(World(base, wrappers_from_mapping(tables), name=f"{name}, {what}"), name)

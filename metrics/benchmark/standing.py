@@ -2,146 +2,127 @@
 
 In each world, the performance of a run is divided by the mean of the best of the paper's four controllers. So 1 is as
 good as this controller, and worlds with few and with many deliveries count alike. The score of a policy is the
-interquartile mean of its held-out runs, so a single world in which it is lucky or breaks down does not decide it.
-
-Trainings of one plan differ far more than runs of one network. So the score of a trained entry is the mean of the
-scores of its trainings: a training that failed counts as one of them. Its interval covers trainings, that of a scripted
-entry runs.
+interquartile mean of its held-out runs, so a single world in which it is lucky or breaks down does not decide it. The
+score of an entry is the mean over its policies: a training that failed counts as one of them.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TypeAlias
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from scipy.special import stdtrit  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
+
+from swarm_forage_env.wrappers.world import World
 
 from ..controllers import PAPER_POLICIES
 from ..curves import FloatArray
-from ..statistics import N_RESAMPLES, Estimate, aggregate, interquartile_mean, probability_of_improvement
+from ..statistics import CONFIDENCE, ROUNDING, Estimate, middle_mean
 from . import protocol as places
 from .entry import Entry, read_entry
-from .protocol import Protocol, ProtocolWorld
+from .protocol import Protocol
 
-_SEED = 1
-"""Seed of the bootstrap; fixed, so that the same entries give the same page."""
-Reference: TypeAlias = Mapping[str, FloatArray]
-"""World -> performance of the runs of the best scripted controller there, per 1,000 s, (runs,)."""
+_WORST = 0.1
+"""Share of the worlds that are the worst."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Standing:
-    """What an entry is worth."""
+    """What an entry is worth; all arrays are (policies, worlds, seeds)."""
 
     entry: Entry
-    score: Estimate
-    """Interquartile mean over the runs of all held-out worlds, mean over trainings if there are any; 1 = as good as the
-    best scripted controller."""
-    improvement: Estimate
-    """Probability that one of its runs beats a run of the best scripted controller in the same world, in [0, 1]."""
-    n_won: int
-    """Number of held-out worlds in which its mean is higher than the means of the paper's four controllers."""
-    n_worlds: int
-    calm: float
-    """Interquartile mean over undisturbed held-out worlds, mean over trainings if there are any."""
-    disturbed: float
-    training: float
-    """The same over the training worlds."""
-    interference: float
-    """Share of robot time lost in held-out worlds, mean over runs."""
-    by_policy: tuple[float, ...]
-    """Score of each policy, where there are several: the spread over trainings."""
-    won_by_policy: tuple[int, ...]
-    """Number of held-out worlds that each policy wins, where there are several."""
+    shares: FloatArray
+    """Performance over the mean of the best scripted controller, in held-out worlds."""
+    training_shares: FloatArray
+    """The same in the training worlds."""
+
+    @cached_property
+    def score(self) -> Estimate:
+        """Mean over policies of the interquartile mean over runs; 1 = as good as the best scripted controller."""
+        return score_of(self.shares)
+
+    @property
+    def by_policy(self) -> FloatArray:
+        """Score of each policy: the spread over trainings."""
+        return _by_policy(self.shares)
+
+    @property
+    def by_world(self) -> FloatArray:
+        """Mean share in each held-out world, over policies and seeds."""
+        return self.shares.mean(axis=(0, 2))
+
+    @property
+    def worst(self) -> float:
+        """Mean share in the tenth of the held-out worlds where it is lowest: in three of 27."""
+        return float(np.sort(self.by_world)[: max(1, round(_WORST * len(self.by_world)))].mean())
+
+    @property
+    def won(self) -> int:
+        """Number of held-out worlds in which its mean is higher than that of the best scripted controller."""
+        return int((self.by_world > 1.0 + ROUNDING).sum())
+
+    @property
+    def in_training(self) -> float:
+        """The score over the training worlds."""
+        return float(_by_policy(self.training_shares).mean())
 
 
-def scripted_entries(protocol: Protocol) -> tuple[Entry, ...]:
-    """Return the entries of the scripted controllers, which come with the package; of the full protocol."""
-    return tuple(read_entry(places.FOLDER / "scripted" / f"{name}.json", protocol) for name in PAPER_POLICIES)
+def score_of(shares: FloatArray) -> Estimate:
+    """Return the score of an entry with its interval, for trainings and worlds of the same kinds.
 
+    Trainings and worlds are both samples, and runs are samples within worlds. What trainings add to the variance of the
+    score is that of their scores, over their number. What worlds add, with their runs, comes from leaving out one after
+    the other (jackknife). Both are summed, and Student's degrees of freedom are those of Welch and Satterthwaite. For
+    one policy, the interval covers worlds and runs: it is that of this policy, and tells nothing of another training.
 
-def reference_of(scripted: Sequence[Entry], protocol: Protocol) -> Reference:
-    """Return the runs of the best scripted controller in each held-out world and each training world."""
-    return {
-        world.name: max((entry.performance(world.name) for entry in scripted), key=np.mean).ravel()
-        for world in protocol.worlds
-        if world.is_scored
-    }
-
-
-def standing_of(entry: Entry, reference: Reference, protocol: Protocol) -> Standing:
-    """Return what an entry is worth; the rates of a quick entry are compared with rates of longer runs."""
-    judged = [world for world in protocol.worlds if world.is_scored]
-    shares = {world.name: shares_of(entry, world, reference) for world in judged}
-    policies = [[k] for k in range(len(entry.policies))]
-    parts = policies if entry.is_trained else [[k for (k,) in policies]]  # what each has a score of its own
-    resampled = 1 if entry.is_trained else N_RESAMPLES  # the interval of trainings needs none
-
-    def scores(chosen: Callable[[ProtocolWorld], bool], of: Sequence[list[int]] = parts) -> list[Estimate]:
-        """Return the score of each part in some of the worlds."""
-        picked = [shares[world.name] for world in judged if chosen(world)]
-        return [
-            interquartile_mean([runs[part].ravel() for runs in picked], seed=_SEED, n_resamples=resampled)
-            for part in of
-        ]
-
-    def middle(chosen: Callable[[ProtocolWorld], bool]) -> float:
-        return float(np.mean([one.value for one in scores(chosen)]))
-
-    held_out = scores(lambda world: world.counts)
-    counting = protocol.scored
-    performances = [entry.performance(world.name) for world in counting]
-    theirs = [reference[world.name] for world in counting]
-    chances = [
-        probability_of_improvement(
-            [runs[part].ravel() for runs in performances], theirs, seed=_SEED, n_resamples=resampled
-        )
-        for part in parts
-    ]
-    is_several = len(policies) > 1
-    by_policy = scores(lambda world: world.counts, policies) if is_several else ()
-    won = [_n_won([runs[k] for runs in performances], theirs) for (k,) in policies] if is_several else ()
-    return Standing(
-        entry=entry,
-        score=over_trainings(held_out) if entry.is_trained else held_out[0],
-        improvement=_within_0_and_1(over_trainings(chances)) if entry.is_trained else chances[0],
-        n_won=_n_won(performances, theirs),
-        n_worlds=len(counting),
-        calm=middle(lambda world: world.counts and not world.is_disturbed),
-        disturbed=middle(lambda world: world.counts and world.is_disturbed),
-        training=middle(lambda world: not world.group),
-        interference=float(np.mean([entry.interference(world.name).mean() for world in counting])),
-        by_policy=tuple(each.value for each in by_policy),
-        won_by_policy=tuple(won),
-    )
-
-
-def _n_won(ours: Sequence[FloatArray], theirs: Sequence[FloatArray]) -> int:
-    """Count the worlds in which our mean performance is higher; as shares, equal ones may differ by rounding."""
-    return sum(bool(our.mean() > their.mean()) for our, their in zip(ours, theirs, strict=True))
-
-
-def over_trainings(by_training: Sequence[Estimate]) -> Estimate:
-    """Return the mean of trainings with Student's interval over them; without an interval for one training.
-
-    Our choice: resampling trainings, then runs, gives intervals that are too short. By simulation, 71 to 76 % of such
-    95 % intervals hold the truth with three trainings, 85 to 88 % with five, but 94 to 96 % of Student's. This is for
-    trainings that scatter about normally. If one of five fails, a third of all entries of five trainings show no
-    failure, and their intervals are too short and too high.
+    By simulation, with variances like those of the entries in docs/benchmark, 94 to 96 % of such intervals hold the
+    truth with five trainings, 93 to 96 % with three. If trainings differ from world to world and in nothing else, it is
+    99 %: this part is in both. Trainings must scatter about normally: if one of five fails, a third of all entries of
+    five trainings show no failure, and their intervals are too short and too high.
 
     Args:
-        by_training: A number of each training, from its runs alone.
+        shares: One per run, (policies, worlds, seeds).
     """
-    over = aggregate([estimate.value for estimate in by_training])
-    n_runs = sum(estimate.n_runs for estimate in by_training)
-    return Estimate(value=over.mean, lower=over.lower, upper=over.upper, n_runs=n_runs)
+    n_policies, n_worlds, _ = shares.shape
+    scores = _by_policy(shares)
+    without = [_by_policy(np.delete(shares, world, axis=1)).mean() for world in range(n_worlds)]
+    of_worlds = (n_worlds - 1) * float(np.var(without))
+    of_policies = float(np.var(scores, ddof=1)) / n_policies if n_policies > 1 else 0.0
+    variance = of_worlds + of_policies
+    half = 0.0
+    if variance > 0.0:
+        freedom = variance**2 / (of_worlds**2 / (n_worlds - 1) + of_policies**2 / max(1, n_policies - 1))
+        half = float(stdtrit(freedom, 0.5 + 0.5 * CONFIDENCE)) * math.sqrt(variance)
+    value = float(scores.mean())
+    return Estimate(value=value, lower=value - half, upper=value + half, n_runs=shares.size)
 
 
-def _within_0_and_1(estimate: Estimate) -> Estimate:
-    """Cut bounds that a share cannot have; NaN stays NaN."""
-    lower, upper = np.clip([estimate.lower, estimate.upper], 0.0, 1.0)
-    return replace(estimate, lower=float(lower), upper=float(upper))
+def _by_policy(shares: FloatArray) -> FloatArray:
+    """The interquartile mean over runs of each policy."""
+    return middle_mean(shares.reshape(len(shares), -1))
 
 
-def shares_of(entry: Entry, world: ProtocolWorld, reference: Reference) -> FloatArray:
-    """Return the performance of an entry's runs over the best scripted mean in a world, (policies, seeds)."""
-    return entry.performance(world.name) / reference[world.name].mean()
+def entries_of_package(names: Sequence[str], protocol: Protocol) -> list[Entry]:
+    """Return entries that come with the package: those of the scripted controllers."""
+    return [read_entry(places.FOLDER / "scripted" / f"{name}.json", protocol) for name in names]
+
+
+def best_of(names: Sequence[str], worlds: Sequence[World], protocol: Protocol) -> FloatArray:
+    """Return the highest mean of entries of the package in some worlds, per 1,000 s, (worlds,)."""
+    means = [entry.performance(worlds).mean(axis=(0, 2)) for entry in entries_of_package(names, protocol)]
+    return np.max(means, axis=0)
+
+
+def standings_of(entries: Sequence[Entry], protocol: Protocol) -> list[Standing]:
+    """Return what entries are worth."""
+    held_out, training = protocol.held_out, protocol.training
+    best, there = (best_of(PAPER_POLICIES, worlds, protocol) for worlds in (held_out, training))
+    return [
+        Standing(
+            entry=entry,
+            shares=entry.performance(held_out) / best[:, None],
+            training_shares=entry.performance(training) / there[:, None],
+        )
+        for entry in entries
+    ]

@@ -23,10 +23,8 @@ def run(
     name: str | None = None,
     file: Path | None = None,
     out: Path = FOLDER / "records",
-    quick: bool = False,
-    trained_in: Literal["given", "other", "nothing", "unknown"] = "unknown",
+    trained_in: Literal["given", "other", "held-out", "nothing", "unknown"] = "unknown",
     training_command: Annotated[str, Parameter(name="--training")] = "",
-    track: str = "open",
     decisions: NonNegativeInt | None = None,
     jobs: Jobs = None,
 ) -> None:
@@ -39,34 +37,26 @@ def run(
         name: Name of the entry; default the policy's.
         file: Entry to write; default NAME.json in results/benchmark.
         out: Folder for records of runs.
-        quick: Quick look: short runs and few seeds, without an entry.
-        trained_in: given: only in the training worlds; other: also elsewhere; nothing: not trained; unknown.
+        trained_in: given: only in the training worlds; other: also elsewhere; held-out: also in held-out worlds;
+            nothing: not trained; unknown.
         training_command: Command that trained the policies.
-        track: 10M, 40M or open: most decisions of a training.
         decisions: Decisions of the longest training, of all its robots.
     """
     first, *others = policies
     if name is None and others:
         raise ConfigError("Expected --name for an entry of several policies.")
-    if quick and file is not None:
-        raise ConfigError("Expected --file without --quick: a quick look is no entry.")
-    from metrics.benchmark import Training, board_of, load_protocol, run_benchmark
+    from metrics.benchmark import Training, board_of, run_benchmark
     from swarm_forage_env._internal.files import as_file_name, check_file
     from swarm_forage_env.policies.registry import policy_label
 
-    protocol = load_protocol(quick=quick)
-    called = name or f"{policy_label(first)}{', quick' if quick else ''}"
-    training = Training(worlds=trained_in, command=training_command, track=track, decisions=decisions)
-    entry_file = None if quick else file or FOLDER / f"{as_file_name(called)}.json"
-    if entry_file is not None:
-        check_file(entry_file)
-    entry = run_benchmark([*policies], name=called, protocol=protocol, training=training, out=out, jobs=jobs)
-    if entry_file is not None:
-        entry.write(entry_file)
-        note(f"entry {entry_file}")
-    say(board_of([entry], protocol).text())
-    if quick:
-        note("A quick look, no entry: shorter runs than those of the scripted controllers.")
+    called = name or policy_label(first)
+    training = Training(worlds=trained_in, command=training_command, decisions=decisions)
+    entry_file = file or FOLDER / f"{as_file_name(called)}.json"
+    check_file(entry_file)
+    entry = run_benchmark([*policies], name=called, training=training, out=out, jobs=jobs)
+    entry.write(entry_file)
+    note(f"entry {entry_file}")
+    say(board_of([entry]).text())
 
 
 @app.command(name="show")

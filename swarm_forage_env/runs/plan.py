@@ -174,6 +174,17 @@ def run_plan(
     return Table(plan=plan, records=found.records, failures=found.failures, folder=folder)
 
 
+def finished_runs(plan: Plan, *, out: str | Path | None = None, jobs: int | None = 1, progress: bool = False) -> Table:
+    """Make all runs of a plan; arguments as in `run_plan`. Raises ConfigError where a run failed."""
+    table = run_plan(plan, out=out, jobs=jobs, progress=progress)
+    for first in table.failures.values():
+        raise ConfigError(
+            f"Expected all {len(plan.specs)} runs to finish, {len(table.failures)} failed; the first, "
+            f"{first.spec.describe()}: {first.error}"
+        )
+    return table
+
+
 def planned_line(specs: Iterable[RunSpec], out: str | Path) -> str:
     """Say in one line which runs there would be."""
     planned = {spec.run_id: spec for spec in specs}

@@ -6,6 +6,8 @@ found.draw("curves.png")        # performance and interference over decisions
 """
 
 import math
+import os
+import shlex
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,7 +20,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
-from swarm_forage_env.runs.plan import Plan
+from swarm_forage_env.runs.plan import Plan, finished_runs
 from swarm_forage_env.runs.progress import duration
 from swarm_forage_env.runs.spec import policy_specs
 from swarm_forage_env.scenarios.performance import performance_of
@@ -31,7 +33,6 @@ from swarm_forage_env.training.evaluation import (
     POLICY_FILE,
     Evaluation,
     best_of,
-    finished_runs,
     judged,
     reached_in,
     read_evaluations,
@@ -134,11 +135,10 @@ class Trainings(Answer):
         rows += [(name, "", *_texts(values, digits), "") for name, values in self.beside.items()]
         notes += failed
         if self.averaged:
-            from metrics.benchmark.entry import entry_command  # late: see evaluation.baseline_runs
-
             notes.append("These evaluations chose the networks and flatter them. To score all in runs of their own:")
             name = self.averaged[0].folder.resolve().parent.name
-            notes.append(entry_command([one.policy for one in self.averaged], name))
+            files = [Path(os.path.relpath(one.policy)).as_posix() for one in self.averaged]
+            notes.append(shlex.join(["swarm-forage", "benchmark", *files, "--name", name]))
         header = ("policy", "decisions", counted_in(self.plan), "interference", "processor time")
         return (Sheet.of(header, rows, title=f"at their best in {place_of(self.plan)}", notes=notes),)
 

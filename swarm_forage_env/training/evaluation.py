@@ -35,7 +35,7 @@ from swarm_forage_env._internal.fields import (
 from swarm_forage_env._internal.files import check_folder, replacing
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.network import Network, NetworkPolicy
-from swarm_forage_env.runs.plan import Condition, Plan, Table, run_plan
+from swarm_forage_env.runs.plan import Condition, Plan, Table, finished_runs
 from swarm_forage_env.runs.run import clocks_s
 from swarm_forage_env.runs.spec import PolicySpec, policy_spec
 from swarm_forage_env.runs.versions import software_versions
@@ -175,16 +175,6 @@ class Evaluation:
     def interference_fraction(self) -> float:
         """Mean fraction of active robots in interference, over all worlds."""
         return float(np.mean([world.interference_fraction for world in self.worlds]))
-
-
-def finished_runs(plan: Plan, *, jobs: int | None = 1, progress: bool = False) -> Table:
-    """Make all runs of a plan; arguments as in `run_plan`. Raises ConfigError where a run failed."""
-    table = run_plan(plan, jobs=jobs, progress=progress)
-    for failure in table.failures.values():
-        raise ConfigError(
-            f"Expected all runs of evaluations to finish, got {failure.error} in {failure.spec.describe()}."
-        )
-    return table
 
 
 def _means(table: Table, condition: Condition) -> tuple[float, float]:

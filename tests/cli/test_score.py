@@ -6,13 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from metrics import PAPER_POLICIES
-from metrics.benchmark import load_protocol
 from swarm_forage_env.policies.registry import RandomPolicy
 from swarm_forage_env.runs.store import load
 from swarm_forage_env.studies.ladders import BUDGETS, Budget
 from swarm_forage_env.training.datasets import Dataset
-from tests.support.entries import TINY, made_up_entry
 
 WORLD = ("--robots", "3", "--set", "n_objects=20", "--jobs", "1", "--budget", "tiny")
 SCORE = ("score", "random", *WORLD)
@@ -64,30 +61,6 @@ def test_failed_runs_are_told_and_the_exit_code_says_so(command, monkeypatch):
     code, out, _ = command(*SCORE, "--measures", "t_lost_fraction")
     assert code == 1
     assert "RuntimeError: no idea" in out
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """A place with the tiny protocol and the entries of the scripted controllers in it."""
-    place = tmp_path_factory.mktemp("benchmark")
-    (place / "benchmark.toml").write_text(TINY.read_text())
-    (place / "scripted").mkdir()
-    for k, name in enumerate(PAPER_POLICIES):
-        made_up_entry(load_protocol(TINY), name, lambda _, k=k: 10.0 + k).write(place / "scripted" / f"{name}.json")
-    return place
-
-
-@pytest.fixture
-def tiny(folder, monkeypatch):
-    monkeypatch.setattr("metrics.benchmark.protocol.FOLDER", folder)
-
-
-def test_a_quick_look_writes_no_entry(command, tiny):
-    code, out, err = command("benchmark", "random", "--quick", "--jobs", "1")
-    assert code == 0, err
-    assert "random" in out
-    assert "no entry" in err
-    assert not list(Path("results/benchmark").glob("*.json"))
 
 
 SHORT = ("--robots", "3", "--set", "n_objects=20", "--horizon", "200", "--set", "physics=compiled")

@@ -19,10 +19,9 @@ from pathlib import Path
 
 import pytest
 
-from metrics import PAPER_POLICIES
 from metrics.benchmark import load_protocol
 from tests.support.console import answer
-from tests.support.entries import TINY, made_up_entry
+from tests.support.entries import TINY, made_up_entry, write_package
 from tests.support.golden_runs import AS_THEN
 from tests.support.pictures import keep_figures
 from tests.support.texts import steady_file, steady_text
@@ -155,11 +154,7 @@ def _same_terminal(patch: pytest.MonkeyPatch) -> None:
 
 
 def _write_benchmark(folder: Path, patch: pytest.MonkeyPatch) -> None:
-    (folder / "scripted").mkdir(parents=True)
-    (folder / "benchmark.toml").write_text(TINY.read_text())
-    for k, name in enumerate(PAPER_POLICIES):
-        entry = made_up_entry(load_protocol(TINY), name, lambda world, k=k: 10.0 + k + world)
-        entry.write(folder / "scripted" / f"{name}.json")
+    write_package(folder, [lambda world, k=k: 10.0 + k + world for k in range(4)])
     made_up_entry(load_protocol(TINY), "mine", lambda world: 13.0 + 2.0 * world, n_policies=2).write(Path("mine.json"))
     patch.setattr("metrics.benchmark.protocol.FOLDER", folder)
 

@@ -6,7 +6,7 @@ import shutil
 import numpy as np
 import pytest
 
-from metrics.benchmark import BenchmarkError, load_protocol, read_entry
+from metrics.benchmark import load_protocol, read_entry
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.network import Network, NetworkError
 from swarm_forage_env.runs.record import RecordError
@@ -59,7 +59,7 @@ OTHER = [
     ("dataset", "dataset.json", in_json(), Dataset, DatasetError, "'colour'"),
     ("network.npz", "", in_network(gates=1), Network.load, NetworkError, "Unknown key about a network 'gates'"),
     ("network.npz", "", in_network(interface={"colour": 1}), Network.load, NetworkError, "Unknown"),
-    ("entry.json", "", in_json(), lambda file: read_entry(file, load_protocol(TINY)), BenchmarkError, "key .*'colour'"),
+    ("entry.json", "", in_json(), lambda file: read_entry(file, load_protocol(TINY)), ConfigError, "key .*'colour'"),
     ("plan.json", "", in_json(), read_plan, ConfigError, "key .*'colour'"),
     ("failure.json", "", in_json("spec", "scenario"), read_failure, RecordError, "key .*colour"),
     ("evaluations.csv", "", in_text("wall_time_s", "colour"), read_evaluations, ConfigError, r"evaluations\.csv"),

@@ -7,7 +7,7 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from metrics.benchmark import BenchmarkError, load_protocol, read_entry
+from metrics.benchmark import load_protocol, read_entry
 from metrics.checks import CurveError
 from metrics.scoring.curves_file import read_curves
 from swarm_forage_env._internal.fields import ConfigError
@@ -28,7 +28,7 @@ READERS: dict[str, tuple[Callable[[Path], Any], type[Exception]]] = {
     "packed.parquet": (read_study, RecordError),
     "failure.json": (read_failure, RecordError),
     "dataset": (lambda place: list(Dataset(place).runs()), DatasetError),
-    "entry.json": (lambda file: read_entry(file, load_protocol(TINY)), BenchmarkError),
+    "entry.json": (lambda file: read_entry(file, load_protocol(TINY)), ConfigError),
     "network.npz": (open_network, (NetworkError, ModelError)),
     "plan.json": (read_plan, ConfigError),
     "evaluations.csv": (read_evaluations, ConfigError),

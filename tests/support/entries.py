@@ -1,11 +1,12 @@
 """Entries of the benchmark without runs: a tiny protocol, and numbers that a test chooses."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from metrics.benchmark import Entry, Protocol, Training
-from metrics.benchmark.entry import EntryPolicy, WorldRuns
+from metrics import PAPER_POLICIES
+from metrics.benchmark import Entry, Protocol, Training, load_protocol
+from metrics.benchmark.entry import EntryPolicy
 
 TINY = Path(__file__).with_name("tiny_benchmark.toml")
 """Two worlds of three or four robots in a small room; see the file."""
@@ -17,14 +18,10 @@ def made_up_entry(
     """Return an entry whose performance in the k-th world is `performance(k)`, one more per policy, two per seed."""
     n_seeds = len(protocol.seeds)
     runs = {
-        world.name: WorldRuns(
-            performance=tuple(tuple(performance(k) + j + 2.0 * s for s in range(n_seeds)) for j in range(n_policies)),
-            interference=((0.1,) * n_seeds,) * n_policies,
-        )
+        world.name: tuple(tuple(performance(k) + j + 2.0 * s for s in range(n_seeds)) for j in range(n_policies))
         for k, world in enumerate(protocol.worlds)
     }
     given: dict[str, Any] = {
-        "command": f"swarm-forage benchmark --policy {name}",
         "training": Training(worlds="nothing"),
         "versions": {"numpy": "2.0"},
         **fields,
@@ -36,3 +33,11 @@ def made_up_entry(
         runs=runs,
         **given,
     )
+
+
+def write_package(folder: Path, performances: Sequence[Callable[[int], float]]) -> None:
+    """Write the tiny protocol, and entries of the scripted controllers, as a benchmark of its own."""
+    (folder / "scripted").mkdir(parents=True)
+    (folder / "benchmark.toml").write_text(TINY.read_text())
+    for name, performance in zip(PAPER_POLICIES, performances, strict=True):
+        made_up_entry(load_protocol(TINY), name, performance).write(folder / "scripted" / f"{name}.json")

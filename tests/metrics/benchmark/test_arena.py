@@ -3,7 +3,7 @@
 import pytest
 
 from metrics.benchmark import evaluate, load_protocol
-from metrics.benchmark.standing import scripted_entries
+from metrics.benchmark.standing import best_of
 from metrics.scoring.limits import limit_of
 from swarm_forage_env import plan_run, run_one, scenario
 
@@ -27,8 +27,9 @@ def test_feedback_holds_the_numbers_of_short_runs():
     assert rescue.of_limit is None
     assert medium.of_limit == pytest.approx(medium.performance * 0.12 / limit_of(deliver).deliveries)
     assert min(medium.of_limit, abs(rescue.later - 1.0)) > 0.0
-    best = next(one for one in scripted_entries(load_protocol()) if one.name == "dpo")
-    assert rescue.ratio == pytest.approx(rescue.performance / best.performance("training: search and rescue").mean())
+    protocol = load_protocol()
+    best = best_of(["dpo"], protocol.training, protocol)[2]
+    assert rescue.ratio == pytest.approx(rescue.performance / best)
     assert feedback.score == pytest.approx((small.ratio + medium.ratio + rescue.ratio) / 3.0)
     assert len(str(feedback).splitlines()) == 7
 
