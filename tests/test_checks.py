@@ -13,7 +13,7 @@ from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv
 from swarm_forage_env.wrappers.base import SwarmWrapper
 from swarm_forage_env.wrappers.registry import parse_wrapper
-from tests.support.busy import BusyPolicy
+from tests.support.crowded_runs import BusyPolicy
 
 SMALL = scenario("warehouse_small", n_robots=5, n_objects=80)
 ADVERSE = (

@@ -10,7 +10,7 @@ from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import scenario
-from tests.support.memories import caches_of
+from tests.support.task_robot import caches_of
 
 CACHES = {"stochm": "static", "stochx": "dynamic"}
 

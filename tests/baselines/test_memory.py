@@ -7,9 +7,8 @@ from baselines.dpo import DPOPolicy
 from baselines.memory import density, with_room
 from swarm_forage_env.scenarios.quirks import Quirks
 from tests.reference.controllers import ObjectDictionary, visible_objects
-from tests.support.memories import caches_of, objects_of
 from tests.support.observations import Observations, make_spec
-from tests.support.task_robot import TaskRobot
+from tests.support.task_robot import TaskRobot, caches_of, objects_of
 
 CENTRE = (72, 40)
 """Centre cell of a cache of 31 x 31 cells: x 57 .. 87, y 25 .. 55, which is 11.4 .. 17.6 m by 5.0 .. 11.2 m."""

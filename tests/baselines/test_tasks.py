@@ -11,8 +11,7 @@ from baselines.robots import Activity, VectorState
 from baselines.tasks import DRAW_POINT_X, DRAW_POINT_Y, TASK_DRAWS
 from swarm_forage_env.contract.codes import Event, Grip, Task
 from swarm_forage_env.scenarios.quirks import Quirks
-from tests.support.memories import caches_of, estimates_of
-from tests.support.task_robot import TaskRobot
+from tests.support.task_robot import TaskRobot, caches_of, estimates_of
 
 CACHE = (72, 40)
 """Centre cell of the cache at (14.5, 8.1) m; its square is 11.4 .. 17.6 m by 5.0 .. 11.2 m."""

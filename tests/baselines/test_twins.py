@@ -14,12 +14,11 @@ from baselines.stochx import STOCHXPolicy
 from baselines.tasks import TASK_DRAWS
 from swarm_forage_env.contract.codes import Event, Goal, Task
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
-from tests.reference import task_chain
 from tests.reference.controllers import ObjectDictionary, ReferenceRobot
 from tests.reference.cpfa import CPFARobot
-from tests.reference.task_controllers import TASKS, ReferenceTaskRobot
-from tests.support.memories import caches_of, estimates_of, objects_of
+from tests.reference.task_controllers import CHILDREN, TASKS, ReferenceTaskRobot
 from tests.support.observations import GREYS, Observations, make_spec
+from tests.support.task_robot import caches_of, estimates_of, objects_of
 
 N_ROBOTS = 6
 STATES = ["acquire", "wait for pick-up", "homing", "homing in nest", "wait for drop", "leave nest"]
@@ -236,7 +235,7 @@ class TaskFuzz(Fuzz):
 def twin_of(policy, i: int, task) -> ReferenceTaskRobot:
     """A slow robot with the first estimates, probabilities and coins of a compiled one."""
     a, p = policy._allocation, policy.parameters
-    blocks = list(task_chain.CHILDREN)[: policy.n_tabs]
+    blocks = list(CHILDREN)[: policy.n_tabs]
 
     def site() -> tuple[float, float] | None:
         robot = policy._robots[i]
@@ -251,7 +250,7 @@ def twin_of(policy, i: int, task) -> ReferenceTaskRobot:
         ObjectDictionary(),
         estimates={name: float(a.estimate[i, code]) for code, name in enumerate(TASKS) if name},
         partition={block: float(a.partition[i, k]) for k, block in enumerate(blocks)},
-        last_child={block: task_chain.CHILDREN[block][a.last_child[i, k]] for k, block in enumerate(blocks)},
+        last_child={block: CHILDREN[block][a.last_child[i, k]] for k, block in enumerate(blocks)},
         block=blocks[a.tab[i]],
         numbers=(p.partition_reactivity, p.partition_gamma, p.subtask_reactivity, p.subtask_gamma),
         smallest_cache=int(p.smallest_cache),

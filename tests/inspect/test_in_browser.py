@@ -8,15 +8,14 @@ import pytest
 from swarm_forage_env.inspect.play.session import PlaySession, Setting
 from swarm_forage_env.inspect.replay.capture import record_replay
 from swarm_forage_env.inspect.replay.files import write_replays
+from swarm_forage_env.inspect.replay.frames import Replay
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.world import World
-from tests.support.browser import Browser, chromium
+from tests.support.browser import Browser, choose_robot, chromium, run_shown, served
 from tests.support.foraging import CROWDED
-from tests.support.play_page import choose_robot, run_shown, served
-from tests.support.replay_page import choose, seek
 
 WORLD = with_overrides(CROWDED, n_objects=40, horizon_s=400.0, interval_s=100.0)
 DISTURBED = (
@@ -164,3 +163,30 @@ def test_a_robot_is_chosen_broken_repaired_and_killed(desktop, session):
     desktop.press("Escape")
     desktop.wait_for("document.querySelector('#robot h2') === null")
     settled(desktop)
+
+
+_MARGIN_PX = 8
+"""Of the arena in its canvas, as in `view.js`."""
+
+
+def seek(browser: Browser, time_s: float) -> None:
+    """Move the slider, and wait until the page is painted."""
+    browser.ask(f"document.getElementById('scrub').value = {time_s}")
+    browser.ask("document.getElementById('scrub').dispatchEvent(new Event('input'))")
+    browser.ask("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+def place_of(browser: Browser, replay: Replay, frame: int, robot: int, *, panel: int = 1) -> tuple[float, float]:
+    """Return where a robot is in the window, in pixels, while an arena is shown as a whole; `panel` counts from 1."""
+    left, top, width, height = browser.box(f".arena:nth-child({panel}) canvas")
+    arena = replay.scenario.arena
+    scale = min((width - 2 * _MARGIN_PX) / arena.width_m, (height - 2 * _MARGIN_PX) / arena.height_m)
+    x_m, y_m = replay.position_m[frame, robot]
+    return left + width / 2 + scale * (x_m - arena.width_m / 2), top + height / 2 - scale * (y_m - arena.height_m / 2)
+
+
+def choose(browser: Browser, replay: Replay, frame: int, robot: int, *, panel: int = 1) -> None:
+    """Go to a frame and click on a robot; frames are as far apart as `replay` has them."""
+    seek(browser, float(replay.times_s[frame]))
+    browser.click_at(*place_of(browser, replay, frame, robot, panel=panel))
+    browser.wait_for(f"document.querySelector('#robot h2')?.textContent.startsWith('robot {robot}f')")

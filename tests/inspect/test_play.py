@@ -1,6 +1,8 @@
-"""The session behind the page to play with: untouched, a run is that of `run_one`; commands do what they say."""
+"""The page to play with: its session is the run of `run_one`, commands do what they say, the server refuses others."""
 
+import http.client
 import json
+from itertools import product
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.inspect.play import session as playing
 from swarm_forage_env.inspect.play.levels import LEVELS
+from swarm_forage_env.inspect.play.server import HOST
 from swarm_forage_env.inspect.play.session import SPEEDS, PlaySession, Setting
 from swarm_forage_env.inspect.replay.frames import Status
 from swarm_forage_env.runs.run import run_one
@@ -19,6 +22,7 @@ from swarm_forage_env.wrappers.throttle import ThrottleConfig
 from swarm_forage_env.wrappers.waveform import Waveform
 from swarm_forage_env.wrappers.world import World
 from tests.reference.replay_arrays import runs_of
+from tests.support.browser import served
 
 ROOM = {"width_m": 8.0, "height_m": 8.0, "nest_centre_m": (1.0, 4.0), "nest_size_m": (1.6, 4.0), "n_objects": 40}
 SMALL = scenario("warehouse_small", n_robots=8, horizon_s=400.0, interval_s=100.0, **ROOM)
@@ -199,3 +203,65 @@ def test_a_run_is_saved_as_a_replay_and_goes_on():
     assert len(arrays["deliveries"]) == arrays["counters"][-1, Counter.COLLECTED]
     session.carry_out({"do": "play"})
     assert look_after(session, clock, 2.0)["over"]
+
+
+@pytest.fixture(scope="module")
+def server():
+    world = World(scenario("warehouse_small", n_robots=3, n_objects=20))
+    with served(PlaySession(Setting(world=world, policy="random"))) as server:
+        yield server
+
+
+def ask(server, method="POST", place="command", *, body="", path=None):
+    """The answer, and its text."""
+    connection = http.client.HTTPConnection(HOST, server.server_port, timeout=60)
+    connection.request(method, f"/{server.token}/{place}" if path is None else path, body)
+    answer = connection.getresponse()
+    text = answer.read().decode()
+    connection.close()
+    return answer, text
+
+
+def refusal(server, *words, **more):
+    answer, text = ask(server, *words, **more)
+    return answer.status, json.loads(text)["error"]
+
+
+def test_the_page_comes_with_its_token_and_may_load_nothing_else(server):
+    answer, text = ask(server, "GET", "")
+    assert answer.status == 200
+    assert text.startswith("<!doctype html>")
+    assert "default-src 'none'" in answer.headers["Content-Security-Policy"]
+    assert "frame-ancestors 'none'" in answer.headers["Content-Security-Policy"]
+    assert (answer.headers["Referrer-Policy"], answer.headers["Cache-Control"]) == ("no-referrer", "no-store")
+
+
+def test_without_the_token_all_is_refused(server):
+    for method, path in product(("GET", "POST"), ("/", "/x/command", "//command", "/%C3%B6/")):
+        status, words = refusal(server, method, path=path, body='{"do": "pause"}')
+        assert (status, words) == (403, "Expected the address with its token, as the command shows it.")
+    assert refusal(server, "GET", "../etc/passwd", body="null")[0] == 404
+
+
+@pytest.mark.parametrize("body", ["{", b"\xff\xfe", '{"do": "fly"}', "[" * 9000])
+def test_garbage_and_unknown_commands_are_refused(server, body):
+    before = server.session.run
+    status, words = refusal(server, body=body)
+    assert status == 400
+    assert words
+    assert server.session.run is before
+
+
+def test_a_frame_a_command_and_a_replay_come_as_json(server):
+    answer, text = ask(server, place="frame", body='{"run": 0}')
+    assert answer.status == 200
+    assert json.loads(text)["about"]["header"]["n_robots"] == 3
+    assert json.loads(ask(server, body='{"do": "kill", "robot": 1}')[1]) == {"done": "robot 1 was killed"}
+    server.session.paused = True
+    assert json.loads(ask(server, place="frame", body="null")[1])["dead"] == [1]
+    while server.session.world.tick < 5:
+        ask(server, body='{"do": "step"}')
+    told = json.loads(ask(server, place="replay", body="null")[1])
+    assert told["name"].endswith("_random.html")
+    assert told["page"].rstrip().endswith("</html>")
+    ask(server, body='{"do": "play"}')

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from metrics import PopulationRates, availability, mean_away, queue_statistics, ratio_for_team
-from tests.reference.population_chain import (
+from tests.reference.measures import (
     generator,
     mean_away_by_exponential,
     stationary_by_null_vector,

@@ -9,7 +9,7 @@ from hypothesis.extra.numpy import arrays
 
 import metrics
 from metrics import MEASURES, PopulationRates, aligned_l1, dtw, noise_floor
-from tests.reference.naive_dtw import dtw_by_enumeration, dtw_by_matrix
+from tests.reference.measures import dtw_by_enumeration, dtw_by_matrix
 
 N_INTERVALS = 6
 

@@ -14,7 +14,7 @@ from swarm_forage_env.policies.kernels.frames import N_FRAMES, frame_of
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.plans import plan_arena
-from tests.reference import frames
+from tests.reference import learner
 from tests.support.stage import build_cache, clear, lay, load, put
 
 
@@ -33,7 +33,7 @@ def test_robots_take_all_frames_alike_and_at_different_times():
 def test_frames_are_those_of_the_slow_twin():
     for robot in (0, 1, 2, 511):
         for decision in (0, 1, 199, 200, 123_456_789):
-            assert frame_of(robot, decision, 200) == frames.frame(robot, decision, 200)
+            assert frame_of(robot, decision, 200) == learner.frame(robot, decision, 200)
 
 
 @pytest.mark.parametrize("actions", ["discrete", "continuous"])
@@ -48,12 +48,12 @@ def test_robots_of_an_arena_see_and_act_as_their_slow_twins(actions):
         obs = env.reset_batch(seed)
         plain.forget()
         for decision in range(5):
-            seen = frames.seen(plain.observe(obs), plain.layout, decision, 3)
+            seen = learner.seen(plain.observe(obs), plain.layout, decision, 3)
             np.testing.assert_array_equal(arena.observe(), seen)
             wanted = rng.integers(11, size=6) if actions == "discrete" else rng.uniform(-1, 1, (6, 3))
             arena.step(wanted, np.zeros(6))
             for _ in range(2):
-                obs, *_ = env.step_batch(frames.commands(plain.command(wanted, obs), decision, 3))
+                obs, *_ = env.step_batch(learner.commands(plain.command(wanted, obs), decision, 3))
         np.testing.assert_array_equal(arena.env.last_obs, obs)
 
 

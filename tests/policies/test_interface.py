@@ -26,8 +26,7 @@ from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.wrappers.registry import parse_wrapper
-from tests.reference.commands import allowed_actions, automatic_grip, numbered_action
-from tests.reference.compact_view import compact_row
+from tests.reference.learner import allowed_actions, automatic_grip, compact_row, numbered_action
 from tests.support.stage import NEST_CELL, OPEN_CELL, cell_centre, lay, load, put, stand, tidy_world
 
 STAND = MOTIONS.index("stand")

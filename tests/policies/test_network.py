@@ -19,7 +19,7 @@ from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.pettingzoo import parallel_env
 from tests.reference import perceptron
 from tests.support.branches import pickled
-from tests.support.busy import change_population
+from tests.support.crowded_runs import change_population
 
 DRIVEN = InterfaceConfig(observation="compact", automatic_gripper=True)
 NUMBERED = dataclasses.replace(DRIVEN, actions="discrete")

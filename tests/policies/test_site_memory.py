@@ -16,7 +16,7 @@ from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.plans import plan_arena
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.world import World
-from tests.reference.site_memory import RobotSites
+from tests.reference.learner import RobotSites
 from tests.support.stage import cell_centre, lay, load, put, tidy_world
 
 INTERFACE = {"observation": "compact", "actions": "discrete", "automatic_gripper": True, "decision_ticks": 5,

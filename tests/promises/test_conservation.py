@@ -9,8 +9,7 @@ from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM
-from tests.support.busy import BusyPolicy, change_population
-from tests.support.crowded_runs import DENSE, RUNS, fresh, make, side
+from tests.support.crowded_runs import DENSE, RUNS, BusyPolicy, change_population, fresh, make, side
 from tests.support.stage import assert_conserved
 
 

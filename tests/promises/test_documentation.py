@@ -1,7 +1,8 @@
-"""The documents are right: examples run, commands are one line, links lead to files."""
+"""The documents are right: examples run, links lead to files, names are listed, notebooks hold what they print."""
 
 import json
 import re
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -91,3 +92,31 @@ def test_numbers_of_runs_are_those_of_the_store():
         by_hand = update_docs.BLOCK.sub("", text)
         numbers = {values[name] for source, values in store.items() for name in update_docs.SOURCES[source][1]}
         assert [number for number in numbers if number in by_hand] == [], f"{page}: a number outside of a block"
+
+
+LISTED = [
+    name
+    for page in (ROOT / "docs/api").glob("*.md")
+    for row in re.findall(r"^\| (`.+?`) \|", page.read_text(), re.MULTILINE)
+    for name in re.findall(r"`([\w.]+)`", row)
+]
+
+
+@pytest.mark.parametrize("package", ["swarm_forage_env", "metrics"])
+def test_every_public_name_is_listed_once(package):
+    names = [name.rpartition(".")[2] for name in LISTED]
+    assert [name for name in import_module(package).__all__ if names.count(name) != 1] == []
+
+
+@pytest.fixture(params=sorted((ROOT / "docs/notebooks").glob("*.ipynb")), ids=lambda path: path.stem)
+def notebook(request):
+    return json.loads(request.param.read_text(encoding="utf-8"))
+
+
+def test_notebooks_hold_what_their_cells_print(notebook):
+    cells = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    outputs = [output for cell in cells for output in cell["outputs"]]
+    assert [cell["execution_count"] for cell in cells] == list(range(1, len(cells) + 1))
+    assert outputs
+    assert {output["output_type"] for output in outputs} <= {"stream", "display_data", "execute_result"}, "no errors"
+    assert {output.get("name", "stdout") for output in outputs} == {"stdout"}, "no warnings"

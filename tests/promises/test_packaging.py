@@ -1,5 +1,6 @@
 """What an installed package promises: light imports, complete names, one version, commands that are pinned."""
 
+import ast
 import os
 import pkgutil
 import subprocess
@@ -7,6 +8,7 @@ import sys
 import tomllib
 from importlib.metadata import metadata, version
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -16,7 +18,6 @@ import metrics.scoring
 import swarm_forage_env
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.registry import POLICIES
-from tests.support.public_names import homes_of
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -86,3 +87,11 @@ def test_a_users_own_metrics_module_does_not_disturb_the_environment(tmp_path):
         "print(env.tick)"
     )
     assert run_python(code, PYTHONPATH=str(tmp_path)).strip() == "1"
+
+
+def homes_of(package: ModuleType) -> dict[str, str]:
+    """Name -> module that defines it, relative to the package."""
+    tree = ast.parse(Path(str(package.__file__)).with_suffix(".pyi").read_text())
+    return {
+        alias.name: node.module or "" for node in tree.body if isinstance(node, ast.ImportFrom) for alias in node.names
+    }

@@ -38,7 +38,7 @@ from swarm_forage_env.wrappers.recorder import COUNTED, TOTALS, RunRecorder
 from swarm_forage_env.wrappers.throttle import ThrottleConfig
 from swarm_forage_env.wrappers.waveform import Waveform
 from swarm_forage_env.wrappers.world import World
-from tests.support.busy import BusyPolicy
+from tests.support.crowded_runs import BusyPolicy
 from tests.support.stage import assert_conserved
 
 CASES = int(os.environ.get("CASES", "18"))

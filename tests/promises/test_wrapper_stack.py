@@ -30,7 +30,7 @@ from swarm_forage_env.wrappers.population import PopulationConfig
 from swarm_forage_env.wrappers.registry import WRAPPERS, parse_wrapper, wrapper_config_class
 from swarm_forage_env.wrappers.throttle import ThrottleConfig
 from swarm_forage_env.wrappers.waveform import Waveform
-from tests.support.busy import BusyPolicy
+from tests.support.crowded_runs import BusyPolicy
 from tests.support.stage import assert_conserved
 
 ROBOTS = 8

@@ -4,13 +4,12 @@ Where a Cache Starter goes is not repeated here but handed in (`site`): the geom
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from swarm_forage_env.contract.codes import Event, Grip
-from tests.reference import task_chain
 from tests.reference.controllers import RHO, ReferenceRobot, sensed, vector_sum, visible_objects
 
 JOBS = {
@@ -223,10 +222,10 @@ class ReferenceTaskRobot(ReferenceRobot):
     def end(self) -> None:
         integer = self.spec.quirks.integer_estimates
         mean = (self.estimates[self.job] + self.lasted.get(self.job, 0)) / 2
-        self.estimates[self.job] = task_chain.whole(mean, integer)
+        self.estimates[self.job] = whole(mean, integer)
         self.started[self.job] = self.now
         k, gamma = self.numbers[:2]
-        self.partition[self.block] = task_chain.partition(self.estimates, self.block, k, gamma, integer)
+        self.partition[self.block] = partition(self.estimates, self.block, k, gamma, integer)
 
     def move(self) -> None:
         there = self.block
@@ -235,7 +234,7 @@ class ReferenceTaskRobot(ReferenceRobot):
         elif self.block == "generalist" and self.job in ("harvester", "collector") and len(self.partition) == 3:
             there = self.job
         if there != self.block:
-            p = task_chain.move(self.estimates, self.block, there, self.spec.quirks.integer_estimates)
+            p = move(self.estimates, self.block, there, self.spec.quirks.integer_estimates)
             if self.draws[5] < p:
                 self.block = there
 
@@ -243,8 +242,8 @@ class ReferenceTaskRobot(ReferenceRobot):
         self.job = self.block
         if self.draws[6] < self.partition[self.block]:
             last = self.last_child[self.block]
-            other = next(child for child in task_chain.CHILDREN[self.block] if child != last)
-            if self.draws[7] < task_chain.switch(self.estimates, last, other, *self.numbers[2:]):
+            other = next(child for child in CHILDREN[self.block] if child != last)
+            if self.draws[7] < switch(self.estimates, last, other, *self.numbers[2:]):
                 last = other
             self.last_child[self.block] = self.job = last
 
@@ -418,3 +417,40 @@ class ReferenceTaskRobot(ReferenceRobot):
         if arrived:
             self.vector, self.recovery, self.searching = "idle", 0, False
         return force
+
+
+CHILDREN = {
+    "generalist": ("harvester", "collector"),
+    "harvester": ("starter", "finisher"),
+    "collector": ("transferer", "cache_collector"),
+}
+"""Root of each block -> its subtasks. Blocks are called by their roots."""
+
+
+def whole(value: float, integer: bool) -> float:
+    """Truncate towards zero if asked."""
+    return math.trunc(value) if integer else value
+
+
+def partition(estimates: Mapping[str, float], root: str, k: float, gamma: float, integer: bool) -> float:
+    """Probability of a subtask instead of `root`."""
+    t, s = estimates[root], sum(estimates[child] for child in CHILDREN[root])
+    bracket = whole(t / s, integer) - 1.25 if t > s else 1.25 - whole(s / t, integer)
+    return min(1.0, gamma / (1.0 + math.exp(-k * whole(bracket, integer))))
+
+
+def switch(estimates: Mapping[str, float], last: str, other: str, k: float, gamma: float) -> float:
+    """Probability of switching to the other subtask."""
+    ratio = min(1.0, estimates[last] / estimates[other])
+    return gamma / (1.0 + math.exp(-k * (ratio - 1.25)))
+
+
+def move(estimates: Mapping[str, float], here: str, there: str, integer: bool) -> float:
+    """Probability of moving to a neighbouring block."""
+    rho = [
+        whole(abs(estimates[root] - sum(estimates[child] for child in CHILDREN[root])) / estimates[root], integer)
+        for root in (here, there)
+    ]
+    if 0 in rho:
+        return 0.5
+    return 0.5 / (1.0 + math.exp(-4.0 * (rho[0] / rho[1] - 3.0)))

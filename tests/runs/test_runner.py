@@ -1,4 +1,4 @@
-"""From specifications to records: one run, many runs, failures, interrupts, executors."""
+"""From specifications to records: one run, many runs, their progress, failures, interrupts, executors, wrong calls."""
 
 import os
 import signal
@@ -12,11 +12,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from metrics import verdict
+from swarm_forage_env import (
+    build_stack,
+    check_determinism,
+    check_policy,
+    from_callable,
+    load_study,
+    parse_wrapper,
+    plan_run,
+    policy_specs,
+    run_study,
+    with_overrides,
+)
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.registry import RandomPolicy
 from swarm_forage_env.policies.trust import UntrustedModelError, only_typed
-from swarm_forage_env.runs import runner
+from swarm_forage_env.runs import progress, runner
 from swarm_forage_env.runs.plan import Plan, run_plan
+from swarm_forage_env.runs.progress import duration, progress_bar
 from swarm_forage_env.runs.record import RecordError
 from swarm_forage_env.runs.run import run_one, run_policy
 from swarm_forage_env.runs.runner import longest_first, rerun, run_all
@@ -270,3 +284,75 @@ def test_other_processes_open_no_models_that_this_one_may_not(tmp_path):
     specs = [RunSpec(world=World(WORLD), policy=str(tmp_path / "mine.zip"), seed=seed) for seed in (0, 1)]
     with only_typed([]), pytest.raises(UntrustedModelError):
         list(each_run(seed_of, specs, jobs=2))
+
+
+def test_an_estimate_goes_by_work_and_leaves_out_the_start(monkeypatch, capsys):
+    """Four minutes of start, then parts of ten per second."""
+    now = [0.0]
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
+    with progress_bar("0/4 runs", 1200.0) as tell:
+        bar_clock = [(240.0, 300.0), (270.0, 600.0), (275.0, 700.0), (300.0, 900.0)]
+        for place, (now[0], done) in enumerate(bar_clock, start=1):
+            tell(done, text=f"{place}/4 runs")
+    assert capsys.readouterr().err.splitlines() == [
+        "1/4 runs",
+        "2/4 runs, about 60 s left",
+        "4/4 runs, about 30 s left",
+    ]
+
+
+def test_nothing_is_shown_where_nobody_asks(capsys, monkeypatch):
+    monkeypatch.setattr(progress, "LINE_EVERY_S", 0.0)
+    with progress_bar("runs", shown=False) as tell:
+        tell(1, 2)
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("seconds", "told"), [(0.2, "1 s"), (89, "89 s"), (90, "2 min"), (5399, "90 min"), (5400, "1.5 h")]
+)
+def test_times_are_told_in_the_unit_that_people_use(seconds, told):
+    assert duration(seconds) == told
+
+
+TINY = scenario("warehouse_small", n_robots=3, n_objects=20, horizon_s=4.0, interval_s=2.0)
+SPEC = plan_run(TINY, "random")
+PLAN = Plan.product("random", TINY, seeds=(0,))
+NOISE = "sensor_noise:sigma=0.1"
+
+
+def test_one_or_several_names_or_objects_are_taken_by_all_alike():
+    world = World(TINY, (parse_wrapper(NOISE),))
+    assert plan_run(TINY, "random", wrappers=[NOISE]).world == World(TINY, [NOISE]) == world
+    assert [type(layer).__name__ for layer in build_stack(TINY, [NOISE]).stack] == ["RunRecorder", "SensorNoise"]
+    assert PLAN.specs == Plan.product(policy_specs(["random"]), [World(TINY)], seeds=[0]).specs == (SPEC,)
+    assert load_study("S1a", seeds=[0, 1], rules="program").run == load_study("S1a", seeds=2, rules=["program"]).run
+
+
+@pytest.mark.parametrize(
+    ("call", "told"),
+    [
+        (lambda: plan_run(TINY, "crw", wrappers=NOISE), "wrappers as a list of configurations or words"),
+        (lambda: plan_run(TINY, "crw", parameters=["x"]), "parameters to be a table of values by name"),
+        (lambda: run_one("crw"), r"spec to be a RunSpec, got 'crw'; plan_run\(world, policy\) makes one"),
+        (lambda: run_policy("crw", SPEC), "a policy object with reset and act, got 'crw'; load_policy makes one"),
+        (lambda: run_all(SPEC), r"specs to be an Iterable, got RunSpec.* Plan.product\(...\).specs are many"),
+        (lambda: run_all([SPEC], executor=4), "executor to be an Executor, got 4; jobs= sets the number"),
+        (lambda: run_plan("crw"), r"plan to be a Plan, got 'crw'; Plan.product\(policies, worlds, seeds\)"),
+        (lambda: Plan.product("crw", TINY, seeds=3), r"seeds to be an Iterable, got 3; range\(n\)"),
+        (lambda: run_study("S1a", "out"), r"spec to be a StudySpec, got 'S1a'; load_study\(file\) reads one"),
+        (lambda: check_policy("random", 7), "scenario to be a ScenarioConfig"),
+        (lambda: check_determinism("random", TINY, seeds=2), "seeds to be a Sequence, got 2"),
+        (lambda: with_overrides("classroom", n_robots=3), r"config to be a ScenarioConfig.* scenario\(name\)"),
+        (lambda: scenario("hall.toml"), r"the name of a scenario, got the file hall.toml; read_world\('hall.toml'\)"),
+        (lambda: parse_wrapper(parse_wrapper(NOISE)), "a wrapper to be a text"),
+        (lambda: verdict("results"), r"a study to be a StudyTable, got 'results'; read_study\(path\) reads one"),
+        (lambda: policy_specs(policy_specs("crw"), caches="static"), "a name, a file or an object for parameters"),
+        (lambda: plan_run(TINY, "crw", parameters={"x": float("inf")}), "policy parameters to be plain JSON values"),
+        (lambda: from_callable(3), "function to be callable, got 3"),
+    ],
+)
+def test_a_wrong_call_is_told_in_a_line(call, told):
+    with pytest.raises(ConfigError, match=f"Expected {told}") as error:
+        call()
+    assert "\n" not in str(error.value)

@@ -11,8 +11,7 @@ from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.presets import scenario
-from tests.support.busy import BusyPolicy, change_population
-from tests.support.crowded_runs import made_for
+from tests.support.crowded_runs import BusyPolicy, change_population, made_for
 from tests.support.stage import assert_conserved
 
 TICKS = 50_000

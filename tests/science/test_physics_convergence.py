@@ -17,8 +17,7 @@ from swarm_forage_env.scenarios.config import PHYSICS_ENGINES, ScenarioConfig
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.state import SwarmState
-from tests.support.engines import drive_at, make_bodies
-from tests.support.heaps import DIAMETER_M
+from tests.support.engines import DIAMETER_M, drive_at, make_bodies
 
 TOLERATED = 0.06
 BASE = scenario("warehouse_small")

@@ -13,7 +13,7 @@ from swarm_forage_env.runs.run import build_stack
 from swarm_forage_env.wrappers.base import SwarmWrapper
 from swarm_forage_env.wrappers.recorder import RunRecorder
 from swarm_forage_env.wrappers.registry import parse_wrapper
-from tests.support.busy import BusyPolicy, change_population
+from tests.support.crowded_runs import BusyPolicy, change_population
 from tests.support.foraging import mild_wrappers, quick_world
 
 SEED = 17

@@ -1,4 +1,4 @@
-"""Crowded runs of every preset with every kind of caches, and of every policy; fingerprints of all their results."""
+"""Busy policies in crowded runs of every preset with every kind of caches; fingerprints of all their results."""
 
 import hashlib
 from itertools import cycle
@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 
 from swarm_forage_env._internal.rng import Stream, stream_rng
-from swarm_forage_env.contract.policy import Policy
+from swarm_forage_env.contract.codes import Grip
+from swarm_forage_env.contract.policy import Policy, SwarmSpec
+from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import POLICIES as NAMES
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import build_stack
 from swarm_forage_env.scenarios.presets import scenario
-from tests.support.busy import BusyPolicy, change_population
 from tests.support.foraging import NEAR, mild_wrappers, quick_world
 
 TICKS = 60
@@ -95,3 +96,41 @@ def all_digests() -> dict[str, str]:
     """Fingerprints of all runs, for another process."""
     runs = {f"{name} {caches} {policy}": digest(make(name, caches), fresh(policy), 17) for policy, name, caches in RUNS}
     return runs | {f"{name} {policy}": episode_digest(name, policy) for name, policy in EPISODES}
+
+
+class BusyPolicy:
+    """Drives about at random, grasps when empty, and lets go in a random way after a random while."""
+
+    def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
+        """Start with all robots grasping."""
+        self._rng = rng
+        self._carrying = spec.layout["carrying"]
+        self._wheels = np.full((spec.n_robots, 2), 0.5)
+        self._release = np.full(spec.n_robots, Grip.GRASP)
+
+    def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
+        """Return (N, 3) actions."""
+        rng, n_robots = self._rng, len(obs)
+        steered = rng.random(n_robots) < 0.05
+        turn = np.where(rng.random(n_robots) < 0.2, 0.4, 0.02) * rng.uniform(-1, 1, n_robots)
+        self._wheels[steered] = np.column_stack((0.5 - turn, 0.5 + turn))[steered]
+        changed = rng.random(n_robots) < 0.03
+        bands = (Grip.GRASP, Grip.RELEASE, Grip.DELIVER, Grip.SITE, Grip.CREATE_CACHE, Grip.CREATE_CACHE)
+        self._release[changed] = rng.choice(bands, n_robots)[changed]
+        carrying = obs[:, self._carrying].ravel() > 0.5
+        return np.column_stack((self._wheels, np.where(carrying, self._release, Grip.GRASP))).astype(np.float32)
+
+
+def change_population(env: ForageEnv, rng: np.random.Generator) -> None:
+    """Let some robots die, come back elsewhere, break or be repaired."""
+    swarm = env.swarm
+    n_robots = len(swarm.active)
+    present = swarm.present ^ (rng.random(n_robots) < 0.05)
+    present[0] = True
+    active = present & (rng.random(n_robots) < 0.8)
+    born = present & ~swarm.present
+    arena = env.scenario.arena
+    places = rng.uniform((0.5, 0.5), (arena.width_m - 0.9, arena.height_m - 0.5), (n_robots, 2))
+    swarm.position[born] = places[born]
+    swarm.heading[born] = rng.uniform(-np.pi, np.pi, n_robots)[born]
+    env.set_population(active=active, present=present)

@@ -19,8 +19,7 @@ from swarm_forage_env.world.state import SwarmState
 from tests.reference.bodies import moved
 from tests.reference.motion import WHEEL_BASE_M, free_motion, held_inside, limited_wheels
 from tests.support import engines
-from tests.support.engines import drive_at, in_each_engine, make_bodies
-from tests.support.heaps import DIAMETER_M, RADIUS_M, heap
+from tests.support.engines import DIAMETER_M, RADIUS_M, drive_at, heap, in_each_engine, make_bodies
 from tests.support.stage import put, tidy_world
 
 MIDDLE = np.array([16.0, 8.0])

@@ -11,9 +11,8 @@ from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.kernels.contact import press
 from swarm_forage_env.world.kernels.tick import look
 from swarm_forage_env.world.motion import TOUCH_SLACK_M
-from tests.reference.contact import pressed_velocities
-from tests.support.engines import in_each_engine
-from tests.support.heaps import DIAMETER_M, RADIUS_M, heap
+from tests.reference.motion import pressed_velocities
+from tests.support.engines import DIAMETER_M, RADIUS_M, heap, in_each_engine
 from tests.support.stage import put, tidy_world
 
 MIDDLE = np.array([16.0, 8.0])

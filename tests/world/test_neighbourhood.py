@@ -9,7 +9,7 @@ import pytest
 from swarm_forage_env import ConfigError, ForageEnv, parallel_env, scenario
 from swarm_forage_env.contract.policy import ActionError, SwarmSpec
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
-from tests.reference import neighbourhood
+from tests.reference import sensing
 
 N_ROBOTS = 12
 SMALL: dict[str, Any] = {
@@ -57,8 +57,8 @@ def test_they_are_those_of_the_twins_and_change_nothing_else(physics):
         plain.step_batch(np.ascontiguousarray(actions[:, :3]))
         env.step_batch(actions)
         np.testing.assert_array_equal(env.last_obs[:, : plain.layout.size], plain.last_obs)
-        seen = [neighbourhood.neighbours(env, robot) for robot in range(N_ROBOTS)]
-        heard = [neighbourhood.heard(env, robot, actions[:, 3:]) for robot in range(N_ROBOTS)]
+        seen = [sensing.neighbours(env, robot) for robot in range(N_ROBOTS)]
+        heard = [sensing.heard(env, robot, actions[:, 3:]) for robot in range(N_ROBOTS)]
         np.testing.assert_allclose(part(env, "neighbours"), seen, atol=1e-6)
         np.testing.assert_allclose(part(env, "messages"), heard, atol=1e-6)
         met.update(part(env, "neighbours")[:, 3::4].sum(axis=1).tolist())

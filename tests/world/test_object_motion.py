@@ -10,7 +10,7 @@ from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, C
 from swarm_forage_env.scenarios.floor import Box, distributable_box
 from swarm_forage_env.world.kernels.walk import can_step, crosses_open_border, walk
 from swarm_forage_env.world.state import ObjectState
-from tests.reference.object_walk import walk_slowly
+from tests.reference.objects import walk_slowly
 
 SIGNIFICANCE = 0.001
 """Seeds are fixed, so a test that passes once passes always; this is what it passed."""

@@ -14,8 +14,7 @@ from swarm_forage_env.world.kernels.obstacles import hold_outside
 from swarm_forage_env.world.state import SwarmState
 from tests.reference.bodies import held_outside, moved
 from tests.reference.sensing import RADIUS_M, interferes, observe, proximity
-from tests.support.engines import drive_at, make_bodies
-from tests.support.heaps import heap
+from tests.support.engines import drive_at, heap, make_bodies
 from tests.support.stage import assert_conserved, put, tidy_world
 
 BLOCK = (16.0, 8.0, 16.4, 8.6)

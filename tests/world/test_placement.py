@@ -37,7 +37,7 @@ from swarm_forage_env.world.placement import (
     static_cache_centres,
 )
 from swarm_forage_env.world.state import ObjectState, Requests, Source, listed, make_list
-from tests.reference.object_placement import choose_cell, random_source, scatter_slowly, waiting_by_the_word
+from tests.reference.objects import choose_cell, random_source, scatter_slowly, waiting_by_the_word
 
 SIGNIFICANCE = 0.001
 """Seeds are fixed, so a test that passes once passes always; this is what it passed."""
