@@ -63,7 +63,8 @@ class Training:
     @property
     def is_finished(self) -> bool:
         """Whether it was carried out to its end, the last evaluation included."""
-        return self.evaluations[-1].steps >= self.plan.total_steps and (self.folder / MODEL_FILE).exists()
+        _, end = self.plan.parts(self.evaluations)[-1]
+        return self.evaluations[-1].steps >= end and (self.folder / MODEL_FILE).exists()
 
 
 def read_training(folder: Path) -> Training:
@@ -165,8 +166,9 @@ class Trainings(Answer):
 
     def _stage_ends(self) -> list[int]:
         """Decisions at which stages ended, after a whole rollout and with an evaluation; as planned where none is."""
-        evaluated = [each.steps for each in self.trainings[0].evaluations]
-        return [next((steps for steps in evaluated if steps >= end), end) for end in self.plan.ends]
+        evaluations = self.trainings[0].evaluations
+        evaluated, parts = [each.steps for each in evaluations], self.plan.parts(evaluations)
+        return [next((steps for steps in evaluated if steps >= end), end) for _, end in parts]
 
     def _mean(self) -> tuple[list[int], FloatArray, FloatArray] | None:
         """The mean of those that are averaged, as far as all of them have come; None where there is none."""

@@ -11,6 +11,7 @@ mean of the ratios, or the worst of them.
 """
 
 import dataclasses
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property, partial
@@ -240,6 +241,11 @@ def reached_in(plan: EvaluationPlan, worlds: Sequence[WorldEvaluation]) -> float
     return float(np.mean(ratios) if plan.chosen_by == "mean" else np.min(ratios))
 
 
+def reached_by(evaluations: Sequence[Evaluation], steps: int) -> float:
+    """Return what counts of the first evaluation after so many decisions, nan before there is one."""
+    return next((each.reached for each in evaluations if each.steps >= steps), math.nan)
+
+
 def best_of(evaluations: Sequence[Evaluation]) -> Evaluation:
     """Return the evaluation whose network is kept: the best one, and the latest of equal ones."""
     return max(reversed(evaluations), key=lambda each: each.reached)
@@ -350,7 +356,8 @@ class Evaluator:
         That is when `every_steps` of the plan have passed since the last one, and at the end of each stage and start.
         """
         last = self.evaluations[-1].steps if self.evaluations else 0
-        return steps - last >= self.plan.evaluation.every_steps or any(last < end <= steps for end in self.plan.ends)
+        parts = self.plan.parts(self.evaluations)
+        return steps - last >= self.plan.evaluation.every_steps or any(last < end <= steps for _, end in parts)
 
     def evaluate(
         self, network: Network | None, steps: int, *, policy: Callable[[], Policy] | None = None

@@ -1,7 +1,8 @@
 """TrainingPlan: a training as frozen data, read from TOML and written beside its results."""
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import accumulate
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from msgspec import Meta
 
-from swarm_forage_env._internal.fields import Checked, ConfigError, Count, Whole, known_keys, read, table, whole
+from swarm_forage_env._internal.fields import Checked, ConfigError, Count, Number, Whole, known_keys, read, table, whole
 from swarm_forage_env._internal.files import json_text, parse_json, parse_toml, replacing
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.policy import layout_for
@@ -19,7 +20,7 @@ from swarm_forage_env.policies.pretrained import plan_file, plan_names
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import scenario_of_same_size
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.training.evaluation import EXPORTABLE, EvaluationPlan, EvaluationWorld
+from swarm_forage_env.training.evaluation import EXPORTABLE, Evaluation, EvaluationPlan, EvaluationWorld, reached_by
 from swarm_forage_env.views.sampler import ScenarioSampler, columns_of
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import wrappers_from_mapping
@@ -82,6 +83,8 @@ class TrainingPlan(Checked):
     stages: Annotated[tuple[Stage, ...], Meta(min_length=1)] = (Stage(steps=DEFAULT_STEPS),)
     starts: Whole = 1
     """How often the first stage is trained anew, one after the other; the best by its last evaluation goes on."""
+    enough: Number | None = None
+    """A start whose last evaluation reaches this is the last one; None = all starts are made."""
     evaluation: EvaluationPlan = field(default_factory=EvaluationPlan)
     seed: Count = 0
     samples: bool = False
@@ -190,19 +193,21 @@ class TrainingPlan(Checked):
         return self.evaluation.worlds_of(self.world)
 
     @property
-    def parts(self) -> tuple[Stage, ...]:
-        """The stages as they are trained one after the other, the first as often as there are starts."""
-        return (self.stages[0],) * self.starts + self.stages[1:]
-
-    @property
-    def ends(self) -> tuple[int, ...]:
-        """Decisions of single robots up to the end of each part."""
-        return tuple(accumulate(stage.steps for stage in self.parts))
-
-    @property
     def total_steps(self) -> int:
-        """Decisions of single robots in all parts."""
-        return self.ends[-1]
+        """Decisions of single robots in all stages, with all starts."""
+        return self.parts()[-1][1]
+
+    def parts(self, evaluations: Sequence[Evaluation] = ()) -> list[tuple[Stage, int]]:
+        """Return the stages as they are trained one after the other, and the decisions up to the end of each.
+
+        The first is there as often as it is begun, as far as the evaluations up to now tell.
+        """
+        first, starts = self.stages[0], 1
+        enough = math.inf if self.enough is None else self.enough
+        while starts < self.starts and not reached_by(evaluations, starts * first.steps) >= enough:
+            starts += 1
+        stages = (first,) * starts + self.stages[1:]
+        return list(zip(stages, accumulate(stage.steps for stage in stages), strict=True))
 
     def arenas_of(self, stage: Stage) -> dict[str, Any]:
         """Return the arguments of the vector environments of a stage, such as `SwarmVecEnv`."""

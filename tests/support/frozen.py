@@ -75,6 +75,7 @@ def training_weights() -> dict[str, float]:
     plan = read_plan(MINUTE)
     short = replace(
         plan,
+        starts=1,
         stages=(Stage(steps=20_000),),
         options={**plan.options, "n_steps": 16},
         evaluation=replace(plan.evaluation, horizon_s=200.0),

@@ -10,7 +10,7 @@ import pytest
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.presets import scenario, warehouse_small
-from swarm_forage_env.training.evaluation import EvaluationPlan, EvaluationWorld
+from swarm_forage_env.training.evaluation import Evaluation, EvaluationPlan, EvaluationWorld
 from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.recipe import LATE_OPTIONS, recipe, small_arena
 from swarm_forage_env.wrappers.registry import parse_wrapper
@@ -132,6 +132,24 @@ def test_fields_are_set_by_name(plan):
     assert (changed.n_arenas, changed.options, changed.scenario.robots.n_robots) == (3, {"gamma": 0.9, "tau": 0.5}, 7)
     with pytest.raises(ConfigError, match=r"Did you mean 'interface\.observation'"):
         plan.with_settings({"interfac.observation": "full"})
+
+
+@pytest.mark.parametrize(
+    ("told", "ends"),
+    [
+        ([], [10, 20, 30, 35]),
+        ([(10, 0.9), (14, 2.0)], [10, 20, 30, 35]),
+        ([(12, 0.9), (20, 1.0)], [10, 20, 25]),
+        ([(10, 1.0)], [10, 15]),
+    ],
+)
+def test_a_start_that_reaches_enough_is_the_last_one(told, ends):
+    plan = TrainingPlan.from_mapping({**PRESET, "starts": 3, "enough": 1.0, "stages": [{"steps": 10}, {"steps": 5}]})
+    none = {"wall_time_s": 0.0, "cpu_time_s": 0.0, "worlds": ()}
+    parts = plan.parts([Evaluation(steps=steps, reached=reached, **none) for steps, reached in told])
+    assert [end for _, end in parts] == ends
+    assert [stage.steps for stage, _ in parts] == [10] * (len(ends) - 1) + [5]
+    assert plan.total_steps == 35
 
 
 def test_plans_that_go_on_with_a_training_differ_in_steps_to_come_alone(plan):

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from io import BytesIO
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,7 @@ from swarm_forage_env.training.evaluation import (
     Evaluation,
     Evaluator,
     check_unused,
+    reached_by,
 )
 from swarm_forage_env.training.plan import SAMPLING, Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.sb3.buffers import ActiveRolloutBuffer, EmptyRolloutError, PresentReplayBuffer
@@ -142,16 +144,20 @@ def _train(
     """Train in a folder that is checked, and that nobody else writes to."""
     model = _opened(plan, folder / MODEL_FILE) if (folder / MODEL_FILE).exists() else None
     begun = done = 0 if model is None else model.num_timesteps
-    for part, (stage, end) in enumerate(zip(plan.parts, plan.ends, strict=True)):
-        latest = getattr(model, _PART, 0)
+    for part in count():
+        parts = plan.parts(watch.evaluator.evaluations)
+        if part == len(parts):
+            break
+        (stage, end), latest = parts[part], getattr(model, _PART, 0)
         if done >= end and not (part == latest and watch.evaluator.is_due(done)):
             continue
         env = SwarmVecEnv(**plan.arenas_of(stage), **extras)
         try:
-            checkpoint = None if model is None else _checkpoint(plan, folder, latest, part, watch.evaluator)
+            starts = len(parts) - len(plan.stages) + 1
+            checkpoint = None if model is None else _checkpoint(plan, folder, latest, part, starts, watch.evaluator)
             model = _prepared(plan, stage, folder, env, done, checkpoint)
             setattr(model, _PART, part)
-            number = max(1, part + 2 - plan.starts)
+            number = max(1, part + 2 - starts)
             _learn(model, max(0, end - done), callbacks, watch, f"stage {number}{_changes(stage)}")
         finally:
             env.close()
@@ -167,19 +173,21 @@ def _train(
     )
 
 
-def _checkpoint(plan: TrainingPlan, folder: Path, latest: int, part: int, evaluator: Evaluator) -> Path | None:
-    """Return what a part begins with when the latest checkpoint is of another part, or of itself; None = a new model.
+def _checkpoint(
+    plan: TrainingPlan, folder: Path, latest: int, part: int, starts: int, evaluator: Evaluator
+) -> Path | None:
+    """Return what a part begins with, after the latest checkpoint of the same or an earlier part; None = a new model.
 
     The best start so far is kept beside the checkpoint.
     """
-    if plan.starts == 1 or latest == part or latest >= plan.starts:
+    if starts == 1 or latest == part or latest >= starts:
         return folder / MODEL_FILE
-    ends = plan.ends[: latest + 1]
-    reached = [next(each.reached for each in evaluator.evaluations if each.steps >= end) for end in ends]
+    first = plan.stages[0].steps
+    reached = [reached_by(evaluator.evaluations, n * first) for n in range(1, latest + 2)]
     if reached[-1] == max(reached):
         with replacing(folder / START_FILE) as draft:
             draft.write_bytes((folder / MODEL_FILE).read_bytes())
-    return folder / START_FILE if part == plan.starts else None
+    return folder / START_FILE if part == starts else None
 
 
 def check_plan(plan: TrainingPlan) -> None:
