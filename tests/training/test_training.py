@@ -161,7 +161,7 @@ def test_ctrl_c_before_the_first_evaluation_loses_nothing(tmp_path, monkeypatch)
 @pytest.mark.parametrize("better", [0, 1])
 def test_the_better_of_two_starts_goes_on(tmp_path, monkeypatch, better):
     """Killed in the second start's evaluation and stopped after its first rollout; all decisions count."""
-    plan = tiny_plan(starts=2, enough=1.0, stages=(Stage(steps=128), Stage(steps=128, options={"learning_rate": 0.0})))
+    plan = tiny_plan(starts=2, enough=2.0, stages=(Stage(steps=128), Stage(steps=128, options={"learning_rate": 0.0})))
     plan = dataclasses.replace(plan, evaluation=dataclasses.replace(plan.evaluation, every_steps=10_000))
     monkeypatch.setattr(training, "_REPORT_EVERY_S", 0.0)
     judge, ways, found = Evaluator.evaluate, ["stop", "kill"], {}
