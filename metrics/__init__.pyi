@@ -6,7 +6,7 @@ from .scoring import RunSummary as RunSummary
 
 # from policies and files of curves to tables of scores
 from .scoring import score as score
-from .scoring import score_curves as score_curves
+from .scoring import read_curves as read_curves
 from .scoring import Scores as Scores
 from .scoring import Performance as Performance
 

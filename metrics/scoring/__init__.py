@@ -3,11 +3,12 @@
 from swarm_forage_env.scenarios.performance import Performance
 
 from .answer import Scores
+from .curves_file import read_curves
 from .frame import differences, scores, summarized
 from .limits import ForagingLimit, limit_of
 from .measures import MEASURES, Measure
 from .plots import draw_scores
-from .policy_scores import curves_question, score, score_curves, score_question
+from .policy_scores import score, score_question
 from .question import Question
 from .run_curves import StudyLine, study_lines
 from .study_numbers import StudyPanel, study_panels
@@ -19,7 +20,7 @@ __all__ = [
     "MEASURES",
     "Measure",
     "score",
-    "score_curves",
+    "read_curves",
     "scores",
     "summarized",
     "differences",
@@ -27,7 +28,6 @@ __all__ = [
     "ForagingLimit",
     "summarize_runs",
     "score_question",
-    "curves_question",
     "study_lines",
     "study_panels",
     "study_figures",

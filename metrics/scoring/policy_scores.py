@@ -1,7 +1,7 @@
 """Score policies, or curves of other simulators and of real robots: which runs their measures need, and their answer.
 
 score(["crw", "dpo"], "warehouse_small", budget="quick", out="results/small")
-score_curves("theirs.csv", ["crw"])
+score(["crw"], curves=read_curves("theirs.csv"))
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,7 +22,6 @@ from swarm_forage_env.wrappers.world import SIZE, World, WorldLike, world_of
 from ..checks import CurveError, chosen_seeds
 from ..curves import Form, Variant
 from .answer import Scores
-from .curves_file import read_curves
 from .frame import scores
 from .measures import DISTURBANCES, MEASURES, check_words, checked_request
 from .question import Question
@@ -30,7 +29,7 @@ from .run_curves import THROTTLE, PerformanceLike, StudyCurves, own_performance,
 
 
 def score(
-    policies: PolicyLike | Sequence[PolicyLike] | Mapping[str, PolicyLike],
+    policies: PolicyLike | Sequence[PolicyLike] | Mapping[str, PolicyLike] = (),
     world: WorldLike = "warehouse_small",
     *,
     out: str | Path | None = None,
@@ -48,10 +47,11 @@ def score(
         jobs: Processes; default one per core.
         executor: Makes the runs in place of the processes, for example Dask's `client.get_executor()`.
         progress: Show progress and an estimate on stderr.
-        asked: All further arguments of `score_question`: measures, budget, seeds, performance, against and others.
+        asked: All further arguments of `score_question`: measures, budget, seeds, curves, against and others.
 
     Raises:
-        CurveError: unknown measures, or a performance that is negative or not a number.
+        CurveError: unknown measures, or a performance that is negative or not a number; of curves a measure that you
+            name and that cannot be computed, or a clock or swarm sizes that no policy can be run with.
         ValueError: an unknown policy, performance, scenario, budget, or values that describe no run.
         ImportError: the policy is a model, and stable-baselines3 is not installed.
         KeyboardInterrupt: Ctrl-C; finished runs are in `out`.
@@ -61,9 +61,10 @@ def score(
 
 
 def score_question(
-    policies: PolicyLike | Sequence[PolicyLike] | Mapping[str, PolicyLike],
+    policies: PolicyLike | Sequence[PolicyLike] | Mapping[str, PolicyLike] = (),
     world: WorldLike = "warehouse_small",
     *,
+    curves: Sequence[StudyCurves] = (),
     measures: Sequence[str] | None = None,
     budget: str | Budget = "standard",
     seeds: int | Sequence[int] | None = None,
@@ -84,8 +85,11 @@ def score_question(
             parameters or caches of their own.
         world: Name of a preset, a complete configuration, or a world with wrappers, which then act in all runs. The
             budget sets horizon and interval.
+        curves: Runs of other simulators or of real robots, from `read_curves`. Policies then run with swarm sizes,
+            numbers of runs and clock of these; without policies the plan has no runs.
         measures: Names in `MEASURES`; default all.
-        budget: "quick", "standard", "paper" (`swarm_forage_env.studies.ladders.BUDGETS`), or one of your own.
+        budget: "quick", "standard", "paper" (`swarm_forage_env.studies.ladders.BUDGETS`), or one of your own. It and
+            all until `disturbance` but `performance` need policies without curves.
         seeds: Their number, or a list; default those of the budget. All experiments use them, so runs are paired.
         horizon_s: Length of a run in seconds, whole intervals; default that of the budget.
         performance: What P(N, t) is: a recorded column ("n_carrying"), "1/" and a column in which less is better
@@ -105,46 +109,60 @@ def score_question(
     if isinstance(performance, str):
         chosen = replace(chosen, scenario=replace(chosen.scenario, performance=performance))
     specs = policy_specs(cast("Any", policies if isinstance(policies, Mapping | list | tuple) else [policies]))
-    labels = tuple(spec.label for spec in specs)
+    labels = [*(spec.label for spec in specs), *(study.controller for study in curves)]
     if against is not None:
         check_words("policy to compare against", [against], labels)
-    allowed = ladders.budget(budget) if isinstance(budget, str) else budget
-    allowed = allowed if horizon_s is None else replace(allowed, horizon_s=horizon_s)
-    check_words("disturbance", [disturbance], DISTURBANCES)
-    varied = {MEASURES[name].varies for name in wanted}
-    criteria = {disturbance if criterion == THROTTLE else criterion for criterion in varied}
-    worlds = ladders.plan_worlds(chosen, criteria, allowed, density=density)
-    plan = Plan.product(specs, worlds, chosen_seeds(seeds, allowed.n_seeds))
-    settings = {
-        "budget": budget if isinstance(budget, str) else "custom",
-        "horizon_s": allowed.horizon_s,
-        "interval_s": allowed.interval_s,
-        "seeds": list(plan.seeds),
-        "performance": (own or performance_of(chosen.scenario.performance)).name,
-        "n_robots": chosen.n_robots,
-    }
+    notes: list[str] = []
+    if curves:
+        if (budget, seeds, horizon_s, density, disturbance) != ("standard", None, None, None, THROTTLE):
+            raise CurveError(
+                "Expected no budget, seeds, length of runs, density or disturbance beside curves, whose runs are as "
+                "their file says."
+            )
+        plan = _plan_beside(curves, specs, chosen) if specs else Plan(conditions=(), seeds=(0,))
+        counted = sorted({seed for study in curves for runs in study.experiments for seed in runs.seeds})
+        settings: dict[str, Any] = {"curves": curves[0].where, "seeds": counted, "horizon_s": curves[0].horizon_s}
+        settings |= {"performance": curves[0].read_as.name}
+        notes += [f"{curves[0].where}: {curves[0].note}"] if curves[0].note else []
+    else:
+        allowed = ladders.budget(budget) if isinstance(budget, str) else budget
+        allowed = allowed if horizon_s is None else replace(allowed, horizon_s=horizon_s)
+        check_words("disturbance", [disturbance], DISTURBANCES)
+        varied = {MEASURES[name].varies for name in wanted}
+        criteria = {disturbance if criterion == THROTTLE else criterion for criterion in varied}
+        worlds = ladders.plan_worlds(chosen, criteria, allowed, density=density)
+        plan = Plan.product(specs, worlds, chosen_seeds(seeds, allowed.n_seeds))
+        notes += _other_objects(chosen, worlds)
+        settings = {
+            "budget": budget if isinstance(budget, str) else "custom",
+            "horizon_s": allowed.horizon_s,
+            "interval_s": allowed.interval_s,
+            "seeds": list(plan.seeds),
+            "performance": (own or performance_of(chosen.scenario.performance)).name,
+            "n_robots": chosen.n_robots,
+        }
 
     def answer(table: Table) -> Scores:
-        studies = [policy_curves(table, label, own) for label in labels]
+        studies = [*(policy_curves(table, spec.label, own) for spec in specs), *curves]
         frame, missing = scores(studies, wanted, variants=variants, forms=forms)
+        for study in curves:
+            reasons = {label: why for (policy, label), why in missing.items() if policy == study.controller}
+            if reasons and (measures is not None or frame.filter(policy=study.controller).is_empty()):
+                label, reason = next(iter(reasons.items()))
+                raise CurveError(f"Cannot compute {label} for {study.controller} from {study.where}: {reason}.")
         return Scores(
             frame=frame,
-            policies=labels,
-            world=chosen.title(),
+            policies=tuple(labels),
+            world=chosen.title() if specs else "",
             missing=missing,
-            failures=_failures(table),
+            failures={spec.label: lines for spec in specs if (lines := table.failure_lines(spec.label))},
             settings={**settings, "out": None if table.folder is None else str(table.folder)},
-            notes=tuple(_other_objects(chosen, worlds)),
+            notes=tuple(notes),
             against=against,
             is_full=is_full,
         )
 
     return Question(plan=plan, answer=answer)
-
-
-def _failures(table: Table) -> dict[str, Sequence[str]]:
-    """Policy -> why runs failed, for those of which some have."""
-    return {each.label: lines for each in table.plan.policies if (lines := table.failure_lines(each.label))}
 
 
 def _other_objects(world: World, worlds: Sequence[World]) -> Iterator[str]:
@@ -154,99 +172,6 @@ def _other_objects(world: World, worlds: Sequence[World]) -> Iterator[str]:
     if there - {here}:
         objects = " or ".join(f"{n:,}" for n in sorted(there))
         yield f"rows over N have {objects} objects, enough for large swarms; 'run' has the {here:,} of the scenario"
-
-
-def score_curves(
-    path: str | Path,
-    policies: Sequence[PolicyLike] | Mapping[str, PolicyLike] = (),
-    world: WorldLike = "warehouse_small",
-    *,
-    out: str | Path | None = None,
-    jobs: int | None = None,
-    executor: Executor | None = None,
-    progress: bool = True,
-    **asked: Any,
-) -> Scores:
-    """Score curves of any simulator or of real robots, beside those of policies that are run here.
-
-    Args:
-        path: A file as `read_curves` reads it.
-        policies: As in `score`, like all that follow. They run with swarm sizes, numbers of runs and clock of the file.
-        world: Where policies run.
-        out: Folder for run records.
-        jobs: Processes.
-        executor: In place of the processes.
-        progress: Whether to show progress.
-        asked: All further arguments of `curves_question`: columns, events, interval_s, measures and others.
-
-    Raises:
-        CurveError: a file with an error, a measure that you name and that cannot be computed, or a clock or swarm sizes
-            that no policy can be run with.
-        ValueError: as `score`.
-    """
-    question = curves_question(path, policies, world, **asked)
-    return question.answer(run_plan(question.plan, out=out, jobs=jobs, executor=executor, progress=progress))
-
-
-def curves_question(
-    path: str | Path,
-    policies: Sequence[PolicyLike] | Mapping[str, PolicyLike] = (),
-    world: WorldLike = "warehouse_small",
-    *,
-    columns: Mapping[str, str] | None = None,
-    events: bool = False,
-    interval_s: float | None = None,
-    performance: str | None = None,
-    measures: Sequence[str] | None = None,
-    variants: Sequence[Variant] = ("corrected",),
-    forms: Sequence[Form] = ("marginal",),
-    against: str | None = None,
-    is_full: bool = False,
-) -> Question[Scores]:
-    """Return the question of `score_curves`; without policies its plan has no runs. Errors as there.
-
-    Args:
-        path: See `score_curves`, as for the next two.
-        policies: See there.
-        world: See there.
-        columns: Our name of a column -> its name in the file, or a number for all rows.
-        events: Whether a row is a delivery with a time, and not an interval.
-        interval_s: Length of an interval, s; needed for events.
-        performance: Column of the file that is its performance, or "1/" and a column; default "performance".
-        measures: Names of measures; default all that the columns allow. `missing` says why others are not computed.
-        variants: This and the next three as in `score_question`.
-        forms: See there.
-        against: See there.
-        is_full: See there.
-    """
-    checked_request(measures, variants, forms)
-    given = read_curves(path, performance, columns=columns, events=events, interval_s=interval_s)
-    chosen = world_of(world)
-    plan = _plan_beside(given, policy_specs(policies), chosen) if policies else Plan(conditions=(), seeds=(0,))
-
-    def answer(table: Table) -> Scores:
-        studies = [*(policy_curves(table, each.label) for each in table.plan.policies), *given]
-        frame, missing = scores(studies, measures, variants=variants, forms=forms)
-        for study in given:
-            reasons = {label: why for (policy, label), why in missing.items() if policy == study.controller}
-            if reasons and (measures is not None or frame.filter(policy=study.controller).is_empty()):
-                label, reason = next(iter(reasons.items()))
-                raise CurveError(f"Cannot compute {label} for {study.controller} from {path}: {reason}.")
-        seeds = sorted({seed for study in studies for runs in study.experiments for seed in runs.seeds})
-        told = {} if performance is None else {"performance": performance}
-        return Scores(
-            frame=frame,
-            policies=tuple(study.controller for study in studies),
-            world=chosen.title() if policies else "",
-            missing=missing,
-            failures=_failures(table),
-            settings={"curves": str(path), "seeds": seeds, "horizon_s": given[0].horizon_s, **told},
-            notes=(f"{path}: {given[0].note}",) if given[0].note else (),
-            against=against,
-            is_full=is_full,
-        )
-
-    return Question(plan=plan, answer=answer)
 
 
 def _plan_beside(given: Sequence[StudyCurves], policies: Sequence[PolicySpec], world: World) -> Plan:

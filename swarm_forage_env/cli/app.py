@@ -15,7 +15,6 @@ from swarm_forage_env.cli import EXIT_USAGE, NothingAskedError, complain
 COMMANDS: dict[str, dict[str, tuple[str, str]]] = {
     "Run and look": {
         "run": ("runs:run", "Run policies in a scenario and compare them."),
-        "plot": ("runs:plot", "Draw stored runs anew."),
         "play": ("look:play", "Steer and disturb a run in the browser."),
         "record": ("look:record", "Film a run, or draw it at one time."),
         "replay": ("look:replay", "Write runs as one HTML page that plays them."),

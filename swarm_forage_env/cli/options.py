@@ -86,13 +86,15 @@ class WorldOptions:
     ] = ()
 
 
-@Parameter(name="*", negative_bool="no-")
-@dataclass(frozen=True, kw_only=True, slots=True)
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
 class StyleOptions:
     """How figures look."""
 
     width_in: Annotated[float | None, Parameter(help="Width in inches; default what the panels want.")] = None
-    title: Annotated[bool, Parameter(help="Whether there is a headline; in a paper, the caption says it.")] = True
+    title: Annotated[
+        bool, Parameter(negative="--no-title", help="Whether there is a headline; in a paper, the caption says it.")
+    ] = True
 
     def style(self) -> FigureStyle:
         """Return the style; raises ConfigError for a width that no page has."""
@@ -100,8 +102,8 @@ class StyleOptions:
 
 
 @Parameter(name="*")
-@dataclass(frozen=True, kw_only=True, slots=True)
-class RunOptions:
+@dataclass(frozen=True, kw_only=True)
+class RunOptions(StyleOptions):
     """How the runs of a question are made, and in which form its answer is shown."""
 
     out: Annotated[Path | None, Parameter(help="Folder for records; default results/SCENARIO.")] = None

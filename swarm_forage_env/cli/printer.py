@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from swarm_forage_env._internal.wording import counted, printable
 from swarm_forage_env.cli import CommandError
+from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 
 if TYPE_CHECKING:
     from metrics.scoring.question import Question
@@ -72,12 +73,19 @@ def ask_and_show(
         if not table.failures:
             raise
         raise CommandError(str(error)) from None
-    show(answer, picture, as_json=options.as_json, file=options.file)
+    show(answer, picture, as_json=options.as_json, file=options.file, style=options.style())
     _tell_of_records(table, folder)
     return int(bool(table.failures))
 
 
-def show(answer: "Answer", picture: Path | None = None, *, as_json: bool = False, file: Path | None = None) -> None:
+def show(
+    answer: "Answer",
+    picture: Path | None = None,
+    *,
+    as_json: bool = False,
+    file: Path | None = None,
+    style: FigureStyle = SCREEN,
+) -> None:
     """Print an answer, draw it, and write it.
 
     Args:
@@ -85,8 +93,9 @@ def show(answer: "Answer", picture: Path | None = None, *, as_json: bool = False
         picture: File for the picture; one that cannot be made is told of, because the answer is worth more.
         as_json: Print JSON; it names the picture.
         file: See `Answer.write`.
+        style: Of the picture.
     """
-    drawn = None if picture is None or not answer.has_picture else drawn_or_told(answer, picture)
+    drawn = None if picture is None or not answer.has_picture else drawn_or_told(answer, picture, style)
     if as_json:
         told = {"picture": None if drawn is None else str(drawn)} if picture is not None or answer.has_picture else {}
         say(json.dumps({**answer.to_mapping(), **told}, indent=1))
@@ -104,10 +113,10 @@ def width_of_terminal() -> int | None:
     return shutil.get_terminal_size().columns if sys.stdout.isatty() else None
 
 
-def drawn_or_told(answer: "Answer", picture: Path) -> Path | None:
+def drawn_or_told(answer: "Answer", picture: Path, style: FigureStyle = SCREEN) -> Path | None:
     """Draw an answer, which is worth more than its picture; where that fails, say why and return None."""
     try:
-        answer.draw(picture)
+        answer.draw(picture, style=style)
     except ImportError as error:
         note(error)
     except OSError as error:

@@ -1,6 +1,5 @@
-"""The commands about runs of policies: `run`, `plot`, `score`, `check` and `rerun`."""
+"""The commands about runs of policies: `run`, `score`, `check` and `rerun`."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,12 +14,10 @@ from swarm_forage_env.cli.options import (
     CurveOptions,
     Names,
     Performance,
-    Picture,
     Policies,
     RunOptions,
     Seed,
     Seeds,
-    StyleOptions,
     WorldOptions,
 )
 from swarm_forage_env.cli.printer import ask_and_show, note, say
@@ -49,38 +46,6 @@ def run(
     chosen, specs = described_runs(world, policies)
     question = Question(plan=Plan.product(specs, chosen, range(seed, seed + seeds)), answer=summarize_runs)
     return ask_and_show(question, options, chosen, policies, seed=seed)
-
-
-def plot(
-    folder: Path,
-    /,
-    *,
-    performance: Performance = None,
-    picture: Picture = None,
-    style: StyleOptions = StyleOptions(),
-) -> None:
-    """Draw stored runs anew: performance over time, one curve per policy. Nothing is run.
-
-    'swarm-forage plot results/warehouse_small --width-in 3.5 --no-title --picture a.pdf' draws it for a column of a
-    paper. 'study plot' draws studies.
-
-    Args:
-        folder: Folder of records that 'run' has stored.
-    """
-    from metrics.scoring.summary import summarize_runs
-    from swarm_forage_env.cli.worlds import default_file
-    from swarm_forage_env.rendering.figures import check_picture
-    from swarm_forage_env.runs.plan import read_table
-    from swarm_forage_env.studies.results import study_file
-
-    if folder.suffix == ".parquet" or study_file(folder).exists():
-        raise ConfigError(f"Expected a folder of runs, got a study; it is 'swarm-forage study plot {folder}'.")
-    table = read_table(folder, performance=performance)
-    found = summarize_runs(table)
-    file = picture or default_file(folder, found.world, [policy.label for policy in table.plan.policies], ".png")
-    check_picture(file)
-    found.draw(file, style=style.style())
-    say(f"picture {file}")
 
 
 def score(
@@ -115,53 +80,31 @@ def score(
         budget: quick, standard or paper: sets the length and number of runs, and the levels.
         disturbance: Disturbance for reactivity and adaptability: throttle or handling_cost.
     """
-    from metrics.scoring import score_question
+    from metrics.scoring import read_curves, score_question
     from swarm_forage_env.cli.worlds import described_fields, described_runs
 
-    asked: dict[str, Any] = {
-        "measures": measures or None,
-        "variants": variant,
-        "forms": form,
-        "against": against,
-        "is_full": show_all,
-    }
-    if curves != CurveOptions():
-        if (budget, seeds, disturbance) != ("standard", None, "throttle"):
-            raise ConfigError(
-                "Expected no --budget, --seeds or --disturbance beside --curves: runs are as in the file."
-            )
-        return _score_curves(policies, world, options, curves, performance=performance, **asked)
-    if performance is not None:
-        world = replace(world, settings=(*world.settings, f"performance={performance}"))
-    if not policies:
+    asked: dict[str, Any] = {"budget": budget, "seeds": seeds, "disturbance": disturbance, "horizon_s": world.horizon}
+    asked |= {"measures": measures or None, "variants": variant, "forms": form, "against": against}
+    file = curves.curves
+    if file is not None:
+        if not policies and world != WorldOptions():
+            raise ConfigError("Expected policies to run in a world beside --curves, got a world alone.")
+        told = {"columns": curves.named_columns(), "events": curves.events, "interval_s": curves.interval}
+        asked["curves"] = read_curves(file, performance, **told)
+        options = replace(options, picture=options.picture or file.with_name(f"{file.stem}_scores.png"))
+    elif curves != CurveOptions():
+        raise ConfigError("Expected a file with --curves for --columns, --events and --interval, got none.")
+    elif not policies:
         raise NothingAskedError("Expected policies, or a file with --curves; 'swarm-forage list' names policies.")
+    elif performance is not None:
+        world = replace(world, settings=(*world.settings, f"performance={performance}"))
     for word in world.settings:
         if word.partition("=")[0] in ("horizon_s", "interval_s"):
             raise ConfigError(f"Expected no --set {word}, which the budget sets; --horizon changes the length of runs.")
     chosen, specs = described_runs(replace(world, horizon=None), policies)
-    asked |= {"budget": budget, "seeds": seeds, "disturbance": disturbance, "horizon_s": world.horizon}
     density = described_fields(world).fields.get("density")
-    question = score_question(specs, chosen, density=density, **asked)
+    question = score_question(specs, chosen, density=density, is_full=show_all, **asked)
     return ask_and_show(question, options, chosen, policies, ending="_scores.png")
-
-
-def _score_curves(
-    policies: Sequence[str], world: WorldOptions, options: RunOptions, curves: CurveOptions, **how: Any
-) -> int:
-    """Score curves of a file beside those of policies, and draw a picture beside the file."""
-    from metrics.scoring import curves_question
-    from swarm_forage_env.cli.worlds import described_runs
-
-    file = curves.curves
-    if file is None:
-        raise ConfigError("Expected a file with --curves for --columns, --events and --interval, got none.")
-    if not policies and world != WorldOptions():
-        raise ConfigError("Expected policies to run in a world beside --curves, got a world alone.")
-    chosen, specs = described_runs(replace(world, horizon=None), policies)
-    given = {"columns": curves.named_columns(), "events": curves.events, "interval_s": curves.interval}
-    question = curves_question(file, specs, chosen, **given, **how)
-    picture = options.picture or file.with_name(f"{file.stem}_scores.png")
-    return ask_and_show(question, replace(options, picture=picture), chosen, policies)
 
 
 def check(policies: Policies, /, *, world: WorldOptions = WorldOptions()) -> None:

@@ -21,13 +21,11 @@ import numpy as np
 from swarm_forage_env._internal.fields import ConfigError, instance, whole
 from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.contract.types import FloatArray
-from swarm_forage_env.policies.registry import policy_label
 from swarm_forage_env.runs.record import Record
 from swarm_forage_env.runs.runner import run_all
 from swarm_forage_env.runs.spec import PolicyLike, PolicySpec, RunSpec, policy_specs
-from swarm_forage_env.runs.store import RunFailure, failure_lines, is_stored, load
-from swarm_forage_env.scenarios.differences import preset_of
-from swarm_forage_env.wrappers.world import UNDISTURBED, World, WorldLike, world_of
+from swarm_forage_env.runs.store import RunFailure, failure_lines, is_stored
+from swarm_forage_env.wrappers.world import World, WorldLike, world_of
 
 Curves = tuple[tuple[int, ...], dict[str, FloatArray]]
 """Seeds of the R finished runs, and for each column its values in T intervals, (R, T)."""
@@ -194,36 +192,3 @@ def planned_line(specs: Iterable[RunSpec], out: str | Path) -> str:
         f"{counted(len(planned), 'run')}, {len(planned) - len(todo):,} stored, {len(todo):,} to do with "
         f"{robot_ticks:.3g} robot-ticks; records go to {out}"
     )
-
-
-def read_table(folder: str | Path, *, performance: str | None = None) -> Table:
-    """Return the runs that a folder holds as the table that made them; of scores and studies those of the plain world.
-
-    Caches that are not those of the scenario count as the policy's, as in runs of several policies in one world.
-
-    Args:
-        folder: Where records are.
-        performance: What of them is performance; default what each was made for.
-
-    Raises:
-        RecordError: the folder holds no records, or a damaged one.
-        ConfigError: it holds runs of several lengths, or of disturbed worlds only.
-    """
-    plain = [record for record in load(folder) if record.spec.world.criterion == UNDISTURBED]
-    if performance is not None:
-        plain = [record.read_as(performance) for record in plain]
-    if not plain:
-        raise ConfigError(f"Expected runs of a world in which nothing is varied in {folder}, got none.")
-    lengths = sorted({(record.spec.scenario.horizon_s, record.spec.scenario.interval_s) for record in plain})
-    if len(lengths) > 1:
-        told = ", ".join(f"{horizon_s:g} s in intervals of {interval_s:g} s" for horizon_s, interval_s in lengths)
-        raise ConfigError(f"Expected runs of one length in {folder}, got {told}; make folders of their own by --out.")
-    conditions: list[Condition] = []
-    for spec in (record.spec for record in plain):
-        own, preset = spec.scenario.caches, preset_of(spec.scenario)
-        policy = PolicySpec(label=policy_label(spec.policy), policy=spec.policy, parameters=spec.parameters, caches=own)
-        condition = Condition(policy, spec.world.with_caches("none" if preset is None else preset.caches))
-        if condition not in conditions:  # wrappers of users may have no hash
-            conditions.append(condition)
-    plan = Plan(conditions=tuple(conditions), seeds=tuple(sorted({record.seed for record in plain})))
-    return Table(plan=plan, records={record.run_id: record for record in plain}, folder=Path(folder))

@@ -35,7 +35,7 @@ RUN, SCORE = "run crw", "score crw"
         ("study verdict .", "without study.toml"),
         ("train --set hiden=3", "Unknown field of the scenario or the training 'hiden'. Did you mean 'hidden'?"),
         ("study rnu", 'Unknown command "rnu". Did you mean "run"?'),
-        (f"{SCORE} --curves x.csv --budget quick", "Expected no --budget"),
+        ("score --curves curves.csv --budget quick", "Expected no budget"),
         ("score --curves x.csv --robots 3", "Expected policies to run in a world beside --curves"),
         ("score --curves curves.csv --columns seed:0", "Expected --columns OURS=THEIRS"),
         ("score --curves curves.csv --events", "the length of an interval"),
@@ -46,7 +46,7 @@ RUN, SCORE = "run crw", "score crw"
 )
 def test_a_mistake_is_one_line(command, words, complaint):
     Path("file").write_text("no record")
-    Path("curves.csv").write_text("n_robots,performance\n1,2\n")
+    Path("curves.csv").write_text("n_robots,seed,interval,performance\n1,0,0,2\n")
     Path("world.toml").write_text("n_robots = 3")
     code, out, err = command(*words.split())
     assert (code, out) == (1 if "inside" in words else 2, "")
