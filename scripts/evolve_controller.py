@@ -4,10 +4,9 @@
     python scripts/evolve_controller.py dpo wander_speed_mps=0.02:0.1 wander_max_change_deg=1:20:log@5
 
 A number is named with the range in which it is looked for; "log" looks in equal ratios. The search begins at the number
-behind "@", else at that of the policy. A set of numbers is worth its
-performance as a share of DPO's, averaged over the worlds. All sets of a generation run with the same seed, which the
-next generation changes, so nothing is fitted to one seed. The table compares what was found with the numbers of before,
-with seeds that no generation had.
+behind "@", else at that of the policy. A set of numbers is worth its performance as a share of DPO's, averaged over the
+worlds. All sets of a generation run with the same seed, which the next generation changes, so nothing is fitted to one
+seed.
 """
 
 import argparse
@@ -20,19 +19,17 @@ from typing import Any
 
 import numpy as np
 
-from metrics import aggregate
 from metrics.benchmark import load_protocol
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.plan import Plan, finished_runs
-from swarm_forage_env.runs.spec import PolicySpec, policy_spec
-from swarm_forage_env.sheet import Sheet
+from swarm_forage_env.runs.spec import policy_spec
 from swarm_forage_env.wrappers.world import World
 
 YARDSTICK = "dpo"
 """The best of the paper's controllers in these worlds."""
-FIRST_SEED, JUDGING_SEED = 100_000, 200_000
-"""Seeds of the generations and of the table; far from those of the benchmark."""
+FIRST_SEED = 100_000
+"""Seed of the first generation; far from those of the benchmark."""
 WIDTH = 0.25
 """Standard deviation of the first generation, as a share of each range; pycma advises about that much."""
 
@@ -76,25 +73,15 @@ def read_range(text: str) -> Range:
     return found
 
 
-def seed_of(generation: int, seed: int) -> int:
-    """Return the seed of the runs of a generation; none is one of the table's, which begin at `JUDGING_SEED`."""
-    return FIRST_SEED * (1 + 2 * seed) + generation
-
-
-def measured(policies: Sequence[PolicySpec], worlds: Sequence[World], seeds: Sequence[int], jobs: int) -> FloatArray:
-    """Return the performance (objects of a run) as an array (policies, worlds, seeds)."""
-    table = finished_runs(Plan.product(policies, worlds, seeds), jobs=jobs)
-    runs = [[table.of(one) for one in table.plan.of_policy(policy.label)] for policy in policies]
-    return np.array([[[run["performance"].sum() for run in each] for each in rows] for rows in runs])
-
-
-def shares(
-    policy: str, sets: Sequence[dict[str, float]], worlds: Sequence[World], seeds: Sequence[int], jobs: int
-) -> FloatArray:
-    """Return the performance of sets of numbers over that of the yardstick, the mean over worlds and seeds (sets,)."""
+def shares(policy: str, sets: Sequence[dict[str, float]], worlds: Sequence[World], seed: int, jobs: int) -> FloatArray:
+    """Return the performance of sets of numbers over that of the yardstick, the mean over worlds (sets,)."""
     policies = [policy_spec(policy, parameters=numbers, label=f"set {k}") for k, numbers in enumerate(sets)]
-    found = measured([policy_spec(YARDSTICK, label="yardstick"), *policies], worlds, seeds, jobs)
-    return (found[1:] / np.maximum(found[:1], 1.0)).mean(axis=(1, 2))  # a yardstick may bring home nothing
+    table = finished_runs(
+        Plan.product([policy_spec(YARDSTICK, label="yardstick"), *policies], worlds, (seed,)), jobs=jobs
+    )
+    runs = [[table.of(one)[0] for one in table.plan.of_policy(each.label)] for each in policies]
+    found = np.array([[run["performance"].sum() for run in each] for each in runs])
+    return (found[1:] / np.maximum(found[:1], 1.0)).mean(axis=1)  # a yardstick may bring home nothing
 
 
 def evolved(
@@ -108,38 +95,12 @@ def evolved(
     for generation in range(words.generations):
         asked = strategy.ask()
         sets = [{one.name: one.number(x) for one, x in zip(ranges, point, strict=True)} for point in asked]
-        worth = shares(policy, sets, worlds, (seed_of(generation, words.seed),), words.jobs)
+        worth = shares(policy, sets, worlds, FIRST_SEED * (1 + 2 * words.seed) + generation, words.jobs)
         strategy.tell(asked, (-worth).tolist())
         told = f"generation {generation + 1}/{words.generations}: best {worth.max():.3f}, mean {worth.mean():.3f}"
         print(told, file=sys.stderr, flush=True)
     middle = np.clip(strategy.result.xfavorite, 0.0, 1.0)
     return {one.name: float(f"{one.number(x):.3g}") for one, x in zip(ranges, middle, strict=True)}
-
-
-def comparison(
-    policy: str,
-    before: dict[str, float],
-    found: dict[str, float],
-    worlds: Sequence[World],
-    words: argparse.Namespace,
-) -> Sheet:
-    """Return performance before and after, beside that of the yardstick."""
-    seeds = range(JUDGING_SEED, JUDGING_SEED + words.judging)
-    policies = [
-        policy_spec(YARDSTICK, label=f"{YARDSTICK}, unchanged"),
-        policy_spec(policy, parameters=before, label="before"),
-        policy_spec(policy, parameters=found, label="evolved"),
-    ]
-    means = [[aggregate(one) for one in each] for each in measured(policies, worlds, seeds, words.jobs)]
-    return Sheet.of(
-        ("numbers", *(world.scenario.name for world in worlds)),
-        [
-            (spec.label, *(f"{one.mean:.1f} ± {one.upper - one.mean:.1f}" for one in each))
-            for spec, each in zip(policies, means, strict=True)
-        ],
-        title=f"Performance of {policy} in {words.horizon:,.0f} s",
-        notes=[f"± 95 % interval of the mean of {words.judging} runs"],
-    )
 
 
 def main() -> None:
@@ -153,7 +114,6 @@ def main() -> None:
     parser.add_argument("--population", type=int, default=8, help="sets of a generation (default: 8)")
     parser.add_argument("--seed", type=int, default=0, help="default: 0")
     parser.add_argument("--horizon", type=float, default=4000.0, help="seconds of a run (default: 4000)")
-    parser.add_argument("--judging", type=int, default=4, help="runs behind the table (default: 4)")
     parser.add_argument("--jobs", type=int, default=1, help="processes (default: 1)")
     words = parser.parse_args()
     numbers: Any = getattr(load_policy(words.policy), "parameters", None)
@@ -167,7 +127,6 @@ def main() -> None:
         replace(world, scenario=replace(world.scenario, horizon_s=words.horizon)) for world in load_protocol().training
     ]
     found = evolved(words.policy, words.ranges, before, worlds, words)
-    print(comparison(words.policy, before, found, worlds, words).text())
     print(f'load_policy("{words.policy}", {json.dumps(found)})')
 
 

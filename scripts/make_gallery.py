@@ -196,25 +196,9 @@ PICTURES: dict[str, tuple[ScenarioConfig, str, dict[str, Any]]] = {
 }
 """File in docs/images -> the world, the policy and how it is drawn; the film is README's."""
 FILM_COLUMNS = 5
-FILM_SPEEDUP = 30.0
-FILM_FPS = 6.0
-FILM_PX = 300
-FILM_TRAIL_S = 10.0
+FILM_LOOK: dict[str, Any] = {"speedup": 30.0, "fps": 6.0, "size_px": 300, "trail_s": 10.0}
 MOST_FILM_BYTES = 400_000
 """The page shows all films at once."""
-
-
-def picture(name: str) -> None:
-    """Draw robots at work, or film them, for the other pages."""
-    world, policy, options = PICTURES[name]
-    print(record_run(world, policy, DOCS / "images" / name, trail_s=TRAIL_S, **options))
-
-
-def show(exhibit: Exhibit) -> None:
-    """Make the replay and the picture of an exhibit."""
-    replays = [record_replay(spec, frame_s=exhibit.frame_s) for spec in exhibit.specs()]
-    path = write_replays(FOLDER / f"{exhibit.name}.html", replays)
-    print(f"{path.name}: {path.stat().st_size / 1e3:.0f} kB")
 
 
 def renew(exhibit: Exhibit) -> None:
@@ -243,27 +227,6 @@ def page() -> str:
     return "\n".join(lines) + "\n"
 
 
-def shoot(film: Film) -> None:
-    """Make a film."""
-    (exhibit,) = (one for one in EXHIBITS if one.name == film.exhibit)
-    spec = exhibit.specs()[film.run]
-    path = record_run(
-        spec.world,
-        spec.policy,
-        FOLDER / f"{film.name}.gif",
-        seconds=film.seconds,
-        seed=SEED,
-        speedup=FILM_SPEEDUP,
-        fps=FILM_FPS,
-        size_px=FILM_PX,
-        trail_s=FILM_TRAIL_S,
-    )
-    size = path.stat().st_size
-    print(f"{path.name}: {size / 1e3:.0f} kB", flush=True)
-    if size > MOST_FILM_BYTES:
-        sys.exit(f"Expected films of at most {MOST_FILM_BYTES / 1e3:.0f} kB; make it shorter or smaller.")
-
-
 def table_of_films() -> list[str]:
     """The films as lines of a table in Markdown: each shows its caption and leads to its replay."""
     lines: list[list[str]] = []
@@ -284,13 +247,23 @@ def make(names: list[str]) -> None:
     FOLDER.mkdir(exist_ok=True)
     for exhibit in EXHIBITS:
         if not names or exhibit.name in names:
-            show(exhibit)
+            replays = [record_replay(spec, frame_s=exhibit.frame_s) for spec in exhibit.specs()]
+            tell(write_replays(FOLDER / f"{exhibit.name}.html", replays))
     for film in FILMS:
         if not names or film.name in names:
-            shoot(film)
-    for name in PICTURES:
+            (exhibit,) = (one for one in EXHIBITS if one.name == film.exhibit)
+            spec, file = exhibit.specs()[film.run], FOLDER / f"{film.name}.gif"
+            tell(record_run(spec.world, spec.policy, file, seconds=film.seconds, seed=SEED, **FILM_LOOK))
+            if file.stat().st_size > MOST_FILM_BYTES:
+                sys.exit(f"Expected films of at most {MOST_FILM_BYTES / 1e3:.0f} kB; make it shorter or smaller.")
+    for name, (world, policy, options) in PICTURES.items():
         if not names or name in names:
-            picture(name)
+            tell(record_run(world, policy, DOCS / "images" / name, trail_s=TRAIL_S, **options))
+
+
+def tell(file: Path) -> None:
+    """Say which file was written."""
+    print(f"{file.name}: {file.stat().st_size / 1e3:.0f} kB", flush=True)
 
 
 def main(words: list[str]) -> None:

@@ -1,9 +1,8 @@
 """Writing films: GIF with Pillow, MP4 with imageio and ffmpeg."""
 
 from collections.abc import Iterable
-from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +10,6 @@ from numpy.typing import NDArray
 from swarm_forage_env._internal.fields import ConfigError, number
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.wording import install_command
-from swarm_forage_env.rendering.view import CACHE_OPACITY, NEST_OPACITY, SOURCE_OPACITY, Colour, Palette
-
-if TYPE_CHECKING:
-    from PIL import Image
 
 Frame = NDArray[np.uint8]
 MAX_FPS = {".gif": 50, ".mp4": 60}
@@ -48,8 +43,8 @@ def check_film(path: Path, fps: float, n_frames: int) -> None:
 def write_film(frames: Iterable[Frame], path: Path, *, fps: float) -> None:
     """Write pictures as a film, whole or not at all; the suffix of `path`, as in `check_film`, chooses the format.
 
-    GIFs use one palette made for this package's pictures, without dithering, and store only what changed from frame to
-    frame, so they stay small. Identical consecutive pictures become one longer frame. GIF rates are rounded to whole
+    GIFs use the colours of the first picture, without dithering, and store only what changed from frame to frame, so
+    they stay small. Identical consecutive pictures become one longer frame. GIF rates are rounded to whole
     hundredths of a second per frame.
 
     Args:
@@ -68,9 +63,12 @@ def write_film(frames: Iterable[Frame], path: Path, *, fps: float) -> None:
 def _write_gif(frames: Iterable[Frame], path: Path, fps: float) -> None:
     from PIL import Image
 
-    palette = _gif_palette()
+    frames = iter(frames)
+    first = Image.fromarray(next(frames))
+    # The legend has all colours from the start; one index means "unchanged".
+    palette = first.quantize(255, method=Image.Quantize.MAXCOVERAGE)
     pictures = (Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
-    next(pictures).save(
+    palette.save(
         path,
         save_all=True,
         append_images=pictures,
@@ -79,32 +77,6 @@ def _write_gif(frames: Iterable[Frame], path: Path, fps: float) -> None:
         optimize=True,
         disposal=1,
     )
-
-
-def _gif_palette() -> "Image.Image":
-    """Colours of our pictures: grounds, things on them, and the mixtures that soft edges and fading need most.
-
-    There are fewer than 256, since one index means "unchanged".
-    """
-    from PIL import Image
-
-    floor = Palette.floor
-    tints = ((Palette.nest, NEST_OPACITY), (Palette.cache, CACHE_OPACITY), (Palette.source, SOURCE_OPACITY))
-    grounds = (floor, Palette.page, Palette.wall, *(_mix(floor, colour, share) for colour, share in tints))
-    things = (Palette.empty, Palette.carrying, Palette.interference, Palette.text, Palette.object, Palette.repair)
-    things += (Palette.nest, Palette.cache, Palette.light)
-    mixed = [_mix(ground, thing, share) for share, ground, thing in product((1.0, 0.5, 0.25, 0.75), grounds, things)]
-    fading = [_mix(floor, thing, share) for thing, share in product(things[:2], (0.06, 0.12, 0.18, 0.37))]
-    glow = [_mix(grounds[3], Palette.light, share) for share in (0.06, 0.12, 0.18, 0.31)]
-    chosen = list(dict.fromkeys([*grounds, *fading, *glow, *mixed]))[:255]
-    picture = Image.new("P", (1, 1))
-    picture.putpalette([channel for entry in chosen for channel in entry])
-    return picture
-
-
-def _mix(ground: Colour, thing: Colour, share: float) -> Colour:
-    red, green, blue = (round(a + (b - a) * share) for a, b in zip(ground, thing, strict=True))
-    return red, green, blue
 
 
 def _write_mp4(frames: Iterable[Frame], path: Path, fps: float) -> None:
