@@ -81,7 +81,8 @@ class Board(Answer):
             score = standing.score
             panel.plot([score.lower, score.upper], [place, place], color=COLOURS[0], linewidth=3, solid_capstyle="butt")
             panel.plot(score.value, place, "o", color=COLOURS[0], markersize=7)
-            panel.plot(standing.by_policy, [place] * len(standing.by_policy), "|", color=COLOURS[1], markersize=10)
+            if len(standing.by_policy) > 1:
+                panel.plot(standing.by_policy, [place] * len(standing.by_policy), "|", color=COLOURS[1], markersize=10)
         panel.axvline(1.0, color="0.5", linewidth=0.8, zorder=0)
         panel.set_yticks(np.arange(len(self.standings)), self._names())
         panel.set_ylim(len(self.standings) - 0.5, -0.5)
