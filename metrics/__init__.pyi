@@ -8,7 +8,6 @@ from .scoring import RunSummary as RunSummary
 from .scoring import score as score
 from .scoring import read_curves as read_curves
 from .scoring import Scores as Scores
-from .scoring import Performance as Performance
 
 # what studies say
 from .scoring import verdict as verdict

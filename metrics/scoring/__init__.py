@@ -1,7 +1,5 @@
 """From policies, runs and files of curves to tables of scores, with notes that help to read them."""
 
-from swarm_forage_env.scenarios.performance import Performance
-
 from .answer import Scores
 from .curves_file import read_curves
 from .frame import differences, scores, summarized
@@ -41,6 +39,5 @@ __all__ = [
     "StudyPanel",
     "StudyFigure",
     "StudyVerdict",
-    "Performance",
     "RunSummary",
 ]

@@ -70,12 +70,15 @@ _LINE = "line of the file"
 """Column for places in messages; no table of curves has one of this name."""
 
 
-def read_curves(path: str | Path, performance: str | None = None, **how: Any) -> tuple[StudyCurves, ...]:
-    """Read a file of curves; one study per policy in it.
+def read_curves(
+    source: str | Path | pl.DataFrame, performance: str | None = None, **how: Any
+) -> tuple[StudyCurves, ...]:
+    """Read curves; one study per policy in them.
 
     Args:
-        path: A Parquet file; or a text with a line of column names, and with commas, semicolons or tabs between values.
-            Beside semicolons and tabs, commas in numbers are decimal.
+        source: A Parquet file; or a text with a line of column names, and with commas, semicolons or tabs between
+            values. Beside semicolons and tabs, commas in numbers are decimal. Or a table of such columns, such as
+            `Record.frame`.
         performance: As in `study_curves`.
         how: Further arguments of `study_curves`.
 
@@ -83,21 +86,25 @@ def read_curves(path: str | Path, performance: str | None = None, **how: Any) ->
         CurveError: as `study_curves`; or the file cannot be read, there is no reference run for what is varied, or no
             runs can be paired.
     """
-    file = Path(checked("path", path, str | Path))
-    try:
-        frame = pl.read_parquet(file) if file.suffix.lower() == ".parquet" else _read_text(file)
-    except OSError as error:
-        raise CurveError(f"Cannot read {file}: {error.strerror or error}.") from error
-    except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
-        raise CurveError(f"Cannot read {file} as Parquet: {str(error).splitlines()[0]}.") from error
-    studies = study_curves(frame, performance, where=str(file), controller=file.stem, **how)
+    if isinstance(source, pl.DataFrame):
+        frame, about = source, {"where": "the table", "controller": "curves"}
+    else:
+        file = Path(checked("path", source, str | Path))
+        about = {"where": str(file), "controller": file.stem}
+        try:
+            frame = pl.read_parquet(file) if file.suffix.lower() == ".parquet" else _read_text(file)
+        except OSError as error:
+            raise CurveError(f"Cannot read {file}: {error.strerror or error}.") from error
+        except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
+            raise CurveError(f"Cannot read {file} as Parquet: {str(error).splitlines()[0]}.") from error
+    studies = study_curves(frame, performance, **about, **how)
     for study in studies:
         for criterion in (THROTTLE, HANDLING, NOISE, POPULATION):
             study.levels(criterion)  # each has a reference
         if not shared_seeds(study.experiments):
             raise CurveError(
-                f"Expected runs with numbers in common over all experiments of {study.controller} in {file}, got none; "
-                "number the runs of each experiment alike (column seed)."
+                f"Expected runs with numbers in common over all experiments of {study.controller} in {study.where}, "
+                "got none; number the runs of each experiment alike (column seed)."
             )
     return studies
 

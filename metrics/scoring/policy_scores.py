@@ -25,7 +25,7 @@ from .answer import Scores
 from .frame import scores
 from .measures import DISTURBANCES, MEASURES, check_words, checked_request
 from .question import Question
-from .run_curves import THROTTLE, PerformanceLike, StudyCurves, own_performance, policy_curves
+from .run_curves import THROTTLE, StudyCurves, policy_curves
 
 
 def score(
@@ -69,7 +69,7 @@ def score_question(
     budget: str | Budget = "standard",
     seeds: int | Sequence[int] | None = None,
     horizon_s: float | None = None,
-    performance: PerformanceLike | None = None,
+    performance: str | None = None,
     density: float | None = None,
     disturbance: str = THROTTLE,
     variants: Sequence[Variant] = ("corrected",),
@@ -93,8 +93,8 @@ def score_question(
         seeds: Their number, or a list; default those of the budget. All experiments use them, so runs are paired.
         horizon_s: Length of a run in seconds, whole intervals; default that of the budget.
         performance: What P(N, t) is: a recorded column ("n_carrying"), "1/" and a column in which less is better
-            ("1/interference_fraction"), "task_balance", "cache_load", or a function of a record (`Performance`).
-            Default that of the scenario. It changes how runs are read; stored ones are not repeated.
+            ("1/interference_fraction"), "task_balance" or "cache_load". Default that of the scenario. It changes how
+            runs are read; stored ones are not repeated.
         density: Robots per m^2 at all swarm sizes: the arena grows with the swarm, and one robot is in the smallest
             arena. Default: all sizes are in the scenario's arena (in search and rescue: at its density).
         disturbance: Disturbance for reactivity and adaptability: "throttle" (robots lose speed) or "handling_cost"
@@ -105,8 +105,8 @@ def score_question(
         is_full: Whether the text has all levels, numbers and differences.
     """
     wanted = checked_request(measures, variants, forms)
-    chosen, own = world_of(world), own_performance(performance)
-    if isinstance(performance, str):
+    chosen = world_of(world)
+    if performance is not None:
         chosen = replace(chosen, scenario=replace(chosen.scenario, performance=performance))
     specs = policy_specs(cast("Any", policies if isinstance(policies, Mapping | list | tuple) else [policies]))
     labels = [*(spec.label for spec in specs), *(study.controller for study in curves)]
@@ -138,12 +138,12 @@ def score_question(
             "horizon_s": allowed.horizon_s,
             "interval_s": allowed.interval_s,
             "seeds": list(plan.seeds),
-            "performance": (own or performance_of(chosen.scenario.performance)).name,
+            "performance": performance_of(chosen.scenario.performance).name,
             "n_robots": chosen.n_robots,
         }
 
     def answer(table: Table) -> Scores:
-        studies = [*(policy_curves(table, spec.label, own) for spec in specs), *curves]
+        studies = [*(policy_curves(table, spec.label) for spec in specs), *curves]
         frame, missing = scores(studies, wanted, variants=variants, forms=forms)
         for study in curves:
             reasons = {label: why for (policy, label), why in missing.items() if policy == study.controller}

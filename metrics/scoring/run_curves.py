@@ -3,15 +3,13 @@
 Run records of `swarm_forage_env` and curves from other sources share the names of columns.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from swarm_forage_env.runs.plan import Condition, Curves, Table
-from swarm_forage_env.runs.record import Record
+from swarm_forage_env.runs.plan import Curves, Table
 from swarm_forage_env.scenarios.columns import ALL_COLUMNS, Column
 from swarm_forage_env.scenarios.performance import (
     Performance,
@@ -72,42 +70,6 @@ INTERVAL_COLUMNS = tuple(
     if column.kind in ("amount", "fraction", "number") and name not in ("criterion_value", *RATE_COLUMNS.values())
 )
 """Columns with one value per interval."""
-
-PerformanceLike: TypeAlias = str | Performance | Callable[[Any], ArrayLike]
-"""A recorded column by name ("n_carrying", "1/interference_fraction"), or a function as in `Performance`."""
-
-
-def own_performance(given: PerformanceLike | None) -> Performance | None:
-    """Return what was given as a `Performance` if it is a function; None if it is a name or nothing."""
-    if given is None or isinstance(given, str | Performance):
-        return given if isinstance(given, Performance) else None
-    if not callable(given):
-        raise CurveError(
-            f"Expected performance to be the name of a recorded column, or a function of a record, got {given!r}."
-        )
-    return Performance(getattr(given, "__name__", type(given).__name__), function=given)
-
-
-def checked_performance(values: ArrayLike, name: str, record: Record) -> FloatArray:
-    """Return a performance of a run as numbers, (T,) float64.
-
-    Raises:
-        CurveError: no numbers, not one per interval, or NaN, infinite or negative ones; the message has the first.
-    """
-    what = f"Expected performance {name} of run {record.run_id}"
-    try:
-        curve = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise CurveError(f"{what} as numbers, got {values!r:.80}; {error}.") from error
-    shape = record["interval"].shape
-    if curve.shape != shape:
-        raise CurveError(f"{what} with one number per interval, shape {shape}, got shape {curve.shape}.")
-    for interval in np.flatnonzero(~(np.isfinite(curve) & (curve >= 0.0))):
-        raise CurveError(
-            f"{what} as finite numbers >= 0, got {curve[interval]} in interval {interval}; let 1/0 be 0, and shift or "
-            "turn round what can be negative."
-        )
-    return curve
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -250,32 +212,12 @@ def curves_in_worlds(
     )
 
 
-def policy_curves(table: Table, policy: str, performance: Performance | None = None) -> StudyCurves:
-    """Return all runs of a policy in a table; worlds without a finished run are there, without runs.
-
-    Args:
-        table: The runs.
-        policy: Label of the policy.
-        performance: A function of records that is the performance; None = what the scenario names.
-
-    Raises:
-        CurveError: a performance that is negative or no number.
-    """
+def policy_curves(table: Table, policy: str) -> StudyCurves:
+    """Return all runs of a policy in a table by its label; worlds without a finished run are there, without runs."""
     conditions = table.plan.of_policy(policy)
-    read_as = performance or performance_of(conditions[0].world.scenario.performance)
-    runs = [(condition.world, _curves(table, condition, read_as)) for condition in conditions]
+    read_as = performance_of(conditions[0].world.scenario.performance)
+    runs = [(condition.world, table.curves(condition, *INTERVAL_COLUMNS)) for condition in conditions]
     return curves_in_worlds(runs, len(table.plan.seeds), controller=policy, read_as=read_as)
-
-
-def _curves(table: Table, condition: Condition, read_as: Performance) -> Curves:
-    """The runs of a condition, with the performance that is asked for."""
-    seeds, columns = table.curves(condition, *INTERVAL_COLUMNS)
-    own = read_as.function
-    checked = [
-        checked_performance(record["performance"] if own is None else own(record.frame), read_as.name, record)
-        for record in table.of(condition)
-    ]
-    return seeds, {**columns, "performance": np.stack(checked)} if checked else columns
 
 
 def rates_of(world: World) -> PopulationRates | None:

@@ -12,14 +12,14 @@ from typing import Any
 from swarm_forage_env._internal.fields import ConfigError, number
 from swarm_forage_env._internal.files import check_file, replacing
 from swarm_forage_env.contract.policy import Policy
-from swarm_forage_env.policies.registry import load_policy, policy_label
+from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.rendering.frame import Trails, render_frame
 from swarm_forage_env.rendering.video import Frame, check_film, write_film
 from swarm_forage_env.rendering.view import arena_view
 from swarm_forage_env.runs.run import LiveRun, build_env
-from swarm_forage_env.runs.spec import plan_run, stated_caches
+from swarm_forage_env.runs.spec import policy_spec
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.wrappers.world import World, WorldLike, world_of
+from swarm_forage_env.wrappers.world import WorldLike, world_of
 
 
 def record_run(
@@ -42,7 +42,7 @@ def record_run(
 
     Args:
         world: A `World`, a configuration or the name of a preset.
-        policy: Name of an installed policy, path of a policy file, or a fresh policy object.
+        policy: Name of an installed policy, path of a policy file, or a policy object, of which a copy acts.
         path: File to write, .gif or .mp4; with `at_s` .png.
         at_s: Simulated time of the only picture.
         seconds: Simulated time to film.
@@ -78,9 +78,11 @@ def record_run(
         raise ConfigError(f"Expected a picture's path to end in .png, got {str(path)!r}; for a film, leave --at out.")
     check_file(path)
     arena_view(given.scenario, size_px)  # refuses a bad size before the run starts
-    given, name, driver = _driven(given, policy, caches, parameters)
+    spec = policy_spec(policy, parameters=parameters, caches=caches)
+    driver: Policy = load_policy(spec.policy, spec.parameters) if spec.factory is None else spec.factory()
+    given = given.with_caches(spec.caches)
     arena = given.scenario.arena
-    look = {"title": given.title(name, f"{arena.width_m:g} x {arena.height_m:g} m"), "size_px": size_px}
+    look = {"title": given.title(spec.label, f"{arena.width_m:g} x {arena.height_m:g} m"), "size_px": size_px}
     run = LiveRun(build_env(given.scenario, given.wrappers, reads=getattr(driver, "reads", None)), driver, seed)
     trails = Trails(given.n_robots, n_samples) if n_samples > 1 else None
     pictures = _pictures(run, ticks, shown[0], trails, progress, look)
@@ -89,18 +91,6 @@ def record_run(
     else:
         write_picture(next(pictures), path)
     return path
-
-
-def _driven(
-    world: World, policy: str | Policy, caches: str | None, parameters: Mapping[str, Any] | None
-) -> tuple[World, str, Policy]:
-    """Return the world with the caches that the policy gets, the policy's name, and a fresh one."""
-    if isinstance(policy, str):
-        spec = plan_run(world, policy, parameters=parameters, caches=caches)
-        return spec.world, policy_label(spec.policy), load_policy(spec.policy, spec.parameters)
-    if parameters:
-        raise ConfigError(f"Expected parameters with a policy's name or file only, got them with {policy!r}.")
-    return world.with_caches(caches or stated_caches(policy)), getattr(policy, "name", type(policy).__name__), policy
 
 
 def _pictures(

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError, number
+from swarm_forage_env._internal.fields import number
 from swarm_forage_env._internal.files import as_file_name, replacing
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.inspect.replay.capture import record_replay
@@ -51,16 +51,7 @@ class FloorMaps:
     """Boxes that are nests; of a difference, those of the first."""
 
     def minus(self, other: "FloorMaps") -> "FloorMaps":
-        """Return what is more here than in `other`, square by square.
-
-        Raises:
-            ConfigError: arenas or squares of other sizes.
-        """
-        mine, theirs = ((*maps.size_m, maps.side_m) for maps in (self, other))
-        if mine != theirs:
-            raise ConfigError(
-                f"Expected maps of one arena in equal squares, got sizes and sides of {mine} and {theirs} m."
-            )
+        """Return what is more here than in `other`, a map of the same arena, square by square."""
         return replace(
             self,
             label=f"{self.label} minus {other.label}",

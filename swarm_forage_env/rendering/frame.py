@@ -1,7 +1,6 @@
 """One picture of the world. Drawing reads the state arrays and never changes them."""
 
 import math
-import textwrap
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -302,34 +301,19 @@ def _write_header(
         f"{np.count_nonzero(events.interfering & swarm.active):,} in interference"
     )
     room = view.width - 2 * margin
-    lines, size = _headline(headline, margin, room - text_width(f"{clock}  ", 1.35 * margin), 0.6 * view.header)
-    for k, line in enumerate(lines):
-        y = 0.33 * view.header + (k - (len(lines) - 1) / 2) * 1.2 * size
-        pen.text(margin, y, line, Palette.text, size, "lm")
+    wide = room - text_width(f"{clock}  ", 1.35 * margin)
+    size = _fitting(headline, 1.35 * margin, wide, LEAST_TEXT_PX)
+    n_letters = int(len(headline) * wide / text_width(headline, size))
+    shown = headline if n_letters >= len(headline) else f"{headline[: max(1, n_letters - 4)]} ..."
+    pen.text(margin, 0.33 * view.header, shown, Palette.text, size, "lm")
     pen.text(margin + room, 0.33 * view.header, clock, Palette.text, size, "rm")
     size = _fitting(f"{done}    {now}", margin, room)
     pen.text(margin, 0.75 * view.header, done, Palette.faint_text, size, "lm")
     pen.text(margin + room, 0.75 * view.header, now, Palette.faint_text, size, "rm")
 
 
-def _headline(words: str, text_px: float, width: float, height: float) -> tuple[list[str], float]:
-    """Return a headline as lines that fit into a box of pixels, as large as can be, and their height.
-
-    What has no room in letters that can be read is cut off.
-    """
-    lines, size = [words], 1.35 * text_px
-    while text_width(max(lines, key=len), size) > width or 1.2 * size * len(lines) > height:
-        size = max(LEAST_TEXT_PX, 0.93 * size)
-        letters = max(1, int(0.95 * len(words) * width / text_width(words, size)))
-        lines = textwrap.wrap(words, letters)
-        if size == LEAST_TEXT_PX:
-            n_lines = max(1, int(height / (1.2 * size)))
-            return textwrap.wrap(words, letters, max_lines=n_lines, placeholder=" ..."), size
-    return lines, size
-
-
-def _fitting(words: str, text_px: float, room: float) -> float:
-    """Return a height, at most `text_px`, in which a line fits into `room` pixels."""
-    while text_width(words, text_px) > room and text_px > _SMALLEST_TEXT_PX:
-        text_px -= 1.0
+def _fitting(words: str, text_px: float, room: float, least_px: float = _SMALLEST_TEXT_PX) -> float:
+    """Return a height, at most `text_px`, in which a line fits into `room` pixels, if any down to `least_px` does."""
+    while text_width(words, text_px) > room and text_px > least_px:
+        text_px = max(least_px, text_px - 1.0)
     return text_px

@@ -226,9 +226,9 @@ def policy_spec(
         caches: Which caches its runs have; default those that it states, else those of the world.
 
     Raises:
-        ConfigError: there is no such policy, its file cannot be opened, or there are no such caches.
+        ConfigError: there is no such policy, its file cannot be opened, there are no such caches, or parameters where
+            none can be given.
         TypeError: something that is no policy.
-        ValueError: parameters where none can be given.
     """
     if isinstance(policy, PolicySpec):
         if parameters or caches is not None:
@@ -308,7 +308,7 @@ def _built_here(given: Any, label: str, parameters: Mapping[str, Any], caches: s
     if isinstance(given, type):
         factory: Any = given
     elif parameters:
-        raise ValueError(f"Expected parameters with a name, a file or a class only, got them with {given!r}.")
+        raise ConfigError(f"Expected parameters with a name, a file or a class only, got them with {given!r}.")
     else:
         acts: Any = given
         factory = partial(copy.deepcopy, given) if is_policy else partial(from_callable, acts, name=name)

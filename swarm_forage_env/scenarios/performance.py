@@ -10,18 +10,14 @@ run. The paper proposes such measures beside deliveries in its discussion.
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.scenarios.columns import CONTRIBUTED_COLUMNS, INTERVAL_COLUMNS
-
-if TYPE_CHECKING:
-    import polars as pl
 
 Curve = NDArray[np.float64]
 Columns = Mapping[str, np.ndarray]
@@ -34,10 +30,7 @@ _COUNTS = ("objects", "robots", "caches", "cells", "robot-ticks")
 
 @dataclass(frozen=True, slots=True)
 class Performance:
-    """What P(N, t) is: a column of the record of a run, or a function of the record.
-
-    Example: `Performance("at work", "robots", function=lambda record: record["n_active"])`.
-    """
+    """What P(N, t) is: a column of the record of a run, or what is computed from several."""
 
     name: str
     unit: str = "1"
@@ -49,15 +42,11 @@ class Performance:
     adds_up: bool | None = None
     """Whether a swarm has what its robots have together, so that twice the swarm could have twice of it. False for
     shares and ratios; measures that compare with growth in proportion then have a note. None = as the unit says: counts
-    do; a function does."""
-    function: "Callable[[pl.DataFrame], ArrayLike] | None" = field(default=None, compare=False)
-    """Takes the record of one run, a table with one row per interval (`swarm-forage list columns`). Returns (T,)
-    numbers >= 0, larger is better; turn round what should be small, 1/x with 1/0 = 0. None = `performance_curve` of the
-    name."""
+    do."""
 
     def __post_init__(self) -> None:
         if self.adds_up is None:
-            object.__setattr__(self, "adds_up", self.function is not None or self.unit in _COUNTS)
+            object.__setattr__(self, "adds_up", self.unit in _COUNTS)
 
     @property
     def amount(self) -> str:

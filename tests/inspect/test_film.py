@@ -75,7 +75,7 @@ class Witness(RandomPolicy):
         ({"fps": 51.0}, r"fps of a \.gif to be a number from 1 to 50"),
         ({"seconds": 2000.0}, "at most 1500 frames for a GIF, got 2001"),
         ({"seconds": 0.5}, "seconds .*two pictures.* >= 1"),
-        ({"parameters": {"wander_speed_mps": 0.05}}, "parameters with a policy's name or file only"),
+        ({"parameters": {"wander_speed_mps": 0.05}}, "parameters with a name, a file or a class only"),
     ],
 )
 def test_impossible_recordings_are_refused_before_the_run(tmp_path, options, expected):

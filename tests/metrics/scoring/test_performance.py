@@ -1,11 +1,12 @@
-"""Scores of any performance: recorded, computed, or a function; stored runs are read again, never repeated."""
+"""Scores of any performance, recorded or computed; stored runs are read again, never repeated."""
 
 import dataclasses
 
 import numpy as np
+import polars as pl
 import pytest
 
-from metrics import CurveError, Performance, limit_of, score
+from metrics import CurveError, limit_of, read_curves, score
 from metrics.scoring.limits import share_of_limit
 from swarm_forage_env import World, parse_wrapper, plan_run, run_one
 from swarm_forage_env._internal.fields import ConfigError
@@ -62,6 +63,14 @@ def test_scenario_and_argument_mean_the_same(folder, no_runs):
     assert str(by_scenario).startswith("stochm in warehouse_small with 20 objects, performance n_active, budget custom")
 
 
+def test_what_nobody_recorded_is_a_table_of_curves(folder):
+    """The share of the robots that are at work: a column made of those of stored runs."""
+    frame = pl.concat([record.frame for record in load(folder)])
+    share = frame.with_columns(performance=pl.col("n_active") / pl.col("n_robots"))
+    found = score(curves=read_curves(share), measures=["raw_performance"], progress=False)
+    assert values(found) == {(1, 0): 2.0, (1, 1): 2.0, (4, 0): 2.0, (4, 1): 2.0}
+
+
 def test_units_follow(folder, no_runs):
     def units(**options):
         measures = ["raw_performance", "efficiency"]
@@ -76,8 +85,6 @@ def test_units_follow(folder, no_runs):
     assert units(performance="deaths") == ["robots in 4 s", "robots per robot in 4 s"]
     assert units(performance="n_active") == ["robots summed over intervals", "robots per robot summed over intervals"]
     assert units(performance="task_balance")[0] == "task_balance summed over intervals"
-    own = Performance(function=lambda record: record["n_active"], name="crowd", unit="heads", is_total=True)
-    assert units(performance=own)[0] == "heads in 4 s"
 
 
 def test_shares_are_noted_where_growth_in_proportion_is_the_scale(folder, no_runs):
@@ -89,32 +96,12 @@ def test_shares_are_noted_where_growth_in_proportion_is_the_scale(folder, no_run
         return {row["measure"] for row in found.summary.iter_rows(named=True) if "no sum over robots" in row["remark"]}
 
     assert noted("task_balance") == noted("1/n_active") == {"efficiency", "task_emergence", "scalability"}
-    assert noted("n_active") == noted("collected") == noted(lambda record: record["n_active"]) == set()
-    share = Performance(function=lambda record: record["interference_fraction"], name="lost", adds_up=False)
-    assert noted(share) == {"efficiency", "task_emergence", "scalability"}
-
-
-@pytest.mark.parametrize(
-    ("function", "message"),
-    [
-        (lambda record: record["n_active"] - 2.0, r"performance mine of run \w+ as finite numbers >= 0, got -1\.0 in"),
-        (lambda record: record["n_active"] * np.nan, "got nan in interval 0"),
-        (lambda record: [1.0, np.inf], "got inf in interval 1; let 1/0 be 0"),
-        (lambda record: 3.0, r"one number per interval, shape \(2,\), got shape \(\)"),
-        (lambda record: record["controller"], "as numbers, got"),
-    ],
-    ids=["negative", "nan", "inf", "one number", "text"],
-)
-def test_values_that_are_no_performance_are_told(function, message, folder):
-    with pytest.raises(CurveError, match=message):
-        scored(out=folder, performance=Performance(function=function, name="mine"))
+    assert noted("n_active") == noted("collected") == set()
 
 
 def test_unknown_performances_are_refused_before_anything_runs(no_runs):
     with pytest.raises(ConfigError, match=r"got 'n_carying'\. Did you mean 'n_carrying'\?"):
         scored(performance="n_carying")
-    with pytest.raises(CurveError, match="name of a recorded column, or a function of a record, got 3"):
-        scored(performance=3)
 
 
 PER_1000_S = {"warehouse_small": 125, "warehouse_medium": 1384, "warehouse_dual": 324, "warehouse_quad": 948}
