@@ -306,7 +306,7 @@ def _write_header(
     n_letters = int(len(headline) * wide / text_width(headline, size))
     shown = headline if n_letters >= len(headline) else f"{headline[: max(1, n_letters - 4)]} ..."
     pen.text(margin, 0.33 * view.header, shown, Palette.text, size, "lm")
-    pen.text(margin + room, 0.33 * view.header, clock, Palette.text, size, "rm")
+    pen.text(margin + room, 0.33 * view.header, clock, Palette.text, 1.35 * margin, "rm")
     size = _fitting(f"{done}    {now}", margin, room)
     pen.text(margin, 0.75 * view.header, done, Palette.faint_text, size, "lm")
     pen.text(margin + room, 0.75 * view.header, now, Palette.faint_text, size, "rm")
