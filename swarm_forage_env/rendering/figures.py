@@ -13,7 +13,7 @@ from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import resources
-from itertools import chain
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -152,7 +152,7 @@ def saved_figure(
                 _grow(figure, len(lines) * _LINE * style.font_size)
         yield figure
         _fit_words(figure, style)
-        _spread_numbers(figure)
+        _turn_numbers(figure)
         for file, ending in zip(files, endings, strict=True):
             with replacing(file, ending=ending) as draft:
                 figure.savefig(draft, metadata=_UNDATED[ending])
@@ -193,29 +193,13 @@ def _fit_words(figure: Figure, style: FigureStyle) -> None:
                 words.set_text("\n".join(textwrap.fill(line, most, break_long_words=False) for line in lines))
 
 
-def _spread_numbers(figure: Figure) -> None:
-    """Put words of levels along x that would run into each other on two lines; what still has no room is left out.
-
-    The last one is the most important one: it is where swarms are largest.
-    """
-    from matplotlib.ticker import FixedLocator
-
-    panels = [panel for panel in figure.axes if isinstance(panel.xaxis.get_major_locator(), FixedLocator)]
-    if panels:
-        figure.draw_without_rendering()
-    for panel in panels:
-        labels = panel.get_xticklabels()
-        if any(label.get_rotation() for label in labels):
-            continue
-        words: list[str] = []
-        ends = [math.inf, math.inf]
-        for label in reversed(labels):
-            extent, gap = label.get_window_extent(), 0.3 * label.get_fontsize() * figure.dpi / 72.0
-            line = next((line for line, end in enumerate(ends) if extent.x1 + gap <= end), None)
-            if line is not None:
-                ends[line] = extent.x0
-            words.insert(0, "" if line is None else "\n" * line + label.get_text())
-        panel.set_xticks(panel.get_xticks(), words)
+def _turn_numbers(figure: Figure) -> None:
+    """Turn words of levels along x that would run into each other."""
+    figure.draw_without_rendering()
+    for panel in figure.axes:
+        words = [label.get_window_extent() for label in panel.get_xticklabels() if label.get_text()]
+        if any(one.x1 > other.x0 > one.x0 for one, other in pairwise(words)):
+            panel.tick_params(axis="x", labelrotation=45)
 
 
 @contextmanager

@@ -44,8 +44,6 @@ LONGEST_S = 0.1
 speed."""
 LONGEST_WAIT_S = 0.1
 """A page that asks for its next frame later than this finds the run as if it had asked then: one that sleeps pauses."""
-LONGEST_SUMMARY_S = 1.0
-"""Somebody who ends the command waits no longer for a run that is being started; our choice."""
 FLASH_S = 0.7
 """Seconds of the reader for which the page shows a delivery, as in `draw.js`."""
 MOST_FLASHES = 200
@@ -213,17 +211,11 @@ class PlaySession:
         return f"{self.spec.world.file_name}_{as_file_name(name)}.html", page_of([replay])
 
     def summary(self) -> str:
-        """Return one line about the run so far; it waits for `LONGEST_SUMMARY_S` at most."""
-        # Who compiles a new run keeps the lock for long; to read the old one without it breaks nothing.
-        is_ours = self._lock.acquire(timeout=LONGEST_SUMMARY_S)
-        try:
-            changes = f"; changed by hand: {self.levels.changes_in_words}" if self.levels.changes else ""
-            delivered = self.world.events.counters[Counter.COLLECTED]
-            time_s = self.world.tick * self.spec.scenario.dt_s
-            return f"{policy_label(self.spec.policy)}: {time_s:,.0f} s, {delivered:,} delivered{changes}"
-        finally:
-            if is_ours:
-                self._lock.release()
+        """Return one line about the run so far, without waiting for one that is being started."""
+        changes = f"; changed by hand: {self.levels.changes_in_words}" if self.levels.changes else ""
+        delivered = self.world.events.counters[Counter.COLLECTED]
+        time_s = self.world.tick * self.spec.scenario.dt_s
+        return f"{policy_label(self.spec.policy)}: {time_s:,.0f} s, {delivered:,} delivered{changes}"
 
     def frame(self, asked: Any = None) -> dict[str, Any]:
         """Let the run go on for what is due, and return what is to be seen.
