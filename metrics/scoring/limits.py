@@ -47,8 +47,8 @@ def limit_of(world: WorldLike) -> ForagingLimit:
     chosen = world_of(world)
     objects, caches = chosen.scenario.objects, chosen.scenario.caches
     unknown = [config.name for config in chosen.wrappers]
-    if objects.placement == "power_law":
-        unknown.append("power-law clusters, in which objects appear again where others were taken")
+    if objects.is_drawn:
+        unknown.append(f"placement {objects.placement!r}, whose regions differ from run to run")
     unknown += ["objects that move (walk_probability)"] * (objects.walk_probability > 0.0)
     unknown += [f"{caches} caches"] * (caches != "none")
     if unknown:

@@ -202,7 +202,7 @@ def curves_in_worlds(
                 rates=rates_of(world),
                 n_planned=n_planned,
                 horizon_s=scenario.horizon_s,
-                maps_differ=world.scenario.objects.placement == "power_law",
+                maps_differ=world.scenario.objects.is_drawn,
             )
             for world, (seeds, columns) in runs
         ),

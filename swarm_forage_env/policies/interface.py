@@ -16,7 +16,7 @@ from gymnasium import spaces
 from msgspec import Meta
 
 from swarm_forage_env._internal.compiling import Calls
-from swarm_forage_env._internal.fields import Checked, ConfigError, Count, Positive, Whole, read
+from swarm_forage_env._internal.fields import Amount, Checked, ConfigError, Count, Positive, Whole, read
 from swarm_forage_env._internal.held import hold
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.contract.kernel_policy import Driver
@@ -94,6 +94,8 @@ class InterfaceConfig(Checked):
     hears nothing. None: as for `neighbours_seen`. Messages need continuous actions."""
     site_memory: bool = False
     """Two places that a robot remembers, see `policies.kernels.learner`: eight more columns."""
+    hearing_m: Amount = 0.0
+    """Distance within which robots tell each other where they picked up last. 0: they do not."""
     frame_decisions: Count = 0
     """Decisions for which each robot sees the world in a frame of its own, turned and mirrored in one of eight ways,
     before it takes another, see `policies.kernels.frames`. 0: all see the world as it is."""
@@ -114,6 +116,8 @@ class InterfaceConfig(Checked):
                 f"Expected interface.frame_decisions of 0 beside extra_observation, because only its author knows what "
                 f"a turn does to it, got {self.frame_decisions}; give interface={{'frame_decisions': 0}}."
             )
+        if self.hearing_m and not self.site_memory:
+            raise ConfigError("Expected site_memory for hearing_m: robots tell each other what they remember.")
         if self.site_memory and {"position", "heading"} & {*self.without}:
             raise ConfigError("Expected position and heading for site_memory, which needs both; got interface without.")
 
@@ -212,6 +216,7 @@ class LearnerInterface:
             cargo_starts=(start["carrying"], start["los_cell"], start["los_object"]),
             grip_starts=(start["ground"], start["carrying"], start["los_object"]),
             half=(float(half_x), float(half_y)),
+            hearing_m=float(config.hearing_m),
             sites=new_site_memory(spec.n_robots),
             frames=frames_of(config.frame_decisions, self.layout, spec.n_robots),
             wheels=_wheels_of(spec),
@@ -292,10 +297,10 @@ class LearnerInterface:
         n_robots = len(self._commands)
         if (self.translation.has_memory or self.config.frame_decisions) and len(obs) != n_robots:
             raise ValueError(f"Expected observations of {n_robots} robots, each with its row, got {len(obs)} rows.")
-        if decision is None and self.config.frame_decisions:
+        if decision is None and (self.config.frame_decisions or self.config.hearing_m):
             raise ValueError(
-                "Expected the number of decisions before this one, which says what frames robots have, got none; call "
-                "observe(observations, decision=...)."
+                "Expected the number of decisions before this one, which says what frames robots have and how old news "
+                "are, got none; call observe(observations, decision=...)."
             )
         if out is None:
             out = np.empty((len(obs), self.layout.size), np.float32)

@@ -207,7 +207,7 @@ def _ground(scenario: ScenarioConfig, size_px: int) -> "Image.Image":
     pen.box(outer, Palette.wall)
     lows = max(inner[0], outer[0] + line), max(inner[1], outer[1] + line)
     pen.box((*lows, min(inner[2], outer[2] - line), min(inner[3], outer[3] - line)), Palette.floor)
-    if scenario.objects.placement != "power_law":  # its clusters are drawn anew in each run
+    if not scenario.objects.is_drawn:
         for left, low, right, high in scenario.source_cells:
             box = view.box((CELL_M * left, CELL_M * low, CELL_M * right, CELL_M * high))
             pen.box(box, Palette.source, SOURCE_OPACITY)

@@ -133,7 +133,7 @@ def arena_view(scenario: ScenarioConfig, size_px: int = 900) -> View:
 def legend_rows(scenario: ScenarioConfig, width: int, scale: float) -> list[list[tuple[str, float, float]]]:
     """Flow the legend into rows of (name, x, y of the middle below the arena) that fit `width` pixels."""
     there = {
-        "source": scenario.objects.placement != "power_law",
+        "source": not scenario.objects.is_drawn,
         "obstacle": bool(scenario.arena.obstacles),
         "cache": scenario.caches != "none",
     }

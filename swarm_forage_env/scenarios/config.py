@@ -239,6 +239,11 @@ class ObjectConfig(Checked):
     drop_ticks: HandlingTicks = 1
     """The same for a drop in the nest, into a cache or at a cache site. Letting go over open floor acts at once."""
 
+    @property
+    def is_drawn(self) -> bool:
+        """Whether the regions with objects are drawn in each run."""
+        return self.placement in ("power_law", "heap")
+
     def check(self) -> None:
         """Refuse an unknown placement, and positions that it does not need or lacks."""
         one_of("objects.placement", self.placement, (*PLACEMENTS, POSITIONS))
@@ -347,6 +352,11 @@ class ScenarioConfig(Checked):
         if self.caches == "dynamic":
             self._check_room_for_caches()
 
+    @property
+    def n_in_heap(self) -> int:
+        """Objects of a new heap, with placement "heap": the others wait, one for each robot that has one under way."""
+        return self.objects.n_objects - self.robots.n_robots
+
     def _check_room_for_robots(self) -> None:
         margin, radius, n_robots = self.robots.start_margin_m, self.robots.radius_m, self.robots.n_robots
         width, height = self.arena.width_m - 2 * margin, self.arena.height_m - 2 * margin
@@ -368,8 +378,13 @@ class ScenarioConfig(Checked):
         )
 
     def _check_room_for_objects(self) -> None:
-        if self.objects.placement == "power_law":
-            return  # clusters are drawn at reset, which raises when they cannot hold the objects
+        _require(
+            self.objects.placement != "heap" or self.n_in_heap > 0,
+            f"Expected more objects than robots for a heap, because each robot may have one under way, got "
+            f"{self.objects.n_objects} for {self.robots.n_robots}; ask for more objects.",
+        )
+        if self.objects.is_drawn:
+            return  # at reset, which raises where there is no room for them
         taken = (*self.arena.all_nest_cells, *self.obstacle_cells)
         for place, cell in zip(self.objects.object_positions_m, self._cells_of_positions, strict=True):
             _require(

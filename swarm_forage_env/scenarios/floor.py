@@ -26,7 +26,7 @@ WHEEL_SCALE_MPS = 0.20
 
 Box: TypeAlias = tuple[int, int, int, int]
 
-PLACEMENTS = ("single_source", "dual_source", "quad_source", "random", "power_law")
+PLACEMENTS = ("single_source", "dual_source", "quad_source", "random", "power_law", "heap")
 POSITIONS = "positions"
 """The placement with places of one's own instead of regions by rule."""
 
@@ -39,7 +39,7 @@ def distributable_box(nx: int, ny: int) -> Box:
 def source_boxes(placement: str, nx: int, ny: int) -> tuple[Box, ...]:
     """Return the source regions of a placement on an nx x ny grid; `POSITIONS` has those of its scenario instead.
 
-    Power-law clusters are drawn at reset; for them the answer is the whole distributable range.
+    Power-law clusters and heaps are drawn later; for them the answer is the whole distributable range.
     The bands are 0.75/0.85 and 0.25/0.85 of the upper distributable index, as in the paper's study; like there, the
     regions end one cell before the distributable range does.
     """
@@ -55,6 +55,7 @@ def source_boxes(placement: str, nx: int, ny: int) -> tuple[Box, ...]:
         "quad_source": (right, left, bottom, top),
         "random": ((x_low, y_low, x_high, y_high),),
         "power_law": ((x_low, y_low, x_end, y_end),),
+        "heap": ((x_low, y_low, x_end, y_end),),
     }
     return boxes[placement]
 

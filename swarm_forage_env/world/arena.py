@@ -22,6 +22,7 @@ from swarm_forage_env.world.caches import create_dynamic_caches, create_static_c
 from swarm_forage_env.world.kernels import tick as kernels
 from swarm_forage_env.world.kernels.disturbances import Disturbances
 from swarm_forage_env.world.kernels.interact import drop_cargo
+from swarm_forage_env.world.kernels.placement import count_objects
 from swarm_forage_env.world.kernels.tick import DONE, NO_ROOM, TO_PLACE
 from swarm_forage_env.world.neighbourhood import Neighbourhood
 from swarm_forage_env.world.placement import (
@@ -29,6 +30,7 @@ from swarm_forage_env.world.placement import (
     draw_source,
     draw_start_poses,
     give_back,
+    move_heap,
     new_draws,
     place_all,
     place_objects,
@@ -140,6 +142,8 @@ class ForagingArena:
             create_static_caches(config, self.objects, self.caches, self.events, supply=ObjectStatus.WAITING)
         source = draw_source(config, self.objects.floor, self._placement_rng)
         place_all(self.objects, source, config.arena.distributable_cells, self._placement_rng)
+        if config.objects.placement == "heap":
+            source.capacity[0] = 0  # what is delivered waits for the next
         if self._static_caches and not clustered:
             create_static_caches(config, self.objects, self.caches, self.events)
         return source
@@ -349,8 +353,14 @@ class ForagingArena:
         rows = listed(self._requests.displaced)
         if len(rows):
             area, draws = self.config.arena.distributable_cells, self._arrays.placement_draws
+            source, floor = self._arrays.source, self.objects.floor
+            is_heap = self.config.objects.placement == "heap"
             give_back(draws, self._placement_rng)
-            place_objects(rows, self.objects, self._arrays.source, area, self._placement_rng)
+            if is_heap and count_objects(floor, *source.regions[0]) == 0:
+                move_heap(self.config, floor, source, self._placement_rng)
+            place_objects(rows, self.objects, source, area, self._placement_rng)
+            if is_heap:
+                source.capacity[0] = 0  # what is delivered waits for the next
             draw_ahead(draws, self._placement_rng)
 
     def _restore_caches(self, tasks: CodeArray | None) -> None:

@@ -3,6 +3,7 @@
 Every object lies on its own free cell: inside the distributable box, empty, neither nest, obstacle nor cache.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.contract.codes import ObjectStatus
+from swarm_forage_env.contract.codes import CELL_EMPTY, ObjectStatus
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M, Box, overlap_cells, square_box
@@ -26,7 +27,9 @@ _AHEAD = 64
 """Objects for which random numbers are drawn ahead of time."""
 
 _TRIALS = 1000
-"""Redraws of start positions before giving up, as in the study."""
+"""Redraws of start positions, and of a heap's place, before giving up, as in the study."""
+FAR_SHARE = 0.3
+"""Least distance of a heap from a nest, between their middles, as a share of the arena's shorter side (our choice)."""
 
 
 def draw_start_poses(config: ScenarioConfig, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
@@ -70,7 +73,7 @@ def _overlaps_of_moved(position: FloatArray, is_moved: BoolArray, tree: KDTree, 
 
 
 def draw_source(config: ScenarioConfig, floor: IntArray, rng: np.random.Generator) -> Source:
-    """Return the source regions of a run; only power-law clusters are random.
+    """Return the source regions of a run; only those of power-law clusters and heaps are random.
 
     Args:
         config: The scenario.
@@ -78,8 +81,12 @@ def draw_source(config: ScenarioConfig, floor: IntArray, rng: np.random.Generato
         rng: Generator of the placement stream.
 
     Raises:
-        ConfigError: the clusters drawn hold fewer objects than the scenario has, or find no room.
+        ConfigError: the clusters drawn hold fewer objects than the scenario has, or clusters or a heap find no room.
     """
+    if config.objects.placement == "heap":
+        source = Source(np.zeros((1, 4), np.int32), np.zeros(1, np.int32), np.array([0, 1], np.int32))
+        move_heap(config, floor, source, rng)
+        return source
     if config.objects.placement != "power_law":
         regions = np.array(config.source_cells, np.int32)
         n_regions = len(regions)
@@ -96,6 +103,36 @@ def draw_source(config: ScenarioConfig, floor: IntArray, rng: np.random.Generato
     regions, capacity = regions[order], capacity[order].astype(np.int32)
     group_start = np.concatenate(([0], np.flatnonzero(np.diff(capacity)) + 1, [len(capacity)]))
     return Source(regions, capacity, group_start.astype(np.int32))
+
+
+def move_heap(config: ScenarioConfig, floor: IntArray, source: Source, rng: np.random.Generator) -> None:
+    """Open a heap somewhere else: a square, just large enough, on empty floor and at least `FAR_SHARE` from every nest.
+
+    Args:
+        config: The scenario.
+        floor: (ny, nx) floor codes.
+        source: Of one region; edited in place. Objects that are placed go there until its capacity is zero.
+        rng: Generator of the placement stream.
+
+    Raises:
+        ConfigError: no such square was found.
+    """
+    side = math.ceil(math.sqrt(config.n_in_heap))
+    x_low, y_low, x_end, y_end = config.arena.distributable_cells
+    far_m = FAR_SHARE * min(config.arena.width_m, config.arena.height_m)
+    last = max(x_low, x_end - side), max(y_low, y_end - side)
+    for x, y in rng.integers((x_low, y_low), last, (_TRIALS, 2), endpoint=True).tolist():
+        middle = CELL_M * (x + side / 2), CELL_M * (y + side / 2)
+        is_far = min(math.dist(middle, nest) for nest in config.arena.nest_centres_m) >= far_m
+        is_inside = x + side <= x_end and y + side <= y_end
+        if is_far and is_inside and np.all(floor[y : y + side, x : x + side] == CELL_EMPTY):
+            source.regions[0] = x, y, x + side, y + side
+            source.capacity[0] = config.n_in_heap
+            return
+    raise ConfigError(
+        f"Found no room for a heap of {config.n_in_heap} objects, {far_m:.1f} m from a nest, in {_TRIALS} trials; ask "
+        "for fewer objects or a larger arena."
+    )
 
 
 def place_objects(
@@ -149,7 +186,7 @@ def give_back(draws: PlacementDraws, rng: np.random.Generator) -> None:
 
 
 def place_all(objects: ObjectState, source: Source, distributable_box: Box, rng: np.random.Generator) -> None:
-    """Place every waiting object at the start of a run.
+    """Place every waiting object at the start of a run, or as many as the source is made for.
 
     Args:
         objects: Edited in place.
@@ -161,9 +198,10 @@ def place_all(objects: ObjectState, source: Source, distributable_box: Box, rng:
         ConfigError: the source has too few free cells; the message says how many objects fit.
     """
     queue = listed(objects.waiting).copy()
+    n_wanted = min(len(queue), int(source.capacity.sum(dtype=np.int64)))
     n_placed = _place_until_full(queue, objects, source, distributable_box, rng)
     make_list(objects.waiting, queue[n_placed:])
-    if n_placed < len(queue):
+    if n_placed < n_wanted:
         n_objects = len(objects.status)
         raise ConfigError(
             f"Expected at most {n_objects - len(queue) + n_placed} objects (one per free cell of the source, up to its "

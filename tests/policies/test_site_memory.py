@@ -4,6 +4,7 @@ import copy
 import pickle
 
 import numpy as np
+import pytest
 
 from swarm_forage_env import RunSpec, load_policy, run_policy
 from swarm_forage_env._internal.rng import Stream, stream_rng
@@ -16,7 +17,7 @@ from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.plans import plan_arena
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.world import World
-from tests.reference.learner import RobotSites
+from tests.reference.learner import RobotSites, tell
 from tests.support.stage import cell_centre, lay, load, put, tidy_world
 
 INTERFACE = {"observation": "compact", "actions": "discrete", "automatic_gripper": True, "decision_ticks": 5,
@@ -39,12 +40,13 @@ def seen(interface: LearnerInterface, env: ForageEnv, name: str) -> np.ndarray:
     return interface.observe(env.arena.observe())[0, interface.layout[name]]
 
 
-def test_sites_match_their_twin_along_a_run():
+@pytest.mark.parametrize("hearing_m", [0.0, 3.0])
+def test_sites_match_their_twin_along_a_run(hearing_m):
     env = ForageEnv(scenario("search_and_rescue", n_robots=30, side_m=16.0, physics="compiled"))
     stack = parse_wrapper("sensor_noise:sigma=0.02").wrap(env)
     policy = load_policy("dpo")
     policy.reset(env.swarm_spec, stream_rng(0, Stream.POLICY))
-    interface = remembering(env, observation="compact")
+    interface = remembering(env, observation="compact", hearing_m=hearing_m)
     twins = [RobotSites() for _ in range(30)]
     columns = slice(interface.layout["pickup_site"].start, interface.layout["sighting_site"].stop)
     obs, columns_used = stack.reset_batch(3), np.zeros(8)
@@ -54,11 +56,16 @@ def test_sites_match_their_twin_along_a_run():
             away = np.arange(30) % 7 == 3
             env.set_population(active=~away, present=~away)
         if tick % 5 == 0:
-            rows = interface.observe(obs)[:, columns]
-            np.testing.assert_allclose(
-                rows, [twin.look(row, env.layout) for twin, row in zip(twins, obs, strict=True)], atol=1e-5
-            )
-            np.testing.assert_array_equal(interface.observe(obs)[:, columns], rows, "looking twice changes nothing")
+            decision = tick // 5
+            rows = interface.observe(obs, decision=decision)[:, columns]
+            for twin, row in zip(twins, obs, strict=True):
+                twin.look(row, env.layout, decision)
+            tell(twins, hearing_m)
+            expected = [twin.columns(row, env.layout) for twin, row in zip(twins, obs, strict=True)]
+            np.testing.assert_allclose(rows, expected, atol=1e-5)
+            if not hearing_m:  # news travel from robot to robot, one way for each look
+                again = interface.observe(obs, decision=decision)[:, columns]
+                np.testing.assert_array_equal(again, rows, "looking twice changes nothing")
             columns_used += np.abs(rows).sum(axis=0)
     assert columns_used.all(), "every column is put to the test"
     interface.forget()
@@ -83,12 +90,35 @@ def test_a_robot_remembers_where_it_picked_up_until_it_comes_back_and_finds_noth
     assert seen(interface, env, "pickup_site")[2] == 0.0
 
 
+def test_robots_in_earshot_hear_where_an_object_was():
+    env = tidy_world(n_robots=3)
+    interface = remembering(env, observation="compact", hearing_m=5.0)
+
+    def known(decision: int) -> list[bool]:
+        interface.observe(env.arena.observe(), decision=decision)
+        return remembered(interface).is_known[:, 0].tolist()
+
+    for robot, metres in enumerate((0.0, 4.0, 8.5)):
+        put(env, robot, PLACE[0] - metres, PLACE[1])
+    assert known(1) == [False, False, False]
+    load(env, 0, 0)
+    assert known(2) == [True, True, False], "4.5 m from one who does not know it yet"
+    assert known(3) == [True, True, True], "who tells it now"
+    np.testing.assert_allclose(remembered(interface).place[2], remembered(interface).place[0])
+    env.swarm.carried_object[0] = -1
+    put(env, 0, *PLACE)
+    assert known(4) == [False, True, True]
+    assert known(5) == [False, True, True], "what it found empty itself counts more than older news"
+    load(env, 1, 1)
+    assert known(6) == [True, True, True]
+
+
 def test_a_new_run_begins_without_memory_and_a_copy_has_it():
     plan = plan_arena("warehouse_small", n_robots=2, physics="compiled", interface=INTERFACE)
     arena = LearnerArena(plan)
     sites = slice(arena.interface.layout["pickup_site"].start, arena.interface.layout["sighting_site"].stop)
     arena.reset(0)
-    for part, value in zip(arena.interface.translation.sites, (3.0, True, True), strict=True):
+    for part, value in zip(arena.interface.translation.sites, (3.0, True, True, 2, 3.0), strict=True):
         part[...] = value
     other, shown = copy.deepcopy(arena), remembered(arena.interface)
     arena.reset()

@@ -1,5 +1,6 @@
 """Slow twins of what a learner sees and does: compact view, memory of sites, commands, frames of robots' own."""
 
+import copy
 import math
 
 import numpy as np
@@ -84,34 +85,46 @@ class RobotSites:
         self.pickup: tuple[float, float] | None = None
         self.sighting: tuple[float, float] | None = None
         self.carried = False
+        self.since = 0
+        self.here: tuple[float, float] | None = None
 
-    def look(self, row: np.ndarray, layout: ObservationLayout) -> list[float]:
-        """Bring the memory up to date with a row of the environment, and return the eight columns."""
+    def look(self, row: np.ndarray, layout: ObservationLayout, decision: int) -> None:
+        """Bring the memory up to date with a row of the environment."""
         part = {name: row[layout[name]] for name in layout.names}
-        cos, sin = (float(value) for value in part["heading"])
-        if cos == sin == 0.0:
+        if not part["heading"].any():
             self.__init__()
-            return [0.0] * 8
+            return
         half_x, half_y = layout.part("position").scale
-        here = float(part["position"][0]) * half_x, float(part["position"][1]) * half_y
+        self.here = here = float(part["position"][0]) * half_x, float(part["position"][1]) * half_y
         carries = part["carrying"][0] == 1.0
         seen = self._nearest(part, here, (half_x, half_y))
         if carries and not self.carried:
-            self.pickup = here
+            self.pickup, self.since = here, decision
             if self._is_near(self.sighting, here):
                 self.sighting = None
         if carries and seen is not None:
             self.sighting = seen
         if not carries and seen is None:
-            self.pickup = None if self._is_near(self.pickup, here) else self.pickup
+            if self._is_near(self.pickup, here):
+                self.pickup, self.since = None, decision
             self.sighting = None if self._is_near(self.sighting, here) else self.sighting
         self.carried = carries
+
+    def hear(self, others: "list[RobotSites]") -> None:
+        """Learn of others where the latest object was."""
+        latest = max((other for other in others if other.pickup), key=lambda other: other.since, default=self)
+        if latest.since > self.since:
+            self.pickup, self.since = latest.pickup, latest.since
+
+    def columns(self, row: np.ndarray, layout: ObservationLayout) -> list[float]:
+        """Return the eight columns."""
+        cos, sin = (float(value) for value in row[layout["heading"]])
         columns = []
         for site in (self.pickup, self.sighting):
             if site is None:
                 columns += [0.0] * 4
             else:
-                x, y = site[0] - here[0], site[1] - here[1]
+                x, y = site[0] - self.here[0], site[1] - self.here[1]
                 columns += [*direction(x, y, cos, sin), min(1.0, math.hypot(x, y) / 20.0)]
         return columns
 
@@ -130,6 +143,14 @@ class RobotSites:
         closest = min(math.hypot(*there) for there in found)
         x, y = next(there for there in found if there[0] ** 2 + there[1] ** 2 < closest**2 + 1e-6)
         return here[0] + x, here[1] + y
+
+
+def tell(twins: list[RobotSites], hearing_m: float) -> None:
+    """Let all robots tell at once, each to those within `hearing_m`."""
+    said = copy.deepcopy(twins)
+    for twin in twins:
+        if twin.here is not None:
+            twin.hear([other for other in said if other.here and math.dist(other.here, twin.here) <= hearing_m])
 
 
 WHEELS = {

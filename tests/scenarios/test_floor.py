@@ -35,6 +35,7 @@ def test_distributable_cells_are_15_to_85_percent_with_both_ends(nx, ny, box):
         ("random", (240, 240), ((36, 36, 204, 204),)),  # 7.2 .. 40.8 m on both axes
         ("quad_source", (240, 240), ((180, 36, 204, 204), (36, 36, 60, 204), (36, 36, 204, 60), (36, 180, 204, 204))),
         ("power_law", (80, 80), ((12, 12, 69, 69),)),
+        ("heap", (80, 80), ((12, 12, 69, 69),)),
     ],
 )
 def test_sources_by_hand(placement, size, boxes):

@@ -1,6 +1,7 @@
 """Where objects, clusters, static caches and robots are placed."""
 
 import itertools
+import math
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, CELL_OBJECT, ObjectStatus
 from swarm_forage_env.contract.types import IntArray
+from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.floor import Box, overlap_cells
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, SEARCH_AND_RESCUE_OBJECTS, scenario
@@ -146,6 +148,45 @@ def test_a_region_at_capacity_is_skipped_dropped_objects_included():
     place_objects([4], objects, source, (0, 0, 12, 6), np.random.default_rng(0))
     assert count_objects(objects.floor, 0, 0, 5, 5) == 3
     assert waiting(objects) == []
+
+
+def test_a_heap_lies_far_from_the_nest_and_moves_on_when_it_is_empty():
+    fields = {"n_robots": 3, "n_objects": 12, "width_m": 20.0, "height_m": 16.0, "nest_size_m": (2.0, 2.0)}
+    env = ForageEnv(scenario("warehouse_small", placement="heap", nest_centre_m=(10.0, 8.0), **fields))
+    env.reset_batch(seed=4)
+    objects, heaps = env.objects, [tuple(env.arena._arrays.source.regions[0].tolist())]
+    for _ in range(40):
+        row = int(np.flatnonzero(objects.status == ObjectStatus.FREE)[0])
+        lift(objects, row)
+        deliver(env, row)
+        assert_consistent(objects)
+        heap = tuple(env.arena._arrays.source.regions[0].tolist())
+        lying = objects.cell[objects.status == ObjectStatus.FREE]
+        assert np.all((lying >= heap[:2]) & (lying < heap[2:])), "objects lie in the heap only"
+        assert (len(lying) == 9) == (heap != heaps[-1]), "a new heap has all that are not under way, others only fewer"
+        heaps += [heap] * (heap != heaps[-1])
+    assert len(heaps) == 5
+    for x_low, y_low, x_high, y_high in heaps:
+        assert (x_high - x_low, y_high - y_low) == (3, 3)
+        assert math.dist(((x_low + x_high) / 10, (y_low + y_high) / 10), (10.0, 8.0)) >= 0.3 * 16.0
+
+
+def deliver(env: ForageEnv, row: int) -> None:
+    """Do what a tick does in the end with an object that was delivered."""
+    make_list(env.arena._requests.displaced, [row])
+    env.arena._replace_displaced()
+
+
+@pytest.mark.parametrize(
+    ("fields", "told"),
+    [
+        ({"n_objects": 50}, "more objects than robots"),
+        ({"n_objects": 5000}, "Found no room for a heap of 4950 objects"),
+    ],
+)
+def test_impossible_heaps_are_refused(fields, told):
+    with pytest.raises(ConfigError, match=told):
+        ForageEnv(scenario("warehouse_small", n_robots=50, placement="heap", **fields)).reset(seed=0)
 
 
 @pytest.mark.parametrize("capacity", [UNLIMITED, 13], ids=["room for all", "too few places"])

@@ -141,7 +141,7 @@ def for_page(scenario: ScenarioConfig) -> dict[str, Any]:
     arena = scenario.arena
     column = scenario.performance if scenario.performance in TOTALS else "collected"
     sources: Iterable[tuple[int, ...]] = ()
-    if scenario.objects.placement != "power_law":  # its clusters differ from run to run
+    if not scenario.objects.is_drawn:
         sources = scenario.source_cells
     return {
         "tasks": [_TASKS.get(task, task.name.lower()) for task in Task],

@@ -177,12 +177,20 @@ class SiteMemory(NamedTuple):
     """(N, N_SITES)."""
     carried: BoolArray
     """(N,) whether the robot carried an object when it looked last."""
+    since: IntArray
+    """(N,) decision in which somebody picked up there, or the robot found the place empty."""
+    told: FloatArray
+    """(N, 3) what each robot tells: x, y and `since`, 0 if it knows of no place; room to work in."""
 
 
 def new_site_memory(n_robots: int) -> SiteMemory:
     """Return memories without any site."""
     return SiteMemory(
-        np.zeros((n_robots, N_SITES, 2)), np.zeros((n_robots, N_SITES), np.bool_), np.zeros(n_robots, np.bool_)
+        np.zeros((n_robots, N_SITES, 2)),
+        np.zeros((n_robots, N_SITES), np.bool_),
+        np.zeros(n_robots, np.bool_),
+        np.zeros(n_robots, np.int32),
+        np.zeros((n_robots, 3)),
     )
 
 
@@ -213,6 +221,8 @@ class Translation(NamedTuple):
     """See `automatic_grip`."""
     half: tuple[float, float]
     """Half the arena, m."""
+    hearing_m: float
+    """Distance within which robots tell each other of pickup sites; 0 = they do not."""
     sites: SiteMemory
     frames: Frames
     wheels: ActionArray
@@ -233,6 +243,7 @@ def remember_sites(
     pose_starts: tuple[int, int],
     cargo_starts: tuple[int, int, int],
     half: tuple[float, float],
+    decision: int,
     memory: SiteMemory,
 ) -> None:
     """Bring the memories up to date with observations (N, D); twice with the same ones is as good as once.
@@ -250,6 +261,7 @@ def remember_sites(
         if row[heading] == 0.0 and row[heading + 1] == 0.0:
             is_known[:] = False
             memory.carried[i] = False
+            memory.since[i] = 0
             continue
         x = row[position] * half_x
         y = row[position + 1] * half_y
@@ -260,6 +272,7 @@ def remember_sites(
             place[PICKUP, 0] = x
             place[PICKUP, 1] = y
             is_known[PICKUP] = True
+            memory.since[i] = decision
             if is_near(place[SIGHTING], x, y):
                 is_known[SIGHTING] = False  # it was this object
         memory.carried[i] = carries
@@ -270,7 +283,37 @@ def remember_sites(
         if not carries and not sees:
             for k in range(N_SITES):
                 if is_near(place[k], x, y):
+                    if k == PICKUP and is_known[k]:
+                        memory.since[i] = decision
                     is_known[k] = False
+
+
+@kernel
+def tell_sites(
+    obs: ObsArray, pose_starts: tuple[int, int], half: tuple[float, float], hearing_m: float, memory: SiteMemory
+) -> None:
+    """Let robots hear of the pickup sites of others within `hearing_m`, as far as they know where they are.
+
+    All tell at once; the latest pick-up counts. What a robot has found empty since, it does not believe again.
+    `pose_starts` and `half` as in `remember_sites`.
+    """
+    position, heading = pose_starts
+    told = memory.told
+    for i in range(obs.shape[0]):
+        told[i, 0] = memory.place[i, PICKUP, 0]
+        told[i, 1] = memory.place[i, PICKUP, 1]
+        told[i, 2] = memory.since[i] if memory.is_known[i, PICKUP] else 0.0
+    for i in range(obs.shape[0]):
+        if obs[i, heading] == 0.0 and obs[i, heading + 1] == 0.0:
+            continue
+        for j in range(obs.shape[0]):
+            x = (obs[j, position] - obs[i, position]) * half[0]
+            y = (obs[j, position + 1] - obs[i, position + 1]) * half[1]
+            if told[j, 2] > memory.since[i] and x * x + y * y <= hearing_m * hearing_m:
+                memory.place[i, PICKUP, 0] = told[j, 0]
+                memory.place[i, PICKUP, 1] = told[j, 1]
+                memory.is_known[i, PICKUP] = True
+                memory.since[i] = int(told[j, 2])
 
 
 @kernel

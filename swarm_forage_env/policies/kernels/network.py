@@ -22,6 +22,7 @@ from swarm_forage_env.policies.kernels.learner import (
     numbered_actions,
     remember_sites,
     show_sites,
+    tell_sites,
 )
 from swarm_forage_env.policies.kernels.products import LANES, ROWS, add_products
 
@@ -181,7 +182,9 @@ def see(obs: ObsArray, decision: int, t: Translation, view: ObsArray) -> None:
                 view[i, c] = obs[i, c]
     at = t.n_shown
     if t.has_memory:
-        remember_sites(obs, t.pose_starts, t.cargo_starts, t.half, t.sites)
+        remember_sites(obs, t.pose_starts, t.cargo_starts, t.half, decision, t.sites)
+        if t.hearing_m > 0.0:
+            tell_sites(obs, t.pose_starts, t.half, t.hearing_m, t.sites)
         show_sites(obs, t.pose_starts, t.half, t.sites, view[:, at:])
         at += N_SITES * SITE_COLUMNS
     for i in range(obs.shape[0]):
