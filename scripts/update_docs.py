@@ -26,9 +26,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import polars as pl
+from scipy.stats import ttest_ind  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
+
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from metrics.benchmark import board_of, read_entry
+from metrics.statistics import aggregate
 from scripts.results_numbers import results_fields
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -168,7 +172,26 @@ def compare(printed: str, stored: dict[str, Any]) -> int:
 def known(store: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
     """Return the store with the fields of docs/results, and the table of the benchmark."""
     board = board_of([read_entry(file) for file in sorted((ROOT / "docs/benchmark").glob("*.json"))])
-    return {**store, "results": results_fields(RESULTS), "benchmark": {"board": board.markdown().strip()}}
+    return {
+        **store,
+        "results": results_fields(RESULTS),
+        "benchmark": {"board": board.markdown().strip()},
+        "talk": talk_fields(),
+    }
+
+
+def talk_fields() -> dict[str, str]:
+    """Return what swarms deliver that talk and that do not, and what it brings, with 95 % intervals over trainings."""
+    runs = pl.read_csv(ROOT / "docs/benchmark/talk.csv")
+    trainings = runs.group_by("swarm", "training", maintain_order=True).agg(pl.col("per_1000_s").mean())
+    talk, silent = (trainings.filter(swarm=name)["per_1000_s"].to_numpy() for name in ("talk", "silent"))
+    limits = ttest_ind(talk, silent, equal_var=False).confidence_interval()
+    shares = [f"{100 * value / silent.mean():.0f}" for value in (talk.mean() - silent.mean(), limits.low, limits.high)]
+    means = {name: aggregate(values) for name, values in (("talk", talk), ("silent", silent))}
+    return {
+        **{name: f"{mean.mean:.1f} ({mean.lower:.1f} to {mean.upper:.1f})" for name, mean in means.items()},
+        "gain": "{} % ({} to {} %)".format(*shares),
+    }
 
 
 def written(text: str, store: dict[str, dict[str, Any]]) -> str:
