@@ -12,7 +12,8 @@ import html
 import json
 import re
 import sys
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from swarm_forage_env import RunSpec, plan_run, scenario
 from swarm_forage_env.inspect.film import record_run
 from swarm_forage_env.inspect.replay.capture import record_replay
 from swarm_forage_env.inspect.replay.files import write_replays
+from swarm_forage_env.policies.registry import policy_label
 from swarm_forage_env.rendering.pages import build_replay_page
 from swarm_forage_env.scenarios.config import ScenarioConfig
 
@@ -44,10 +46,12 @@ class Exhibit:
     """Disturbance of the last run; the others have none."""
     frame_s: float = FRAME_S
     horizon_s: float = HORIZON_S
+    fields: Mapping[str, Any] = field(default_factory=dict)
+    """Of the scenario."""
 
     def specs(self) -> list[RunSpec]:
         """The runs, with the same seed."""
-        world = scenario(self.scenario, horizon_s=self.horizon_s, physics="compiled")
+        world = scenario(self.scenario, horizon_s=self.horizon_s, physics="compiled", **self.fields)
         last = len(self.policies) - 1
         return [
             plan_run(world, name, seed=SEED, wrappers=[self.wrapper] if self.wrapper and index == last else [])
@@ -102,6 +106,24 @@ EXHIBITS = (
         "The trained network beside a yardstick that reads the world: each robot knows the nearest object left. "
         "Robots pass each other on the right.",
         frame_s=2.0,
+    ),
+    Exhibit(
+        "talk",
+        "warehouse_small",
+        (str(FOLDER / "silent.npz"), str(FOLDER / "talk.npz")),
+        "One rich heap at a time, which moves on when it is empty. In the second run, robots tell each other where "
+        "they picked up last: one finds the heap, and the others turn to it.",
+        frame_s=3.0,
+        horizon_s=3000.0,
+        fields={
+            "n_robots": 24,
+            "n_objects": 64,
+            "width_m": 32.0,
+            "height_m": 32.0,
+            "nest_centre_m": (16.0, 16.0),
+            "nest_size_m": (4.0, 4.0),
+            "placement": "heap",
+        },
     ),
     Exhibit(
         "cpfa",
@@ -184,7 +206,7 @@ FILMS = (
     Film("film_medium", "objects anywhere", "warehouse_medium", seconds=240.0),
     Film("film_quad", "four sources", "warehouse_quad", seconds=240.0),
     Film("film_search_and_rescue", "search and rescue", "search_and_rescue"),
-    Film("film_dual", "two sources", "warehouse_dual", 1),
+    Film("film_talk", "robots that tell each other", "talk", seconds=450.0),
 )
 WALLS = ((14.0, 0.2, 14.4, 6.0), (14.0, 10.0, 14.4, 15.8), (20.0, 7.0, 21.0, 9.0))
 PICTURES: dict[str, tuple[ScenarioConfig, str, dict[str, Any]]] = {
@@ -223,7 +245,8 @@ def page() -> str:
     ]
     for exhibit in EXHIBITS:
         title = exhibit.name.replace("_", " ")
-        lines += [f"- [{title}](gallery/{exhibit.name}.html) ({', '.join(exhibit.policies)}): {exhibit.text}"]
+        names = ", ".join(map(policy_label, exhibit.policies))
+        lines += [f"- [{title}](gallery/{exhibit.name}.html) ({names}): {exhibit.text}"]
     return "\n".join(lines) + "\n"
 
 
