@@ -10,15 +10,14 @@ from gymnasium import spaces
 from swarm_forage_env._internal.compiling import is_compiled
 from swarm_forage_env._internal.fields import ConfigError, table
 from swarm_forage_env.contract.policy import ActionError, state_size
-from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
+from swarm_forage_env.contract.types import BoolArray, ObsArray
 from swarm_forage_env.env import ForageEnv, checked_seed
 from swarm_forage_env.layer import OPTION_OF_TESTS
 from swarm_forage_env.policies.extras import ExtraFunctionError, extra_columns, extra_rewards
 from swarm_forage_env.policies.interface import MOTIONS, LearnerInterface
 from swarm_forage_env.policies.kernels.network import keep_on
 from swarm_forage_env.views.plans import ArenaPlan
-from swarm_forage_env.world.kernels.disturbances import Disturbances
-from swarm_forage_env.wrappers.base import SwarmWrapper, needs_no_python
+from swarm_forage_env.wrappers.base import needs_no_python
 from swarm_forage_env.wrappers.world import World
 
 SCENARIO_OPTION = "scenario"
@@ -51,27 +50,21 @@ class LearnerArena:
         self._plan = plan
         self._share = share
         self.n_rows = plan.world.n_robots
-        self._overrides: dict[str, Any] = {}
-        self._world: World | None = None
         self._seeds: np.random.Generator | None = None  # not before it is used: copies draw worlds of their own
-        self._adopt(*self._built({}, None))
+        self._build({}, None)
 
     @property
     def n_robots(self) -> int:
         """Robots of this run, at most as many as there are rows."""
         return self.forage_env.scenario.robots.n_robots
 
-    def _built(
-        self, overrides: Mapping[str, Any], world: World | None
-    ) -> tuple[ForageEnv | SwarmWrapper, LearnerInterface]:
-        """Build an environment and its interface, of which one may be refused; the arena stays as it is."""
+    def _build(self, overrides: dict[str, Any], world: World | None) -> None:
+        """Build environment and interface, of which one may be refused; the arena then stays as it is."""
         env = self._plan.build(overrides, world)
-        return env, LearnerInterface(self._plan.interface, env.unwrapped.swarm_spec)
-
-    def _adopt(self, env: ForageEnv | SwarmWrapper, interface: LearnerInterface) -> None:
+        self.interface = LearnerInterface(self._plan.interface, env.unwrapped.swarm_spec)
         self.env = env
         self.forage_env: ForageEnv = env.unwrapped
-        self.interface = interface
+        self._overrides, self._world = overrides, world
 
     def reset(self, seed: int | None = None, options: Mapping[str, Any] | None = None) -> None:
         """Start a run.
@@ -85,33 +78,34 @@ class LearnerArena:
             ConfigError: another option, a scenario field beside `scenario`, an unknown field, another number of robots,
                 or more objects than a sampler's worlds have; the arena stays as it was.
         """
-        overrides = _scenario_overrides(options)
-        if overrides is None:
-            overrides = self._overrides
-        seed = checked_seed(seed)
+        overrides, seed = self._chosen_overrides(options), checked_seed(seed)
         seeds = np.random.default_rng(seed) if seed is not None or self._seeds is None else copy.deepcopy(self._seeds)
         if seed is None:
             seed = int(seeds.integers(2**31))
         sampler = self._plan.sampler
-        self._change(overrides, None if sampler is None else sampler.world_of(seed, self._share))
+        world = None if sampler is None else sampler.world_of(seed, self._share)
+        if (overrides, world) != (self._overrides, self._world):
+            before = self.env
+            self._build(overrides, world)
+            before.close()
         self._seeds = seeds  # not before the world is known to be possible
         self.env.reset_batch(seed)
-        self._begin()
-        self.interface.forget()
-
-    def _begin(self) -> None:
-        """Find out, once per run, whether several ticks can be one compiled call."""
         env = self.forage_env
         is_paid = env.reward_model.payment is not None
         self._tells_ahead = is_compiled(keep_on) and is_paid and needs_no_python(env, self.env.stack)
+        self.interface.forget()
 
-    def _change(self, overrides: dict[str, Any], world: World | None) -> None:
-        """Build another environment, if the one that there is has another world."""
-        if (overrides, world) != (self._overrides, self._world):
-            before = self.env
-            self._adopt(*self._built(overrides, world))
-            self._overrides, self._world = overrides, world
-            before.close()
+    def _chosen_overrides(self, options: Mapping[str, Any] | None) -> dict[str, Any]:
+        """Return the fields that `options` ask for, or those of before."""
+        for key in options or {}:
+            if key not in (SCENARIO_OPTION, OPTION_OF_TESTS):
+                raise ConfigError(
+                    f"Expected the reset option {SCENARIO_OPTION!r} only, with fields of the scenario, such as "
+                    f"options={{'scenario': {{'n_objects': 100}}}}, got {key!r}."
+                )
+        if not options or SCENARIO_OPTION not in options:
+            return self._overrides
+        return dict(table("the reset option 'scenario'", options[SCENARIO_OPTION]))
 
     def step(self, actions: np.ndarray, rewards: np.ndarray) -> None:
         """Carry out a decision: step until its ticks are done or the run ends.
@@ -141,7 +135,7 @@ class LearnerArena:
         end = min(start + self._plan.interface.decision_ticks, env.max_cycles)
         try:
             while True:
-                n_ahead, disturbances = self._told_ahead(end - before)
+                n_ahead, disturbances = self.env.told_ahead(end - before) if self._tells_ahead else (0, None)
                 if n_ahead == 0:
                     rewards += self.env.step_batch(interface.carry_out(chosen, self.env.last_obs))[1]
                 else:
@@ -155,10 +149,6 @@ class LearnerArena:
             if not isinstance(error, ActionError) or arena.tick > start:
                 env.break_off()
             raise
-
-    def _told_ahead(self, n_ticks: int) -> tuple[int, Disturbances | None]:
-        """Return how many ticks can be one compiled call, and what wrappers do in them; 0 = Python steps one."""
-        return self.env.told_ahead(n_ticks) if self._tells_ahead else (0, None)
 
     def _add_extra(self, rewards: np.ndarray) -> None:
         """Add the user's `extra_reward` of a decision to the rewards of the robots (N,)."""
@@ -174,10 +164,6 @@ class LearnerArena:
         """Which rows are at work, (rows,): a new array."""
         return self._with_spare_rows(self.forage_env.active)
 
-    @property
-    def _decision(self) -> int:
-        return self._plan.interface.decisions_in(self.forage_env.tick)
-
     def observe(self, out: ObsArray | None = None) -> ObsArray:
         """Return what the learner sees now, (rows, d): a new array, or `out`.
 
@@ -189,18 +175,16 @@ class LearnerArena:
         n_robots = self.n_robots
         if n_robots < self.n_rows:
             out[n_robots:] = 0.0
-        self.interface.show(self.env.last_obs, out[:n_robots], self._decision, self._extra_columns())
+        plan, env, extra = self._plan, self.forage_env, None
+        if plan.extra_observation is not None:
+            try:
+                extra = extra_columns(plan.extra_observation, env.arena, plan.interface.extra_columns)
+            except ExtraFunctionError:
+                env.break_off()
+                raise
+        decision = plan.interface.decisions_in(env.arena.tick)
+        self.interface.show(self.env.last_obs, out[:n_robots], decision, extra)
         return out
-
-    def _extra_columns(self) -> FloatArray | None:
-        function = self._plan.extra_observation
-        if function is None:
-            return None
-        try:
-            return extra_columns(function, self.forage_env.arena, self._plan.interface.extra_columns)
-        except ExtraFunctionError:
-            self.forage_env.break_off()
-            raise
 
     @property
     def state_space(self) -> spaces.Box:
@@ -235,16 +219,3 @@ class LearnerArena:
         padded = np.zeros((self.n_rows, *rows.shape[1:]), rows.dtype)
         padded[: len(rows)] = rows
         return padded
-
-
-def _scenario_overrides(options: Mapping[str, Any] | None) -> dict[str, Any] | None:
-    """Return the overridden fields that `options` asks for, None when it has no such key."""
-    for key in options or {}:
-        if key not in (SCENARIO_OPTION, OPTION_OF_TESTS):
-            raise ConfigError(
-                f"Expected the reset option {SCENARIO_OPTION!r} only, with fields of the scenario, such as "
-                f"options={{'scenario': {{'n_objects': 100}}}}, got {key!r}."
-            )
-    if not options or SCENARIO_OPTION not in options:
-        return None
-    return dict(table("the reset option 'scenario'", options[SCENARIO_OPTION]))
