@@ -1,10 +1,9 @@
 """Pictures of runs and trainings. They need matplotlib (the optional extra "plots")."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import cycle, repeat
+from itertools import cycle
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -21,7 +20,6 @@ from swarm_forage_env.rendering.figures import (
 
 _SMOOTHED = 5
 """Intervals of a running mean: deliveries come in bursts, which hide who delivers more (our choice)."""
-_MEAN = "mean with its\n95 % interval\n(Student's)"
 _MANY_INTERVALS = 20
 """With fewer, single ones are drawn alone."""
 
@@ -85,9 +83,8 @@ def _running_mean(values: FloatArray) -> FloatArray:
 
 def draw_trainings(
     path: str | Path,
-    trainings: Mapping[str, tuple[Sequence[int], Sequence[float], Sequence[float]]],
+    trainings: Mapping[str, Sequence[tuple[int, float, float]]],
     *,
-    mean: tuple[Sequence[int], FloatArray, FloatArray] | None = None,
     beside: Mapping[str, tuple[float, float]],
     stage_ends: Sequence[int],
     title: str,
@@ -98,10 +95,8 @@ def draw_trainings(
 
     Args:
         path: File to write; as in `saved_figure`, whose errors this has.
-        trainings: Name -> (E,) decisions before each evaluation, (E,) what the scenario counts, and (E,) mean fraction
-            of active robots in interference.
-        mean: Of the trainings, which are then thin lines of one colour: (E,) decisions; (3, E) mean, lower and upper
-            bound of what the scenario counts; the same of interference.
+        trainings: Name -> each evaluation: decisions before it, what the scenario counts, and mean fraction of active
+            robots in interference.
         beside: Controllers to compare with -> what they achieve, and their interference, NaN if unknown.
         stage_ends: Decisions at which the stages of the training end.
         title: Headline.
@@ -110,21 +105,12 @@ def draw_trainings(
     """
     with saved_figure(path, (9.0, 5.0), title=title, style=style) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
-        found = looks((*(trainings if mean is None else (_MEAN,) * len(trainings)), *beside))
+        found = looks((*trainings, *beside))
         # Five trainings have a colour twice, so each has a marker of its own.
-        lines: Iterator[dict[str, Any]] = ({"marker": marker} for marker in cycle(MARKERS))
-        if mean is not None:
-            lines = repeat({"linewidth": 0.8, "alpha": 0.5})
-        for look, line, (steps, *curves) in zip(found, lines, trainings.values(), strict=False):
+        for look, marker, evaluations in zip(found, cycle(MARKERS), trainings.values(), strict=False):
+            steps, *curves = np.transpose(evaluations)
             for axes, curve in zip((upper, lower), curves, strict=True):
-                shown = look.name if mean is None else f"each of {len(trainings)}"
-                axes.plot(np.asarray(steps) / 1e6, curve, color=look.colour, label=shown, clip_on=False, **line)
-        if mean is not None:
-            decisions, *curves = mean
-            millions = np.asarray(decisions) / 1e6
-            for axes, (middle, low, high) in zip((upper, lower), curves, strict=True):
-                axes.plot(millions, middle, color=found[0].colour, marker="o", label=_MEAN, clip_on=False)
-                shade(axes, millions, low, high, found[0].colour)
+                axes.plot(steps / 1e6, curve, color=look.colour, label=look.name, clip_on=False, marker=marker)
         dashes = ("--", "-.", ":", (0, (6, 1))) * len(beside)
         for look, levels, dash in zip(found[len(trainings) :], beside.values(), dashes, strict=False):
             for axes, level in zip((upper, lower), levels, strict=True):
@@ -139,5 +125,4 @@ def draw_trainings(
             for end in stage_ends[:-1]:
                 axes.axvline(end / 1e6, color="black", linestyle=":", linewidth=1)
         # Beside the axes: levels of others may lie anywhere in them. Not at the top, where headlines may be wide.
-        shown_once = {label: handle for handle, label in zip(*upper.get_legend_handles_labels(), strict=True)}
-        figure.legend([*shown_once.values()], [*shown_once], loc="outside right center")
+        figure.legend(*upper.get_legend_handles_labels(), loc="outside right center")

@@ -18,7 +18,6 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.wording import counted
-from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 from swarm_forage_env.runs.plan import Plan, finished_runs
 from swarm_forage_env.runs.progress import duration
@@ -89,8 +88,6 @@ class Trainings(Answer):
     """Trainings that are judged by the same runs, and other policies in them.
 
     Those of one plan that differ in their seeds have a mean, with Student's 95 % interval of the mean over trainings.
-    In the picture it reaches as far as all of them have come; between evaluations, which a resumed training makes at
-    other times, curves are straight.
     """
 
     trainings: tuple[Training, ...]
@@ -104,42 +101,36 @@ class Trainings(Answer):
         """The plan of the first one; the others are judged alike."""
         return self.trainings[0].plan
 
-    @property
-    def averaged(self) -> tuple[Training, ...]:
-        """Those whose mean is told: several of one plan that did not fail."""
-        alike = all(replace(one.plan, seed=0) == replace(self.plan, seed=0) for one in self.trainings)
-        found = tuple(one for one in self.trainings if one.label not in self.failures)
-        return found if alike and len(found) > 1 else ()
-
     def sheets(self) -> tuple[Sheet, ...]:
         """Return a row per training as it is kept, mean and interval, the others, and how to score what is kept."""
-        failed = [f"{label} failed and is in no mean: {reason}" for label, reason in self.failures.items()]
+        notes = [f"{label} failed and is in no mean: {reason}" for label, reason in self.failures.items()]
         if not self.trainings:
-            return (Sheet(title="no training was evaluated", notes=failed),)
-        is_ratio = bool(self.plan.evaluation.worlds)
-        digits = (2 if is_ratio else 1, 3)  # ratios are about 1
-        kept = [(one, one.kept, (one.kept.reached, one.kept.interference_fraction)) for one in self.trainings]
+            return (Sheet(title="no training was evaluated", notes=notes),)
+        digits = 2 if self.plan.evaluation.worlds else 1  # ratios are about 1
+
+        def row(label: str, reached: float, interference: float, steps: str = "", time: str = "") -> tuple[str, ...]:
+            busy = "" if math.isnan(interference) else f"{interference:.3f}"
+            return label, steps, f"{reached:.{digits}f}", busy, time
+
         rows = [
-            (one.label, f"{best.steps:,}", *_texts(values, digits), duration(one.evaluations[-1].cpu_time_s))
-            for one, best, values in kept
+            row(one.label, *one.kept.levels, f"{one.kept.steps:,}", duration(one.evaluations[-1].cpu_time_s))
+            for one in self.trainings
         ]
-        notes: list[str] = []
-        if self.averaged:
-            columns = np.transpose([values for one, _, values in kept if one in self.averaged])
-            means = [_mean(column) for column in columns]
-            rows.append(("mean", "", *_texts([mean for mean, *_ in means], digits), ""))
-            bounds = [
-                " to ".join(f"{bound:.{n}f}" for bound in ends) for (_, *ends), n in zip(means, digits, strict=True)
-            ]
-            rows.append(("95 %", "", *bounds, ""))
-            notes.append("95 %: Student's interval of the mean over trainings.")
-        rows += [(name, "", *_texts(values, digits), "") for name, values in self.beside.items()]
-        notes += failed
-        if self.averaged:
+        sound = [one for one in self.trainings if one.label not in self.failures]
+        is_averaged = len(sound) > 1 and all(replace(one.plan, seed=self.plan.seed) == self.plan for one in sound)
+        if is_averaged:
+            from metrics.statistics import aggregate  # late: see evaluation.baseline_runs
+
+            reached, busy = map(aggregate, zip(*(one.kept.levels for one in sound), strict=True))
+            ends = f"{reached.lower:.{digits}f} to {reached.upper:.{digits}f}", f"{busy.lower:.3f} to {busy.upper:.3f}"
+            rows += [row("mean", reached.mean, busy.mean), ("95 %", "", *ends, "")]
+            notes.insert(0, "95 %: Student's interval of the mean over trainings.")
             notes.append("These evaluations chose the networks and flatter them. To score all in runs of their own:")
-            name = self.averaged[0].folder.resolve().parent.name
-            files = [Path(os.path.relpath(one.policy)).as_posix() for one in self.averaged]
-            notes.append(shlex.join(["swarm-forage", "benchmark", *files, "--name", name]))
+            files = [Path(os.path.relpath(one.policy)).as_posix() for one in sound]
+            notes.append(
+                shlex.join(["swarm-forage", "benchmark", *files, "--name", sound[0].folder.resolve().parent.name])
+            )
+        rows += [row(name, *levels) for name, levels in self.beside.items()]
         header = ("policy", "decisions", counted_in(self.plan), "interference", "processor time")
         return (Sheet.of(header, rows, title=f"at their best in {place_of(self.plan)}", notes=notes),)
 
@@ -152,66 +143,25 @@ class Trainings(Answer):
         """Draw performance and interference over decisions; raises ImportError without matplotlib."""
         from swarm_forage_env.rendering.plots import draw_trainings
 
-        mean = self._mean()
+        is_one = len(self.trainings) == 1
         draw_trainings(
             Path(path),
-            {one.label: tuple(_curves(one.evaluations)) for one in self.trainings},  # type: ignore[arg-type] - three
-            mean=mean,
-            beside=dict(self.beside),
-            stage_ends=self._stage_ends() if len(self.trainings) == 1 or mean is not None else (),
-            title=f"{'training' if len(self.trainings) == 1 else 'trainings'} in {place_of(self.plan)}",
+            {one.label: [(each.steps, *each.levels) for each in one.evaluations] for one in self.trainings},
+            beside=self.beside,
+            stage_ends=[end for _, end in self.plan.parts(self.trainings[0].evaluations)] if is_one else (),
+            title=f"{'training' if is_one else 'trainings'} in {place_of(self.plan)}",
             ylabel=counted_in(self.plan),
             style=style,
         )
-
-    def _stage_ends(self) -> list[int]:
-        """Decisions at which stages ended, after a whole rollout and with an evaluation; as planned where none is."""
-        evaluations = self.trainings[0].evaluations
-        evaluated, parts = [each.steps for each in evaluations], self.plan.parts(evaluations)
-        return [next((steps for steps in evaluated if steps >= end), end) for _, end in parts]
-
-    def _mean(self) -> tuple[list[int], FloatArray, FloatArray] | None:
-        """The mean of those that are averaged, as far as all of them have come; None where there is none."""
-        each = [_curves(one.evaluations) for one in self.averaged]
-        first, last = max((one[0][0] for one in each), default=0), min((one[0][-1] for one in each), default=-1)
-        common = [step for step in sorted({step for one in each for step in one[0]}) if first <= step <= last]
-        if not common:
-            return None
-        performance, interference = (
-            np.transpose(
-                [_mean(column) for column in np.transpose([np.interp(common, one[0], one[k]) for one in each])]
-            )
-            for k in (1, 2)
-        )
-        return common, performance, interference
-
-
-def _curves(evaluations: Sequence[Evaluation]) -> list[list[Any]]:
-    """Return decisions, what counts, and interference of each evaluation."""
-    rows = [(each.steps, each.reached, each.interference_fraction) for each in evaluations]
-    return [list(column) for column in zip(*rows, strict=True)]
-
-
-def _mean(values: Sequence[float]) -> tuple[float, float, float]:
-    """Return the mean of one value per training, and the bounds of its 95 % interval."""
-    from metrics.statistics import aggregate  # late: see evaluation.baseline_runs
-
-    found = aggregate(values)
-    return found.mean, found.lower, found.upper
-
-
-def _texts(values: Sequence[float], digits: Sequence[int]) -> list[str]:
-    return ["" if math.isnan(value) else f"{value:.{n}f}" for value, n in zip(values, digits, strict=True)]
 
 
 def beside_baseline(trainings: Sequence[Training], failures: Mapping[str, str] | None = None) -> Trainings:
     """Return how trainings that are judged by the same runs went, beside the baseline of their evaluations."""
     if not trainings:
         return Trainings(trainings=(), failures=failures or {})
-    first, (world, *others) = trainings[0], trainings[0].evaluations[-1].worlds
-    is_ratio = bool(first.plan.evaluation.worlds)
+    world, *others = trainings[0].evaluations[-1].worlds
     name = "baseline of each world" if others else world.baseline_policy
-    level = (1.0 if is_ratio else world.baseline), math.nan
+    level = (1.0 if trainings[0].plan.evaluation.worlds else world.baseline), math.nan
     return Trainings(trainings=tuple(trainings), beside={name: level}, failures=failures or {})
 
 
@@ -219,16 +169,12 @@ def curves(
     folders: Sequence[str | Path],
     *,
     beside: Sequence[str] | None = None,
-    jobs: int | None = None,
-    progress: bool = True,
 ) -> Trainings:
     """Return how trainings went, beside policies that make the runs of their evaluations.
 
     Args:
         folders: Folders of trainings that are judged by the same runs.
         beside: Policies, each with the caches that it is made for; default the paper's.
-        jobs: Processes; default one per core.
-        progress: Show progress and an estimate on stderr.
 
     Raises:
         ConfigError: a folder without evaluations, one that is given twice, trainings that are judged by other runs, or
@@ -244,9 +190,7 @@ def curves(
     baselines = {world.world: (world.baseline_policy, world.baseline) for world in last.worlds}
     if beside:
         specs = policy_specs({name: name for name in beside})
-        table = finished_runs(
-            Plan.product(specs, plan.judging_worlds, plan.evaluation.seeds), jobs=jobs, progress=progress
-        )
+        table = finished_runs(Plan.product(specs, plan.judging_worlds, plan.evaluation.seeds), jobs=None, progress=True)
         for name in beside:
             worlds = judged(plan.evaluation, table, name, baselines)
             interference = float(np.mean([world.interference_fraction for world in worlds]))

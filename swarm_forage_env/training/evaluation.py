@@ -75,16 +75,6 @@ class EvaluationWorld(World):
     def _default_name(self) -> str:
         return f"{self.scenario.name}_{self.n_robots}"
 
-    def to_mapping(self) -> dict[str, Any]:
-        """Return the world as plain values."""
-        wrappers = {config.name: config.to_mapping() for config in self.wrappers}
-        return {
-            "name": self.name,
-            "scenario": asdict(self.scenario),
-            "wrappers": wrappers,
-            "baseline": self.baseline,
-        }
-
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class EvaluationPlan(Checked):
@@ -128,17 +118,10 @@ class EvaluationPlan(Checked):
             world: That of the training; judged in where the plan has no others.
         """
         own = EvaluationWorld(world.scenario, world.wrappers, name=world.name, baseline=self.baseline)
-        return tuple(map(self._timed, self.worlds or (own,)))
-
-    def _timed(self, world: EvaluationWorld) -> EvaluationWorld:
+        worlds = self.worlds or (own,)
         if self.horizon_s is None:
-            return world
-        return replace(world, scenario=with_overrides(world.scenario, horizon_s=self.horizon_s))
-
-    def to_mapping(self) -> dict[str, Any]:
-        """Return the plan as plain values."""
-        plain = {item.name: getattr(self, item.name) for item in dataclasses.fields(self)}
-        return {**plain, "worlds": [world.to_mapping() for world in self.worlds]}
+            return worlds
+        return tuple(replace(one, scenario=with_overrides(one.scenario, horizon_s=self.horizon_s)) for one in worlds)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -176,6 +159,11 @@ class Evaluation:
     def interference_fraction(self) -> float:
         """Mean fraction of active robots in interference, over all worlds."""
         return float(np.mean([world.interference_fraction for world in self.worlds]))
+
+    @property
+    def levels(self) -> tuple[float, float]:
+        """What counts, and interference."""
+        return self.reached, self.interference_fraction
 
 
 def _means(table: Table, condition: Condition) -> tuple[float, float]:

@@ -6,11 +6,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import accumulate
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, cast
 
 from msgspec import Meta
 
-from swarm_forage_env._internal.fields import Checked, ConfigError, Count, Number, Whole, known_keys, read, table, whole
+from swarm_forage_env._internal.fields import Checked, ConfigError, Count, Number, Whole, known_keys, read, table
 from swarm_forage_env._internal.files import json_text, parse_json, parse_toml, replacing
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.policy import layout_for
@@ -30,8 +30,8 @@ DEFAULT_STEPS = 3_400_000
 """Decisions of single robots in all stages; our choice."""
 SAMPLING = ("ppo", "a2c")
 """Algorithms whose networks give probabilities of discrete actions."""
-IN_RUNS = {"decision_ticks": 1, "frame_decisions": 0}
-"""Fields of an interface that may be others in runs than in training, of the same network -> the least."""
+IN_RUNS = ("decision_ticks", "frame_decisions")
+"""Fields of an interface that may be others in runs than in training, of the same network."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -51,11 +51,6 @@ class Stage(Checked):
     def check(self) -> None:
         """Take lists, the only sequences of files, as the tuples of scenarios."""
         object.__setattr__(self, "scenario", {name: _tuples(value) for name, value in self.scenario.items()})
-
-    def to_mapping(self) -> dict[str, Any]:
-        """Return the stage as plain values; `sampler` only where there is one."""
-        plain: dict[str, Any] = {"steps": self.steps, "scenario": dict(self.scenario), "options": dict(self.options)}
-        return plain if self.sampler is None else {**plain, "sampler": dict(self.sampler.table)}
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -122,8 +117,7 @@ class TrainingPlan(Checked):
 
     def _check_in_runs(self) -> None:
         known_keys(self.in_runs, IN_RUNS, prefix="in_runs.")
-        for name, value in self.in_runs.items():
-            whole(f"in_runs.{name}", value, at_least=IN_RUNS[name])
+        _ = self.run_interface  # refuses other values, and frames beside extra columns
         if self.in_runs and self.algorithm not in EXPORTABLE:
             raise ConfigError(
                 f"Expected in_runs only with {', '.join(EXPORTABLE)}, got {self.algorithm}; leave it out."
@@ -133,7 +127,6 @@ class TrainingPlan(Checked):
                 "Expected in_runs.frame_decisions only for a policy that learns with frames, got 0 of them in "
                 "interface.frame_decisions; leave one of both out, or give both."
             )
-        _ = self.run_interface  # refuses frames beside extra columns
 
     def _check_worlds(self) -> None:
         """Refuse worlds that cannot be, or that one policy cannot have in common."""
@@ -150,7 +143,7 @@ class TrainingPlan(Checked):
         for stage in self.stages:
             sampler = stage.sampler or self.sampler
             for config in (self.scenario,) if sampler is None else sampler.ends:
-                if _common(config) != _common(self.scenario):
+                if (config.caches, columns_of(config)) != (self.scenario.caches, columns_of(self.scenario)):
                     raise ConfigError(
                         f"Expected stages and worlds with the same caches and columns of observations as "
                         f"{self.scenario.name}, which are those of the policy; {config.name} has others."
@@ -234,18 +227,9 @@ class TrainingPlan(Checked):
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the plan as nested plain values."""
-        _, *others = dataclasses.fields(self)
-        plain = {item.name: getattr(self, item.name) for item in others}
-        plain |= {
-            "interface": dataclasses.asdict(self.interface),
-            "evaluation": self.evaluation.to_mapping(),
-            "stages": [stage.to_mapping() for stage in self.stages],
-        }
-        if self.sampler is not None:
-            return plain | {"sampler": dict(self.sampler.table)}
-        del plain["sampler"]
-        disturbed = {config.name: config.to_mapping() for config in self.wrappers}
-        return {"scenario": dataclasses.asdict(self.scenario), "wrappers": disturbed, **plain}
+        plain = _plain(self)
+        world = plain.pop("world")
+        return plain if self.sampler else {"scenario": world["scenario"], "wrappers": world["wrappers"], **plain}
 
     def settings(self) -> dict[str, Any]:
         """Return all plain values of the plan by their names with dots, such as "interface.observation"."""
@@ -334,9 +318,10 @@ class TrainingPlan(Checked):
 
 def _tables(where: str, given: Any) -> list[dict[str, Any]]:
     """Return the tables of a list, as [[where]] of TOML."""
-    if not isinstance(given, list):
+    if not isinstance(given, list | tuple):
         raise ConfigError(f"Expected {where} to be a list of tables, [[{where}]], got {given!r}.")
-    return [dict(table(f"{where}[{k}]", one)) for k, one in enumerate(given)]
+    tables = cast("Sequence[Any]", given)
+    return [dict(table(f"{where}[{k}]", one)) for k, one in enumerate(tables)]
 
 
 def _world(values: dict[str, Any], kind: Any) -> Any:
@@ -392,9 +377,23 @@ def named_plan(name: str) -> TrainingPlan:
     return read_plan(name if shipped is None else shipped)
 
 
-def _common(config: ScenarioConfig) -> tuple[Any, ...]:
-    """Return what all worlds of a policy have in common."""
-    return config.caches, columns_of(config)
+def _plain(value: Any) -> Any:
+    """Return plans, stages, worlds and samplers as plain values; without a sampler where there is none."""
+    if isinstance(value, ScenarioSampler):
+        return dict(value.table)
+    if isinstance(value, ScenarioConfig | InterfaceConfig):
+        return dataclasses.asdict(value)
+    if isinstance(value, World):
+        wrappers = {config.name: config.to_mapping() for config in value.wrappers}
+        named = {"name": value.name, "baseline": value.baseline} if isinstance(value, EvaluationWorld) else {}
+        return {"scenario": dataclasses.asdict(value.scenario), "wrappers": wrappers, **named}
+    if dataclasses.is_dataclass(value):
+        plain = {item.name: _plain(getattr(value, item.name)) for item in dataclasses.fields(value)}
+        return {name: item for name, item in plain.items() if item is not None or name != "sampler"}
+    if isinstance(value, Mapping):
+        return dict(value)
+    is_listed = isinstance(value, tuple) and value and dataclasses.is_dataclass(value[0])
+    return list(map(_plain, value)) if is_listed else value
 
 
 def _leaves(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:

@@ -253,31 +253,19 @@ def _stages(
     third = steps // 3
     if third < shortest:
         return (Stage(steps=steps, scenario=episodes),)
-    first = (Stage(steps=third, scenario={**_fitting_small_arena(config), **episodes}),) if small_start else ()
+    first = (Stage(steps=third, scenario={**small_arena(config), **episodes}),) if small_start else ()
     middle = Stage(steps=steps - third * (small_start + bool(late)), scenario=episodes)
     last = (Stage(steps=third, scenario=episodes, options=late),) if late else ()
     return (*first, middle, *last)
-
-
-def _fitting_small_arena(config: ScenarioConfig) -> dict[str, Any]:
-    """Return `small_arena`; raises ConfigError where there cannot be one."""
-    small = small_arena(config)
-    try:
-        if config.objects.object_positions_m:
-            raise ConfigError("Expected no object_positions_m, which it may not hold.")
-        with_overrides(config, **small)
-    except ConfigError as error:
-        raise ConfigError(
-            f"Cannot begin in a smaller arena (small_start) of {small['width_m']} x {small['height_m']} m: {error} "
-            "Or train in the whole arena from the beginning: small_start=False (--set small_start=false)."
-        ) from error
-    return small
 
 
 def small_arena(config: ScenarioConfig) -> dict[str, Any]:
     """Return fields that shrink the arena to SMALL_START of its size with nest and obstacles in proportion.
 
     Only along x for a single and a dual source, which lie beside the nest: the other axis is no way home.
+
+    Raises:
+        ConfigError: there cannot be such an arena.
     """
     arena = config.arena
     is_beside = config.objects.placement in ("single_source", "dual_source")
@@ -287,7 +275,7 @@ def small_arena(config: ScenarioConfig) -> dict[str, Any]:
         for extent, share in zip((arena.width_m, arena.height_m), shares, strict=True)
     )
     (centre_x, centre_y), (size_x, size_y) = arena.nest_centre_m, arena.nest_size_m
-    return {
+    small = {
         "width_m": width_m,
         "height_m": height_m,
         "nest_centre_m": (centre_x * shares[0], centre_y * shares[1]),
@@ -298,3 +286,13 @@ def small_arena(config: ScenarioConfig) -> dict[str, Any]:
             if (boxes := getattr(arena, name))
         },
     }
+    try:
+        if config.objects.object_positions_m:
+            raise ConfigError("Expected no object_positions_m, which it may not hold.")
+        with_overrides(config, **small)
+    except ConfigError as error:
+        raise ConfigError(
+            f"Cannot begin in a smaller arena (small_start) of {width_m} x {height_m} m: {error} "
+            "Or train in the whole arena from the beginning: small_start=False (--set small_start=false)."
+        ) from error
+    return small

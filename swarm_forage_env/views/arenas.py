@@ -13,9 +13,8 @@ rows (`LearnerArena`) are absent from the first step of the run to the last. The
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, cast
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -28,23 +27,7 @@ from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.plans import ArenaPlan, plan_arena, takes
 from swarm_forage_env.wrappers.base import SwarmWrapper
 
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class RunOutcome:
-    """How a run of one arena ended."""
-
-    arena: int
-    seed: int
-    seconds: float
-    """Simulated time, s."""
-    collected: int
-    """Objects delivered."""
-    first_picked: int
-    """Objects picked up for the first time."""
-    scenario: str
-    """Name of the scenario."""
-    n_robots: int
-    """Robots of this run."""
+_NOBODY: Any = np.zeros(0, np.int32)
 
 
 @dataclass(kw_only=True, slots=True)
@@ -61,27 +44,21 @@ class ArenaStep:
     """(R,) rows whose arena reached its horizon while their robot could have gone on."""
     active: BoolArray
     """(R,) rows whose robot is at work in `obs`."""
-    ended: IntArray
+    ended: IntArray = _NOBODY
     """(E,) rows that are done, ascending."""
-    final_obs: ObsArray
-    """(E, d) their last observations."""
-    is_episode: BoolArray
+    final_obs: ObsArray = _NOBODY
+    """(E, d) their last observations, where E > 0."""
+    is_episode: BoolArray = _NOBODY
     """(E,) True where an episode ended, False where the row was absent."""
-    returns: np.ndarray
+    returns: np.ndarray = _NOBODY
     """(E,) float64, sums of rewards; float32 would lose the small ones of long runs."""
-    lengths: IntArray
+    lengths: IntArray = _NOBODY
     """(E,) steps that began with the robot in the world."""
-    outcomes: tuple[RunOutcome, ...] = ()
-    """Runs that ended."""
-    final_states: tuple[ObsArray, ...] = ()
+    outcomes: dict[int, dict[str, Any]] = field(default_factory=dict)
+    """Arenas whose run ended -> its seed, simulated seconds, objects collected and first_picked, scenario (its name),
+    and n_robots."""
+    final_states: dict[int, ObsArray] = field(default_factory=dict)
     """Their last global views, see `LearnerArena.state`."""
-
-
-def set_on_stack(env: ForageEnv | SwarmWrapper, name: str, value: Any) -> None:
-    """Set an attribute of a stack, in the wrapper or environment that has it itself and does not only pass it on."""
-    while isinstance(env, SwarmWrapper) and name not in vars(env) and not hasattr(type(env), name):
-        env = cast("ForageEnv | SwarmWrapper", env.env)  # checked by its constructor
-    setattr(env, name, value)
 
 
 class ArenaBatch:
@@ -113,7 +90,7 @@ class ArenaBatch:
         self.n_arenas, self.n_robots = n_arenas, plan.world.n_robots
         self.n_rows = n_arenas * self.n_robots
         self.render_mode = plan.render_mode
-        self._is_reset = self._is_closed = False
+        self._is_reset = False
         shape = self._shape = n_arenas, self.n_robots
         self._absent, self._present, self._dead, self._active = np.zeros((4, *shape), np.bool_)
         self._returns, self._lengths = np.zeros(shape), np.zeros(shape, np.int32)
@@ -128,12 +105,7 @@ class ArenaBatch:
         Args:
             seeds: One per arena; see `LearnerArena.reset`.
             options: One per arena; see `LearnerArena.reset`.
-
-        Raises:
-            RuntimeError: closed.
         """
-        if self._is_closed:
-            raise RuntimeError("Expected open arenas, but they were closed.")
         self._is_reset = False  # and stays False if a seed or an option is refused before every arena has started
         obs = np.empty((*self._shape, self.interface.layout.size), np.float32)
         for number, (seed, option) in enumerate(zip(seeds, options, strict=True)):
@@ -168,11 +140,16 @@ class ArenaBatch:
             actions: (R,) or (R, k), one action of the interface per row; those of absent rows are ignored.
 
         Raises:
-            RuntimeError: not reset yet, closed, or a step before this one failed half done.
+            RuntimeError: not reset yet, or a step before this one failed half done.
             ValueError: wrong shape, or actions that the interface or the drive refuses. A note names the arena.
         """
         self._require_reset("step")
-        actions = self._checked_rows(actions)
+        actions = np.asarray(actions)
+        if actions.ndim == 0 or len(actions) != self.n_rows:
+            raise ValueError(
+                f"Expected actions for {self.n_rows} rows ({self.n_arenas} arenas of {self.n_robots} robots), "
+                f"got shape {actions.shape}."
+            )
         obs = np.empty((*self._shape, self.interface.layout.size), np.float32)
         rewards = np.zeros(self._shape, np.float32)
         present = self._present.copy()
@@ -195,49 +172,35 @@ class ArenaBatch:
             terminated[over] |= self._absent[over]
             truncated[over] = ~terminated[over]
         obs = obs.reshape(self.n_rows, -1)
-        ended = np.flatnonzero(terminated | truncated).astype(np.int32)
         step = ArenaStep(
             obs=obs,
             rewards=rewards.ravel(),
             terminated=terminated.ravel(),
             truncated=truncated.ravel(),
             active=self._active.flatten(),
-            **(self._endings(ended, obs) if len(ended) else self._no_endings),
-            outcomes=tuple(map(self._outcome, over)),
-            final_states=tuple(self.arenas[number].state() for number in over),
         )
+        ended = np.flatnonzero(terminated | truncated).astype(np.int32)
+        if len(ended):
+            step.ended, step.final_obs, step.is_episode = ended, obs[ended], ~self._absent.ravel()[ended]
+            step.returns, step.lengths = self._returns.ravel()[ended], self._lengths.ravel()[ended]
         self._absent |= self._dead
         for number in over:
+            step.outcomes[number], step.final_states[number] = self._outcome(number), self.arenas[number].state()
             self._start(number, obs.reshape(*self._shape, -1)[number])
             step.active.reshape(self._shape)[number] = self._active[number]
         return step
 
-    def _endings(self, ended: IntArray, obs: ObsArray) -> dict[str, Any]:
-        """Return what an `ArenaStep` says of the rows that are done."""
-        return {
-            "ended": ended,
-            "final_obs": obs[ended],
-            "is_episode": ~self._absent.ravel()[ended],
-            "returns": self._returns.ravel()[ended],
-            "lengths": self._lengths.ravel()[ended],
-        }
-
-    @cached_property
-    def _no_endings(self) -> dict[str, Any]:
-        return self._endings(np.zeros(0, np.int32), np.zeros((self.n_rows, self.interface.layout.size), np.float32))
-
-    def _outcome(self, number: int) -> RunOutcome:
+    def _outcome(self, number: int) -> dict[str, Any]:
+        """Return what an `ArenaStep` says of a run that ended."""
         env = self.arenas[number].forage_env
-        assert env.seed_value is not None, "an environment that was stepped has a seed"
-        return RunOutcome(
-            arena=number,
-            seed=env.seed_value,
-            seconds=env.tick * env.scenario.dt_s,
-            collected=int(env.events.counters[Counter.COLLECTED]),
-            first_picked=int(env.events.counters[Counter.FIRST_PICKED]),
-            scenario=env.scenario.name,
-            n_robots=env.scenario.robots.n_robots,
-        )
+        return {
+            "seed": env.seed_value,
+            "seconds": env.tick * env.scenario.dt_s,
+            "collected": int(env.events.counters[Counter.COLLECTED]),
+            "first_picked": int(env.events.counters[Counter.FIRST_PICKED]),
+            "scenario": env.scenario.name,
+            "n_robots": env.scenario.robots.n_robots,
+        }
 
     def states(self) -> ObsArray:
         """Return the global view of each arena, (n_arenas, S) float32, see `LearnerArena.state`."""
@@ -247,25 +210,13 @@ class ArenaBatch:
         """Return which discrete actions make sense now, (R, number of actions); spare rows can only stand.
 
         Raises:
-            RuntimeError: not reset yet, or closed.
+            RuntimeError: not reset yet.
             ValueError: the actions are continuous.
         """
         self._require_reset("action_masks")
         return np.concatenate([arena.mask() for arena in self.arenas])
 
-    def _checked_rows(self, actions: Any) -> np.ndarray:
-        """Return actions as an array; raises ValueError unless there is one per row."""
-        actions = np.asarray(actions)
-        if actions.ndim == 0 or len(actions) != self.n_rows:
-            raise ValueError(
-                f"Expected actions for {self.n_rows} rows ({self.n_arenas} arenas of {self.n_robots} robots), "
-                f"got shape {actions.shape}."
-            )
-        return actions
-
     def _require_reset(self, what: str) -> None:
-        if self._is_closed:
-            raise RuntimeError("Expected open arenas, but they were closed.")
         if not self._is_reset:
             raise RuntimeError(f"Call reset before {what}; after a step that failed half done, too.")
 
@@ -279,8 +230,7 @@ class ArenaBatch:
         return [arena.forage_env.render() for arena in self.arenas]
 
     def close(self) -> None:
-        """Close all environments; afterwards `reset` and `step` raise errors."""
-        self._is_closed = True
+        """Close all environments."""
         for arena in self.arenas:
             arena.env.close()
 

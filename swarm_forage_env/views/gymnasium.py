@@ -1,6 +1,5 @@
 """The swarm as Gymnasium environments: one agent for all robots, or a vector environment of robots."""
 
-import dataclasses
 import time
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -14,13 +13,10 @@ from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.contract.types import BoolArray, ObsArray
 from swarm_forage_env.env import ForageEnv, checked_seed
 from swarm_forage_env.policies.interface import LearnerInterface
-from swarm_forage_env.views.arenas import ArenaStep, RunOutcome, open_arenas, set_on_stack
+from swarm_forage_env.views.arenas import ArenaStep, open_arenas
 from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.plans import constructor_takes, plan_arena
 from swarm_forage_env.wrappers.base import WrapperConfig
-
-_OF_RUN = [item for item in dataclasses.fields(RunOutcome) if item.type in (int, float) and item.name != "arena"]
-"""What infos of a vector environment tell of a run that ended: its numbers."""
 
 
 class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
@@ -212,15 +208,16 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
         seconds = np.where(is_episode, round(time.perf_counter() - self._started, 6), 0.0)
         told: dict[str, Any] = {"episode": {"r": returns, "l": lengths, "t": seconds}, "_episode": is_episode}
         if step.outcomes:
-            of_run = {item.name: np.zeros(self.num_envs, item.type) for item in _OF_RUN}
+            of_run = dict[str, np.ndarray]()
             has_ended, states = np.zeros(self.num_envs, np.bool_), np.full(self.num_envs, None, object)
-            for outcome, state in zip(step.outcomes, step.final_states, strict=True):
-                rows = slice(outcome.arena * self.n_robots, (outcome.arena + 1) * self.n_robots)
+            for arena, outcome in step.outcomes.items():
+                rows = slice(arena * self.n_robots, (arena + 1) * self.n_robots)
                 has_ended[rows] = True
-                for name, values in of_run.items():
-                    values[rows] = getattr(outcome, name)
+                for name, value in outcome.items():
+                    if name != "scenario":
+                        of_run.setdefault(name, np.zeros(self.num_envs, type(value)))[rows] = value
                 for row in range(rows.start, rows.stop):
-                    states[row] = state
+                    states[row] = step.final_states[arena]
             told |= {"run": of_run, "_run": has_ended, "state": states, "_state": has_ended.copy()}
         return told
 
@@ -251,23 +248,6 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
         if self.render_mode is None:
             return None
         return tuple(picture for picture in self._arenas.render() if picture is not None)
-
-    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
-        """Call a method of every arena's environment, or read an attribute; returns one result per arena."""
-        found = self.get_attr(name)
-        return tuple(member(*args, **kwargs) if callable(member) else member for member in found)
-
-    def get_attr(self, name: str) -> tuple[Any, ...]:
-        """Return an attribute of every arena's environment."""
-        return tuple(getattr(env, name) for env in self._arenas.envs)
-
-    def set_attr(self, name: str, values: Any) -> None:
-        """Set an attribute of every arena's environment: one value for all, or a list or tuple of one per arena."""
-        per_arena = list(values) if isinstance(values, list | tuple) else [values] * self.n_arenas
-        if len(per_arena) != self.n_arenas:
-            raise ValueError(f"Expected one value per arena ({self.n_arenas}), got {len(per_arena)}.")
-        for env, value in zip(self._arenas.envs, per_arena, strict=True):
-            set_on_stack(env, name, value)
 
     def close_extras(self, **kwargs: Any) -> None:
         """Close all arenas."""

@@ -7,8 +7,6 @@ from gymnasium import spaces
 from pettingzoo import ParallelEnv
 from pettingzoo.utils.conversions import parallel_to_aec
 
-from swarm_forage_env.contract.layout import ObservationLayout
-from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.layer import is_over, packed_actions
 from swarm_forage_env.policies.interface import LearnerInterface
@@ -53,16 +51,6 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
     def forage_env(self) -> ForageEnv:
         """The parallel environment at the bottom; another object after a reset that changed the scenario."""
         return self._arena.forage_env
-
-    @property
-    def layout(self) -> ObservationLayout:
-        """Named slices of an observation row."""
-        return self.interface.layout
-
-    @property
-    def swarm_spec(self) -> SwarmSpec:
-        """What every policy may know before this run."""
-        return self.forage_env.swarm_spec
 
     @property
     def np_random(self) -> np.random.Generator:

@@ -46,34 +46,18 @@ class ArenaPlan:
             world: What the sampler has drawn; None = that of the plan.
 
         Raises:
-            ConfigError: unknown fields, values that do not fit together, another number of robots, or more robots or
-                objects than the largest worlds of the sampler have.
+            ConfigError: unknown fields, values that do not fit together, another number of robots, or more objects than
+                the worlds of the sampler have.
         """
         given = world or self.world
         scenario = scenario_of_same_size(given.scenario, overrides)
-        if self.sampler is not None:
-            self._check_room(scenario, self.sampler)
-        env = ForageEnv(
-            scenario,
-            max_cycles=self.max_cycles,
-            render_mode=self.render_mode,
-            reads=self.interface.reads,
-        )
-        return wrap_in_order(env, given.wrappers)
-
-    @staticmethod
-    def _check_room(scenario: ScenarioConfig, sampler: ScenarioSampler) -> None:
-        """Refuse a world that has no room in the rows of the sampler's worlds."""
-        sizes = {
-            "n_robots": (scenario.robots.n_robots, sampler.n_robots),
-            "n_objects": (scenario.objects.n_objects, sampler.n_objects),
-        }
-        for name, (n_there, most) in sizes.items():
-            if n_there > most:
-                raise ConfigError(
-                    f"Expected {name} of at most {most}, for which spaces have room, got {n_there}; give the sampler "
-                    "a world with as many."
-                )
+        if self.sampler is not None and scenario.objects.n_objects > self.sampler.n_objects:
+            raise ConfigError(
+                f"Expected n_objects of at most {self.sampler.n_objects}, for which spaces have room, got "
+                f"{scenario.objects.n_objects}; give the sampler a world with as many."
+            )
+        shown = {"max_cycles": self.max_cycles, "render_mode": self.render_mode, "reads": self.interface.reads}
+        return wrap_in_order(ForageEnv(scenario, **shown), given.wrappers)
 
 
 DEFAULT_SCENARIO = "warehouse_small"

@@ -26,7 +26,7 @@ from typing import Any, cast, get_type_hints
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError, known_keys, number, read, table, whole
+from swarm_forage_env._internal.fields import ConfigError, known_keys, number, read, table
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.layout import BUILT_IN_SLICES, LayoutRow
 from swarm_forage_env.contract.policy import layout_for
@@ -118,12 +118,9 @@ class ScenarioSampler:
             share: Which of the worlds, as a place in [0, 1) among their weights; None = by chance, too.
 
         Raises:
-            ConfigError: no whole number from 0 up as seed, a share outside of [0, 1), or values that do not fit
-                together.
+            ConfigError: values that do not fit together.
         """
-        rng = stream_rng(whole("seed", seed, at_least=0), Stream.SCENARIO)
-        if share is not None:
-            number("share", share, at_least=0.0, below=1.0)
+        rng = stream_rng(seed, Stream.SCENARIO)
         by_chance = rng.random()
         n = int(np.searchsorted(self._bounds, by_chance if share is None else share, side="right"))
         return self._world(n, rng.random)

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import asdict
 from typing import Any
 
 import gymnasium
@@ -12,7 +11,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
 from swarm_forage_env.contract.types import BoolArray
-from swarm_forage_env.views.arenas import ArenaStep, open_arenas, set_on_stack
+from swarm_forage_env.views.arenas import ArenaStep, open_arenas
 from swarm_forage_env.views.plans import constructor_takes
 
 
@@ -98,20 +97,14 @@ class SwarmVecEnv(VecEnv):
                 info["TimeLimit.truncated"] = bool(step.truncated[row])
                 if step.is_episode[k]:
                     info["episode"] = {"r": float(step.returns[k]), "l": int(step.lengths[k]), "t": seconds}
-            for outcome in step.outcomes:
-                told = asdict(outcome)
-                infos[told.pop("arena") * self.n_robots]["run"] = told
+            for arena, outcome in step.outcomes.items():
+                infos[arena * self.n_robots]["run"] = outcome
         return infos
 
     @property
-    def active_column(self) -> int:
-        """Column of an observation that is 1 for robots at work."""
-        return self.interface.active_column
-
-    @property
     def rollout_buffer_kwargs(self) -> dict[str, Any]:
-        """Arguments of `ActiveRolloutBuffer` about the observations; a new dict in every call."""
-        return {"active_column": self.active_column, "n_columns": self.interface.layout.size}
+        """Arguments of `ActiveRolloutBuffer`; the column is counted from the end, see there."""
+        return {"active_column": self.interface.active_column - self.interface.layout.size}
 
     def action_masks(self) -> BoolArray:
         """Return which discrete actions make sense now, (num_envs, number of actions); see `LearnerInterface.mask`."""
@@ -123,18 +116,17 @@ class SwarmVecEnv(VecEnv):
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
         """Return an attribute of the environment that each row is a part of, one value per row."""
-        rows = self._rows(indices)
+        envs = self._arenas.envs
         if attr_name == "action_masks":  # the name under which algorithms with masks look for them
             if self.interface.config.actions != "discrete":
                 raise AttributeError("Continuous actions have no masks.")
-            return [self.action_masks] * len(rows)
-        envs = self._arenas.envs
-        return [getattr(envs[row // self.n_robots], attr_name) for row in rows]
+            return [self.action_masks for _ in self._get_indices(indices)]
+        return [getattr(envs[row // self.n_robots], attr_name) for row in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
-        """Set an attribute of the environments that the rows are parts of."""
-        for arena in self._arenas_of(self._rows(indices)):
-            set_on_stack(self._arenas.envs[arena], attr_name, value)
+        """Set an attribute of the outermost wrappers, or environments, that the rows are parts of."""
+        for arena in {row // self.n_robots for row in self._get_indices(indices)}:
+            setattr(self._arenas.envs[arena], attr_name, value)
 
     def env_method(
         self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
@@ -143,14 +135,15 @@ class SwarmVecEnv(VecEnv):
 
         `action_masks` is answered row by row, as algorithms with masks expect.
         """
-        rows = self._rows(indices)
+        rows = [*self._get_indices(indices)]
         if method_name == "action_masks":
             return list(self.action_masks()[rows])
+        arenas = [row // self.n_robots for row in rows]
         told = {
             arena: getattr(self._arenas.envs[arena], method_name)(*method_args, **method_kwargs)
-            for arena in self._arenas_of(rows)
+            for arena in sorted({*arenas})
         }
-        return [told[row // self.n_robots] for row in rows]
+        return [told[arena] for arena in arenas]
 
     def env_is_wrapped(self, wrapper_class: type[gymnasium.Wrapper], indices: VecEnvIndices = None) -> list[bool]:
         """Return False for each row, but True for `Monitor`, because rows report their episodes in the same way.
@@ -158,14 +151,8 @@ class SwarmVecEnv(VecEnv):
         `evaluate_policy` and `EvalCallback` ask for it. They then count episodes and not dones, which absent rows have,
         too.
         """
-        return [wrapper_class is Monitor] * len(self._rows(indices))
+        return [wrapper_class is Monitor for _ in self._get_indices(indices)]
 
     def close(self) -> None:
         """Close all arenas."""
         self._arenas.close()
-
-    def _rows(self, indices: VecEnvIndices) -> list[int]:
-        return list(self._get_indices(indices))
-
-    def _arenas_of(self, rows: Sequence[int]) -> list[int]:
-        return sorted({row // self.n_robots for row in rows})

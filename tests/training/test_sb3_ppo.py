@@ -170,7 +170,7 @@ def test_a_rollout_of_ppo_with_a_death_a_repair_and_a_time_limit_by_hand(gae_lam
     drawn = torch.cat([batch.returns for batch in batches]).numpy()
     np.testing.assert_allclose(np.sort(drawn), np.sort(expected[taught]), rtol=1e-6)
     seen = torch.cat([batch.observations for batch in batches]).numpy()
-    assert np.all(seen[:, env.active_column] == 1.0)
+    assert np.all(seen[:, env.interface.active_column] == 1.0)
     assert len(next(model.rollout_buffer.get()).returns) == 14
 
 

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import torch
-from gymnasium import spaces
 from stable_baselines3.common.buffers import ReplayBuffer, RolloutBuffer
 from stable_baselines3.common.type_aliases import ReplayBufferSamples, RolloutBufferSamples
 from stable_baselines3.common.vec_env import VecNormalize
@@ -29,51 +28,21 @@ class ActiveRolloutBuffer(RolloutBuffer):
 
     Give it to an algorithm by
     `rollout_buffer_class=ActiveRolloutBuffer, rollout_buffer_kwargs=env.rollout_buffer_kwargs`, with `env` the
-    `SwarmVecEnv`; that holds behind `VecFrameStack`, too. Numbers must reach it as the environment gave them:
-    `VecNormalize(norm_obs=True)` is refused.
+    `SwarmVecEnv`. Numbers must reach it as the environment gave them: `VecNormalize(norm_obs=True)` is refused.
     """
 
-    def __init__(
-        self,
-        buffer_size: int,
-        observation_space: spaces.Space,
-        *args: Any,
-        active_column: int,
-        n_columns: int | None = None,
-        **kwargs: Any,
-    ) -> None:
-        """Create the buffer; arguments as `RolloutBuffer`, and two more.
+    def __init__(self, *args: Any, active_column: int, **kwargs: Any) -> None:
+        """Create the buffer; arguments as `RolloutBuffer`, and `active_column`, which is 1 for robots at work, else 0.
 
-        Args:
-            buffer_size: Steps of a rollout.
-            observation_space: Observations of one row.
-            args: See above.
-            active_column: Column of what the environment gives that is 1 for robots at work, else 0.
-            n_columns: Columns of what the environment gives; observations may be several such frames, the newest last.
-                None: observations are single frames.
-            kwargs: See above.
-
-        Raises:
-            ValueError: the columns of an observation are not a whole number of frames, or a frame has no such column.
+        Several observations in one (`VecFrameStack`) count by the newest, which stands last, if it is counted from the
+        end: `env.rollout_buffer_kwargs` does so.
         """
-        width = (observation_space.shape or (0,))[-1]
-        frame = width if n_columns is None else n_columns
-        if frame < 1 or width % frame or not 0 <= active_column < frame:
-            raise ValueError(
-                f"Expected observations of whole frames of {frame} columns with column {active_column} among them, got "
-                f"{observation_space.shape}; take both numbers from the environment (env.interface)."
-            )
-        self._active_column = width - frame + active_column
-        self._newest = slice(width - frame, width)
-        super().__init__(buffer_size, observation_space, *args, **kwargs)
+        self._active_column = active_column
+        super().__init__(*args, **kwargs)
 
     def at_work(self, observations: np.ndarray) -> np.ndarray:
         """Return which rows of observations (.., columns) are of robots at work, (..) bool."""
         return observations[..., self._active_column] == 1.0
-
-    def present(self, observations: np.ndarray) -> np.ndarray:
-        """Return which rows of observations (.., columns) are of robots in the world, (..) bool; others are zeros."""
-        return np.any(observations[..., self._newest], axis=-1)
 
     def compute_returns_and_advantage(self, last_values: torch.Tensor, dones: np.ndarray) -> None:
         """Compute GAE(lambda) advantages and lambda returns, bridging steps of robots that are not at work.
@@ -91,7 +60,7 @@ class ActiveRolloutBuffer(RolloutBuffer):
         is_active = self.at_work(self.observations)
         if not np.all(is_active | (column == 0.0)):
             raise ValueError(
-                f"Expected column {self._active_column} of observations to be 0 or 1 (active), got "
+                "Expected the active column of observations to be 0 or 1, got "
                 f"{column.min():.3g} to {column.max():.3g}; do not normalize observations (they are in [-1, 1])."
             )
         next_values = last_values.clone().cpu().numpy().flatten()

@@ -37,7 +37,12 @@ def export_network(
         NetworkError: a model of another kind (SAC and TD3 among them), layers that a network file cannot hold, or an
             interface that is not the model's.
     """
-    _check_interface(model, interface)
+    _check_spaces(model, interface)
+    note = getattr(model, MODEL_NOTE, None)
+    if note is not None and interface_from_mapping(note["interface"]) != interface:
+        raise NetworkError(
+            f"Expected the interface that the model was trained with, {note['interface']}, got {interface}."
+        )
     layers = _acting_layers(model)
     between = {type(layer) for layer in layers if not isinstance(layer, nn.Linear)}
     alternates = all(isinstance(layer, nn.Linear) == (k % 2 == 0) for k, layer in enumerate(layers))
@@ -72,15 +77,6 @@ def note_interface(
     _check_spaces(model, interface)
     draws = has_probabilities(model.policy) if samples is None else samples
     setattr(model, MODEL_NOTE, {"interface": asdict(interface), "caches": caches, "samples": draws})
-
-
-def _check_interface(model: BaseAlgorithm, interface: InterfaceConfig) -> None:
-    _check_spaces(model, interface)
-    note = getattr(model, MODEL_NOTE, None)
-    if note is not None and interface_from_mapping(note["interface"]) != interface:
-        raise NetworkError(
-            f"Expected the interface that the model was trained with, {note['interface']}, got {interface}."
-        )
 
 
 def _check_spaces(model: BaseAlgorithm, interface: InterfaceConfig) -> None:

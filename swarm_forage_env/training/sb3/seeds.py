@@ -80,11 +80,11 @@ def train_seeds(
     n_processes = processes_of(len(seeds), jobs)
     check_plan(plan)
     check_folder(folder)
-    failures: dict[int, str] = {}
+    failures: dict[str, str] = {}
 
     def told(seed: int, news: TrainingStatus | Evaluation | str) -> None:
         if isinstance(news, str):
-            failures[seed] = news
+            failures[seed_folder(folder, seed).name] = news
         if report is not None:
             report(seed, news)
 
@@ -93,14 +93,9 @@ def train_seeds(
         todo = [job for seed in seeds if (job := _job(replace(plan, seed=seed), folder, resume)) is not None]
         plan.write(folder / PLAN_FILE)
         _train_all(todo, n_processes, told)
-        return read_seeds(folder, seeds, failures)
-
-
-def read_seeds(folder: Path, seeds: Sequence[int], failures: dict[int, str]) -> Trainings:
-    """Return how trainings with several seeds went so far, those that have been evaluated; `failures` by seed."""
-    begun = [seed_folder(folder, seed) for seed in seeds if (seed_folder(folder, seed) / EVALUATIONS_FILE).exists()]
-    named = {seed_folder(folder, seed).name: reason for seed, reason in failures.items()}
-    return beside_baseline([read_training(place) for place in begun], named)
+        places = [seed_folder(folder, seed) for seed in seeds]
+        begun = [read_training(place) for place in places if (place / EVALUATIONS_FILE).exists()]
+        return beside_baseline(begun, failures)
 
 
 def is_finished(folder: Path) -> bool:
@@ -137,7 +132,7 @@ def _job(plan: TrainingPlan, folder: Path, resume: bool) -> _Job | None:
 
 
 def _train_all(todo: Sequence[_Job], n_processes: int, report: SeedReport) -> None:
-    """Train so many at a time; each process tells at last that it has ended: None."""
+    """Train so many at a time, each in a process that closes its connection at the end."""
     waiting, running = deque(todo), dict[Any, tuple[int, BaseProcess]]()
     try:
         while waiting or running:
@@ -147,37 +142,31 @@ def _train_all(todo: Sequence[_Job], n_processes: int, report: SeedReport) -> No
             for connection in wait([*running], WAKE_UP_EVERY_S):
                 seed, process = running[connection]
                 try:
-                    news = connection.recv()  # type: ignore[union-attr] - it is one of ours
+                    report(seed, connection.recv())  # type: ignore[union-attr] - it is one of ours
                 except (EOFError, OSError):
                     process.join()
-                    report(seed, _how_it_ended(process.exitcode or 0))
-                    news = None
-                else:
-                    if news is not None:
-                        report(seed, news)
-                if news is None:
                     del running[connection]
-                    process.join()
+                    if process.exitcode:
+                        report(seed, _how_it_ended(process.exitcode))
     except BaseException:
         _stop([process for _, process in running.values()])
         raise
 
 
 def _how_it_ended(code: int) -> str:
-    """Say how a process ended that did not say it itself, and what to do."""
+    """Say how a process ended that failed without a word, and what to do."""
     how = f"its process ended with {f'exit code {code}' if code >= 0 else f'signal {-code}'}"
     if code == -getattr(signal, "SIGKILL", 9):  # Windows has none
         how = "its process was killed, most likely because memory ran out; try fewer at a time (--jobs 1)"
     return f"{how}; --resume (with --trust-models) goes on with it"
 
 
-def _started(job: _Job) -> tuple[Any, BaseProcess]:
+def _started(job: _Job) -> tuple[Connection, BaseProcess]:
     """Start the process of a training; returns what it tells through."""
     context = get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_train_here, args=(job, theirs), name=job[1].name)
-    wrappers = map(type, job[0].world.wrappers)
-    with single_threaded_children(), deaf_children(), scriptless_children(wrappers):
+    with single_threaded_children(), deaf_children(), scriptless_children(map(type, job[0].world.wrappers)):
         process.start()
     theirs.close()
     return ours, process
@@ -194,7 +183,6 @@ def _train_here(job: _Job, driver: Connection) -> None:
         sys.exit(128 + signal.SIGTERM)
     except Exception as error:  # noqa: BLE001 - whatever a training raises is its failure
         driver.send(" ".join(str(error).split()) if isinstance(error, ConfigError) else in_words(error))
-    driver.send(None)
 
 
 def _interrupt(*_: object) -> None:

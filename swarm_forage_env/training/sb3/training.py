@@ -313,7 +313,7 @@ class _Watch(BaseCallback):
         self.plan, self._folder, self._report, self._extra = plan, folder, report, extra_observation
         made_by = {"versions": {"stable-baselines3": stable_baselines3.__version__, "torch": str(torch.__version__)}}
         self.evaluator = Evaluator(plan, folder, made_by, resume=True)  # the folder was looked at
-        self._last_report, self._next_evaluation = -math.inf, 0
+        self._last_report = -math.inf
 
     def keep(self, model: BaseAlgorithm) -> None:
         """Write a checkpoint, beside the plan that it is one of.
@@ -331,18 +331,14 @@ class _Watch(BaseCallback):
 
     def _on_training_start(self) -> None:
         self.plan.write(self._folder / PLAN_FILE)  # not before arenas and model are known to be possible
-        if self._next_evaluation == 0:
-            self._report(TrainingStatus(steps=self.num_timesteps, episode_return=math.nan))
-            self._next_evaluation = self.num_timesteps + self.plan.evaluation.every_steps
-            if self.evaluator.is_due(self.num_timesteps):  # it was killed before it was done
-                self._evaluate()
+        self._report(TrainingStatus(steps=self.num_timesteps, episode_return=math.nan))
 
     def _on_step(self) -> bool:
         return True
 
     def _on_rollout_start(self) -> None:
         # Not at the end of a rollout, which has not taught anything yet.
-        if self.num_timesteps >= self._next_evaluation:
+        if self.evaluator.is_due(self.num_timesteps):
             self._evaluate()
 
     def _on_rollout_end(self) -> None:
@@ -361,7 +357,6 @@ class _Watch(BaseCallback):
 
     def _evaluate(self) -> None:
         """Keep a checkpoint, run the policy, and note how it did."""
-        self._next_evaluation = self.num_timesteps + self.plan.evaluation.every_steps
         self.keep(self.model)
         plan, network, policy = self.plan, None, None
         if plan.algorithm in EXPORTABLE:
