@@ -29,7 +29,7 @@ import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector.utils import batch_space
 
-from swarm_forage_env._internal.archives import ArchiveError, read_arrays
+from swarm_forage_env._internal.archives import read_arrays
 from swarm_forage_env._internal.fields import ConfigError, Count, checked, known_keys
 from swarm_forage_env._internal.files import alone_in, check_folder, read_json, replacing
 from swarm_forage_env._internal.rng import Stream, stream_rng
@@ -135,19 +135,12 @@ class Dataset:
 
 def read_steps(file: str | Path) -> Steps:
     """Read a run; raises DatasetError for a file that is damaged or holds other arrays."""
+    path = Path(file)
     try:
-        arrays: dict[str, Any] = read_arrays(Path(file))
-        if {*arrays} != {*ARRAYS}:
-            raise ArchiveError(f"Expected the arrays {', '.join(ARRAYS)}, got {', '.join(arrays)}.")
-        n_steps, n_robots = arrays["rewards"].shape
-        for name, array in arrays.items():
-            if array.shape[:2] != (n_steps + (name in _LONGER_BY_ONE), n_robots):
-                raise ArchiveError(f"Expected {name} of {n_steps} decisions of {n_robots} robots, got {array.shape}.")
-    except OSError as error:
-        raise DatasetError(f"Cannot read {file}: {error.strerror or error}.") from error
-    except ValueError as error:
+        arrays: dict[str, Any] = read_arrays(path)
+        return Steps(seed=int(path.stem.removeprefix("seed_")), **arrays)
+    except (OSError, TypeError, ValueError) as error:
         raise DatasetError(f"Expected {file} to be a run of a data set: {error} Record it again.") from error
-    return Steps(seed=int(Path(file).stem.removeprefix("seed_")), **arrays)
 
 
 def record_dataset(

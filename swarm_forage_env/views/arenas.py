@@ -27,7 +27,11 @@ from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.plans import ArenaPlan, plan_arena, takes
 from swarm_forage_env.wrappers.base import SwarmWrapper
 
-_NOBODY: Any = np.zeros(0, np.int32)
+_NOBODY = np.zeros(0, np.int32)
+
+
+def _nobody() -> Any:
+    return _NOBODY
 
 
 @dataclass(kw_only=True, slots=True)
@@ -44,15 +48,15 @@ class ArenaStep:
     """(R,) rows whose arena reached its horizon while their robot could have gone on."""
     active: BoolArray
     """(R,) rows whose robot is at work in `obs`."""
-    ended: IntArray = _NOBODY
+    ended: IntArray = field(default_factory=_nobody)
     """(E,) rows that are done, ascending."""
-    final_obs: ObsArray = _NOBODY
+    final_obs: ObsArray = field(default_factory=_nobody)
     """(E, d) their last observations, where E > 0."""
-    is_episode: BoolArray = _NOBODY
+    is_episode: BoolArray = field(default_factory=_nobody)
     """(E,) True where an episode ended, False where the row was absent."""
-    returns: np.ndarray = _NOBODY
+    returns: np.ndarray = field(default_factory=_nobody)
     """(E,) float64, sums of rewards; float32 would lose the small ones of long runs."""
-    lengths: IntArray = _NOBODY
+    lengths: IntArray = field(default_factory=_nobody)
     """(E,) steps that began with the robot in the world."""
     outcomes: dict[int, dict[str, Any]] = field(default_factory=dict)
     """Arenas whose run ended -> its seed, simulated seconds, objects collected and first_picked, scenario (its name),

@@ -153,11 +153,9 @@ def test_damaged_files_are_named(tmp_path):
     dataset = recorded(tmp_path)
     run = tmp_path / "seed_000003.npz"
     with np.load(run) as stored:
-        arrays = dict(stored)
-    for told, change in {"active": arrays["active"][1:], "observations": arrays["observations"][:, 1:]}.items():
-        np.savez(run, **arrays | {told: change})
-        with pytest.raises(DatasetError, match=rf"seed_000003\.npz.*{told} of 100 decisions of 4 robots"):
-            first(dataset)
+        np.savez(run, **{name: array for name, array in stored.items() if name != "active"})
+    with pytest.raises(DatasetError, match=r"seed_000003\.npz.*active"):
+        first(dataset)
     for content in (b"", b"no archive", run.read_bytes()[:500]):
         run.write_bytes(content)
         with pytest.raises(DatasetError, match=r"seed_000003\.npz"):

@@ -134,7 +134,7 @@ def train(
         if resume:
             trust.check(folder / MODEL_FILE)
         torch.set_num_threads(1)  # networks this small gain nothing from more, and arenas want the cores
-        watch = _Watch(plan, folder, report or _keep_quiet, extra_observation)
+        watch = _Watch(plan, folder, report or (lambda _: None), extra_observation)
         return _train(plan, folder, watch, CallbackList([watch, *callbacks]), extras)
 
 
@@ -158,7 +158,7 @@ def _train(
             model = _prepared(plan, stage, folder, env, done, checkpoint)
             setattr(model, _PART, part)
             number = max(1, part + 2 - starts)
-            _learn(model, max(0, end - done), callbacks, watch, f"stage {number}{_changes(stage)}")
+            _learn(model, max(0, end - done), callbacks, watch, f"stage {number}")
         finally:
             env.close()
         done = model.num_timesteps
@@ -272,11 +272,6 @@ def training_seed(seed: int, done: int) -> int:
     return int(np.random.default_rng((seed, done)).integers(2**31))
 
 
-def _changes(stage: Stage) -> str:
-    fields = ", ".join(f"{name} = {value}" for name, value in stage.scenario.items())
-    return f", with {fields}" if fields else ""
-
-
 def _learn(model: BaseAlgorithm, steps: int, callbacks: BaseCallback, watch: "_Watch", where: str) -> None:
     try:
         model.learn(steps, callback=callbacks, reset_num_timesteps=False, tb_log_name=watch.plan.algorithm)
@@ -378,7 +373,3 @@ class _Watch(BaseCallback):
     def _seeing_more(self, network: Network) -> Policy:
         """The network with the function of the user that it needs."""
         return LearnedPolicy(network.about.interface, network.choose, extra_observation=self._extra)
-
-
-def _keep_quiet(news: TrainingStatus | Evaluation) -> None:
-    """Report to nobody."""
