@@ -70,16 +70,13 @@ _LINE = "line of the file"
 """Column for places in messages; no table of curves has one of this name."""
 
 
-def read_curves(
-    source: str | Path | pl.DataFrame, performance: str | None = None, **how: Any
-) -> tuple[StudyCurves, ...]:
+def read_curves(source: str | Path | pl.DataFrame, **how: Any) -> tuple[StudyCurves, ...]:
     """Read curves; one study per policy in them.
 
     Args:
         source: A Parquet file; or a text with a line of column names, and with commas, semicolons or tabs between
             values. Beside semicolons and tabs, commas in numbers are decimal. Or a table of such columns, such as
             `Record.frame`.
-        performance: As in `study_curves`.
         how: Further arguments of `study_curves`.
 
     Raises:
@@ -97,7 +94,7 @@ def read_curves(
             raise CurveError(f"Cannot read {file}: {error.strerror or error}.") from error
         except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
             raise CurveError(f"Cannot read {file} as Parquet: {str(error).splitlines()[0]}.") from error
-    studies = study_curves(frame, performance, **about, **how)
+    studies = study_curves(frame, **about, **how)
     for study in studies:
         for criterion in (THROTTLE, HANDLING, NOISE, POPULATION):
             study.levels(criterion)  # each has a reference
@@ -141,7 +138,6 @@ def _read_text(file: Path) -> pl.DataFrame:
 
 def study_curves(
     frame: pl.DataFrame,
-    performance: str | None = None,
     *,
     columns: Mapping[str, str] | None = None,
     events: bool = False,
@@ -154,9 +150,8 @@ def study_curves(
     Args:
         frame: Rows in any order, one per interval of a run with columns as in `CURVE_COLUMNS`, or one per delivery with
             those of `EVENT_COLUMNS`. Runs are cut to the shortest; `StudyCurves.note` says so.
-        performance: Column that is read as performance, or "1/" and a column in which less is better; default
-            "performance".
-        columns: Our name of a column -> its name in the table, or a number, which then stands in each row.
+        columns: Our name of a column -> its name in the table, or a number, which then stands in each row. That of
+            performance may be "1/" and a column in which less is better.
         events: Whether a row is a delivery.
         interval_s: Length of an interval, s. Needed for events; of curves without `END`, where it is known.
         where: Name of the table in messages.
@@ -170,14 +165,14 @@ def study_curves(
     if interval_s is not None and not 0.0 < interval_s <= MOST:
         raise CurveError(f"Expected an interval of more than 0 s, got {interval_s:g} s.")
     names = dict(columns or {})
-    if performance is not None:
-        names["performance"] = performance.removeprefix(INVERTED)
+    performance = names.get("performance", "performance")
+    names |= {"performance": performance.removeprefix(INVERTED)} if "performance" in names else {}
     known = EVENT_COLUMNS if events else CURVE_COLUMNS
     given = _Given.named(frame, names, known, where)
     clock = TIME if events else END if END in given.frame.columns else "interval"
     given.require("n_robots", "seed", clock, *([] if events else ["performance"]))
     table, note = _with_experiments(given.typed(known), given, controller), ""
-    if performance is not None and performance.startswith(INVERTED):  # 1/0 is 0: distances need finite curves
+    if performance.startswith(INVERTED):  # 1/0 is 0: distances need finite curves
         inverse = pl.when(pl.col("performance") != 0.0).then(1.0 / pl.col("performance")).otherwise(0.0)
         table = table.with_columns(performance=inverse)
     if events:
@@ -236,9 +231,9 @@ def _same(ends_s: Sequence[FloatArray], where: str) -> FloatArray | None:
     return ends_s[0] if ends_s else None
 
 
-def _performance(name: str | None) -> Performance:
+def _performance(name: str) -> Performance:
     """Return what a column is as performance."""
-    if name is None:
+    if name == "performance" or _is_number(name):
         return DELIVERIES
     # Nobody knows what a column of one's own is; it is taken for a total. An inverse is none, and does not add up.
     known = PERFORMANCE_COLUMNS.get(name, Performance(name, is_total=True, adds_up=True))

@@ -69,7 +69,6 @@ def score_question(
     budget: str | Budget = "standard",
     seeds: int | Sequence[int] | None = None,
     horizon_s: float | None = None,
-    performance: str | None = None,
     density: float | None = None,
     disturbance: str = THROTTLE,
     variants: Sequence[Variant] = ("corrected",),
@@ -89,12 +88,9 @@ def score_question(
             numbers of runs and clock of these; without policies the plan has no runs.
         measures: Names in `MEASURES`; default all.
         budget: "quick", "standard", "paper" (`swarm_forage_env.studies.ladders.BUDGETS`), or one of your own. It and
-            all until `disturbance` but `performance` need policies without curves.
+            all until `disturbance` need policies without curves.
         seeds: Their number, or a list; default those of the budget. All experiments use them, so runs are paired.
         horizon_s: Length of a run in seconds, whole intervals; default that of the budget.
-        performance: What P(N, t) is: a recorded column ("n_carrying"), "1/" and a column in which less is better
-            ("1/interference_fraction"), "task_balance" or "cache_load". Default that of the scenario. It changes how
-            runs are read; stored ones are not repeated.
         density: Robots per m^2 at all swarm sizes: the arena grows with the swarm, and one robot is in the smallest
             arena. Default: all sizes are in the scenario's arena (in search and rescue: at its density).
         disturbance: Disturbance for reactivity and adaptability: "throttle" (robots lose speed) or "handling_cost"
@@ -106,8 +102,6 @@ def score_question(
     """
     wanted = checked_request(measures, variants, forms)
     chosen = world_of(world)
-    if performance is not None:
-        chosen = replace(chosen, scenario=replace(chosen.scenario, performance=performance))
     specs = policy_specs(cast("Any", policies if isinstance(policies, Mapping | list | tuple) else [policies]))
     labels = [*(spec.label for spec in specs), *(study.controller for study in curves)]
     if against is not None:

@@ -45,13 +45,6 @@ Seed = Annotated[NonNegativeInt, Parameter(help="Seed of the run; of several run
 Jobs = Annotated[
     PositiveInt | None, Parameter(help="Number of processes; default one per usable core; 1 = only this process.")
 ]
-Performance = Annotated[
-    str | None,
-    Parameter(
-        help="What counts as performance: a recorded column (see 'swarm-forage list columns'), 1/COLUMN if less is "
-        "better, task_balance or cache_load; default the scenario's."
-    ),
-]
 Picture = Annotated[Path | None, Parameter(help="Picture to draw: .png, .svg or .pdf; default beside the results.")]
 AnswerFile = Annotated[
     Path | None, Parameter(name="--file", help="Also write the answer to a file: .txt, .md, .tex, .csv or .json.")
@@ -73,7 +66,8 @@ class WorldOptions:
         Parameter(
             name="--set",
             help="KEY=VALUE: set any field of the scenario, such as n_objects=100, density=0.05 (robots per m2: the "
-            "arena becomes as large as the swarm needs) or performance=cache_pickups; may be repeated.",
+            "arena becomes as large as the swarm needs) or performance=cache_pickups (see 'swarm-forage list "
+            "columns'); may be repeated.",
         ),
     ] = ()
     wrappers: Annotated[
@@ -123,7 +117,7 @@ class CurveOptions:
         Path | None, Parameter(help="Score the curves of a .csv or .parquet file; policies run as long as these.")
     ] = None
     columns: Annotated[
-        str, Parameter(help="OURS=THEIRS,...: what columns of the file are called, or a number for all rows.")
+        str, Parameter(help="OURS=THEIRS,...: names of columns in the file, or 1/COLUMN, or a number for all rows.")
     ] = ""
     events: Annotated[bool, Parameter(negative="", help="A row of the file is a delivery with its time_s.")] = False
     interval: Annotated[float | None, Parameter(help="Length of an interval, s; needed for --events.")] = None

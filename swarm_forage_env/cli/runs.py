@@ -13,7 +13,6 @@ from swarm_forage_env.cli.options import (
     AsJson,
     CurveOptions,
     Names,
-    Performance,
     Policies,
     RunOptions,
     Seed,
@@ -55,7 +54,6 @@ def score(
     world: WorldOptions = WorldOptions(),
     options: RunOptions = RunOptions(),
     curves: CurveOptions = CurveOptions(),
-    performance: Performance = None,
     measures: Names = (),
     variant: Names = ("corrected",),
     form: Names = ("marginal",),
@@ -90,14 +88,12 @@ def score(
         if not policies and world != WorldOptions():
             raise ConfigError("Expected policies to run in a world beside --curves, got a world alone.")
         told = {"columns": curves.named_columns(), "events": curves.events, "interval_s": curves.interval}
-        asked["curves"] = read_curves(file, performance, **told)
+        asked["curves"] = read_curves(file, **told)
         options = replace(options, picture=options.picture or file.with_name(f"{file.stem}_scores.png"))
     elif curves != CurveOptions():
         raise ConfigError("Expected a file with --curves for --columns, --events and --interval, got none.")
     elif not policies:
         raise NothingAskedError("Expected policies, or a file with --curves; 'swarm-forage list' names policies.")
-    elif performance is not None:
-        world = replace(world, settings=(*world.settings, f"performance={performance}"))
     for word in world.settings:
         if word.partition("=")[0] in ("horizon_s", "interval_s"):
             raise ConfigError(f"Expected no --set {word}, which the budget sets; --horizon changes the length of runs.")

@@ -64,8 +64,8 @@ def test_columns_have_other_names_or_one_value():
 
 def test_performance_is_another_column_or_its_inverse():
     frame = TWO_SIZES.filter(n_robots=1, seed=0).with_columns(wait=pl.Series([4.0, 0.0]))
-    assert by_size(only(frame, performance="wait")) == {1: [[4.0, 0.0]]}
-    inverse = only(frame, performance="1/wait")
+    assert by_size(only(frame, columns={"performance": "wait"})) == {1: [[4.0, 0.0]]}
+    inverse = only(frame, columns={"performance": "1/wait"})
     assert by_size(inverse) == {1: [[0.25, 0.0]]}
     assert not inverse.read_as.adds_up
 
@@ -191,7 +191,10 @@ def test_bad_tables_get_one_line_that_says_where(frame, message):
 BAD_REQUESTS = {
     "unknown column": ({"columns": {"performance": "itms"}}, "a column itms for performance .* Did you mean 'items'"),
     "unknown name of ours": ({"columns": {"performence": "items"}}, "Did you mean 'performance'"),
-    "place of a named column": ({"performance": "items"}, r"line 1 of .*, column items \(performance\), got 'x'"),
+    "place of a named column": (
+        {"columns": {"performance": "items"}},
+        r"line 1 of .*, column items \(performance\), got 'x'",
+    ),
     "no interval for events": ({"events": True}, "the length of an interval"),
     "interval of 0 s": ({"interval_s": 0.0}, "an interval of more than 0 s"),
     "events without time": ({"events": True, "interval_s": 1.0}, "the column time_s"),
