@@ -289,3 +289,40 @@ def known_name(what: str, name: Any, known: Iterable[str], *, all_by: str = "") 
         near = nearest(str(name), names)
         others = (f"Near it: {', '.join(near)}. " if near[1:] else "") + f"All {len(names)}: {all_by}."
     raise ConfigError(f"Unknown {what} {name!r}.{suggestion(str(name), names)} {others}")
+
+
+def settings(what: str, text: str) -> dict[str, Any]:
+    """Return the words of "key=value,key=value" by name. A dot names a key inside a table, "+" joins members of a list.
+
+    Args:
+        what: What is set, for the message.
+        text: At least one such word.
+
+    Raises:
+        ConfigError: a word that is no key=value, or a key that comes twice.
+    """
+    mapping: dict[str, Any] = {}
+    for setting in text.split(","):
+        key, equals, value = (part.strip() for part in setting.partition("="))
+        if not (key and equals and value):
+            raise ConfigError(f"Expected {what} as key=value, got {setting!r} in {text!r}.")
+        *parents, last = key.split(".")
+        target = mapping
+        for parent in parents:
+            target = target.setdefault(parent, {})
+        if not isinstance(target, dict) or last in target:
+            raise ConfigError(f"Expected {key} once, and either as a value or as a table, got {text!r}.")
+        target[last] = _plain_value(value)
+    return mapping
+
+
+def _plain_value(text: str) -> Any:
+    """Read a word as a truth value, a number or a text; if it is no number and has a "+", as a list."""
+    if text.lower() in ("true", "false"):
+        return text.lower() == "true"
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return [_plain_value(word) for word in text.split("+")] if "+" in text else text

@@ -487,17 +487,8 @@ def chosen_interface(given: GivenInterface, default: InterfaceConfig | None = No
     if given is None:
         return default
     if isinstance(given, Mapping):
-        return interface_from_mapping({**asdict(default), **given})
+        return read(InterfaceConfig, {**asdict(default), **given}, "interface")
     raise ConfigError(
         f"Expected interface as an InterfaceConfig or its fields by name, such as {{'actions': 'discrete'}}, "
         f"got {given!r}."
     )
-
-
-def interface_from_mapping(mapping: Mapping[str, Any]) -> InterfaceConfig:
-    """Build a configuration from fields by name, as trained policies store it.
-
-    Raises:
-        ConfigError: an unknown key or value.
-    """
-    return read(InterfaceConfig, mapping, "interface")

@@ -6,8 +6,6 @@ wherever the name of a policy may.
 
 import hashlib
 import itertools
-import warnings
-from dataclasses import asdict
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -26,7 +24,6 @@ from swarm_forage_env.policies.interface import (
     InterfaceConfig,
     any_swarm,
     chosen_interface,
-    interface_from_mapping,
 )
 from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.policies.network import Network, NetworkPolicy
@@ -35,10 +32,6 @@ from swarm_forage_env.scenarios.config import CACHE_KINDS
 MODEL_NOTE = "swarm_forage_note"
 """Attribute of a model, saved with it: {"interface": fields, "caches": kind, "samples": whether it draws}."""
 _DIGEST_DIGITS = 16
-
-
-class InterfaceGuessWarning(UserWarning):
-    """A model without a note: what its spaces show is taken, and one tick per decision, which they do not show."""
 
 
 class ModelError(ValueError):
@@ -55,8 +48,7 @@ class ModelPolicy(LearnedPolicy):
 
     * the note that our training leaves in the file (`training.sb3.export.note_interface`),
     * the parameter `interface`, whose fields override those of the note,
-    * its spaces. They do not show how many ticks a decision lasts; 1 is taken, and an `InterfaceGuessWarning` says so
-      unless `digest` is given.
+    * its spaces. They do not show how many ticks a decision lasts, so without a note that has to be said.
 
     Nothing is normalised: a model trained behind `VecNormalize` gets other numbers than in training.
 
@@ -77,8 +69,8 @@ class ModelPolicy(LearnedPolicy):
 
         Raises:
             ImportError: stable-baselines3 is not installed.
-            ModelError: the file is missing, has changed, or does not hold such a model; or its spaces are not those of
-                its interface.
+            ModelError: the file is missing, has changed, or does not hold such a model; its spaces are not those of its
+                interface; or nothing says how many ticks a decision lasts.
             ConfigError: an unknown field or value in `interface`.
         """
         name = Path(path).name
@@ -90,7 +82,12 @@ class ModelPolicy(LearnedPolicy):
             draws = draws and samples
         if note is None and not isinstance(interface, InterfaceConfig):
             said = dict(interface or {})
-            interface_from_mapping(said)  # refuses unknown fields and values
+            chosen_interface(said)  # refuses unknown fields and values
+            if "decision_ticks" not in said:
+                raise ModelError(
+                    f"Expected the ticks of a decision for {name}, which has no note of its training, got none; say "
+                    f"{name}:decision_ticks=1 if it decides in every tick."
+                )
             config = _deduced(found, tuple(said.items()))
             if config is None:
                 raise ModelError(
@@ -98,8 +95,6 @@ class ModelPolicy(LearnedPolicy):
                     f"{' to '.join(found)}. Say what it was trained with, such as {name}:neighbours_seen=3, or call "
                     "training.sb3.export.note_interface(model, interface) before it is saved."
                 )
-            if digest is None and "decision_ticks" not in said:
-                warnings.warn(_told(name, config, draws), InterfaceGuessWarning, stacklevel=2)
         config = chosen_interface(interface, config)
         fitting = describe_spaces(any_swarm(config))
         if found != fitting:
@@ -134,23 +129,12 @@ def _deduced(found: tuple[str, str], said: tuple[tuple[str, Any], ...]) -> Inter
     for seen, done, grips, remembers in itertools.product(OBSERVATIONS, ACTIONS, (False, True), (False, True)):
         fields = {"observation": seen, "actions": done, "automatic_gripper": grips, "site_memory": remembers}
         try:
-            config = interface_from_mapping({**fields, **dict(said)})
+            config = chosen_interface({**fields, **dict(said)})
         except ConfigError:  # no messages beside discrete actions
             continue
         if describe_spaces(any_swarm(config)) == found:
             return config
     return None
-
-
-def _told(name: str, config: InterfaceConfig, draws: bool) -> str:
-    """Say how a model without a note runs, and what to add."""
-    default = asdict(InterfaceConfig())
-    shown = ",".join(f"{key}={value}".lower() for key, value in asdict(config).items() if value != default[key])
-    return (
-        f"{name} has no note of its training. By its spaces it runs with {shown or 'full observations and commands'}, "
-        f"{'draws its actions' if draws else 'takes its best actions'}, and decides in every tick; if it decided less "
-        f"often, say so: {name}:decision_ticks=5. export_network (training.sb3) makes faster files of most."
-    )
 
 
 def has_probabilities(network: Any) -> bool:
@@ -162,7 +146,7 @@ def _read_note(note: Any, name: str) -> tuple[InterfaceConfig, str, bool]:
     """Return interface, caches and whether actions are drawn, as a note says; raises ModelError for something else."""
     try:
         values = table("it", note)
-        interface = interface_from_mapping(table("interface", values.get("interface")))
+        interface = chosen_interface(table("interface", values.get("interface")))
         one_of("caches", values.get("caches"), CACHE_KINDS)
         checked("samples", values.get("samples"), bool)
     except ConfigError as error:

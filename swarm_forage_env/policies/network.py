@@ -9,28 +9,22 @@ import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from swarm_forage_env._internal.archives import ArchiveError, read_arrays
-from swarm_forage_env._internal.fields import ConfigError, checked, known_keys, number, one_of, table
+from swarm_forage_env._internal.fields import Checked, ConfigError, number, read
 from swarm_forage_env._internal.files import json_text, parse_json, replacing
 from swarm_forage_env.contract.kernel_policy import KernelPolicy
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ObsArray
-from swarm_forage_env.policies.interface import (
-    InterfaceConfig,
-    LearnerInterface,
-    any_swarm,
-    interface_from_mapping,
-)
+from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, any_swarm
 from swarm_forage_env.policies.kernels.network import Choice, Layers, forward, step_network
 from swarm_forage_env.policies.kernels.products import LANES, ROWS
 from swarm_forage_env.policies.learned import InterfacePolicy, check_extra
-from swarm_forage_env.scenarios.config import CACHE_KINDS
+from swarm_forage_env.scenarios.config import CacheKind
 
-ACTIVATIONS = ("tanh", "relu")
 TEMPERATURES = (0.0001, 100.0)
 """Least and largest temperature; our choice: further out, actions are drawn as by the likeliest or by chance. Values of
 actions (DQN) lie closer together than logits, and need a lower one."""
@@ -42,7 +36,7 @@ class NetworkError(ConfigError):
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class NetworkAbout:
+class NetworkAbout(Checked):
     """What is needed besides the weights, as plain values.
 
     Raises:
@@ -50,21 +44,15 @@ class NetworkAbout:
     """
 
     interface: InterfaceConfig
-    activation: str
+    activation: Literal["tanh", "relu"]
     """What follows on every layer except the last, "tanh" or "relu". The weights do not tell it."""
     samples: bool
     """Whether discrete actions are drawn by the softmax of the outputs, as the logits of PPO and A2C want it; if not,
     the one with the largest output is taken. Continuous actions are always the mean."""
-    caches: str = "none"
+    caches: CacheKind = "none"
     """Kind of caches that the policy was trained with; the default for its runs."""
     card: dict[str, Any] = field(default_factory=dict)
     """How the network was made, as a text for readers."""
-
-    def __post_init__(self) -> None:
-        one_of("activation", self.activation, ACTIVATIONS)
-        one_of("caches", self.caches, CACHE_KINDS)
-        checked("samples", self.samples, bool)
-        table("card", self.card)
 
     def to_json(self) -> str:
         """Return the text that files hold."""
@@ -74,11 +62,8 @@ class NetworkAbout:
     def from_json(cls, text: str) -> "NetworkAbout":
         """Read the text back; raises NetworkError where it says something else."""
         try:
-            mapping = table("it", parse_json(text))
-            known_keys(mapping, cls.__dataclass_fields__, "key about a network")
-            interface = interface_from_mapping(table("interface", mapping.get("interface")))
-            return cls(**{**mapping, "interface": interface})
-        except (TypeError, ValueError) as error:
+            return read(cls, parse_json(text))
+        except ValueError as error:
             raise NetworkError(f"Expected a description of a network, got {text[:80]!r}: {error}") from error
 
 

@@ -1,7 +1,6 @@
 """How a policy is found and made: by its registered name, from a file, from a function."""
 
 import re
-import tomllib
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from functools import partial
@@ -11,9 +10,9 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import ConfigError, settings
 from swarm_forage_env._internal.wording import suggestion
-from swarm_forage_env.contract.policy import Policy, SwarmSpec, real_numbers
+from swarm_forage_env.contract.policy import Policy, SwarmSpec, as_actions
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.policies import trust
 
@@ -70,24 +69,12 @@ class CallablePolicy:
         self.name = name
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
-        """Remember which shapes of actions fit."""
-        self._shapes = spec.action_shapes
+        """Remember which actions fit."""
+        self._spec = spec
 
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
-        """Return the function's actions, checked for type and shape; raises ValueError otherwise."""
-        given = self.function(obs)
-        try:
-            actions = real_numbers(given)
-        except (TypeError, ValueError) as error:
-            raise ValueError(
-                f"Expected policy {self.name!r} to return real numbers, one row per robot: {error}."
-            ) from error
-        if actions.shape not in self._shapes:
-            raise ValueError(
-                f"Expected policy {self.name!r} to return actions with shape (n_robots, 3) = "
-                f"{' or '.join(map(str, self._shapes))}, got {actions.shape}; return one row per robot."
-            )
-        return actions
+        """Return the function's actions; raises ActionError for what are none."""
+        return as_actions(self.function(obs), self._spec.n_robots, self._spec.message_size)
 
 
 def from_callable(function: Callable[[ObsArray], ActionArray], *, name: str | None = None) -> CallablePolicy:
@@ -118,16 +105,7 @@ class PolicyFile(NamedTuple):
 
     def interface(self) -> dict[str, Any]:
         """Return the fields that are said with the file; raises ConfigError for a word that is no field=value."""
-        fields: dict[str, Any] = {}
-        for word in filter(None, self.words.split(",")):
-            name, equals, value = (part.strip() for part in word.partition("="))
-            if not (name and equals and value):
-                raise ConfigError(f"Expected the interface of {self.path} as field=value, got {word!r}.")
-            try:
-                fields[name] = tomllib.loads(f"value = {value.lower()}")["value"]
-            except (tomllib.TOMLDecodeError, RecursionError):
-                fields[name] = value
-        return fields
+        return settings(f"the interface of {self.path}", self.words) if self.words else {}
 
 
 def policy_file(policy: str) -> PolicyFile | None:

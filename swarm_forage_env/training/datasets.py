@@ -36,7 +36,7 @@ from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env._internal.wording import install_command
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
-from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
+from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, chosen_interface
 from swarm_forage_env.policies.learned import InterfacePolicy
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import build_env
@@ -100,7 +100,7 @@ class Dataset:
         try:
             known_keys(card, ("run", "interface", "columns"), "key of a data set")
             self.spec = RunSpec.from_mapping(card["run"])
-            self.interface = interface_from_mapping(card["interface"])
+            self.interface = chosen_interface(card["interface"])
             self.columns = tuple(map(str, card["columns"]))
         except (KeyError, TypeError, ConfigError) as error:
             raise DatasetError(f"Cannot use {file}: {error}") from error
@@ -283,7 +283,7 @@ def recorded_env(spec: Mapping[str, Any], interface: Mapping[str, Any], **option
         options: Others of `JointForageEnv`, such as `render_mode`.
     """
     run = RunSpec.from_mapping(spec)
-    seen = interface_from_mapping(dict(interface))
+    seen = chosen_interface(dict(interface))
     return JointForageEnv(run.scenario, wrappers=run.wrappers, interface=seen, **options)
 
 

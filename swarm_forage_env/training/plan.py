@@ -14,7 +14,7 @@ from swarm_forage_env._internal.fields import Checked, ConfigError, Count, Numbe
 from swarm_forage_env._internal.files import json_text, parse_json, parse_toml, replacing
 from swarm_forage_env._internal.wording import suggestion
 from swarm_forage_env.contract.policy import layout_for
-from swarm_forage_env.policies.interface import InterfaceConfig, any_swarm, interface_from_mapping, learner_layout
+from swarm_forage_env.policies.interface import InterfaceConfig, any_swarm, chosen_interface, learner_layout
 from swarm_forage_env.policies.network import TEMPERATURES, Network
 from swarm_forage_env.policies.pretrained import plan_file, plan_names
 from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -302,7 +302,7 @@ class TrainingPlan(Checked):
         else:
             values["world"] = _world(values, World)
         if "interface" in values:
-            values["interface"] = interface_from_mapping(table("interface", values["interface"]))
+            values["interface"] = chosen_interface(table("interface", values["interface"]))
         if "evaluation" in values:
             evaluation = {**table("evaluation", values["evaluation"])}
             worlds = _tables("evaluation.worlds", evaluation.get("worlds", []))

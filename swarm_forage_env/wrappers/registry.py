@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from swarm_forage_env._internal.fields import ConfigError, checked, known_name, table
+from swarm_forage_env._internal.fields import ConfigError, checked, known_name, settings, table
 
 if TYPE_CHECKING:
     from swarm_forage_env.wrappers.base import WrapperConfig
@@ -33,7 +33,7 @@ def wrapper_config_class(name: str) -> "type[WrapperConfig]":
 def parse_wrapper(text: str) -> "WrapperConfig":
     """Build a wrapper configuration from one word of a command line.
 
-    The form is `name:key=value,key=value`. A dot names a key inside a table, "+" joins the members of a list:
+    The form is `name:key=value,key=value`, see `settings`:
 
         throttle:waveform=square,amplitude=0.2,period_s=5000,carriers=true
         sensor_noise:sigma=0.03,groups=proximity+light,sigmas.position=0.1
@@ -42,41 +42,12 @@ def parse_wrapper(text: str) -> "WrapperConfig":
         ConfigError: an unknown name or key, a word that is no key=value, no settings, or values that the
             wrapper refuses; the message has an example.
     """
-    name, _, settings = checked("a wrapper", text, str).strip().partition(":")
+    name, _, words = checked("a wrapper", text, str).strip().partition(":")
     config_class = wrapper_config_class(name)
     try:
-        return config_class.from_mapping(_settings(settings))
+        return config_class.from_mapping(settings("the settings of a wrapper", words))
     except ConfigError as error:
         raise ConfigError(f"{error} For example: {name}:{config_class.example}") from error
-
-
-def _settings(text: str) -> dict[str, Any]:
-    """Return the words key=value of one wrapper as a mapping."""
-    mapping: dict[str, Any] = {}
-    for setting in text.split(","):
-        key, equals, value = (part.strip() for part in setting.partition("="))
-        if not (key and equals and value):
-            raise ConfigError(f"Expected the settings of a wrapper as key=value, got {setting!r} in {text!r}.")
-        *parents, last = key.split(".")
-        target = mapping
-        for parent in parents:
-            target = target.setdefault(parent, {})
-        if not isinstance(target, dict) or last in target:
-            raise ConfigError(f"Expected {key} once, and either as a value or as a table, got {text!r}.")
-        target[last] = _plain_value(value)
-    return mapping
-
-
-def _plain_value(text: str) -> Any:
-    """Read a word as a truth value, a number or a text; if it is no number and has a "+", as a list."""
-    if text.lower() in ("true", "false"):
-        return text.lower() == "true"
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
-    return [_plain_value(word) for word in text.split("+")] if "+" in text else text
 
 
 def wrapper_configs(given: "Iterable[WrapperConfig | str]") -> "tuple[WrapperConfig, ...]":
@@ -112,7 +83,7 @@ def wrappers_from_mapping(tables: Mapping[str, Any]) -> "tuple[WrapperConfig, ..
         ConfigError: an unknown name or key, or values that a wrapper refuses.
     """
     configs = [
-        wrapper_config_class(name).from_mapping(table(f"the settings of wrapper {name}", settings))
-        for name, settings in tables.items()
+        wrapper_config_class(name).from_mapping(table(f"the settings of wrapper {name}", fields))
+        for name, fields in tables.items()
     ]
     return tuple(sorted(configs, key=lambda config: config.stack_position))

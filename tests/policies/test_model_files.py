@@ -2,7 +2,6 @@
 
 import dataclasses
 import sys
-import warnings
 import zipfile
 from pathlib import Path
 
@@ -17,7 +16,6 @@ from swarm_forage_env.policies import model_files
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, any_swarm
 from swarm_forage_env.policies.model_files import (
     MODEL_NOTE,
-    InterfaceGuessWarning,
     ModelError,
     ModelPolicy,
     file_digest,
@@ -30,12 +28,12 @@ from swarm_forage_env.studies.ladders import Budget
 from swarm_forage_env.views.pettingzoo import parallel_env
 from tests.support.branches import pickled
 
-pytestmark = pytest.mark.filterwarnings(f"ignore::{InterfaceGuessWarning.__module__}.{InterfaceGuessWarning.__name__}")
 TINY = Budget(horizon_s=4.0, interval_s=2.0, n_seeds=1, n_sizes=2, n_levels=1)
 ENV = parallel_env("warehouse_small", n_robots=4, n_objects=20)
 OBS = np.random.default_rng(1).uniform(-1.0, 1.0, (4, ENV.layout.size)).astype(np.float32)
 ACTIVE = np.ones(4, bool)
 SIZE = ENV.layout.size
+EACH_TICK = {"interface": {"decision_ticks": 1}}
 NUMBERED = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=3)
 
 
@@ -109,31 +107,13 @@ def test_what_spaces_show_need_not_be_said(tmp_path, algorithm, fields, said):
     options = {"buffer_size": 10} if algorithm == "DQN" else {}
     interface = InterfaceConfig(**fields, **said)
     _, path = model(algorithm, tmp_path, interface, **options)
-    assert load_policy(str(path), {"interface": said})._config == interface
-
-
-def test_what_is_deduced_is_said_once_on_one_line_before_any_run(tmp_path):
-    _, path = model("PPO", tmp_path, dataclasses.replace(NUMBERED, decision_ticks=1))
-    world = scenario("warehouse_small", n_robots=4)
-    words = (
-        r"model\.zip has no note.*observation=compact,actions=discrete,automatic_gripper=true, draws its actions, "
-        r".*model\.zip:decision_ticks=5\. export_network .* of most\.$"
-    )
-    with pytest.warns(InterfaceGuessWarning, match=words) as told:
-        spec = plan_run(world, str(path))
-    assert len(told) == 1
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        load_policy(spec.policy, spec.parameters)  # as every run of the plan does
-        plan_run(world, f"{path}:decision_ticks=1")
-        _, noted = model("A2C", tmp_path, NUMBERED, note=note())
-        load_policy(str(noted))
+    assert load_policy(str(path), {"interface": {**said, "decision_ticks": 1}})._config == interface
 
 
 def test_models_with_probabilities_draw_by_the_chance_of_their_run(tmp_path):
     made, path = model("PPO", tmp_path, dataclasses.replace(NUMBERED, decision_ticks=1))
     rows = np.repeat(OBS[:1], 4, axis=0)
-    drawn = [[started(path, seed).act(rows, ACTIVE).copy() for _ in range(2)] for seed in range(6)]
+    drawn = [[started(path, seed, **EACH_TICK).act(rows, ACTIVE).copy() for _ in range(2)] for seed in range(6)]
     assert all(np.array_equal(*pair) for pair in drawn), "the same chance, the same actions"
     assert len({pair[0].tobytes() for pair in drawn}) > 3
     _, path = model("PPO", tmp_path, NUMBERED, note=note())
@@ -144,10 +124,11 @@ def test_models_with_probabilities_draw_by_the_chance_of_their_run(tmp_path):
 
 def test_a_model_of_the_whole_swarm_sees_all_rows_at_once(tmp_path):
     made, path = model("A2C", tmp_path, seen=box(4, SIZE), done=box(4, 3))
-    np.testing.assert_array_equal(started(path).act(OBS, ACTIVE), made.predict(OBS, deterministic=True)[0])
+    policy = started(path, **EACH_TICK)
+    np.testing.assert_array_equal(policy.act(OBS, ACTIVE), made.predict(OBS, deterministic=True)[0])
     other = parallel_env("warehouse_small", n_robots=5, n_objects=20)
     with pytest.raises(ModelError, match=r"the 4 robots that .* steers, got 5"):
-        load_policy(str(path)).reset(other.swarm_spec, np.random.default_rng(0))
+        load_policy(str(path), EACH_TICK).reset(other.swarm_spec, np.random.default_rng(0))
 
 
 @pytest.mark.parametrize(
@@ -155,10 +136,11 @@ def test_a_model_of_the_whole_swarm_sees_all_rows_at_once(tmp_path):
     [
         (
             {"seen": box(7)},
-            {},
+            EACH_TICK,
             r"goes from Box\(7\) to Box\(3\)\. Say what .*model\.zip:neighbours_seen=3.*note_interface",
         ),
-        ({}, {"interface": {"observation": "compact"}}, r"goes from Box\(\d+\) to Box\(3\)"),
+        ({}, {}, r"ticks of a decision for model\.zip.* say model\.zip:decision_ticks=1"),
+        ({}, {"interface": {"observation": "compact", "decision_ticks": 1}}, r"goes from Box\(\d+\) to Box\(3\)"),
         (
             {"interface": NUMBERED},
             {"interface": InterfaceConfig()},
@@ -194,7 +176,7 @@ def test_a_model_with_a_note_runs_as_it_was_trained(tmp_path):
     first, second = (policy.act(sign * OBS, ACTIVE)[:, :2].copy() for sign in (1.0, -1.0))
     assert np.any(first != second)
     _, path = model("A2C", tmp_path)
-    assert not hasattr(load_policy(str(path)), "caches"), "only a note tells them"
+    assert not hasattr(load_policy(str(path), EACH_TICK), "caches"), "only a note tells them"
 
 
 def test_an_interface_is_said_with_the_file(tmp_path):
@@ -238,7 +220,7 @@ def test_a_recurrent_model_remembers_within_a_run(monkeypatch, tmp_path):
 def test_files_that_are_missing_changed_or_no_models_are_refused(tmp_path, monkeypatch):
     _, path = model("A2C", tmp_path)
     digest = file_digest(path)
-    load_policy(str(path), {"digest": digest})
+    load_policy(str(path), {"digest": digest, **EACH_TICK})
     model("A2C", tmp_path, policy_kwargs={"net_arch": [5]})
     with pytest.raises(ModelError, match=f"digest {digest}.* changed since .*plan the run again"):
         load_policy(str(path), {"digest": digest})

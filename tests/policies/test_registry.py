@@ -49,17 +49,17 @@ def test_what_the_word_for_a_file_says(word, path, label, interface):
     found = policy_file(word)
     assert found is not None
     assert (file_of(word), policy_label(word), found.interface()) == (path, label, interface)
-    with pytest.raises(ConfigError, match=r"interface of a\.zip as field=value, got 'x'"):
+    with pytest.raises(ConfigError, match=r"interface of a\.zip as key=value, got 'x'"):
         policy_file("a.zip:decision_ticks=2,x").interface()
 
 
 @pytest.mark.parametrize(
     ("actions", "message"),
     [
-        (np.full((4, 3), 0.5 + 1j), "'mine' to return real numbers, .*complex128"),
-        ([["a", "b", "c"]] * 4, "'mine' to return real numbers, .*<U1"),
-        ([[0.0, 0.0, 0.0], [0.0]], "'mine' to return real numbers, .*inhomogeneous"),
-        (np.zeros((4, 2)), r"'mine' to return actions with shape \(n_robots, 3\) = \(4, 3\), got \(4, 2\)"),
+        (np.full((4, 3), 0.5 + 1j), "real numbers are needed, not complex128"),
+        ([["a", "b", "c"]] * 4, "real numbers are needed, not <U1"),
+        ([[0.0, 0.0, 0.0], [0.0]], "inhomogeneous"),
+        (np.zeros((4, 2)), r"actions with shape \(n_robots, 3\) = \(4, 3\), got \(4, 2\)"),
     ],
 )
 def test_what_a_function_must_not_return(actions, message):
@@ -197,11 +197,11 @@ def test_another_process_finds_it(file):
     [
         ("mine.py", {}, r"Expected the class with its file, as mine\.py:MyPolicy.* Classes in it: Ahead, Lame, Deaf\."),
         ("mine.py:Ahaed", {}, r"to have a class Ahaed\. Did you mean 'Ahead'\?"),
-        ("broken.py:Ahead", {}, r"Expected Python in .*broken\.py, got: invalid syntax"),
+        ("broken.py:Ahead", {}, r"Cannot run .*broken\.py: SyntaxError: invalid syntax \(broken\.py, line 1\)"),
         ("mine.py:Deaf", {}, r"the methods reset and act, got Deaf without act\."),
-        ("mine.py:Lame", {}, r"Cannot make mine\.py:Lame: RuntimeError: no legs \(line 30\)\."),
+        ("mine.py:Lame", {}, r"Cannot make mine\.py:Lame: RuntimeError: no legs \(.*mine\.py, line 30\)\."),
         ("mine.py:Ahead", {"spead": 1.0}, r"Expected parameters that mine\.py:Ahead takes, got \{'spead'"),
-        ("mine.py:Ahead:observation=compact", {}, "without an interface"),
+        ("mine.py:Ahead:observation=compact", {}, r"takes, got \{'interface'"),
         ("other.py:Ahead", {}, r"Cannot read the policy file other\.py: No such file"),
     ],
 )
@@ -213,21 +213,17 @@ def test_what_cannot_be_made_is_told(file, word, parameters, reason):
 
 @pytest.fixture
 def two_folders(tmp_path, monkeypatch):
-    """Two versions of a policy, each with its own module `nets_beside`, which one imports by way of another file."""
+    """Two versions of a policy, each with its own module `nets_beside`."""
     monkeypatch.setattr(sys, "path", [*sys.path])
-    for name in ("nets_beside", "helpers_beside"):
-        monkeypatch.delitem(sys.modules, name, raising=False)
+    monkeypatch.delitem(sys.modules, "nets_beside", raising=False)
     for number in (1, 2):
         folder = tmp_path / f"v{number}"
         folder.mkdir()
         (folder / "nets_beside.py").write_text(f"NUMBER = {number}\n")
-        first = "from nets_beside import NUMBER" if number == 1 else "import helpers_beside"
         (folder / "pol.py").write_text(
-            f"{first}\n\n\nclass P:\n    def reset(self, spec, rng): ...\n    def act(self, obs, active): ...\n"
+            "from nets_beside import NUMBER\n\n\n"
+            "class P:\n    def reset(self, spec, rng): ...\n    def act(self, obs, active): ...\n"
         )
-    (tmp_path / "v2" / "helpers_beside.py").write_text(
-        "def number():\n    from nets_beside import NUMBER\n    return NUMBER\n"
-    )
     return tmp_path
 
 

@@ -8,7 +8,7 @@ from stable_baselines3.common.torch_layers import FlattenExtractor
 from stable_baselines3.dqn.policies import DQNPolicy
 from torch import nn
 
-from swarm_forage_env.policies.interface import InterfaceConfig, any_swarm, interface_from_mapping
+from swarm_forage_env.policies.interface import InterfaceConfig, any_swarm, chosen_interface
 from swarm_forage_env.policies.model_files import MODEL_NOTE, describe_spaces, has_probabilities
 from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkError
 
