@@ -78,7 +78,7 @@ class ScriptedPolicy(KernelPolicy):
         constants, robots, memory, *others = self._state
         wider = self._with_room(memory, self._room_until - self.n_ticks, cast(SwarmSpec, self._spec))
         if wider is not memory:
-            self._go_on_with(constants, robots, wider, *others)
+            self._take(constants, robots, wider, *others)
 
     @property
     def activity(self) -> CodeArray:

@@ -6,7 +6,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from swarm_forage_env.contract.policy import Memories, SwarmSpec
-from swarm_forage_env.contract.types import CodeArray
 
 from .cache_memory import TaskMemory, new_task_memory, task_memory_with_room
 from .memory import listed, object_memories
@@ -80,15 +79,11 @@ class TaskPolicy(ScriptedPolicy):
         constants = task_constants(self.parameters, spec, self.n_tabs)
         robots = new_task_robots(spec.n_robots)
         self._allocation = new_allocation(spec.n_robots, self.parameters, spec.quirks, self.n_tabs, rng)
+        self.task = self._allocation.task
         self._start_script(spec, rng, TASK_DRAWS, constants, robots, new_task_memory(spec), self._allocation)
 
     def _with_room(self, memory: Any, n_ticks: int, spec: SwarmSpec) -> TaskMemory:
         return task_memory_with_room(memory, self._robots, n_ticks, spec)
-
-    @property
-    def task(self) -> CodeArray:
-        """(N,) int8 `Task` codes; a live view, read only."""
-        return self._allocation.task
 
     def describe_memories(self) -> Memories:
         """Return where all robots remember objects and caches."""

@@ -24,7 +24,7 @@ from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env._internal.wording import install_command, suggestion
 from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.contract.layout import LIGHT_IF_CARRYING, ObservationLayout
-from swarm_forage_env.contract.policy import Policy, SwarmSpec, sees_world
+from swarm_forage_env.contract.policy import COMMANDS, Policy, SwarmSpec, sees_world
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.layer import at_rest
@@ -267,7 +267,7 @@ def _asked(policy: Policy, obs: ObsArray, active: BoolArray, tick: int, spec: Sw
             f"Expected act to leave obs and active as they are, got them changed at tick {tick}; they belong to the "
             "environment: work on copies."
         )
-    shapes = spec.action_shapes
+    shapes = sorted({(spec.n_robots, COMMANDS), (spec.n_robots, spec.action_size)})
     expected = f"Expected actions as float32 of shape (n_robots, 3) = {' or '.join(map(str, shapes))} in [-1, 1]"
     if not isinstance(actions, np.ndarray) or actions.dtype != np.float32 or actions.shape not in shapes:
         raise CheckError(

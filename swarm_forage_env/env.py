@@ -11,7 +11,7 @@ from pettingzoo import ParallelEnv
 
 from swarm_forage_env._internal.fields import instance, whole
 from swarm_forage_env.contract.layout import ObservationLayout
-from swarm_forage_env.contract.policy import ActionError, SwarmSpec, as_actions, refused_action
+from swarm_forage_env.contract.policy import ActionError, SwarmSpec, as_actions, refused_action, state_size
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.layer import BatchStep, SwarmLayer
 from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -120,7 +120,7 @@ class ForageEnv(SwarmLayer, ParallelEnv[str, np.ndarray, np.ndarray]):
     @cached_property
     def state_space(self) -> spaces.Box:
         """Space of `state()`: (6 N + 3 M,) float32 in [-1, 1]."""
-        return spaces.Box(-1.0, 1.0, (self.swarm_spec.state_size,), np.float32)
+        return spaces.Box(-1.0, 1.0, (state_size(self.swarm_spec.n_robots, self.swarm_spec.n_objects),), np.float32)
 
     @cached_property
     def swarm_spec(self) -> SwarmSpec:

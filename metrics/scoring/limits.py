@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.floor import CELL_M, WHEEL_SCALE_MPS, capacity
+from swarm_forage_env.scenarios.floor import CELL_M, WHEEL_SCALE_MPS, free_area
 from swarm_forage_env.wrappers.world import World, WorldLike, world_of
 
 from ..checks import CurveError
@@ -84,7 +84,7 @@ def _limit(scenario: ScenarioConfig) -> ForagingLimit:
     piece = int(np.searchsorted(m * cost - time_s * (1.0 - up_to), 0.0, side="right")) - 1
     slope, start = float(trips_s[piece]), float(up_to[piece])
     unbounded = (time_s - m * (float(cost[piece]) - slope * start)) / (m * slope + time_s)
-    n_places = capacity(scenario.source_cells, *scenario.arena.n_cells, taken)
+    n_places = free_area(scenario.source_cells, taken)
     nearest = min(unbounded, 1.0 - max(0, m - n) / n_places)
     deliveries = time_s * nearest / float(np.interp(nearest, up_to, cost))
     return ForagingLimit(deliveries=deliveries, first_pickups=deliveries + m)

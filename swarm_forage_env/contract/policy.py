@@ -134,16 +134,6 @@ class SwarmSpec:
         """Columns A of an action: the commands and what the robot says."""
         return COMMANDS + self.message_size
 
-    @property
-    def action_shapes(self) -> tuple[tuple[int, int], ...]:
-        """Shapes of actions that fit: (N, A), and (N, 3), which says zeros."""
-        return tuple(dict.fromkeys((self.n_robots, columns) for columns in (COMMANDS, self.action_size)))
-
-    @property
-    def state_size(self) -> int:
-        """Numbers in the global view `ForageEnv.state()`: six per robot, three per object."""
-        return state_size(self.n_robots, self.n_objects)
-
     @classmethod
     def of(cls, scenario: ScenarioConfig, *, horizon_s: float | None = None) -> "SwarmSpec":
         """Return the constants of a scenario; no environment is needed.
@@ -207,15 +197,6 @@ class RobotStates(NamedTuple):
     """What an activity is called; the same all through a run."""
 
 
-class RememberedPlaces(NamedTuple):
-    """Where one robot remembers things, for people; see `Memories.of_robot`."""
-
-    objects_m: FloatArray
-    """(K, 2) m, middles of the cells of remembered objects."""
-    caches_m: FloatArray
-    """(C, 2) m, middles of remembered caches."""
-
-
 class Memories(NamedTuple):
     """Where all robots remember things, for people; see `Policy`. One row per place, in any order."""
 
@@ -237,10 +218,10 @@ class Memories(NamedTuple):
         nothing = cls(np.zeros(0, np.int32), np.zeros((0, 2)), np.zeros(0, np.bool_))
         return cls(*(np.concatenate(columns) for columns in zip(nothing, *parts, strict=True)))
 
-    def of_robot(self, row: int) -> RememberedPlaces:
-        """Return the places of one robot."""
+    def of_robot(self, row: int) -> tuple[FloatArray, FloatArray]:
+        """Return where one robot remembers objects, (K, 2) m, and caches, (C, 2) m."""
         own = self.robot == row
-        return RememberedPlaces(self.place_m[own & ~self.is_cache], self.place_m[own & self.is_cache])
+        return self.place_m[own & ~self.is_cache], self.place_m[own & self.is_cache]
 
 
 def sees_world(policy: object) -> bool:
@@ -256,7 +237,7 @@ class Policy(Protocol):
     are doing, and `describe_memories() -> Memories`, where they remember things (replays keep both for people);
     `see_world(env)`, called by runs after `reset` with the `ForageEnv`, which a policy may read and must not change: a
     policy that has it is a yardstick and no contestant, so that `check_policy` and the benchmark refuse it;
-    `compiled() -> CompiledPolicy | None`, for runs without Python between ticks (`KernelPolicy` has it); the class
+    `compiled() -> KernelPolicy | None`, for runs without Python between ticks (`KernelPolicy` has it); the class
     attributes `caches` ("none", "static", "dynamic": those that the policy is made for) and `reads` (names of the
     slices it looks at; default all; "light if carrying" = light only of robots that carry).
     """

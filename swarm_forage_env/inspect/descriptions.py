@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from swarm_forage_env._internal.fields import ConfigError, known_name
-from swarm_forage_env.contract.policy import SwarmSpec
+from swarm_forage_env.contract.policy import SwarmSpec, state_size
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.pretrained import network_file
@@ -114,7 +114,7 @@ def _scenario_lines(config: ScenarioConfig, headline: str) -> Iterator[str]:
     yield "\nSpaces, per robot:"
     yield f"  action       {interface.action_space}: left wheel, right wheel, gripper"
     yield f"  observation  {interface.observation_space}"
-    yield f"  state()      Box(-1.0, 1.0, ({spec.state_size},), float32)"
+    yield f"  state()      Box(-1.0, 1.0, ({state_size(spec.n_robots, spec.n_objects)},), float32)"
     yield "\nObservation:"
     yield spec.layout.describe()
 

@@ -384,12 +384,7 @@ class LearnerInterface:
 
     @cached_property
     def _driver(self) -> Driver:
-        state = (self._held, *self._chosen, self._commands)
-        return Driver(keep_on, state, decision_ticks=self.config.decision_ticks)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return what copies and pickles have; addresses of compiled code are no others' than this one's."""
-        return {name: value for name, value in vars(self).items() if name not in ("_held", "_driver")}
+        return _Decision(self.config.decision_ticks, self._held, *self._chosen, self._commands)
 
     def mask(self, obs: ObsArray) -> BoolArray:
         """Return which discrete actions make sense, (N, number of actions) bool; at least one per row.
@@ -409,6 +404,16 @@ class LearnerInterface:
         mask = np.empty((len(obs), self._n_choices), np.bool_)
         mask_actions(obs, self._mask_starts, self._dynamic_caches, mask)
         return mask
+
+
+class _Decision(Driver):
+    """What a learner has decided."""
+
+    _kernel = staticmethod(keep_on)
+
+    def __init__(self, decision_ticks: int, *state: Any) -> None:
+        self.decision_ticks, self.calls = decision_ticks, (Calls(), Calls())
+        self._take(*state)
 
 
 def _wheels_of(spec: SwarmSpec) -> ActionArray:

@@ -9,12 +9,12 @@ import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from swarm_forage_env._internal.archives import ArchiveError, read_arrays
-from swarm_forage_env._internal.fields import Checked, ConfigError, number, read
+from swarm_forage_env._internal.fields import Checked, ConfigError, number, one_of, read
 from swarm_forage_env._internal.files import json_text, parse_json, replacing
 from swarm_forage_env.contract.kernel_policy import KernelPolicy
 from swarm_forage_env.contract.policy import SwarmSpec
@@ -23,7 +23,7 @@ from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterfac
 from swarm_forage_env.policies.kernels.network import Choice, Layers, forward, step_network
 from swarm_forage_env.policies.kernels.products import LANES, ROWS
 from swarm_forage_env.policies.learned import InterfacePolicy, check_extra
-from swarm_forage_env.scenarios.config import CacheKind
+from swarm_forage_env.scenarios.config import CACHE_KINDS
 
 TEMPERATURES = (0.0001, 100.0)
 """Least and largest temperature; our choice: further out, actions are drawn as by the likeliest or by chance. Values of
@@ -44,15 +44,20 @@ class NetworkAbout(Checked):
     """
 
     interface: InterfaceConfig
-    activation: Literal["tanh", "relu"]
-    """What follows on every layer except the last, "tanh" or "relu". The weights do not tell it."""
+    activation: str
+    """"tanh" or "relu", what follows on every layer except the last. The weights do not tell it."""
     samples: bool
     """Whether discrete actions are drawn by the softmax of the outputs, as the logits of PPO and A2C want it; if not,
     the one with the largest output is taken. Continuous actions are always the mean."""
-    caches: CacheKind = "none"
+    caches: str = "none"
     """Kind of caches that the policy was trained with; the default for its runs."""
     card: dict[str, Any] = field(default_factory=dict)
     """How the network was made, as a text for readers."""
+
+    def check(self) -> None:
+        """Refuse other activations and caches than there are."""
+        one_of("activation", self.activation, ("tanh", "relu"))
+        one_of("caches", self.caches, CACHE_KINDS)
 
     def to_json(self) -> str:
         """Return the text that files hold."""

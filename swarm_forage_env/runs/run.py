@@ -13,7 +13,7 @@ import numpy as np
 from swarm_forage_env._internal.fields import ConfigError, instance
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.codes import Grip
-from swarm_forage_env.contract.kernel_policy import CompiledPolicy
+from swarm_forage_env.contract.kernel_policy import KernelPolicy
 from swarm_forage_env.contract.policy import Policy, sees_world
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.env import ForageEnv, read_only
@@ -59,7 +59,7 @@ class LiveRun:
         self._has_tasks = hasattr(policy, "task")
 
     @property
-    def compiled_policy(self) -> CompiledPolicy | None:
+    def compiled_policy(self) -> KernelPolicy | None:
         """The policy for a run without Python between ticks; None where Python might have a say.
 
         That is where `needs_no_python` says so, or a recorder that is a subclass or was changed.

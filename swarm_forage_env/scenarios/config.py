@@ -31,13 +31,14 @@ from swarm_forage_env.scenarios.floor import (
     WALL_M,
     WHEEL_SCALE_MPS,
     Box,
+    Rectangle,
     cache_centre_box,
-    capacity,
     distributable_box,
+    free_area,
     overlap_cells,
     source_boxes,
 )
-from swarm_forage_env.scenarios.obstacles import Boxes, Rectangle, blocked_cells, check_boxes, covered_area_m2
+from swarm_forage_env.scenarios.obstacles import Boxes, blocked_cells, check_boxes
 from swarm_forage_env.scenarios.performance import performance_of
 from swarm_forage_env.scenarios.quirks import Quirks
 
@@ -360,17 +361,15 @@ class ScenarioConfig(Checked):
     def _check_room_for_robots(self) -> None:
         margin, radius, n_robots = self.robots.start_margin_m, self.robots.radius_m, self.robots.n_robots
         width, height = self.arena.width_m - 2 * margin, self.arena.height_m - 2 * margin
-        obstacles = self.arena.obstacles
         _require(
             width > 0 and height > 0,
             f"Expected an arena larger than twice robots.start_margin_m = {margin} m, got "
             f"{self.arena.width_m} x {self.arena.height_m} m; lower the margin or enlarge the arena.",
         )
-        disc = math.pi * radius**2
         starts = margin, margin, self.arena.width_m - margin, self.arena.height_m - margin
-        covered = covered_area_m2(starts, obstacles, radius) if obstacles else 0.0
-        most = int(MAX_DISC_SHARE * (width * height - covered) / disc)
-        besides = f" less {covered:.1f} m^2 for obstacles" if covered else ""
+        closed = [(box[0] - radius, box[1] - radius, box[2] + radius, box[3] + radius) for box in self.arena.obstacles]
+        most = int(MAX_DISC_SHARE * free_area([starts], closed) / (math.pi * radius**2))
+        besides = " clear of obstacles" if closed else ""
         _require(
             n_robots <= most,
             f"Expected at most {most} robots in a start area of {width:.1f} x {height:.1f} m{besides} (discs may cover "
@@ -393,7 +392,7 @@ class ScenarioConfig(Checked):
                 f"Expected objects.object_positions_m between 15 % and 85 % of each axis, clear of nest and obstacles, "
                 f"got {place}.",
             )
-        room = _capacity(self.source_cells, self.arena.n_cells, taken)
+        room = int(_free_area(self.source_cells, taken))
         besides = ", or move obstacles" if self.arena.obstacles else ""
         _require(
             self.objects.n_objects <= room,
@@ -489,9 +488,7 @@ def whole_intervals(scenario: ScenarioConfig, horizon_ticks: int | None = None) 
     return ticks // scenario.interval_ticks
 
 
-@lru_cache(maxsize=64)
-def _capacity(sources: tuple[Box, ...], n_cells: tuple[int, int], taken: tuple[Box, ...]) -> int:
-    return capacity(sources, *n_cells, taken)
+_free_area = lru_cache(maxsize=64)(free_area)
 
 
 SECTIONS: dict[str, type] = {

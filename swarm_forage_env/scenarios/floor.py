@@ -9,6 +9,8 @@ from typing import TypeAlias
 
 import numpy as np
 
+from swarm_forage_env._internal.fields import Number
+
 CELL_M = 0.2
 """Side of a floor cell and of an object."""
 CELLS_PER_M = 5.0
@@ -25,6 +27,8 @@ WHEEL_SCALE_MPS = 0.20
 """Wheel speed that an action or an observation of 1.0 stands for."""
 
 Box: TypeAlias = tuple[int, int, int, int]
+Rectangle: TypeAlias = tuple[Number, Number, Number, Number]
+"""x low, y low, x high, y high in m."""
 
 PLACEMENTS = ("single_source", "dual_source", "quad_source", "random", "power_law", "heap")
 POSITIONS = "positions"
@@ -81,18 +85,18 @@ def overlap_cells(a: Box, b: Box) -> int:
     return max(0, min(a[2], b[2]) - max(a[0], b[0])) * max(0, min(a[3], b[3]) - max(a[1], b[1]))
 
 
-def capacity(sources: Iterable[Box], nx: int, ny: int, taken: Iterable[Box]) -> int:
-    """Number of objects that fit the source regions when the cells of `taken`, such as the nest, are left free.
+def free_area(inside: Iterable[Box | Rectangle], taken: Iterable[Box | Rectangle]) -> float:
+    """Return the area of boxes `inside` that no box of `taken` covers, in cells or m^2; overlaps count once.
 
-    Regions of the quad source overlap in their corners; those cells count once.
+    A cell holds one object, so sources less nest and obstacles have room for so many.
     """
-    inside = [np.clip(np.array([*boxes], np.int64).reshape(-1, 4), 0, (nx, ny, nx, ny)) for boxes in (sources, taken)]
+    every = [np.array([*boxes], np.float64).reshape(-1, 4) for boxes in (inside, taken)]
     # Nothing changes between two edges, so a huge floor is looked at as the few rectangles that edges cut it into.
-    edges_x, edges_y = (np.unique(np.concatenate(inside)[:, axis::2]) for axis in (0, 1))
-    is_source = np.zeros((max(0, len(edges_y) - 1), max(0, len(edges_x) - 1)), np.bool_)
-    for boxes, is_free in zip(inside, (True, False), strict=True):
-        lows_x, highs_x = np.searchsorted(edges_x, boxes[:, 0::2]).T
-        lows_y, highs_y = np.searchsorted(edges_y, boxes[:, 1::2]).T
-        for x_low, y_low, x_high, y_high in zip(lows_x, lows_y, highs_x, highs_y, strict=True):
-            is_source[y_low:y_high, x_low:x_high] = is_free
-    return int(np.diff(edges_y) @ is_source @ np.diff(edges_x))
+    x, y = (np.unique(np.concatenate(every)[:, axis::2]) for axis in (0, 1))
+    is_free = np.zeros((max(0, len(y) - 1), max(0, len(x) - 1)), np.bool_)
+    for boxes, becomes in zip(every, (True, False), strict=True):
+        for (x_low, x_high), (y_low, y_high) in zip(
+            np.searchsorted(x, boxes[:, 0::2]), np.searchsorted(y, boxes[:, 1::2]), strict=True
+        ):
+            is_free[y_low:y_high, x_low:x_high] = becomes
+    return float(np.diff(y) @ is_free @ np.diff(x))

@@ -13,11 +13,9 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from swarm_forage_env._internal.fields import ConfigError, Number
-from swarm_forage_env.scenarios.floor import CELL_M, CELLS_PER_M, Box
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.scenarios.floor import CELL_M, CELLS_PER_M, Box, Rectangle
 
-Rectangle: TypeAlias = tuple[Number, Number, Number, Number]
-"""x low, y low, x high, y high in m."""
 Boxes: TypeAlias = Annotated[tuple[Rectangle, ...], Meta(max_length=200)]
 """Obstacles, or further nests; at most 200 (our choice: every robot looks at all of them in every tick)."""
 MIN_SIDE_M = CELL_M
@@ -68,33 +66,6 @@ def blocked_cells(box: Rectangle, nx: int, ny: int, radius_m: float) -> Box:
         low.append(max(0, min(covered[0], first_near)))
         high.append(min(n_cells, max(covered[1], last_near + 1)))
     return low[0], low[1], high[0], high[1]
-
-
-def covered_area_m2(area: Rectangle, obstacles: Iterable[Rectangle], radius_m: float) -> float:
-    """Return how much of an area obstacles close to the centres of robots, m^2; corners count as square.
-
-    Args:
-        area: Where centres may be, m.
-        obstacles: Boxes, m.
-        radius_m: Of a robot.
-    """
-    grown = [
-        (
-            max(area[0], box[0] - radius_m),
-            max(area[1], box[1] - radius_m),
-            min(area[2], box[2] + radius_m),
-            min(area[3], box[3] + radius_m),
-        )
-        for box in obstacles
-    ]
-    inside = [box for box in grown if box[0] < box[2] and box[1] < box[3]]
-    x = np.unique([area[0], area[2], *(edge for box in inside for edge in (box[0], box[2]))])
-    y = np.unique([area[1], area[3], *(edge for box in inside for edge in (box[1], box[3]))])
-    is_covered = np.zeros((len(y) - 1, len(x) - 1), np.bool_)
-    for box in inside:
-        rows = slice(*np.searchsorted(y, (box[1], box[3])))
-        is_covered[rows, slice(*np.searchsorted(x, (box[0], box[2])))] = True
-    return float((is_covered * np.diff(y)[:, None] * np.diff(x)).sum())
 
 
 def stretched(

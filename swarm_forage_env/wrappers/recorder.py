@@ -5,7 +5,7 @@ from typing import ClassVar
 import numpy as np
 
 from swarm_forage_env.contract.codes import Counter, Task
-from swarm_forage_env.contract.kernel_policy import CompiledPolicy
+from swarm_forage_env.contract.kernel_policy import KernelPolicy
 from swarm_forage_env.contract.policy import refused_tasks
 from swarm_forage_env.contract.types import BoolArray, CodeArray
 from swarm_forage_env.env import ForageEnv
@@ -79,7 +79,7 @@ class RunRecorder(SwarmWrapper):
         if self._ticks_left == 0 or self._complete:
             self._close_interval(has_tasks=tasks is not None)
 
-    def run(self, policy: CompiledPolicy, n_ticks: int) -> None:
+    def run(self, policy: KernelPolicy, n_ticks: int) -> None:
         """Let a compiled policy drive a swarm for some ticks, at most to the end of the run.
 
         Wrappers inside are asked for what they do `ahead`; where one has to act, their hooks are called in that tick.

@@ -287,7 +287,7 @@ class Driver:
     def act(self, env: ForageEnv, obs: np.ndarray) -> np.ndarray:
         if self.numbers is None:
             return self.policy.act(obs, env.active)
-        return self.numbers(self.rng, env.swarm_spec.action_shapes[-1]).astype(np.float32)
+        return self.numbers(self.rng, (env.swarm_spec.n_robots, env.swarm_spec.action_size)).astype(np.float32)
 
 
 def walk(world: RandomWorld, *, is_disturbed: bool) -> list[bytes]:

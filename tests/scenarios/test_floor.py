@@ -8,8 +8,8 @@ from swarm_forage_env.contract.codes import CELL_NEST, Event, Grip
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.config import PHYSICS_ENGINES
-from swarm_forage_env.scenarios.floor import PLACEMENTS, capacity, distributable_box, overlap_cells, source_boxes
-from swarm_forage_env.scenarios.obstacles import blocked_cells, covered_area_m2, distances_m, stretched
+from swarm_forage_env.scenarios.floor import PLACEMENTS, distributable_box, free_area, overlap_cells, source_boxes
+from swarm_forage_env.scenarios.obstacles import blocked_cells, distances_m, stretched
 from swarm_forage_env.scenarios.presets import at_density, scenario
 from tests.support.stage import load, put, tidy_world
 
@@ -43,13 +43,13 @@ def test_sources_by_hand(placement, size, boxes):
 
 
 @pytest.mark.parametrize("placement", PLACEMENTS)
-def test_capacity_is_the_number_of_source_cells_off_the_nest(placement):
+def test_the_free_area_is_the_number_of_source_cells_off_the_nest(placement):
     nest, area, boxes = (20, 4, 60, 40), distributable_box(70, 50), source_boxes(placement, 70, 50)
     cells = {
         (x, y) for low_x, low_y, high_x, high_y in boxes for x in range(low_x, high_x) for y in range(low_y, high_y)
     }
-    assert capacity(boxes, 70, 50, [nest]) == len([1 for x, y in cells if not (20 <= x < 60 and 4 <= y < 40)])
-    assert capacity(boxes, 70, 50, []) == len(cells)
+    assert free_area(boxes, [nest]) == len([1 for x, y in cells if not (20 <= x < 60 and 4 <= y < 40)])
+    assert free_area(boxes, []) == len(cells)
     assert all(overlap_cells(box, area) == overlap_cells(box, box) > 0 for box in boxes)
 
 
@@ -128,7 +128,7 @@ def test_objects_keep_off_cells_that_a_box_covers_or_no_robot_can_stand_on(box, 
     np.testing.assert_array_equal(is_covered | is_near, expected)
 
 
-def test_covered_area_and_distances_are_those_of_many_points():
+def test_free_area_and_distances_are_those_of_many_points():
     boxes = (WALL, PILLAR, (18.5, 8.0, 20.0, 9.0), (2.0, 2.0, 5.0, 3.0))
     area = (2.8, 2.8, 29.2, 13.2)
     points = np.random.default_rng(0).uniform(area[:2], area[2:], (40_000, 2))
@@ -138,8 +138,9 @@ def test_covered_area_and_distances_are_those_of_many_points():
         low, high = np.array(box[:2]), np.array(box[2:])
         is_covered |= np.all((points > low - 0.1) & (points < high + 0.1), axis=1)
         nearest = np.minimum(nearest, np.linalg.norm(points - np.clip(points, low, high), axis=1))
-    share = covered_area_m2(area, boxes, 0.1) / ((area[2] - area[0]) * (area[3] - area[1]))
-    assert share == pytest.approx(is_covered.mean(), abs=0.003)
+    grown = [(box[0] - 0.1, box[1] - 0.1, box[2] + 0.1, box[3] + 0.1) for box in boxes]
+    share = free_area([area], grown) / ((area[2] - area[0]) * (area[3] - area[1]))
+    assert share == pytest.approx(np.mean(~is_covered), abs=0.003)
     np.testing.assert_allclose(distances_m(boxes, points), nearest)
     assert np.all(distances_m((), points[:3]) == np.inf)
 

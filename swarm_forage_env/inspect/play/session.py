@@ -333,7 +333,7 @@ class PlaySession:
                 "n_cache_slots": len(self.world.caches.alive),
                 "dt_s": here.dt_s,
                 "position_step_m": self._capture.step_m,
-                "has_tasks": hasattr(self._policy, "task"),
+                "has_tasks": getattr(self._policy, "task", None) is not None,
                 "signals": [],
                 **for_page(here),
             },
