@@ -407,7 +407,7 @@ def _results(world: World, policy: Policy, seed: int) -> dict[str, np.ndarray]:
     run.advance()
     swarm = run.forage_env.swarm
     poses = {f"{what} of the robots at the end": getattr(swarm, what).copy() for what in ("position", "heading")}
-    return {**poses, **recorder.columns(), **recorder.contributed()}
+    return {**poses, **recorder.columns()}
 
 
 def _subject(policy: Any, world: WorldLike) -> tuple[Callable[[], Policy], World]:

@@ -19,6 +19,7 @@ from swarm_forage_env.runs.spec import stated_caches
 from swarm_forage_env.scenarios import presets
 from swarm_forage_env.scenarios.columns import ALL_COLUMNS, CONTRIBUTED_COLUMNS
 from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.differences import as_setting
 from swarm_forage_env.sheet import Sheet
 from swarm_forage_env.wrappers.registry import WRAPPERS, wrapper_config_class
 from swarm_forage_env.wrappers.world import FILE, read_world
@@ -180,17 +181,6 @@ def _network_lines(file: Path, network: Network) -> Iterator[str]:
         yield f"  [{part}]"
         for name, value in values.items() if isinstance(values, Mapping) else (("", values),):
             yield f"    {name:<24}{textwrap.shorten(in_words(value), _MOST_LETTERS, placeholder=' ...')}".rstrip()
-
-
-def as_setting(value: Any) -> str:
-    """Return the value of a field as --set takes it: "4,6", places as "1,2+3,4"."""
-    if isinstance(value, tuple):
-        return ("+" if value and isinstance(value[0], tuple) else ",").join(map(as_setting, value))
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, float) and value == float(f"{value:.9g}"):
-        return f"{value:.9g}"
-    return str(value)
 
 
 def in_words(value: Any) -> str:

@@ -138,8 +138,7 @@ def run_policy(policy: Policy, spec: RunSpec) -> Record:
         "wall_time_s": f"{wall_time_s:.3f}",
         "cpu_time_s": f"{cpu_time_s:.3f}",
     }
-    contributed = {name: values.astype(np.float64) for name, values in recorder.contributed().items()}
-    return Record(spec=spec, columns={**contributed, **recorder.columns()}, made_with=software_versions() | origin)
+    return Record(spec=spec, columns=recorder.columns(), made_with=software_versions() | origin)
 
 
 def clocks_s() -> FloatArray:

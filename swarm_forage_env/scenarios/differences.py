@@ -7,7 +7,7 @@ Whatever names a world asks here, so that a wall, another nest or three objects 
 import hashlib
 import json
 from functools import lru_cache
-from typing import Any, cast
+from typing import Any
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.wording import counted
@@ -110,17 +110,18 @@ def _words(name: str, value: Any) -> str:
     if name == "caches":
         return f"{value.replace('none', 'no')} caches"
     unit = next((ending for ending in _UNITS if name.endswith(ending)), "")
-    what, told = name.removesuffix(unit).replace("_", " "), _value_words(value)
+    what, told = name.removesuffix(unit).replace("_", " "), as_setting(value)
     if len(told) > _LONGEST:
         return f"{len(value)} {what} ({digest_of(value, 4)})"
     return f"{what} {told}{_UNITS.get(unit, '')}"
 
 
-def _value_words(value: Any) -> str:
-    """A value as --set takes it."""
+def as_setting(value: Any) -> str:
+    """Return the value of a field as --set takes it: "4,6", places as "1,2+3,4"."""
+    if isinstance(value, tuple):
+        return ("+" if value and isinstance(value[0], tuple) else ",").join(map(as_setting, value))
     if isinstance(value, bool):
-        return "on" if value else "off"
-    if isinstance(value, list | tuple):
-        entries = cast("tuple[Any, ...]", value)
-        return ("+" if any(isinstance(entry, tuple) for entry in entries) else ",").join(map(_value_words, entries))
-    return f"{value:g}" if isinstance(value, float) else str(value)
+        return str(value).lower()
+    if isinstance(value, float) and value == float(f"{value:.9g}"):
+        return f"{value:.9g}"
+    return str(value)

@@ -113,30 +113,34 @@ class RunRecorder(SwarmWrapper):
         env.make_whole()
 
     def columns(self) -> dict[str, np.ndarray]:
-        """Return the columns of the finished run that every record has by name, (T,) each.
+        """Return the columns of the finished run by name, (T,) each.
+
+        After those that every record has (`INTERVAL_COLUMNS`) come those of other wrappers, of the policy's tasks, and
+        of counters that are no field of a record.
 
         Raises:
             RuntimeError: the run has not ended yet.
         """
-        self._require_complete()
+        if not self._complete:
+            raise RuntimeError(
+                "Expected a finished run, got one that has not reached its horizon; step until `complete` is true."
+            )
         scenario = self.unwrapped.scenario
         interval = np.arange(self._n_intervals, dtype=np.int32)
+        counted = {
+            name: self._counts[:, counter] if name in TOTALS else self._counts[:, counter] / self._interval_ticks
+            for name, counter in COUNTED.items()
+        }
         columns: dict[str, np.ndarray] = {
             "interval": interval,
             "t_end_s": (interval + 1.0) * scenario.interval_s,
             "interference_fraction": self._interference,
             "adversity": self._adversity(),
+            **{name: values for name, values in counted.items() if name in INTERVAL_COLUMNS},
+            **self._contributed,
+            **{name: values.astype(float) for name, values in counted.items() if name not in INTERVAL_COLUMNS},
         }
-        columns |= {name: values for name, values in self._counted().items() if name in INTERVAL_COLUMNS}
-        columns["performance"] = performance_curve(scenario.performance, columns | self.contributed())
-        return columns
-
-    def _counted(self) -> dict[str, np.ndarray]:
-        """What the arena counts, as columns."""
-        return {
-            name: self._counts[:, counter] if name in TOTALS else self._counts[:, counter] / self._interval_ticks
-            for name, counter in COUNTED.items()
-        }
+        return columns | {"performance": performance_curve(scenario.performance, columns)}
 
     def _adversity(self) -> np.ndarray:
         """Conditions, (T,): the throttle if there is one, else what handling takes under its cost, else zero."""
@@ -144,21 +148,6 @@ class RunRecorder(SwarmWrapper):
             if name in self._contributed:
                 return self._contributed[name]
         return np.zeros(self._n_intervals)
-
-    def contributed(self) -> dict[str, np.ndarray]:
-        """Return the columns that not every record has, (T,) each; raises as `columns`.
-
-        They come from other wrappers, from the policy's tasks, and from counters that are no field of a record.
-        """
-        self._require_complete()
-        later = {name: values for name, values in self._counted().items() if name not in INTERVAL_COLUMNS}
-        return self._contributed | later
-
-    def _require_complete(self) -> None:
-        if not self._complete:
-            raise RuntimeError(
-                "Expected a finished run, got one that has not reached its horizon; step until `complete` is true."
-            )
 
     def _close_interval(self, *, has_tasks: bool) -> None:
         row = self._interval

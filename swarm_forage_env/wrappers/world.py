@@ -180,17 +180,15 @@ class WorldDescription:
 
 
 def described(name: str | Path) -> WorldDescription:
-    """Return what a file says of a world, or the preset of that name; errors as `describe_file`."""
-    return describe_file(name) if Path(name).suffix == FILE else WorldDescription(preset=str(name))
-
-
-def describe_file(file: str | Path) -> WorldDescription:
-    """Read a file of a world, and look at no values of scenario fields.
+    """Return what a file says of a world, or the preset of that name, and look at no values of scenario fields.
 
     Raises:
-        ConfigError: not readable, no TOML, an unknown field, or tables that no wrapper has or refuses; names the file.
+        ConfigError: a file that is not readable, no TOML, has an unknown field, or tables that no wrapper takes;
+            names the file.
     """
-    path = Path(file)
+    path = Path(name)
+    if path.suffix != FILE:
+        return WorldDescription(preset=str(name))
     try:
         tables = parse_toml(path.read_text(encoding="utf-8"))
         outside = [name for name in tables if name in _SETTABLE]
@@ -212,11 +210,13 @@ def read_world(file: str | Path) -> World:
     """Read a world from its file, as `--scenario FILE.toml` does.
 
     Raises:
-        ConfigError: as `describe_file`, or the scenario cannot be; names the file.
+        ConfigError: as `described`, or the scenario cannot be; names the file.
     """
-    described = describe_file(file)
+    if Path(file).suffix != FILE:
+        raise ConfigError(f"Expected the file of a world, which ends with {FILE}, got {file}.")
+    told = described(file)
     try:
-        return described.world()
+        return told.world()
     except ConfigError as error:
         raise ConfigError(f"Cannot use {file}: {error}") from error
 
@@ -233,10 +233,8 @@ def world_of(given: WorldLike) -> World:
     """
     if isinstance(given, World):
         return given
-    if isinstance(given, str | Path) and Path(given).suffix == FILE:
+    if isinstance(given, Path) or (isinstance(given, str) and given.endswith(FILE)):
         return read_world(given)
-    if isinstance(given, Path):
-        raise ConfigError(f"Expected the file of a world, which ends with {FILE}, got {given}.")
     return World(scenario(given) if isinstance(given, str) else given)
 
 

@@ -78,7 +78,7 @@ def test_a_run_without_python_is_the_run_with_it(name, wrappers):
     assert [run.compiled_policy is None for run in runs] == [False, True]
     for run in runs:
         run.advance()
-    results = [run._stack.columns() | run._stack.contributed() for run in runs]
+    results = [run._stack.columns() for run in runs]
     assert results[0].keys() == results[1].keys()
     for column, values in results[0].items():
         np.testing.assert_array_equal(values, results[1][column], err_msg=column)

@@ -223,7 +223,7 @@ def look_at(env: ForageEnv, obs: np.ndarray) -> None:
 
 def look_at_record(recorder: RunRecorder, first: np.ndarray) -> None:
     """Check that columns add up and agree with the world; `first` = counters after the reset."""
-    env, columns = recorder.unwrapped, recorder.columns() | recorder.contributed()
+    env, columns = recorder.unwrapped, recorder.columns()
     counters, ticks = env.events.counters - first, env.scenario.interval_ticks
     assert all(np.isfinite(values).all() for values in columns.values())
     for name, counter in COUNTED.items():

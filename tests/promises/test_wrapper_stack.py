@@ -153,12 +153,9 @@ def test_wrappers_without_effect_change_nothing(names):
     record, expected = wrapped.columns(), bare.columns()
     if names == ("handling_cost",):  # conditions are then the ticks that handling takes, one in any case
         expected["adversity"] = np.ones_like(expected["adversity"])
-    assert record.keys() == expected.keys()
-    for name, values in expected.items():
-        np.testing.assert_array_equal(record[name], values, err_msg=name)
-    counted = bare.contributed()
-    for name, values in wrapped.contributed().items():
-        assert (values == counted.get(name, name.startswith("handling_cost"))).all(), name
+    assert record.keys() >= expected.keys()
+    for name, values in record.items():
+        assert (values == expected.get(name, name.startswith("handling_cost"))).all(), name
 
 
 # Streams

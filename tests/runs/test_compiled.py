@@ -92,7 +92,7 @@ def outcome(run: LiveRun) -> dict[str, np.ndarray]:
     shown = {"obs": recorder.last_obs.copy(), "actions": policy.compiled().actions.copy()}
     shown |= {name: np.array(getattr(swarm, name)) for name in swarm._fields}
     shown |= {"tick": np.array(run.forage_env.tick)}
-    return shown | (recorder.columns() | recorder.contributed() if recorder.complete else {})
+    return shown | (recorder.columns() if recorder.complete else {})
 
 
 def assert_same(one: LiveRun, other: LiveRun) -> None:
@@ -252,7 +252,7 @@ def test_a_run_goes_on_from_a_snapshot_and_from_a_copy(name, wrappers):
     for stack, driver in ((other, policy), (twin, twin_policy)):
         stack.run(driver.compiled(), 500)
         assert stack.complete
-        for column, values in (stack.columns() | stack.contributed()).items():
+        for column, values in stack.columns().items():
             np.testing.assert_array_equal(values, expected[column], err_msg=column)
         np.testing.assert_array_equal(stack.last_obs, expected["obs"])
 

@@ -84,7 +84,7 @@ def episode_digest(name: str, policy_name: str) -> str:
         seen.update(obs.tobytes() + world.active.tobytes())
         obs, reward, terminated, truncated = recorder.step_batch(policy.act(obs, world.active))
         seen.update(reward.tobytes() + terminated.tobytes())
-    columns = {**recorder.columns(), **recorder.contributed()}
+    columns = recorder.columns()
     assert columns["collected"].sum() > 5
     assert columns["malfunctions"].sum() > 5
     for column in columns.values():

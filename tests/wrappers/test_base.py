@@ -15,6 +15,7 @@ from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.runs.run import build_env
+from swarm_forage_env.scenarios.columns import INTERVAL_COLUMNS
 from swarm_forage_env.views.gymnasium import JointForageEnv, SwarmVectorEnv
 from swarm_forage_env.views.pettingzoo import parallel_env
 from swarm_forage_env.world.kernels.counting import add_task_shares
@@ -260,7 +261,7 @@ def recorded(recorder: RunRecorder, ticks: int = 15, tasks=None) -> RunRecorder:
 
 def told(recorder: RunRecorder) -> dict[str, np.ndarray]:
     """What not every record has, without counters of the world."""
-    return {name: values for name, values in recorder.contributed().items() if name not in COUNTED}
+    return {name: values for name, values in recorder.columns().items() if name not in (*COUNTED, *INTERVAL_COLUMNS)}
 
 
 class Contributor(SwarmWrapper):
@@ -320,7 +321,7 @@ def test_after_the_last_death_the_rest_is_zero_even_if_the_world_is_stepped_on(f
     assert columns["n_active"].tolist() == [4.0, 2 * 4 / 5, 0.0]
     np.testing.assert_allclose(columns["interference_fraction"], [0.25, 2 * 0.25 / 5, 0.0])
     np.testing.assert_allclose(columns["t_end_s"], [1.0, 2.0, 3.0])
-    assert recorder.contributed()["throttle"].tolist() == [5.0, 7.0, 0.0]
+    assert recorder.columns()["throttle"].tolist() == [5.0, 7.0, 0.0]
 
 
 def test_task_shares_are_means_over_ticks_of_active_robots():

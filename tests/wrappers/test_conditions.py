@@ -230,7 +230,7 @@ def test_last_value_and_mean_are_recorded_per_interval():
         recorder.reset_batch(seed)
         while not recorder.complete:
             recorder.step_batch(np.zeros((4, 3), np.float32))
-        recorded = recorder.contributed()
+        recorded = recorder.columns()
         assert recorded["throttle"].tolist() == pytest.approx([0.05, 0.10, 0.15])
         assert recorded["throttle_mean"].tolist() == pytest.approx([0.03, 0.08, 0.13])
         assert recorder.columns()["adversity"].tolist() == recorded["throttle_mean"].tolist()
@@ -242,7 +242,7 @@ def test_the_waveform_itself_is_recorded_where_it_is_negative():
     recorder.reset_batch(0)
     while not recorder.complete:
         recorder.step_batch(np.zeros((4, 3), np.float32))
-    assert recorder.contributed()["throttle"].tolist() == [0.5, -0.5, 0.5]
+    assert recorder.columns()["throttle"].tolist() == [0.5, -0.5, 0.5]
 
 
 # Configuration
@@ -304,7 +304,7 @@ def test_last_value_and_mean_of_costs_are_recorded():
         recorder.reset_batch(seed)
         while not recorder.complete:
             recorder.step_batch(np.zeros((1, 3), np.float32))
-    contributed = recorder.contributed()
+    contributed = recorder.columns()
     assert contributed["handling_cost"].tolist() == pytest.approx([5.0, 10.0, 15.0])
     assert contributed["handling_cost_mean"].tolist() == pytest.approx([3.0, 8.0, 13.0])
     assert recorder.columns()["adversity"].tolist() == contributed["handling_cost_mean"].tolist()

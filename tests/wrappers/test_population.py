@@ -304,7 +304,7 @@ def test_both_ways_of_death_are_the_same_world_and_record(lives_on):
         while not recorder.complete:
             actions = rng.uniform(-1, 1, (6, 3)).astype(np.float32)
             obs.append(recorder.step_batch(actions)[0].copy())
-        results.append((np.stack(obs), snapshot(recorder.unwrapped), recorder.columns() | recorder.contributed()))
+        results.append((np.stack(obs), snapshot(recorder.unwrapped), recorder.columns()))
     (obs, world, record), (other_obs, other_world, other_record) = results
     np.testing.assert_array_equal(obs, other_obs)
     assert_same_world(world, other_world)
@@ -402,7 +402,7 @@ def test_events_queue_and_times_are_recorded():
     recorder.reset_batch(2)
     while not recorder.complete:
         recorder.step_batch(hold(recorder.unwrapped))
-    record = recorder.columns() | recorder.contributed()
+    record = recorder.columns()
     _, tally = simulate_population(population.rates, 12, 300, 2, initial_robots=8)
     for name in ("deaths", "births", "malfunctions", "repairs"):
         assert record[name].sum() == getattr(tally, name) > 0

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import kernel, part
+from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.types import ActionArray, IntArray, ObsArray
 
 N_FRAMES = 8
@@ -20,7 +20,6 @@ APART = 7
 """Decisions by which robots change their frames one after the other."""
 OF_ROBOT, OF_PERIOD = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xD1B54A32D192ED03)
 FIRST_FACTOR, SECOND_FACTOR = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
-_HALF, _HALF_BITS = np.uint64(0xFFFFFFFF), np.uint64(32)
 
 
 class Frames(NamedTuple):
@@ -38,30 +37,13 @@ class Frames(NamedTuple):
     """(d,) room to work in."""
 
 
-@part
-def _sum(a: np.uint64, b: np.uint64) -> np.uint64:
-    """Return a + b modulo 2^64, half by half: numpy warns of overflow where this is not compiled."""
-    low = (a & _HALF) + (b & _HALF)
-    high = ((a >> _HALF_BITS) + (b >> _HALF_BITS) + (low >> _HALF_BITS)) & _HALF
-    return (high << _HALF_BITS) | (low & _HALF)
-
-
-@part
-def _product(a: np.uint64, b: np.uint64) -> np.uint64:
-    """Return a * b modulo 2^64, in the same way."""
-    low = (a & _HALF) * (b & _HALF)
-    across = (((a >> _HALF_BITS) * (b & _HALF)) & _HALF) + (((a & _HALF) * (b >> _HALF_BITS)) & _HALF)
-    high = ((low >> _HALF_BITS) + across) & _HALF
-    return (high << _HALF_BITS) | (low & _HALF)
-
-
 @kernel
 def frame_of(robot: int, decision: int, length: int) -> int:
     """Return the frame of a robot in a decision, 0 to 7: the robot's number and the period, well mixed (SplitMix64)."""
     period = np.uint64((decision + APART * robot) // length)
-    mixed = _sum(_product(np.uint64(robot + 1), OF_ROBOT), _product(period, OF_PERIOD))
-    mixed = _product(mixed ^ (mixed >> np.uint64(30)), FIRST_FACTOR)
-    mixed = _product(mixed ^ (mixed >> np.uint64(27)), SECOND_FACTOR)
+    mixed = np.uint64(robot + 1) * OF_ROBOT + period * OF_PERIOD  # modulo 2^64
+    mixed = (mixed ^ (mixed >> np.uint64(30))) * FIRST_FACTOR
+    mixed = (mixed ^ (mixed >> np.uint64(27))) * SECOND_FACTOR
     return int((mixed ^ (mixed >> np.uint64(31))) >> np.uint64(61))
 
 
