@@ -7,7 +7,7 @@ A policy, scripted or trained, sees observations and never the state of the worl
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -63,7 +63,10 @@ def as_actions(actions: ActionArray, n_robots: int, message_size: int = 0) -> Ac
     columns = f"{COMMANDS} + message_size" if message_size else f"{COMMANDS}"
     wanted = f"Expected actions with shape (n_robots, {columns}) = {expected}"
     try:
-        checked = real_numbers(actions)
+        given = np.asarray(actions)
+        if given.dtype.kind not in "biufO":  # numpy would convert texts, too; objects say themselves what they are
+            raise TypeError(f"real numbers are needed, not {given.dtype}")
+        checked = np.ascontiguousarray(given, np.float32)  # kernels are compiled for such arrays only
     except (TypeError, ValueError) as error:
         raise ActionError(f"{wanted}: {error}.") from error
     if message_size and checked.shape == (n_robots, COMMANDS):
@@ -71,21 +74,6 @@ def as_actions(actions: ActionArray, n_robots: int, message_size: int = 0) -> Ac
     if checked.shape != expected:
         raise ActionError(f"{wanted}, got {checked.shape}; pass one row per robot, inactive ones included.")
     return checked
-
-
-def real_numbers(values: Any) -> np.ndarray:
-    """Return real numbers as a contiguous float32 array, the same array if it is one.
-
-    Kernels are compiled for such arrays only; another type would have all compiled anew.
-
-    Raises:
-        TypeError: text, dates or complex numbers, which numpy would convert, too.
-        ValueError: no array.
-    """
-    given = np.asarray(values)
-    if given.dtype.kind not in "biufO":  # objects say themselves whether they are numbers
-        raise TypeError(f"real numbers are needed, not {given.dtype}")
-    return np.ascontiguousarray(given, np.float32)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
