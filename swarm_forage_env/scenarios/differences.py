@@ -7,7 +7,7 @@ Whatever names a world asks here, so that a wall, another nest or three objects 
 import hashlib
 import json
 from functools import lru_cache
-from typing import Any
+from typing import Any, cast
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.wording import counted
@@ -118,8 +118,9 @@ def _words(name: str, value: Any) -> str:
 
 def as_setting(value: Any) -> str:
     """Return the value of a field as --set takes it: "4,6", places as "1,2+3,4"."""
-    if isinstance(value, tuple):
-        return ("+" if value and isinstance(value[0], tuple) else ",").join(map(as_setting, value))
+    if isinstance(value, list | tuple):
+        entries = cast("tuple[Any, ...]", value)
+        return ("+" if entries and isinstance(entries[0], tuple) else ",").join(map(as_setting, entries))
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, float) and value == float(f"{value:.9g}"):
