@@ -79,7 +79,10 @@ def own(*places, **others):
         ({"obstacles": (WALL,) * 201}, "at most 200"),
         ({"obstacles": ((24.0, 0.0, 28.0, 16.0),)}, "at most 0 objects"),
         ({"obstacles": ((24.0, 0.0, 27.0, 16.0),)}, "at most 56 objects"),
-        ({"obstacles": ((4.8, 0.0, 23.0, 16.0),), "n_robots": 50_000}, "26.4 x 10.4 m less 191.0 m^2 for obstacles"),
+        (
+            {"obstacles": ((4.8, 0.0, 23.0, 16.0),), "n_robots": 50_000},
+            "at most 1470 robots in a start area of 26.4 x 10.4 m clear of obstacles",
+        ),
         ({"further_nests": ((4.0, 4.0, 6.0, 5.0),)}, "clear of the nest (1.6, 1.6, 4.8, 14.4)"),
         ({"further_nests": (EAST, (29.0, 7.0, 31.0, 8.0))}, "arena.further_nests[1] clear of the nest (28.0"),
         ({"further_nests": (EAST,), "obstacles": (EAST,)}, "arena.obstacles[0] clear of the nest (28.0"),
