@@ -39,7 +39,7 @@ def export_network(
     """
     _check_spaces(model, interface)
     note = getattr(model, MODEL_NOTE, None)
-    if note is not None and interface_from_mapping(note["interface"]) != interface:
+    if note is not None and chosen_interface(note["interface"]) != interface:
         raise NetworkError(
             f"Expected the interface that the model was trained with, {note['interface']}, got {interface}."
         )
