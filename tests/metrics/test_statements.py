@@ -60,6 +60,7 @@ def test_curves_are_shares_of_the_unit_without_levels_that_lack_runs():
     ("given", "message"),
     [
         ({"levels": [2, 1], "scores": {"a": np.ones((2, 4))}}, "Expected levels in rising order"),
+        ({"levels": [[1, 2]], "scores": {"a": np.ones((2, 4))}}, "Expected levels in rising order"),
         ({"levels": [1, 2], "scores": {"a": np.ones((2, 4)), "b": np.ones((2, 5))}}, "mark a missing run with NaN"),
     ],
 )
@@ -129,7 +130,10 @@ def test_an_order_goes_from_one_panel_to_another_unless_policies_tie():
     said = follows(PLACE, OTHER)
     assert judged(said, first=first, second=first).answer == "supported"
     assert judged(said, first=first, second=turned).answer == "contradicted"
-    assert judged(follows(PLACE, OTHER, turned=True), first=first, second=turned).answer == "supported"
+    other = judged(follows(PLACE, OTHER, turned=True), first=first, second=turned)
+    assert other.answer == "supported"
+    leads = [one.parts[0].numbers()["mean"] for one in (other, judged(said, first=first, second=turned))]
+    assert leads[0] == pytest.approx(-leads[1])
     assert judged(follows(PLACE, FAR), first=first, far=turned).answer == "supported", "shorter distances are better"
     tied = judged(said, first=panel({**dict.fromkeys(HIGH, 1.0), "crw": 2.0}, n_runs=4), second=first)
     assert tied.answer == "supported", "three of six pairs differ, and crw leads the others"

@@ -13,8 +13,8 @@ from tests.support.crowded_runs import DENSE, RUNS, BusyPolicy, change_populatio
 from tests.support.stage import assert_conserved
 
 
-def run_conserved(env: ForageEnv, policy, ticks: int, *, seed: int, population: bool = False, every: int = 1) -> None:
-    """Run and check the whole world after every tick, or after each `every` ticks."""
+def run_conserved(env: ForageEnv, policy, ticks: int, *, seed: int, population: bool = False) -> None:
+    """Run and check the whole world after every tick."""
     rng = np.random.default_rng(seed)
     policy.reset(env.swarm_spec, stream_rng(seed, Stream.POLICY))
     obs = env.reset_batch(seed)
@@ -24,8 +24,7 @@ def run_conserved(env: ForageEnv, policy, ticks: int, *, seed: int, population: 
             change_population(env, rng)
             assert_conserved(env)
         obs = env.step_batch(policy.act(obs, env.active), tasks=getattr(policy, "task", None))[0]
-        if tick % every == 0:
-            assert_conserved(env)
+        assert_conserved(env)
 
 
 @pytest.mark.parametrize(("policy", "name", "caches"), RUNS)

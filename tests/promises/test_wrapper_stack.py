@@ -132,15 +132,10 @@ def play(env, seed: int, ticks: int, *, check=None) -> str:
 @each_stack
 def test_a_seed_is_a_run(wrappers):
     env = stacked(wrappers)
-    first = play(env, 5, 60)
+    first = play(env, 5, 60, check=assert_conserved)
     assert play(env, 6, 25) != first
     assert play(env, 5, 60) == first, "the same instance, after another run"
     assert play(stacked(tuple(reversed(wrappers))), 5, 60) == first, "another instance, wrappers named in another order"
-
-
-@each_stack
-def test_objects_are_conserved(wrappers):
-    play(stacked(wrappers, n_robots=30), 2, 150, check=assert_conserved)
 
 
 # Nothing happens unless asked for
@@ -156,9 +151,6 @@ def test_wrappers_without_effect_change_nothing(names):
     assert record.keys() >= expected.keys()
     for name, values in record.items():
         assert (values == expected.get(name, name.startswith("handling_cost"))).all(), name
-
-
-# Streams
 
 
 # As data
@@ -205,6 +197,9 @@ def test_runs_survive_json_and_parquet(wrappers, tmp_path):
 )
 def test_wrappers_are_named_on_a_command_line(text, expected):
     assert parse_wrapper(text) == expected
+
+
+# Streams
 
 
 def wheel_and_sensor_draws(*names: str) -> tuple[list[np.ndarray], list[np.ndarray]]:

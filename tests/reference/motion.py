@@ -25,12 +25,12 @@ def limited_speeds(left: float, right: float) -> tuple[float, float]:
 
 
 def free_motion(
-    pose: tuple[float, float, float], wheels: tuple[float, float], seconds: float
+    pose: tuple[float, float, float], wheels: tuple[float, float], seconds: float, base_m: float = WHEEL_BASE_M
 ) -> tuple[float, float, float]:
     """Pose after driving with constant wheel speeds: a straight line or an arc of a circle."""
     x, y, heading = pose
     left, right = wheels
-    speed, turn_rate = (left + right) / 2, (right - left) / WHEEL_BASE_M
+    speed, turn_rate = (left + right) / 2, (right - left) / base_m
     if turn_rate == 0.0:
         return x + speed * seconds * math.cos(heading), y + speed * seconds * math.sin(heading), heading
     radius = speed / turn_rate

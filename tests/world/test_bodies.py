@@ -216,17 +216,24 @@ def deepest_overlap(swarm: SwarmState) -> float:
 
 @in_each_engine
 @pytest.mark.parametrize(
-    ("command", "substeps"), [((-0.5, -0.5), 4), ((-0.5, 0.5), 5), ((0.15, 0.75), 4), ((0.4, 0.39), 5)]
+    ("command", "substeps", "base_m"),
+    [
+        ((-0.5, -0.5), 4, WHEEL_BASE_M),
+        ((-0.5, 0.5), 5, WHEEL_BASE_M),
+        ((0.15, 0.75), 4, WHEEL_BASE_M),
+        ((0.4, 0.39), 5, WHEEL_BASE_M),
+        ((0.0, 1.0), 4, 0.02),  # two radians in a tick
+    ],
 )
-def test_free_motion_is_the_closed_form(command, substeps):
-    env = tidy_world(n_robots=1, physics_substeps=(1 / substeps,) * substeps)
+def test_free_motion_is_the_closed_form(command, substeps, base_m):
+    env = tidy_world(n_robots=1, physics_substeps=(1 / substeps,) * substeps, wheel_base_m=base_m)
     put(env, 0, *MIDDLE, heading=2.5)
     wheels = limited_wheels(*(np.float32(value).item() for value in command))
     actions = np.array([[*command, 1.0]], np.float32)
     ticks = 100
     for _ in range(ticks):
         env.step_batch(actions)
-    x, y, heading = free_motion((*MIDDLE, 2.5), wheels, 0.2 * ticks)
+    x, y, heading = free_motion((*MIDDLE, 2.5), wheels, 0.2 * ticks, base_m)
     path = abs(sum(wheels)) / 2 * 0.2 * ticks
     assert env.swarm.position[0] == pytest.approx((x, y), abs=1e-9 + 1e-6 * path)
     assert math.cos(env.swarm.heading[0] - heading) == pytest.approx(1.0, abs=1e-9)
