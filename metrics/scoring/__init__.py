@@ -6,8 +6,7 @@ from .frame import differences, scores, summarized
 from .limits import ForagingLimit, limit_of
 from .measures import MEASURES, Measure
 from .plots import draw_scores
-from .policy_scores import score, score_question
-from .question import Question
+from .policy_scores import Question, score, score_question
 from .run_curves import StudyLine, study_lines
 from .study_numbers import StudyPanel, study_panels
 from .study_plots import StudyFigure, draw_figure, plot, study_figures

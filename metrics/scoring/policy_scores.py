@@ -4,11 +4,11 @@ score(["crw", "dpo"], "warehouse_small", budget="quick", out="results/small")
 score(["crw"], curves=read_curves("theirs.csv"))
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -24,8 +24,15 @@ from ..curves import Form, Variant
 from .answer import Scores
 from .frame import scores
 from .measures import DISTURBANCES, MEASURES, check_words, checked_request
-from .question import Question
 from .run_curves import THROTTLE, StudyCurves, policy_curves
+
+
+class Question(NamedTuple):
+    """Which runs a score needs, before any is made, and how their table answers it."""
+
+    plan: Plan
+    answer: Callable[[Table], Scores]
+    """From the table of the runs to the answer, which says which runs failed."""
 
 
 def score(
@@ -75,7 +82,7 @@ def score_question(
     forms: Sequence[Form] = ("marginal",),
     against: str | None = None,
     is_full: bool = False,
-) -> Question[Scores]:
+) -> Question:
     """Return the question of `score`, which has its runs before any is made; errors as there.
 
     Args:

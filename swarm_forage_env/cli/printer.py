@@ -6,18 +6,17 @@ Names of policies, files and scenarios are shown as they are: no console reads m
 import json
 import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from swarm_forage_env._internal.wording import counted, printable
 from swarm_forage_env.cli import CommandError
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 
 if TYPE_CHECKING:
-    from metrics.scoring.question import Question
     from swarm_forage_env.cli.options import RunOptions
-    from swarm_forage_env.runs.plan import Table
+    from swarm_forage_env.runs.plan import Plan, Table
     from swarm_forage_env.sheet import Answer
     from swarm_forage_env.wrappers.world import World
 
@@ -33,7 +32,8 @@ def note(text: object) -> None:
 
 
 def ask_and_show(
-    question: "Question[Any]",
+    plan: "Plan",
+    answer: "Callable[[Table], Answer]",
     options: "RunOptions",
     world: "World",
     policies: Sequence[str],
@@ -41,7 +41,7 @@ def ask_and_show(
     ending: str = ".png",
     seed: int = 0,
 ) -> int:
-    """Make the runs of a question and show its answer, or only its plan; returns 1 if runs have failed.
+    """Make the runs of a plan and show the answer of their table, or only the plan; returns 1 if runs have failed.
 
     Folder and picture are named by `options`, else by the other arguments: see `cli.worlds.default_file`.
 
@@ -62,18 +62,18 @@ def ask_and_show(
         check_form(options.file)
     picture_ending(picture)  # before the work; a place that cannot be written to is told of beside the answer
     if options.dry_run:
-        specs = question.plan.specs
+        specs = plan.specs
         planned = json.dumps([spec.to_mapping() for spec in specs], indent=1)
         say(planned if options.as_json else planned_line(specs, folder))
         return 0
-    table = run_plan(question.plan, out=folder, jobs=options.jobs, progress=True)
+    table = run_plan(plan, out=folder, jobs=options.jobs, progress=True)
     try:
-        answer: Answer = question.answer(table)
+        found = answer(table)
     except CurveError as error:
         if not table.failures:
             raise
         raise CommandError(str(error)) from None
-    show(answer, picture, as_json=options.as_json, file=options.file, style=options.style())
+    show(found, picture, as_json=options.as_json, file=options.file, style=options.style())
     _tell_of_records(table, folder)
     return int(bool(table.failures))
 

@@ -38,13 +38,13 @@ def run(
     Makes the runs in parallel, shows a table, stores one record per run and draws performance over time. The command
     does not repeat runs that the folder already holds, so after an interruption, just enter it again.
     """
-    from metrics.scoring import Question, summarize_runs
+    from metrics.scoring import summarize_runs
     from swarm_forage_env.cli.worlds import described_runs
     from swarm_forage_env.runs.plan import Plan
 
     chosen, specs = described_runs(world, policies)
-    question = Question(plan=Plan.product(specs, chosen, range(seed, seed + seeds)), answer=summarize_runs)
-    return ask_and_show(question, options, chosen, policies, seed=seed)
+    plan = Plan.product(specs, chosen, range(seed, seed + seeds))
+    return ask_and_show(plan, summarize_runs, options, chosen, policies, seed=seed)
 
 
 def score(
@@ -100,7 +100,7 @@ def score(
     chosen, specs = described_runs(replace(world, horizon=None), policies)
     density = described_fields(world).fields.get("density")
     question = score_question(specs, chosen, density=density, is_full=show_all, **asked)
-    return ask_and_show(question, options, chosen, policies, ending="_scores.png")
+    return ask_and_show(*question, options, chosen, policies, ending="_scores.png")
 
 
 def check(policies: Policies, /, *, world: WorldOptions = WorldOptions()) -> None:
