@@ -161,7 +161,7 @@ def record_dataset(
 
     Args:
         spec: The run, see `runs.spec.plan_run`; its seed is replaced by each of `seeds`.
-        seeds: Different whole numbers from 0 up.
+        seeds: Whole numbers from 0 up.
         folder: Where they go; made if it is missing.
         observation: "full" or "compact": what is recorded instead of what a learned policy sees, or of "full".
         site_memory: Whether the columns of `InterfaceConfig.site_memory` are recorded; None = those that a learned
@@ -170,12 +170,11 @@ def record_dataset(
         advance: Called with the robot-ticks that are done when a run ends.
 
     Raises:
-        ConfigError: seeds that are no different whole numbers, or an unknown kind of observation.
+        ConfigError: seeds that are no whole numbers, or an unknown kind of observation.
         DatasetError: the folder holds another data set, or another call is writing to it.
         ValueError: the policy refuses the swarm.
     """
-    if not seeds or len(set(checked("seeds", tuple(seeds), tuple[Count, ...]))) < len(seeds):
-        raise ConfigError(f"Expected one or more different seeds, got {', '.join(map(str, seeds)) or 'none'}.")
+    wanted = {*checked("seeds", tuple(seeds), tuple[Count, ...])}
     folder, world = Path(folder), SwarmSpec.of(spec.scenario)
     config = _interface_of(spec, world, observation, site_memory)
     columns = [part.name for part in LearnerInterface(config, world).layout for _ in range(part.size)]
@@ -190,7 +189,7 @@ def record_dataset(
                 raise DatasetError(f"The data set in {folder} has another {differing[0]}; give another folder.")
         with replacing(folder / CARD_FILE) as draft:
             draft.write_text(json.dumps(card, indent=1), encoding="utf-8")
-        todo = [replace(spec, seed=seed) for seed in seeds if not _file(folder, seed).exists()]
+        todo = [replace(spec, seed=seed) for seed in sorted(wanted) if not _file(folder, seed).exists()]
         made = each_run(partial(_keep, config, folder), todo, jobs=jobs)
         for n_made, _ in enumerate(made, 1):
             if advance is not None:

@@ -9,12 +9,10 @@ from stable_baselines3.common.buffers import ReplayBuffer, RolloutBuffer
 from stable_baselines3.common.type_aliases import ReplayBufferSamples, RolloutBufferSamples
 from stable_baselines3.common.vec_env import VecNormalize
 
+from swarm_forage_env._internal.fields import ConfigError
+
 SAMPLES = ("observations", "actions", "values", "log_probs", "advantages", "returns")
 """Arrays of a rollout that minibatches are taken from."""
-
-
-class EmptyRolloutError(ValueError):
-    """A rollout in which nobody was at work, so that there is nothing to learn from."""
 
 
 class ActiveRolloutBuffer(RolloutBuffer):
@@ -82,13 +80,11 @@ class ActiveRolloutBuffer(RolloutBuffer):
         """Yield minibatches of the steps at work in random order.
 
         Raises:
-            EmptyRolloutError: nobody was at work in the whole rollout.
+            ConfigError: nobody was at work in the whole rollout.
         """
         assert self.full
         if not self._is_active.any():
-            raise EmptyRolloutError(
-                "Expected a robot at work in the rollout, got none to learn from; take more n_steps."
-            )
+            raise ConfigError("Expected a robot at work in the rollout, got none to learn from; take more n_steps.")
         if not self.generator_ready:
             taught = self.swap_and_flatten(self._is_active).ravel()
             for name in SAMPLES:

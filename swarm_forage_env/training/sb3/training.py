@@ -43,7 +43,7 @@ from swarm_forage_env.training.evaluation import (
     reached_by,
 )
 from swarm_forage_env.training.plan import SAMPLING, Stage, TrainingPlan, read_plan
-from swarm_forage_env.training.sb3.buffers import ActiveRolloutBuffer, EmptyRolloutError, PresentReplayBuffer
+from swarm_forage_env.training.sb3.buffers import ActiveRolloutBuffer, PresentReplayBuffer
 from swarm_forage_env.training.sb3.export import ACTIVATION_CLASSES, export_network, note_interface
 from swarm_forage_env.training.sb3.ppo import SwarmPPO
 from swarm_forage_env.views.plans import plan_arena
@@ -279,7 +279,7 @@ def _learn(model: BaseAlgorithm, steps: int, callbacks: BaseCallback, watch: "_W
         if not _has_diverged(model):
             watch.keep(model)
         raise
-    except (ConfigError, EmptyRolloutError) as error:  # what only a reset or a run finds to be impossible
+    except ConfigError as error:  # what only a reset or a run finds to be impossible
         raise ConfigError(f"Cannot train in {where}: {error}") from error
     except ValueError as error:
         if not _has_diverged(model):
