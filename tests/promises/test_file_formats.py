@@ -57,7 +57,7 @@ def in_network(**changed):
 
 OTHER = [
     ("dataset", "dataset.json", in_json(), Dataset, DatasetError, "'colour'"),
-    ("network.npz", "", in_network(gates=1), Network.load, NetworkError, "Unknown key about a network 'gates'"),
+    ("network.npz", "", in_network(gates=1), Network.load, NetworkError, "of a network, .*Unknown key 'gates'"),
     ("network.npz", "", in_network(interface={"colour": 1}), Network.load, NetworkError, "Unknown"),
     ("entry.json", "", in_json(), lambda file: read_entry(file, load_protocol(TINY)), ConfigError, "key .*'colour'"),
     ("plan.json", "", in_json(), read_plan, ConfigError, "key .*'colour'"),
