@@ -70,7 +70,7 @@ def test_quirk_site_box_truncated(changes, box):
     assert sides == pytest.approx(box)
 
 
-@pytest.mark.parametrize("seed", [0, 1, 29])  # in 29 the best point is where two discs meet
+@pytest.mark.parametrize("seed", [0, 1, 32, 83])  # in 32 and 83 the best point is where two discs meet, on either side
 def test_no_allowed_point_is_nearer(seed):
     """Caches anywhere, even overlapping, as a memory of caches that are long gone may have them."""
     rng = np.random.default_rng(seed)
