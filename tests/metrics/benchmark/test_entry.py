@@ -73,7 +73,7 @@ def test_readme_tells_of_the_minute_what_its_entry_says():
     protocol = load_protocol()
     (standing,) = standings_of([read_entry(root / "docs/benchmark/minute.json")], protocol)
     won = (standing.shares.mean(axis=2) > 1.0).sum(axis=1)
-    assert len(won) == 6
+    assert len(won) == 10
     words = " ".join((root / "README.md").read_text(encoding="utf-8").split())
     told = f"{won.min()} of {len(protocol.held_out)} worlds"
-    assert f"the worst of six such trainings beats the paper's four controllers in {told}" in words
+    assert f"the worst of ten such trainings beats the paper's four controllers in {told}" in words
