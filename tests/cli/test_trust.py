@@ -129,11 +129,12 @@ class Stage(gymnasium.Env):
     observation_space, action_space = spaces.Box(-1.0, 1.0, (111,), np.float32), spaces.Box(-1.0, 1.0, (3,), np.float32)
 
 
-def test_a_model_without_a_note_is_run_after_a_line_about_what_is_guessed(command):
+def test_a_model_without_a_note_is_run_with_the_length_of_its_decisions(command):
     library = pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-baselines3 and torch")
     library.A2C("MlpPolicy", Stage(), device="cpu", seed=1).save("model.zip")
-    with pytest.warns(UserWarning, match=r"model\.zip has no note of its training"):
-        assert command("run", "model.zip", *WORLD)[0] == 0
+    code, _, err = command("run", "model.zip", *WORLD)
+    assert (code, len(err.splitlines())) == (2, 1)
+    assert "say model.zip:decision_ticks=1" in err
     code, out, err = command("run", "random,model.zip:decision_ticks=5", *WORLD)
     assert code == 0, err
     assert len(json.loads(out)["runs"]) == 2
