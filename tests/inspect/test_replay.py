@@ -141,10 +141,9 @@ def test_places_are_those_that_robots_remember(name):
         run.advance(to_tick=tick)
         memories = policy.describe_memories()
         for robot in range(spec.scenario.robots.n_robots):
-            told = memories.of_robot(robot)
             expected = {
                 (kind, *(round(kept.position_step_m * step, 3) for step in steps))
-                for kind, places_m in ((1, told.objects_m), (2, told.caches_m))
+                for kind, places_m in enumerate(memories.of_robot(robot), 1)
                 for steps in np.rint(places_m / kept.position_step_m).tolist()
             }
             assert places_at(kept, frame, robot) == expected
