@@ -78,6 +78,7 @@ def test_memory_equals_the_naive_rule(monkeypatch):
             twins[i].update(*visible_objects(task, senses))
         for i, twin in enumerate(twins):
             known = objects_of(policy, i)
+            assert policy._robots["n_known"][i] == len(twin.known), "each once"
             assert {row: entry[:2] for row, entry in known.items()} == {
                 row: cell for row, (cell, _) in twin.known.items()
             }
