@@ -28,6 +28,8 @@ STACK_ORDER = (
     "ForageEnv",
 )
 """The documented stack, outermost first; `SwarmWrapper.stack_position` counts along it."""
+_STEPS = ("step", "step_batch")
+"""Methods of a wrapper that are called on the outermost one only."""
 _HOOKS = ("before_step", "gain", "observe", "after_step")
 """Methods that are called on every wrapper in each step."""
 
@@ -63,7 +65,8 @@ class SwarmWrapper(SwarmLayer, BaseParallelWrapper):
 
         Raises:
             TypeError: `env` is neither a ForageEnv nor a SwarmWrapper. A wrapper from another library in between would
-                be skipped without notice; wrap it around the whole stack instead.
+                be skipped without notice; wrap it around the whole stack instead. Or `env` is a SwarmWrapper that
+                overrides `step_batch` or another method that would not be called.
             ConfigError: the stack would not be in the documented order.
         """
         if not isinstance(env, ForageEnv | SwarmWrapper):
@@ -71,11 +74,18 @@ class SwarmWrapper(SwarmLayer, BaseParallelWrapper):
                 f"Expected {type(self).__name__} to wrap a ForageEnv or a SwarmWrapper, got {type(env).__name__}; "
                 "put other wrappers outside of the swarm wrappers."
             )
-        if isinstance(env, SwarmWrapper) and self.stack_position >= env.stack_position:
-            raise ConfigError(
-                f"Expected {type(env).__name__} not inside of {type(self).__name__}; the order, outermost first and "
-                f"each at most once, is {', '.join(STACK_ORDER)}."
-            )
+        if isinstance(env, SwarmWrapper):
+            replaced = [name for name in _STEPS if getattr(type(env), name) is not getattr(SwarmWrapper, name)]
+            if replaced:
+                raise TypeError(
+                    f"Expected {type(env).__name__} inside of {type(self).__name__} to override hooks only, got its "
+                    f"own {' and '.join(replaced)}, which would never be called; override {', '.join(_HOOKS)} instead."
+                )
+            if self.stack_position >= env.stack_position:
+                raise ConfigError(
+                    f"Expected {type(env).__name__} not inside of {type(self).__name__}; the order, outermost first "
+                    f"and each at most once, is {', '.join(STACK_ORDER)}."
+                )
         super().__init__(env)
         self.made_from = config
         self._inner = env

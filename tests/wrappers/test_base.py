@@ -138,6 +138,20 @@ def test_only_the_documented_order_can_be_stacked():
 # Born safe
 
 
+class StepsItself(SwarmWrapper):
+    """Overrides what is called on the outermost wrapper only."""
+
+    stack_position = 4
+
+    def step_batch(self, *arguments, **options):
+        return super().step_batch(*arguments, **options)
+
+
+def test_a_wrapper_that_steps_itself_is_refused_where_it_would_be_skipped():
+    with pytest.raises(TypeError, match="StepsItself inside of Contributor to override hooks only"):
+        Contributor(StepsItself(ForageEnv(small_scenario())))
+
+
 @pytest.mark.parametrize(("hook", "fault"), [("gain", KeyboardInterrupt), ("after_step", OSError)])
 def test_whatever_fails_within_a_tick_is_not_gone_on_with(hook, fault):
     """Some hooks of the tick have been called, and others not; Ctrl-C is no Exception."""
