@@ -41,7 +41,7 @@ def test_feedback_holds_the_numbers_of_short_runs():
         ("class A: pass\n" + STANDS.replace("reset", "begin"), "got Stands without reset"),
         ("class A:\n  def\n", "program.py, line 2"),
         ("nobody", "Unknown policy 'nobody'"),
-        ("1 / 0\nclass A: pass\n", "ZeroDivisionError: division by zero (line 1)"),
+        ("1 / 0\nclass A: pass\n", "ZeroDivisionError: division by zero (program.py, line 1)"),
         (STANDS.replace("return", "nil; return"), "warehouse_medium: NameError: name 'nil'"),
         (CANNOT, "NameError: name 'nil' is not defined (program.py:5)"),
         (5, "Expected a policy"),

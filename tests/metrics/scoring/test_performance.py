@@ -166,7 +166,7 @@ def test_first_pickups_are_held_against_all_objects_that_appear():
 @pytest.mark.parametrize(
     ("world", "why"),
     [
-        (scenario("search_and_rescue", walk_probability=0.0), "power-law clusters"),
+        (scenario("search_and_rescue", walk_probability=0.0), "placement .power_law."),
         (scenario("warehouse_small", walk_probability=0.1), "objects that move"),
         (scenario("warehouse_small", caches="static"), "static caches"),
         (World(scenario("warehouse_small"), (parse_wrapper("sensor_noise:sigma=0.1"),)), "sensor_noise"),
