@@ -131,10 +131,10 @@ class Browser:
         self, address: str, ready: str = "document.getElementById('loading')?.hidden === true", *, fragment: str = ""
     ) -> None:
         """Open an address and wait until it is ready; what was kept of an earlier page is gone."""
-        self.complaints.clear()
+        self.call("Page.navigate", url="about:blank")  # another fragment alone would not load the page anew
+        self.complaints.clear()  # an earlier page may have asked a server that has ended
         self.requests.clear()
         self._address = address
-        self.call("Page.navigate", url="about:blank")  # another fragment alone would not load the page anew
         self.call("Page.navigate", url=self._address + fragment)
         self.wait_for(ready)
 
