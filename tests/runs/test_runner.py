@@ -146,13 +146,16 @@ def test_ctrl_c_keeps_what_is_finished_and_says_so(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 def test_ctrl_c_ends_the_workers_at_once(tmp_path):
-    """A terminal sends it to all processes of a command. A script needs no guard against being read again."""
+    """A terminal sends it to all processes of a command. A script needs no guard against being read again.
+
+    Runs take a second each: polars loses a Ctrl-C that comes within the milliseconds in which it writes a file.
+    """
     script = """
 import sys
 from dataclasses import replace
 from swarm_forage_env import plan_run, run_all, scenario
 
-world = scenario("warehouse_small", n_robots=5, n_objects=20, horizon_s=200.0)
+world = scenario("warehouse_small", n_robots=5, n_objects=20)
 spec = plan_run(world, "random")
 try:
     run_all([replace(spec, seed=seed) for seed in range(9999)], out=sys.argv[1], jobs=2)
