@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, cast
 
 import numpy as np
+import polars as pl
 
 from swarm_forage_env.runs.plan import Plan, Table, run_plan
 from swarm_forage_env.runs.spec import PolicyLike, PolicySpec, policy_specs
@@ -113,18 +114,13 @@ def score_question(
     labels = [*(spec.label for spec in specs), *(study.controller for study in curves)]
     if against is not None:
         check_words("policy to compare against", [against], labels)
-    notes: list[str] = []
     if curves:
         if (budget, seeds, horizon_s, density, disturbance) != ("standard", None, None, None, THROTTLE):
             raise CurveError(
                 "Expected no budget, seeds, length of runs, density or disturbance beside curves, whose runs are as "
                 "their file says."
             )
-        plan = _plan_beside(curves, specs, chosen) if specs else Plan(conditions=(), seeds=(0,))
-        counted = sorted({seed for study in curves for runs in study.experiments for seed in runs.seeds})
-        settings: dict[str, Any] = {"curves": curves[0].where, "seeds": counted, "horizon_s": curves[0].horizon_s}
-        settings |= {"performance": curves[0].read_as.name}
-        notes += [f"{curves[0].where}: {curves[0].note}"] if curves[0].note else []
+        plan, settings, notes = _asked_beside(curves, specs, chosen)
     else:
         allowed = ladders.budget(budget) if isinstance(budget, str) else budget
         allowed = allowed if horizon_s is None else replace(allowed, horizon_s=horizon_s)
@@ -133,24 +129,14 @@ def score_question(
         criteria = {disturbance if criterion == THROTTLE else criterion for criterion in varied}
         worlds = ladders.plan_worlds(chosen, criteria, allowed, density=density)
         plan = Plan.product(specs, worlds, chosen_seeds(seeds, allowed.n_seeds))
-        notes += _other_objects(chosen, worlds)
-        settings = {
-            "budget": budget if isinstance(budget, str) else "custom",
-            "horizon_s": allowed.horizon_s,
-            "interval_s": allowed.interval_s,
-            "seeds": list(plan.seeds),
-            "performance": performance_of(chosen.scenario.performance).name,
-            "n_robots": chosen.n_robots,
-        }
+        settings = {"budget": budget if isinstance(budget, str) else "custom", **_settings_of(plan, chosen, allowed)}
+        notes = [*_other_objects(chosen, worlds)]
 
     def answer(table: Table) -> Scores:
         studies = [*(policy_curves(table, spec.label) for spec in specs), *curves]
         frame, missing = scores(studies, wanted, variants=variants, forms=forms)
         for study in curves:
-            reasons = {label: why for (policy, label), why in missing.items() if policy == study.controller}
-            if reasons and (measures is not None or frame.filter(policy=study.controller).is_empty()):
-                label, reason = next(iter(reasons.items()))
-                raise CurveError(f"Cannot compute {label} for {study.controller} from {study.where}: {reason}.")
+            _refuse_missing(study, frame, missing, is_asked=measures is not None)
         return Scores(
             frame=frame,
             policies=tuple(labels),
@@ -164,6 +150,39 @@ def score_question(
         )
 
     return Question(plan=plan, answer=answer)
+
+
+def _asked_beside(
+    curves: Sequence[StudyCurves], specs: Sequence[PolicySpec], chosen: World
+) -> tuple[Plan, dict[str, Any], list[str]]:
+    """Return which runs policies need beside curves, the settings of the answer, and notes on the file."""
+    first = curves[0]
+    plan = _plan_beside(curves, specs, chosen) if specs else Plan(conditions=(), seeds=(0,))
+    counted = sorted({seed for study in curves for runs in study.experiments for seed in runs.seeds})
+    settings: dict[str, Any] = {"curves": first.where, "seeds": counted, "horizon_s": first.horizon_s}
+    settings |= {"performance": first.read_as.name}
+    return plan, settings, [f"{first.where}: {first.note}"] if first.note else []
+
+
+def _settings_of(plan: Plan, chosen: World, allowed: Budget) -> dict[str, Any]:
+    """Return what the answer says of the runs that a budget asks for."""
+    return {
+        "horizon_s": allowed.horizon_s,
+        "interval_s": allowed.interval_s,
+        "seeds": list(plan.seeds),
+        "performance": performance_of(chosen.scenario.performance).name,
+        "n_robots": chosen.n_robots,
+    }
+
+
+def _refuse_missing(
+    study: StudyCurves, frame: pl.DataFrame, missing: Mapping[tuple[str, str], str], *, is_asked: bool
+) -> None:
+    """Refuse curves that lack a measure that was asked for, or all of them."""
+    reasons = {label: why for (policy, label), why in missing.items() if policy == study.controller}
+    if reasons and (is_asked or frame.filter(policy=study.controller).is_empty()):
+        label, reason = next(iter(reasons.items()))
+        raise CurveError(f"Cannot compute {label} for {study.controller} from {study.where}: {reason}.")
 
 
 def _other_objects(world: World, worlds: Sequence[World]) -> Iterator[str]:

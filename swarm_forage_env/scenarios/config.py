@@ -54,8 +54,7 @@ MAX_HANDLING_TICKS = 1_000_000
 """Longest pick-up or drop (our choice: twenty runs of the paper, far below what a 32-bit tick holds)."""
 HandlingTicks: TypeAlias = Annotated[int, Meta(ge=1, le=MAX_HANDLING_TICKS)]
 MAX_CELLS = 2**30
-"""Largest floor, 6.5 km square (our choice: its codes take 4 GiB where something lies everywhere; a million robots at
-5 % density need half of it, and the largest floor of the paper has 409,600 cells)."""
+"""Largest floor, 6.5 km square (our choice: its codes take 4 GiB, half of which a million robots at 5 % need)."""
 
 MAX_SUBSTEPS = 100
 """Most substeps of a tick (our choice: overlap stops shrinking long before, and every one takes time)."""
@@ -204,8 +203,7 @@ class RobotConfig(Checked):
     start_margin_m: Positive = 2.8
     """Robots start at uniform positions at least this far from the arena border."""
     neighbours_seen: Annotated[int, Meta(ge=0, le=64)] = 0
-    """How many of the nearest robots a robot observes; 0 = none, as in the paper. At most 64 (our choice: 256 columns,
-    twice those of all other sensors)."""
+    """How many of the nearest robots a robot observes; 0 = none, as in the paper. Our choice: at most 256 columns."""
     neighbour_range_m: Positive = 2.0
     """How far it sees them, between centres (our choice: twice the side of its window on the floor)."""
     message_size: Annotated[int, Meta(ge=0, le=64)] = 0
@@ -353,11 +351,6 @@ class ScenarioConfig(Checked):
         if self.caches == "dynamic":
             self._check_room_for_caches()
 
-    @property
-    def n_in_heap(self) -> int:
-        """Objects of a new heap, with placement "heap": the others wait, one for each robot that has one under way."""
-        return self.objects.n_objects - self.robots.n_robots
-
     def _check_room_for_robots(self) -> None:
         margin, radius, n_robots = self.robots.start_margin_m, self.robots.radius_m, self.robots.n_robots
         width, height = self.arena.width_m - 2 * margin, self.arena.height_m - 2 * margin
@@ -377,10 +370,10 @@ class ScenarioConfig(Checked):
         )
 
     def _check_room_for_objects(self) -> None:
+        n_objects, n_robots = self.objects.n_objects, self.robots.n_robots
         _require(
-            self.objects.placement != "heap" or self.n_in_heap > 0,
-            f"Expected more objects than robots for a heap, because each robot may have one under way, got "
-            f"{self.objects.n_objects} for {self.robots.n_robots}; ask for more objects.",
+            self.objects.placement != "heap" or n_objects > n_robots,  # each robot may have one under way
+            f"Expected more objects than robots for a heap, got {n_objects} for {n_robots}; ask for more objects.",
         )
         if self.objects.is_drawn:
             return  # at reset, which raises where there is no room for them

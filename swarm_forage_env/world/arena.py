@@ -268,9 +268,8 @@ class ForagingArena:
         now, driver_draws = driver.next_ticks()
         picks, walks = self.draws(first)
         if n_ticks > 1:
-            nothing = NO_DRAWS, self._nothing
-            drawn = [len(rows) for rows in (driver_draws, picks, walks) if not any(rows is one for one in nothing)]
-            n_ticks = min([n_ticks, *drawn])
+            drawn = (rows for rows in (driver_draws, picks, walks) if rows is not NO_DRAWS)
+            n_ticks = min([n_ticks, *(len(rows) for rows in drawn if rows is not self._nothing)])
         is_kept = self._arrays.sensors.kept
         is_kept[0] = kept  # the world may rely on the observation, but not longer than this call lasts
         try:

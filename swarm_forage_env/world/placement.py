@@ -108,6 +108,8 @@ def draw_source(config: ScenarioConfig, floor: IntArray, rng: np.random.Generato
 def move_heap(config: ScenarioConfig, floor: IntArray, source: Source, rng: np.random.Generator) -> None:
     """Open a heap somewhere else: a square, just large enough, on empty floor and at least `FAR_SHARE` from every nest.
 
+    It holds all objects but one for each robot: so many may be under way when the one before is empty.
+
     Args:
         config: The scenario.
         floor: (ny, nx) floor codes.
@@ -117,7 +119,8 @@ def move_heap(config: ScenarioConfig, floor: IntArray, source: Source, rng: np.r
     Raises:
         ConfigError: no such square was found.
     """
-    side = math.ceil(math.sqrt(config.n_in_heap))
+    n_in_heap = config.objects.n_objects - config.robots.n_robots
+    side = math.ceil(math.sqrt(n_in_heap))
     x_low, y_low, x_end, y_end = config.arena.distributable_cells
     far_m = FAR_SHARE * min(config.arena.width_m, config.arena.height_m)
     last = max(x_low, x_end - side), max(y_low, y_end - side)
@@ -127,10 +130,10 @@ def move_heap(config: ScenarioConfig, floor: IntArray, source: Source, rng: np.r
         is_inside = x + side <= x_end and y + side <= y_end
         if is_far and is_inside and np.all(floor[y : y + side, x : x + side] == CELL_EMPTY):
             source.regions[0] = x, y, x + side, y + side
-            source.capacity[0] = config.n_in_heap
+            source.capacity[0] = n_in_heap
             return
     raise ConfigError(
-        f"Found no room for a heap of {config.n_in_heap} objects, {far_m:.1f} m from a nest, in {_TRIALS} trials; ask "
+        f"Found no room for a heap of {n_in_heap} objects, {far_m:.1f} m from a nest, in {_TRIALS} trials; ask "
         "for fewer objects or a larger arena."
     )
 
