@@ -11,17 +11,11 @@ import pytest
 
 from swarm_forage_env.cli import training_report
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.training.evaluation import (
-    EVALUATIONS_FILE,
-    PLAN_FILE,
-    Evaluation,
-    EvaluationPlan,
-    WorldEvaluation,
-    write_evaluations,
-)
+from swarm_forage_env.training.evaluation import EvaluationPlan
 from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.recipe import recipe
 from swarm_forage_env.wrappers.world import World
+from tests.support.small_files import evaluated, trained
 
 TRUSTING = ("--trust-models", "train")
 SETTINGS = ("n_objects=20", "n_arenas=2", "options.n_steps=16", "options.batch_size=64", "small_start=true",
@@ -94,14 +88,7 @@ def test_ctrl_c_says_how_to_go_on(command, monkeypatch):
     assert err.endswith("swarm-forage: Stopped before there was anything to keep; the same command starts again.\n")
 
     folder = Path("results/training/warehouse_small_ppo")
-    folder.mkdir(parents=True)
-    (folder / "model.zip").touch()
-    world = WorldEvaluation(
-        world="small", baseline_policy="crw", performance=5.0, baseline=4.0, ratio=1.25, interference_fraction=0.1
-    )
-    done = Evaluation(steps=64, wall_time_s=1.0, cpu_time_s=1.0, reached=5.0, worlds=(world,))
-    write_evaluations(folder / "evaluations.csv", [done])
-    recipe().write(folder / "plan.json")
+    trained(folder, recipe(), evaluated(64, 5.0))
     assert f"To go on: swarm-forage --trust-models train --out {folder} --resume" in command("train", *TINY)[2]
     if find_spec("matplotlib"):
         assert (folder / "training.png").read_bytes().startswith(b"\x89PNG")
@@ -154,35 +141,12 @@ PLAN = TrainingPlan(
 )
 
 
-def training(folder: str, plan: TrainingPlan = PLAN, *, best: float = 40.0) -> None:
-    Path(folder).mkdir(parents=True)
-    plan.write(Path(folder, PLAN_FILE))
-    rows = [
-        Evaluation(
-            steps=steps,
-            wall_time_s=1.0,
-            cpu_time_s=1.0,
-            reached=per,
-            worlds=(
-                WorldEvaluation(
-                    world=PLAN.judging_worlds[0].name,
-                    baseline_policy="crw",
-                    performance=per,
-                    baseline=5.0,
-                    ratio=per / 5.0,
-                    interference_fraction=0.25,
-                ),
-            ),
-        )
-        for steps, per in ((10, 0.0), (20, best), (30, best / 2))
-    ]
-    write_evaluations(Path(folder, EVALUATIONS_FILE), rows)
-
-
 def test_trainings_are_drawn_beside_others(command, monkeypatch):
     pytest.importorskip("matplotlib")
-    training("first")
-    training("second", dataclasses.replace(PLAN, algorithm="a2c"), best=8.0)
+    for name, algorithm, best in (("first", "ppo", 40.0), ("second", "a2c", 8.0)):
+        world = PLAN.judging_worlds[0].name
+        told = [evaluated(steps, reached, world=world) for steps, reached in ((10, 0.0), (20, best), (30, best / 2))]
+        trained(Path(name), dataclasses.replace(PLAN, algorithm=algorithm), *told)
     words = ("train", "curves", "first", "second", "--policy", "random,crw")
     code, out, _ = command(*words, "--picture", "both.png")
     assert code == 0

@@ -20,8 +20,15 @@ from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.studies.results import pack_study, run_study
 from swarm_forage_env.studies.study_file import Axis
 from swarm_forage_env.training.datasets import record_dataset
-from swarm_forage_env.training.evaluation import Evaluation, WorldEvaluation, write_evaluations
-from swarm_forage_env.training.plan import read_plan
+from swarm_forage_env.training.evaluation import (
+    EVALUATIONS_FILE,
+    MODEL_FILE,
+    PLAN_FILE,
+    Evaluation,
+    WorldEvaluation,
+    write_evaluations,
+)
+from swarm_forage_env.training.plan import TrainingPlan, read_plan
 from tests.support.entries import TINY, made_up_entry
 from tests.support.tiny_study import tiny_study
 
@@ -65,10 +72,28 @@ def _plan(file: Path) -> None:
 
 
 def _evaluations(file: Path) -> None:
-    world = WorldEvaluation(
-        world="small", baseline_policy="crw", performance=1.5, baseline=2.0, ratio=0.75, interference_fraction=0.1
+    write_evaluations(file, [evaluated(384, 1.5)])
+
+
+def evaluated(steps: int, reached: float, interference: float = 0.25, *, world: str = "small") -> Evaluation:
+    """An evaluation of a training in one world, whose baseline reaches 5."""
+    told = WorldEvaluation(
+        world=world,
+        baseline_policy="random",
+        performance=reached,
+        baseline=5.0,
+        ratio=reached / 5.0,
+        interference_fraction=interference,
     )
-    write_evaluations(file, [Evaluation(steps=384, wall_time_s=28.0, cpu_time_s=28.0, reached=1.5, worlds=(world,))])
+    return Evaluation(steps=steps, wall_time_s=1.0, cpu_time_s=60.0, reached=reached, worlds=(told,))
+
+
+def trained(folder: Path, plan: TrainingPlan, *evaluations: Evaluation) -> None:
+    """Write a folder as a training leaves it, with an empty model."""
+    folder.mkdir(parents=True, exist_ok=True)
+    plan.write(folder / PLAN_FILE)
+    (folder / MODEL_FILE).touch()
+    write_evaluations(folder / EVALUATIONS_FILE, evaluations)
 
 
 MAKERS: dict[str, Callable[[Path], None]] = {

@@ -1,9 +1,9 @@
 """Trainings of one plan with several seeds: what is trained, what goes on, what fails, and what all come to."""
 
-import dataclasses
 import json
 import signal
 import time
+from dataclasses import replace
 from multiprocessing import Pipe
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,15 +17,7 @@ from metrics.statistics import aggregate
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.presets import warehouse_small
 from swarm_forage_env.training.curves import beside_baseline, read_training
-from swarm_forage_env.training.evaluation import (
-    EVALUATIONS_FILE,
-    MODEL_FILE,
-    PLAN_FILE,
-    Evaluation,
-    EvaluationPlan,
-    WorldEvaluation,
-    write_evaluations,
-)
+from swarm_forage_env.training.evaluation import Evaluation, EvaluationPlan
 from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.sb3 import seeds as module
 from swarm_forage_env.training.sb3.seeds import seed_folder, train_seeds
@@ -33,6 +25,7 @@ from swarm_forage_env.training.sb3.training import train
 from swarm_forage_env.wrappers.world import World
 from tests.support import fake_trainings
 from tests.support.fake_trainings import STATUS
+from tests.support.small_files import evaluated, trained
 
 PLAN = TrainingPlan(
     world=World(warehouse_small(n_robots=4, n_objects=20, horizon_s=200.0)),
@@ -43,27 +36,6 @@ PLAN = TrainingPlan(
     stages=(Stage(steps=128),),
     evaluation=EvaluationPlan(every_steps=128, horizon_s=200.0, n_runs=1, baseline="random"),
 )
-
-
-def evaluated(steps: int, reached: float, interference: float = 0.25) -> Evaluation:
-    world = WorldEvaluation(
-        world=PLAN.world.name,
-        baseline_policy="random",
-        performance=reached,
-        baseline=5.0,
-        ratio=reached / 5.0,
-        interference_fraction=interference,
-    )
-    return Evaluation(steps=steps, wall_time_s=1.0, cpu_time_s=60.0, reached=reached, worlds=(world,))
-
-
-def made(folder: Path, seed: int, *evaluations: Evaluation, plan: TrainingPlan = PLAN) -> None:
-    """A folder as a training leaves it."""
-    place = seed_folder(folder, seed)
-    place.mkdir(parents=True, exist_ok=True)
-    dataclasses.replace(plan, seed=seed).write(place / PLAN_FILE)
-    (place / MODEL_FILE).touch()
-    write_evaluations(place / EVALUATIONS_FILE, evaluations)
 
 
 def fake(monkeypatch, *, fails=()) -> list[tuple[int, bool]]:
@@ -77,7 +49,7 @@ def fake(monkeypatch, *, fails=()) -> list[tuple[int, bool]]:
         if plan.seed in fails:
             theirs.send("too large")
         else:
-            made(folder.parent, plan.seed, evaluated(plan.total_steps, 4.0 + plan.seed), plan=plan)
+            trained(folder, plan, evaluated(plan.total_steps, 4.0 + plan.seed))
             theirs.send(evaluated(128, 4.0 + plan.seed))
         theirs.close()
         return ours, SimpleNamespace(join=lambda *_: None, terminate=list, kill=list, exitcode=0)
@@ -95,7 +67,7 @@ def test_each_seed_is_trained_in_its_folder_as_alone(tmp_path, tmp_path_factory)
     assert sorted(seed for seed, kind in told if kind is Evaluation) == [3, 4]
     assert {path.name for path in tmp_path.iterdir()} == {"plan.json", "seed_3", "seed_4"}
     alone = tmp_path_factory.mktemp("alone") / "run"
-    train(dataclasses.replace(PLAN, seed=4), alone)
+    train(replace(PLAN, seed=4), alone)
     same, other = (np.load(folder / "policy.npz") for folder in (alone, tmp_path / "seed_4"))
     names = [name for name in same.files if name != "about"]  # which tells when it was trained
     assert "weight_0" in names
@@ -106,8 +78,8 @@ def test_each_seed_is_trained_in_its_folder_as_alone(tmp_path, tmp_path_factory)
 
 def test_what_is_finished_is_kept_and_the_rest_goes_on(tmp_path, monkeypatch):
     calls = fake(monkeypatch, fails={3})
-    made(tmp_path, 0, evaluated(128, 4.0))
-    made(tmp_path, 1, evaluated(64, 4.0))
+    for seed, steps in enumerate((128, 64)):
+        trained(seed_folder(tmp_path, seed), replace(PLAN, seed=seed), evaluated(steps, 4.0))
     told = []
     found = train_seeds(PLAN, range(4), tmp_path, resume=True, report=lambda *news: told.append(news))
     assert calls == [(1, True), (2, False), (3, False)]
@@ -155,7 +127,8 @@ def test_an_interrupt_lets_processes_keep_what_they_have(tmp_path, monkeypatch):
 def test_means_are_over_trainings_as_they_are_kept(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for seed, best in enumerate((10.0, 20.0, 60.0)):
-        made(tmp_path, seed, evaluated(64, best, 0.1), evaluated(128, best / 2, 0.2))
+        evaluations = evaluated(64, best, 0.1), evaluated(128, best / 2, 0.2)
+        trained(seed_folder(tmp_path, seed), replace(PLAN, seed=seed), *evaluations)
     three = [read_training(seed_folder(tmp_path, seed)) for seed in range(3)]
     found = beside_baseline(three, {"seed_2": "diverged"})
     assert [one.kept.steps for one in found.trainings] == [64, 64, 64]
@@ -172,8 +145,8 @@ def test_means_are_over_trainings_as_they_are_kept(tmp_path, monkeypatch):
     assert next(iter(json.loads(found.json()).values()))[0]["policy"] == "seed_0"
     one = beside_baseline(three[:1])
     assert "95 %" not in one.text()
-    driven = dataclasses.replace(PLAN.interface, actions="continuous")
-    sac = dataclasses.replace(PLAN, algorithm="sac", options={}, interface=driven)
-    made(tmp_path, 5, evaluated(64, 10.0), evaluated(128, 4.0), plan=sac)
-    last = read_training(tmp_path / "seed_5")
+    driven = replace(PLAN.interface, actions="continuous")
+    sac = replace(PLAN, algorithm="sac", options={}, interface=driven)
+    trained(tmp_path / "sac", sac, evaluated(64, 10.0), evaluated(128, 4.0))
+    last = read_training(tmp_path / "sac")
     assert (Path(last.policy).name, last.kept.steps) == ("model.zip", 128), "its network is in no file"
