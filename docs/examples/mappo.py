@@ -1,12 +1,13 @@
 """MAPPO in one file: PPO whose critic sees the state of the arena; plain torch on a vector environment.
 
-    python docs/examples/mappo.py docs/benchmark/plans/ippo.toml 3 results/mappo/seed_3.npz
+    python docs/examples/mappo.py docs/benchmark/plans/ippo.toml 3 seed_3.npz interface.frame_decisions=200
 
-trains in the worlds and stages of a plan, with its options, by seed 3. The critic values a robot by the state of its
+trains by a plan, with seed 3; a value of the plan may be another one. The critic values a robot by the state of its
 arena and by what the robot sees. Arenas start anew within the step that ends them: where one was truncated, the value
 of its last state is added. Steps of robots not at work are left out.
 """
 
+import json
 import sys
 from pathlib import Path
 
@@ -96,7 +97,10 @@ def learn(
 
 
 if __name__ == "__main__":
-    plan, seed, file = read_plan(sys.argv[1]), int(sys.argv[2]), Path(sys.argv[3])
+    plan_file, seed, file, *settings = sys.argv[1:]
+    plan, seed, file = read_plan(plan_file), int(seed), Path(file)
+    changes = (setting.split("=") for setting in settings)
+    plan = plan.with_settings({name: json.loads(value) for name, value in changes})
     torch.set_num_threads(1)
     torch.manual_seed(seed)
     stages = [(stage, SwarmVectorEnv(**plan.arenas_of(stage))) for stage in plan.stages]
