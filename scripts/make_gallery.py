@@ -64,21 +64,20 @@ EXHIBITS = (
         "warehouse_small",
         "warehouse_small",
         ("crw", "dpo", "stochm", "stochx"),
-        "The paper's four controllers in the small warehouse. CRW walks at random. DPO goes back to objects that it "
-        "remembers. In STOCHM and STOCHX, robots hand objects over at caches, so each carries them part of the way.",
+        "CRW walks at random, DPO goes back to objects that it remembers, and in STOCHM and STOCHX robots hand objects "
+        "over at caches.",
     ),
     Exhibit(
         "trained_policy",
         "warehouse_small",
         ("crw", "ppo_warehouse_small"),
-        "The trained policy beside CRW. Its robots drive straight to the source and straight home.",
+        "Robots of the trained policy drive straight to the source and straight home.",
     ),
     Exhibit(
         "generalist",
         "warehouse_small",
         ("dpo", "generalist"),
-        "One network for all scenarios, beside DPO, the one of the paper's four that delivers most. This is a "
-        "whole run of 10,000 s in the small warehouse.",
+        "One network for all scenarios beside the best of the paper's four, in a whole run of 10,000 s.",
         frame_s=10.0,
         horizon_s=10_000.0,
     ),
@@ -86,7 +85,7 @@ EXHIBITS = (
         "generalist_medium",
         "warehouse_medium",
         ("dpo", "generalist"),
-        "The same network in the medium warehouse, for a whole run. No jams form.",
+        "The same in the medium warehouse.",
         frame_s=10.0,
         horizon_s=10_000.0,
     ),
@@ -94,8 +93,7 @@ EXHIBITS = (
         "generalist_rescue",
         "search_and_rescue",
         ("dpo", "generalist"),
-        "The same network in search and rescue, for a whole run. Each robot remembers where it last picked up an "
-        "object and what it saw on its way home, and returns there.",
+        "The same in search and rescue: robots return to where they picked up an object, or saw one on their way home.",
         frame_s=10.0,
         horizon_s=10_000.0,
     ),
@@ -103,16 +101,14 @@ EXHIBITS = (
         "oracle",
         "warehouse_medium",
         ("generalist", "oracle"),
-        "The trained network beside a yardstick that reads the world: each robot knows the nearest object left. "
-        "Robots pass each other on the right.",
+        "The network beside a yardstick that sees the whole world.",
         frame_s=2.0,
     ),
     Exhibit(
         "talk",
         "warehouse_small",
         (str(FOLDER / "silent.npz"), str(FOLDER / "talk.npz")),
-        "One rich heap at a time, which moves on when it is empty. In the second run, robots tell each other where "
-        "they picked up last: one finds the heap, and the others turn to it.",
+        "One rich heap at a time. In the second run, robots tell each other where they picked up last.",
         frame_s=3.0,
         horizon_s=3000.0,
         fields={
@@ -129,7 +125,7 @@ EXHIBITS = (
         "cpfa",
         "warehouse_small",
         ("crw", "cpfa"),
-        "The field's baseline beside CRW. Robots go out straight, search, and return to where they found many objects.",
+        "CPFA robots go out straight, search, and return to where they found many objects.",
     ),
     Exhibit(
         "warehouse_dual",
@@ -158,14 +154,14 @@ EXHIBITS = (
         "sensor_noise",
         "warehouse_small",
         ("dpo", "dpo"),
-        "In the second run, noise makes robots see obstacles that do not exist.",
+        "In the second run, robots see obstacles that do not exist.",
         wrapper="sensor_noise:sigma=0.05",
     ),
     Exhibit(
         "actuator_noise",
         "warehouse_small",
         ("dpo", "dpo"),
-        "In the second run, wheels turn faster or slower than commanded, so robots never drive quite straight.",
+        "In the second run, wheels turn faster or slower than commanded.",
         wrapper="actuator_noise:sigma=0.5",
     ),
     Exhibit(
