@@ -54,7 +54,7 @@ def learn(
     obs, infos = envs.reset(seed=seed)
     n_rows, arena = envs.num_envs, torch.arange(envs.num_envs) // envs.n_robots
     optimizer.param_groups[0]["lr"] = learning_rate
-    for done in range(0, n_decisions, n_steps * n_rows):
+    for rollout_number in range(1, n_decisions // (n_steps * n_rows) + 1):
         seen, states = torch.zeros(n_steps, *obs.shape), torch.zeros(n_steps, *envs.state().shape)
         arenas = arena + envs.n_arenas * torch.arange(n_steps)[:, None]  # (steps, rows) into the states of all steps
         at_work = torch.zeros(n_steps, n_rows, dtype=torch.bool)
@@ -93,7 +93,7 @@ def learn(
                 (error - gain - ent_coef * choices.entropy().mean()).backward()
                 nn.utils.clip_grad_norm_(optimizer.param_groups[0]["params"], 0.5)
                 optimizer.step()
-        print(f"{done + n_steps * n_rows:,} decisions: {rewards.mean():.4f} reward per decision", flush=True)
+        print(f"{n_steps * n_rows * rollout_number:,}: {rewards.mean():.4f} reward per decision", flush=True)
 
 
 if __name__ == "__main__":
