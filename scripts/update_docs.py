@@ -99,7 +99,7 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
             (f"swarm-forage run crw,dpo --scenario classroom --robots {size} --seeds 4",),
             ("crw", "dpo"),
         )
-        for size in (1, 5, 10, 20, 40)
+        for size in (1, 10, 20, 40)
     },
 }
 """Name -> commands, of which the last prints the table, and what its rows are called in blocks."""
