@@ -80,6 +80,9 @@ def test_a_density_holds_for_all_sizes():
     assert areas[0] == areas[1], "one robot has the smallest arena of the others"
     assert areas[1] == pytest.approx(100.0, rel=0.1)
     assert areas[2] == pytest.approx(400.0, rel=0.1)
+    spec = study(Axis(name="density", values=(0.05, 0.1)), set={"n_robots": 40})
+    arenas = [spec.world(place).scenario.arena for place in spec.places]
+    assert [arena.width_m * arena.height_m for arena in arenas] == pytest.approx([800.0, 400.0], rel=0.1)
 
 
 def test_values_that_the_paper_does_not_have():
