@@ -49,6 +49,8 @@ class SlowWorld:
     floor: dict[tuple[int, int], int]
     caches: dict[int, SlowCache]
     carriers: dict[int, int]
+    from_cache: set[int]
+    """Robots whose cargo comes from a cache."""
     events: dict[int, tuple[Event, int, tuple[int, int, int, int]]] = field(default_factory=dict)
     first_picked: set[int] = field(default_factory=set)
     displaced: list[int] = field(default_factory=list)
@@ -167,12 +169,12 @@ class SlowWorld:
         """An interaction takes effect."""
         kind, target = request
         if kind == "deliver":
-            row = self.cargo.pop(robot)
+            row = self.let_go(robot)
             self.displaced.append(row)
             self.report(robot, Event.DELIVERED, row)
         elif kind == "drop into cache":
             assert target is not None
-            row = self.cargo.pop(robot)
+            row = self.let_go(robot)
             self.caches[target].contents.add(row)
             self.report(robot, Event.JOINED_CACHE, row, target)
         elif kind == "take from floor":
@@ -185,6 +187,7 @@ class SlowWorld:
             row = sorted(cache.contents)[int(chance * len(cache.contents))]
             cache.contents.remove(row)
             self.take(robot, row)
+            self.from_cache.add(robot)
             self.report(robot, Event.PICKED_FROM_CACHE, row, target)
             if len(cache.contents) == 1:
                 self.floor[cache.centre] = cache.contents.pop()
@@ -199,9 +202,14 @@ class SlowWorld:
         self.carriers[row] += 1
         self.cargo[robot] = row
 
+    def let_go(self, robot: int) -> int:
+        """A robot gives away its cargo."""
+        self.from_cache.discard(robot)
+        return self.cargo.pop(robot)
+
     def lay_down(self, robot: int) -> bool:
         """A robot lets go over open floor."""
-        row, cell = self.cargo.pop(robot), self.cell(robot)
+        row, cell = self.let_go(robot), self.cell(robot)
         inside = self.area[0] <= cell[0] < self.area[2] and self.area[1] <= cell[1] < self.area[3]
         if inside and cell not in self.floor and not self.cell_in_nest(cell):
             self.floor[cell] = row

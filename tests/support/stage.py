@@ -29,14 +29,10 @@ from tests.support import engines
 
 NEST_CELL = (16, 40)
 OPEN_CELL = (60, 40)
-BASE_CELL = OPEN_CELL
-"""Centre of the cache that a test is about."""
 CORNER_CACHE = (40, 20)
 """Centre of a cache clear of the nest, within the proximity distance of the open cell."""
 CORNERS = [(-0.07, -0.07), (0.07, 0.07)]
 """Offsets in one cell at which two robots stand without touching."""
-WALL_CELL = (60, 5)
-"""A cell outside of the distributable box, where nothing may lie."""
 
 
 def tidy_world(*, n_robots: int = 4, n_objects: int = 8, caches: str = "none", **overrides: Any) -> ForageEnv:
@@ -137,13 +133,6 @@ def act(env: ForageEnv, grips: Mapping[int, float]) -> list[Event]:
 def events_of(env: ForageEnv, grip: float, ticks: int, robot: int = 0) -> list[Event]:
     """Step some ticks in which one robot sends the same gripper command; return its events."""
     return [act(env, {robot: grip})[robot] for _ in range(ticks)]
-
-
-def repair(env: ForageEnv, *rows: int) -> None:
-    """Send robots into repair, all others to work."""
-    active = np.ones(len(env.active), np.bool_)
-    active[list(rows)] = False
-    env.set_population(active=active, present=np.ones_like(active))
 
 
 def kill(env: ForageEnv, row: int) -> None:
