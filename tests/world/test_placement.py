@@ -1,11 +1,12 @@
-"""Where objects, clusters, static caches and robots are placed."""
+"""Where objects, clusters and static caches are placed, and how free objects walk."""
 
+import copy
 import itertools
 import math
 
 import numpy as np
 import pytest
-from scipy.stats import chisquare
+from scipy.stats import binomtest, chisquare
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.rng import Stream, stream_rng
@@ -13,7 +14,7 @@ from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, C
 from swarm_forage_env.contract.types import IntArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.floor import Box, overlap_cells
+from swarm_forage_env.scenarios.floor import Box, distributable_box
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, SEARCH_AND_RESCUE_OBJECTS, scenario
 from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.world.allocation import new_objects
@@ -25,18 +26,19 @@ from swarm_forage_env.world.clusters import (
     draw_sizes,
     footprint,
 )
-from swarm_forage_env.world.kernels.placement import DRAWS, UNLIMITED, count_objects, place_displaced, scatter
+from swarm_forage_env.world.kernels.placement import DRAWS, UNLIMITED, place_displaced, scatter
+from swarm_forage_env.world.kernels.walk import crosses_open_border, walk
 from swarm_forage_env.world.placement import (
     draw_ahead,
     draw_source,
     give_back,
     new_draws,
-    place_all,
     place_objects,
     static_cache_centres,
 )
 from swarm_forage_env.world.state import ObjectState, Requests, Source, listed, make_list
-from tests.reference.objects import choose_cell, random_source, scatter_slowly, waiting_by_the_word
+from tests.reference.objects import choose_cell, random_source, scatter_slowly, waiting_by_the_word, walk_slowly
+from tests.support.stage import assert_conserved, cell_centre
 
 SIGNIFICANCE = 0.001
 """Seeds are fixed, so a test that passes once passes always; this is what it passed."""
@@ -62,14 +64,6 @@ def lift(objects: ObjectState, row: int) -> None:
     objects.carriers[row] += 1
 
 
-def furnished(config: ScenarioConfig, seed: int = 0) -> tuple[ObjectState, Source, np.random.Generator]:
-    objects = new_objects(config)
-    rng = stream_rng(seed, Stream.PLACEMENT)
-    source = draw_source(config, objects.floor, rng)
-    place_all(objects, source, config.arena.distributable_cells, rng)
-    return objects, source, rng
-
-
 def assert_consistent(objects: ObjectState) -> None:
     free = np.flatnonzero(objects.status == ObjectStatus.FREE)
     x, y = objects.cell[free].T
@@ -80,22 +74,24 @@ def assert_consistent(objects: ObjectState) -> None:
     assert np.all(objects.cell[not_lying] == -1)
 
 
-@pytest.mark.parametrize("name", SCENARIO_NAMES)
-def test_presets_place_every_object_on_its_own_free_cell(name):
-    config = scenario(name)
-    before = new_objects(config).floor
-    objects, source, _ = furnished(config)
-    assert np.all(objects.status == ObjectStatus.FREE)
-    assert waiting(objects) == []
-    assert_consistent(objects)
-    x, y = objects.cell.T
-    assert len({*zip(x.tolist(), y.tolist(), strict=True)}) == config.objects.n_objects
-    assert np.all(before[y, x] == CELL_EMPTY)
-    x_low, y_low, x_high, y_high = config.arena.distributable_cells
-    assert np.all((x >= x_low) & (x < x_high) & (y >= y_low) & (y < y_high))
+@pytest.mark.parametrize(
+    ("name", "fields"),
+    [
+        *((name, {}) for name in SCENARIO_NAMES),
+        ("search_and_rescue", {"side_m": 16, "caches": "static"}),
+        ("search_and_rescue", {"side_m": 128, "caches": "static"}),
+    ],
+)
+def test_every_object_lies_in_a_region_within_its_capacity(name, fields):
+    env = ForageEnv(scenario(name, **fields))
+    env.reset_batch(0)
+    assert_conserved(env)
+    free, source = env.objects.status == ObjectStatus.FREE, env.arena._arrays.source
+    assert np.all(free | (env.objects.status == ObjectStatus.CACHED))
+    x, y = env.objects.cell[free].T
     inside = [(x >= box[0]) & (x < box[2]) & (y >= box[1]) & (y < box[3]) for box in source.regions.tolist()]
     assert np.all(np.any(inside, axis=0))
-    np.testing.assert_array_equal(objects.floor == CELL_NEST, before == CELL_NEST)
+    assert np.all(np.sum(inside, axis=1) <= source.capacity)
 
 
 @pytest.mark.parametrize("share_free", [0.9, 0.02], ids=["by trying", "by listing"])
@@ -115,36 +111,6 @@ def test_every_free_cell_is_equally_likely(share_free):
         lift(objects, 0)
     assert counts[~free].sum() == 0
     assert chisquare(counts[free]).pvalue > SIGNIFICANCE
-
-
-def test_groups_then_regions_are_equally_likely():
-    regions = np.array([(0, 0, 4, 4), (5, 0, 9, 4), (10, 0, 14, 4), (15, 0, 25, 10)], np.int32)
-    source = Source(regions, np.array([8, 8, 8, 16], np.int32), np.array([0, 3, 4], np.int32))
-    objects = bare_objects(1, 30, 12)
-    rng = np.random.default_rng(2)
-    counts = np.zeros(4, int)
-    for _ in range(6_000):
-        place_objects([0], objects, source, (0, 0, 30, 12), rng)
-        counts[np.searchsorted([5, 10, 15], objects.cell[0, 0], side="right")] += 1
-        lift(objects, 0)
-    assert chisquare(counts, [1_000, 1_000, 1_000, 3_000]).pvalue > SIGNIFICANCE
-
-
-def test_a_region_at_capacity_is_skipped_dropped_objects_included():
-    regions = np.array([(0, 0, 5, 5), (6, 0, 11, 5)], np.int32)
-    source = Source(regions, np.array([3, 3], np.int32), np.array([0, 2], np.int32))
-    objects = bare_objects(6, 12, 6)
-    objects.floor[2, 2], objects.floor[3, 3] = CELL_OBJECT + 4, CELL_OBJECT + 5  # laid there by robots
-    objects.cell[[4, 5]] = (2, 2), (3, 3)
-    objects.status[[4, 5]] = ObjectStatus.FREE
-    make_list(objects.waiting, [])
-    place_objects([0, 1, 2, 3], objects, source, (0, 0, 12, 6), np.random.default_rng(0))
-    assert count_objects(objects.floor, 0, 0, 5, 5) == 3
-    assert count_objects(objects.floor, 6, 0, 11, 5) == 3
-    lift(objects, 4)  # frees a slot although cells were free all along
-    place_objects([4], objects, source, (0, 0, 12, 6), np.random.default_rng(0))
-    assert count_objects(objects.floor, 0, 0, 5, 5) == 3
-    assert waiting(objects) == []
 
 
 def test_a_heap_lies_far_from_the_nest_and_moves_on_when_it_is_empty():
@@ -350,82 +316,36 @@ def test_preset_counts_always_fit(side):
         assert source.capacity.sum() >= SEARCH_AND_RESCUE_OBJECTS[side]
 
 
-@pytest.mark.parametrize(("side", "seed"), [(16, 0), (48, 1), (128, 2)])
-def test_every_object_lies_in_a_cluster_within_its_capacity(side, seed):
-    config = scenario("search_and_rescue", side_m=side, caches="static")
-    objects = painted(config)
-    rng = stream_rng(seed, Stream.PLACEMENT)
-    source = draw_source(config, objects.floor, rng)
-    place_all(objects, source, config.arena.distributable_cells, rng)
-    occupancy = np.array([count_objects(objects.floor, *box) for box in source.regions.tolist()])
-    assert occupancy.sum() == config.objects.n_objects
-    assert np.all(occupancy <= source.capacity)
-
-
 # Static caches
 
 
-CACHE_SIDES = {16: 15, 32: 31, 48: 47, 64: 63, 80: 79, 96: 95, 112: 111, 128: 127}
-"""Side of the arena in metres: side of a cache in cells."""
-
-
-def metres(centres):
-    return [pytest.approx(((2 * x + 1) / 10, (2 * y + 1) / 10)) for x, y in centres]
-
-
-def test_single_source_has_one_half_way_between_nest_and_strip():
-    assert metres(static_cache_centres(scenario("warehouse_small"))) == [(14.5, 8.1)]
-
-
-def test_random_placement_has_four_at_the_quarters():
-    centres = static_cache_centres(scenario("warehouse_medium"))
-    assert metres(centres) == [(12.1, 24.1), (36.1, 24.1), (24.1, 12.1), (24.1, 36.1)]
-
-
-@pytest.mark.parametrize("side", SEARCH_AND_RESCUE_OBJECTS)
-def test_search_and_rescue_has_four_at_the_quarters(side):
-    config = scenario("search_and_rescue", side_m=side)
-    quarter = side / 4
-    assert [
-        (quarter + 0.1, 2 * quarter + 0.1),
-        (3 * quarter + 0.1, 2 * quarter + 0.1),
-        (2 * quarter + 0.1, quarter + 0.1),
-        (2 * quarter + 0.1, 3 * quarter + 0.1),
-    ] == metres(static_cache_centres(config))
-    assert config.cache_side_cells == CACHE_SIDES[side]
-
-
-def test_dual_source_has_one_on_either_side_of_the_nest():
-    config = scenario("warehouse_dual")  # half way from 16.0 to 25.6 m and to 6.4 m, on the centre of a cell
-    assert metres(static_cache_centres(config)) == [(20.9, 8.1), (11.3, 8.1)]
-
-
-def test_quad_source_stands_clear_of_the_nest():
-    config = scenario("warehouse_quad")
-    west, east, south, north = static_cache_centres(config)
-    assert (west, south) == ((72, 120), (120, 72))  # 0.30 X
-    # 0.675 X = cell 162 would reach 4 cells into the nest (cells 96 .. 143) with a half side of 23.
-    assert (east, north) == ((167, 120), (120, 167))
-
-
 @pytest.mark.parametrize(
-    "config",
+    ("name", "fields", "centres_m"),
     [
-        scenario("warehouse_small"),
-        scenario("warehouse_medium"),
-        scenario("warehouse_quad"),
-        scenario("warehouse_dual"),
-        *(scenario("search_and_rescue", side_m=side) for side in SEARCH_AND_RESCUE_OBJECTS),
+        ("warehouse_small", {}, [(14.5, 8.1)]),  # half way between nest and strip
+        # Half way from 16.0 to 25.6 m and to 6.4 m, on the centre of a cell.
+        ("warehouse_dual", {}, [(20.9, 8.1), (11.3, 8.1)]),
+        ("warehouse_medium", {}, [(12.1, 24.1), (36.1, 24.1), (24.1, 12.1), (24.1, 36.1)]),
+        # East at 0.675 X = cell 162 a half side of 23 cells would reach 4 into the nest, cells 96 .. 143.
+        ("warehouse_quad", {}, [(14.5, 24.1), (33.5, 24.1), (24.1, 14.5), (24.1, 33.5)]),
+        *(
+            (
+                "search_and_rescue",
+                {"side_m": side},
+                [
+                    (side / 4 + 0.1, side / 2 + 0.1),
+                    (3 * side / 4 + 0.1, side / 2 + 0.1),
+                    (side / 2 + 0.1, side / 4 + 0.1),
+                    (side / 2 + 0.1, 3 * side / 4 + 0.1),
+                ],
+            )
+            for side in SEARCH_AND_RESCUE_OBJECTS
+        ),
     ],
-    ids=lambda config: f"{config.objects.placement}-{config.arena.width_m:g}",
 )
-def test_squares_share_no_cell_with_nest_or_each_other(config):
-    half = config.cache_side_cells // 2
-    squares = [(x - half, y - half, x + half + 1, y + half + 1) for x, y in static_cache_centres(config)]
-    for a, b in itertools.combinations([*squares, config.arena.nest_cells], 2):
-        assert overlap_cells(a, b) == 0
-    nx, ny = config.arena.n_cells
-    assert all(overlap_cells(square, (0, 0, nx, ny)) == config.cache_side_cells**2 for square in squares)
+def test_static_caches_by_hand(name, fields, centres_m):
+    centres = static_cache_centres(scenario(name, **fields))
+    assert [cell_centre(centre) for centre in centres] == [pytest.approx(centre_m) for centre_m in centres_m]
 
 
 @pytest.mark.parametrize(
@@ -450,3 +370,81 @@ def test_squares_without_room_are_refused(name, overrides, told):
     config = scenario(name, **overrides)
     with pytest.raises(ConfigError, match=f"Expected .*{told}"):
         static_cache_centres(config)
+
+
+# Random walk of free objects
+
+
+def lying(cells: list[tuple[int, int]], nx: int, ny: int) -> ObjectState:
+    """Return objects lying on the given cells of an otherwise empty floor."""
+    objects = bare_objects(len(cells), nx, ny)
+    make_list(objects.waiting, [])
+    for row, (x, y) in enumerate(cells):
+        objects.floor[y, x], objects.cell[row], objects.status[row] = CELL_OBJECT + row, (x, y), ObjectStatus.FREE
+    return objects
+
+
+def crowded_floor(rng: np.random.Generator) -> tuple[ObjectState, Box]:
+    """Return 200 objects, a quarter of them not free, between nest and cache cells."""
+    nx, ny = 60, 40
+    cells = [(int(k) % nx, int(k) // nx) for k in rng.permutation(nx * ny)[:200]]
+    objects = lying(cells, nx, ny)
+    for row in range(0, 200, 4):
+        x, y = objects.cell[row]
+        objects.floor[y, x] = CELL_EMPTY
+        objects.status[row] = (ObjectStatus.CARRIED, ObjectStatus.CACHED, ObjectStatus.WAITING)[row % 3]
+        objects.cell[row] = (30, 20) if objects.status[row] == ObjectStatus.CACHED else (-1, -1)
+    litter = (objects.floor == CELL_EMPTY) & (rng.random(objects.floor.shape) < 0.3)
+    objects.floor[litter] = rng.choice([CELL_NEST, CELL_CACHE, CELL_CACHE - 1], np.count_nonzero(litter))
+    return objects, distributable_box(nx, ny)
+
+
+def walked(objects: ObjectState, area: Box, p: float, rng: np.random.Generator, *, self_conflict: bool = False) -> int:
+    chance = rng.random(len(objects.status))
+    return walk(objects.floor, objects.status, objects.cell, chance, p, area, self_conflict)
+
+
+@pytest.mark.parametrize("self_conflict", [False, True])
+@pytest.mark.parametrize("probability", [0.1, 1.0])
+def test_walk_agrees_with_its_slow_twin(probability, self_conflict):
+    rng = np.random.default_rng(8)
+    objects, area = crowded_floor(rng)
+    twin = copy.deepcopy(objects)
+    for tick in range(40):
+        chance = np.random.default_rng(tick).random(200)
+        moved = walked(objects, area, probability, np.random.default_rng(tick), self_conflict=self_conflict)
+        assert moved == walk_slowly(twin, area, probability, chance, self_conflict)
+        np.testing.assert_array_equal(objects.floor, twin.floor)
+        np.testing.assert_array_equal(objects.cell, twin.cell)
+
+
+def test_the_number_that_triggers_a_move_does_not_bias_its_direction():
+    rng = np.random.default_rng(6)
+    counts = np.zeros((3, 3), int)
+    for _ in range(40_000):
+        objects = lying([(1, 1)], 3, 3)
+        if walked(objects, (0, 0, 3, 3), 0.05, rng):
+            counts += objects.floor == CELL_OBJECT
+    counts = np.delete(counts.ravel(), 4)
+    assert binomtest(int(counts.sum()), 40_000, 0.05).pvalue > SIGNIFICANCE
+    assert chisquare(counts).pvalue > SIGNIFICANCE
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "dx", "dy", "crosses"),
+    [
+        (5, 10, 1, 0, True),  # the border after cell 5
+        (6, 10, -1, 0, True),  # the same from the other side
+        (5, 10, -1, 0, False),
+        (5, 10, 0, 1, False),  # beside the open border, not across it
+        (5, 10, 1, 1, True),  # one open border is enough for a diagonal step
+        (10, 40, 1, 1, True),
+        (10, 41, -1, -1, True),
+        (10, 11, 1, 1, False),
+        (155, 10, 1, 0, True),
+        (160, 10, 1, 0, False),
+        (640, 643, 1, 1, False),  # beyond the study's grids no border is open
+    ],
+)
+def test_self_conflict_lets_objects_across_open_borders_only(x, y, dx, dy, crosses):
+    assert crosses_open_border(x, y, dx, dy) == crosses
