@@ -45,17 +45,6 @@ def steered_wheels(force_cms: float, angle_deg: float) -> tuple[float, float]:
     return (slow, fast) if angle_deg > 0 else (fast, slow)
 
 
-def held_inside(poses: list[tuple[float, float]], room: tuple[float, float, float, float]) -> list[tuple[float, float]]:
-    """Places moved along each axis to the nearest point of a closed rectangle."""
-    x_low, y_low, x_high, y_high = room
-    held = []
-    for x, y in poses:
-        inside_x = x_low if x < x_low else x_high if x > x_high else x
-        inside_y = y_low if y < y_low else y_high if y > y_high else y
-        held.append((inside_x, inside_y))
-    return held
-
-
 Vector = tuple[float, float]
 
 

@@ -1,12 +1,14 @@
-"""Bodies in either engine, without an arena around them; which engine a test's arenas have."""
+"""Bodies in either engine, without an arena around them."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
 from swarm_forage_env.contract.layout import observation_layout
 from swarm_forage_env.scenarios.config import PHYSICS_ENGINES, ScenarioConfig
+from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.bodies import Bodies
 from swarm_forage_env.world.chipmunk import ChipmunkBodies
 from swarm_forage_env.world.kernels.beams import proximity
@@ -14,21 +16,7 @@ from swarm_forage_env.world.kernels.bins import bin_robots, mark_cells
 from swarm_forage_env.world.sensors import new_sensors
 from swarm_forage_env.world.state import SwarmState
 
-CHOSEN = "compiled"
-"""What `stage.tidy_world` makes; the fixture `each_engine` changes it for a test."""
-
-
-@pytest.fixture(params=PHYSICS_ENGINES)
-def each_engine(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Run a test once with each engine in the arenas of `stage.tidy_world` and in `CHOSEN`.
-
-    A `conftest.py` beside the tests has to import it.
-    """
-    monkeypatch.setattr("tests.support.engines.CHOSEN", request.param)
-
-
-in_each_engine = pytest.mark.usefixtures("each_engine")
-"""For a file of tests, or for those of its tests whose world has bodies that could make a difference."""
+in_each_engine = pytest.mark.parametrize("physics", PHYSICS_ENGINES)
 
 
 class SensedBodies(Bodies):
@@ -59,6 +47,16 @@ def make_bodies(config: ScenarioConfig, swarm: SwarmState) -> ChipmunkBodies | S
     if config.physics == "compiled":
         return SensedBodies(config, swarm)
     return ChipmunkBodies(config, swarm.position, swarm.heading)
+
+
+def bodies_at(
+    places: Any, heading: Any, physics: str = "compiled", **overrides: Any
+) -> tuple[ChipmunkBodies | SensedBodies, SwarmState]:
+    """Bodies of robots at these poses in the small warehouse, and their state."""
+    swarm = SwarmState.empty(len(places))
+    swarm.position[:], swarm.heading[:] = places, heading
+    swarm.facing[:] = np.column_stack((np.cos(swarm.heading), np.sin(swarm.heading)))
+    return make_bodies(scenario("warehouse_small", n_robots=len(places), physics=physics, **overrides), swarm), swarm
 
 
 def drive_at(

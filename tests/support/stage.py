@@ -25,7 +25,6 @@ from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.caches import create_cache
 from swarm_forage_env.world.state import listed, make_list
 from swarm_forage_env.wrappers.base import SwarmWrapper
-from tests.support import engines
 
 NEST_CELL = (16, 40)
 OPEN_CELL = (60, 40)
@@ -37,7 +36,7 @@ CORNERS = [(-0.07, -0.07), (0.07, 0.07)]
 
 def tidy_world(*, n_robots: int = 4, n_objects: int = 8, caches: str = "none", **overrides: Any) -> ForageEnv:
     """A small warehouse after reset, with objects in the depot, robots in the yard and no cache standing."""
-    options: dict[str, Any] = {"respawn_scale": 0.0, "physics": engines.CHOSEN, **overrides}
+    options: dict[str, Any] = {"respawn_scale": 0.0, **overrides}
     env = ForageEnv(scenario("warehouse_small", n_robots=n_robots, n_objects=n_objects, caches=caches, **options))
     env.reset_batch(0)
     clear(env)

@@ -24,7 +24,7 @@ from swarm_forage_env.world.caches import (
 )
 from swarm_forage_env.world.placement import static_cache_centres
 from swarm_forage_env.world.state import Source, listed, make_list
-from tests.support.stage import act, assert_conserved, build_cache, clear, lay, load, stand, tidy_world
+from tests.support.stage import act, assert_conserved, clear, lay, load, stand, tidy_world
 
 STATIC_CENTRE = (72, 40)
 """Centre cell of the static cache of the small warehouse."""
@@ -41,15 +41,6 @@ def contents(env: ForageEnv, slot: int) -> list[int]:
 
 
 # Creation
-
-
-def test_single_source_starts_with_the_first_two_objects():
-    env = reset("warehouse_small", caches="static")
-    assert env.caches.alive.sum() == 1
-    assert env.caches.cell[0].tolist() == list(STATIC_CENTRE)
-    assert contents(env, 0) == [0, 1]
-    assert env.events.counters[Counter.CACHES_CREATED] == 1
-    assert_conserved(env)
 
 
 def test_random_placement_absorbs_what_lies_on_the_squares():
@@ -166,31 +157,6 @@ def test_all_missing_caches_come_back_together():
     assert env.caches.alive.sum() == 4
     assert sorted(env.caches.serial[:4].tolist()) == [1, 3, 5, 6]
     assert_conserved(env)
-
-
-# Slots
-
-
-def test_a_freed_slot_is_used_again_under_a_new_serial():
-    config = scenario("warehouse_small", n_robots=1, n_objects=20, caches="dynamic", respawn_scale=0.0)
-    env = ForageEnv(config)
-    env.reset_batch(0)
-    clear(env)
-    for row in range(20):
-        lay(env, row, (121 + row % 10, 14 + row // 10))
-    serials = []
-    for turn in range(6):
-        slot = build_cache(env, [turn, turn + 1], (60, 40))
-        serials.append(int(env.caches.serial[slot]))
-        assert slot == 0
-        stand(env, 0, (60, 40))
-        act(env, {0: Grip.GRASP})
-        act(env, {0: Grip.GRASP})
-        assert not env.caches.alive.any()
-        act(env, {0: Grip.RELEASE})
-        for row in (turn, turn + 1):
-            lay(env, row, (121 + row % 10, 14 + row // 10))
-    assert serials == [1, 2, 3, 4, 5, 6]
 
 
 # Dynamic caches: which objects a CREATE_CACHE drop gathers, where the cache is placed, when none is created
