@@ -1,13 +1,10 @@
 """The stack of wrappers: order, hooks, gains, snapshots, and the record of a run."""
 
-import collections
 import copy
 import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from swarm_forage_env import SnapshotError, load_policy
 from swarm_forage_env._internal.fields import ConfigError
@@ -18,7 +15,6 @@ from swarm_forage_env.runs.run import build_env
 from swarm_forage_env.scenarios.columns import INTERVAL_COLUMNS
 from swarm_forage_env.views.gymnasium import JointForageEnv, SwarmVectorEnv
 from swarm_forage_env.views.pettingzoo import parallel_env
-from swarm_forage_env.world.kernels.counting import add_task_shares
 from swarm_forage_env.wrappers.base import STACK_ORDER, SwarmWrapper
 from swarm_forage_env.wrappers.recorder import COUNTED, RunRecorder
 from swarm_forage_env.wrappers.registry import parse_wrapper
@@ -343,28 +339,13 @@ def test_task_shares_are_means_over_ticks_of_active_robots():
     recorder.reset_batch(0)
     tasks = np.array([Task.HARVESTER, Task.HARVESTER, Task.COLLECTOR, Task.GENERALIST], np.int8)
     for tick in range(15):
-        if tick == 5:
-            recorder.unwrapped.set_population(active=np.array([True, False, True, False]), present=np.ones(4, np.bool_))
+        if tick in (5, 12):
+            at_work = [True, False, True, False] if tick == 5 else [False] * 4
+            recorder.unwrapped.set_population(active=np.array(at_work), present=np.ones(4, np.bool_))
         recorder.step_batch(STILL, tasks=tasks)
     shares = told(recorder)
     assert set(shares) == {f"task_share_{task.name.lower()}" for task in Task}
-    np.testing.assert_allclose(shares["task_share_harvester"], [0.5, 0.5, 0.5])
-    np.testing.assert_allclose(shares["task_share_collector"], [0.25, 0.5, 0.5])
+    np.testing.assert_allclose(shares["task_share_harvester"], [0.5, 0.5, 0.2])
+    np.testing.assert_allclose(shares["task_share_collector"], [0.25, 0.5, 0.2])
     np.testing.assert_allclose(shares["task_share_generalist"], [0.25, 0.0, 0.0])
     np.testing.assert_allclose(shares["task_share_none"], 0.0)
-
-
-def task_shares(tasks, active, n_codes):
-    """Share of active robots in each of `n_codes` tasks; zeros while no robot is active."""
-    working = [int(task) for task, at_work in zip(tasks, active, strict=True) if at_work]
-    counts = collections.Counter(working)
-    return [counts[code] / len(working) if working else 0.0 for code in range(n_codes)]
-
-
-@given(st.lists(st.tuples(st.integers(0, 7), st.booleans()), min_size=1, max_size=30))
-def test_task_share_kernel_agrees_with_its_twin(robots):
-    tasks = np.array([code for code, _ in robots], np.int8)
-    active = np.array([at_work for _, at_work in robots])
-    shares = np.zeros(8)
-    assert add_task_shares(tasks, active, shares)
-    np.testing.assert_allclose(shares, task_shares(tasks, active, 8))
