@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from metrics.scoring import score_question
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import model_files
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, any_swarm
@@ -22,13 +21,11 @@ from swarm_forage_env.policies.model_files import (
 )
 from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.policies.registry import load_policy
-from swarm_forage_env.runs.spec import RunSpec, plan_run, policy_spec
+from swarm_forage_env.runs.spec import RunSpec, plan_run, policy_spec, policy_specs
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.studies.ladders import Budget
 from swarm_forage_env.views.pettingzoo import parallel_env
 from tests.support.branches import pickled
 
-TINY = Budget(horizon_s=4.0, interval_s=2.0, n_seeds=1, n_sizes=2, n_levels=1)
 ENV = parallel_env("warehouse_small", n_robots=4, n_objects=20)
 OBS = np.random.default_rng(1).uniform(-1.0, 1.0, (4, ENV.layout.size)).astype(np.float32)
 ACTIVE = np.ones(4, bool)
@@ -186,9 +183,7 @@ def test_an_interface_is_said_with_the_file(tmp_path):
     given = {"interface": {"decision_ticks": 2, "site_memory": False}}
     assert said == plan_run(world, str(path), parameters=given)
     assert RunSpec.from_mapping(said.to_mapping()) == said
-    assert score_question([f"{path}:decision_ticks=7"], world, budget=TINY).plan.policies[0].label == "model"
-    with pytest.raises(ConfigError, match="Did you mean 'decision_ticks'"):
-        load_policy(f"{path}:decision_tick=7")
+    assert policy_spec(f"{path}:decision_ticks=7").label == "model"
     for once in (load_policy, lambda words, given: policy_spec(words, parameters=given)):
         with pytest.raises(ConfigError, match="once, got it with the file and as a parameter"):
             once(f"{path}:decision_ticks=2", given)
@@ -241,32 +236,16 @@ def test_files_that_are_missing_changed_or_no_models_are_refused(tmp_path, monke
         load_policy(str(bad))
 
 
-@pytest.fixture
-def network_file(tmp_path) -> Path:
-    """A network that drives straight on, made for static caches."""
+def test_a_network_file_holds_its_own_interface_and_goes_by_its_folder_or_path_beside_others_of_its_name(tmp_path):
     interface = InterfaceConfig(automatic_gripper=True)
     about = NetworkAbout(interface=interface, activation="tanh", samples=False, caches="static")
-    path = tmp_path / "straight.npz"
-    Network((np.zeros((SIZE, 2), np.float32),), (np.full(2, 0.5, np.float32),), about).save(path)
-    return path
-
-
-def test_networks_are_policies_by_their_path(network_file):
-    policy = load_policy(str(network_file), {"digest": file_digest(network_file)})
-    policy.reset(ENV.swarm_spec, np.random.default_rng(0))
-    np.testing.assert_array_equal(policy.act(OBS, ACTIVE)[:, :2], 0.5)
-    with pytest.raises(ModelError, match="changed since"):
-        load_policy(str(network_file), {"digest": "0"})
-    with pytest.raises(ModelError, match="a network file holds its own"):
-        load_policy(f"{network_file}:decision_ticks=2")
-
-
-@pytest.mark.parametrize(("folders", "labels"), [(("a", "b"), "short"), (("a/same", "b/same"), "whole")])
-def test_files_of_equal_names_go_by_their_folders_or_paths(network_file, tmp_path, folders, labels):
-    files = [tmp_path / folder / network_file.name for folder in folders]
+    network = Network((np.zeros((SIZE, 2), np.float32),), (np.full(2, 0.5, np.float32),), about)
+    files = [tmp_path / folder / "straight.npz" for folder in ("a", "b", "a/same", "b/same")]
     for file in files:
-        file.parent.mkdir(parents=True)
-        file.write_bytes(network_file.read_bytes())
-    plan = score_question(files, scenario("warehouse_small", n_robots=3), budget=TINY).plan
-    expected = {"short": ["a/straight.npz", "b/straight.npz"], "whole": [str(file) for file in files]}
-    assert [policy.label for policy in plan.policies] == expected[labels]
+        file.parent.mkdir(exist_ok=True)
+        network.save(file)
+    with pytest.raises(ModelError, match="a network file holds its own"):
+        load_policy(f"{files[0]}:decision_ticks=2")
+    assert [spec.label for spec in policy_specs(files[:2])] == ["a/straight.npz", "b/straight.npz"]
+    assert [spec.label for spec in policy_specs(files[2:])] == [str(file) for file in files[2:]]
+    assert [spec.label for spec in policy_specs([files[0], "crw"])] == ["straight", "crw"]

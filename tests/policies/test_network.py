@@ -18,7 +18,6 @@ from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.pettingzoo import parallel_env
 from tests.reference import perceptron
-from tests.support.branches import pickled
 from tests.support.crowded_runs import change_population
 
 DRIVEN = InterfaceConfig(observation="compact", automatic_gripper=True)
@@ -203,22 +202,6 @@ def test_layers_of_a_state_dict_make_the_same_network(kind):
     del state["mlp.2.bias"]
     with pytest.raises(NetworkError, match="layers that follow on each other"):
         Network.from_state_dict(state, network.about)
-
-
-def test_a_copy_continues_as_the_original_does():
-    """Between two decisions, with actions that are drawn."""
-    env = parallel_env("warehouse_small", n_robots=6, n_objects=20)
-    interface = InterfaceConfig(observation="compact", actions="discrete", decision_ticks=3)
-    policy = NetworkPolicy(compact_network(interface, 11, samples=True))
-    policy.reset(env.swarm_spec, np.random.default_rng(2))
-    obs = env.reset_batch(3)
-    for _ in range(4):
-        policy.act(obs, env.active)
-    twin = pickled(policy)
-    of_twin = [twin.act(obs, env.active).copy() for _ in range(12)]
-    of_policy = [policy.act(obs, env.active).copy() for _ in range(12)]
-    np.testing.assert_array_equal(of_twin, of_policy)
-    assert not np.array_equal(of_policy[0], of_policy[3])
 
 
 # In runs

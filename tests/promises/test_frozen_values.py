@@ -2,15 +2,10 @@
 
 import pytest
 
-from tests.support.frozen import FROZEN, score_values, stored, training_weights, verdict_answers
+from tests.support.frozen import score_values, stored, training_weights, verdict_answers
 from tests.support.golden_runs import AS_THEN
 
 pytestmark = [*AS_THEN]
-
-
-def test_all_files_are_tested():
-    assert set(FROZEN) == {"score", "verdict", "training"}
-    assert all(stored(name) for name in FROZEN)
 
 
 def test_scores_of_four_policies_have_the_same_values():

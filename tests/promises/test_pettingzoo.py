@@ -69,23 +69,6 @@ def idle(world: ForageEnv) -> dict[str, np.ndarray]:
     return {agent: np.zeros(3, np.float32) for agent in world.agents}
 
 
-def test_dicts_hold_the_rows_of_the_batch():
-    dicts, batch = parallel_env(**SMALL), parallel_env(**SMALL)
-    rng = np.random.default_rng(0)
-    obs, infos = dicts.reset(seed=2)
-    np.testing.assert_array_equal(np.stack(list(obs.values())), batch.reset_batch(2))
-    assert list(obs) == list(infos) == dicts.possible_agents
-    for _ in range(30):
-        actions = rng.uniform(-1, 1, (5, 3)).astype(np.float32)
-        obs, rewards, terminations, truncations, infos = dicts.step(dict(zip(dicts.agents, actions, strict=True)))
-        rows, reward, terminated, truncated = batch.step_batch(actions)
-        np.testing.assert_array_equal(np.stack(list(obs.values())), rows)
-        assert list(rewards.values()) == reward.tolist()
-        assert list(terminations.values()) == terminated.tolist()
-        assert set(truncations.values()) == {truncated}
-        assert [info["active"] for info in infos.values()] == batch.active.tolist()
-
-
 def kill(world: ForageEnv, *rows: int) -> None:
     alive = world.swarm.present.copy()
     alive[list(rows)] = False

@@ -85,19 +85,6 @@ def test_an_action_is_kept_for_the_ticks_of_a_decision_and_rewards_add_up():
     assert last.lengths.tolist() == [2, 2, 2]
 
 
-def test_seeds_decide_everything_and_runs_continue_their_sequence():
-    first, second = (ArenaBatch(plan(), 2) for _ in range(2))
-    rng = np.random.default_rng(0)
-    actions = rng.uniform(-1, 1, (12, 6, 3)).astype(np.float32)
-    seen = []
-    for batch in (first, second):
-        obs, _ = batch.reset([5, 6], [None, None])
-        seen.append([obs, *(batch.step(action).obs for action in actions)])
-    np.testing.assert_array_equal(*seen)
-    assert not np.array_equal(seen[0][0][:3], seen[0][0][3:]), "arenas of different seeds differ"
-    assert not np.array_equal(seen[0][0], seen[0][5]), "the next run of an arena has another seed"
-
-
 def test_a_reset_changes_the_scenario_for_all_later_runs_until_told_otherwise():
     batch = ArenaBatch(plan(InterfaceConfig(observation="compact")), 2)
     batch.reset([0, 1], [{"scenario": {"n_objects": 9, "width_m": 24.0}}, None])

@@ -28,21 +28,6 @@ def test_is_made_by_its_id():
         assert env.step(env.action_space.sample())[3]
 
 
-def test_shows_the_same_world_as_the_parallel_environment():
-    joint = JointForageEnv("warehouse_small", n_robots=8, max_cycles=30)
-    parallel = parallel_env("warehouse_small", n_robots=8, max_cycles=30)
-    obs, _ = joint.reset(seed=3)
-    rows, _ = parallel.reset(seed=3)
-    rng = np.random.default_rng(0)
-    for _ in range(30):
-        np.testing.assert_array_equal(obs, np.stack(list(rows.values())))
-        actions = rng.uniform(-1, 1, (8, 3)).astype(np.float32)
-        obs, reward, _, truncated, _ = joint.step(actions)
-        rows, rewards, _, truncations, _ = parallel.step(dict(zip(parallel.agents, actions, strict=True)))
-        assert reward == pytest.approx(sum(rewards.values()))
-        assert truncated == all(truncations.values())
-
-
 INTERFACES = {
     "full": InterfaceConfig(),
     "driven": InterfaceConfig(observation="compact", automatic_gripper=True),

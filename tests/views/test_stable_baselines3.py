@@ -22,21 +22,13 @@ from tests.support.branches import pickled
 IDLE = np.zeros((lives.N_ROBOTS, 3), np.float32)
 
 
-def told_story(env: SwarmVecEnv) -> list[tuple]:
+def test_the_story_by_hand():
+    env = SwarmVecEnv(**lives.WORLD)
     env.seed(7)
     env.reset()
-    return lives.live(lambda **change: env.env_method("set_population", **change), lambda: env.step(IDLE))
-
-
-def test_rewards_and_dones_by_hand():
-    steps = told_story(SwarmVecEnv(**lives.WORLD))
+    steps = lives.live(lambda **change: env.env_method("set_population", **change), lambda: env.step(IDLE))
     np.testing.assert_array_equal([rewards for _, rewards, _, _ in steps], lives.REWARDS)
     np.testing.assert_array_equal([dones for _, _, dones, _ in steps], lives.TERMINATED | lives.TRUNCATED)
-
-
-def test_infos_by_hand():
-    env = SwarmVecEnv(**lives.WORLD)
-    steps = told_story(env)
     for tick, (_, _, dones, infos) in enumerate(steps):
         assert len(infos) == lives.N_ROBOTS
         for robot, info in enumerate(infos):

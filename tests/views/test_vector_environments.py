@@ -49,19 +49,13 @@ def test_the_number_of_sub_environments_is_a_whole_number_of_swarms():
             gymnasium.make_vec(env_id, n_robots=4, num_envs=wrong)
     with pytest.raises(ValueError, match="got num_envs = 8 and n_arenas = 3; give one of both"):
         gymnasium.make_vec(env_id, n_robots=4, num_envs=8, n_arenas=3)
-    with pytest.raises(ValueError, match="n_arenas to be a whole number >= 1"):
-        gymnasium.make_vec(env_id, n_robots=4, n_arenas=0)
-
-
-def told_story() -> list[tuple]:
-    envs = SwarmVectorEnv(**lives.WORLD)
-    envs.reset(seed=7)
-    (env,) = envs._arenas.envs
-    return lives.live(env.set_population, lambda: envs.step(IDLE))
 
 
 def test_infos_by_hand():
-    steps = told_story()
+    envs = SwarmVectorEnv(**lives.WORLD)
+    envs.reset(seed=7)
+    (env,) = envs._arenas.envs
+    steps = lives.live(env.set_population, lambda: envs.step(IDLE))
     np.testing.assert_array_equal([rewards for _, rewards, *_ in steps], lives.REWARDS)
     np.testing.assert_array_equal([infos["active"] for *_, infos in steps[:-1]], lives.ACTIVE_BEFORE[1:])
     for tick, (obs, _, terminated, truncated, infos) in enumerate(steps):
