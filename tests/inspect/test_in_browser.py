@@ -8,13 +8,12 @@ import pytest
 from swarm_forage_env.inspect.play.session import PlaySession, Setting
 from swarm_forage_env.inspect.replay.capture import record_replay
 from swarm_forage_env.inspect.replay.files import write_replays
-from swarm_forage_env.inspect.replay.frames import Replay
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.world import World
-from tests.support.browser import Browser, choose_robot, chromium, run_shown, served
+from tests.support.browser import Browser, choose_robot, chromium, served
 from tests.support.foraging import CROWDED
 
 WORLD = with_overrides(CROWDED, n_objects=40, horizon_s=400.0, interval_s=100.0)
@@ -38,11 +37,6 @@ def replays(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def page(replays, tmp_path_factory) -> Path:
-    return write_replays(tmp_path_factory.mktemp("page") / "one.html", replays[0])
-
-
-@pytest.fixture(scope="module")
-def pair(replays, tmp_path_factory) -> Path:
     return write_replays(tmp_path_factory.mktemp("page") / "two.html", replays)
 
 
@@ -66,7 +60,7 @@ def browser(request) -> Browser:
 
 
 def test_play_moves_robots_and_pause_stops_them(page, browser):
-    browser.open(page)
+    browser.open(page.as_uri())
     before = browser.ask(PIXELS)
     browser.click("#play")
     browser.wait_for("Number(document.getElementById('scrub').value) > 5")
@@ -76,22 +70,21 @@ def test_play_moves_robots_and_pause_stops_them(page, browser):
     still = browser.ask(PIXELS)
     browser.ask("new Promise((done) => setTimeout(done, 200))")
     assert browser.ask(PIXELS) == still
-    browser.keep_picture(f"play_{browser.width}")
     assert (browser.complaints, browser.requests) == ([], [])
 
 
-def test_a_click_chooses_a_robot_and_tells_its_state(pair, replays, desktop):
+def test_a_click_chooses_a_robot_and_tells_its_state(page, replays, desktop):
     replay = replays[0]
-    desktop.open(pair)
+    desktop.open(page.as_uri())
     frame = 150  # one per second
     robot = next(r for r in range(12) if not replay.status[frame, r] & (8 | 4))
-    choose(desktop, replay, frame, robot)
+    seek(desktop, float(replay.times_s[frame]))
+    choose_robot(desktop, replay.scenario.arena, robot, *replay.position_m[frame, robot])
     words = desktop.text("#robot .told")
     assert replay.activities[replay.activity[frame, robot]] in words
     assert "thing" in words
     desktop.press("f")
     desktop.wait_for("document.querySelector('#robot button').ariaPressed === 'true'")
-    desktop.keep_picture("robot")
     desktop.press("Escape")
     desktop.wait_for("document.querySelector('#robot h2') === null")
     assert (desktop.complaints, desktop.requests) == ([], [])
@@ -102,7 +95,7 @@ def test_a_damaged_page_says_so(page, desktop, tmp_path):
     start = text.index('class="run">') + 40
     broken = tmp_path / "broken.html"
     broken.write_text(text[:start] + "AAAA" * 20 + text[start + 80 :])
-    desktop.open(broken, "document.getElementById('loading')?.textContent.includes('cannot be shown')")
+    desktop.open(broken.as_uri(), "document.getElementById('loading')?.textContent.includes('cannot be shown')")
     assert "may be damaged" in desktop.text("#loading")
 
 
@@ -120,8 +113,8 @@ def session():
 
 def opened(browser: Browser, session, *, plays: bool = False) -> None:
     session.paused = not plays
-    browser.open_address(session.address)
-    run_shown(browser, "12 robots")
+    browser.open(session.address)
+    browser.wait_for("document.querySelector('.names').textContent.includes('12 robots')")
 
 
 def settled(browser: Browser) -> None:
@@ -130,9 +123,7 @@ def settled(browser: Browser) -> None:
     assert [address for address in browser.requests if not address.startswith("http://127.0.0.1:")] == []
 
 
-@pytest.mark.parametrize("kind", ["desktop", "phone"])
-def test_it_plays_pauses_and_steps(request, kind, session):
-    browser = request.getfixturevalue(kind)
+def test_it_plays_pauses_and_steps(browser, session):
     opened(browser, session, plays=True)
     browser.wait_for(f"{SECONDS} > 3")
     browser.click("#play")
@@ -146,13 +137,12 @@ def test_it_plays_pauses_and_steps(request, kind, session):
     browser.wait_for("document.getElementById('note').textContent === 'one tick'")
     assert session.world.tick == tick + 1
     assert browser.ask("document.documentElement.scrollWidth") <= browser.width
-    browser.keep_picture(f"play_page_{kind}")
     settled(browser)
 
 
 def test_a_robot_is_chosen_broken_repaired_and_killed(desktop, session):
     opened(desktop, session)
-    choose_robot(desktop, session, 4)
+    choose_robot(desktop, session.spec.scenario.arena, 4, *session.world.swarm.position[4].tolist())
     desktop.wait_for("document.querySelector('#robot table').textContent.includes('wheels')")
     assert "exploring" in desktop.text("#robot table")
     for button, words in (("break", "in repair"), ("repair", "empty"), ("kill", "dead")):
@@ -165,28 +155,8 @@ def test_a_robot_is_chosen_broken_repaired_and_killed(desktop, session):
     settled(desktop)
 
 
-_MARGIN_PX = 8
-"""Of the arena in its canvas, as in `view.js`."""
-
-
 def seek(browser: Browser, time_s: float) -> None:
     """Move the slider, and wait until the page is painted."""
     browser.ask(f"document.getElementById('scrub').value = {time_s}")
     browser.ask("document.getElementById('scrub').dispatchEvent(new Event('input'))")
     browser.ask("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
-
-
-def place_of(browser: Browser, replay: Replay, frame: int, robot: int, *, panel: int = 1) -> tuple[float, float]:
-    """Return where a robot is in the window, in pixels, while an arena is shown as a whole; `panel` counts from 1."""
-    left, top, width, height = browser.box(f".arena:nth-child({panel}) canvas")
-    arena = replay.scenario.arena
-    scale = min((width - 2 * _MARGIN_PX) / arena.width_m, (height - 2 * _MARGIN_PX) / arena.height_m)
-    x_m, y_m = replay.position_m[frame, robot]
-    return left + width / 2 + scale * (x_m - arena.width_m / 2), top + height / 2 - scale * (y_m - arena.height_m / 2)
-
-
-def choose(browser: Browser, replay: Replay, frame: int, robot: int, *, panel: int = 1) -> None:
-    """Go to a frame and click on a robot; frames are as far apart as `replay` has them."""
-    seek(browser, float(replay.times_s[frame]))
-    browser.click_at(*place_of(browser, replay, frame, robot, panel=panel))
-    browser.wait_for(f"document.querySelector('#robot h2')?.textContent.startsWith('robot {robot}f')")

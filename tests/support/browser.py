@@ -1,6 +1,5 @@
 """A real browser without a window, driven over its debugging pipe: no package is needed, only chromium."""
 
-import base64
 import itertools
 import json
 import os
@@ -18,19 +17,15 @@ import pytest
 
 from swarm_forage_env.inspect.play.server import PlayServer
 from swarm_forage_env.inspect.play.session import PlaySession
+from swarm_forage_env.scenarios.config import ArenaConfig
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 PATIENCE_S = 60.0
 
 
-def find_chromium() -> str | None:
-    """Return the path of a browser, None where there is none."""
-    return os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
-
-
 def chromium() -> str:
     """Return the path of a browser; skips the test where there is none."""
-    found = find_chromium()
+    found = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
     if found is None:
         pytest.skip(f"needs a browser: none of {', '.join(NAMES)} is installed")
     return found
@@ -118,30 +113,14 @@ class Browser:
         elif event["method"] == "Network.requestWillBeSent" and about["request"]["url"] != self._address:
             self.requests.append(about["request"]["url"])
 
-    def open(
-        self, file: Path, ready: str = "document.getElementById('loading')?.hidden === true", *, fragment: str = ""
-    ) -> None:
-        """Open a file and wait until it is ready; by default until its replay is unpacked.
-
-        A fragment such as "#t=60" ends the address.
-        """
-        self.open_address(file.resolve().as_uri(), ready, fragment=fragment)
-
-    def open_address(
-        self, address: str, ready: str = "document.getElementById('loading')?.hidden === true", *, fragment: str = ""
-    ) -> None:
-        """Open an address and wait until it is ready; what was kept of an earlier page is gone."""
-        self.call("Page.navigate", url="about:blank")  # another fragment alone would not load the page anew
-        self.complaints.clear()  # an earlier page may have asked a server that has ended
+    def open(self, address: str, ready: str = "document.getElementById('loading')?.hidden === true") -> None:
+        """Open an address and wait until it is ready, by default until its run is shown; what was kept is gone."""
+        self.call("Page.navigate", url="about:blank")  # an earlier page may ask a server that has ended
+        self.complaints.clear()
         self.requests.clear()
         self._address = address
-        self.call("Page.navigate", url=self._address + fragment)
+        self.call("Page.navigate", url=address)
         self.wait_for(ready)
-
-    def keep_picture(self, name: str) -> None:
-        """Write a picture for people to look at, if the environment says where."""
-        if "REPLAY_PICTURES" in os.environ:
-            self.picture(Path(os.environ["REPLAY_PICTURES"]) / f"{name}.png")
 
     def ask(self, expression: str) -> Any:
         """Return the value of an expression in the page."""
@@ -169,29 +148,20 @@ class Browser:
         )
         return left, top, width, height
 
-    def middle(self, selector: str) -> tuple[float, float]:
-        """Return where the middle of an element is in the window."""
-        left, top, width, height = self.box(selector)
-        return left + width / 2, top + height / 2
-
     def click(self, selector: str) -> None:
         """Click in the middle of an element."""
-        self.click_at(*self.middle(selector))
+        left, top, width, height = self.box(selector)
+        self.click_at(left + width / 2, top + height / 2)
 
     def click_at(self, x: float, y: float) -> None:
         """Press and release the mouse."""
         for kind in ("mousePressed", "mouseReleased"):
             self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
 
-    def press(self, key: str, *, code: str = "") -> None:
+    def press(self, key: str) -> None:
         """Press and release a key."""
         for kind in ("keyDown", "keyUp"):
-            self.call("Input.dispatchKeyEvent", type=kind, key=key, code=code or key)
-
-    def picture(self, file: Path) -> Path:
-        """Write what the page looks like as PNG."""
-        file.write_bytes(base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"]))
-        return file
+            self.call("Input.dispatchKeyEvent", type=kind, key=key, code=key)
 
 
 _MARGIN_PX = 8
@@ -212,20 +182,10 @@ def served(session: PlaySession) -> Iterator[PlayServer]:
         server.server_close()
 
 
-def pixel_of(browser: Browser, session: PlaySession, x_m: float, y_m: float) -> tuple[float, float]:
-    """Return where a place of the arena is in the window, while the whole arena is shown."""
+def choose_robot(browser: Browser, arena: ArenaConfig, robot: int, x_m: float, y_m: float) -> None:
+    """Click on a robot that stands at a place of an arena which is shown as a whole."""
     left, top, width, height = browser.box(".arena canvas")
-    arena = session.spec.scenario.arena
     scale = min((width - 2 * _MARGIN_PX) / arena.width_m, (height - 2 * _MARGIN_PX) / arena.height_m)
-    return left + width / 2 + scale * (x_m - arena.width_m / 2), top + height / 2 - scale * (y_m - arena.height_m / 2)
-
-
-def choose_robot(browser: Browser, session: PlaySession, robot: int) -> None:
-    """Click on a robot of a run that stands still."""
-    browser.click_at(*pixel_of(browser, session, *session.world.swarm.position[robot].tolist()))
-    browser.wait_for(f"document.querySelector('#robot h2')?.textContent === 'robot {robot}'")
-
-
-def run_shown(browser: Browser, text: str) -> None:
-    """Wait until the headline, or the line below it, has some text."""
-    browser.wait_for(f"document.querySelector('.names').textContent.includes('{text}')")
+    x, y = scale * (x_m - arena.width_m / 2), scale * (y_m - arena.height_m / 2)
+    browser.click_at(left + width / 2 + x, top + height / 2 - y)
+    browser.wait_for(f"parseInt(document.querySelector('#robot h2')?.textContent.slice(6)) === {robot}")
