@@ -11,7 +11,7 @@ from swarm_forage_env.inspect.descriptions import describe
 from swarm_forage_env.inspect.maps import MEANINGS, FloorMaps, draw_maps, floor_maps
 from swarm_forage_env.inspect.replay.frames import Replay, Status
 from swarm_forage_env.policies.interface import InterfaceConfig
-from swarm_forage_env.policies.network import Network, NetworkAbout
+from swarm_forage_env.policies.pretrained import network_file
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.world import World
@@ -104,29 +104,9 @@ def test_maps_of_one_quantity_have_one_scale_and_differences_a_symmetric_one(mon
     assert scales[2] == scales[3] == pytest.approx((-9.0, 9.0), rel=0.02)
 
 
-FRAMED = InterfaceConfig(
-    observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5, frame_decisions=200
-)
-
-
-@pytest.fixture
-def told(tmp_path):
-    """Write a network with a card, and return the lines about it."""
-
-    def tell(**about) -> list[str]:
-        layers = (np.zeros((23, 4), np.float32), np.zeros((4, 6), np.float32))
-        biases = (np.zeros(4, np.float32), np.zeros(6, np.float32))
-        Network(layers, biases, NetworkAbout(interface=FRAMED, samples=False, **{"activation": "tanh"} | about)).save(
-            tmp_path / "mine.npz"
-        )
-        return list(describe(str(tmp_path / "mine.npz")).notes)
-
-    return tell
-
-
-def test_the_layers_and_every_field_of_the_interface_are_told(told):
-    first, *lines = told(activation="relu", caches="static")
-    assert first.endswith("mine.npz: a network of 23 x 4 x 6 units (relu)")
+def test_the_layers_and_every_field_of_the_interface_of_a_network_are_told():
+    first, *lines = describe(str(network_file("generalist"))).notes
+    assert first.endswith("generalist.npz: a network of 31 x 64 x 64 x 6 units (tanh)")
     fields = {line.split()[0]: line.split()[-1] for line in lines if line.startswith("    ")}
     assert {*(item.name for item in dataclasses.fields(InterfaceConfig)), "samples", "caches"} == set(fields)
-    assert (fields["decision_ticks"], fields["frame_decisions"], fields["caches"]) == ("5", "200", "static")
+    assert (fields["decision_ticks"], fields["frame_decisions"], fields["caches"]) == ("2", "1000", "none")

@@ -184,18 +184,6 @@ def test_scalings_are_one_without_deviation_and_reciprocal_to_each_other(v, idea
 
 
 @law
-@given(lam=rate, mu=rate, n=st.integers(1, 30), horizon=st.floats(1.0, 1e4))
-def test_mean_away_grows_with_time_towards_equilibrium(lam, mu, n, horizon):
-    rates = PopulationRates(lambda_bd=lam, mu_bd=mu)
-    away = metrics.mean_away(rates, n, horizon)
-    limit = metrics.queue_statistics(rates, n).truncated_length
-    assert limit is not None
-    assert 0.0 < away <= metrics.mean_away(rates, n, 2 * horizon) * (1 + 1e-9)
-    assert away <= limit * (1 + 1e-9)
-    assert away <= 0.5 * lam * horizon * (1 + 1e-9)  # nobody returns
-
-
-@law
 @given(lam=rate, mu=rate, n=st.integers(1, 30))
 def test_littles_law_ties_lengths_and_times(lam, mu, n):
     assume(lam < 0.999 * mu)
@@ -203,19 +191,6 @@ def test_littles_law_ties_lengths_and_times(lam, mu, n):
     assert queue.length == pytest.approx(lam * queue.time, rel=1e-6)
     assert queue.time_printed == pytest.approx(queue.time + 1 / mu, rel=1e-12)
     assert queue.truncated_length <= min(n, queue.length) * (1 + 1e-9)
-
-
-@law
-@given(n=st.integers(1, 300), q=st.floats(1e-3, 1e3), data=st.data())
-def test_availability_falls_with_robots_needed_and_with_the_rate_of_leaving(n, q, data):
-    n_min = data.draw(st.integers(1, n))
-    p_v = metrics.availability(n, n_min, q)
-    assert 0.0 <= p_v <= 1.0
-    assert metrics.availability(n, n_min + 1, q) <= p_v
-    assert metrics.availability(n, n_min, 1.1 * q) <= p_v
-    away = metrics.queue_statistics(PopulationRates(lambda_bd=q, mu_bd=1.0), n).truncated_distribution
-    assert away is not None
-    assert p_v == pytest.approx(away[: n - n_min + 1].sum(), rel=1e-6, abs=1e-12)
 
 
 @pytest.mark.parametrize(("n", "m"), [(10, 10), (50, 50), (80, 37)])

@@ -1,6 +1,7 @@
 """Trained policies in files: found by their suffix, opened with care, applied as they were trained."""
 
 import dataclasses
+import shutil
 import sys
 import zipfile
 from pathlib import Path
@@ -19,12 +20,12 @@ from swarm_forage_env.policies.model_files import (
     ModelPolicy,
     file_digest,
 )
-from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.spec import RunSpec, plan_run, policy_spec, policy_specs
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.pettingzoo import parallel_env
 from tests.support.branches import pickled
+from tests.support.small_files import small_file
 
 ENV = parallel_env("warehouse_small", n_robots=4, n_objects=20)
 OBS = np.random.default_rng(1).uniform(-1.0, 1.0, (4, ENV.layout.size)).astype(np.float32)
@@ -237,15 +238,12 @@ def test_files_that_are_missing_changed_or_no_models_are_refused(tmp_path, monke
 
 
 def test_a_network_file_holds_its_own_interface_and_goes_by_its_folder_or_path_beside_others_of_its_name(tmp_path):
-    interface = InterfaceConfig(automatic_gripper=True)
-    about = NetworkAbout(interface=interface, activation="tanh", samples=False, caches="static")
-    network = Network((np.zeros((SIZE, 2), np.float32),), (np.full(2, 0.5, np.float32),), about)
-    files = [tmp_path / folder / "straight.npz" for folder in ("a", "b", "a/same", "b/same")]
+    files = [tmp_path / folder / "net.npz" for folder in ("a", "b", "a/same", "b/same")]
     for file in files:
         file.parent.mkdir(exist_ok=True)
-        network.save(file)
+        shutil.copy(small_file("network.npz"), file)
     with pytest.raises(ModelError, match="a network file holds its own"):
         load_policy(f"{files[0]}:decision_ticks=2")
-    assert [spec.label for spec in policy_specs(files[:2])] == ["a/straight.npz", "b/straight.npz"]
+    assert [spec.label for spec in policy_specs(files[:2])] == ["a/net.npz", "b/net.npz"]
     assert [spec.label for spec in policy_specs(files[2:])] == [str(file) for file in files[2:]]
-    assert [spec.label for spec in policy_specs([files[0], "crw"])] == ["straight", "crw"]
+    assert [spec.label for spec in policy_specs([files[0], "crw"])] == ["net", "crw"]

@@ -10,7 +10,7 @@ import pytest
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
+from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.kernels.network import pick, power
 from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkError, NetworkPolicy
@@ -19,6 +19,7 @@ from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.pettingzoo import parallel_env
 from tests.reference import perceptron
 from tests.support.crowded_runs import change_population
+from tests.support.networks import network_of
 
 DRIVEN = InterfaceConfig(observation="compact", automatic_gripper=True)
 NUMBERED = dataclasses.replace(DRIVEN, actions="discrete")
@@ -33,13 +34,6 @@ def small_network(**changes) -> Network:
     weights = (np.array([[1.0, -1.0], [0.0, 2.0]], np.float32), np.array([[1.0, 0.0], [0.0, 3.0]], np.float32))
     biases = (np.array([0.0, 0.5], np.float32), np.array([0.25, 0.0], np.float32))
     return Network(weights, biases, about(**changes))
-
-
-def compact_network(interface=DRIVEN, n_actions=2, **changes) -> Network:
-    rng = np.random.default_rng(1)
-    weights = tuple(rng.normal(size=size).astype(np.float32) for size in ((23, 8), (8, n_actions)))
-    biases = tuple(rng.normal(size=size).astype(np.float32) for size in (8, n_actions))
-    return Network(weights, biases, about(interface, **changes))
 
 
 def layers_of(network: Network) -> tuple[np.ndarray, ...]:
@@ -113,7 +107,7 @@ def test_a_temperature_makes_likely_actions_likelier():
 
 def test_files_give_back_what_was_written_and_are_replaced_whole_or_not_at_all(tmp_path):
     path = tmp_path / "network.npz"
-    network = compact_network(NUMBERED, 6, samples=True, caches="static", card={"by": ["hand", 1]})
+    network = network_of(NUMBERED, 8, samples=True, caches="static", card={"by": ["hand", 1]})
     network.save(path)
     again, before = Network.load(path), path.read_bytes()
     assert again.about == network.about
@@ -121,7 +115,7 @@ def test_files_give_back_what_was_written_and_are_replaced_whole_or_not_at_all(t
         np.testing.assert_array_equal(one, other, strict=True)
     assert all(isinstance(load_policy(one), NetworkPolicy) for one in (path, str(path)))
     with pytest.raises(ValueError, match="plain JSON values"):
-        compact_network(card={"not": {"plain"}}).save(path)
+        network_of(DRIVEN, 8, card={"not": {"plain"}}).save(path)
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
 
@@ -175,7 +169,7 @@ def test_a_network_that_does_not_fit_its_interface_is_refused_before_it_is_kept_
     with pytest.raises(NetworkError, match=reason):
         Network.from_state_dict(state_dict(narrow), narrow.about)
     with pytest.raises(NetworkError, match=r"to 6 actions, .* got one from 23 to 2"):
-        compact_network(NUMBERED, 2).save(tmp_path / "few.npz")
+        dataclasses.replace(network_of(DRIVEN, 8), about=about(NUMBERED)).save(tmp_path / "few.npz")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -191,7 +185,7 @@ def state_dict(network: Network) -> dict[str, np.ndarray]:
 
 @pytest.mark.parametrize("kind", ["arrays", "tensors"])
 def test_layers_of_a_state_dict_make_the_same_network(kind):
-    network = compact_network()
+    network = network_of(DRIVEN, 8)
     state = state_dict(network)
     if kind == "tensors":
         torch = pytest.importorskip("torch")
@@ -211,18 +205,6 @@ DISCRETE = {"actions": "discrete", "automatic_gripper": True}
 COMPACT = {"observation": "compact", "decision_ticks": 3, "site_memory": True}
 
 
-def random_network(interface: InterfaceConfig, env: ForageEnv, **about) -> Network:
-    """One with layers of 5 and 13 that wants to do everything now and then."""
-    shape, rng = LearnerInterface(interface, env.swarm_spec), np.random.default_rng(3)
-    space = shape.action_space
-    sizes = [shape.layout.size, 5, 13, int(space.n) if hasattr(space, "n") else space.shape[0]]
-    weights = tuple(rng.normal(size=size).astype(np.float32) for size in itertools.pairwise(sizes))
-    biases = tuple(rng.normal(size=size).astype(np.float32) for size in sizes[1:])
-    return Network(
-        weights, biases, NetworkAbout(interface=interface, **{"activation": "tanh", "samples": False} | about)
-    )
-
-
 @pytest.mark.parametrize(
     ("choices", "about", "fields"),
     [
@@ -238,7 +220,7 @@ def random_network(interface: InterfaceConfig, env: ForageEnv, **about) -> Netwo
 def test_a_network_acts_as_its_slow_twin(choices, about, fields):
     env = ForageEnv(scenario("warehouse_small", n_robots=N_ROBOTS, n_objects=200, **fields))
     interface = InterfaceConfig(**choices)
-    network = random_network(interface, env, **about)
+    network = network_of(interface, 5, 13, seed=3, swarm=env.swarm_spec, **about)
     policy, spec, crowd = NetworkPolicy(network), env.swarm_spec, np.random.default_rng(5)
     twin = LearnedPolicy(interface, choose=perceptron.SlowNetwork(network, N_ROBOTS, stream_rng(2, Stream.POLICY)))
     for one in (policy, twin):

@@ -4,14 +4,12 @@ import base64
 import copy
 import json
 import re
-import sys
 from importlib import resources
 from itertools import product
 
 import numpy as np
 import pytest
 
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.rendering.frame import Trails, render_frame
 from swarm_forage_env.rendering.pages import (
@@ -30,7 +28,6 @@ from swarm_forage_env.rendering.view import (
     legend_rows,
     text_width,
 )
-from swarm_forage_env.rendering.window import Window
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.floor import CELL_M
 from swarm_forage_env.scenarios.presets import scenario
@@ -214,33 +211,3 @@ def test_every_script_is_in_its_page_which_loads_nothing(folder):
     assert re.findall(r"https?:|//[\w.]+\.\w+/|\b(?:src|href)=\"(?!data:,\")|@import|url\(", page) == []
     asked = ["place"] if folder == "play_page" else []  # relative to the address with the token
     assert re.findall(r"\bfetch\((\w+)", page) == asked
-
-
-pygame = pytest.importorskip("pygame")
-
-FRAME = np.full((120, 200, 3), (10, 200, 30), np.uint8)
-
-
-@pytest.fixture
-def window(monkeypatch):
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    window = Window()
-    yield window
-    window.close()
-
-
-def test_a_picture_fills_the_window(window):
-    for picture in (FRAME, FRAME[:60]):
-        copy.deepcopy(window).show(picture, "a run")
-        shown = pygame.surfarray.array3d(pygame.display.get_surface()).swapaxes(0, 1)
-        np.testing.assert_array_equal(shown, picture)
-    assert pygame.display.get_caption()[0] == "a run"
-
-
-def test_without_a_display_or_pygame_the_message_says_what_to_do(monkeypatch):
-    monkeypatch.setenv("SDL_VIDEODRIVER", "there is no such driver")
-    with pytest.raises(ConfigError, match="swarm-forage record"):
-        Window().show(FRAME, "")
-    monkeypatch.setitem(sys.modules, "pygame", None)
-    with pytest.raises(ImportError, match=r'pygame-ce.*pip install ".\[render\]"'):
-        Window()

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gymnasium import spaces
 
 from baselines.crw import CRWPolicy
 from baselines.stochm import STOCHMPolicy
@@ -14,8 +13,8 @@ from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env._internal.prefetching import LARGE
 from swarm_forage_env.contract.codes import Counter, Task
 from swarm_forage_env.contract.policy import ActionError, Policy, SwarmSpec
-from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
-from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkPolicy
+from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.policies.network import NetworkPolicy
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import LiveRun, build_env, build_stack
 from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -29,6 +28,7 @@ from swarm_forage_env.wrappers.throttle import Throttle, ThrottleConfig
 from swarm_forage_env.wrappers.waveform import Waveform
 from tests.support.drivers import LAST_TICK, UntilNaN, tick_by_tick
 from tests.support.foraging import quick_world
+from tests.support.networks import network_of
 
 POOLS = (
     (
@@ -104,7 +104,6 @@ def assert_same(one: LiveRun, other: LiveRun) -> None:
 
 def network(world: ScenarioConfig, decision_ticks: int) -> NetworkPolicy:
     """A network with weights by chance."""
-    chance = np.random.default_rng(decision_ticks)
     interface = InterfaceConfig(
         observation="compact",
         actions="discrete" if decision_ticks % 2 else "continuous",
@@ -112,14 +111,7 @@ def network(world: ScenarioConfig, decision_ticks: int) -> NetworkPolicy:
         decision_ticks=decision_ticks,
         site_memory=decision_ticks > 3,
     )
-    learner = LearnerInterface(interface, SwarmSpec.of(world))
-    space = learner.action_space
-    n_actions = int(space.n) if isinstance(space, spaces.Discrete) else space.shape[0]
-    shapes = (learner.layout.size, 7), (7, n_actions)
-    weights = tuple(chance.normal(0.0, 1.0, shape).astype(np.float32) for shape in shapes)
-    biases = tuple(chance.normal(0.0, 0.5, shape[1]).astype(np.float32) for shape in shapes)
-    about = NetworkAbout(interface=interface, activation="tanh", samples=False, caches=world.caches)
-    return NetworkPolicy(Network(weights, biases, about))
+    return NetworkPolicy(network_of(interface, 7, seed=decision_ticks, swarm=SwarmSpec.of(world), caches=world.caches))
 
 
 RUNS = [

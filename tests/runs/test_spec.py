@@ -9,7 +9,6 @@ import pytest
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.model_files import file_digest
-from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.policies.registry import POLICIES, RandomPolicy, policy_class
 from swarm_forage_env.runs.plan import Condition, Plan, Table, run_plan
 from swarm_forage_env.runs.run import run_one
@@ -19,6 +18,7 @@ from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM
 from swarm_forage_env.wrappers.noise import ActuatorNoiseConfig, SensorNoiseConfig
 from swarm_forage_env.wrappers.world import World
+from tests.support.networks import network_of
 
 BASE = RunSpec(world=World(scenario("warehouse_small")), policy="crw")
 
@@ -146,10 +146,7 @@ def network_in(tmp_path):
     def write(folder, seed=0):
         path = tmp_path / folder / "net.npz"
         path.parent.mkdir(exist_ok=True)
-        weights = np.random.default_rng(seed).normal(size=(23, 6)).astype(np.float32)
-        interface = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True)
-        about = NetworkAbout(interface=interface, activation="tanh", samples=False, caches="static")
-        Network((weights,), (np.zeros(6, np.float32),), about).save(path)
+        network_of(InterfaceConfig(observation="compact"), seed=seed, caches="static").save(path)
         return path
 
     return write

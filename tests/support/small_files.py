@@ -7,11 +7,8 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
-import numpy as np
-
 from metrics.benchmark import load_protocol
 from swarm_forage_env.policies.interface import InterfaceConfig
-from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.policies.pretrained import plan_file
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import plan_run
@@ -30,6 +27,7 @@ from swarm_forage_env.training.evaluation import (
 )
 from swarm_forage_env.training.plan import TrainingPlan, read_plan
 from tests.support.entries import TINY, made_up_entry
+from tests.support.networks import network_of
 from tests.support.tiny_study import tiny_study
 
 SPEC = plan_run(scenario("warehouse_small", n_robots=2, n_objects=10, horizon_s=4.0, interval_s=2.0), "dpo", seed=1)
@@ -61,8 +59,7 @@ def _entry(file: Path) -> None:
 
 def _network(file: Path) -> None:
     interface = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True)
-    weights = np.linspace(-1.0, 1.0, 138, dtype=np.float32).reshape(23, 6)
-    Network((weights,), (weights[0],), NetworkAbout(interface=interface, activation="tanh", samples=False)).save(file)
+    network_of(interface).save(file)
 
 
 def _plan(file: Path) -> None:

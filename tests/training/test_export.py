@@ -3,7 +3,6 @@
 import re
 import shutil
 import subprocess
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -16,6 +15,7 @@ from swarm_forage_env.policies.kernels.network import pick
 from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.policies.pretrained import network_file
 from swarm_forage_env.training.manual import manual_of
+from tests.support.networks import network_of
 
 PROGRAM = """\
 #include <stdio.h>
@@ -70,24 +70,11 @@ LARGE = 40
 """Rows of observations."""
 
 
-def made_network(activation, sizes, **choices):
-    """A network of random weights with these sizes of its layers."""
-    rng = np.random.default_rng(7)
-    pairs = list(pairwise(sizes))
-    return Network(
-        tuple(rng.normal(0.0, 0.5, pair).astype(np.float32) for pair in pairs),
-        tuple(rng.normal(0.0, 0.5, pair[1]).astype(np.float32) for pair in pairs),
-        NetworkAbout(interface=InterfaceConfig(**choices), activation=activation, samples=False),
-    )
-
-
 NETWORKS = {
     "generalist": Network.load(network_file("generalist")),
-    "relu and gripper": made_network(
-        "relu", (23, 20, 11), observation="compact", actions="discrete", automatic_gripper=False
-    ),
-    "commands": made_network("tanh", (111, 16, 8, 3)),
-    "drives only": made_network("tanh", (23, 2), observation="compact", automatic_gripper=True),
+    "relu and gripper": network_of(InterfaceConfig(observation="compact", actions="discrete"), 20, activation="relu"),
+    "commands": network_of(InterfaceConfig(), 16, 8),
+    "drives only": network_of(InterfaceConfig(observation="compact", automatic_gripper=True)),
 }
 
 

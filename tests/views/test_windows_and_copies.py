@@ -6,8 +6,10 @@ import sys
 import numpy as np
 import pytest
 
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.rendering.window import Window
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.gymnasium import JointForageEnv
 from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv, parallel_env
@@ -64,6 +66,22 @@ def test_a_window_that_the_user_closes_stays_closed(display):
     for _ in range(3):
         env.step({agent: np.zeros(3, np.float32) for agent in env.agents})
         assert not display.get_init()
+
+
+def test_a_copied_window_takes_the_size_of_its_pictures(display):
+    for size in ((120, 200, 3), (60, 200, 3)):
+        copy.deepcopy(Window()).show(np.zeros(size, np.uint8), "a run")
+        assert display.get_surface().get_size() == size[1::-1]
+
+
+def test_without_a_display_or_pygame_the_message_says_what_to_do(monkeypatch):
+    pytest.importorskip("pygame")
+    monkeypatch.setenv("SDL_VIDEODRIVER", "there is no such driver")
+    with pytest.raises(ConfigError, match="swarm-forage record"):
+        Window().show(np.zeros((60, 60, 3), np.uint8), "")
+    monkeypatch.setitem(sys.modules, "pygame", None)
+    with pytest.raises(ImportError, match=r'pygame-ce.*pip install ".\[render\]"'):
+        Window()
 
 
 NUMBERED = InterfaceConfig(observation="compact", actions="discrete", decision_ticks=3)
