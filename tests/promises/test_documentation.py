@@ -2,12 +2,17 @@
 
 import json
 import re
+import subprocess
+import sys
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from scripts import update_docs
+from swarm_forage_env import RunSpec, World, run_one, scenario
 from swarm_forage_env.runs import workers
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -56,6 +61,7 @@ def test_files_of_examples_stand_in_a_page_or_are_linked_from_one(file):
     shown, linked = f"```python\n{file.read_text()}```\n", f"](examples/{file.name})"
     texts = [page.read_text() for page in PAGES]
     assert any(shown in text or linked in text for text in texts), f"{file}: no page shows it as it is, or links to it"
+    assert file.stem in {*NEEDS, "leave_rules_out"}, "each is tried"
 
 
 def test_relative_links_lead_to_files():
@@ -72,7 +78,7 @@ def test_index_lists_every_page():
 
 
 def test_table_of_worlds_names_every_scenario():
-    from swarm_forage_env import SCENARIO_NAMES, scenario
+    from swarm_forage_env import SCENARIO_NAMES
 
     page = (ROOT / "docs" / "worlds.md").read_text()
     rows = re.findall(r"^\| `\w+` \| [\d.]+ x .+? \|.+?\|.+?\|", page, re.MULTILINE)
@@ -120,3 +126,40 @@ def test_notebooks_hold_what_their_cells_print(notebook):
     assert outputs
     assert {output["output_type"] for output in outputs} <= {"stream", "display_data", "execute_result"}, "no errors"
     assert {output.get("name", "stdout") for output in outputs} == {"stdout"}, "no warnings"
+
+
+# Examples for learning libraries, each in a process of its own, where the library is installed
+
+NEEDS = {
+    "agilerl_ppo": "agilerl",
+    "benchmarl_ippo": "benchmarl",
+    "cleanrl_ppo": "torch",
+    "mappo": "torch",
+    "optuna_search": "optuna",
+    "rllib_ppo": "ray",
+    "sb3_contrib_recurrent_ppo": "sb3_contrib",
+    "stable_baselines3_ppo": "stable_baselines3",
+    "torchrl_ppo": "torchrl",
+}
+"""Example -> module that it needs."""
+PLANNED = ("mappo", str(ROOT / "tests/support/tiny_plan.toml"), "1", "policy.npz")
+"""An example that trains by a plan, and what it is told."""
+LENGTH = re.compile(r"^N_DECISIONS = [\d_]+", re.MULTILINE)
+"""How long an example trains: minutes, here until all of its code has run once."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NEEDS)
+def test_an_example_trains_a_policy_that_runs(name, tmp_path):
+    if find_spec(NEEDS[name]) is None:
+        pytest.skip(f"needs {NEEDS[name]}, see docs/libraries.md")
+    program, n_lengths = LENGTH.subn("N_DECISIONS = 1_000", (ROOT / "docs/examples" / f"{name}.py").read_text())
+    assert n_lengths == (name not in ("optuna_search", *PLANNED))
+    (tmp_path / "example.py").write_text(program)
+    command = [sys.executable, "-W", "ignore", "example.py", *(PLANNED[1:] if name in PLANNED else ())]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-4000:]
+    policy = next(tmp_path.rglob("policy.*"))
+    small = scenario("warehouse_small", n_robots=8, horizon_s=200.0)
+    record = run_one(RunSpec(world=World(small), policy=str(policy), seed=1))
+    assert np.isfinite(record["performance"]).all()

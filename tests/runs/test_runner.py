@@ -8,6 +8,7 @@ import time
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -28,7 +29,8 @@ from swarm_forage_env import (
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.registry import RandomPolicy
 from swarm_forage_env.policies.trust import UntrustedModelError, only_typed
-from swarm_forage_env.runs import progress, runner
+from swarm_forage_env.runs import cluster, progress, runner
+from swarm_forage_env.runs.cluster import LOCAL, cluster_executor
 from swarm_forage_env.runs.plan import Plan, run_plan
 from swarm_forage_env.runs.progress import duration, progress_bar
 from swarm_forage_env.runs.record import RecordError
@@ -203,6 +205,34 @@ def test_runs_that_their_executor_cancels_are_no_failures(tmp_path):
         run_here(SPECS, tmp_path, executor=Cancelling())
     assert [record.seed for record in load(tmp_path)]
     assert not (tmp_path / "failures").exists()
+
+
+on_dask = pytest.mark.skipif(find_spec("distributed") is None, reason="needs the cluster extra")
+
+
+@pytest.mark.slow
+@on_dask
+def test_a_cluster_of_this_machine_is_one_word(tmp_path):
+    """It makes the same runs, and a run that always kills its worker ends the call."""
+    with cluster_executor(LOCAL, 1) as executor:
+        found = run_all(SPECS, out=tmp_path, executor=executor, progress=False)
+    assert same(found.records, run_here(SPECS).records)
+    with pytest.raises(WorkerError, match="A run killed its workers"), cluster_executor(LOCAL, 1) as executor:
+        executor.submit(os._exit, 9).result()
+
+
+@pytest.mark.slow
+@on_dask
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # Dask leaves coroutines behind
+def test_a_scheduler_that_does_not_answer_is_told(monkeypatch):
+    """Dask would wait ten seconds for a thread of its own to start, which is too short on a busy machine."""
+    monkeypatch.setattr("distributed.utils._CollectErrorThread", None)
+    monkeypatch.setattr(cluster, "CONNECT_WITHIN_S", 0.2)
+    told = "Expected local or the address of a Dask scheduler, got '{}'".format
+    calls = [((f"{kind}://127.0.0.1:9",), told(f"{kind}://127.0.0.1:9")) for kind in ("tcp", "tls", "ucx")]
+    for given, message in [*calls, (("tcp://127.0.0.1:9", 3), "no number of workers for a running scheduler")]:
+        with pytest.raises(ConfigError, match=message), cluster_executor(*given):
+            pytest.fail("there should be no executor")
 
 
 def test_long_runs_come_first_and_then_a_run_of_each_policy():
