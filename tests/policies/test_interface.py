@@ -13,8 +13,6 @@ from swarm_forage_env.contract.layout import ObservationLayout
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import (
-    GRIPS,
-    MOTIONS,
     InterfaceConfig,
     LearnerInterface,
     any_swarm,
@@ -27,9 +25,6 @@ from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.reference.learner import allowed_actions, automatic_grip, compact_row, numbered_action
 from tests.support.stage import NEST_CELL, OPEN_CELL, cell_centre, lay, load, put, stand, tidy_world
-
-STAND = MOTIONS.index("stand")
-GRASP, RELEASE, DELIVER, SITE, CREATE_CACHE = (len(MOTIONS) + k for k in range(len(GRIPS)))
 
 
 def bound(env: ForageEnv, **choices) -> LearnerInterface:

@@ -13,7 +13,7 @@ from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.policies.oracle import OraclePolicy
 
 FREE, CARRIED = ObjectStatus.FREE, ObjectStatus.CARRIED
-EAST, NORTH, WEST = 0.0, np.pi / 2, np.pi
+EAST, WEST = 0.0, np.pi
 
 
 def commands(robots, objects):

@@ -160,13 +160,6 @@ def test_actions_that_do_not_fit_are_refused_and_nothing_moves():
     assert world.tick == 0
 
 
-def test_seeds_are_whole_numbers():
-    world = parallel_env(**SMALL)
-    for seed in (-1, 3.0, "3", True):
-        with pytest.raises(ValueError, match=r"seed \(or None\) to be a whole number >= 0, got"):
-            world.reset(seed=seed)
-
-
 def test_resets_without_a_seed_continue_the_sequence_of_the_last_seed():
     one, other = parallel_env(**SMALL), parallel_env(**SMALL)
     first = [one.reset_batch(3).copy(), *(one.reset_batch().copy() for _ in range(3))]

@@ -29,7 +29,6 @@ from tests.support.pictures import words_in
 TIMES = np.array([100.0, 200.0, 300.0])
 PLACE = {"PYTHONPATH": str(Path(__file__).resolve().parents[2]), "MPLCONFIGDIR": mpl.get_configdir()}
 """What another process needs to draw."""
-PAPER = FigureStyle(width_in=3.5, font_size=7, title=False)
 
 
 def draw(path, names=("crw", "dpo", "$a$ mine"), **options):

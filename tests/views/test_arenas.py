@@ -17,7 +17,6 @@ from swarm_forage_env.views.gymnasium import JointForageEnv
 from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv
 from swarm_forage_env.views.plans import ArenaPlan, plan_arena
-from swarm_forage_env.views.sampler import ScenarioSampler
 from swarm_forage_env.wrappers.base import SwarmWrapper
 from tests.support import lives
 from tests.support.sampled import sampler
@@ -203,12 +202,6 @@ def drawn(seeds=SEEDS):
 
 def sizes(seeds=SEEDS):
     return [world.n_robots for world in drawn(seeds)]
-
-
-def worlds_of(**fields):
-    """A sampler of one small world."""
-    world = {"preset": "warehouse_small", "n_robots": 2, "n_objects": 10, "physics": "compiled", **fields}
-    return ScenarioSampler({"worlds": [{"scenario": world}]})
 
 
 def test_each_arena_is_bit_for_bit_that_of_its_world_alone():

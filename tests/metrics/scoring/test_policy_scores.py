@@ -1,6 +1,7 @@
 """`score`: any policies give one answer, no run is made twice, failures are shown, and sentences say who is best."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import polars as pl
 import pytest
 
 import metrics
-from metrics import MEASURES, CurveError, score, summarize_runs
+from metrics import MEASURES, CurveError, read_curves, score, summarize_runs
 from metrics.scoring import Scores, score_question
 from metrics.scoring.answer import spread
 from metrics.scoring.frame import SCHEMA
@@ -18,6 +19,7 @@ from swarm_forage_env.runs import runner
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import policy_specs
 from swarm_forage_env.runs.store import load
+from swarm_forage_env.scenarios.performance import DERIVED_PERFORMANCES, PERFORMANCE_COLUMNS
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.studies.ladders import Budget
 from swarm_forage_env.wrappers.registry import parse_wrapper
@@ -37,10 +39,6 @@ def scored(policies="random", world=WORLD, **options):
 def planned(policies, **options):
     """The runs that score policies in the tiny budget."""
     return score_question(policies, WORLD, **{"budget": TINY, **options}).plan
-
-
-def still(obs):
-    return np.zeros((len(obs), 3), np.float32)
 
 
 @pytest.fixture(scope="module")
@@ -230,3 +228,83 @@ def test_failed_runs_are_in_the_answer_and_leave_nothing_to_draw(tmp_path):
     assert str(summary).endswith("RuntimeError: I would rather not")
     with pytest.raises(ValueError, match="nothing to draw"):
         summary.draw(tmp_path / "runs.png")
+
+
+# Any performance
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Stored runs of two sizes and two seeds of a policy with tasks, scored by deliveries."""
+    place = tmp_path_factory.mktemp("runs")
+    performed(out=place)
+    return place
+
+
+def performed(performance="collected", **options):
+    """Score a policy with tasks in the tiny budget by a performance."""
+    world = replace(WORLD, performance=performance)
+    return scored("stochm", world, **{"measures": ["raw_performance"], **options})
+
+
+def values(found) -> dict[tuple[int, int], float]:
+    """(Robots, seed) -> raw performance."""
+    return {(n, seed): value for n, seed, value in found.frame.select("n_robots", "seed", "value").iter_rows()}
+
+
+@pytest.fixture
+def no_runs(monkeypatch):
+    monkeypatch.setattr(runner, "run_one", lambda spec: pytest.fail("a stored run was repeated"))
+
+
+def test_every_column_of_stored_runs_can_be_scored(folder, no_runs):
+    for name in (*PERFORMANCE_COLUMNS, *DERIVED_PERFORMANCES, "1/interference_fraction"):
+        found = performed(out=folder, performance=name)
+        assert len(values(found)) == 4
+        assert all(np.isfinite(value) and value >= 0.0 for value in values(found).values()), name
+        assert found.settings["performance"] == name
+        for record in load(folder) if name in PERFORMANCE_COLUMNS else ():
+            expected = record.columns.get(name, np.full(2, float(name == "task_share_none"))).sum()
+            assert values(found)[record.spec.world.n_robots, record.seed] == pytest.approx(expected), name
+
+
+def test_the_scenario_says_what_performance_is(folder, no_runs):
+    by_scenario = performed(performance="n_active", out=folder)
+    assert values(by_scenario) == {(1, 0): 2.0, (1, 1): 2.0, (4, 0): 8.0, (4, 1): 8.0}
+    assert str(by_scenario).startswith("stochm in warehouse_small with 20 objects, performance n_active, budget custom")
+
+
+def test_what_nobody_recorded_is_a_table_of_curves(folder):
+    """The share of the robots that are at work: a column made of those of stored runs."""
+    frame = pl.concat([record.frame for record in load(folder)])
+    share = frame.with_columns(performance=pl.col("n_active") / pl.col("n_robots"))
+    found = score(curves=read_curves(share), measures=["raw_performance"], progress=False)
+    assert values(found) == {(1, 0): 2.0, (1, 1): 2.0, (4, 0): 2.0, (4, 1): 2.0}
+
+
+def test_units_follow(folder, no_runs):
+    def units(**options):
+        measures = ["raw_performance", "efficiency"]
+        return (
+            performed(out=folder, measures=measures, **options)
+            .summary.group_by("measure", maintain_order=True)
+            .first()["unit"]
+            .to_list()
+        )
+
+    assert units() == ["objects in 4 s", "objects per robot in 4 s"]
+    assert units(performance="deaths") == ["robots in 4 s", "robots per robot in 4 s"]
+    assert units(performance="n_active") == ["robots summed over intervals", "robots per robot summed over intervals"]
+    assert units(performance="task_balance")[0] == "task_balance summed over intervals"
+
+
+def test_shares_are_noted_where_growth_in_proportion_is_the_scale(folder, no_runs):
+    """Two swarms in full balance are no worse than one; a swarm of four is not expected to have four times of it."""
+    measures = ["raw_performance", "efficiency", "t_lost_fraction", "task_emergence", "scalability"]
+
+    def noted(performance):
+        found = performed(out=folder, measures=measures, performance=performance)
+        return {row["measure"] for row in found.summary.iter_rows(named=True) if "no sum over robots" in row["remark"]}
+
+    assert noted("task_balance") == noted("1/n_active") == {"efficiency", "task_emergence", "scalability"}
+    assert noted("n_active") == noted("collected") == set()
