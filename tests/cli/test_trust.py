@@ -1,14 +1,12 @@
 """Models run code when they are opened: only those that somebody typed are."""
 
+import base64
 import json
 import pickle
 import zipfile
 from pathlib import Path
 
-import gymnasium
-import numpy as np
 import pytest
-from gymnasium import spaces
 
 from swarm_forage_env.cli.worlds import split_names
 from swarm_forage_env.policies import trust
@@ -31,8 +29,6 @@ class Evil:
 
 def evil_model(path: Path, **more: object) -> Path:
     """A file like a model of stable-baselines3, of which one part writes the file `owned` when it is opened."""
-    import base64
-
     payload = base64.b64encode(pickle.dumps(Evil())).decode()
     about = {"policy_class": {":type:": "x", ":serialized:": payload}, **more}
     with zipfile.ZipFile(path, "w") as archive:
@@ -123,15 +119,12 @@ def test_a_typed_python_file_is_run_and_one_in_a_study_only_on_trust(command):
 WORLD = ("--robots", "3", "--set", "n_objects=20", "--horizon", "4", "--set", "interval_s=2", "--jobs", "1", "--json")
 
 
-class Stage(gymnasium.Env):
-    """The spaces of the environment itself, for one robot."""
-
-    observation_space, action_space = spaces.Box(-1.0, 1.0, (111,), np.float32), spaces.Box(-1.0, 1.0, (3,), np.float32)
-
-
 def test_a_model_without_a_note_is_run_with_the_length_of_its_decisions(command):
     library = pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-baselines3 and torch")
-    library.A2C("MlpPolicy", Stage(), device="cpu", seed=1).save("model.zip")
+    from swarm_forage_env.training.sb3 import SwarmVecEnv
+
+    env = SwarmVecEnv("warehouse_small", n_robots=3, n_objects=20)
+    library.A2C("MlpPolicy", env, device="cpu", seed=1).save("model.zip")
     code, _, err = command("run", "model.zip", *WORLD)
     assert (code, len(err.splitlines())) == (2, 1)
     assert "say model.zip:decision_ticks=1" in err

@@ -5,19 +5,17 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Counter
-from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.inspect import film as film_module
 from swarm_forage_env.inspect.film import record_run
-from swarm_forage_env.policies.registry import RandomPolicy, load_policy
+from swarm_forage_env.policies.registry import RandomPolicy
 from swarm_forage_env.rendering.video import write_film
 from swarm_forage_env.rendering.view import Palette
-from swarm_forage_env.runs.run import run_policy
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.recorder import TOTALS
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.world import World
-from tests.support.drivers import tick_by_tick
+from tests.support.drivers import states_of
 from tests.support.foraging import CROWDED
 
 Image = pytest.importorskip("PIL.Image")
@@ -57,16 +55,6 @@ def test_an_mp4_has_every_picture_even_of_odd_size(tmp_path):
     assert shown[25, 15] == pytest.approx(Palette.empty, abs=30)
 
 
-class Witness(RandomPolicy):
-    """Counts how often it is asked."""
-
-    calls = 0
-
-    def act(self, obs, active):
-        self.calls += 1
-        return super().act(obs, active)
-
-
 @pytest.mark.parametrize(
     ("options", "expected"),
     [
@@ -78,12 +66,12 @@ class Witness(RandomPolicy):
         ({"parameters": {"wander_speed_mps": 0.05}}, "parameters with a name, a file or a class only"),
     ],
 )
-def test_impossible_recordings_are_refused_before_the_run(tmp_path, options, expected):
-    policy, world = Witness(), scenario("warehouse_small", n_robots=4, n_objects=10)
+def test_impossible_recordings_are_refused_before_the_run(tmp_path, monkeypatch, options, expected):
+    monkeypatch.setattr(RandomPolicy, "reset", lambda *_: pytest.fail("a run was started"))
+    policy, world = RandomPolicy(), scenario("warehouse_small", n_robots=4, n_objects=10)
     path = tmp_path / options.pop("path", "run.gif")
     with pytest.raises(ConfigError, match=expected):
         record_run(world, policy, path, **options)
-    assert policy.calls == 0
     assert not list(tmp_path.iterdir())
 
 
@@ -108,23 +96,13 @@ DISTURBED = (
 
 
 def test_a_film_shows_the_run_that_its_name_promises(filmed, tmp_path, monkeypatch):
-    policy, wrappers = "stochm", DISTURBED
-    spec = plan_run(CROWDED, policy, wrappers=wrappers, seed=5)
-    step, states = ForageEnv.advance, {}
-
-    def note(self, *arguments, **options):
-        result = step(self, *arguments, **options)
-        states[self.tick] = self.swarm.position.copy(), self.swarm.heading.copy(), self.events.counters.copy()
-        return result
-
-    with monkeypatch.context() as patch:
-        patch.setattr(ForageEnv, "advance", note)
-        record = run_policy(tick_by_tick(load_policy(policy)), spec)
+    states, record = states_of(plan_run(CROWDED, "stochm", wrappers=DISTURBED, seed=5), monkeypatch)
     options = {"seconds": 80.0, "speedup": 40.0, "fps": 20.0, "seed": 5}
-    record_run(World(CROWDED, wrappers), policy, tmp_path / "run.gif", **options)
+    record_run(World(CROWDED, DISTURBED), "stochm", tmp_path / "run.gif", **options)
     assert [tick for tick, *_ in filmed] == list(range(0, 401, 10))
     for tick, *state in filmed[1:]:
-        for mine, theirs in zip(state, states[tick], strict=True):
+        swarm, _, counters = states[tick]
+        for mine, theirs in zip(state, (swarm.position, swarm.heading, counters), strict=True):
             np.testing.assert_array_equal(mine, theirs)
     counters = filmed[-1][3] - filmed[0][3]  # a static cache is counted when the world is made
     assert counters[Counter.FREE_PICKUPS] > 0

@@ -85,21 +85,15 @@ def test_squares_smaller_than_cells_are_refused(replay):
         floor_maps(replay, side_m=0.1)
 
 
-def images_of(monkeypatch, tmp_path, *maps: FloorMaps):
-    """Draw maps, and return the panels that show them."""
-    pytest.importorskip("matplotlib")
-    drawn = keep_figures(monkeypatch)
-    draw_maps(tmp_path / "unused.png", maps)
-    return [axes for axes in drawn[-1].axes if axes.get_images()]
-
-
 def test_maps_of_one_quantity_have_one_scale_and_differences_a_symmetric_one(monkeypatch, tmp_path):
+    pytest.importorskip("matplotlib")
     few, many = (
         FloorMaps(label=name, side_m=1.0, size_m=(2.0, 1.0), arrays={"density": np.array([[0.0, value]])})
         for name, value in (("few", 1.0), ("many", 10.0))
     )
-    panels = images_of(monkeypatch, tmp_path, few, many, many.minus(few), few.minus(many))
-    scales = [axes.get_images()[0].get_clim() for axes in panels]
+    drawn = keep_figures(monkeypatch)
+    draw_maps(tmp_path / "unused.png", (few, many, many.minus(few), few.minus(many)))
+    scales = [axes.get_images()[0].get_clim() for axes in drawn[0].axes if axes.get_images()]
     assert scales[0] == scales[1] == pytest.approx((0.0, 10.0), rel=0.02)
     assert scales[2] == scales[3] == pytest.approx((-9.0, 9.0), rel=0.02)
 

@@ -10,18 +10,17 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from swarm_forage_env.contract.codes import Counter, ObjectStatus
-from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.inspect.replay.capture import record_replay
 from swarm_forage_env.inspect.replay.coding import pack
 from swarm_forage_env.inspect.replay.files import write_replays
 from swarm_forage_env.inspect.replay.frames import HEADING_STEPS, Replay, Status
 from swarm_forage_env.policies.registry import load_policy
-from swarm_forage_env.runs.run import LiveRun, build_env, run_one, run_policy
+from swarm_forage_env.runs.run import LiveRun, build_env, run_one
 from swarm_forage_env.runs.spec import RunSpec, plan_run
 from swarm_forage_env.wrappers.recorder import TOTALS
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.reference.replay_arrays import runs_of, unpacked
-from tests.support.drivers import tick_by_tick
+from tests.support.drivers import states_of
 from tests.support.foraging import CROWDED
 
 DISTURBED = (
@@ -63,18 +62,7 @@ def test_a_replay_is_the_run_of_the_record():
 
 
 def test_frames_show_the_run_within_half_a_step(monkeypatch):
-    step, states = ForageEnv.advance, {}
-
-    def note(self, *arguments, **options):
-        result = step(self, *arguments, **options)
-        swarm = self.swarm
-        kept = swarm.position, swarm.heading, swarm.present, swarm.active, swarm.carried_object, self.objects.cell
-        states[self.tick] = [part.copy() for part in (*kept, self.objects.status)]
-        return result
-
-    with monkeypatch.context() as patch:
-        patch.setattr(ForageEnv, "advance", note)
-        run_policy(tick_by_tick(load_policy("stochm")), spec_of())
+    states, _ = states_of(spec_of(), monkeypatch)
     kept = record_replay(spec_of(), frame_s=1.0)
     table = np.full((60, 3), -9)
     for frame, tick in enumerate(kept.ticks.tolist()):
@@ -82,16 +70,17 @@ def test_frames_show_the_run_within_half_a_step(monkeypatch):
         table[changed[:, 1]] = changed[:, 2:]
         if tick == 0:
             continue
-        position, heading, present, active, carried, cell, status = states[tick]
-        assert np.abs(kept.position_m[frame] - position)[present].max() <= kept.position_step_m / 2 + 1e-9
-        turned = np.angle(np.exp(1j * (kept.heading[frame] * (2.0 * np.pi / HEADING_STEPS) - heading)))[present]
+        swarm, objects, _ = states[tick]
+        present, carried, status = swarm.present, swarm.carried_object, objects.status
+        assert np.abs(kept.position_m[frame] - swarm.position)[present].max() <= kept.position_step_m / 2 + 1e-9
+        turned = np.angle(np.exp(1j * (kept.heading[frame] * (2.0 * np.pi / HEADING_STEPS) - swarm.heading)))[present]
         assert np.abs(turned).max() <= np.pi / HEADING_STEPS + 1e-9
         assert np.array_equal(kept.has(Status.ABSENT)[frame], ~present)
-        assert np.array_equal(kept.has(Status.REPAIR)[frame], present & ~active)
+        assert np.array_equal(kept.has(Status.REPAIR)[frame], present & ~swarm.active)
         assert np.array_equal(kept.has(Status.CARRYING)[frame], carried >= 0)
         assert np.array_equal(table[:, 0], status)
         lies = status != ObjectStatus.CARRIED
-        assert np.array_equal(table[lies, 1:], cell[lies])
+        assert np.array_equal(table[lies, 1:], objects.cell[lies])
         assert np.array_equal(carried[table[~lies, 1]], np.flatnonzero(~lies))
 
 
