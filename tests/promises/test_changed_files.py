@@ -1,5 +1,6 @@
 """Files of every format with other bytes are read or refused in one line; CASES=1000 tries as many of each."""
 
+import json
 import os
 import shutil
 import traceback
@@ -103,3 +104,40 @@ def test_any_changed_file_is_read_or_refused_in_one_line(name, tmp_path, capfd):
     assert seen == {"accepted", "refused"}
     assert capfd.readouterr() == ("", "")
     assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+def in_json(*path: str) -> Callable[[Path], None]:
+    """Write an unknown field into a table of a file, found by its keys."""
+
+    def change(file: Path) -> None:
+        content = json.loads(file.read_text(encoding="utf-8"))
+        table = content
+        for key in path:
+            table = table[key]
+        table["colour"] = 1
+        file.write_text(json.dumps(content), encoding="utf-8")
+
+    return change
+
+
+def other_column(file: Path) -> None:
+    file.write_text(file.read_text().replace("wall_time_s", "colour"))
+
+
+@pytest.mark.parametrize(
+    ("name", "part", "change", "told"),
+    [
+        ("dataset", "dataset.json", in_json(), "'colour'"),
+        ("entry.json", "", in_json(), "key .*'colour'"),
+        ("plan.json", "", in_json(), "key .*'colour'"),
+        ("failure.json", "", in_json("spec", "scenario"), "key .*colour"),
+        ("evaluations.csv", "", other_column, r"evaluations\.csv"),
+    ],
+)
+def test_files_of_other_fields_are_refused_and_never_guessed_at(tmp_path, name, part, change, told):
+    original, file = small_file(name), tmp_path / name
+    (shutil.copytree if original.is_dir() else shutil.copy)(original, file)
+    change(file / part)
+    read, error = READERS[name]
+    with pytest.raises(error, match=told):
+        read(file)
