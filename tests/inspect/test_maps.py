@@ -11,10 +11,10 @@ from swarm_forage_env.inspect.descriptions import describe
 from swarm_forage_env.inspect.maps import MEANINGS, FloorMaps, draw_maps, floor_maps
 from swarm_forage_env.inspect.replay.frames import Replay, Status
 from swarm_forage_env.policies.interface import InterfaceConfig
-from swarm_forage_env.policies.pretrained import network_file
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.world import World
+from tests.support.networks import network_of
 from tests.support.pictures import keep_figures
 
 WORLD = scenario("warehouse_small", n_robots=2, n_objects=1, horizon_s=200.0)
@@ -98,9 +98,11 @@ def test_maps_of_one_quantity_have_one_scale_and_differences_a_symmetric_one(mon
     assert scales[2] == scales[3] == pytest.approx((-9.0, 9.0), rel=0.02)
 
 
-def test_the_layers_and_every_field_of_the_interface_of_a_network_are_told():
-    first, *lines = describe(str(network_file("generalist"))).notes
-    assert first.endswith("generalist.npz: a network of 31 x 64 x 64 x 6 units (tanh)")
+def test_the_layers_and_every_field_of_the_interface_of_a_network_are_told(tmp_path):
+    interface = InterfaceConfig(observation="compact", actions="discrete", decision_ticks=5, frame_decisions=200)
+    network_of(interface, 4, activation="relu", caches="static").save(tmp_path / "mine.npz")
+    first, *lines = describe(str(tmp_path / "mine.npz")).notes
+    assert first.endswith("mine.npz: a network of 23 x 4 x 11 units (relu)")
     fields = {line.split()[0]: line.split()[-1] for line in lines if line.startswith("    ")}
     assert {*(item.name for item in dataclasses.fields(InterfaceConfig)), "samples", "caches"} == set(fields)
-    assert (fields["decision_ticks"], fields["frame_decisions"], fields["caches"]) == ("2", "1000", "none")
+    assert (fields["decision_ticks"], fields["frame_decisions"], fields["caches"]) == ("5", "200", "static")
