@@ -39,24 +39,19 @@ SMALL = (
 )
 ROOM = f"--robots 6 {SMALL} --jobs 1"
 SECONDS = "--horizon 400 --set interval_s=100"
-RUN = f"run crw,dpo --seeds 2 {ROOM} {SECONDS}"
-CURVES = "score --curves curves.csv"
-SCORE = f"score crw,dpo --budget quick --seeds 2 --horizon 400 {ROOM}"
-STUDY = "study run S1a.toml --jobs 1 --out done"
-BENCHMARK = "benchmark crw --name again --trained-in nothing --jobs 1"
 
 CASES = {
-    "run.txt": RUN,
+    "run.txt": f"run crw,dpo --seeds 2 {ROOM} {SECONDS}",
     "rerun.txt": "rerun record.parquet",
     "check.txt": f"check crw,dpo {SMALL} --robots 6 {SECONDS}",
-    "score.txt": SCORE,
-    "score_curves.txt": CURVES,
+    "score.txt": f"score crw,dpo --budget quick --seeds 2 --horizon 400 {ROOM}",
+    "score_curves.txt": "score --curves curves.csv",
     "study_list.txt": "study list",
-    "study_run.txt": STUDY,
+    "study_run.txt": "study run S1a.toml --jobs 1 --out done",
     "study_status.txt": "study status done",
     "study_verdict.txt": "study verdict done",
     "study_plot.txt": "study plot done --out figures --band --variant corrected,paper",
-    "benchmark.txt": BENCHMARK,
+    "benchmark.txt": "benchmark crw --name again --trained-in nothing --jobs 1",
     "benchmark_show.txt": "benchmark show mine.json",
     "list.txt": "list",
     "info.txt": "info search_and_rescue",

@@ -24,8 +24,6 @@ DISTURBED = (
 pytestmark = pytest.mark.slow
 
 PIXELS = "document.querySelector('.arena canvas').toDataURL()"
-DESKTOP = {"width": 1280, "height": 900}
-PHONE = {"width": 390, "height": 844, "touch": True}
 
 
 @pytest.fixture(scope="module")
@@ -43,14 +41,14 @@ def page(replays, tmp_path_factory) -> Path:
 @pytest.fixture(scope="module")
 def desktop(tmp_path_factory) -> Iterator[Browser]:
     chromium()  # skips before anything is run
-    with Browser(tmp_path_factory.mktemp("desktop"), **DESKTOP) as browser:
+    with Browser(tmp_path_factory.mktemp("desktop"), width=1280, height=900) as browser:
         yield browser
 
 
 @pytest.fixture(scope="module")
 def phone(tmp_path_factory) -> Iterator[Browser]:
     chromium()
-    with Browser(tmp_path_factory.mktemp("phone"), **PHONE) as browser:
+    with Browser(tmp_path_factory.mktemp("phone"), width=390, height=844, touch=True) as browser:
         yield browser
 
 

@@ -3,6 +3,7 @@
 import http.client
 import json
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -30,16 +31,6 @@ NOISY = (SensorNoiseConfig(sigma=0.01), ThrottleConfig(waveform=Waveform(kind="c
 WALL = (4.0, 2.0, 4.4, 5.0)
 
 
-class Clock:
-    """The reader's time, which a test sets forward."""
-
-    def __init__(self):
-        self.now_s = 0.0
-
-    def __call__(self):
-        return self.now_s
-
-
 @pytest.fixture(autouse=True)
 def patient(monkeypatch):
     """Ticks take long while they are compiled."""
@@ -47,8 +38,10 @@ def patient(monkeypatch):
 
 
 def session_of(policy="crw", wrappers=(), *, seed=3, world=SMALL):
-    clock = Clock()
-    return PlaySession(Setting(world=World(world, wrappers), policy=policy, seed=seed), clock=clock), clock
+    """A session, and the reader's time, which a test sets forward."""
+    clock = SimpleNamespace(now_s=0.0)
+    setting = Setting(world=World(world, wrappers), policy=policy, seed=seed)
+    return PlaySession(setting, clock=lambda: clock.now_s), clock
 
 
 def look_after(session, clock, seconds, **asked):

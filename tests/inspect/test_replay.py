@@ -28,17 +28,6 @@ DISTURBED = (
     parse_wrapper("throttle:waveform=sine,amplitude=0.2,offset=0.2,period_s=40"),
     parse_wrapper("sensor_noise:sigma=0.02"),
 )
-ARRAYS = (
-    "position",
-    "heading",
-    "status",
-    "activity",
-    "counters",
-    "object_events",
-    "deliveries",
-    "cache_events",
-    "memory_events",
-)
 
 
 def spec_of(policy: str = "stochm", wrappers=DISTURBED, **fields):
@@ -151,7 +140,8 @@ def test_a_page_holds_every_array_of_its_runs(replay, tmp_path):
     runs = runs_of(path)
     assert [about["label"] for about, _ in runs] == ["stochm", "crw"]
     for (about, found), kept in zip(runs, (replay, other), strict=True):
-        there = {name: getattr(kept, name) for name in ARRAYS if getattr(kept, name) is not None}
+        values = {item.name: getattr(kept, item.name) for item in dataclasses.fields(kept)}
+        there = {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
         there |= {f"signal_{name}": values for name, values in kept.signals.items()}
         assert found.keys() == there.keys()
         for name, array in there.items():

@@ -7,6 +7,7 @@ import pytest
 
 from swarm_forage_env import load_policy, plan_run, scenario
 from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.policies.interface import LearnerInterface
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.pretrained import network_file
@@ -97,14 +98,10 @@ def test_what_robots_remember_is_recorded_where_it_is_asked_for_or_seen(policy, 
         recorded(tmp_path / "usual", policy, observation="full").columns == (remembering if is_seen else plain).columns
     )
     rows, seen = first(remembering).observations, first(plain).observations
-    interface = LearnerInterface(remembering.interface, env_spec())
+    interface = LearnerInterface(remembering.interface, SwarmSpec.of(WORLD))
     for row, obs in zip(rows, seen, strict=True):
         np.testing.assert_array_equal(row, interface.observe(obs))
     assert rows[:, :, seen.shape[2] :].any(), "nobody remembers anything"
-
-
-def env_spec():
-    return build_env(WORLD).unwrapped.swarm_spec
 
 
 def test_transitions_are_the_decisions_of_robots_at_work(tmp_path):

@@ -14,28 +14,15 @@ import pytest
 pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-baselines3 and torch")
 
 from metrics.statistics import aggregate
-from swarm_forage_env.policies.interface import InterfaceConfig
-from swarm_forage_env.scenarios.presets import warehouse_small
 from swarm_forage_env.training.curves import beside_baseline, read_training
-from swarm_forage_env.training.evaluation import Evaluation, EvaluationPlan
-from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
+from swarm_forage_env.training.evaluation import Evaluation
+from swarm_forage_env.training.plan import read_plan
 from swarm_forage_env.training.sb3 import seeds as module
 from swarm_forage_env.training.sb3.seeds import seed_folder, train_seeds
 from swarm_forage_env.training.sb3.training import train
-from swarm_forage_env.wrappers.world import World
 from tests.support import fake_trainings
-from tests.support.fake_trainings import STATUS
+from tests.support.fake_trainings import SHORT, STATUS
 from tests.support.small_files import evaluated, trained
-
-PLAN = TrainingPlan(
-    world=World(warehouse_small(n_robots=4, n_objects=20, horizon_s=200.0)),
-    interface=InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5),
-    n_arenas=2,
-    hidden=(8,),
-    options={"n_steps": 16, "batch_size": 64},
-    stages=(Stage(steps=128),),
-    evaluation=EvaluationPlan(every_steps=128, horizon_s=200.0, n_runs=1, baseline="random"),
-)
 
 
 def fake(monkeypatch, *, fails=()) -> list[tuple[int, bool]]:
@@ -62,33 +49,33 @@ def fake(monkeypatch, *, fails=()) -> list[tuple[int, bool]]:
 def test_each_seed_is_trained_in_its_folder_as_alone(tmp_path, tmp_path_factory):
     """Real processes, so it takes seconds."""
     told = []
-    found = train_seeds(PLAN, [3, 4], tmp_path, jobs=2, report=lambda seed, news: told.append((seed, type(news))))
+    found = train_seeds(SHORT, [3, 4], tmp_path, jobs=2, report=lambda seed, news: told.append((seed, type(news))))
     assert not found.failures
     assert sorted(seed for seed, kind in told if kind is Evaluation) == [3, 4]
     assert {path.name for path in tmp_path.iterdir()} == {"plan.json", "seed_3", "seed_4"}
     alone = tmp_path_factory.mktemp("alone") / "run"
-    train(replace(PLAN, seed=4), alone)
+    train(replace(SHORT, seed=4), alone)
     same, other = (np.load(folder / "policy.npz") for folder in (alone, tmp_path / "seed_4"))
     names = [name for name in same.files if name != "about"]  # which tells when it was trained
     assert "weight_0" in names
     assert all(np.array_equal(same[name], other[name]) for name in names)
-    assert read_plan(tmp_path / "plan.json") == PLAN
+    assert read_plan(tmp_path / "plan.json") == SHORT
     assert [(one.plan.seed, one.is_finished) for one in found.trainings] == [(3, True), (4, True)]
 
 
 def test_what_is_finished_is_kept_and_the_rest_goes_on(tmp_path, monkeypatch):
     calls = fake(monkeypatch, fails={3})
     for seed, steps in enumerate((128, 64)):
-        trained(seed_folder(tmp_path, seed), replace(PLAN, seed=seed), evaluated(steps, 4.0))
+        trained(seed_folder(tmp_path, seed), replace(SHORT, seed=seed), evaluated(steps, 4.0))
     told = []
-    found = train_seeds(PLAN, range(4), tmp_path, resume=True, report=lambda *news: told.append(news))
+    found = train_seeds(SHORT, range(4), tmp_path, resume=True, report=lambda *news: told.append(news))
     assert calls == [(1, True), (2, False), (3, False)]
     assert ([one.label for one in found.trainings], found.failures) == (
         ["seed_0", "seed_1", "seed_2"],
         {"seed_3": "too large"},
     )
     assert (3, "too large") in told
-    longer = PLAN.longer(256)
+    longer = SHORT.longer(256)
     train_seeds(longer, range(1), tmp_path, resume=True)
     assert calls[3:] == [(0, True)]
     assert read_plan(tmp_path / "plan.json") == longer
@@ -98,7 +85,7 @@ def test_what_is_finished_is_kept_and_the_rest_goes_on(tmp_path, monkeypatch):
 def test_a_process_that_is_killed_ends_no_other_training(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "_train_here", fake_trainings.one_is_killed)
     told = []
-    found = train_seeds(PLAN, range(3), tmp_path, jobs=2, report=lambda *news: told.append(news))
+    found = train_seeds(SHORT, range(3), tmp_path, jobs=2, report=lambda *news: told.append(news))
     assert sorted(seed for seed, news in told if news == STATUS) == [0, 1, 2]
     assert [*found.failures] == ["seed_1"]
     assert "its process was killed, most likely because memory ran out" in found.failures["seed_1"]
@@ -119,7 +106,7 @@ def test_an_interrupt_lets_processes_keep_what_they_have(tmp_path, monkeypatch):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        train_seeds(PLAN, range(2), tmp_path, jobs=2, report=report)
+        train_seeds(SHORT, range(2), tmp_path, jobs=2, report=report)
     assert time.monotonic() - max(begun.values()) < module.KEEP_S
     assert all((tmp_path / f"seed_{seed}" / "kept").exists() for seed in range(2))
 
@@ -128,7 +115,7 @@ def test_means_are_over_trainings_as_they_are_kept(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for seed, best in enumerate((10.0, 20.0, 60.0)):
         evaluations = evaluated(64, best, 0.1), evaluated(128, best / 2, 0.2)
-        trained(seed_folder(tmp_path, seed), replace(PLAN, seed=seed), *evaluations)
+        trained(seed_folder(tmp_path, seed), replace(SHORT, seed=seed), *evaluations)
     three = [read_training(seed_folder(tmp_path, seed)) for seed in range(3)]
     found = beside_baseline(three, {"seed_2": "diverged"})
     assert [one.kept.steps for one in found.trainings] == [64, 64, 64]
@@ -145,8 +132,8 @@ def test_means_are_over_trainings_as_they_are_kept(tmp_path, monkeypatch):
     assert next(iter(json.loads(found.json()).values()))[0]["policy"] == "seed_0"
     one = beside_baseline(three[:1])
     assert "95 %" not in one.text()
-    driven = replace(PLAN.interface, actions="continuous")
-    sac = replace(PLAN, algorithm="sac", options={}, interface=driven)
+    driven = replace(SHORT.interface, actions="continuous")
+    sac = replace(SHORT, algorithm="sac", options={}, interface=driven)
     trained(tmp_path / "sac", sac, evaluated(64, 10.0), evaluated(128, 4.0))
     last = read_training(tmp_path / "sac")
     assert (Path(last.policy).name, last.kept.steps) == ("model.zip", 128), "its network is in no file"

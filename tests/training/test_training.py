@@ -27,30 +27,10 @@ from swarm_forage_env.training.sb3.export import export_network
 from swarm_forage_env.training.sb3.training import train
 from swarm_forage_env.views.sampler import ScenarioSampler
 from swarm_forage_env.wrappers.world import World
+from tests.support.fake_trainings import NUMBERED, SHORT, tiny_plan
 from tests.support.sampled import sampler
 
-NUMBERED = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5)
 DRIVEN = InterfaceConfig(observation="compact", automatic_gripper=True)
-
-
-def tiny_plan(**changes) -> TrainingPlan:
-    """Two stages of three rollouts, in seconds."""
-    plan = TrainingPlan(
-        world=World(warehouse_small(n_robots=4, n_objects=20, horizon_s=200.0)),
-        interface=NUMBERED,
-        n_arenas=2,
-        hidden=(8,),
-        options={"n_steps": 16, "batch_size": 64},
-        stages=(
-            Stage(steps=384, scenario={"n_objects": 40}),
-            Stage(steps=384, options={"learning_rate": 1e-4, "gamma": 0.9}),
-        ),
-        evaluation=EvaluationPlan(every_steps=256, horizon_s=200.0, n_runs=1, baseline="random"),
-    )
-    return dataclasses.replace(plan, **changes)
-
-
-SHORT = tiny_plan(stages=(Stage(steps=128),))
 
 
 @pytest.fixture(scope="module")
