@@ -98,25 +98,6 @@ def test_distances_are_symmetric_and_not_negative(name, ideal, observed):
 
 
 @law
-@given(perf1=performance, perf2=performance, n=sizes, factor=scale)
-def test_task_emergence_is_linear_in_the_curves(perf1, perf2, n, factor):
-    value = metrics.task_emergence(perf1, n[0], perf2, n[1])
-    scaled = metrics.task_emergence(factor * perf1, n[0], factor * perf2, n[1])
-    assert scaled == pytest.approx(factor * value, rel=1e-9, abs=1e-5)
-    total = metrics.task_emergence([perf1.sum()], n[0], [perf2.sum()], n[1])
-    assert total == pytest.approx(value, rel=1e-9, abs=1e-5)
-
-
-@law
-@given(perf1=working, perf2=working, n=sizes, factor=scale)
-@pytest.mark.parametrize("variant", ["paper", "corrected"])
-def test_scalability_does_not_depend_on_the_unit(variant, perf1, perf2, n, factor):
-    value = metrics.scalability(perf1, n[0], perf2, n[1], variant=variant)
-    scaled = metrics.scalability(factor * perf1, n[0], factor * perf2, n[1], variant=variant)
-    assert scaled == pytest.approx(value, rel=1e-6, abs=1e-6)
-
-
-@law
 @given(lone=working, lost=fraction, n=sizes)
 @pytest.mark.parametrize("name", SIZE_MEASURES)
 def test_independent_robots_are_neutral_at_any_pair_of_sizes(name, lone, lost, n):

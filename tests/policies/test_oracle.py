@@ -5,7 +5,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from metrics.benchmark import run_benchmark
 from swarm_forage_env import CheckError, check_policy, scenario
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Grip, ObjectStatus
@@ -87,5 +86,3 @@ def test_without_a_world_it_says_where_it_works():
 def test_it_is_no_contestant():
     with pytest.raises(CheckError, match="reads the world"):
         check_policy("oracle")
-    with pytest.raises(ConfigError, match="oracle, which reads the world"):
-        run_benchmark(["oracle"], name="mine")

@@ -372,7 +372,6 @@ class Somewhere(RandomPolicy):
         (lambda: parse_wrapper(parse_wrapper(NOISE)), "a wrapper to be a text"),
         (lambda: verdict("results"), r"a study to be a StudyTable, got 'results'; read_study\(path\) reads one"),
         (lambda: policy_specs(policy_specs("crw"), caches="static"), "a name, a file or an object for parameters"),
-        (lambda: plan_run(TINY, "crw", parameters={"x": float("inf")}), "policy parameters to be plain JSON values"),
         (lambda: from_callable(3), "function to be callable, got 3"),
         (lambda: policy_specs(Somewhere), "caches of the policy to be one of none, static, dynamic, got 'some'"),
     ],

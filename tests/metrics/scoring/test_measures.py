@@ -159,24 +159,6 @@ def test_a_handling_cost_is_sampled_as_a_throttle_is():
     assert found["distance"].to_list() == [3.0, 3.0]
 
 
-WAVES = [
-    ("square", 4e-5, [0.15, 0.20, 0.25, 0.30, 0.35, 0.40], [7.4, 9.8, 12.2, 14.6, 17.0, 19.4]),
-    ("sine", 2e-5, [0.15, 0.20, 0.25, 0.30, 0.35, 0.40, 0.45], [5.04, 7.18, 9.44, 11.76, 14.13, 16.52, 18.92]),
-]
-
-
-@pytest.mark.parametrize(("kind", "frequency", "amplitudes", "paper"), WAVES, ids=["square", "sine"])
-def test_environment_distances_are_those_of_the_papers_figures(kind, frequency, amplitudes, paper):
-    """Conditions are sampled at the ends of 50 intervals; their means over intervals would give other distances."""
-    ticks = np.arange(1, 50_001)
-    parts = [rows(5, [[1.0] * 50], criterion="throttle", criterion_value=0.0, adversity=0.1, throttle=0.1)]
-    for a in amplitudes:
-        wave = metrics.waveform(kind, ticks, frequency=frequency, amplitude=a, offset=a).reshape(50, 1000)
-        means, ends = wave.mean(axis=1).tolist(), wave[:, -1].tolist()
-        parts.append(rows(5, [[1.0] * 50], criterion="throttle", criterion_value=a, adversity=means, throttle=ends))
-    np.testing.assert_allclose(scored(*parts, measures=["reactivity"])["distance"], paper, atol=0.005)
-
-
 def test_reactivity_follows_the_mean_conditions_and_the_printed_form_the_sampled_ones():
     common = {"criterion": "throttle", "t_end_s": CLOCK}
     sampled = [0.1, 0.6, 0.6, 0.1]
