@@ -8,7 +8,7 @@
 
 The commands are listed below; the store is docs/results.json. Answers to claims and means of measures come of the files
 of docs/results, see `results_numbers.py`. A block looks like
-`<!-- generated: run.crw by scripts/update_docs -->20.45 ± 0.91<!-- end -->`; `run.table` is all that a command printed.
+`<!-- generated: run.crw -->20.45 ± 0.91<!-- end -->`; `run.table` is all that a command printed.
 A number must not begin a line: Markdown takes a comment there for the start of an HTML block, which ends the paragraph.
 --remake needs an installation with everything: pip install -e ".[plots,train]" "torch==2.13.0"
 """
@@ -41,12 +41,10 @@ RESULTS = ROOT / "docs/results"
 PAGES = [ROOT / "README.md", ROOT / "paper/paper.md", *sorted((ROOT / "docs").rglob("*.md")),
          *sorted((ROOT / "swarm_forage_env/policies/pretrained").glob("*.md"))]  # fmt: skip
 BLOCK = re.compile(
-    r"(<!-- generated: (?P<source>\w+)\.(?P<field>\w+) by scripts/update_docs -->)(?P<text>.*?)(<!-- end -->)",
+    r"(<!-- generated: (?P<source>\w+)\.(?P<field>\w+) -->)(?P<text>.*?)(<!-- end -->)",
     re.DOTALL,
 )
-BEGINS_A_LINE = re.compile(
-    r"^[ >]*(?:(?:[-*+]|\d+[.)]) +)?<!-- generated: \w+\.\w+ by scripts/update_docs -->(?!\n)", re.MULTILINE
-)
+BEGINS_A_LINE = re.compile(r"^[ >]*(?:(?:[-*+]|\d+[.)]) +)?<!-- generated: \w+\.\w+ -->(?!\n)", re.MULTILINE)
 PACKAGES = ("numpy", "scipy", "numba", "pymunk")
 FIVE = ("crw", "dpo", "stochm", "stochx", "ppo_warehouse_small")
 WITH_ALL = ("crw", "dpo", "stochm", "stochx", "generalist")
