@@ -54,23 +54,25 @@ def normal_of_bits(bits: np.ndarray) -> np.ndarray:
     return np.array([standard(each) for each in bits.ravel()], np.float32).reshape(bits.shape)
 
 
+SENSORS = {"proximity": 24, "light": 24, "ground": 4, "wheel_speed": 2, "position": 2, "heading": 1}
+"""Group of sensors -> numbers that are drawn for it."""
+
+
 def noisy_row(
-    row: list[float], draws: dict[str, list[float]], sigma: float, size_m: tuple[float, float]
+    row: list[float], draws: list[float], sigmas: dict[str, float], size_m: tuple[float, float]
 ) -> list[float]:
-    """One observation row with Gaussian noise of standard deviation sigma on all sensors, draws by group."""
-    noisy = list(row)
-
-    def add(start: int, group: str, units: list[float], low: float) -> None:
-        for k, (draw, unit) in enumerate(zip(draws[group], units, strict=True)):
-            noisy[start + k] = min(1.0, max(low, row[start + k] + sigma * draw * unit))
-
-    add(0, "proximity", [1.0] * 24, 0.0)
-    add(24, "light", [1.0] * 24, 0.0)
-    add(48, "ground", [1.0] * 4, 0.0)
-    add(52, "wheel_speed", [0.01 / 0.20] * 2, -1.0)
-    add(54, "position", [2.0 / size_m[0], 2.0 / size_m[1]], -1.0)
-    angle = math.atan2(row[57], row[56]) + sigma * draws["heading"][0]
-    noisy[56:58] = math.cos(angle), math.sin(angle)
+    """One observation row with Gaussian noise on the groups that have a standard deviation."""
+    units = {"wheel_speed": [0.01 / 0.20] * 2, "position": [2.0 / size_m[0], 2.0 / size_m[1]]}
+    noisy, start, draw = list(row), 0, iter(draws)
+    for group, size in SENSORS.items():
+        if group == "heading" and group in sigmas:
+            angle = math.atan2(row[57], row[56]) + sigmas[group] * next(draw)
+            noisy[56:58] = math.cos(angle), math.sin(angle)
+        elif group in sigmas:
+            low = -1.0 if group in units else 0.0
+            for k, unit in enumerate(units.get(group, [1.0] * size), start):
+                noisy[k] = min(1.0, max(low, row[k] + sigmas[group] * next(draw) * unit))
+        start += size
     return noisy
 
 
@@ -125,13 +127,3 @@ class SlowPopulation:
             if self.in_repair:
                 self.at_work.add(self.in_repair.popleft())
             self.happen("repair", tick)
-
-
-def by_group(draws: np.ndarray) -> list[dict[str, list[float]]]:
-    """What `SensorNoise` draws for one tick with all groups noisy, (N, 57), per robot and group."""
-    sizes = {"proximity": 24, "light": 24, "ground": 4, "wheel_speed": 2, "position": 2, "heading": 1}
-    ends = np.cumsum(list(sizes.values())).tolist()
-    return [
-        {name: row[end - size : end] for (name, size), end in zip(sizes.items(), ends, strict=True)}
-        for row in draws.tolist()
-    ]

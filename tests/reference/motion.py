@@ -38,13 +38,6 @@ def free_motion(
     return x + radius * (math.sin(end) - math.sin(heading)), y - radius * (math.cos(end) - math.cos(heading)), end
 
 
-def steered_wheels(force_cms: float, angle_deg: float) -> tuple[float, float]:
-    """Wheel speeds in m/s of the study's steering: soft turns up to 15 degrees, beyond them turns on the spot."""
-    base, share = min(force_cms, 10.0) / 100, abs(angle_deg) / 15
-    slow, fast = (base * (1 - share), base * (1 + share)) if share <= 1 else (-0.10, 0.10)
-    return (slow, fast) if angle_deg > 0 else (fast, slow)
-
-
 Vector = tuple[float, float]
 
 

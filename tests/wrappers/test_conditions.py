@@ -9,10 +9,8 @@ from hypothesis import strategies as st
 
 import metrics
 from swarm_forage_env.contract.codes import Event, Grip
-from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import plan_run
-from swarm_forage_env.scenarios.floor import WHEEL_SCALE_MPS
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.wrappers.handling import HandlingCost, HandlingCostConfig
 from swarm_forage_env.wrappers.recorder import RunRecorder
@@ -25,10 +23,9 @@ from swarm_forage_env.wrappers.throttle import (
 )
 from swarm_forage_env.wrappers.waveform import Waveform
 from tests.reference.adversity import throttle_gain
-from tests.reference.motion import steered_wheels
 from tests.support.fake_arena import FakeArena
 from tests.support.foraging import quick_world
-from tests.support.stage import NEST_CELL, OPEN_CELL, begin, lay, load, put, stand, tidy_world
+from tests.support.stage import OPEN_CELL, begin, lay, load, put, stand, tidy_world
 
 DT_S = 0.2
 SAMPLES = range(1_000, 50_001, 1_000)
@@ -154,34 +151,6 @@ def gain_of(config: ThrottleConfig, commands, *, carrying=(), wheel_gain=None) -
     return world.calls[-1]["wheel_gain"]
 
 
-def wheels_after(env: ForageEnv, config: ThrottleConfig, wheels_mps) -> list[float]:
-    """Wheel speeds in cm/s of robot 0 after one throttled step with these commanded speeds in m/s."""
-    stack = Throttle(env, config)
-    begin(stack)
-    put(env, 0, 16.0, 8.0)
-    actions = np.zeros((len(env.active), 3), np.float32)
-    actions[:, 2] = Grip.RELEASE
-    actions[0, :2] = np.array(wheels_mps) / WHEEL_SCALE_MPS
-    stack.step_batch(actions)
-    return (env.swarm.wheel_speed[0] * 100).tolist()
-
-
-@pytest.fixture(scope="module")
-def lone_robot():
-    return tidy_world(n_robots=1)
-
-
-@pytest.mark.parametrize(
-    ("strength", "force_cms", "expected_cms"),
-    [(0.8, 8.0, 1.6), (0.3, 17.0, 7.0), (0.0, 17.0, 10.0), (1.0, 8.0, 0.0)],
-)
-def test_driving_straight(lone_robot, strength, force_cms, expected_cms):
-    wheels = wheels_after(lone_robot, throttled(strength), steered_wheels(force_cms, 0.0))
-    assert wheels == pytest.approx([expected_cms] * 2, abs=1e-6)
-    moved = np.hypot(*(lone_robot.swarm.position[0] - (16.0, 8.0)))
-    assert moved == pytest.approx(expected_cms / 100 * 0.2, abs=1e-8)
-
-
 @given(
     left=st.floats(-2.0, 2.0, width=32),
     right=st.floats(-2.0, 2.0, width=32),
@@ -217,23 +186,21 @@ def test_whoever_carries_at_the_start_of_a_step_is_throttled_in_it():
 # Time
 
 
-def ramp(n_ticks: int) -> ThrottleConfig:
-    """V(t) = t / 100 up to `n_ticks`."""
-    times = (0.0, n_ticks * 0.2)
-    return ThrottleConfig(waveform=Waveform(kind="table", times_s=times, values=(0.0, n_ticks / 100)))
-
-
-def test_last_value_and_mean_are_recorded_per_interval():
-    config = ThrottleConfig(waveform=ramp(50).waveform, carriers=True)
-    recorder = RunRecorder(config.wrap(FakeArena()))
-    for seed in (0, 1):  # a second run starts afresh
+@pytest.mark.parametrize(
+    ("config_class", "column", "unit"), [(ThrottleConfig, "throttle", 0.01), (HandlingCostConfig, "handling_cost", 1.0)]
+)
+def test_last_value_and_mean_are_recorded_per_interval(config_class, column, unit):
+    """V(t) = t units for the 15 ticks of a run, in three intervals of five; a second run starts afresh."""
+    ramp = Waveform(kind="table", times_s=(0.0, 3.0), values=(0.0, 15 * unit))
+    recorder = RunRecorder(config_class(waveform=ramp).wrap(tidy_world(n_robots=1, horizon_s=3.0, interval_s=1.0)))
+    for seed in (0, 1):
         recorder.reset_batch(seed)
         while not recorder.complete:
-            recorder.step_batch(np.zeros((4, 3), np.float32))
+            recorder.step_batch(np.zeros((1, 3), np.float32))
         recorded = recorder.columns()
-        assert recorded["throttle"].tolist() == pytest.approx([0.05, 0.10, 0.15])
-        assert recorded["throttle_mean"].tolist() == pytest.approx([0.03, 0.08, 0.13])
-        assert recorder.columns()["adversity"].tolist() == recorded["throttle_mean"].tolist()
+        assert recorded[column].tolist() == pytest.approx([5 * unit, 10 * unit, 15 * unit])
+        assert recorded[f"{column}_mean"].tolist() == pytest.approx([3 * unit, 8 * unit, 13 * unit])
+        assert recorded["adversity"].tolist() == recorded[f"{column}_mean"].tolist()
 
 
 def test_the_waveform_itself_is_recorded_where_it_is_negative():
@@ -271,43 +238,17 @@ def costing(ticks: float) -> HandlingCostConfig:
     return HandlingCostConfig(waveform=Waveform(kind="constant", amplitude=ticks))
 
 
-def ticks_until(event: Event, config: HandlingCostConfig) -> int:
-    """Ticks from the start of a pick-up or a delivery to its effect."""
-    env = tidy_world()
-    stack = HandlingCost(env, config)
-    begin(stack)
-    stand(env, 0, NEST_CELL if event == Event.DELIVERED else OPEN_CELL)
-    if event == Event.DELIVERED:
-        load(env, 0, 0)
-    else:
-        lay(env, 0, OPEN_CELL)
-    actions = np.zeros((4, 3), np.float32)
-    actions[:, 2] = Grip.RELEASE
-    actions[0, 2] = Grip.DELIVER if event == Event.DELIVERED else Grip.GRASP
-    while env.events.code[0] != event:
-        stack.step_batch(actions)
-        assert env.tick < 100
-    return env.tick - 1
-
-
-@pytest.mark.parametrize("event", [Event.PICKED_UP, Event.DELIVERED])
 @pytest.mark.parametrize(("value", "ticks"), [(-3.0, 1), (1.99, 1), (2.0, 2), (5.7, 5)])
-def test_the_integer_part_counts_and_at_least_one_tick(event, value, ticks):
-    assert ticks_until(event, costing(value)) == ticks
-
-
-def test_last_value_and_mean_of_costs_are_recorded():
-    """V(t) = t for the 15 ticks of a run, in three intervals of five; a second run starts afresh."""
-    ramp = HandlingCostConfig(waveform=Waveform(kind="table", times_s=(0.0, 3.0), values=(0.0, 15.0)))
-    recorder = RunRecorder(ramp.wrap(tidy_world(n_robots=1, horizon_s=3.0, interval_s=1.0)))
-    for seed in (0, 1):
-        recorder.reset_batch(seed)
-        while not recorder.complete:
-            recorder.step_batch(np.zeros((1, 3), np.float32))
-    contributed = recorder.columns()
-    assert contributed["handling_cost"].tolist() == pytest.approx([5.0, 10.0, 15.0])
-    assert contributed["handling_cost_mean"].tolist() == pytest.approx([3.0, 8.0, 13.0])
-    assert recorder.columns()["adversity"].tolist() == contributed["handling_cost_mean"].tolist()
+def test_the_integer_part_counts_and_at_least_one_tick(value, ticks):
+    env = tidy_world(n_robots=1)
+    stack = HandlingCost(env, costing(value))
+    begin(stack)
+    stand(env, 0, OPEN_CELL)
+    lay(env, 0, OPEN_CELL)
+    while env.events.code[0] != Event.PICKED_UP:
+        stack.step_batch(np.array([[0.0, 0.0, Grip.GRASP]], np.float32))
+        assert env.arena._requests.handling_ticks.tolist() == [ticks, ticks]
+    assert env.tick - 1 == ticks
 
 
 def test_a_world_with_slow_handling_equals_the_wrapper_that_makes_it_slow():
