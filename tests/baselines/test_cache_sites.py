@@ -1,6 +1,8 @@
 """Where caches are started: the allowed point nearest to the midpoint on the way to the nest, against a full search."""
 
+import cmath
 import math
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
@@ -9,7 +11,6 @@ from baselines.cache_sites import is_allowed, nearest_allowed, select_site
 from baselines.task_policy import site_box_m
 from baselines.tasks import DRAW_POINT_X, DRAW_POINT_Y, TASK_DRAWS
 from swarm_forage_env.scenarios.quirks import Quirks
-from tests.reference import scattered_sites
 from tests.support.observations import make_spec
 from tests.support.task_robot import TaskRobot
 
@@ -104,7 +105,41 @@ def test_no_allowed_point_is_nearer(seed):
     assert nearest <= math.sqrt(best.distance) + 4 * step, "the grid must have a point near the best one"
 
 
-# The scatter of the authors' program
+# The scatter of the authors' program, against a slow twin: places as complex numbers, draws as an iterator
+
+
+FAR = {"inside": 0.005, "border": 0.05}
+"""Share of sites that lie anywhere allowed: the midpoint is allowed, or the best place is on a border."""
+SCALE_M = {"inside": 0.0125, "border": 0.03}
+
+
+def random_shares(share: float) -> Iterator[float]:
+    """Random numbers that follow from one: those of Park and Miller, as in the C++ engine `minstd_rand`."""
+    state = 1 + int(share * (2**31 - 3))
+    while True:
+        yield state / (2**31 - 1)
+        state = state * 48271 % (2**31 - 1)
+
+
+def scattered_site(
+    best: complex,
+    where: str,
+    box: tuple[float, float, float, float],
+    turn: float,
+    draw: float,
+    is_allowed: Callable[[complex], bool],
+) -> complex:
+    """Where the site lies: `turn` is the share of a full turn, `draw` decides how far; both in [0, 1)."""
+    if draw < FAR[where]:
+        low, high = complex(*box[:2]), complex(*box[2:])
+        size = high - low
+        along, across = random_shares(turn), random_shares(draw / FAR[where])
+        tried = (low + complex(size.real * next(along), size.imag * next(across)) for _ in range(256))
+        return next((place for place in tried if is_allowed(place)), best)
+    rest = (draw - FAR[where]) / (1.0 - FAR[where])
+    offset = cmath.rect(SCALE_M[where] / (1.0 - rest), cmath.tau * turn)
+    tried = (best + offset * cmath.exp(2.4j * k) for k in range(16))
+    return next((place for place in tried if is_allowed(place)), best)
 
 
 def scattered(robot: TaskRobot, x: float, y: float, u: float, v: float) -> tuple[complex, complex]:
@@ -113,7 +148,7 @@ def scattered(robot: TaskRobot, x: float, y: float, u: float, v: float) -> tuple
     goal = choose(robot, x, y, u, v)
     middle = 0.5 * (x + c.nests_m[0, 0]), 0.5 * (y + c.nests_m[0, 1])
     best = nearest_allowed(robot.record, *middle, 2 * math.pi * u, c, memory)
-    expected = scattered_sites.site(
+    expected = scattered_site(
         complex(best.x, best.y),
         "inside" if best.distance == 0.0 else "border",
         (c.site_x_low_m, c.site_y_low_m, c.site_x_high_m, c.site_y_high_m),

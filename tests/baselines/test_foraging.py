@@ -10,7 +10,6 @@ from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import scenario
-from tests.support.task_robot import caches_of
 
 CACHES = {"stochm": "static", "stochx": "dynamic"}
 
@@ -25,19 +24,14 @@ class Run:
         self.policy.reset(self.env.swarm_spec, stream_rng(seed, Stream.POLICY))
         self.tasks: set[int] = set()
         self.fifths: list[np.ndarray] = []
-        self.cells_of_caches: dict[int, list[int]] = {}  # serial -> centre cell, of all that have ever been
         before = self.counters
         for tick in range(1, ticks + 1):
             tasks = getattr(self.policy, "task", None)
             obs, *_ = self.env.step_batch(self.policy.act(obs, self.env.active), tasks=tasks)
             self.tasks |= set() if tasks is None else set(tasks.tolist())
-            caches = self.env.caches
-            known = zip(caches.serial[caches.alive].tolist(), caches.cell[caches.alive].tolist(), strict=True)
-            self.cells_of_caches |= dict(known)
             if tick % (ticks // 5) == 0:
                 self.fifths.append(self.counters - before)
                 before = self.counters
-        self.obs = obs
 
     @property
     def counters(self) -> np.ndarray:
@@ -66,25 +60,6 @@ def test_swarms_deliver_and_use_caches(policy_name, scenario_name, ticks, delive
     taken = counters[Counter.FREE_PICKUPS] + counters[Counter.CACHE_PICKUPS]
     left = counters[Counter.COLLECTED] + counters[Counter.CACHE_DROPS] + counters[Counter.FLOOR_DROPS]
     assert taken == left + held, "every object that is picked up is dropped once"
-
-
-def test_what_robots_remember_of_caches_was_true_and_is_while_they_see_them():
-    run = Run("warehouse_small", "stochm", ticks=3000, seed=6)
-    run.policy.act(run.obs, run.env.active)  # takes note of what is seen now
-    remembered = [caches_of(run.policy, robot) for robot in range(50)]
-    assert sum(len(known) for known in remembered) == run.policy._robots["n_caches"].sum() > 0
-    for known in remembered:
-        for serial, (x, y, count, density) in known.items():
-            assert [x, y] == run.cells_of_caches[serial]
-            assert count >= 2
-            assert 0.9 < density <= 1.0
-    sees_cache = run.obs[:, run.env.layout["los_cache"]][:, 0] > 0
-    assert 5 < np.count_nonzero(sees_cache) < 50
-    caches = run.env.caches
-    (slot,) = np.flatnonzero(caches.alive)
-    present = (*caches.cell[slot].tolist(), int(caches.count[slot]))
-    for robot in np.flatnonzero(sees_cache):
-        assert remembered[robot][int(caches.serial[slot])][:3] == present
 
 
 @pytest.mark.parametrize(("policy", "caches"), [("dpo", "none"), ("stochm", "static")])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from baselines.crw import CRWPolicy
-from baselines.motion import arrival, drive, phototaxis, wander, wander_freely
+from baselines.motion import drive, phototaxis, wander, wander_freely
 from baselines.parameters import ControllerParameters, kernel_constants
 from baselines.robots import new_robots
 from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
@@ -43,23 +43,6 @@ def wheels(length_cmps: float, angle_deg: float) -> np.ndarray:
 )
 def test_drive_turns_softly_up_to_15_degrees_and_on_the_spot_beyond(length, angle, expected):
     assert wheels(length, angle) == pytest.approx(expected, abs=1e-5)
-
-
-@pytest.mark.parametrize(("distance", "length"), [(0.5, 8.0), (0.21, 8.0), (0.1, 4.0), (0.01, 1.0), (0.0, 1.0)])
-def test_arrival_slows_down_near_the_goal(distance, length):
-    robot = new_robots(1)[0]
-    robot.goal_x_m, robot.goal_y_m = 5.0 + distance, 3.0
-    force = arrival(robot, 5.0, 3.0, 1.0, 0.0, C)
-    assert polar(force) == pytest.approx((length, 0.0), abs=1e-9)
-    assert bool(robot.is_slowing) == (distance <= 0.2)
-
-
-def test_arrival_points_to_the_goal_in_the_robot_frame():
-    robot = new_robots(1)[0]
-    robot.goal_x_m, robot.goal_y_m = 5.0, 6.0
-    heading = math.radians(30.0)
-    force = arrival(robot, 5.0, 3.0, math.cos(heading), math.sin(heading), C)
-    assert polar(force) == pytest.approx((8.0, 60.0))
 
 
 def test_phototaxis_follows_the_light_and_goes_straight_in_the_dark():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from baselines.dpo import DPOPolicy
-from baselines.memory import density, with_room
+from baselines.memory import with_room
 from swarm_forage_env.scenarios.quirks import Quirks
 from tests.reference.controllers import ObjectDictionary, visible_objects
 from tests.support.observations import Observations, make_spec
@@ -19,22 +19,6 @@ def new_policy(task) -> DPOPolicy:
     policy = DPOPolicy()
     policy.reset(task, np.random.default_rng(0))
     return policy
-
-
-def test_density_of_an_object_seen_now_and_long_ago():
-    log_keep = DPOPolicy().parameters.derived()["log_keep"]
-    assert density(0, log_keep) == pytest.approx(1.0 - 0.00001, abs=1e-12)
-    assert density(49_999, log_keep) == pytest.approx(0.6065, abs=1e-4)
-
-
-def test_positions_come_from_the_exact_cell_not_from_the_noisy_position():
-    observations = Observations(make_spec())
-    policy = new_policy(observations.spec)
-    observations.pose(10.1, 8.1)
-    observations.believed_position(10.9, 7.3)
-    observations.window({(0, 0): 7})
-    policy.act(observations.array, np.ones(1, bool))
-    assert objects_of(policy, 0)[7][:2] == (50, 40)
 
 
 def test_lists_grow_and_lose_nothing():
@@ -94,18 +78,6 @@ def stand(robot: TaskRobot, cell: tuple[int, int], *caches) -> None:
     robot.seen.pose((cell[0] + 0.5) * 0.2, (cell[1] + 0.5) * 0.2)
     robot.seen.caches(*caches)
     robot.act()
-
-
-def test_a_cache_is_remembered_with_place_count_and_decaying_density():
-    robot = TaskRobot()
-    stand(robot, (56, 40), CACHE_SEEN)
-    assert caches_of(robot.policy, 0) == {7: (72, 40, 12, pytest.approx(1 - 1e-5))}
-    stand(robot, (40, 40))
-    stand(robot, (40, 40))
-    assert caches_of(robot.policy, 0) == {7: (72, 40, 12, pytest.approx((1 - 1e-5) ** 3, abs=1e-12))}
-    stand(robot, (56, 40), (7, CENTRE, 11))
-    assert caches_of(robot.policy, 0) == {7: (72, 40, 11, pytest.approx(1 - 1e-5))}
-    assert robot.record.n_caches == 1
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""What all scripted controllers share: parameters, copies in the middle of a run, arrays of any layout."""
+"""Scripted controllers: copies in the middle of a run, arrays of any layout, worked numbers, parameters."""
 
 import copy
 import dataclasses
@@ -6,18 +6,22 @@ import pickle
 
 import numpy as np
 import pytest
+from scipy import stats
 
-from baselines.cpfa import CPFAPolicy
+from baselines.cpfa import CPFAPolicy, poisson_cdf
 from baselines.crw import CRWPolicy
 from baselines.dpo import DPOPolicy
-from baselines.object_choice import MemoryParameters
-from baselines.parameters import ParameterError
+from baselines.object_choice import MemoryParameters, object_utility
+from baselines.parameters import ParameterError, kernel_constants
+from baselines.robots import Activity
 from baselines.stochm import STOCHMPolicy
 from baselines.stochx import STOCHXPolicy
 from baselines.tasks import NO_TAB, ROOTED_TAB, STOCHM_PARAMETERS, STOCHX_PARAMETERS
 from swarm_forage_env.contract.codes import TAB_CHILDREN, TAB_ROOT, Tab, Task
+from swarm_forage_env.scenarios.quirks import Quirks
 from tests.support.observations import Observations, make_spec
 from tests.support.stage import OPEN_CELL, load, stand, tidy_world
+from tests.support.task_robot import TaskRobot
 
 N_ROBOTS = 5
 each_policy = pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy, CPFAPolicy, STOCHMPolicy, STOCHXPolicy])
@@ -66,6 +70,36 @@ def test_a_robot_keeps_its_cargo_when_it_comes_back_to_work(policy_class):
     env.step_batch(actions)
     assert env.swarm.carried_object.tolist() == [0, 1, 2, -1]
     assert not env.swarm.wheel_speed.any()
+
+
+# Worked numbers
+
+
+def utility(anchor_x: float, pheromone: float = 1.0) -> float:
+    parameters = MemoryParameters()
+    c = kernel_constants(parameters, make_spec(), **parameters.derived())[0]
+    return object_utility(anchor_x, 8.0, 24.0, 8.0, pheromone, c)
+
+
+def test_utility_of_the_worked_example():
+    assert utility(25.0) == pytest.approx(59.26, abs=0.005)
+    assert utility(26.0) == pytest.approx(30.99, abs=0.005)
+
+
+def test_starting_within_tolerance_is_an_arrival_unless_the_quirk_is_on():
+    for quirk, activity in ((False, Activity.WAIT_PICKUP), (True, Activity.ACQUIRE)):
+        quirks = Quirks(finisher_tolerance_mismatch=quirk)
+        robot = TaskRobot(DPOPolicy(object_tolerance_m=0.5), quirks=quirks)
+        robot.seen.window({(2, 0): 7})
+        robot.seen.ground("object")
+        robot.act()
+        assert robot.activity is activity
+
+
+@pytest.mark.parametrize("rate", [0.0, 4.0, 20.0])
+def test_the_poisson_distribution_is_that_of_scipy(rate):
+    for count in range(25):
+        assert poisson_cdf(count, rate) == pytest.approx(stats.poisson.cdf(count, rate), rel=1e-12)
 
 
 # Parameters

@@ -5,7 +5,6 @@ import pytest
 
 from baselines import stoch_n1
 from baselines.robots import Activity
-from baselines.stochx import STOCHXPolicy
 from baselines.task_policy import task_constants
 from baselines.tasks import STOCHM_PARAMETERS, STOCHX_PARAMETERS
 from swarm_forage_env.contract.codes import Tab, Task
@@ -95,31 +94,6 @@ def test_moving_average():
 # Procedures
 
 
-class Robot:
-    """Allocation of one robot that has just been made, with its constants."""
-
-    def __init__(self, policy_class=STOCHXPolicy, quirks: Quirks = Quirks(), **overrides) -> None:  # noqa: B008 - frozen
-        policy = policy_class(**overrides)
-        self.c = task_constants(policy.parameters, make_spec(quirks=quirks), policy.n_tabs)[0]
-        rng = np.random.default_rng(1)
-        self.a = stoch_n1.new_allocation(1, policy.parameters, quirks, policy.n_tabs, rng)
-
-    def be(self, tab: Tab, task: Task) -> None:
-        self.a.tab[0], self.a.task[0] = tab, task
-
-    def next(self, move: float = 1.0, partition: float = 1.0, switch: float = 1.0, now: int = 1) -> Task:
-        stoch_n1.next_task(self.a, 0, now, self.c, move, partition, switch)
-        return self.task
-
-    @property
-    def task(self) -> Task:
-        return Task(int(self.a.task[0]))
-
-    @property
-    def tab(self) -> Tab:
-        return Tab(int(self.a.tab[0]))
-
-
 def test_first_block_estimates_and_coins():
     n = 4000
     a = stoch_n1.new_allocation(n, STOCHX_PARAMETERS, Quirks(), 3, np.random.default_rng(3))
@@ -137,45 +111,12 @@ def test_first_block_estimates_and_coins():
     assert (m.tab == Tab.GENERALIST).all()
 
 
-def test_ending_a_task_updates_its_estimate_and_its_block_only():
-    robot = Robot()
-    robot.be(Tab.HARVESTER, Task.STARTER)
-    robot.a.estimate[0] = 1500
-    robot.a.exec_time[0, Task.STARTER] = 2001
-    robot.a.partition[:] = -1
-    stoch_n1.end_task(robot.a, 0, 77, robot.c)
-    assert robot.a.estimate[0, Task.STARTER] == 1750.5
-    assert np.count_nonzero(robot.a.estimate[0] == 1500) == 7
-    expected = stoch_n1.partition_probability(1500, 3250.5, *X_PARTITION, False)
-    assert robot.a.partition[0].tolist() == [-1, expected, -1]
-    assert robot.a.exec_start[0, Task.STARTER] == 77
-
-
-def run_ticks(robot: Robot, first: int, last: int, activity: Activity) -> None:
-    for now in range(first, last + 1):
-        stoch_n1.after_tick(robot.a, 0, now, activity, robot.c)
-
-
 def test_quirk_transferer_interface_is_entered_with_the_transport_and_never_left():
-    robot = Robot(quirks=Quirks(transferer_interface_never_leaves=True))
+    spec = make_spec(quirks=Quirks(transferer_interface_never_leaves=True))
+    constants = task_constants(STOCHX_PARAMETERS, spec, 3)[0]
     has_interface, seen = False, []
     for activity in (Activity.ACQUIRE, Activity.WAIT_PICKUP, Activity.TRANSPORT, Activity.WAIT_DROP, Activity.ACQUIRE):
-        has_interface = stoch_n1.interface_after(has_interface, Task.TRANSFERER, activity, robot.c)
+        has_interface = stoch_n1.interface_after(has_interface, Task.TRANSFERER, activity, constants)
         seen.append(has_interface)
     assert seen == [False, False, True, True, True]
-    assert not stoch_n1.interface_after(True, Task.HARVESTER, Activity.WAIT_DROP, robot.c)
-
-
-def test_abort_probability_is_the_least_without_an_interface_except_for_generalists():
-    robot = Robot()
-    robot.a.estimate[0] = 1000
-    robot.be(Tab.HARVESTER, Task.HARVESTER)
-    run_ticks(robot, 2000, 2000, Activity.ACQUIRE)
-    assert robot.a.p_abort[0, Task.HARVESTER] == 1e-4
-    run_ticks(robot, 2000, 2000, Activity.TRANSPORT)
-    assert robot.a.p_abort[0, Task.HARVESTER] == 1e-4, "the interface counts from the next tick on"
-    run_ticks(robot, 2000, 2000, Activity.TRANSPORT)
-    assert robot.a.p_abort[0, Task.HARVESTER] == pytest.approx(0.018, abs=1e-4)
-    robot.be(Tab.GENERALIST, Task.GENERALIST)
-    run_ticks(robot, 2000, 2000, Activity.ACQUIRE)
-    assert robot.a.p_abort[0, Task.GENERALIST] == pytest.approx(0.018, abs=1e-4)
+    assert not stoch_n1.interface_after(True, Task.HARVESTER, Activity.WAIT_DROP, constants)

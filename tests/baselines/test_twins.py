@@ -14,8 +14,7 @@ from baselines.stochx import STOCHXPolicy
 from baselines.tasks import TASK_DRAWS
 from swarm_forage_env.contract.codes import Event, Goal, Task
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
-from tests.reference.controllers import ObjectDictionary, ReferenceRobot
-from tests.reference.cpfa import CPFARobot
+from tests.reference.controllers import CPFARobot, ObjectDictionary, ReferenceRobot
 from tests.reference.task_controllers import CHILDREN, TASKS, ReferenceTaskRobot
 from tests.support.observations import GREYS, Observations, make_spec
 from tests.support.task_robot import caches_of, estimates_of, objects_of
@@ -164,6 +163,13 @@ def test_cpfa_is_as_the_slow_one(quirks):
         ]
         assert robots["has_site"].tolist() == [twin.site is not None for twin in twins]
         met |= {(twin.stage, twin.vector, twin.informed) for twin in twins if twin.state == "acquire"}
+    found, told = policy.describe_memories(), policy.describe_robots()
+    assert dict(zip(found.robot.tolist(), found.place_m.tolist(), strict=True)) == {
+        i: pytest.approx(twin.site[0], abs=1e-5) for i, twin in enumerate(twins) if twin.site
+    }
+    assert [told.words[code] == "searching" for code in told.activity] == [
+        (twin.state, twin.stage) == ("acquire", "search") for twin in twins
+    ]
     for informed in (False, True):
         assert met >= {("search", "idle", informed), ("search", "vector", informed), ("travel", "vector", informed)}
     assert {stage for stage, _, _ in met} >= {"give up", "search", "travel"}
@@ -290,14 +296,22 @@ def test_tasks_are_as_in_the_slow_ones(policy_class, quirks, ticks):
             expected = twins[i].tick(fuzz.seen.array[i], policy._draws[i], now)
             assert [TASKS[policy.task[i]], TASK_STATES[policy.activity[i]]] == [twins[i].job, twins[i].state]
             assert np.abs(actions[i] - expected).max() <= 2e-6  # pytest.approx takes longer than the controller
+            left_alone = zip(policy._memory.shunned[i], policy._memory.n_shunned[i], strict=True)
+            assert [set(names[:n].tolist()) for names, n in left_alone] == [
+                {row + 1 for row in twins[i].shunned},
+                twins[i].not_to_take,
+                twins[i].not_to_add,
+            ]
             visited.add((Task(int(policy.task[i])), Activity(int(policy.activity[i]))))
             goals.add(int(policy._robots[i].goal_kind))
             searching += policy._robots[i].is_searching
     for i, twin in enumerate(twins):
-        known = {cache.serial: (*cell, cache.count) for cell, cache in twin.caches.items()}
-        assert {serial: value[:3] for serial, value in caches_of(policy, i).items()} == known
-        assert {row: cell for row, (*cell, _) in objects_of(policy, i).items()} == {
-            row: list(cell) for row, (cell, _) in twin.memory.known.items()
+        assert caches_of(policy, i) == {
+            cache.serial: (*cell, cache.count, pytest.approx(cache.density, abs=1e-9))
+            for cell, cache in twin.caches.items()
+        }
+        assert objects_of(policy, i) == {
+            row: (*cell, pytest.approx(density, abs=1e-9)) for row, (cell, density) in twin.memory.known.items()
         }
         estimates = estimates_of(policy, i)
         assert {name: estimates[code] for code, name in enumerate(TASKS) if name} == pytest.approx(twin.estimates)

@@ -7,7 +7,6 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import CELL_NEST, Event, Grip
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
-from swarm_forage_env.scenarios.config import PHYSICS_ENGINES
 from swarm_forage_env.scenarios.floor import PLACEMENTS, distributable_box, free_area, overlap_cells, source_boxes
 from swarm_forage_env.scenarios.obstacles import blocked_cells, distances_m, stretched
 from swarm_forage_env.scenarios.presets import at_density, scenario
@@ -165,9 +164,8 @@ def test_nests_are_whole_cells_with_lights_of_their_own():
     assert arena.lights_m[:3] == scenario("warehouse_small").arena.lights_m
 
 
-@pytest.mark.parametrize("physics", PHYSICS_ENGINES)
-def test_every_nest_takes_deliveries_and_holds_no_objects(physics):
-    env = tidy_world(n_robots=2, physics=physics, further_nests=(EAST, SQUARE))
+def test_every_nest_takes_deliveries_and_holds_no_objects():
+    env = tidy_world(n_robots=2, further_nests=(EAST, SQUARE))
     for robot, (x, y) in enumerate(((29.0, 6.0), (17.0, 3.0))):
         put(env, robot, x, y)
         load(env, robot, robot)

@@ -4,7 +4,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.codes import Counter
@@ -59,13 +58,6 @@ def test_nobody_leaves_the_arena(policy):
     assert 0.0 <= env.events.interference_sum[0] <= TICKS
     if policy == "crw":
         assert counters[-1][Counter.COLLECTED] > 500
-
-
-def test_nobody_leaves_a_crowded_arena():
-    env = ForageEnv(scenario("warehouse_small", n_robots=400, n_objects=800))
-    run(env, BusyPolicy(), 2, ticks=10_000)
-    pairs = cKDTree(env.swarm.position).query_pairs(2 * RADIUS_M - 4 * TOLERATED_M)
-    assert not pairs
 
 
 @pytest.mark.parametrize("caches", ["none", "static", "dynamic"])

@@ -12,7 +12,6 @@ import pytest
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import pdist
 
-from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import PHYSICS_ENGINES, ScenarioConfig
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import scenario
@@ -85,22 +84,6 @@ def test_overlap_shrinks_with_the_number_of_substeps(table):
 def test_four_is_the_smallest_number_of_equal_substeps_that_is_tolerable(table):
     assert [n_substeps for n_substeps, overlap in table.items() if overlap < TOLERATED] == [4, 5, 10]
     assert equal(4) == DEFAULT
-
-
-def test_free_motion_does_not_depend_on_the_substeps(base):
-    ends = []
-    for substeps in (equal(1), equal(10), DEFAULT):
-        env = ForageEnv(divided(with_overrides(base, n_robots=1, n_objects=1), substeps))
-        env.reset_batch(0)
-        rng = np.random.default_rng(0)
-        start = env.swarm.position[0].copy()
-        for _ in range(50):
-            env.step_batch(np.column_stack((rng.uniform(-0.5, 1.0, (1, 2)), [[1.0]])).astype(np.float32))
-        ends.append((env.swarm.position[0] - start, env.swarm.heading[0]))
-    for moved, heading in ends[1:]:
-        np.testing.assert_allclose(moved, ends[0][0], atol=1e-9)
-        assert heading == pytest.approx(ends[0][1], abs=1e-9)
-    assert np.linalg.norm(ends[0][0]) > 0.1
 
 
 def jam(base: ScenarioConfig, substeps: tuple[float, ...], n_robots: int, ticks: int = 600) -> float:

@@ -6,43 +6,14 @@ import pickle
 import numpy as np
 import pytest
 
-from swarm_forage_env import Snapshot, SnapshotError, parallel_env, scenario
+from swarm_forage_env import Snapshot, SnapshotError, parallel_env
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
-from tests.support.branches import Branch, pickled
+from tests.support.branches import Branch, pickled, whole_stack
 
 
-def small(**options) -> ForageEnv:
+def small(**options):
     return parallel_env("warehouse_small", **{"n_robots": 3, "n_objects": 9, "physics": "compiled", **options})
-
-
-def test_a_heap_of_robots_goes_on_from_a_snapshot():
-    """All push into one corner, so that what an engine remembers of contacts matters."""
-    world = scenario("warehouse_small", n_robots=60, width_m=8.0, height_m=8.0, nest_centre_m=(2.0, 4.0),
-                     nest_size_m=(1.0, 2.0), n_objects=5, physics="compiled")  # fmt: skip
-    env = ForageEnv(world)
-    env.reset_batch(3)
-    swarm = env.swarm
-
-    def towards_the_corner(target: ForageEnv, ticks: int) -> bytes:
-        seen = b""
-        for _ in range(ticks):
-            position, heading = target.swarm.position, target.swarm.heading
-            turn = np.sin(np.arctan2(-position[:, 1], -position[:, 0]) - heading) * 0.5
-            actions = np.column_stack((0.5 - turn, 0.5 + turn, np.zeros(60))).astype(np.float32)
-            target.step_batch(actions)
-            seen += target.swarm.position.tobytes() + target.swarm.heading.tobytes()
-        return seen
-
-    towards_the_corner(env, 400)
-    distance = np.hypot(*(swarm.position[:, None] - swarm.position[None]).T) + np.eye(60)
-    assert (distance < 2.01 * world.robots.radius_m).sum() > 60, "they touch"
-    snapshot, other = env.snapshot(), ForageEnv(world)
-    expected = towards_the_corner(env, 60)
-    other.restore(snapshot)
-    assert towards_the_corner(other, 60) == expected
-    env.restore(snapshot)
-    assert towards_the_corner(env, 60) == expected
 
 
 def test_a_snapshot_stays_as_it_is():
@@ -58,22 +29,25 @@ def test_a_snapshot_stays_as_it_is():
     assert isinstance(snapshot, Snapshot)
 
 
-def test_agents_and_observations_come_back():
-    env = small()
+NOISE = "sensor_noise:sigma=0.1"
+
+
+@pytest.mark.parametrize("wrappers", [(), (NOISE,)], ids=["bare", "with noise"])
+def test_agents_and_what_they_were_shown_come_back(wrappers):
+    env, other = small(wrappers=wrappers), small(wrappers=wrappers)
     env.reset(seed=1)
     dead = np.array([False, True, False])
-    env.set_population(active=~dead, present=~dead, terminated=dead)
+    env.unwrapped.set_population(active=~dead, present=~dead, terminated=dead)
     obs, *_ = env.step({agent: np.ones(3, np.float32) for agent in env.agents})
     snapshot, state = env.snapshot(), env.state()
     env.reset(seed=2)
-    other = small()
     for target in (env, other):
         restored = target.restore(snapshot)
         assert target.agents == list(restored) == ["robot_0", "robot_2"]
         for agent, row in restored.items():
             np.testing.assert_array_equal(row, obs[agent])
         np.testing.assert_array_equal(target.state(), state)
-        assert (target.tick, target.seed_value) == (1, 1)
+        assert (target.unwrapped.tick, target.unwrapped.seed_value) == (1, 1)
 
 
 def test_a_finished_run_is_finished_after_a_restore_and_can_be_left():
@@ -100,14 +74,43 @@ def test_chipmunk_says_what_a_copy_needs(way):
 
 
 @pytest.mark.parametrize(
-    "options", [{"n_robots": 4}, {"max_cycles": 9}, {"wrappers": ["throttle:waveform=constant,amplitude=0.1"]}]
+    ("mine", "others"),
+    [
+        ({}, {"n_robots": 4}),
+        ({}, {"max_cycles": 9}),
+        ({}, {"wrappers": [NOISE]}),
+        ({"wrappers": [NOISE]}, {}),
+        ({"wrappers": [NOISE]}, {"wrappers": ["sensor_noise:sigma=0.2"]}),
+    ],
 )
-def test_snapshots_of_others_are_refused(options):
-    env, other = small(), small(**options)
+def test_snapshots_of_others_are_refused(mine, others):
+    env, other = small(**mine), small(**others)
     env.reset(seed=1)
     other.reset(seed=2)
     before = env.state()
     with pytest.raises(SnapshotError, match="scenario, length, reads and wrappers of this one, got another"):
         env.restore(other.snapshot())
     np.testing.assert_array_equal(env.state(), before)
-    assert env.seed_value == 1
+    assert env.unwrapped.seed_value == 1
+
+
+POLICY_OF = {"none": "dpo", "static": "stochm", "dynamic": "stochx"}
+RUNS = [("warehouse_small", "none"), ("warehouse_medium", "static"), ("warehouse_dual", "dynamic")]
+
+
+@pytest.mark.parametrize(("name", "caches"), RUNS)
+def test_a_stack_goes_on_from_a_snapshot_to_the_same_record(name, caches):
+    stack = whole_stack(name, "compiled", caches)
+    run = Branch(stack, load_policy(POLICY_OF[caches])).go_on(300)
+    snapshot = stack.snapshot()
+    fresh = whole_stack(name, "compiled", caches)
+    branches = [run.beside(env, env.restore_batch(snapshot)) for env in (fresh,)]
+    branches += [run.beside(env, run.obs) for env in (copy.deepcopy(stack), pickled(stack))]
+    expected = run.beside(stack, run.obs).go_on(200)
+    columns = expected.columns()
+    assert sum(columns["deaths"]) > 0
+    assert sum(columns["repairs"]) > 0
+    branches.append(run.beside(stack, stack.restore_batch(snapshot)))  # after the end of the run
+    for branch in branches:
+        assert branch.go_on(200).seen == expected.seen
+        assert branch.columns() == columns

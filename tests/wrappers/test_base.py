@@ -1,24 +1,19 @@
 """The stack of wrappers: order, hooks, gains, snapshots, and the record of a run."""
 
-import copy
 import itertools
 
 import numpy as np
 import pytest
 
-from swarm_forage_env import SnapshotError, load_policy
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.runs.run import build_env
 from swarm_forage_env.scenarios.columns import INTERVAL_COLUMNS
 from swarm_forage_env.views.gymnasium import JointForageEnv, SwarmVectorEnv
 from swarm_forage_env.views.pettingzoo import parallel_env
 from swarm_forage_env.wrappers.base import STACK_ORDER, SwarmWrapper
 from swarm_forage_env.wrappers.recorder import COUNTED, RunRecorder
-from swarm_forage_env.wrappers.registry import parse_wrapper
-from tests.support.branches import Branch, pickled, whole_stack
 from tests.support.fake_arena import FakeArena, small_scenario
 
 
@@ -171,18 +166,6 @@ def test_whatever_fails_within_a_tick_is_not_gone_on_with(hook, fault):
     wrapper.step_batch(actions)
 
 
-def test_a_hook_of_an_instance_is_a_hook():
-    """What the world would refuse is refused before it acts."""
-    wrapper = wrapper_at(4)(ForageEnv(small_scenario()))
-    wrapper.reset_batch(7)
-    called = []
-    wrapper.before_step = lambda: called.append(True)
-    with pytest.raises(ActionError, match="Expected finite actions"):
-        wrapper.step_batch(np.full((4, 3), np.nan, np.float32))
-    wrapper.step_batch(np.zeros((4, 3), np.float32))
-    assert called == [True]
-
-
 def test_a_seed_that_cannot_be_is_one_kind_of_error_everywhere():
     world = small_scenario()
     for env in (
@@ -206,54 +189,6 @@ def test_what_is_only_to_be_read_cannot_be_written():
     for array in (env.active, env.terminated):
         with pytest.raises(ValueError, match="read-only"):
             array[:] = True
-
-
-# Snapshots of a whole stack
-
-
-POLICY_OF = {"none": "dpo", "static": "stochm", "dynamic": "stochx"}
-RUNS = [("warehouse_small", "none"), ("warehouse_medium", "static"), ("warehouse_dual", "dynamic")]
-
-
-@pytest.mark.parametrize(("name", "caches"), RUNS)
-def test_a_stack_goes_on_from_a_snapshot_to_the_same_record(name, caches):
-    stack = whole_stack(name, "compiled", caches)
-    run = Branch(stack, load_policy(POLICY_OF[caches])).go_on(300)
-    snapshot = stack.snapshot()
-    fresh = whole_stack(name, "compiled", caches)
-    branches = [run.beside(env, env.restore_batch(snapshot)) for env in (fresh,)]
-    branches += [run.beside(env, run.obs) for env in (copy.deepcopy(stack), pickled(stack))]
-    expected = run.beside(stack, run.obs).go_on(200)
-    columns = expected.columns()
-    assert sum(columns["deaths"]) > 0
-    assert sum(columns["repairs"]) > 0
-    branches.append(run.beside(stack, stack.restore_batch(snapshot)))  # after the end of the run
-    for branch in branches:
-        assert branch.go_on(200).seen == expected.seen
-        assert branch.columns() == columns
-
-
-@pytest.mark.parametrize("words", [["sensor_noise:sigma=0.2"], []], ids=["other", "none"])
-def test_snapshots_of_other_stacks_are_refused(words):
-    world = small_scenario(physics="compiled")
-    env = build_env(world, [parse_wrapper("sensor_noise:sigma=0.1")])
-    env.reset_batch(1)
-    other = build_env(world, [parse_wrapper(word) for word in words])
-    for refusing in (other, env.unwrapped):
-        with pytest.raises(SnapshotError, match="wrappers of this one, got another"):
-            refusing.restore(env.snapshot())
-
-
-def test_observations_per_agent_are_those_that_the_wrappers_showed():
-    env = build_env(small_scenario(physics="compiled"), [parse_wrapper("sensor_noise:sigma=0.1")])
-    env.reset(seed=1)
-    obs, *_ = env.step({agent: np.ones(3, np.float32) for agent in env.agents})
-    snapshot = env.snapshot()
-    env.step({agent: np.ones(3, np.float32) for agent in env.agents})
-    restored = env.restore(snapshot)
-    assert list(restored) == list(obs)
-    for agent, row in restored.items():
-        np.testing.assert_array_equal(row, obs[agent])
 
 
 # RunRecorder: intervals as differences of counters
