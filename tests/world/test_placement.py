@@ -10,11 +10,12 @@ from scipy.stats import binomtest, chisquare
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.rng import Stream, stream_rng
-from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, CELL_OBJECT, ObjectStatus
+from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, CELL_OBJECT, Counter, ObjectStatus
 from swarm_forage_env.contract.types import IntArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.floor import Box, distributable_box
+from swarm_forage_env.scenarios.obstacles import distances_m
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, SEARCH_AND_RESCUE_OBJECTS, scenario
 from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.world.allocation import new_objects
@@ -370,6 +371,42 @@ def test_squares_without_room_are_refused(name, overrides, told):
     config = scenario(name, **overrides)
     with pytest.raises(ConfigError, match=f"Expected .*{told}"):
         static_cache_centres(config)
+
+
+# Among obstacles, and at positions of one's own
+
+
+@pytest.mark.parametrize(
+    ("placement", "caches"), [("single_source", "dynamic"), ("random", "none"), ("power_law", "none")]
+)
+def test_robots_objects_and_caches_start_clear_of_boxes(placement, caches):
+    boxes = ((24.0, 3.0, 25.0, 13.0), (10.0, 5.0, 12.0, 11.0), (17.1, 2.0, 17.53, 9.0))
+    config = scenario(
+        "warehouse_small", n_robots=60, n_objects=120, placement=placement, caches=caches, obstacles=boxes,
+        walk_probability=0.5,
+    )  # fmt: skip
+    env = ForageEnv(config)
+    env.reset_batch(0)
+    assert distances_m(boxes, env.swarm.position).min() >= config.robots.radius_m
+    assert np.count_nonzero(env.objects.status == ObjectStatus.FREE) == 120
+    for _ in range(5):
+        env.step_batch(np.zeros((60, 3), np.float32))
+        assert_conserved(env)
+    assert env.events.counters[Counter.OBJECTS_MOVED] > 100
+
+
+def test_objects_appear_at_positions_of_ones_own_and_nowhere_else():
+    places = ((20.1, 8.1), (20.1, 8.9), (21.0, 8.3), (9.05, 5.55))
+    config = scenario("warehouse_small", n_robots=2, n_objects=3, placement="positions", object_positions_m=places)
+    env, seen = ForageEnv(config), set()
+    cells = {(math.floor(x * 5), math.floor(y * 5)) for x, y in places}
+    for seed in range(12):
+        env.reset_batch(seed)
+        lying = set(map(tuple, env.objects.cell.tolist()))
+        assert len(lying) == 3
+        assert lying <= cells
+        seen |= lying
+    assert seen == cells
 
 
 # Random walk of free objects

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from swarm_forage_env.contract.codes import CELL_OBJECT, Counter, Event
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.scenarios.obstacles import distances_m
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.world.kernels.beams import proximity
@@ -98,6 +99,28 @@ def test_every_slice_equals_its_twin_along_a_run(name, caches):
 def crowding(name: str) -> dict[str, object]:
     """Enough objects that robots meet some."""
     return {"n_objects": 80} if name == "search_and_rescue" else {"n_objects": 300}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_among_boxes_beams_and_interference_are_those_of_the_slow_twin(seed):
+    block = (16.0, 8.0, 16.4, 8.6)
+    env = tidy_world(n_robots=6, obstacles=(block, (20.0, 4.0, 20.4, 12.0)))
+    rng = np.random.default_rng(seed)
+    for robot in range(6):
+        angle = rng.uniform(-math.pi, math.pi)
+        while True:
+            place = rng.uniform((15.8, 7.8), (16.6, 8.8))
+            away = distances_m((block,), place[None])[0]
+            if away > sensing.RADIUS_M and (
+                robot == 0 or np.hypot(*(env.swarm.position[:robot] - place).T).min() > 2 * sensing.RADIUS_M
+            ):
+                break
+        put(env, robot, *place, angle)
+    obs = env.arena.observe()
+    np.testing.assert_allclose(obs, sensing.observe(env), atol=2e-6)
+    assert obs[:, env.layout["proximity"]].any()
+    env.step_batch(np.zeros((6, 3), np.float32))
+    assert env.events.interfering.tolist() == [sensing.interferes(env, robot) for robot in range(6)]
 
 
 # Reading less

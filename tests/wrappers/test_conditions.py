@@ -212,25 +212,6 @@ def test_the_waveform_itself_is_recorded_where_it_is_negative():
     assert recorder.columns()["throttle"].tolist() == [0.5, -0.5, 0.5]
 
 
-# Configuration
-
-
-def test_levels_of_the_study():
-    square, sine = square_throttles(), sine_throttles()
-    assert len(square) == 7
-    assert len(sine) == 8
-    assert all(config.carriers for config in square)
-    assert not any(config.carriers for config in sine)
-    assert [config.waveform.amplitude for config in square] == [0.10, 0.15, 0.20, 0.25, 0.30, 0.35, 0.40]
-    assert [config.waveform.amplitude for config in sine] == [0.10, 0.15, 0.20, 0.25, 0.30, 0.35, 0.40, 0.45]
-    for configs, kind, period_s, highest in ((square, "square", 5_000.0, 0.80), (sine, "sine", 10_000.0, 0.90)):
-        assert configs[0].waveform == Waveform(kind="constant", amplitude=0.10)
-        for config in configs[1:]:
-            assert (config.waveform.kind, config.waveform.period_s) == (kind, period_s)
-            assert config.waveform.offset == config.waveform.amplitude
-        assert configs[-1].waveform.ends[1] == pytest.approx(highest)
-
-
 # Cost of handling: how long pick-ups and drops take
 
 

@@ -14,7 +14,7 @@ from swarm_forage_env.layer import at_rest
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.gymnasium import JointForageEnv
-from swarm_forage_env.wrappers.population import PopulationConfig, PopulationDynamics, death_levels, malfunction_levels
+from swarm_forage_env.wrappers.population import PopulationConfig, PopulationDynamics, malfunction_levels
 from swarm_forage_env.wrappers.population_process import (
     EventClock,
     EventClocks,
@@ -376,15 +376,7 @@ def test_a_run_has_the_events_of_its_simulation_and_records_them():
 # Configuration
 
 
-def test_levels_of_the_study_are_those_of_the_paper():
-    for n_robots, repair in ((50, 0.001022222), (200, 0.001005556)):
-        levels = malfunction_levels(n_robots)
-        assert [level.malfunction_per_tick for level in levels] == pytest.approx([0.001 * (1 + x) for x in range(8)])
-        assert [level.repair_per_tick for level in levels] == pytest.approx([repair * (1 + x) for x in range(8)])
-        assert {(level.death_per_tick, level.birth_per_tick) for level in levels} == {(0.0, 0.0)}
-    assert [level.death_per_tick for level in death_levels()] == [
-        0.0001, 0.0003, 0.0005, 0.0007, 0.0009, 0.0011, 0.0013, 0.0015,
-    ]  # fmt: skip
+def test_levels_of_other_sizes_are_refused():
     with pytest.raises(ConfigError, match="Expected 50 or 200 robots"):
         malfunction_levels(100)
 
