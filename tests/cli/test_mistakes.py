@@ -102,21 +102,19 @@ def test_where_a_command_reads_and_writes_may_be_gone(tmp_path, words, out, err)
     assert (ended.stdout.count("\n"), ended.stderr.count("\n")) == (bool(out), bool(err))
 
 
-TINY_RUN = ("run", "random", "--robots", "3", "--horizon", "4", "--set", "interval_s=2", "--jobs", "1")
 needs_training = pytest.mark.skipif(
     find_spec("stable_baselines3") is None or find_spec("torch") is None, reason="needs the train extra"
 )
-FILMED = ("random", "--robots", "3")
 
 
 @pytest.mark.parametrize(
     "words",
     [
-        TINY_RUN,
+        ("run", "random", "--robots", "3", "--horizon", "4", "--set", "interval_s=2", "--jobs", "1"),
         ("score", "random", "--budget", "quick", "--jobs", "1"),
         ("score", "random,crw", "--budget", "quick", "--jobs", "1"),
         ("study", "run", "S1a", "--budget", "smoke", "--jobs", "1"),
-        ("record", *FILMED),
+        ("record", "random", "--robots", "3"),
         ("replay", "random", "--robots", "3"),
         pytest.param(("train", "--robots", "3", "--steps", "1", "--set", "n_arenas=1"), marks=needs_training),
     ],

@@ -88,14 +88,6 @@ def test_ctrl_c_says_how_to_go_on(command, monkeypatch):
         assert (folder / "training.png").read_bytes().startswith(b"\x89PNG")
 
 
-def planned(monkeypatch, command, *words):
-    """The plan that words of the command describe; nothing is trained."""
-    plans = []
-    monkeypatch.setattr(training_report, "run_training", lambda plan, folder, **_: plans.append(plan))
-    assert command("train", *words)[0] == 0
-    return plans[0]
-
-
 def test_words_are_arguments_of_the_recipe(command, monkeypatch):
     Path("world.toml").write_text("[set]\nn_robots = 7\nnest_progress = 0.0\n[wrappers.sensor_noise]\nsigma = 0.01\n")
     words = "--scenario world.toml --horizon 400 --wrapper actuator_noise:sigma=0.1 --algo sac --steps 300 --seed 4"
@@ -105,7 +97,10 @@ def test_words_are_arguments_of_the_recipe(command, monkeypatch):
         "activation=tanh options.batch_size=8 options.gamma=0.9"
     )
     each = (word for setting in settings.split() for word in ("--set", setting))
-    assert planned(monkeypatch, command, *words.split(), *each) == recipe(
+    plans = []
+    monkeypatch.setattr(training_report, "run_training", lambda plan, folder, **_: plans.append(plan))
+    assert command("train", *words.split(), *each)[0] == 0
+    assert plans[0] == recipe(
         "warehouse_small",
         algorithm="sac",
         steps=300,

@@ -47,11 +47,6 @@ def test_where_runs_have_no_scatter_only_the_mean_is_known(runs, mean):
     assert np.isnan([found.std, found.lower, found.upper]).all()
 
 
-def test_the_paired_test_is_that_of_scipy():
-    values = np.array([1.0, 2.5, -0.5, 3.0, 2.0])
-    assert paired_p(values) == pytest.approx(stats.ttest_1samp(values, 0.0).pvalue, rel=1e-12)
-
-
 @pytest.mark.parametrize(
     ("values", "expected"),
     [([0.0, 0.0, 0.0], 1.0), ([2.0, 2.0, 2.0], 0.25), ([1.0], NAN), ([], NAN), ([math.inf, 1.0], NAN)],

@@ -177,11 +177,9 @@ EXAMPLES = {
     "sawtooth, phase in cycles": (lambda: wave("sawtooth", 0.0, 0.0, 0.5, phase=0.25), 0.25),
     "dtw": (lambda: [metrics.dtw(*pair) for pair in DTW], [2.0, 2.0, 2.0, 0.0, 10.0]),
     "aligned distance": (lambda: metrics.aligned_l1(*DTW[3]), 1.0),
-    "improvement": (lambda: metrics.probability_of_improvement([3, 4, 5], [1, 2, 4]).value, 7.5 / 9),
     "improvement where less is better": (
         lambda: metrics.probability_of_improvement([3, 4, 5], [1, 2, 4], higher_is_better=False).value, 1.5 / 9
     ),
-    "noise floor of two runs": (lambda: metrics.noise_floor([[0.0, 0.0], [1.0, 1.0]]), [2.0]),
     "ideal conditions": (lambda: metrics.environment_distance(np.full(50, 0.1), 0.1), 0.0),
 }  # fmt: skip
 

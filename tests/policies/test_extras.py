@@ -103,14 +103,11 @@ def test_a_policy_that_was_trained_with_them_needs_the_function_again():
     world = scenario("warehouse_small", **FIELDS, horizon_s=20.0, interval_s=20.0)
     interface = InterfaceConfig(observation="compact", actions="discrete", extra_columns=2)
     spec = SwarmSpec.of(world)
-    layout, choices = LearnerInterface(interface, spec).layout, LearnerInterface(interface, spec).action_space
-    weights = np.zeros((layout.size, choices.n), np.float32)  # type: ignore[union-attr] - discrete
+    layout, (columns, n_actions) = LearnerInterface(interface, spec).layout, LearnerInterface(interface, spec).widths
+    weights = np.zeros((columns, n_actions), np.float32)
     weights[layout["extra"].start, 1] = 1.0  # who looks north drives; all others stand
-    network = Network(
-        (weights,),
-        (np.zeros(choices.n, np.float32),),
-        NetworkAbout(interface=interface, activation="tanh", samples=False),
-    )  # type: ignore[union-attr]
+    about = NetworkAbout(interface=interface, activation="tanh", samples=False)
+    network = Network((weights,), (np.zeros(n_actions, np.float32),), about)
     with pytest.raises(ExtraFunctionError, match=r"extra_observation of 2 columns that the policy was trained with"):
         NetworkPolicy(network).reset(spec, np.random.default_rng())
 

@@ -47,7 +47,6 @@ def test_what_is_no_file(word):
 )
 def test_what_the_word_for_a_file_says(word, path, label, interface):
     found = policy_file(word)
-    assert found is not None
     assert (file_of(word), policy_label(word), found.interface()) == (path, label, interface)
     with pytest.raises(ConfigError, match=r"interface of a\.zip as key=value, got 'x'"):
         policy_file("a.zip:decision_ticks=2,x").interface()

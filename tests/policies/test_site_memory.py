@@ -10,7 +10,6 @@ from swarm_forage_env import RunSpec, load_policy, run_policy
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
-from swarm_forage_env.policies.kernels.learner import SiteMemory
 from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.learner_arena import LearnerArena
@@ -27,12 +26,6 @@ PLACE = cell_centre((60, 40))
 
 def remembering(env: ForageEnv, **choices) -> LearnerInterface:
     return LearnerInterface(InterfaceConfig(site_memory=True, **choices), env.swarm_spec)
-
-
-def remembered(interface: LearnerInterface) -> SiteMemory:
-    memory = interface.memory()
-    assert memory is not None
-    return memory
 
 
 def seen(interface: LearnerInterface, env: ForageEnv, name: str) -> np.ndarray:
@@ -69,7 +62,7 @@ def test_sites_match_their_twin_along_a_run(hearing_m):
             columns_used += np.abs(rows).sum(axis=0)
     assert columns_used.all(), "every column is put to the test"
     interface.forget()
-    assert not remembered(interface).is_known.any()
+    assert not interface.memory().is_known.any()
 
 
 def test_a_robot_remembers_where_it_picked_up_until_it_comes_back_and_finds_nothing():
@@ -96,7 +89,7 @@ def test_robots_in_earshot_hear_where_an_object_was():
 
     def known(decision: int) -> list[bool]:
         interface.observe(env.arena.observe(), decision=decision)
-        return remembered(interface).is_known[:, 0].tolist()
+        return interface.memory().is_known[:, 0].tolist()
 
     for robot, metres in enumerate((0.0, 4.0, 8.5)):
         put(env, robot, PLACE[0] - metres, PLACE[1])
@@ -104,7 +97,7 @@ def test_robots_in_earshot_hear_where_an_object_was():
     load(env, 0, 0)
     assert known(2) == [True, True, False], "4.5 m from one who does not know it yet"
     assert known(3) == [True, True, True], "who tells it now"
-    np.testing.assert_allclose(remembered(interface).place[2], remembered(interface).place[0])
+    np.testing.assert_allclose(interface.memory().place[2], interface.memory().place[0])
     env.swarm.carried_object[0] = -1
     put(env, 0, *PLACE)
     assert known(4) == [False, True, True]
@@ -120,10 +113,10 @@ def test_a_new_run_begins_without_memory_and_a_copy_has_it():
     arena.reset(0)
     for part, value in zip(arena.interface.translation.sites, (3.0, True, True, 2, 3.0), strict=True):
         part[...] = value
-    other, shown = copy.deepcopy(arena), remembered(arena.interface)
+    other, shown = copy.deepcopy(arena), arena.interface.memory()
     arena.reset()
     assert not arena.observe()[:, sites].any()
-    for part, kept in zip(remembered(other.interface), shown, strict=True):
+    for part, kept in zip(other.interface.memory(), shown, strict=True):
         np.testing.assert_array_equal(part, kept)
 
 

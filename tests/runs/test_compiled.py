@@ -20,8 +20,7 @@ from swarm_forage_env.runs.run import LiveRun, build_env, build_stack
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
-from swarm_forage_env.wrappers.noise import SensorNoise, SensorNoiseConfig
-from swarm_forage_env.wrappers.population import PopulationDynamics
+from swarm_forage_env.wrappers.noise import SensorNoiseConfig
 from swarm_forage_env.wrappers.recorder import RunRecorder
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.throttle import Throttle, ThrottleConfig
@@ -86,7 +85,6 @@ def both(policy: str, wrappers: Any = (), **fields: Any) -> list[LiveRun]:
 def outcome(run: LiveRun) -> dict[str, np.ndarray]:
     """Everything that a run shows and records."""
     recorder, swarm = run._stack, run.forage_env.swarm
-    assert isinstance(recorder, RunRecorder)
     policy = copy.copy(run._policy)
     vars(policy).pop("act", None)
     shown = {"obs": recorder.last_obs.copy(), "actions": policy.compiled().actions.copy()}
@@ -206,9 +204,6 @@ def test_robots_killed_and_levels_changed_between_two_ticks_count_from_the_next_
     for run in runs:
         run.advance(to_tick=100)
         _, noise, population, throttle = run._stack.stack
-        assert isinstance(noise, SensorNoise)
-        assert isinstance(population, PopulationDynamics)
-        assert isinstance(throttle, Throttle)
         assert population.kill(0)
         noise.reconfigure(SensorNoiseConfig(sigma=0.3, groups=("proximity", "position")))
         throttle.reconfigure(ThrottleConfig(waveform=Waveform(kind="constant", amplitude=0.9)))
@@ -230,7 +225,6 @@ def test_a_run_goes_on_from_a_snapshot_and_from_a_copy(name, wrappers):
     run.advance(to_tick=222)
     assert run._policy.compiled() is first
     recorder, policy = run._stack, run._policy
-    assert isinstance(recorder, RunRecorder)
     stored, whole = pickle.dumps((recorder.snapshot(), policy)), pickle.loads(pickle.dumps(run))  # noqa: S301 - our own
     twin, twin_policy = copy.deepcopy((recorder, policy))
     run.advance()
@@ -239,7 +233,6 @@ def test_a_run_goes_on_from_a_snapshot_and_from_a_copy(name, wrappers):
     whole.advance()
     assert_same(whole, run)
     other = both(name, wrappers)[0]._stack
-    assert isinstance(other, RunRecorder)
     other.restore_batch(snapshot)
     for stack, driver in ((other, policy), (twin, twin_policy)):
         stack.run(driver.compiled(), 500)

@@ -335,17 +335,15 @@ def test_times_are_told_in_the_unit_that_people_use(seconds, told):
     assert duration(seconds) == told
 
 
-TINY = scenario("warehouse_small", n_robots=3, n_objects=20, horizon_s=4.0, interval_s=2.0)
-SPEC = plan_run(TINY, "random")
-PLAN = Plan.product("random", TINY, seeds=(0,))
+PLAN = Plan.product("random", WORLD, seeds=(0,))
 NOISE = "sensor_noise:sigma=0.1"
 
 
 def test_one_or_several_names_or_objects_are_taken_by_all_alike():
-    world = World(TINY, (parse_wrapper(NOISE),))
-    assert plan_run(TINY, "random", wrappers=[NOISE]).world == World(TINY, [NOISE]) == world
-    assert [type(layer).__name__ for layer in build_stack(TINY, [NOISE]).stack] == ["RunRecorder", "SensorNoise"]
-    assert PLAN.specs == Plan.product(policy_specs(["random"]), [World(TINY)], seeds=[0]).specs == (SPEC,)
+    world = World(WORLD, (parse_wrapper(NOISE),))
+    assert plan_run(WORLD, "random", wrappers=[NOISE]).world == World(WORLD, [NOISE]) == world
+    assert [type(layer).__name__ for layer in build_stack(WORLD, [NOISE]).stack] == ["RunRecorder", "SensorNoise"]
+    assert PLAN.specs == Plan.product(policy_specs(["random"]), [World(WORLD)], seeds=[0]).specs == (SPECS[0],)
     assert load_study("S1a", seeds=[0, 1], rules="program").run == load_study("S1a", seeds=2, rules=["program"]).run
 
 
@@ -356,17 +354,17 @@ class Somewhere(RandomPolicy):
 @pytest.mark.parametrize(
     ("call", "told"),
     [
-        (lambda: plan_run(TINY, "crw", wrappers=NOISE), "wrappers as a list of configurations or words"),
-        (lambda: plan_run(TINY, "crw", parameters=["x"]), "parameters to be a table of values by name"),
+        (lambda: plan_run(WORLD, "crw", wrappers=NOISE), "wrappers as a list of configurations or words"),
+        (lambda: plan_run(WORLD, "crw", parameters=["x"]), "parameters to be a table of values by name"),
         (lambda: run_one("crw"), r"spec to be a RunSpec, got 'crw'; plan_run\(world, policy\) makes one"),
-        (lambda: run_policy("crw", SPEC), "a policy object with reset and act, got 'crw'; load_policy makes one"),
-        (lambda: run_all(SPEC), r"specs to be an Iterable, got RunSpec.* Plan.product\(...\).specs are many"),
-        (lambda: run_all([SPEC], executor=4), "executor to be an Executor, got 4; jobs= sets the number"),
+        (lambda: run_policy("crw", SPECS[0]), "a policy object with reset and act, got 'crw'; load_policy makes one"),
+        (lambda: run_all(SPECS[0]), r"specs to be an Iterable, got RunSpec.* Plan.product\(...\).specs are many"),
+        (lambda: run_all([SPECS[0]], executor=4), "executor to be an Executor, got 4; jobs= sets the number"),
         (lambda: run_plan("crw"), r"plan to be a Plan, got 'crw'; Plan.product\(policies, worlds, seeds\)"),
-        (lambda: Plan.product("crw", TINY, seeds=3), r"seeds to be an Iterable, got 3; range\(n\)"),
+        (lambda: Plan.product("crw", WORLD, seeds=3), r"seeds to be an Iterable, got 3; range\(n\)"),
         (lambda: run_study("S1a", "out"), r"spec to be a StudySpec, got 'S1a'; load_study\(file\) reads one"),
         (lambda: check_policy("random", 7), "scenario to be a ScenarioConfig"),
-        (lambda: check_determinism("random", TINY, seeds=2), "seeds to be a Sequence, got 2"),
+        (lambda: check_determinism("random", WORLD, seeds=2), "seeds to be a Sequence, got 2"),
         (lambda: with_overrides("classroom", n_robots=3), r"config to be a ScenarioConfig.* scenario\(name\)"),
         (lambda: scenario("hall.toml"), r"the name of a scenario, got the file hall.toml; read_world\('hall.toml'\)"),
         (lambda: parse_wrapper(parse_wrapper(NOISE)), "a wrapper to be a text"),

@@ -116,19 +116,12 @@ def test_a_planned_run_has_the_world_its_policy_is_made_for():
         assert plan_run(scenario("warehouse_small"), policy, caches="dynamic").scenario.caches == "dynamic"
 
 
-def test_a_run_is_planned_in_a_world_a_scenario_or_a_preset_by_name():
-    world = scenario("warehouse_small")
-    assert plan_run("warehouse_small", "crw") == plan_run(world, "crw") == plan_run(World(world), "crw") == BASE
-
-
 def test_wrappers_are_added_to_those_of_the_world():
     inner, outer = ActuatorNoiseConfig(sigma=0.1), SensorNoiseConfig(sigma=0.1)
     world = World(scenario("warehouse_small"), (inner,), criterion="noise", value=0.1)
     spec = plan_run(world, "stochm", wrappers=[outer])
     assert spec.wrappers == (outer, inner)
     assert (spec.scenario.caches, spec.world.criterion, spec.world.value) == ("static", "noise", 0.1)
-    with pytest.raises(ConfigError, match="each wrapper at most once"):
-        plan_run(world, "crw", wrappers=[inner])
 
 
 class ForStatic(RandomPolicy):

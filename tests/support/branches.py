@@ -58,7 +58,6 @@ class Branch:
 
     def columns(self) -> dict[str, list[Any]]:
         """Columns of the record of the finished run."""
-        assert isinstance(self.env, RunRecorder)
         columns = self.env.columns()
         return {name: column.tolist() for name, column in columns.items()}
 

@@ -9,7 +9,6 @@ from pathlib import Path
 
 from metrics.benchmark import load_protocol
 from swarm_forage_env.policies.interface import InterfaceConfig
-from swarm_forage_env.policies.pretrained import plan_file
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.runs.store import RunFailure, failure_file, store
@@ -25,16 +24,14 @@ from swarm_forage_env.training.evaluation import (
     WorldEvaluation,
     write_evaluations,
 )
-from swarm_forage_env.training.plan import TrainingPlan, read_plan
+from swarm_forage_env.training.plan import TrainingPlan
+from swarm_forage_env.training.recipe import recipe
 from tests.support.entries import TINY, made_up_entry
 from tests.support.networks import network_of
 from tests.support.tiny_study import tiny_study
 
 SPEC = plan_run(scenario("warehouse_small", n_robots=2, n_objects=10, horizon_s=4.0, interval_s=2.0), "dpo", seed=1)
-
-
-def _record(file: Path) -> None:
-    run_one(SPEC).write(file)
+INTERFACE = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True)
 
 
 def _failure(file: Path) -> None:
@@ -47,29 +44,6 @@ def _packed(file: Path) -> None:
     folder = file.parent / "of_study"
     run_study(tiny_study(Axis(name="n_robots", values=(2,))), folder, jobs=1)
     pack_study(folder, file)
-
-
-def _dataset(folder: Path) -> None:
-    record_dataset(SPEC, (1,), folder)
-
-
-def _entry(file: Path) -> None:
-    made_up_entry(load_protocol(TINY), "mine", lambda k: 10.0 * k).write(file)
-
-
-def _network(file: Path) -> None:
-    interface = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True)
-    network_of(interface).save(file)
-
-
-def _plan(file: Path) -> None:
-    shipped = plan_file("ppo_warehouse_small")
-    assert shipped is not None
-    read_plan(shipped).write(file)
-
-
-def _evaluations(file: Path) -> None:
-    write_evaluations(file, [evaluated(384, 1.5)])
 
 
 def evaluated(steps: int, reached: float, interference: float = 0.25, *, world: str = "small") -> Evaluation:
@@ -93,15 +67,15 @@ def trained(folder: Path, plan: TrainingPlan, *evaluations: Evaluation) -> None:
     write_evaluations(folder / EVALUATIONS_FILE, evaluations)
 
 
-MAKERS: dict[str, Callable[[Path], None]] = {
-    "record.parquet": _record,
+MAKERS: dict[str, Callable[[Path], object]] = {
+    "record.parquet": lambda file: run_one(SPEC).write(file),
     "packed.parquet": _packed,
     "failure.json": _failure,
-    "dataset": _dataset,
-    "entry.json": _entry,
-    "network.npz": _network,
-    "plan.json": _plan,
-    "evaluations.csv": _evaluations,
+    "dataset": lambda folder: record_dataset(SPEC, (1,), folder),
+    "entry.json": lambda file: made_up_entry(load_protocol(TINY), "mine", lambda k: 10.0 * k).write(file),
+    "network.npz": lambda file: network_of(INTERFACE).save(file),
+    "plan.json": lambda file: recipe().write(file),
+    "evaluations.csv": lambda file: write_evaluations(file, [evaluated(384, 1.5)]),
 }
 """Name of a file, or of the folder of a data set -> what writes it. The entry is one of `entries.TINY`."""
 

@@ -89,10 +89,8 @@ DEATHS = ("population:death_per_tick=0.05", "sensor_noise:sigma=0.05")
 
 
 def parallel(**options) -> ParallelLearnerEnv:
-    made = parallel_env("warehouse_small", n_robots=6, n_objects=20, physics="compiled", wrappers=DEATHS,
+    return parallel_env("warehouse_small", n_robots=6, n_objects=20, physics="compiled", wrappers=DEATHS,
                         **{"interface": NUMBERED, **options})  # fmt: skip
-    assert isinstance(made, ParallelLearnerEnv)
-    return made
 
 
 def joint(**options) -> JointForageEnv:
