@@ -22,10 +22,10 @@ Image = pytest.importorskip("PIL.Image")
 ImageSequence = pytest.importorskip("PIL.ImageSequence")
 
 
-def pictures(n_frames: int, height: int = 60, width: int = 81):
+def pictures():
     """A blue square that crosses the floor."""
-    for frame in range(n_frames):
-        picture = np.full((height, width, 3), Palette.floor, np.uint8)
+    for frame in range(12):
+        picture = np.full((60, 81, 3), Palette.floor, np.uint8)
         picture[20:30, 2 * frame : 2 * frame + 10] = Palette.empty
         yield picture
 
@@ -36,17 +36,17 @@ def frames_of(path) -> list[np.ndarray]:
 
 
 def test_a_gif_shows_every_picture_in_true_colours_for_ever(tmp_path):
-    write_film(pictures(12), tmp_path / "film.gif", fps=20)
+    write_film(pictures(), tmp_path / "film.gif", fps=20)
     with Image.open(tmp_path / "film.gif") as film:
         assert (film.info["duration"], film.info["loop"]) == (50, 0)
-    for shown, drawn in zip(frames_of(tmp_path / "film.gif"), pictures(12), strict=True):
+    for shown, drawn in zip(frames_of(tmp_path / "film.gif"), pictures(), strict=True):
         assert np.abs(shown.astype(int) - drawn).max() <= 4
 
 
 @pytest.mark.slow
 def test_an_mp4_has_every_picture_even_of_odd_size(tmp_path):
     imageio_ffmpeg, imageio = pytest.importorskip("imageio_ffmpeg"), pytest.importorskip("imageio.v2")
-    write_film(pictures(12), tmp_path / "film.MP4", fps=10)
+    write_film(pictures(), tmp_path / "film.MP4", fps=10)
     n_frames, duration_s = imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "film.MP4"))
     assert (n_frames, duration_s) == (12, pytest.approx(1.2, abs=0.05))
     with imageio.get_reader(tmp_path / "film.MP4") as film:

@@ -37,10 +37,10 @@ def patient(monkeypatch):
     monkeypatch.setattr("swarm_forage_env.inspect.play.session.LONGEST_S", 1000.0)
 
 
-def session_of(policy="crw", wrappers=(), *, seed=3, world=SMALL):
+def session_of(policy="crw", wrappers=()):
     """A session, and the reader's time, which a test sets forward."""
     clock = SimpleNamespace(now_s=0.0)
-    setting = Setting(world=World(world, wrappers), policy=policy, seed=seed)
+    setting = Setting(world=World(SMALL, wrappers), policy=policy, seed=3)
     return PlaySession(setting, clock=lambda: clock.now_s), clock
 
 

@@ -50,8 +50,8 @@ class World:
         self.events = StepEvents.empty(n_robots)
         self.view = arena_view(self.config, 900)
 
-    def draw(self, tick: int = 100, **options) -> np.ndarray:
-        return render_frame(self.config, self.swarm, self.objects, self.caches, self.events, tick=tick, **options)
+    def draw(self, **options) -> np.ndarray:
+        return render_frame(self.config, self.swarm, self.objects, self.caches, self.events, tick=100, **options)
 
     def lay(self, row: int, cell: tuple[int, int]) -> None:
         self.objects.status[row] = ObjectStatus.FREE

@@ -69,9 +69,9 @@ def random_stack(chance: np.random.Generator) -> list[WrapperConfig]:
     return [parse_wrapper(str(chance.choice(pool))) for pool in POOLS if chance.random() < 0.6]
 
 
-def live(policy: Any, world: ScenarioConfig, wrappers: Any = (), *, by_ticks: bool = False, seed: int = 4) -> LiveRun:
+def live(policy: Any, world: ScenarioConfig, wrappers: Any = (), *, by_ticks: bool = False) -> LiveRun:
     stack = build_stack(world, wrappers, reads=getattr(policy, "reads", None))
-    return LiveRun(stack, tick_by_tick(policy) if by_ticks else policy, seed)
+    return LiveRun(stack, tick_by_tick(policy) if by_ticks else policy, seed=4)
 
 
 def both(policy: str, wrappers: Any = (), **fields: Any) -> list[LiveRun]:

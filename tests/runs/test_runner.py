@@ -249,8 +249,8 @@ def test_stored_runs_of_other_versions_are_pointed_out(tmp_path, monkeypatch, ca
     assert "2 of 2 runs stored already, 2 by other code or versions" in capsys.readouterr().err
 
 
-def plan_of(*policies, seeds=(0, 1)):
-    return Plan.product(policies, [World(WORLD)], seeds=seeds)
+def plan_of(*policies):
+    return Plan.product(policies, [World(WORLD)], seeds=(0, 1))
 
 
 def test_a_plan_runs_what_only_this_process_can_build(tmp_path):

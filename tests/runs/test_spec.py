@@ -23,9 +23,9 @@ from tests.support.networks import network_of
 BASE = RunSpec(world=World(scenario("warehouse_small")), policy="crw")
 
 
-def base_in(name="warehouse_small", **overrides):
+def base_in(**overrides):
     """The same run in another scenario."""
-    return replace(BASE, world=World(scenario(name, **overrides)))
+    return replace(BASE, world=World(scenario("warehouse_small", **overrides)))
 
 
 def base_with(**fields):

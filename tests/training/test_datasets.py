@@ -22,9 +22,9 @@ WORLD = scenario("warehouse_small", n_robots=4, n_objects=400, horizon_s=20.0, i
 DEADLY = (PopulationConfig(death_per_tick=0.03),)
 
 
-def recorded(folder, policy="crw", seeds=(3,), wrappers=(), world=WORLD, **choices):
+def recorded(folder, policy="crw", seeds=(3,), wrappers=(), **choices):
     """The data set of a policy, recorded into a folder."""
-    record_dataset(plan_run(world, policy, wrappers=wrappers), seeds, folder, **choices)
+    record_dataset(plan_run(WORLD, policy, wrappers=wrappers), seeds, folder, **choices)
     return Dataset(folder)
 
 

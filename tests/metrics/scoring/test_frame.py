@@ -185,7 +185,8 @@ def test_undefined_runs_do_not_count_and_infinite_ones_forbid_the_test():
     assert found["better"] == ""
 
 
-def summary(*names, runs=((1.0, 2.0), (2.0, 2.0))):
+def summary(*names):
+    runs = (1.0, 2.0), (2.0, 2.0)
     common = {"criterion": "population_size", "criterion_value": 0.0, "interference_fraction": 0.1}
     parts = [
         rows(n, made, **{**common, "controller": name, **how})
