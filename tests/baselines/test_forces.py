@@ -76,14 +76,6 @@ def test_turns_of_a_free_walk_have_the_expected_spread_and_bound(turns_deg):
     assert settled.mean() == pytest.approx(0.0, abs=0.02)
 
 
-@pytest.mark.parametrize(("seconds", "cosine"), [(5, 0.93), (40, 0.56)])
-def test_heading_is_forgotten_at_the_expected_rate(turns_deg, seconds, cosine):
-    ticks = round(seconds / 0.2)
-    headings = np.radians(np.cumsum(turns_deg[20:], axis=0))
-    change = headings[ticks:] - headings[:-ticks]
-    assert np.cos(change).mean() == pytest.approx(cosine, abs=0.02)
-
-
 @pytest.mark.parametrize(
     ("changes", "has_series"),
     [

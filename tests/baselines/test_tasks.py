@@ -86,6 +86,15 @@ def test_utility_of_a_cache():
     assert cache_utility(7.2, 8.0, 1, 7.2, 8.0, 0.5, robot.constants) > 1e5
 
 
+def test_robots_go_to_an_object_however_poor(robot):
+    robot.start(Task.GENERALIST)
+    robot.finish_soon()
+    robot.know_object(3, (17, 41))  # in the nest, 25 m away: utility 0.03
+    robot.seen.pose(28.0, 8.0)
+    robot.act()
+    assert robot.goal == pytest.approx((3.5, 8.3))
+
+
 def test_creation_needs_an_object_within_eighty_centimetres():
     robot = TaskRobot()
     robot.know_object(3, (50, 50))  # centre (10.1, 10.1)

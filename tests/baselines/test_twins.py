@@ -67,7 +67,8 @@ class Fuzz:
 @pytest.mark.parametrize("quirks", [Quirks(), AUTHORS_PROGRAM], ids=["as described", "authors' program"])
 @pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy])
 def test_compiled_controller_acts_like_the_slow_one(policy_class, quirks):
-    task = make_spec(N_ROBOTS, quirks=quirks)
+    nests = ((1.6, 1.6, 4.8, 14.4), (11.0, 9.0, 13.0, 11.0))  # now the one and now the other is nearer
+    task = make_spec(N_ROBOTS, quirks=quirks, nest_boxes_m=nests)
     has_memory = policy_class is DPOPolicy
     fuzz = Fuzz(task, seed=1)
     policy = policy_class()
