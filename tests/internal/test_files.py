@@ -83,12 +83,6 @@ def test_streams_and_seeds_differ_and_come_again():
     assert firsts == {stream_rng(seed, stream).random() for seed in range(50) for stream in Stream}
 
 
-def test_streams_of_one_seed_are_uncorrelated():
-    numbers = np.array([stream_rng(3, stream).random(20_000) for stream in Stream])
-    correlation = np.corrcoef(numbers) - np.eye(len(Stream))
-    assert np.abs(correlation).max() < 5 / np.sqrt(20_000)
-
-
 @pytest.mark.parametrize("shape", [(1,), (7,), (9000,), (0,), (3, 4), (700, 4)])
 def test_draws_by_tick_are_those_of_one_call_per_tick(shape):
     draws, rng = TickDraws(np.random.default_rng(5), *shape), np.random.default_rng(5)
