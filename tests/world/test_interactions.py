@@ -118,7 +118,7 @@ def test_pick_ups_and_drops_of_several_ticks():
         env.set_handling_ticks(pickup=1.5, drop=1)
 
 
-@pytest.mark.parametrize(("rows", "tick"), [((0, 3), 0), ((1, 2), 3), ((3, 1), 5)])
+@pytest.mark.parametrize(("rows", "tick"), [((0, 3), 3), ((1, 2), 1), ((3, 1), 5)])
 def test_the_turn_goes_round(rows, tick):
     env = tidy_world(n_robots=5)
     lay(env, 0, OPEN_CELL)
