@@ -1,16 +1,21 @@
-"""Every slice of the observation against a slow twin, the sensor models by numbers, and interference, by one rule."""
+"""Every slice of the observation against a slow twin; interference, by one rule; neighbours and messages."""
 
 import collections
 import itertools
 import math
+from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from swarm_forage_env import ConfigError, parallel_env
 from swarm_forage_env.contract.codes import CELL_OBJECT, Counter, Event
+from swarm_forage_env.contract.policy import ActionError, SwarmSpec
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.scenarios.obstacles import distances_m
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import Quirks
@@ -155,7 +160,7 @@ def test_reads_may_only_skip_slices_that_nobody_reads(reads):
 # Bits of cells with robots, by which large swarms leave out cells where nobody is
 
 
-N_ROBOTS, SIDE_M, RADIUS_M, REACH_M = 1500, 40.0, 0.085, 0.1
+N_MANY, SIDE_M, RADIUS_M, REACH_M = 1500, 40.0, 0.085, 0.1
 CELL_M = 2 * RADIUS_M + REACH_M
 
 
@@ -163,21 +168,21 @@ CELL_M = 2 * RADIUS_M + REACH_M
 def many_robots():
     """Robots, some in pairs, in lines along the ends of words and in the corners; some are away."""
     rng = np.random.default_rng(5)
-    position = rng.uniform(0.1, SIDE_M - 0.1, (N_ROBOTS, 2))
+    position = rng.uniform(0.1, SIDE_M - 0.1, (N_MANY, 2))
     position[500:1000] = np.clip(position[:500] + rng.uniform(-0.2, 0.2, (500, 2)), 0.1, SIDE_M - 0.1)
     position[1000:1100, 0] = 32 * CELL_M * rng.integers(1, 4, 100) + rng.uniform(-0.3, 0.3, 100)
-    angle = rng.uniform(-np.pi, np.pi, N_ROBOTS)
-    return position, np.column_stack((np.cos(angle), np.sin(angle))), rng.random(N_ROBOTS) < 0.9
+    angle = rng.uniform(-np.pi, np.pi, N_MANY)
+    return position, np.column_stack((np.cos(angle), np.sin(angle))), rng.random(N_MANY) < 0.9
 
 
 def seen_with(many_robots, n_bins, n_words):
     """Readings and who is near, as it is with so many bins and words."""
     position, facing, present = many_robots
-    first_in_bin, next_in_bin = np.full(n_bins, -1, np.int32), np.full(N_ROBOTS, -1, np.int32)
+    first_in_bin, next_in_bin = np.full(n_bins, -1, np.int32), np.full(N_MANY, -1, np.int32)
     occupied = np.full(n_words, 2**32 - 1, np.uint32)
     bin_robots(position, present, CELL_M, first_in_bin, next_in_bin)
     mark_cells(position, present, CELL_M, occupied)
-    obs, near = np.zeros((N_ROBOTS, 24), np.float32), np.zeros(N_ROBOTS, np.bool_)
+    obs, near = np.zeros((N_MANY, 24), np.float32), np.zeros(N_MANY, np.bool_)
     bins, room = (CELL_M, first_in_bin, next_in_bin), np.array([0.0, 0.0, SIDE_M, SIDE_M])
     walls = room, np.zeros((0, 4))
     proximity(position, facing, present, bins, occupied, *walls, RADIUS_M, REACH_M, obs, 0, near, False)
@@ -195,7 +200,7 @@ def test_with_them_robots_see_what_they_see_without(many_robots, n_bins, n_words
 def test_who_is_alone_is_mostly_known_to_be(many_robots):
     position, _, _ = many_robots
     occupied = np.zeros(4096, np.uint32)
-    alone = np.ones(N_ROBOTS, np.bool_)
+    alone = np.ones(N_MANY, np.bool_)
     alone[100:] = False
     mark_cells(position, alone, CELL_M, occupied)
     cells = (position[:100] / CELL_M).astype(int)
@@ -263,3 +268,158 @@ def test_flags_and_sums_equal_those_of_the_slow_rule_on_slow_readings():
     assert counted[Counter.INTERFERING_NEAR_CACHES] < counted[Counter.INTERFERING]
     assert env.events.interference_sum[0] == pytest.approx(share)
     assert [int(env.events.counters[c]) for c in (Counter.ACTIVE, Counter.PRESENT)] == [20 * 50, 20 * 55]
+
+
+# Neighbours and messages: what robots perceive of each other
+
+
+N_FEW = 12
+SMALL: dict[str, Any] = {
+    "n_robots": N_FEW,
+    "n_objects": 60,
+    "width_m": 8.0,
+    "height_m": 6.0,
+    "nest_centre_m": (1.0, 3.0),
+    "nest_size_m": (0.8, 2.0),
+    "start_margin_m": 0.6,
+    "physics": "compiled",
+}
+BOTH: dict[str, Any] = {"neighbours_seen": 3, "neighbour_range_m": 1.3, "message_size": 2, "message_range_m": 1.7}
+
+
+def made(**fields: Any) -> ForageEnv:
+    return ForageEnv(scenario("warehouse_small", **(SMALL | fields)))
+
+
+def drawn(ticks: int, size: int = 5) -> np.ndarray:
+    """Actions with which robots drive on, grasp and say something, some of it out of range."""
+    actions = np.random.default_rng(0).uniform(-1.2, 1.2, (ticks, N_FEW, size)).astype(np.float32)
+    actions[..., :3] = np.abs(actions[..., :3])
+    return actions
+
+
+def slice_of(env: ForageEnv, name: str) -> np.ndarray:
+    return env.last_obs[:, env.layout[name]]
+
+
+@pytest.mark.parametrize("physics", ["chipmunk", "compiled"])
+def test_they_are_those_of_the_twins_and_change_nothing_else(physics):
+    plain, env = made(physics=physics), made(physics=physics, **BOTH)
+    assert env.layout.names == (*plain.layout.names, "neighbours", "messages")
+    plain.reset_batch(seed=1)
+    env.reset_batch(seed=1)
+    assert not slice_of(env, "messages").any(), "nobody has said anything yet"
+    rng, met = np.random.default_rng(1), set[float]()
+    for tick, actions in enumerate(drawn(40)):
+        if tick % 10 == 5:  # some are away, some in repair
+            present = rng.random(N_FEW) < 0.8
+            active = present & (rng.random(N_FEW) < 0.8)
+            for each in (plain, env):
+                each.set_population(active=active, present=present)
+        plain.step_batch(np.ascontiguousarray(actions[:, :3]))
+        env.step_batch(actions)
+        np.testing.assert_array_equal(env.last_obs[:, : plain.layout.size], plain.last_obs)
+        seen = [sensing.neighbours(env, robot) for robot in range(N_FEW)]
+        heard = [sensing.heard(env, robot, actions[:, 3:]) for robot in range(N_FEW)]
+        np.testing.assert_allclose(slice_of(env, "neighbours"), seen, atol=1e-6)
+        np.testing.assert_allclose(slice_of(env, "messages"), heard, atol=1e-6)
+        met.update(slice_of(env, "neighbours")[:, 3::4].sum(axis=1).tolist())
+    assert met == {0.0, 1.0, 2.0, 3.0}
+
+
+def test_cargo_is_seen_and_the_nearest_comes_first():
+    env = made(**BOTH)
+    env.reset_batch(seed=1)
+    env.swarm.position[:] = np.column_stack([np.full(N_FEW, 7.0), 0.4 + 0.4 * np.arange(N_FEW)])
+    env.swarm.position[:3] = (3.0, 3.0), (3.5, 3.0), (3.0, 3.4)
+    env.swarm.facing[0] = 0.0, 1.0
+    env.swarm.carried_object[1] = 5
+    env.arena.observe()
+    forward, left = 0.4 / 1.3, -0.5 / 1.3
+    expected = [forward, 0.0, 0.0, 1.0, 0.0, left, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0]
+    np.testing.assert_allclose(slice_of(env, "neighbours")[0], expected, atol=1e-6)
+
+
+def test_of_equally_near_robots_the_lower_row_comes_first():
+    env = made(neighbours_seen=2)
+    env.reset_batch(seed=1)
+    env.swarm.position[:] = np.column_stack([np.full(N_FEW, 7.0), 0.4 + 0.4 * np.arange(N_FEW)])
+    env.swarm.position[:4] = (3.0, 3.0), (3.5, 3.0), (2.5, 3.0), (3.0, 3.5)
+    env.swarm.facing[0] = 1.0, 0.0
+    env.arena.observe()
+    np.testing.assert_allclose(slice_of(env, "neighbours")[0, [0, 1, 4, 5]], [0.25, 0.0, -0.25, 0.0], atol=1e-6)
+
+
+def test_a_message_that_is_not_finite_is_refused():
+    env = made(**BOTH)
+    env.reset_batch(seed=1)
+    actions = np.zeros((N_FEW, 5), np.float32)
+    actions[4, 3] = np.nan
+    with pytest.raises(ActionError, match="robot_4; the world was not stepped"):
+        env.step_batch(actions)
+    with pytest.raises(ActionError, match=r"\(n_robots, 3 \+ message_size\) = \(12, 5\), got \(12, 4\)"):
+        env.step_batch(np.zeros((N_FEW, 4), np.float32))
+    assert env.tick == 0
+
+
+@pytest.mark.parametrize("observation", ["full", "compact"])
+def test_learners_see_and_say_them_through_every_view(observation):
+    fields: dict[str, Any] = {**SMALL, **BOTH, "interface": {"observation": observation}}
+    dicts = parallel_env("warehouse_small", **fields)
+    rows = gymnasium.make_vec("swarm_forage/warehouse_small-v0", **fields)
+    joint = gymnasium.make("swarm_forage/warehouse_small-v0", **fields)
+    size = {"full": 111, "compact": 23}[observation] + 12 + 3
+    assert dicts.action_space("robot_0").shape == rows.single_action_space.shape == (5,)
+    assert joint.action_space.shape == (N_FEW, 5)
+    first = [np.stack(list(dicts.reset(seed=3)[0].values())), rows.reset(seed=3)[0], joint.reset(seed=3)[0]]
+    actions = np.clip(drawn(1)[0], -1.0, 1.0)
+    stepped = [
+        np.stack(list(dicts.step(dict(zip(dicts.possible_agents, actions, strict=True)))[0].values())),
+        rows.step(actions)[0],
+        joint.step(actions)[0],
+    ]
+    for seen in (first, stepped):
+        assert seen[0].shape == (N_FEW, size)
+        np.testing.assert_array_equal(seen[0], seen[1])
+        np.testing.assert_array_equal(seen[0], seen[2])
+    assert stepped[0][:, -1].any()
+    assert (stepped[0][:, -3:-1] != 0.0).any(), "what is heard are not only zeros"
+
+
+def test_a_policy_says_what_it_needs():
+    shown = InterfaceConfig(observation="compact").for_scenario(scenario("warehouse_small", **BOTH))
+    assert (shown.neighbours_seen, shown.neighbour_range_m, shown.message_size) == (3, 1.3, 2)
+    for fields, words in (
+        ({}, r"got none; give the scenario neighbours_seen=3 and neighbour_range_m=1\.3"),
+        ({**BOTH, "neighbour_range_m": 2.0}, r"forward, left / 2 m.*neighbour_range_m=1\.3"),
+        ({**BOTH, "message_size": 1}, r"messages of 2 numbers, .* got 1; give the scenario message_size=2"),
+    ):
+        with pytest.raises(ConfigError, match=words):
+            LearnerInterface(shown, SwarmSpec.of(scenario("warehouse_small", **fields)))
+    with pytest.raises(ConfigError, match=r"a scenario with neighbours, because the policy reads .* neighbours_seen"):
+        ForageEnv(scenario("warehouse_small"), reads=shown.reads)
+    blind = InterfaceConfig(neighbours_seen=0, message_size=0).for_scenario(scenario("warehouse_small", **BOTH))
+    assert blind.sensors == ()
+
+
+def test_numbered_actions_carry_no_message():
+    with pytest.raises(ConfigError, match=r"'continuous' for messages of 2 numbers, got 'discrete'.*message_size=0"):
+        parallel_env("warehouse_small", **BOTH, interface={"actions": "discrete"})
+    interface = {"actions": "discrete", "message_size": 0}
+    env = parallel_env("warehouse_small", **SMALL, **BOTH, interface=interface)
+    assert "messages" not in env.interface.layout.names
+    env.reset(seed=1)
+    env.step(dict.fromkeys(env.agents, 1))
+
+
+def test_a_reset_keeps_the_spaces():
+    env = parallel_env("warehouse_small", **SMALL, **BOTH, interface={})
+    env.reset(options={"scenario": {"neighbour_range_m": 1.3, "message_range_m": 3.0}})
+    with pytest.raises(ConfigError, match="message_size to stay 2, as spaces promise, got 3"):
+        env.reset(options={"scenario": {"message_size": 3}})
+    with pytest.raises(ConfigError, match=r"neighbour_range_m to stay 1\.3, .* got 4;"):
+        env.reset(options={"scenario": {"neighbour_range_m": 4.0}})
+    env.reset()
+    assert env.forage_env.scenario.robots.neighbour_range_m == 1.3
+    alone = parallel_env("warehouse_small", **SMALL, interface={})
+    alone.reset(options={"scenario": {"neighbour_range_m": 4.0}})  # no column depends on it
