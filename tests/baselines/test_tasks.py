@@ -104,6 +104,25 @@ def test_creation_needs_an_object_within_eighty_centimetres():
         assert near == is_near
 
 
+def test_a_transfer_goes_to_a_cache_nearer_to_the_nest(robot):
+    pick_up(robot, Task.TRANSFERER)
+    robot.know_cache(8, (25, 75), 5)  # at (5.1, 15.1) m, 7.4 m from the nest's centre; the other is 11.3 m from it
+    robot.seen.pose(20.5, 8.1)
+    robot.act()
+    assert max(abs(robot.goal[0] - 5.1), abs(robot.goal[1] - 15.1)) < 3.1
+
+
+def test_a_cache_that_is_there_again_serves_as_well(robot):
+    robot.start(Task.TRANSFERER)
+    robot.finish_soon()
+    robot.seen.caches(CACHE_SEEN)
+    robot.act()
+    goal = robot.goal
+    robot.seen.caches((9, CACHE, 12))
+    robot.act(2)
+    assert robot.goal == goal
+
+
 # The authors' quirks
 
 
