@@ -99,32 +99,19 @@ STUDY_TABLE = [
 
 @pytest.mark.parametrize(("sigma", "obstacle", "object_seen", "area_seen"), STUDY_TABLE)
 def test_decisions_under_the_noise_of_the_study(world, sigma, obstacle, object_seen, area_seen):
-    layout, samples = world.layout, 60
-
-    def share(decision, group: str, value: float) -> float:
-        obs = np.zeros((ROBOTS, layout.size), np.float32)
-        obs[:, layout[group]] = value
-        seen = noisy(world, obs, samples, sigma=sigma)[:, :, layout[group]].reshape(samples * ROBOTS, -1)
-        return float(np.mean([decision(row) for row in seen]))
-
-    def tolerance(probability: float) -> float:
-        """Half a unit of the last printed place, and four standard errors."""
-        return 0.0051 + 4 * np.sqrt(probability * (1 - probability) / (samples * ROBOTS))
-
-    def described(row):
-        return sees_obstacle(row, False)
-
-    def program(row):
-        return sees_obstacle(row, True)
-
-    # A sum of 24 clamped draws is nearly normal along each axis, with this variance; the field of view is 2.61 of pi.
-    variance = 12 * sigma**2 * (1 / 2 - 1 / (2 * np.pi))
-    long_ahead = 2.61 / np.pi * np.exp(-(0.1**2) / (2 * variance))
-    assert share(described, "proximity", 0.0) == pytest.approx(long_ahead, abs=tolerance(long_ahead))
-    assert share(program, "proximity", 0.0) == pytest.approx(obstacle, abs=tolerance(obstacle))
-    assert share(sees_object, "ground", 0.0) == pytest.approx(object_seen, abs=tolerance(object_seen))
-    assert share(sees_nest, "ground", 179 / 255) == pytest.approx(area_seen, abs=tolerance(area_seen))
-    assert share(sees_cache, "ground", 102 / 255) == pytest.approx(area_seen, abs=tolerance(area_seen))
+    samples = 60
+    for decision, group, value, expected in (
+        (lambda ring: sees_obstacle(ring, True), "proximity", 0.0, obstacle),
+        (sees_object, "ground", 0.0, object_seen),
+        (sees_nest, "ground", 179 / 255, area_seen),
+        (sees_cache, "ground", 102 / 255, area_seen),
+    ):
+        obs = np.zeros((ROBOTS, world.layout.size), np.float32)
+        obs[:, world.layout[group]] = value
+        seen = noisy(world, obs, samples, sigma=sigma)[:, :, world.layout[group]].reshape(samples * ROBOTS, -1)
+        error = np.sqrt(expected * (1 - expected) / len(seen))
+        share = np.mean([decision(row) for row in seen])
+        assert share == pytest.approx(expected, abs=0.0051 + 4 * error), "to the last place that is printed"
 
 
 def test_levels_of_the_study():
