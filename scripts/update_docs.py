@@ -7,8 +7,8 @@
                                         where other versions are installed, only say that they are not compared
 
 The commands are listed below; the store is docs/results.json. Answers to claims and means of measures come of the files
-of docs/results, see `results_numbers.py`. A block looks like
-`<!-- generated: run.crw -->20.45 ± 0.91<!-- end -->`; `run.table` is all that a command printed.
+of docs/results, see `results_numbers.py`: of the confirmatory study as results, of the exploratory one as explored. A
+block looks like `<!-- generated: run.crw -->20.45 ± 0.91<!-- end -->`; `run.table` is all that a command printed.
 A number must not begin a line: Markdown takes a comment there for the start of an HTML block, which ends the paragraph.
 --remake needs an installation with everything: pip install -e ".[plots,train]" "torch==2.13.0"
 """
@@ -172,7 +172,8 @@ def known(store: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
     board = board_of([read_entry(file) for file in sorted((ROOT / "docs/benchmark").glob("*.json"))])
     return {
         **store,
-        "results": results_fields(RESULTS),
+        "explored": results_fields(RESULTS),
+        "results": results_fields(RESULTS / "confirmatory"),
         "benchmark": {"board": board.markdown().strip()},
         "talk": talk_fields(),
     }
