@@ -11,6 +11,8 @@
     results.contradicted, .supported, .equivalent   claims with these answers under both rules, as tables
     results.split                                   claims supported under one of the rules alone, else contradicted
     results.readings                                claims whose readings part, as a table
+    results.same_described, .same_program           to how many claims an earlier study gave the same answer
+    results.turned                                  claims that were decided before, and are decided otherwise
 
 `write_results` writes the files.
 """
@@ -35,10 +37,14 @@ Given = tuple[str, str]
 """The answers under both rules."""
 
 
-def results_fields(folder: Path) -> dict[str, str]:
-    """Return the fields of the files in a folder such as docs/results."""
+DECIDED = ("supported", "contradicted", "equivalent")
+
+
+def results_fields(folder: Path, earlier: Path | None = None) -> dict[str, str]:
+    """Return the fields of the files in a folder such as docs/results, beside those of an earlier study."""
     lines = _lines(folder / "verdicts.csv")
-    main = _answers([line for line in lines if line["is_main"] == "true"])
+    main = _main(lines)
+    before = _main(_lines(earlier / "verdicts.csv")) if earlier else main
     readings = {one: _answers([line for line in lines if line["reading"] == one]) for one in READINGS}
     return {
         **{name: ", ".join(given) for name, given in main.items()},
@@ -48,8 +54,10 @@ def results_fields(folder: Path) -> dict[str, str]:
         **dict(_means(folder / "measures.csv")),
         **_runs(folder / "runs.csv"),
         "answers": _counts([*main.values()]),
-        **{word: _claims(main, lambda given, word=word: given == (word, word)) for word in ANSWERS},
-        "split": _claims(main, lambda given: {*given} == {"supported", "contradicted"}),
+        **{word: _claims(main, before, lambda now, _, word=word: now == (word, word)) for word in ANSWERS},
+        "split": _claims(main, before, lambda now, _: {*now} == {"supported", "contradicted"}),
+        "turned": _claims(main, before, _has_turned),
+        **{f"same_{rules}": _same(main, before, place) for place, rules in enumerate(RULES)},
         "readings": _parted(readings),
     }
 
@@ -57,6 +65,11 @@ def results_fields(folder: Path) -> dict[str, str]:
 def _lines(file: Path) -> list[dict[str, str]]:
     with file.open(encoding="utf-8", newline="") as lines:
         return list(csv.DictReader(lines))
+
+
+def _main(lines: Sequence[dict[str, str]]) -> dict[str, Given]:
+    """Return the answers in the main reading."""
+    return _answers([line for line in lines if line["is_main"] == "true"])
 
 
 def _answers(lines: Sequence[dict[str, str]]) -> dict[str, Given]:
@@ -113,9 +126,23 @@ def _counts(answers: Sequence[Given]) -> str:
     )
 
 
-def _claims(answers: dict[str, Given], is_wanted: Callable[[Given], bool]) -> str:
-    found = [(name, CLAIMS[name].text, *given) for name, given in answers.items() if is_wanted(given)]
-    return _table(["claim", "the paper", *RULES], found) if found else "None."
+def _claims(answers: dict[str, Given], before: dict[str, Given], is_wanted: Callable[[Given, Given], bool]) -> str:
+    """Return the claims of which `is_wanted` says so of the answers now and before."""
+    found = [
+        (name, CLAIMS[name].text, ", ".join(given), ", ".join(before[name]))
+        for name, given in answers.items()
+        if is_wanted(given, before[name])
+    ]
+    return _table(["claim", "the paper", "confirmatory", "exploratory"], found) if found else "None."
+
+
+def _has_turned(now: Given, before: Given) -> bool:
+    """Say whether an answer was decided before, and is decided otherwise."""
+    return any(new != old and new in DECIDED and old in DECIDED for new, old in zip(now, before, strict=True))
+
+
+def _same(answers: dict[str, Given], before: dict[str, Given], place: int) -> str:
+    return f"{sum(given[place] == before[name][place] for name, given in answers.items())} of {len(answers)}"
 
 
 def _parted(readings: dict[str, dict[str, Given]]) -> str:

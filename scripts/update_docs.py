@@ -173,7 +173,7 @@ def known(store: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
     return {
         **store,
         "explored": results_fields(RESULTS),
-        "results": results_fields(RESULTS / "confirmatory"),
+        "results": results_fields(RESULTS / "confirmatory", RESULTS),
         "benchmark": {"board": board.markdown().strip()},
         "talk": talk_fields(),
     }
