@@ -7,6 +7,7 @@
     results.S1a_raw_performance_described_crw_128   a mean of measures.csv: set, measure, rules, policy, value,
                                                     and values on other axes, such as _walk_probability_0
     results.runs, .sets, .hours, .version           what was run, and by what
+    results.per_condition                           the fewest and the most runs of a condition
     results.answers                                 how many claims have which answer, as a table
     results.contradicted, .supported, .equivalent   claims with these answers under both rules, as tables
     results.split                                   claims supported under one of the rules alone, else contradicted
@@ -108,6 +109,7 @@ def _runs(file: Path) -> dict[str, str]:
     return {
         "runs": f"{sum(int(line['runs']) for line in lines):,}",
         "sets": f"{len(lines)}",
+        "per_condition": f"{min(int(line['fewest']) for line in lines)} to {max(int(line['most']) for line in lines)}",
         "hours": f"{sum(float(line['hours'] or 0.0) for line in lines):.1f}",
         "version": ", ".join(sorted({line["version"] for line in lines})),
     }
