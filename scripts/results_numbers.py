@@ -91,7 +91,8 @@ def _contrasts(file: Path) -> Iterator[tuple[str, str]]:
         key = (line["claim"], line["reading"], line["rules"])
         seen[key] += 1
         if line["lower"]:
-            mean, lower, upper = (f"{round(100.0 * float(line[name]), 1) + 0.0:.1f}" for name in ("mean", "lower", "upper"))
+            percents = (round(100.0 * float(line[name]), 1) for name in ("mean", "lower", "upper"))
+            mean, lower, upper = (f"{percent + 0.0:.1f}" for percent in percents)  # no "-0.0"
             yield f"{key[0]}_{seen[key]}_{key[1]}_{key[2]}", f"{mean} % ({lower} to {upper})"
 
 
