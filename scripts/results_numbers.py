@@ -12,7 +12,9 @@
     results.contradicted, .supported, .equivalent   claims with these answers under both rules, as tables
     results.split                                   claims supported under one of the rules alone, else contradicted
     results.readings                                claims whose readings part, as a table
-    results.same_described, .same_program           to how many claims an earlier study gave the same answer
+    results.same_described, .same_program           of the claims that runs decide, how many an earlier study decided so
+    results.new_described, .new_program             which of them it did not decide so
+    results.X1_figures                              the contrasts of all figures of a claim, as a table
     results.turned                                  claims that were decided before, and are decided otherwise
 
 `write_results` writes the files.
@@ -58,7 +60,8 @@ def results_fields(folder: Path, earlier: Path | None = None) -> dict[str, str]:
         **{word: _claims(main, before, lambda now, _, word=word: now == (word, word)) for word in ANSWERS},
         "split": _claims(main, before, lambda now, _: {*now} == {"supported", "contradicted"}),
         "turned": _claims(main, before, _has_turned),
-        **{f"same_{rules}": _same(main, before, place) for place, rules in enumerate(RULES)},
+        **dict(_decided(main, before)),
+        "X1_figures": _figures(folder / "contrasts.csv", "X1"),
         "readings": _parted(readings),
     }
 
@@ -91,9 +94,14 @@ def _contrasts(file: Path) -> Iterator[tuple[str, str]]:
         key = (line["claim"], line["reading"], line["rules"])
         seen[key] += 1
         if line["lower"]:
-            percents = (round(100.0 * float(line[name]), 1) for name in ("mean", "lower", "upper"))
-            mean, lower, upper = (f"{percent + 0.0:.1f}" for percent in percents)  # no "-0.0"
-            yield f"{key[0]}_{seen[key]}_{key[1]}_{key[2]}", f"{mean} % ({lower} to {upper})"
+            yield f"{key[0]}_{seen[key]}_{key[1]}_{key[2]}", _percents(line).replace(" (", " % (")
+
+
+def _percents(line: dict[str, str]) -> str:
+    """Return a mean with its interval in percent."""
+    numbers = (round(100.0 * float(line[name]), 1) + 0.0 for name in ("mean", "lower", "upper"))  # no "-0.0"
+    mean, lower, upper = (f"{number:.1f}" for number in numbers)
+    return f"{mean} ({lower} to {upper})"
 
 
 def _means(file: Path) -> Iterator[tuple[str, str]]:
@@ -144,8 +152,25 @@ def _has_turned(now: Given, before: Given) -> bool:
     return any(new != old and new in DECIDED and old in DECIDED for new, old in zip(now, before, strict=True))
 
 
-def _same(answers: dict[str, Given], before: dict[str, Given], place: int) -> str:
-    return f"{sum(given[place] == before[name][place] for name, given in answers.items())} of {len(answers)}"
+def _decided(answers: dict[str, Given], before: dict[str, Given]) -> Iterator[tuple[str, str]]:
+    """Yield, for each of the rules, how many answers that runs decide are those of before, and claims with others."""
+    for place, rules in enumerate(RULES):
+        decided = [name for name, given in answers.items() if CLAIMS[name].statements and given[place] in DECIDED]
+        new = [name for name in decided if before[name][place] != answers[name][place]]
+        yield f"same_{rules}", f"{len(decided) - len(new)} of {len(decided)}"
+        yield f"new_{rules}", ", ".join(new)
+
+
+def _figures(file: Path, claim: str) -> str:
+    """Return a claim about many figures as a table of their contrasts, in amounts and in shares."""
+    columns = [(reading, rules) for reading in READINGS[:2] for rules in RULES]
+    rows: dict[str, dict[tuple[str, str], str]] = {}
+    for line in _lines(file):
+        if line["claim"] == claim and line["lower"]:
+            cell = f"{_percents(line)} {SIGNS[line['answer']]}"
+            rows.setdefault(line["where"], {})[line["reading"], line["rules"]] = cell
+    lines = [[where, *(cells[column] for column in columns)] for where, cells in rows.items()]
+    return _table(["figure", *(f"{reading}: {rules}" for reading, rules in columns)], lines)
 
 
 def _parted(readings: dict[str, dict[str, Given]]) -> str:
