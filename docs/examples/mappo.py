@@ -16,24 +16,32 @@ import torch
 from torch import nn
 from torch.distributions import Categorical
 
+from swarm_forage_env.contract.policy import state_size
 from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.training.plan import read_plan
 from swarm_forage_env.views.gymnasium import SwarmVectorEnv
 
 WIDTH = 64
 """Of all hidden layers."""
+OWN = state_size(1, 0)
 
 
 class Critic(nn.Module):
-    """Value of each row (rows,) by what it sees (rows, d) and by the state (arenas, S) of its arena."""
+    """Value of each robot by what it sees (rows, d), by the state (arenas, S) of its arena, and by its own part of that.
 
-    def __init__(self, n_columns, n_state):
+    A state begins with OWN numbers for each of its N robots; `place` (rows,) is N times the arena plus the robot.
+    """
+
+    def __init__(self, n_columns, n_state, n_robots):
         super().__init__()
-        self.of_view, self.of_state = nn.Linear(n_columns, WIDTH), nn.Linear(n_state, WIDTH)
+        self.n_robots = n_robots
+        self.of_robot, self.of_state = nn.Linear(n_columns + OWN, WIDTH), nn.Linear(n_state, WIDTH)
         self.onwards = nn.Sequential(nn.Tanh(), nn.Linear(WIDTH, WIDTH), nn.Tanh(), nn.Linear(WIDTH, 1))
 
-    def forward(self, seen, states, arena):
-        return self.onwards(self.of_view(seen) + self.of_state(states)[arena])[:, 0]
+    def forward(self, seen, states, place):
+        own = states[:, : self.n_robots * OWN].reshape(-1, OWN)[place]
+        of_arenas = self.of_state(states)[place // self.n_robots]
+        return self.onwards(self.of_robot(torch.hstack([seen, own])) + of_arenas)[:, 0]
 
 
 def learn(
@@ -52,11 +60,11 @@ def learn(
 ):
     """Train actor and critic for a stage."""
     obs, infos = envs.reset(seed=seed)
-    n_rows, arena = envs.num_envs, torch.arange(envs.num_envs) // envs.n_robots
+    n_rows, place = envs.num_envs, torch.arange(envs.num_envs)
     optimizer.param_groups[0]["lr"] = learning_rate
     for rollout_number in range(1, n_decisions // (n_steps * n_rows) + 1):
         seen, states = torch.zeros(n_steps, *obs.shape), torch.zeros(n_steps, *envs.state().shape)
-        arenas = arena + envs.n_arenas * torch.arange(n_steps)[:, None]  # (steps, rows) into the states of all steps
+        places = place + n_rows * torch.arange(n_steps)[:, None]  # (steps, rows), in the states of all steps
         at_work = torch.zeros(n_steps, n_rows, dtype=torch.bool)
         actions, log_probs, values, rewards, dones, advantages = torch.zeros(6, n_steps, n_rows)
         with torch.no_grad():
@@ -64,14 +72,15 @@ def learn(
                 seen[step], states[step], at_work[step] = map(torch.from_numpy, (obs, envs.state(), infos["active"]))
                 choices = Categorical(logits=actor(seen[step]))
                 actions[step] = choices.sample()
-                log_probs[step], values[step] = choices.log_prob(actions[step]), critic(seen[step], states[step], arena)
+                log_probs[step], values[step] = choices.log_prob(actions[step]), critic(seen[step], states[step], place)
                 obs, reward, terminated, truncated, infos = envs.step(actions[step].numpy().astype(int))
                 if truncated.any():  # ended by time, not by death: add the value of what would have followed
                     last = [infos["final_obs"][truncated], infos["final_info"]["state"][truncated]]
                     last = [torch.from_numpy(np.stack(part)) for part in last]
-                    reward[truncated] += gamma * critic(*last, torch.arange(len(last[0]))).numpy()
+                    robots = np.flatnonzero(truncated) % envs.n_robots
+                    reward[truncated] += gamma * critic(*last, place[: len(robots)] * envs.n_robots + robots).numpy()
                 rewards[step], dones[step] = torch.from_numpy(reward), torch.from_numpy(terminated | truncated)
-            following = critic(*map(torch.from_numpy, (obs, envs.state())), arena)
+            following = critic(*map(torch.from_numpy, (obs, envs.state())), place)
             last = torch.zeros(n_rows)
             for step in reversed(range(n_steps)):
                 target = rewards[step] + gamma * following * (1 - dones[step])
@@ -79,16 +88,16 @@ def learn(
                 following = values[step] = torch.where(at_work[step], values[step], target)
                 decay = gamma * torch.where(at_work[step], gae_lambda, 1.0)
                 last = advantages[step] = target - following + decay * (1 - dones[step]) * last
-        rollout = [part[at_work] for part in (seen, arenas, actions, log_probs, advantages, advantages + values)]
+        rollout = [part[at_work] for part in (seen, places, actions, log_probs, advantages, advantages + values)]
         for _ in range(n_epochs):
             for chosen in torch.randperm(len(rollout[0])).split(batch_size):
-                rows, arenas_of_rows, taken, before, advantage, returns = (part[chosen] for part in rollout)
+                rows, places_of_rows, taken, before, advantage, returns = (part[chosen] for part in rollout)
                 choices = Categorical(logits=actor(rows))
                 ratio = (choices.log_prob(taken) - before).exp()
                 advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
                 clipped = ratio.clamp(1 - clip_range, 1 + clip_range)
                 gain = torch.min(advantage * ratio, advantage * clipped).mean()
-                error = 0.5 * (critic(rows, states.flatten(0, 1), arenas_of_rows) - returns).square().mean()
+                error = 0.5 * (critic(rows, states.flatten(0, 1), places_of_rows) - returns).square().mean()
                 optimizer.zero_grad()
                 (error - gain - ent_coef * choices.entropy().mean()).backward()
                 nn.utils.clip_grad_norm_(optimizer.param_groups[0]["params"], 0.5)
@@ -108,7 +117,7 @@ if __name__ == "__main__":
     envs.reset(seed=seed)
     n_columns, n_actions = envs.interface.widths
     layers = (nn.Linear(n_columns, WIDTH), nn.Tanh(), nn.Linear(WIDTH, WIDTH), nn.Tanh(), nn.Linear(WIDTH, n_actions))
-    actor, critic = nn.Sequential(*layers), Critic(n_columns, envs.state().shape[1])
+    actor, critic = nn.Sequential(*layers), Critic(n_columns, envs.state().shape[1], envs.n_robots)
     optimizer = torch.optim.Adam([*actor.parameters(), *critic.parameters()], eps=1e-5)
     for stage, envs in stages:
         learn(envs, seed, stage.steps, **{**plan.options, **stage.options})
