@@ -43,11 +43,11 @@ Given = tuple[str, str]
 DECIDED = ("supported", "contradicted", "equivalent")
 
 
-def results_fields(folder: Path, earlier: Path | None = None) -> dict[str, str]:
+def results_fields(folder: Path, earlier: Path) -> dict[str, str]:
     """Return the fields of the files in a folder such as docs/results, beside those of an earlier study."""
     lines = _lines(folder / "verdicts.csv")
     main = _main(lines)
-    before = _main(_lines(earlier / "verdicts.csv")) if earlier else main
+    before = _main(_lines(earlier / "verdicts.csv"))
     readings = {one: _answers([line for line in lines if line["reading"] == one]) for one in READINGS}
     return {
         **{name: ", ".join(given) for name, given in main.items()},
@@ -55,7 +55,7 @@ def results_fields(folder: Path, earlier: Path | None = None) -> dict[str, str]:
         **{f"{line['claim']}_{line['reading']}_{line['rules']}": _counted(line) for line in lines},
         **dict(_contrasts(folder / "contrasts.csv")),
         **dict(_means(folder / "measures.csv")),
-        **_runs(folder / "runs.csv"),
+        **runs_fields(folder),
         "answers": _counts([*main.values()]),
         **{word: _claims(main, before, lambda now, _, word=word: now == (word, word)) for word in ANSWERS},
         "split": _claims(main, before, lambda now, _: {*now} == {"supported", "contradicted"}),
@@ -113,8 +113,9 @@ def _means(file: Path) -> Iterator[tuple[str, str]]:
             yield "_".join([line["set"], *place]), number(float(line["mean"]))
 
 
-def _runs(file: Path) -> dict[str, str]:
-    lines = _lines(file)
+def runs_fields(folder: Path) -> dict[str, str]:
+    """Return what was run, and by what, of a folder such as docs/results."""
+    lines = _lines(folder / "runs.csv")
     return {
         "runs": f"{sum(int(line['runs']) for line in lines):,}",
         "sets": f"{len(lines)}",

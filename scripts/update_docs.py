@@ -7,8 +7,8 @@
                                         where other versions are installed, only say that they are not compared
 
 The commands are listed below; the store is docs/results.json. Answers to claims and means of measures come of the files
-of docs/results, see `results_numbers.py`: of the confirmatory study as results, of the exploratory one as explored. A
-block looks like `<!-- generated: run.crw -->20.45 ± 0.91<!-- end -->`; `run.table` is all that a command printed.
+of docs/results/confirmatory, see `results_numbers.py`; explored.runs and others say what the first study ran. A block
+looks like `<!-- generated: run.crw -->20.45 ± 0.91<!-- end -->`; `run.table` is all that a command printed.
 A number must not begin a line: Markdown takes a comment there for the start of an HTML block, which ends the paragraph.
 --remake needs an installation with everything: pip install -e ".[plots,train]" "torch==2.13.0"
 """
@@ -33,7 +33,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from metrics.benchmark import board_of, read_entry
 from metrics.statistics import aggregate
-from scripts.results_numbers import results_fields
+from scripts.results_numbers import results_fields, runs_fields
 
 ROOT = Path(__file__).resolve().parent.parent
 STORE = ROOT / "docs/results.json"
@@ -172,7 +172,7 @@ def known(store: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
     board = board_of([read_entry(file) for file in sorted((ROOT / "docs/benchmark").glob("*.json"))])
     return {
         **store,
-        "explored": results_fields(RESULTS),
+        "explored": runs_fields(RESULTS),
         "results": results_fields(RESULTS / "confirmatory", RESULTS),
         "benchmark": {"board": board.markdown().strip()},
         "talk": talk_fields(),

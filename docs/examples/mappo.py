@@ -2,9 +2,9 @@
 
     python docs/examples/mappo.py docs/benchmark/plans/ippo.toml 3 seed_3.npz interface.frame_decisions=200
 
-trains by a plan, with seed 3; a value of the plan may be another one. The critic values a robot by the state of its
-arena and by what the robot sees. Arenas start anew within the step that ends them: where one was truncated, the value
-of its last state is added. Steps of robots not at work are left out.
+trains in the worlds and stages of a plan, with its options and seed 3; a value of the plan may be another one. The
+critic values a robot by the state of its arena and by what the robot sees. Arenas start anew within the step that ends
+them: where one was truncated, the value of its last state is added. Steps of robots not at work are left out.
 """
 
 import json
@@ -27,7 +27,7 @@ OWN = state_size(1, 0)
 
 
 class Critic(nn.Module):
-    """Value of each robot by what it sees (rows, d), by the state (arenas, S) of its arena, and by its own part of that.
+    """Value of each robot by what it sees (rows, d), by the state (arenas, S) of its arena and its own part of that.
 
     A state begins with OWN numbers for each of its N robots; `place` (rows,) is N times the arena plus the robot.
     """
@@ -47,6 +47,7 @@ class Critic(nn.Module):
 def learn(
     envs,
     seed,
+    scenario,
     n_decisions,
     *,
     learning_rate=3e-4,
@@ -59,10 +60,10 @@ def learn(
     ent_coef=0.003,
 ):
     """Train actor and critic for a stage."""
-    obs, infos = envs.reset(seed=seed)
+    obs, infos = envs.reset(seed=seed, options={"scenario": scenario})
     n_rows, place = envs.num_envs, torch.arange(envs.num_envs)
     optimizer.param_groups[0]["lr"] = learning_rate
-    for rollout_number in range(1, n_decisions // (n_steps * n_rows) + 1):
+    for rollout_number in range(1, max(1, n_decisions // (n_steps * n_rows)) + 1):
         seen, states = torch.zeros(n_steps, *obs.shape), torch.zeros(n_steps, *envs.state().shape)
         places = place + n_rows * torch.arange(n_steps)[:, None]  # (steps, rows), in the states of all steps
         at_work = torch.zeros(n_steps, n_rows, dtype=torch.bool)
@@ -77,7 +78,7 @@ def learn(
                 if truncated.any():  # ended by time, not by death: add the value of what would have followed
                     last = [infos["final_obs"][truncated], infos["final_info"]["state"][truncated]]
                     last = [torch.from_numpy(np.stack(part)) for part in last]
-                    robots = np.flatnonzero(truncated) % envs.n_robots
+                    robots = place[torch.from_numpy(truncated)] % envs.n_robots
                     reward[truncated] += gamma * critic(*last, place[: len(robots)] * envs.n_robots + robots).numpy()
                 rewards[step], dones[step] = torch.from_numpy(reward), torch.from_numpy(terminated | truncated)
             following = critic(*map(torch.from_numpy, (obs, envs.state())), place)
@@ -120,7 +121,7 @@ if __name__ == "__main__":
     actor, critic = nn.Sequential(*layers), Critic(n_columns, envs.state().shape[1], envs.n_robots)
     optimizer = torch.optim.Adam([*actor.parameters(), *critic.parameters()], eps=1e-5)
     for stage, envs in stages:
-        learn(envs, seed, stage.steps, **{**plan.options, **stage.options})
+        learn(envs, seed, dict(stage.scenario), stage.steps, **{**plan.options, **stage.options})
     about = NetworkAbout(interface=plan.interface, activation="tanh", samples=True)
     file.parent.mkdir(parents=True, exist_ok=True)
     Network.from_state_dict(actor.state_dict(), about).save(file)

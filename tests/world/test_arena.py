@@ -225,6 +225,10 @@ def delivering_world(**options) -> ForageEnv:
 def test_weights_multiply_and_add():
     env = delivering_world(reward=RewardConfig(delivery=3.0, first_pickup=-2.0, tick=0.5))
     assert rewards_of(env, {0: Grip.DELIVER, 1: Grip.GRASP}) == pytest.approx([3.5, -1.5, 0.5, 0.5])
+    rewards_of(env, {1: Grip.RELEASE})
+    rewards_of(env, {1: Grip.GRASP})
+    assert rewards_of(env, {1: Grip.GRASP}) == pytest.approx([0.5] * 4)  # only the first pick-up is paid
+    assert env.swarm.carried_object[1] == 1
 
 
 def test_team_reward_is_the_mean_over_active_robots():

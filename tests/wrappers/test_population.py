@@ -89,9 +89,6 @@ def test_equals_the_slow_twin_in_every_tick(seed, death, birth, malfunction, rep
         assert changed or np.array_equal(before, (fast.present, fast.active))
 
 
-# The study
-
-
 # Other rates during a run
 
 PROCESSES = ("death", "birth", "malfunction", "repair")

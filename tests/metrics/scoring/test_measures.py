@@ -82,7 +82,7 @@ COLLAPSE = (
     rows(2, [[8.0], [8.0]], interference_fraction=0.2),
     rows(4, [[1.6], [1.6]], interference_fraction=0.6),
 )
-"""A swarm that delivers a fifth when its size doubles from 2 to 4; its scores by hand are in test_emergence.py."""
+"""A swarm that delivers a fifth when its size doubles from 2 to 4."""
 
 
 def test_where_performance_falls_spatial_emergence_misleads():
