@@ -159,6 +159,8 @@ def test_an_example_trains_a_policy_that_runs(name, tmp_path):
     command = [sys.executable, "-W", "ignore", "example.py", *(PLANNED[1:] if name in PLANNED else ())]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-4000:]
+    if name in PLANNED:
+        assert done.stdout.count("reward per decision") == 3  # both stages: two rollouts and one
     policy = next(tmp_path.rglob("policy.*"))
     small = scenario("warehouse_small", n_robots=8, horizon_s=200.0)
     record = run_one(RunSpec(world=World(small), policy=str(policy), seed=1))
