@@ -119,6 +119,12 @@ if __name__ == "__main__":
     n_columns, n_actions = envs.interface.widths
     layers = (nn.Linear(n_columns, WIDTH), nn.Tanh(), nn.Linear(WIDTH, WIDTH), nn.Tanh(), nn.Linear(WIDTH, n_actions))
     actor, critic = nn.Sequential(*layers), Critic(n_columns, envs.state().shape[1], envs.n_robots)
+    for layer in [*actor.modules(), *critic.modules()]:
+        if isinstance(layer, nn.Linear):  # with the weights that torch begins with, robots learn half as much
+            nn.init.orthogonal_(layer.weight, 2**0.5)
+            nn.init.zeros_(layer.bias)
+    nn.init.orthogonal_(actor[-1].weight, 0.01)
+    nn.init.orthogonal_(critic.onwards[-1].weight, 1.0)
     optimizer = torch.optim.Adam([*actor.parameters(), *critic.parameters()], eps=1e-5)
     for stage, envs in stages:
         learn(envs, seed, dict(stage.scenario), stage.steps, **{**plan.options, **stage.options})
