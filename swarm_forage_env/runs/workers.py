@@ -9,10 +9,11 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager, nullcontext, suppress
 from itertools import islice
 from multiprocessing import get_context, parent_process
+from queue import Empty, SimpleQueue
 from typing import TypeVar
 
 from swarm_forage_env._internal.compiling import is_kept, tell_of_first_run
@@ -107,20 +108,23 @@ def each_run(
 def _done(
     workers: Executor, do: Callable[[RunSpec], Result], specs: Sequence[RunSpec], at_a_time: int
 ) -> Generator[tuple[RunSpec, Result]]:
-    waiting, running = iter(specs), dict[Future[Result], RunSpec]()
+    # `concurrent.futures.wait` locks every future; a Ctrl-C in it leaves locks for which the end of the pool waits.
+    waiting, running, done = iter(specs), dict[Future[Result], RunSpec](), SimpleQueue[Future[Result]]()
     wrappers = {type(config) for spec in specs for config in spec.wrappers}
     try:
         while True:
             with deaf_children(), scriptless_children(wrappers):
-                running |= {workers.submit(do, spec): spec for spec in islice(waiting, at_a_time - len(running))}
+                for spec in islice(waiting, at_a_time - len(running)):
+                    future = workers.submit(do, spec)
+                    running[future] = spec
+                    future.add_done_callback(done.put)
             if not running:
                 return
-            finished, _ = wait(running, timeout=WAKE_UP_EVERY_S, return_when=FIRST_COMPLETED)
-            lost = [one for one in finished if one.cancelled() or isinstance(one.exception(), BrokenExecutor)]
-            for future in finished.difference(lost):
+            with suppress(Empty):
+                future = done.get(timeout=WAKE_UP_EVERY_S)
+                if future.cancelled():
+                    raise WorkerError
                 yield running.pop(future), future.result()
-            if lost:
-                raise WorkerError
     except BrokenExecutor as error:
         raise WorkerError from error
     finally:

@@ -134,10 +134,7 @@ def test_ctrl_c_keeps_what_is_finished_and_says_so(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 def test_ctrl_c_ends_the_workers_at_once(tmp_path):
-    """A terminal sends it to all processes of a command. A script needs no guard against being read again.
-
-    Runs take a second each: polars loses a Ctrl-C that comes within the milliseconds in which it writes a file.
-    """
+    """A terminal sends it to all processes of a command. A script needs no guard against being read again."""
     script = """
 import sys
 from dataclasses import replace
