@@ -254,7 +254,8 @@ class ForagingArena:
             acts: Whether the driver acts; else its actions stand as they are.
             kept: Whether nobody has written into the observation since the last call.
             task_shares: (codes,) gets the share of active robots in each task, tick by tick; None = they do not count.
-            rewards: What makes the rewards added to `paid`, (N,) float32; it must have a `payment`. None = there are none.
+            rewards: What makes the rewards; it must have a `payment`. None = there are none.
+            paid: (N,) float32, the rewards are added.
 
         Raises:
             ActionError: as in `step`; the ticks before have happened.
