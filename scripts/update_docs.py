@@ -168,15 +168,25 @@ def compare(printed: str, stored: dict[str, Any]) -> int:
 
 
 def known(store: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Return the store with the fields of docs/results, and the table of the benchmark."""
-    board = board_of([read_entry(file) for file in sorted((ROOT / "docs/benchmark").glob("*.json"))])
+    """Return the store with the fields of docs/results, the benchmark, and talking."""
     return {
         **store,
         "explored": runs_fields(RESULTS),
         "results": results_fields(RESULTS / "confirmatory", RESULTS),
-        "benchmark": {"board": board.markdown().strip()},
+        "benchmark": benchmark_fields(),
         "talk": talk_fields(),
     }
+
+
+def benchmark_fields() -> dict[str, str]:
+    """Return the table of the benchmark, how many worlds it has, each score, and what the worst training won."""
+    board = board_of([read_entry(file) for file in sorted((ROOT / "docs/benchmark").glob("*.json"))])
+    fields = {"board": board.markdown().strip(), "worlds": str(len(board.protocol.held_out))}
+    for standing in board.standings:
+        won = (standing.shares.mean(axis=2) > 1.0).sum(axis=1)
+        fields[standing.entry.name] = f"{standing.score.value:.2f}"
+        fields[f"{standing.entry.name}_worst"] = f"{won.min()} of {fields['worlds']}"
+    return fields
 
 
 def talk_fields() -> dict[str, str]:

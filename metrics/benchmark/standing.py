@@ -54,7 +54,7 @@ class Standing:
 
     @property
     def worst(self) -> float:
-        """Mean share in the tenth of the held-out worlds where it is lowest: in three of 27."""
+        """Mean share in the tenth of the held-out worlds where it is lowest: in three of 33."""
         return float(np.sort(self.by_world)[: max(1, round(_WORST * len(self.by_world)))].mean())
 
     @property

@@ -134,6 +134,7 @@ NEEDS = {
     "agilerl_ppo": "agilerl",
     "benchmarl_ippo": "benchmarl",
     "cleanrl_ppo": "torch",
+    "evolve_network": "numpy",
     "mappo": "torch",
     "optuna_search": "optuna",
     "rllib_ppo": "ray",
@@ -142,8 +143,9 @@ NEEDS = {
     "torchrl_ppo": "torchrl",
 }
 """Example -> module that it needs."""
-PLANNED = ("mappo", str(ROOT / "tests/support/tiny_plan.toml"), "1", "policy.npz")
-"""An example that trains by a plan, and what it is told."""
+PLANNED = {"evolve_network": 2, "mappo": 3}
+"""Example that trains by a plan -> lines that it prints in two stages."""
+TOLD = (str(ROOT / "tests/support/tiny_plan.toml"), "1", "policy.npz")
 LENGTH = re.compile(r"^N_DECISIONS = [\d_]+", re.MULTILINE)
 """How long an example trains: minutes, here until all of its code has run once."""
 
@@ -156,11 +158,11 @@ def test_an_example_trains_a_policy_that_runs(name, tmp_path):
     program, n_lengths = LENGTH.subn("N_DECISIONS = 1_000", (ROOT / "docs/examples" / f"{name}.py").read_text())
     assert n_lengths == (name not in ("optuna_search", *PLANNED))
     (tmp_path / "example.py").write_text(program)
-    command = [sys.executable, "-W", "ignore", "example.py", *(PLANNED[1:] if name in PLANNED else ())]
+    command = [sys.executable, "-W", "ignore", "example.py", *(TOLD if name in PLANNED else ())]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-4000:]
     if name in PLANNED:
-        assert done.stdout.count("reward per decision") == 3  # both stages: two rollouts and one
+        assert done.stdout.count("reward per decision") == PLANNED[name]
     policy = next(tmp_path.rglob("policy.*"))
     small = scenario("warehouse_small", n_robots=8, horizon_s=200.0)
     record = run_one(RunSpec(world=World(small), policy=str(policy), seed=1))

@@ -1,13 +1,11 @@
 """Entry files: what is written is read back, and a file that is no whole entry is refused in a clear line."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from metrics.benchmark import load_protocol, read_entry
-from metrics.benchmark.standing import standings_of
 from swarm_forage_env._internal.fields import ConfigError
 from tests.support.entries import TINY, made_up_entry
 
@@ -66,14 +64,3 @@ def test_an_entry_from_a_stranger_is_refused_by_the_name_of_the_field(change, me
     with pytest.raises(ConfigError, match=message) as refused:
         read_entry(file, protocol)
     assert str(file) in str(refused.value)
-
-
-def test_readme_tells_of_the_minute_what_its_entry_says():
-    root = Path(__file__).parents[3]
-    protocol = load_protocol()
-    (standing,) = standings_of([read_entry(root / "docs/benchmark/minute.json")], protocol)
-    won = (standing.shares.mean(axis=2) > 1.0).sum(axis=1)
-    assert len(won) == 10
-    words = " ".join((root / "README.md").read_text(encoding="utf-8").split())
-    told = f"{won.min()} of {len(protocol.held_out)} worlds"
-    assert f"the worst of ten such trainings beats the paper's four controllers in {told}" in words

@@ -116,10 +116,10 @@ def real():
     return load_protocol()
 
 
-def test_it_has_three_worlds_or_more_of_eight_kinds(real):
-    assert len(real.held_out) == 27
+def test_it_has_three_worlds_or_more_of_ten_kinds(real):
+    assert len(real.held_out) == 33
     kinds = [world.name.partition(",")[0] for world in real.held_out]
-    assert len({*kinds}) == 8
+    assert len({*kinds}) == 10
     assert min(kinds.count(kind) for kind in kinds) >= 3
 
 
