@@ -32,7 +32,7 @@ from scipy.stats import ttest_ind  # pyright: ignore[reportMissingTypeStubs]  (s
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from metrics.benchmark import board_of, read_entry
-from metrics.statistics import aggregate
+from metrics.statistics import ROUNDING, aggregate
 from scripts.results_numbers import results_fields, runs_fields
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -183,7 +183,7 @@ def benchmark_fields() -> dict[str, str]:
     board = board_of([read_entry(file) for file in sorted((ROOT / "docs/benchmark").glob("*.json"))])
     fields = {"board": board.markdown().strip(), "worlds": str(len(board.protocol.held_out))}
     for standing in board.standings:
-        won = (standing.shares.mean(axis=2) > 1.0).sum(axis=1)
+        won = (standing.shares.mean(axis=2) > 1.0 + ROUNDING).sum(axis=1)
         fields[standing.entry.name] = f"{standing.score.value:.2f}"
         fields[f"{standing.entry.name}_worst"] = f"{won.min()} of {fields['worlds']}"
     return fields

@@ -61,6 +61,8 @@ def evolve(envs, genes, scenario, n_decisions, rates, seed, rng):
     """Return the genes after a stage, in which the rate falls between two."""
     obs, infos = envs.reset(seed=seed, options={"scenario": scenario})
     n_rows, shape = envs.num_envs, (-1, envs.n_robots)
+    if envs.n_robots % 2:
+        sys.exit(f"Expected worlds whose largest swarm has an even number of robots, got {envs.n_robots}.")
     slope, square = np.zeros((2, len(genes)))
     n_generations = max(1, n_decisions // (n_rows * GENERATION))
     for number, rate in enumerate(np.linspace(*rates, n_generations), 1):
