@@ -36,6 +36,11 @@ class Protocol:
     """The worlds that count, named after their group: "corridor, long"."""
 
     @property
+    def groups(self) -> tuple[str, ...]:
+        """Group of each held-out world. Worlds of a group are alike, or one hall with different disturbances."""
+        return tuple(world.name.partition(", ")[0] for world in self.held_out)
+
+    @property
     def worlds(self) -> tuple[World, ...]:
         """All worlds, those to train in first."""
         return self.training + self.held_out

@@ -166,9 +166,10 @@ def variants(fields):
 
 
 def test_worlds_are_variants_sizes_and_what_disturbs():
-    names = ["source below", "2 robots", "4 robots", "slow", "noisy wheels"]
+    names = ["room, source below", "room, 2 robots", "room, 4 robots", "worn, slow", "worn, noisy wheels"]
     found = load_protocol(TINY)
-    assert [world.name for world in found.worlds] == ["training: here", *(f"room, {name}" for name in names)]
+    assert [world.name for world in found.worlds] == ["training: here", *names]
+    assert found.groups == ("room", "room", "room", "worn", "worn")
     assert [world.n_robots for world in found.held_out] == [4, 2, 4, 4, 4]
     assert [bool(world.wrappers) for world in found.held_out] == [False, False, False, True, True]
     middles = np.array(found.held_out[0].scenario.objects.object_positions_m)
