@@ -1,21 +1,21 @@
 """Evolution in one file: each robot tries a network of its own, and the swarm keeps what pays; no torch, no gradients.
 
-    python docs/examples/evolve_network.py docs/benchmark/plans/ippo.toml 3 seed_3.npz interface.frame_decisions=200
+    python docs/examples/evolve_network.py docs/benchmark/plans/ippo.toml 3 results/seed_3 interface.frame_decisions=200
 
 evolves one network in the worlds and stages of a plan, with its interface and seed 3; a value of the plan may be
-another one. In a generation, the two robots of each pair change the network by the same noise, one to either side. The
-network then moves towards the noise of robots that earned more than the others of their arena. This is the evolution
-strategy of Salimans et al. (2017), with robots as the population.
+another one. The folder gets evaluations and the best network. In a generation, the two robots of each pair change the
+network by the same noise, one to either side. The network then moves towards the noise of robots that earned more than
+the others of their arena. This is the evolution strategy of Salimans et al. (2017), with robots as the population.
 """
 
-import itertools
 import json
 import sys
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 
 from swarm_forage_env.policies.network import Network, NetworkAbout
+from swarm_forage_env.training.evaluation import Evaluator
 from swarm_forage_env.training.plan import read_plan
 from swarm_forage_env.views.gymnasium import SwarmVectorEnv
 
@@ -35,6 +35,12 @@ def layers_of(genes, n_columns, n_actions):
     sizes = [(n_columns, HIDDEN), (HIDDEN,), (HIDDEN, n_actions), (n_actions,)]
     parts = np.split(genes, np.cumsum([np.prod(size) for size in sizes])[:-1], axis=-1)
     return [part.reshape(*genes.shape[:-1], *size) for part, size in zip(parts, sizes, strict=True)]
+
+
+def network_of(genes, n_columns, n_actions):
+    weight_1, bias_1, weight_2, bias_2 = (part.astype(np.float32) for part in layers_of(genes, n_columns, n_actions))
+    about = NetworkAbout(interface=plan.interface, activation="tanh", samples=plan.samples)
+    return Network((weight_1, weight_2), (bias_1, bias_2), about)
 
 
 def earnings(envs, obs, infos, genes, rng):
@@ -57,14 +63,14 @@ def advantages(earned, is_there):
     return above / (np.sqrt((above**2).sum(axis=1, keepdims=True) / count) + 1e-8)
 
 
-def evolve(envs, genes, scenario, n_decisions, rates, seed, rng):
-    """Return the genes after a stage, in which the rate falls between two."""
-    obs, infos = envs.reset(seed=seed, options={"scenario": scenario})
+def evolve(envs, genes, scenario, done, end, rates, rng):
+    """Return the genes after a stage, which ends at so many decisions, and how many are done; the rate falls."""
+    obs, infos = envs.reset(seed=plan.seed, options={"scenario": scenario})
     n_rows, shape = envs.num_envs, (-1, envs.n_robots)
     if envs.n_robots % 2:
         sys.exit(f"Expected worlds whose largest swarm has an even number of robots, got {envs.n_robots}.")
     slope, square = np.zeros((2, len(genes)))
-    n_generations = max(1, n_decisions // (n_rows * GENERATION))
+    n_generations = -((done - end) // (n_rows * GENERATION))
     for number, rate in enumerate(np.linspace(*rates, n_generations), 1):
         noise = rng.normal(size=(n_rows // 2, len(genes))).astype(np.float32)
         noise = np.stack([noise, -noise], axis=1).reshape(n_rows, -1)
@@ -73,24 +79,28 @@ def evolve(envs, genes, scenario, n_decisions, rates, seed, rng):
         better = advantages(earned.reshape(shape), at_work.reshape(shape) > 0).ravel() @ noise
         slope, square = 0.9 * slope + 0.1 * better, 0.99 * square + 0.01 * better**2
         genes = genes + rate * slope / (1 - 0.9**number) / (np.sqrt(square / (1 - 0.99**number)) + 1e-8)
-        print(f"{n_rows * GENERATION * number:,}: {earned.sum() / at_work.sum():.4f} reward per decision", flush=True)
-    return genes
+        done += n_rows * GENERATION
+        print(f"{done:,}: {earned.sum() / at_work.sum():.4f} reward per decision", flush=True)
+        if evaluator.is_due(done):
+            evaluator.evaluate(network_of(genes, *envs.interface.widths), done)
+    return genes, done
 
 
 if __name__ == "__main__":
-    plan_file, seed, file, *settings = sys.argv[1:]
-    plan, seed, file = read_plan(plan_file), int(seed), Path(file)
-    changes = (setting.split("=") for setting in settings)
-    plan = plan.with_settings({name: json.loads(value) for name, value in changes})
-    rng = np.random.default_rng(seed)
-    stages = [(stage, SwarmVectorEnv(**plan.arenas_of(stage))) for stage in plan.stages]
-    n_columns, n_actions = stages[0][1].interface.widths
+    plan_file, seed, folder, *settings = sys.argv[1:]
+    changes = (setting.split("=") for setting in [*settings, f"seed={seed}"])
+    plan = read_plan(plan_file).with_settings({name: json.loads(value) for name, value in changes})
+    plan = replace(
+        plan,
+        stages=tuple(replace(stage, steps=TIMES * stage.steps) for stage in plan.stages),
+        evaluation=replace(plan.evaluation, every_steps=TIMES * plan.evaluation.every_steps),
+    )
+    evaluator = Evaluator(plan, folder, {"by": "evolution in plain numpy"})
+    rng = np.random.default_rng(plan.seed)
+    stages = [(stage, end, SwarmVectorEnv(**plan.arenas_of(stage))) for stage, end in plan.parts()]
+    n_columns, n_actions = stages[0][2].interface.widths
     first = rng.normal(size=(n_columns, HIDDEN)) / np.sqrt(n_columns)
-    genes = np.concatenate([first.ravel(), np.zeros(HIDDEN + HIDDEN * n_actions + n_actions)])
-    ends = RATE * (1.0 - np.cumsum([0, *(stage.steps for stage in plan.stages)]) / sum(s.steps for s in plan.stages))
-    for (stage, envs), rates in zip(stages, itertools.pairwise(ends), strict=True):
-        genes = evolve(envs, genes, dict(stage.scenario), TIMES * stage.steps, rates, seed, rng)
-    weight_1, bias_1, weight_2, bias_2 = (part.astype(np.float32) for part in layers_of(genes, n_columns, n_actions))
-    about = NetworkAbout(interface=plan.interface, activation="tanh", samples=True)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    Network((weight_1, weight_2), (bias_1, bias_2), about).save(file)
+    genes, done = np.concatenate([first.ravel(), np.zeros(HIDDEN + HIDDEN * n_actions + n_actions)]), 0
+    for stage, end, envs in stages:
+        rates = RATE * (1.0 - np.array([end - stage.steps, end]) / plan.total_steps)
+        genes, done = evolve(envs, genes, dict(stage.scenario), done, end, rates, rng)

@@ -1,15 +1,15 @@
 """MAPPO in one file: PPO whose critic sees the state of the arena; plain torch on a vector environment.
 
-    python docs/examples/mappo.py docs/benchmark/plans/ippo.toml 3 seed_3.npz interface.frame_decisions=200
+    python docs/examples/mappo.py docs/benchmark/plans/ippo.toml 3 results/seed_3 interface.frame_decisions=200
 
 trains in the worlds and stages of a plan, with its options and seed 3; a value of the plan may be another one. The
-critic values a robot by the state of its arena and by what the robot sees. Arenas start anew within the step that ends
-them: where one was truncated, the value of its last state is added. Steps of robots not at work are left out.
+folder gets evaluations and the best network. The critic values a robot by the state of its arena and by what the robot
+sees. Arenas start anew within the step that ends them: where one was truncated, the value of its last state is added.
+Steps of robots not at work are left out.
 """
 
 import json
 import sys
-from pathlib import Path
 
 import numpy as np
 import torch
@@ -18,6 +18,7 @@ from torch.distributions import Categorical
 
 from swarm_forage_env.contract.policy import state_size
 from swarm_forage_env.policies.network import Network, NetworkAbout
+from swarm_forage_env.training.evaluation import Evaluator
 from swarm_forage_env.training.plan import read_plan
 from swarm_forage_env.views.gymnasium import SwarmVectorEnv
 
@@ -48,7 +49,8 @@ def learn(
     envs,
     seed,
     scenario,
-    n_decisions,
+    done,
+    end,
     *,
     learning_rate=3e-4,
     n_steps=128,
@@ -59,11 +61,11 @@ def learn(
     clip_range=0.2,
     ent_coef=0.003,
 ):
-    """Train actor and critic for a stage."""
+    """Train actor and critic for a stage, which ends at so many decisions; returns how many are done."""
     obs, infos = envs.reset(seed=seed, options={"scenario": scenario})
     n_rows, place = envs.num_envs, torch.arange(envs.num_envs)
     optimizer.param_groups[0]["lr"] = learning_rate
-    for rollout_number in range(1, max(1, n_decisions // (n_steps * n_rows)) + 1):
+    while done < end:
         seen, states = torch.zeros(n_steps, *obs.shape), torch.zeros(n_steps, *envs.state().shape)
         places = place + n_rows * torch.arange(n_steps)[:, None]  # (steps, rows), in the states of all steps
         at_work = torch.zeros(n_steps, n_rows, dtype=torch.bool)
@@ -103,19 +105,24 @@ def learn(
                 (error - gain - ent_coef * choices.entropy().mean()).backward()
                 nn.utils.clip_grad_norm_(optimizer.param_groups[0]["params"], 0.5)
                 optimizer.step()
-        print(f"{n_steps * n_rows * rollout_number:,}: {rewards.mean():.4f} reward per decision", flush=True)
+        done += n_steps * n_rows
+        print(f"{done:,}: {rewards.mean():.4f} reward per decision", flush=True)
+        if evaluator.is_due(done):
+            about = NetworkAbout(interface=plan.interface, activation="tanh", samples=plan.samples)
+            evaluator.evaluate(Network.from_state_dict(actor.state_dict(), about), done)
+    return done
 
 
 if __name__ == "__main__":
-    plan_file, seed, file, *settings = sys.argv[1:]
-    plan, seed, file = read_plan(plan_file), int(seed), Path(file)
-    changes = (setting.split("=") for setting in settings)
-    plan = plan.with_settings({name: json.loads(value) for name, value in changes})
+    plan_file, seed, folder, *settings = sys.argv[1:]
+    changes = (setting.split("=") for setting in [*settings, f"seed={seed}"])
+    plan = read_plan(plan_file).with_settings({name: json.loads(value) for name, value in changes})
+    evaluator = Evaluator(plan, folder, {"by": "MAPPO in plain torch"})
     torch.set_num_threads(1)
-    torch.manual_seed(seed)
+    torch.manual_seed(plan.seed)
     stages = [(stage, SwarmVectorEnv(**plan.arenas_of(stage))) for stage in plan.stages]
     envs = stages[0][1]
-    envs.reset(seed=seed)
+    envs.reset(seed=plan.seed)
     n_columns, n_actions = envs.interface.widths
     layers = (nn.Linear(n_columns, WIDTH), nn.Tanh(), nn.Linear(WIDTH, WIDTH), nn.Tanh(), nn.Linear(WIDTH, n_actions))
     actor, critic = nn.Sequential(*layers), Critic(n_columns, envs.state().shape[1], envs.n_robots)
@@ -126,8 +133,7 @@ if __name__ == "__main__":
     nn.init.orthogonal_(actor[-1].weight, 0.01)
     nn.init.orthogonal_(critic.onwards[-1].weight, 1.0)
     optimizer = torch.optim.Adam([*actor.parameters(), *critic.parameters()], eps=1e-5)
+    done = end = 0
     for stage, envs in stages:
-        learn(envs, seed, dict(stage.scenario), stage.steps, **{**plan.options, **stage.options})
-    about = NetworkAbout(interface=plan.interface, activation="tanh", samples=True)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    Network.from_state_dict(actor.state_dict(), about).save(file)
+        end += stage.steps
+        done = learn(envs, plan.seed, dict(stage.scenario), done, end, **{**plan.options, **stage.options})
