@@ -85,6 +85,7 @@ def draw_trainings(
     path: str | Path,
     trainings: Mapping[str, Sequence[tuple[int, float, float]]],
     *,
+    methods: Sequence[str],
     beside: Mapping[str, tuple[float, float]],
     stage_ends: Sequence[int],
     title: str,
@@ -97,6 +98,7 @@ def draw_trainings(
         path: File to write; as in `saved_figure`, whose errors this has.
         trainings: Name -> each evaluation: decisions before it, what the scenario counts, and mean fraction of active
             robots in interference.
+        methods: One per training; those of one method look alike, and the legend names the method.
         beside: Controllers to compare with -> what they achieve, and their interference, NaN if unknown.
         stage_ends: Decisions at which the stages of the training end.
         title: Headline.
@@ -105,12 +107,13 @@ def draw_trainings(
     """
     with saved_figure(path, (9.0, 5.0), title=title, style=style) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
-        found = looks((*trainings, *beside))
-        # Five trainings have a colour twice, so each has a marker of its own.
-        for look, marker, evaluations in zip(found, cycle(MARKERS), trainings.values(), strict=False):
+        found = looks((*methods, *beside))
+        # Five methods have a colour twice, so each has a marker of its own.
+        markers = dict(zip(dict.fromkeys(methods), cycle(MARKERS), strict=False))
+        for method, look, evaluations in zip(methods, found, trainings.values(), strict=False):
             steps, *curves = np.transpose(evaluations)
             for axes, curve in zip((upper, lower), curves, strict=True):
-                axes.plot(steps / 1e6, curve, color=look.colour, label=look.name, clip_on=False, marker=marker)
+                axes.plot(steps / 1e6, curve, color=look.colour, label=look.name, clip_on=False, marker=markers[method])
         dashes = ("--", "-.", ":", (0, (6, 1))) * len(beside)
         for look, levels, dash in zip(found[len(trainings) :], beside.values(), dashes, strict=False):
             for axes, level in zip((upper, lower), levels, strict=True):
@@ -125,4 +128,6 @@ def draw_trainings(
             for end in stage_ends[:-1]:
                 axes.axvline(end / 1e6, color="black", linestyle=":", linewidth=1)
         # Beside the axes: levels of others may lie anywhere in them. Not at the top, where headlines may be wide.
-        figure.legend(*upper.get_legend_handles_labels(), loc="outside right center")
+        handles, labels = upper.get_legend_handles_labels()
+        once = dict(zip(labels, handles, strict=True))
+        figure.legend(once.values(), once.keys(), loc="outside right center")

@@ -140,13 +140,18 @@ class Trainings(Answer):
         return bool(self.trainings)
 
     def draw(self, path: str | Path, *, style: FigureStyle = SCREEN) -> None:
-        """Draw performance and interference over decisions; raises ImportError without matplotlib."""
+        """Draw performance and interference over decisions; raises ImportError without matplotlib.
+
+        Trainings of several folders look alike if they lie in the same one: they are seeds of one method.
+        """
         from swarm_forage_env.rendering.plots import draw_trainings
 
         is_one = len(self.trainings) == 1
+        above = [one.folder.resolve().parent.name for one in self.trainings]  # seeds of one method lie in one folder
         draw_trainings(
             Path(path),
             {one.label: [(each.steps, *each.levels) for each in one.evaluations] for one in self.trainings},
+            methods=above if len(set(above)) > 1 else [one.label for one in self.trainings],
             beside=self.beside,
             stage_ends=[end for _, end in self.plan.parts(self.trainings[0].evaluations)] if is_one else (),
             title=f"{'training' if is_one else 'trainings'} in {place_of(self.plan)}",

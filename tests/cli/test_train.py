@@ -11,6 +11,7 @@ import pytest
 
 from swarm_forage_env.cli import training_report
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.training.curves import curves
 from swarm_forage_env.training.evaluation import EvaluationPlan
 from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.recipe import recipe
@@ -152,6 +153,18 @@ def test_trainings_are_drawn_beside_others(command, monkeypatch):
     assert code == 1
     assert "No picture without matplotlib" in err
     assert not Path("first/curves.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("folders", "methods"), [(("a/s0", "a/s1", "b/s0"), ["a", "a", "b"]), (("a/s0", "a/s1"), ["s0", "s1"])]
+)
+def test_seeds_of_several_methods_look_like_their_method(monkeypatch, tmp_path, folders, methods):
+    drawn = []
+    monkeypatch.setattr("swarm_forage_env.rendering.plots.draw_trainings", lambda *_, **given: drawn.append(given))
+    for folder in folders:
+        trained(tmp_path / folder, PLAN, evaluated(10, 1.0, world=PLAN.judging_worlds[0].name))
+    curves([tmp_path / folder for folder in folders], beside=()).draw("all.png")
+    assert drawn[0]["methods"] == methods
 
 
 @pytest.fixture
