@@ -30,7 +30,8 @@ OWN = state_size(1, 0)
 class Critic(nn.Module):
     """Value of each robot by what it sees (rows, d), by the state (arenas, S) of its arena and its own part of that.
 
-    A state begins with OWN numbers for each of its N robots; `place` (rows,) is N times the arena plus the robot.
+    A state begins with OWN numbers for each of its N robots; `place` (rows,) is N times the arena plus the robot. Its
+    thousands of numbers are made small: else a step of Adam moves the value by what they say of the arena alone.
     """
 
     def __init__(self, n_columns, n_state, n_robots):
@@ -41,7 +42,7 @@ class Critic(nn.Module):
 
     def forward(self, seen, states, place):
         own = states[:, : self.n_robots * OWN].reshape(-1, OWN)[place]
-        of_arenas = self.of_state(states)[place // self.n_robots]
+        of_arenas = self.of_state(states / states.shape[1] ** 0.5)[place // self.n_robots]
         return self.onwards(self.of_robot(torch.hstack([seen, own])) + of_arenas)[:, 0]
 
 
