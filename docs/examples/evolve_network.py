@@ -2,10 +2,11 @@
 
     python docs/examples/evolve_network.py docs/benchmark/plans/ippo.toml 3 results/seed_3 interface.frame_decisions=200
 
-evolves one network in the worlds and stages of a plan, with its interface and seed 3; a value of the plan may be
-another one. The folder gets evaluations and the best network. In a generation, the two robots of each pair change the
-network by the same noise, one to either side. The network then moves towards the noise of robots that earned more than
-the others of their arena. This is the evolution strategy of Salimans et al. (2017), with robots as the population.
+evolves one network by a plan and seed 3: in its worlds, stages and interface, with ten times its decisions; a value of
+it may be another one. The folder gets evaluations and the best network. In a generation, the two robots of each pair
+change the network by the same noise, one to either side. The network then moves towards the noise of robots that earned
+more than the others of their arena. This is the evolution strategy of Salimans et al. (2017), with robots as the
+population.
 """
 
 import json
@@ -65,7 +66,7 @@ def advantages(earned, is_there):
 
 def evolve(envs, genes, scenario, done, end, rates, rng):
     """Return the genes after a stage, which ends at so many decisions, and how many are done; the rate falls."""
-    obs, infos = envs.reset(seed=plan.seed, options={"scenario": scenario})
+    obs, infos = envs.reset(seed=int(rng.integers(2**31)), options={"scenario": scenario})
     n_rows, shape = envs.num_envs, (-1, envs.n_robots)
     if envs.n_robots % 2:
         sys.exit(f"Expected worlds whose largest swarm has an even number of robots, got {envs.n_robots}.")

@@ -2,10 +2,10 @@
 
     python docs/examples/mappo.py docs/benchmark/plans/ippo.toml 3 results/seed_3 interface.frame_decisions=200
 
-trains in the worlds and stages of a plan, with its options and seed 3; a value of the plan may be another one. The
-folder gets evaluations and the best network. The critic values a robot by the state of its arena and by what the robot
-sees. Arenas start anew within the step that ends them: where one was truncated, the value of its last state is added.
-Steps of robots not at work are left out.
+trains by a plan and seed 3: in its worlds and stages, with its interface and options; a value of it may be another
+one. The folder gets evaluations and the best network. The critic values a robot by the state of its arena and by what
+the robot sees. Arenas start anew within the step that ends them: where one was truncated, the value of its last state
+is added. Steps of robots not at work are left out.
 """
 
 import json
@@ -31,7 +31,7 @@ class Critic(nn.Module):
     """Value of each robot by what it sees (rows, d), by the state (arenas, S) of its arena and its own part of that.
 
     A state begins with OWN numbers for each of its N robots; `place` (rows,) is N times the arena plus the robot. Its
-    thousands of numbers are made small: else a step of Adam moves the value by what they say of the arena alone.
+    thousands of numbers are divided by the root of their number: else one step of Adam changes values too much.
     """
 
     def __init__(self, n_columns, n_state, n_robots):
@@ -48,22 +48,21 @@ class Critic(nn.Module):
 
 def learn(
     envs,
-    seed,
     scenario,
     done,
     end,
     *,
     learning_rate=3e-4,
-    n_steps=128,
-    batch_size=2048,
-    n_epochs=4,
+    n_steps=2048,
+    batch_size=64,
+    n_epochs=10,
     gamma=0.99,
     gae_lambda=0.95,
     clip_range=0.2,
-    ent_coef=0.003,
+    ent_coef=0.0,
 ):
-    """Train actor and critic for a stage, which ends at so many decisions; returns how many are done."""
-    obs, infos = envs.reset(seed=seed, options={"scenario": scenario})
+    """Train until a stage ends; returns how many decisions are done. Defaults are those of stable-baselines3."""
+    obs, infos = envs.reset(seed=int(torch.randint(2**31, ())), options={"scenario": scenario})
     n_rows, place = envs.num_envs, torch.arange(envs.num_envs)
     optimizer.param_groups[0]["lr"] = learning_rate
     while done < end:
@@ -98,7 +97,7 @@ def learn(
                 rows, places_of_rows, taken, before, advantage, returns = (part[chosen] for part in rollout)
                 choices = Categorical(logits=actor(rows))
                 ratio = (choices.log_prob(taken) - before).exp()
-                advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
+                advantage = (advantage - advantage.mean()) / (advantage.std(correction=0) + 1e-8)
                 clipped = ratio.clamp(1 - clip_range, 1 + clip_range)
                 gain = torch.min(advantage * ratio, advantage * clipped).mean()
                 error = 0.5 * (critic(rows, states.flatten(0, 1), places_of_rows) - returns).square().mean()
@@ -121,8 +120,8 @@ if __name__ == "__main__":
     evaluator = Evaluator(plan, folder, {"by": "MAPPO in plain torch"})
     torch.set_num_threads(1)
     torch.manual_seed(plan.seed)
-    stages = [(stage, SwarmVectorEnv(**plan.arenas_of(stage))) for stage in plan.stages]
-    envs = stages[0][1]
+    stages = [(stage, end, SwarmVectorEnv(**plan.arenas_of(stage))) for stage, end in plan.parts()]
+    envs = stages[0][2]
     envs.reset(seed=plan.seed)
     n_columns, n_actions = envs.interface.widths
     layers = (nn.Linear(n_columns, WIDTH), nn.Tanh(), nn.Linear(WIDTH, WIDTH), nn.Tanh(), nn.Linear(WIDTH, n_actions))
@@ -134,7 +133,6 @@ if __name__ == "__main__":
     nn.init.orthogonal_(actor[-1].weight, 0.01)
     nn.init.orthogonal_(critic.onwards[-1].weight, 1.0)
     optimizer = torch.optim.Adam([*actor.parameters(), *critic.parameters()], eps=1e-5)
-    done = end = 0
-    for stage, envs in stages:
-        end += stage.steps
-        done = learn(envs, plan.seed, dict(stage.scenario), done, end, **{**plan.options, **stage.options})
+    done = 0
+    for stage, end, envs in stages:
+        done = learn(envs, dict(stage.scenario), done, end, **{**plan.options, **stage.options})

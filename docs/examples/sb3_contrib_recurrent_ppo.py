@@ -2,8 +2,8 @@
 
     python docs/examples/sb3_contrib_recurrent_ppo.py docs/benchmark/plans/ippo.toml 3 results/seed_3
 
-trains in the worlds and stages of a plan, with its options and seed 3; a value of the plan may be another one. The
-folder gets evaluations and the best model, which runs from its zip file with a memory per robot.
+trains by a plan and seed 3: in its worlds and stages, with its interface, hidden layers and options; a value of it may
+be another one. The folder gets evaluations and the best model, which runs from its zip file with a memory per robot.
 """
 
 import json
@@ -20,7 +20,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from swarm_forage_env.policies.model_files import ModelPolicy
 from swarm_forage_env.training.evaluation import Evaluator, best_of
 from swarm_forage_env.training.plan import read_plan
-from swarm_forage_env.training.sb3 import SwarmVecEnv
+from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, SwarmVecEnv
 from swarm_forage_env.training.sb3.export import note_interface
 from swarm_forage_env.training.sb3.training import training_seed
 
@@ -29,10 +29,8 @@ ROWS = ("observations", "actions", "values", "log_probs", "advantages", "returns
 MEMORIES = ("hidden_states_pi", "cell_states_pi", "hidden_states_vf", "cell_states_vf")
 
 
-class RolloutsOfRobots(RecurrentRolloutBuffer):
-    """Minibatches of whole sequences from all arenas; steps of robots not at work teach nothing."""
-
-    active_column: int
+class RolloutsOfRobots(RecurrentRolloutBuffer, ActiveRolloutBuffer):
+    """Minibatches of rows from all arenas; steps of robots not at work teach nothing, but fill them."""
 
     def compute_returns_and_advantage(self, *args, **kwargs):
         super().compute_returns_and_advantage(*args, **kwargs)
@@ -44,7 +42,7 @@ class RolloutsOfRobots(RecurrentRolloutBuffer):
 
     def _get_samples(self, *args, **kwargs):
         samples = super()._get_samples(*args, **kwargs)
-        return samples._replace(mask=(samples.observations[:, self.active_column] == 1.0).float())
+        return samples._replace(mask=self.at_work(samples.observations).float())
 
 
 class Watch(BaseCallback):
@@ -88,8 +86,8 @@ if __name__ == "__main__":
         done = before.num_timesteps if before else 0
         options = {**plan.options, **stage.options, "seed": training_seed(plan.seed, done)}
         model = RecurrentPPO("MlpLstmPolicy", env, policy_kwargs=network, device="cpu", **options)
-        model.rollout_buffer.__class__ = RolloutsOfRobots
-        model.rollout_buffer.active_column = env.rollout_buffer_kwargs["active_column"]
+        model.rollout_buffer.__class__ = RolloutsOfRobots  # the algorithm takes no class for it
+        model.rollout_buffer._active_column = env.rollout_buffer_kwargs["active_column"]
         note_interface(model, env.interface.config, samples=plan.samples)
         if before:
             model.set_parameters(before.get_parameters())

@@ -118,6 +118,7 @@ class ModelPolicy(LearnedPolicy):
         import torch  # pyright: ignore[reportMissingImports] - an extra
 
         with torch.random.fork_rng(devices=()):
+            # The generator itself: torch.manual_seed traces the stack, which takes longer than a decision.
             torch.default_generator.manual_seed(int(rng.integers(2**31)) if self._draws else 0)
             actions, self._memory = self._network.predict(rows, state=self._memory, deterministic=not self._draws)
         return actions
