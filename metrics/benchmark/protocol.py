@@ -37,7 +37,7 @@ class Protocol:
 
     @property
     def groups(self) -> tuple[str, ...]:
-        """Group of each held-out world. Worlds of a group are alike, or one hall with different disturbances."""
+        """Group of each held-out world; what they have in common is in `benchmark.toml`."""
         return tuple(world.name.partition(", ")[0] for world in self.held_out)
 
     @property

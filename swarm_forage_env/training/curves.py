@@ -135,6 +135,21 @@ class Trainings(Answer):
         return (Sheet.of(header, rows, title=f"at their best in {place_of(self.plan)}", notes=notes),)
 
     @property
+    def methods(self) -> list[str]:
+        """What each training is drawn as: its label, or the folder above it where others are seeds of the same method.
+
+        Seeds of one method lie in one folder, and their plans differ in nothing else. Those of a single method have
+        their labels.
+        """
+        of = [(one.folder.resolve().parent, replace(one.plan, seed=0)) for one in self.trainings]
+        if all(method == of[0] for method in of):
+            return [one.label for one in self.trainings]
+        return [
+            one.folder.parent.as_posix() if of.count(method) > 1 else one.label
+            for method, one in zip(of, self.trainings, strict=True)
+        ]
+
+    @property
     def has_picture(self) -> bool:
         """Whether there is an evaluation to draw."""
         return bool(self.trainings)
@@ -142,16 +157,15 @@ class Trainings(Answer):
     def draw(self, path: str | Path, *, style: FigureStyle = SCREEN) -> None:
         """Draw performance and interference over decisions; raises ImportError without matplotlib.
 
-        Trainings of several folders look alike if they lie in the same one: they are seeds of one method.
+        Seeds of one method look alike where there are several methods.
         """
         from swarm_forage_env.rendering.plots import draw_trainings
 
         is_one = len(self.trainings) == 1
-        above = [one.folder.resolve().parent.name for one in self.trainings]  # seeds of one method lie in one folder
         draw_trainings(
             Path(path),
             {one.label: [(each.steps, *each.levels) for each in one.evaluations] for one in self.trainings},
-            methods=above if len(set(above)) > 1 else [one.label for one in self.trainings],
+            methods=self.methods,
             beside=self.beside,
             stage_ends=[end for _, end in self.plan.parts(self.trainings[0].evaluations)] if is_one else (),
             title=f"{'training' if is_one else 'trainings'} in {place_of(self.plan)}",

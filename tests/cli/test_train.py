@@ -155,16 +155,28 @@ def test_trainings_are_drawn_beside_others(command, monkeypatch):
     assert not Path("first/curves.png").exists()
 
 
-@pytest.mark.parametrize(
-    ("folders", "methods"), [(("a/s0", "a/s1", "b/s0"), ["a", "a", "b"]), (("a/s0", "a/s1"), ["s0", "s1"])]
-)
-def test_seeds_of_several_methods_look_like_their_method(monkeypatch, tmp_path, folders, methods):
-    drawn = []
-    monkeypatch.setattr("swarm_forage_env.rendering.plots.draw_trainings", lambda *_, **given: drawn.append(given))
-    for folder in folders:
-        trained(tmp_path / folder, PLAN, evaluated(10, 1.0, world=PLAN.judging_worlds[0].name))
-    curves([tmp_path / folder for folder in folders], beside=()).draw("all.png")
-    assert drawn[0]["methods"] == methods
+def test_seeds_of_several_methods_look_alike(command, monkeypatch):
+    pytest.importorskip("matplotlib")
+    figures = []
+
+    def keep(figure, path, **_):
+        figures.append(figure)
+        Path(path).touch()
+
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", keep)
+    told = evaluated(10, 1.0, world=PLAN.judging_worlds[0].name), evaluated(20, 2.0, world=PLAN.judging_worlds[0].name)
+    for folder, rate in (("a/s0", 0.1), ("a/s1", 0.1), ("a/s2", 0.2), ("b/s0", 0.1)):
+        seed = int(folder[-1])
+        trained(Path(folder), dataclasses.replace(PLAN, seed=seed, options={"learning_rate": rate}), *told)
+    for folders, names, looks in (
+        (("a/s0", "a/s1", "a/s2", "b/s0"), ["a", "s2", "b/s0"], 3),  # s2 learnt at another rate
+        (("a/s0", "a/s1"), ["s0", "s1"], 2),
+    ):
+        curves(folders, beside=()).draw("all.png")
+        (legend,) = figures[-1].legends
+        lines = figures[-1].axes[0].lines
+        assert [text.get_text() for text in legend.get_texts()] == names
+        assert (len(lines), len({(line.get_color(), line.get_marker()) for line in lines})) == (len(folders), looks)
 
 
 @pytest.fixture

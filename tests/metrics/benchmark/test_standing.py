@@ -88,7 +88,7 @@ def test_the_interval_counts_trainings(protocol):
 
 @pytest.mark.parametrize("of_trainings", [0.03, 0.15])
 def test_95_percent_of_intervals_hold_the_truth(of_trainings):
-    """Trainings, groups and worlds differ, with effects of their own and together, as those of the entries do."""
+    """Trainings, groups and worlds differ, with effects of their own and together; worlds of a group are alike."""
     rng = np.random.default_rng(2)
     n, groups = 150, load_protocol().groups
     of_groups = rng.normal(size=(n, 1, len(groups), 1))[:, :, [groups.index(name) for name in groups]]
