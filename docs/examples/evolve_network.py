@@ -9,12 +9,12 @@ more than the others of their arena. This is the evolution strategy of Salimans 
 population.
 """
 
-import json
 import sys
 from dataclasses import replace
 
 import numpy as np
 
+from swarm_forage_env.cli.worlds import parse_setting
 from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.training.evaluation import Evaluator
 from swarm_forage_env.training.plan import read_plan
@@ -88,9 +88,10 @@ def evolve(envs, genes, scenario, done, end, rates, rng):
 
 
 if __name__ == "__main__":
+    if len(sys.argv) < 4:
+        sys.exit(__doc__)
     plan_file, seed, folder, *settings = sys.argv[1:]
-    changes = (setting.split("=") for setting in [*settings, f"seed={seed}"])
-    plan = read_plan(plan_file).with_settings({name: json.loads(value) for name, value in changes})
+    plan = read_plan(plan_file).with_settings(dict(map(parse_setting, [*settings, f"seed={seed}"])))
     plan = replace(
         plan,
         stages=tuple(replace(stage, steps=TIMES * stage.steps) for stage in plan.stages),

@@ -3,12 +3,11 @@
     python docs/examples/mappo.py docs/benchmark/plans/ippo.toml 3 results/seed_3 interface.frame_decisions=200
 
 trains by a plan and seed 3: in its worlds and stages, with its interface and options; a value of it may be another
-one. The folder gets evaluations and the best network. The critic values a robot by the state of its arena and by what
-the robot sees. Arenas start anew within the step that ends them: where one was truncated, the value of its last state
-is added. Steps of robots not at work are left out.
+one. Networks are always two layers of 64 with tanh. The folder gets evaluations and the best network. The critic values
+a robot by the state of its arena and by what the robot sees. Arenas start anew within the step that ends them: where
+one was truncated, the value of its last state is added. Steps of robots not at work are left out.
 """
 
-import json
 import sys
 
 import numpy as np
@@ -16,6 +15,7 @@ import torch
 from torch import nn
 from torch.distributions import Categorical
 
+from swarm_forage_env.cli.worlds import parse_setting
 from swarm_forage_env.contract.policy import state_size
 from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.training.evaluation import Evaluator
@@ -114,9 +114,12 @@ def learn(
 
 
 if __name__ == "__main__":
+    if len(sys.argv) < 4:
+        sys.exit(__doc__)
     plan_file, seed, folder, *settings = sys.argv[1:]
-    changes = (setting.split("=") for setting in [*settings, f"seed={seed}"])
-    plan = read_plan(plan_file).with_settings({name: json.loads(value) for name, value in changes})
+    plan = read_plan(plan_file).with_settings(dict(map(parse_setting, [*settings, f"seed={seed}"])))
+    if plan.algorithm != "ppo" or plan.starts > 1:
+        sys.exit(f"Expected a plan of ppo with one start, got {plan.algorithm} with {plan.starts}.")
     evaluator = Evaluator(plan, folder, {"by": "MAPPO in plain torch"})
     torch.set_num_threads(1)
     torch.manual_seed(plan.seed)

@@ -1,12 +1,12 @@
-"""RecurrentPPO of sb3-contrib, whose robots learn what to remember: pip install sb3-contrib.
+r"""RecurrentPPO of sb3-contrib, whose robots learn what to remember: pip install sb3-contrib.
 
-    python docs/examples/sb3_contrib_recurrent_ppo.py docs/benchmark/plans/ippo.toml 3 results/seed_3
+    python docs/examples/sb3_contrib_recurrent_ppo.py docs/benchmark/plans/ippo.toml 3 results/seed_3 \
+        interface.frame_decisions=200 interface.site_memory=false options.batch_size=8192
 
 trains by a plan and seed 3: in its worlds and stages, with its interface, hidden layers and options; a value of it may
 be another one. The folder gets evaluations and the best model, which runs from its zip file with a memory per robot.
 """
 
-import json
 import sys
 from functools import partial
 from pathlib import Path
@@ -17,11 +17,12 @@ from sb3_contrib import RecurrentPPO
 from sb3_contrib.common.recurrent.buffers import RecurrentRolloutBuffer
 from stable_baselines3.common.callbacks import BaseCallback
 
+from swarm_forage_env.cli.worlds import parse_setting
 from swarm_forage_env.policies.model_files import ModelPolicy
 from swarm_forage_env.training.evaluation import Evaluator, best_of
 from swarm_forage_env.training.plan import read_plan
 from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, SwarmVecEnv
-from swarm_forage_env.training.sb3.export import note_interface
+from swarm_forage_env.training.sb3.export import ACTIVATION_CLASSES, note_interface
 from swarm_forage_env.training.sb3.training import training_seed
 
 CELLS = 64
@@ -68,21 +69,29 @@ class Watch(BaseCallback):
             return
         self.model.save(latest)
         evaluation = self.evaluator.evaluate(None, steps, policy=partial(ModelPolicy, latest))
-        print(f"{steps:,}: {evaluation.reached:.3f}", flush=True)
+        print(f"{steps:,}: {evaluation.reached:.3f} of the baselines", flush=True)
         if best_of(self.evaluator.evaluations) is evaluation:
             latest.replace(self.folder / "policy.zip")
 
 
 if __name__ == "__main__":
+    if len(sys.argv) < 4:
+        sys.exit(__doc__)
     plan_file, seed, folder, *settings = sys.argv[1:]
-    changes = (setting.split("=") for setting in [*settings, f"seed={seed}"])
-    plan = read_plan(plan_file).with_settings({name: json.loads(value) for name, value in changes})
+    plan = read_plan(plan_file).with_settings(dict(map(parse_setting, [*settings, f"seed={seed}"])))
     torch.set_num_threads(1)
+    if plan.algorithm != "ppo" or plan.starts > 1 or plan.in_runs or plan.temperature != 1.0:
+        sys.exit(f"Expected a plan of ppo with one start, without in_runs and temperature, got {plan_file}.")
+    Path(folder).mkdir(parents=True, exist_ok=True)
     watch, before = Watch(Evaluator(plan, folder, {"by": "RecurrentPPO of sb3-contrib"}), Path(folder)), None
     for stage, end in plan.parts():
         env = SwarmVecEnv(**plan.arenas_of(stage))
         env.set_options({"scenario": dict(stage.scenario)})
-        network = {"lstm_hidden_size": CELLS, "net_arch": list(plan.hidden)}
+        network = {
+            "lstm_hidden_size": CELLS,
+            "net_arch": list(plan.hidden),
+            "activation_fn": ACTIVATION_CLASSES[plan.activation],
+        }
         done = before.num_timesteps if before else 0
         options = {**plan.options, **stage.options, "seed": training_seed(plan.seed, done)}
         model = RecurrentPPO("MlpLstmPolicy", env, policy_kwargs=network, device="cpu", **options)
