@@ -57,7 +57,9 @@ class Training:
     @property
     def policy(self) -> str:
         """File of that network or model."""
-        return (self.folder / (POLICY_FILE if self.plan.algorithm in EXPORTABLE else MODEL_FILE)).as_posix()
+        path = self.folder / (POLICY_FILE if self.plan.algorithm in EXPORTABLE else MODEL_FILE)
+        model = path.with_suffix(".zip")  # of a learner that is not ours
+        return (model if model.exists() else path).as_posix()
 
     @property
     def is_finished(self) -> bool:
@@ -117,7 +119,8 @@ class Trainings(Answer):
             for one in self.trainings
         ]
         sound = [one for one in self.trainings if one.label not in self.failures]
-        is_averaged = len(sound) > 1 and all(replace(one.plan, seed=self.plan.seed) == self.plan for one in sound)
+        of, seeds = _methods(sound), {one.plan.seed for one in sound}
+        is_averaged = len(sound) > 1 and len(seeds) == len(sound) and of.count(of[0]) == len(of)
         if is_averaged:
             from metrics.statistics import aggregate  # late: see evaluation.baseline_runs
 
@@ -141,8 +144,8 @@ class Trainings(Answer):
         Seeds of one method lie in one folder, and their plans differ in nothing else. Those of a single method have
         their labels.
         """
-        of = [(one.folder.resolve().parent, replace(one.plan, seed=0)) for one in self.trainings]
-        if all(method == of[0] for method in of):
+        of = _methods(self.trainings)
+        if of.count(of[0]) == len(of):
             return [one.label for one in self.trainings]
         return [
             one.folder.parent.as_posix() if of.count(method) > 1 else one.label
@@ -172,6 +175,11 @@ class Trainings(Answer):
             ylabel=counted_in(self.plan),
             style=style,
         )
+
+
+def _methods(trainings: Sequence[Training]) -> list[tuple[Path, TrainingPlan]]:
+    """Return what trainings of one method have in common."""
+    return [(one.folder.resolve().parent, replace(one.plan, seed=0)) for one in trainings]
 
 
 def beside_baseline(trainings: Sequence[Training], failures: Mapping[str, str] | None = None) -> Trainings:
