@@ -269,7 +269,7 @@ def known_keys(mapping: Iterable[str], known: Iterable[str], what: str = "key", 
     names = tuple(known)
     for key in mapping:
         if key not in names:
-            raise UnknownNameError(f"Unknown {what} {f'{prefix}{key}'!r}.{suggestion(str(key), names)}")
+            raise UnknownNameError(f"Unknown {what} {f'{prefix}{key}'!r}.{suggestion(str(key), names, prefix=prefix)}")
 
 
 def known_name(what: str, name: Any, known: Iterable[str], *, all_by: str = "") -> None:

@@ -165,11 +165,12 @@ def nearest(name: str, known: Iterable[str]) -> list[str]:
     return difflib.get_close_matches(name, list(known), n=_MOST_NEAR, cutoff=_NEAR)
 
 
-def suggestion(name: str, known: Iterable[str]) -> str:
+def suggestion(name: str, known: Iterable[str], *, prefix: str = "") -> str:
     """Return " Did you mean ...?" with the nearest known name, or an empty string; case does not matter."""
     spelt = {each.lower(): each for each in known}
-    close = difflib.get_close_matches(name.lower(), spelt, n=1)
-    return f" Did you mean {spelt[close[0]]!r}?" if close else ""
+    longer = [each for each in spelt if name and each.startswith(name.lower())]
+    close = difflib.get_close_matches(name.lower(), spelt, n=1) or longer
+    return f" Did you mean {prefix + spelt[close[0]]!r}?" if close else ""
 
 
 def install_command(extra: str) -> str:

@@ -133,7 +133,7 @@ def test_a_model_without_a_note_is_run_with_the_length_of_its_decisions(command)
     assert len(json.loads(out)["runs"]) == 2
     code, _, err = command("run", "model.zip:decision_tick=5", *WORLD)
     assert (code, len(err.splitlines())) == (2, 1)
-    assert "Did you mean 'decision_ticks'" in err
+    assert "Did you mean 'interface.decision_ticks'" in err
 
 
 def test_words_about_a_file_stay_with_it():

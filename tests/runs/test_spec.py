@@ -96,7 +96,7 @@ def test_what_describes_no_run_is_refused(fields, message):
     ("part", "message"),
     [
         ({"polcy": "crw"}, "Unknown key of a run specification 'polcy'. Did you mean 'policy'"),
-        ({"scenario": {"name": "mine", "are": {}}}, r"Unknown key 'scenario\.are'.* Did you mean 'arena'"),
+        ({"scenario": {"name": "mine", "are": {}}}, r"Unknown key 'scenario\.are'.* Did you mean 'scenario.arena'"),
         ({"scenario": "warehouse_small"}, "Expected scenario to be a table of values by name, got 'warehouse_small'"),
         ({"wrappers": [{"wrapper": "fog"}]}, "Unknown wrapper 'fog'"),
         ({"wrappers": [{"sigma": 1}]}, "Missing key 'wrapper'"),

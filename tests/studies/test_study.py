@@ -169,7 +169,7 @@ def test_nonsense_is_refused(changes, message):
     [
         ([("nois", (0.1,))], "Did you mean 'noise'"),
         ([("horizon_s", (400.0,))], "Unknown axis"),
-        ([("sensor_noise.sigm", (0.1,))], "Did you mean 'sigma'"),
+        ([("sensor_noise.sigm", (0.1,))], "Did you mean 'sensor_noise.sigma'"),
         ([("quirk", ("explore_double_strat",))], "Unknown quirk.* Did you mean 'explore_double_start'"),
         ([("quirk", ("none",)), ("scattered_sites", (True,))], "Expected quirks from one place"),
         ([("noise", ())], "one or more different numbers"),
