@@ -123,7 +123,7 @@ def test_tables_become_dataclasses():
     [
         ([], "Expected box to be a table"),
         ({}, r"Missing key 'box\.parts'\."),
-        ({"parts": [], "lids": 1}, r"Unknown key 'box\.lids'\. Did you mean 'lid'\?"),
+        ({"parts": [], "lids": 1}, r"Unknown key 'box\.lids'\. Did you mean 'box\.lid'\?"),
         ({"parts": [{}]}, r"Missing key 'box\.parts\[0\]\.name'"),
         ({"parts": [[]]}, r"Expected box\.parts\[0\] to be a Part, got \[\]"),
         (
@@ -141,7 +141,7 @@ def test_what_is_wrong_in_a_table_is_named_by_its_path(given, message):
 
 def test_unknown_names_are_refused_with_the_nearest():
     known_keys({"side": 1}, ("side", "top"))
-    with pytest.raises(TypeError, match=r"^Unknown option 'box\.sied'\. Did you mean 'side'\?$"):
+    with pytest.raises(TypeError, match=r"^Unknown option 'box\.sied'\. Did you mean 'box\.side'\?$"):
         known_keys({"top": 1, "sied": 1}, ("side", "top"), "option", prefix="box.")
     with pytest.raises(ConfigError, match=r"^Unknown side 'lefd'\. Did you mean 'left'\? Known: left, right\.$"):
         known_name("side", "lefd", ("left", "right"))

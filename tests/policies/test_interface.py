@@ -163,7 +163,7 @@ def test_wrong_actions_are_refused(choices, actions, reason):
         ({"automatic_gripper": 1}, "True or False"),
         ({"decision_ticks": 0}, ">= 1"),
         ({"frame_decisions": -1}, r"interface\.frame_decisions"),
-        ({"action": "discrete"}, "Did you mean 'actions"),
+        ({"action": "discrete"}, "Did you mean 'interface.actions"),
         ({"without": ("gps",)}, "Unknown slice 'gps'. Known: proximity"),
         ({"without": ("position",), "site_memory": True}, "Expected position and heading for site_memory"),
         ("discrete", "its fields by name"),

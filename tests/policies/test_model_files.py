@@ -148,7 +148,7 @@ def test_a_model_of_the_whole_swarm_sees_all_rows_at_once(tmp_path):
         (
             {"interface": NUMBERED, "note": note() | {"interface": {"decision_tick": 2}}},
             {},
-            "Did you mean 'decision_ticks'",
+            "Did you mean 'interface.decision_ticks'",
         ),
         ({"interface": NUMBERED, "note": note(samples=None)}, {}, "samples to be True or False"),
     ],
