@@ -132,7 +132,7 @@ ABOUT = json.loads(small_network().about.to_json())
         ({"about": np.array("{")}, "description of a network, got '{'"),
         ({"about": np.array(json.dumps(ABOUT | {"activaton": "red"}))}, "Did you mean 'activation'"),
         ({"about": np.array(json.dumps(ABOUT | {"interface": {"actions": "diskrete"}}))}, "Did you mean 'discrete'"),
-        ({"about": np.array(json.dumps(ABOUT | {"interface": {"action": "discrete"}}))}, "Did you mean .interface.actions"),
+        ({"about": np.array(json.dumps(ABOUT | {"interface": {"action": "discrete"}}))}, "mean .interface.actions"),
         ({"about": np.array(json.dumps(ABOUT))}, r"layers that follow on each other, got weights \[\]"),
     ],
 )
