@@ -30,7 +30,7 @@ def test_what_is_written_is_read_back(protocol, file):
     np.testing.assert_array_equal(
         found.performance(protocol.held_out)[:, :, 1], [[13, 14, 15, 16, 17], [14, *range(15, 19)]]
     )
-    assert sum(line.startswith('  "room, ') for line in file.read_text().splitlines()) == 3, "a line per world"
+    assert sum(line.startswith(('  "room, ', '  "worn, ')) for line in file.read_text().splitlines()) == 5, "one each"
 
 
 def put(*path_and_value):
