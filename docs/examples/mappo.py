@@ -46,6 +46,20 @@ class Critic(nn.Module):
         return self.onwards(self.of_robot(torch.hstack([seen, own])) + of_arenas)[:, 0]
 
 
+def advantages_of(rewards, values, following, dones, at_work, gamma, gae_lambda):
+    """Return advantages and values (steps, rows); `following` (rows,) are the values after the last step.
+
+    The value of a robot not at work follows from its next step: no network, and no lambda in the decay.
+    """
+    advantages, values, last = torch.zeros_like(values), values.clone(), torch.zeros_like(following)
+    for step in reversed(range(len(rewards))):
+        target = rewards[step] + gamma * following * (1 - dones[step])
+        following = values[step] = torch.where(at_work[step], values[step], target)
+        decay = gamma * torch.where(at_work[step], gae_lambda, 1.0)
+        last = advantages[step] = target - following + decay * (1 - dones[step]) * last
+    return advantages, values
+
+
 def learn(
     envs,
     scenario,
@@ -69,7 +83,7 @@ def learn(
         seen, states = torch.zeros(n_steps, *obs.shape), torch.zeros(n_steps, *envs.state().shape)
         places = place + n_rows * torch.arange(n_steps)[:, None]  # (steps, rows), in the states of all steps
         at_work = torch.zeros(n_steps, n_rows, dtype=torch.bool)
-        actions, log_probs, values, rewards, dones, advantages = torch.zeros(6, n_steps, n_rows)
+        actions, log_probs, values, rewards, dones = torch.zeros(5, n_steps, n_rows)
         with torch.no_grad():
             for step in range(n_steps):
                 seen[step], states[step], at_work[step] = map(torch.from_numpy, (obs, envs.state(), infos["active"]))
@@ -84,13 +98,7 @@ def learn(
                     reward[truncated] += gamma * critic(*last, place[: len(robots)] * envs.n_robots + robots).numpy()
                 rewards[step], dones[step] = torch.from_numpy(reward), torch.from_numpy(terminated | truncated)
             following = critic(*map(torch.from_numpy, (obs, envs.state())), place)
-            last = torch.zeros(n_rows)
-            for step in reversed(range(n_steps)):
-                target = rewards[step] + gamma * following * (1 - dones[step])
-                # The value of a robot not at work follows from its next step: no network, and no lambda in the decay.
-                following = values[step] = torch.where(at_work[step], values[step], target)
-                decay = gamma * torch.where(at_work[step], gae_lambda, 1.0)
-                last = advantages[step] = target - following + decay * (1 - dones[step]) * last
+            advantages, values = advantages_of(rewards, values, following, dones, at_work, gamma, gae_lambda)
         rollout = [part[at_work] for part in (seen, places, actions, log_probs, advantages, advantages + values)]
         for _ in range(n_epochs):
             for chosen in torch.randperm(len(rollout[0])).split(batch_size):
