@@ -177,6 +177,11 @@ def test_seeds_of_several_methods_look_alike(command, monkeypatch):
         lines = figures[-1].axes[0].lines
         assert [text.get_text() for text in legend.get_texts()] == names
         assert (len(lines), len({(line.get_color(), line.get_marker()) for line in lines})) == (len(folders), looks)
+    Path("a/s1/policy.zip").touch()  # as RecurrentPPO leaves it
+    found = curves(("a/s0", "a/s1"), beside=()).text()
+    assert "\nmean " in found
+    assert "a/s1/policy.zip --name a" in found
+    assert "\nmean " not in curves(("a/s1", "b/s0"), beside=()).text(), "two methods with one plan"
 
 
 @pytest.fixture
